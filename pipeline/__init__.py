@@ -1,0 +1,1 @@
+"""Sling2Sim2Real: from one recording of an elastic band to a slingshot policy."""

@@ -1,0 +1,202 @@
+"""The `sling` command: one small function a subcommand, each calling the library.
+
+Run `sling --help`, or `sling launch --help`. A user's mistake is one line on stderr and exit
+status 1; a command line that cannot be understood is exit status 2.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import math
+import sys
+from pathlib import Path
+from typing import NoReturn
+
+from pipeline import errors
+from pipeline.errors import UserError
+
+DEFAULT_METHOD = "sling2sim2real"
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    arguments = parser().parse_args()
+    errors.run(lambda: execute(arguments))
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Run a subcommand and print its text; whatever a library prints goes to stderr."""
+    with contextlib.redirect_stdout(sys.stderr):
+        text, status = arguments.command(arguments)
+    print(text)
+    return status
+
+
+class Parser(argparse.ArgumentParser):
+    """A command line that cannot be understood is one line too."""
+
+    def error(self, message: str) -> NoReturn:
+        if "--draw: expected one argument" in message:
+            message += ", joined by = because it begins with -: --draw=-0.30,-0.17"
+        self.exit(2, f"error: {message} (see `{self.prog} --help`)\n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The whole command line."""
+    top = Parser(
+        prog="sling", description="From a recording of an elastic band to a slingshot policy."
+    )
+    commands = top.add_subparsers(required=True, metavar="COMMAND")
+
+    def command(function, help: str) -> argparse.ArgumentParser:
+        name = function.__name__.removeprefix("run_").replace("_", "-")
+        sub = commands.add_parser(name, help=help, description=f"{help}.")
+        sub.set_defaults(command=function)
+        return sub
+
+    sub = command(run_add_band, "check a recording and add its band to params.yaml")
+    sub.add_argument("name", help="what to call the band: letters, digits and _")
+    sub.add_argument("--recording", type=Path, required=True, metavar="FILE.mcap")
+    sub.add_argument("--mass", type=positive, required=True, metavar="KG", help="on a scale")
+    sub.add_argument("--diameter", type=positive, default=0.010, metavar="M", help="default 0.010")
+    sub.add_argument(
+        "--rest-length", type=positive, default=0.52, metavar="M", help="between the clamps, 0.52"
+    )
+
+    sub = command(run_check, "say what is in a recording, what is missing, whether it can be used")
+    sub.add_argument("recording", type=Path, metavar="FILE.mcap")
+    sub.add_argument("--json", action="store_true")
+
+    sub = command(run_launch, "simulate one launch with identified or hand-written parameters")
+    sub.add_argument("--theta", type=Path, required=True, metavar="FILE", help="data/theta/...json")
+    sub.add_argument("--band", required=True)
+    sub.add_argument(
+        "--draw", type=draw, required=True, metavar="Y,Z", help="frame O [m]: --draw=-0.30,-0.17"
+    )
+    sub.add_argument("--json", action="store_true")
+
+    sub = command(run_aim, "say where to draw for a target, by the trained policy")
+    sub.add_argument("--band", required=True)
+    sub.add_argument("--method", default=DEFAULT_METHOD, help=f"default {DEFAULT_METHOD}")
+    sub.add_argument("--target", type=positive, required=True, metavar="M", help="along the floor")
+    sub.add_argument("--json", action="store_true")
+
+    sub = command(run_bench, "measure rollouts and launches a second")
+    sub.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
+    sub.add_argument("--json", action="store_true")
+    return top
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    value = number(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"must be above 0, got {text}")
+    return value
+
+
+def number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"must be a number, got {text!r}")
+    return value
+
+
+def draw(text: str) -> tuple[float, float]:
+    """A drawn position (y, z), frame O [m]."""
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise argparse.ArgumentTypeError(f"must be Y,Z such as --draw=-0.30,-0.17, got {text!r}")
+    y, z = map(number, parts)
+    if y >= 0:
+        raise argparse.ArgumentTypeError(f"y must be below 0 (behind the fork), got {y:g}")
+    return y, z
+
+
+def shown(content: dict, as_json: bool) -> tuple[str, int]:
+    """A flat result as one JSON object, or one line an entry, with exit status 0."""
+    if as_json:
+        return json.dumps(content, allow_nan=False), 0
+    width = max(map(len, content))
+    return "\n".join(f"{key:{width}}  {readable(value)}" for key, value in content.items()), 0
+
+
+def readable(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return " ".join(map(readable, value)) or "-"
+    return "-" if value is None else str(value)
+
+
+def run_add_band(arguments: argparse.Namespace) -> tuple[str, int]:
+    from pipeline.recording.add_band import add_band
+
+    add_band(
+        arguments.name,
+        arguments.recording,
+        mass=arguments.mass,
+        diameter=arguments.diameter,
+        rest_length=arguments.rest_length,
+    )
+
+
+def run_check(arguments: argparse.Namespace) -> tuple[str, int]:
+    from pipeline.params import load
+    from pipeline.recording.check import check_recording
+
+    report = check_recording(arguments.recording, load())
+    return (report.to_json() if arguments.json else report.to_text()), 0
+
+
+def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
+    from pipeline.params import load
+    from pipeline.sling.launch import launch
+    from pipeline.sling.model import Sling
+    from pipeline.theta import load_theta, vector
+
+    params = load()
+    if arguments.band not in params.bands:
+        known = ", ".join(params.bands)
+        raise UserError(f"band {arguments.band}: not in params.yaml, which has {known}")
+    theta = vector(load_theta(arguments.theta, arguments.band))
+    sling = Sling.of(params.bands[arguments.band], params.setup, params.sling)
+    result = launch(sling, theta, arguments.draw, max_force=params.setup.max_force)
+    return shown(
+        {
+            "landing_y_m": finite(result.landing_y[0]),
+            "speed_m_s": finite(result.speed[0]),
+            "hold_force_n": finite(result.hold_force[0]),
+            "failure": result.failure[0],
+        },
+        arguments.json,
+    )
+
+
+def run_aim(arguments: argparse.Namespace) -> tuple[str, int]:
+    from pipeline.params import load
+    from pipeline.policy.aim import aim
+
+    return shown(aim(load(), arguments.band, arguments.method, arguments.target), arguments.json)
+
+
+def run_bench(arguments: argparse.Namespace) -> tuple[str, int]:
+    from pipeline.bench import bench
+    from pipeline.params import load
+
+    entries = bench(load(), device=arguments.device)
+    if arguments.json:
+        return json.dumps({"device": arguments.device, "batches": entries}), 0
+    lines = ["  ".join(entries[0])]
+    lines += ["  ".join(f"{value:{len(key)}.0f}" for key, value in e.items()) for e in entries]
+    return "\n".join(lines), 0
+
+
+def finite(value: float) -> float | None:
+    """JSON has no NaN: what is not known is null."""
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,90 @@
+"""Distance between measured point clouds and simulated bands, for a batch of rollouts.
+
+A band is a tube around its centre line. Measured to simulated: each point's distance to the tube's
+surface. Simulated to measured: for points on the ridge of the tube that faces the camera, the
+distance to the nearest measured point; what the camera cannot see counts for nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+LANES = {"cpu": 16, "cuda": 32}
+SAMPLES = 3  # simulated points an edge
+
+
+class Chamfer:
+    """Frame by frame distances of one episode's clouds to simulated centre lines."""
+
+    def __init__(
+        self,
+        clouds: list[np.ndarray],
+        camera: np.ndarray,
+        *,
+        radius: float,
+        rest_length: float,
+        symmetric: bool = True,
+        device: str = "cpu",
+    ) -> None:
+        """Pack the clouds for `device`.
+
+        Args:
+            clouds: Points of each frame [m], K arrays of shape (P, 3); an empty one counts as NaN.
+            camera: Its position [m], shape (3,).
+            radius, rest_length: Of the unstretched band [m]; it thins where it is stretched, as
+                an incompressible body does.
+            symmetric: The mean of both directions; else measured to simulated alone.
+        """
+        self.camera = np.asarray(camera, float)
+        self.radius, self.rest_length = float(radius), float(rest_length)
+        self.symmetric, self.device = symmetric, device
+        self.frames = len(clouds)
+        self._lanes = LANES["cuda" if device.startswith("cuda") else "cpu"]
+        self._packed = _pack(clouds, self._lanes)
+        self._on_device = None
+
+    def __call__(self, center_line: np.ndarray) -> np.ndarray:
+        """Distances [m], shape (N, K), of centre lines [m], shape (N, K, L, 3)."""
+        import warp as wp
+
+        from pipeline.identify.kernel import chamfer_kernel
+
+        count, frames, nodes, _ = center_line.shape
+        if frames != self.frames:
+            raise ValueError(f"{frames} simulated frames, {self.frames} measured")
+        kernel = chamfer_kernel(nodes - 1, SAMPLES, self.symmetric, self._lanes)
+        if self._on_device is None:
+            self._on_device = [wp.array(array, device=self.device) for array in self._packed]
+        line = wp.array(np.ascontiguousarray(center_line, np.float32).ravel(), device=self.device)
+        errors = wp.zeros(count * frames * 2, dtype=wp.float32, device=self.device)
+        threads = 32 if self._lanes == 32 else 1
+        wp.launch(
+            kernel,
+            dim=count * frames * threads,
+            inputs=[
+                line,
+                *self._on_device,
+                frames,
+                self.radius,
+                self.rest_length / (nodes - 1),
+                wp.vec3(*self.camera),
+                errors,
+            ],
+            device=self.device,
+            block_dim=threads,
+        )
+        both = errors.numpy().reshape(count, frames, 2).astype(float)
+        return both.mean(axis=2) if self.symmetric else both[:, :, 0]
+
+
+def _pack(clouds: list[np.ndarray], lanes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Blocks of `lanes` points as rows x, y, z, weight; and where each frame's blocks begin."""
+    blocks, first = [], [0]
+    for cloud in clouds:
+        size = -(-len(cloud) // lanes)
+        rows = np.zeros((size * lanes, 4), np.float32)
+        rows[: len(cloud), :3], rows[: len(cloud), 3] = cloud, 1
+        rows[len(cloud) :, :3] = cloud[:1]  # weighs nothing, and is never nearer than the point
+        blocks.append(rows.reshape(size, lanes, 4).transpose(0, 2, 1).ravel())
+        first.append(first[-1] + size)
+    return np.concatenate([*blocks, np.zeros(0, np.float32)]), np.array(first, np.int32)

@@ -1,0 +1,111 @@
+"""Losses of a batch of parameters: simulate, compare, and say what failed."""
+
+from __future__ import annotations
+
+import os
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.episode import Episode
+from pipeline.identify.loss import TERMS, EpisodeLoss
+from pipeline.identify.space import Space
+from pipeline.sling.interaction import interact
+
+SLICE = {"cpu": 16, "cuda": 2048}  # rollouts a call: the lanes of a CPU vector; what memory holds
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """N evaluated parameter vectors of dimension D.
+
+    Attributes:
+        unit, theta: In the unit cube and physical, shape (N, D).
+        terms: Each loss term, shape (N,); NaN where the rollout failed.
+        total: Weighted sum of the terms, shape (N,); +inf where the rollout failed.
+        failure: None or the reason, length N.
+        seconds: What it took.
+    """
+
+    unit: np.ndarray
+    theta: np.ndarray
+    terms: dict[str, np.ndarray]
+    total: np.ndarray
+    failure: list[str | None]
+    seconds: float = 0.0
+
+
+class Evaluator:
+    """Evaluates points of the unit cube against one episode; results ignore the worker count."""
+
+    def __init__(
+        self,
+        episode: Episode,
+        sling,
+        loss: EpisodeLoss,
+        space: Space,
+        *,
+        device: str = "cpu",
+        workers: int | None = None,
+        simulate=interact,
+    ) -> None:
+        """Keep what every batch needs.
+
+        Args:
+            workers: Threads on the CPU (the kernels release the interpreter); None: all cores.
+            simulate: Called as `simulate(sling, episode, thetas, device=device)`.
+        """
+        self.space, self.loss = space, loss
+        self._simulate = lambda thetas: simulate(sling, episode, thetas, device=device)
+        on_gpu = device.startswith("cuda")
+        self._slice = SLICE["cuda" if on_gpu else "cpu"]
+        self._pool = ThreadPoolExecutor(1 if on_gpu else workers or os.cpu_count())
+        self._compiled = False
+
+    def __call__(self, unit: np.ndarray) -> Evaluation:
+        """Evaluate points of the unit cube, shape (N, D)."""
+        start = time.perf_counter()
+        unit = np.array(unit, float)
+        theta = self.space.to_physical(unit)
+        slices = [theta[i : i + self._slice] for i in range(0, len(theta), self._slice)]
+        parts = []
+        if not self._compiled:  # kernels are compiled and loaded once, not by two threads at a time
+            parts, slices = [self._evaluate(slices[0])], slices[1:]
+            self._compiled = True
+        parts += self._pool.map(self._evaluate, slices)
+        terms = {name: np.concatenate([part[0][name] for part in parts]) for name in TERMS}
+        failure = [reason for part in parts for reason in part[1]]
+        failed = np.array([reason is not None for reason in failure])
+        return Evaluation(
+            unit=unit,
+            theta=theta,
+            terms={name: np.where(failed, np.nan, values) for name, values in terms.items()},
+            total=np.where(failed, np.inf, self.loss.total(terms)),
+            failure=failure,
+            seconds=time.perf_counter() - start,
+        )
+
+    def _evaluate(self, theta: np.ndarray) -> tuple[dict[str, np.ndarray], list[str | None]]:
+        rollouts = self._simulate(theta)
+        with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
+            terms = self.loss.terms(rollouts)
+            finite = np.isfinite(self.loss.total(terms))
+        failure = [
+            reason or (None if good else "the loss is not finite")
+            for reason, good in zip(rollouts.failure, finite, strict=True)
+        ]
+        return terms, failure
+
+
+class Penalty:
+    """What an optimiser is told: a failed point counts twice the worst finite loss so far."""
+
+    def __init__(self) -> None:
+        self.worst = 0.0
+
+    def __call__(self, total: np.ndarray) -> np.ndarray:
+        finite = np.isfinite(total)
+        self.worst = max([self.worst, *total[finite]])
+        return np.where(finite, total, 2 * self.worst if self.worst else 1e6)

@@ -1,0 +1,62 @@
+"""The box of the search: physical parameters to the unit cube and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.sling.model import THETA
+
+
+@dataclass(frozen=True)
+class Space:
+    """A box with axes on linear or logarithmic scales.
+
+    Attributes:
+        names: Of the axes, length D.
+        low, high: Physical bounds, shape (D,).
+        log: Which axes are logarithmic, shape (D,).
+    """
+
+    names: tuple[str, ...]
+    low: np.ndarray
+    high: np.ndarray
+    log: np.ndarray
+
+    @classmethod
+    def of(cls, parameters) -> Space:
+        """Make it from params.yaml's `parameters`, in the simulator's order."""
+        boxes = [getattr(parameters, name) for name in THETA]
+        return cls(
+            names=THETA,
+            low=np.array([box.low for box in boxes], float),
+            high=np.array([box.high for box in boxes], float),
+            log=np.array([box.scale == "log" for box in boxes]),
+        )
+
+    @property
+    def dimension(self) -> int:
+        return len(self.names)
+
+    def to_physical(self, unit: np.ndarray) -> np.ndarray:
+        """Physical values, shape (..., D), of points in the unit cube, shape (..., D)."""
+        unit = np.asarray(unit, float)
+        low, high = self._scaled(self.low), self._scaled(self.high)
+        value = low + unit * (high - low)
+        value = np.where(self.log, np.exp(np.where(self.log, value, 0.0)), value)
+        return np.clip(value, self.low, self.high)  # exp(log(high)) may round above high
+
+    def to_unit(self, theta: np.ndarray) -> np.ndarray:
+        """Points in the unit cube, shape (..., D), of physical values, shape (..., D)."""
+        low, high = self._scaled(self.low), self._scaled(self.high)
+        return (self._scaled(np.asarray(theta, float)) - low) / (high - low)
+
+    def _scaled(self, value: np.ndarray) -> np.ndarray:
+        return np.where(self.log, np.log(np.where(self.log, value, 1.0)), value)
+
+
+def reflect(unit: np.ndarray) -> np.ndarray:
+    """Fold points at the faces of the unit cube until they lie in it; those inside stay."""
+    folded = np.mod(unit, 2.0)
+    return np.where(folded > 1.0, 2.0 - folded, folded)

@@ -1,0 +1,100 @@
+"""Where everything stands: the robot's base, the cameras and the force sensor, by /tf_static or params."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pipeline.errors import UserError
+from pipeline.recording.frames import Transform
+from pipeline.recording.reader import Recording
+
+FORK = "fork"
+TOOLS = ("tcp", "ee", "end_effector")  # words in the name of the frame that a pose is given for
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Static transforms of one recording.
+
+    Attributes:
+        base: Frame of the pose topic to frame O.
+        camera: Depth camera to frame O.
+        color: Depth camera to colour camera.
+        sensor: Force sensor to end effector, or to frame O where `sensor_is_fixed`.
+        sensor_is_fixed: The wrench is given in a frame that does not move with the hand.
+        sources: Where each came from, in words.
+    """
+
+    base: Transform
+    camera: Transform
+    color: Transform
+    sensor: Rotation
+    sensor_is_fixed: bool
+    sources: dict[str, str]
+
+
+def geometry_of(recording: Recording, setup: object) -> Geometry:
+    """Resolve the frames; params come before /tf_static. Raises UserError where one is missing."""
+    tree, sources = recording.transforms, {}
+    pose_frame, wrench_frame = recording.pose.frame, recording.wrench.frame
+    color_frame = recording.color.frame or recording.color_camera.frame
+    depth_frame = recording.depth.frame or recording.depth_camera.frame
+
+    def to_fork(name: str, frame: str, given: tuple[float, ...] | None) -> Transform:
+        if given is not None:
+            sources[name] = f"setup.{name}"
+            return Transform.of(given).inverse()
+        found = tree.between(FORK, frame)
+        if found is None:
+            has = ", ".join(tree.frames) or "nothing"
+            raise UserError(
+                f"{recording.path}: /tf_static does not join {frame!r} to {FORK!r} (it has {has}):"
+                f" publish it, or set setup.{name} in params.yaml"
+            )
+        sources[name] = f"/tf_static {FORK} <- {frame}"
+        return found
+
+    base = to_fork("base_to_fork", pose_frame, setup.base_to_fork)
+    color_to_fork = to_fork("camera_to_fork", color_frame, setup.camera_to_fork)
+    color = _between_cameras(recording, color_frame, depth_frame)
+
+    fixed = tree.between(pose_frame, wrench_frame)
+    if fixed is not None:
+        sensor = base.rotation * fixed.rotation
+        sources["wrench"] = f"fixed frame {wrench_frame}"
+    else:
+        tool = _tool_frame(tree, wrench_frame)
+        sensor = tree.between(tool, wrench_frame).rotation
+        sources["wrench"] = f"{wrench_frame} on {tool}, which the pose topic is taken to move"
+    return Geometry(base, color_to_fork @ color, color, sensor, fixed is not None, sources)
+
+
+def _between_cameras(recording: Recording, color_frame: str, depth_frame: str) -> Transform:
+    """Depth camera to colour camera; identity where the depth is registered to colour."""
+    if color_frame == depth_frame:
+        return Transform.identity()
+    found = recording.transforms.between(color_frame, depth_frame)
+    if found is None:
+        raise UserError(
+            f"{recording.path}: depth is in frame {depth_frame!r}, colour in {color_frame!r}, and"
+            " /tf_static does not join the two: publish it, or record depth registered to colour"
+        )
+    return found
+
+
+def _tool_frame(tree, wrench_frame: str) -> str:
+    """PoseStamped does not say which frame it moves: one named like a tool, else the sensor's root."""
+    rigid = [frame for frame in tree.frames if tree.between(frame, wrench_frame) is not None]
+    named = [frame for frame in rigid if set(frame.lower().split("_")) & set(TOOLS)]
+    roots = [frame for frame in rigid if tree.is_root(frame)]
+    return (named or roots or [wrench_frame])[0]
+
+
+def turned(pose: np.ndarray) -> tuple[Rotation, float]:
+    """Mean orientation of poses (S, 7), and the largest angle from it [rad]."""
+    rotations = Rotation.from_quat(pose[:, 3:])
+    mean = rotations.mean()
+    return mean, float((mean.inv() * rotations).magnitude().max())

@@ -1,0 +1,103 @@
+"""The recorded interaction in the rig's own physics: hang, grasp, lift, pull, pause, slip, swing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline.errors import UserError
+from pipeline.rig.motion import END, GRASP, OPEN, Motion
+from pipeline.rig.string import ElasticString
+from pipeline.rig.world import bent_at
+
+if TYPE_CHECKING:
+    from pipeline.params import Params
+
+CHUNK = 500  # states at a time, for memory
+
+
+@dataclass(frozen=True)
+class Interaction:
+    """What happened, frame O.
+
+    Attributes:
+        force: Of the band on the gripper at the sensor's times [N], shape (T, 3).
+        lines: Nodes of the band at the camera's times [m], shape (K, nodes, 3).
+        slip_time: When the band leaves the fingers [s].
+    """
+
+    force: np.ndarray
+    lines: np.ndarray
+    slip_time: float
+
+
+def hang(string: ElasticString, tolerance: float) -> np.ndarray:
+    """Nodes of the band that hangs from its clamps, shape (nodes, 3)."""
+    reach = np.linalg.norm(string.clamps[1] - string.clamps[0]) / 2
+    depth = np.sqrt(max((string.length / 2) ** 2 - reach**2, 0.0))
+    return string.settled(bent_at(string, np.array([0.0, 0.0, -depth])), tolerance, held=False)
+
+
+def pull_and_release(
+    string: ElasticString,
+    hanging: np.ndarray,
+    motion: Motion,
+    sensor_times: np.ndarray,
+    camera_times: np.ndarray,
+    params: Params,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Interaction:
+    """Follow the band from rest through the motion.
+
+    Args:
+        hanging: Where the band hangs, shape (nodes, 3).
+        sensor_times, camera_times: To report at [s], ascending, between 0 and END.
+
+    Raises:
+        UserError: The pads cannot hold the band.
+    """
+    rig = params.rig
+    holding = 2 * rig.pad_friction * params.setup.grip_force  # two pads
+
+    def pull(time: float) -> np.ndarray:
+        return motion.position(time, 2)
+
+    def margin(time: float, y: np.ndarray) -> float:
+        grip = holding * float(motion.grip(time))
+        return grip - float(np.linalg.norm(string.on_hand(y, pull(time))))
+
+    y = string.state(hanging)
+    y[string.middle, 3:6] = motion.position(GRASP, 1)
+    last = OPEN + motion.opening_time
+    wanted = np.union1d(sensor_times, camera_times)
+    wanted = wanted[(wanted > GRASP) & (wanted < last)]
+    held_times, held = string.integrate(
+        y, np.concatenate([[GRASP], wanted, [last]]), rig.tolerance, pull=pull, event=margin
+    )
+    slip = float(held_times[-1])
+    if slip < OPEN:
+        raise UserError(
+            f"rig.pad_friction: {rig.pad_friction:g} lets the band slip out at {slip:.2f} s,"
+            f" before the fingers open; raise it or setup.grip_force"
+        )
+    progress(f"held from {GRASP:.2f} s, slipped free at {slip:.4f} s")
+
+    force = np.zeros((len(sensor_times), 3))
+    sensed = np.isin(held_times, sensor_times)
+    load = np.concatenate(
+        [
+            string.on_hand(held[i : i + CHUNK], pull(held_times[i : i + CHUNK]))
+            for i in range(0, len(held), CHUNK)
+        ]
+    )
+    force[np.isin(sensor_times, held_times)] = load[sensed]
+
+    after = camera_times[camera_times > slip]
+    free = string.integrate(held[-1], np.concatenate([[slip], after, [END]]), rig.tolerance)[1]
+    lines = np.repeat(hanging[None], len(camera_times), axis=0)
+    lines[np.isin(camera_times, held_times)] = held[np.isin(held_times, camera_times), :, :3]
+    lines[camera_times > slip] = free[1:-1, :, :3]
+    return Interaction(force=force, lines=lines, slip_time=slip)

@@ -1,0 +1,112 @@
+"""Launch trials: the same band drawn, paused and let go with the projectile in a massless pouch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from pipeline.rig.string import GRAVITY, ElasticString
+from pipeline.rig.world import pulled, resting, string_of
+
+if TYPE_CHECKING:
+    from pipeline.params import Params
+
+PATIENCE = 0.5  # s within which the projectile leaves the pouch, if it ever does
+FLIGHT = 20.0  # s, more than any flight takes
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One launch, SI units, frame O; NaN where there is nothing to tell.
+
+    Attributes:
+        landing_y: Where the projectile meets the floor.
+        failure: None, or why there is no landing.
+        hold_force: Of the drawn band on the hand.
+        speed, angle: Of the projectile as it leaves the pouch [m/s, rad above the horizon].
+    """
+
+    landing_y: float
+    failure: str | None
+    hold_force: float
+    speed: float = float("nan")
+    angle: float = float("nan")
+
+
+def launch(
+    band_name: str, params: Params, draw: tuple[float, float], trial_seed: int | None
+) -> Trial:
+    """Launch from the commanded draw (y, z).
+
+    Args:
+        trial_seed: Of the actuation error (`trials.actuation_error`, normal in y and z): equal seeds
+            give every method the same error. None: none.
+    """
+    aim = np.array([0.0, *draw])
+    if trial_seed is not None:
+        rng = np.random.default_rng([params.rig.seed, trial_seed])
+        aim[1:] += rng.normal(0, params.trials.actuation_error, 2)
+    return launch_from(string_of(params, band_name), params, aim)
+
+
+def launch_from(string: ElasticString, params: Params, aim: np.ndarray) -> Trial:
+    """Launch from exactly the draw `aim` (3,)."""
+    tolerance, mass = params.rig.tolerance, params.setup.projectile_mass
+    taut = string.length / 2
+    if np.linalg.norm(aim - string.clamps[0]) <= taut:
+        return Trial(float("nan"), "too short: the drawn band is slack", 0.0)
+    y = drawn_state(string, aim, tolerance)
+    hold_force = float(np.linalg.norm(string.on_hand(y, np.zeros(3))))
+    limit = params.setup.max_force
+    if hold_force > limit:
+        reason = f"holding takes {hold_force:.1f} N, more than {limit:g} N"
+        return Trial(float("nan"), reason, hold_force)
+
+    loaded = replace(string, payload=mass)
+    heading = -aim / np.linalg.norm(aim)
+
+    def push(time: float, y: np.ndarray) -> float:
+        """Force of the pouch on the projectile along the launch [N]."""
+        acceleration = loaded.forces(y)[0][loaded.middle] / loaded.masses[loaded.middle]
+        return float(mass * (acceleration - GRAVITY) @ heading)
+
+    times, states = loaded.integrate(y, np.array([0.0, PATIENCE]), tolerance, event=push)
+    if times[-1] >= PATIENCE:
+        return Trial(float("nan"), "the projectile never left the pouch", hold_force)
+    position, velocity = states[-1, loaded.middle, 1:3], states[-1, loaded.middle, 4:6]
+    floor = -params.setup.fork_height
+    landing = fly(position, velocity, floor, params.rig.projectile_drag / mass)
+    speed, angle = float(np.hypot(*velocity)), float(np.arctan2(velocity[1], velocity[0]))
+    if not landing > 0:
+        reason = "too short: the projectile fell before the fork"
+        return Trial(float("nan"), reason, hold_force, speed, angle)
+    return Trial(landing, None, hold_force, speed, angle)
+
+
+def drawn_state(string: ElasticString, aim: np.ndarray, tolerance: float) -> np.ndarray:
+    """The band at rest, held at `aim` after the pull and the pause of the recording."""
+    stress, memory = pulled(string, aim)[1:]
+    return string.state(resting(string, aim, tolerance), memory[-1] / stress[-1])
+
+
+def fly(position: np.ndarray, velocity: np.ndarray, floor: float, drag: float) -> float:
+    """Where a projectile from `position` (y, z) with `velocity` meets z = floor.
+
+    Args:
+        drag: Deceleration per squared speed [1/m].
+    """
+
+    def rates(time: float, state: np.ndarray) -> np.ndarray:
+        speed = np.hypot(state[2], state[3])
+        return np.concatenate([state[2:], GRAVITY[1:] - drag * speed * state[2:]])
+
+    def height(time: float, state: np.ndarray) -> float:
+        return state[1] - floor
+
+    height.terminal, height.direction = True, -1
+    state = np.concatenate([position, velocity])
+    flight = solve_ivp(rates, (0, FLIGHT), state, events=height, rtol=1e-9, atol=1e-9)
+    return float(flight.y_events[0][0][0])

@@ -1,0 +1,93 @@
+"""What the robot does: a path through waypoints, small tracking errors, fingers that close and open.
+
+Positions are of the tool centre point between the finger tips, in frame O. Each leg is a cubic
+with rest at both ends; smooth wander is added to what is commanded, and the pose reports the sum.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+APPROACH, REACHED, GRASP, LIFTED, PULL, PULLED, OPEN, RETREAT, RETREATED = (
+    *(0.0, 0.8, 1.0, 2.0, 2.0, 6.0, 8.0, 8.3, 9.3),
+)
+END = 10.0
+PULL_LENGTH = 0.40
+APPROACH_LENGTH = 0.10  # m behind the hanging band, where the hand starts
+RETREAT_LENGTH = 0.06
+CLOSING_TIME = 0.1  # the fingers close from REACHED on
+FINGER_OPEN, FINGER_CLOSED = 0.04, 0.008  # of each finger joint
+WANDER_TONES = 6
+WANDER_BAND = 0.1, 1.5  # Hz
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Path of the tool centre point and state of the fingers.
+
+    Attributes:
+        path: Commanded position, a piecewise polynomial.
+        amplitude, frequency, phase: Of the wander, shapes (tones, 3), (tones, 1), (tones, 3).
+        opening_time: From the first motion of the opening fingers until they are open [s].
+    """
+
+    path: CubicHermiteSpline
+    amplitude: np.ndarray
+    frequency: np.ndarray
+    phase: np.ndarray
+    opening_time: float
+
+    @classmethod
+    def through(
+        cls,
+        hanging: np.ndarray,
+        tracking_error: float,
+        opening_time: float,
+        rng: np.random.Generator,
+    ) -> Motion:
+        """Grasp the middle where it hangs (3,), lift it to the tips, pull, let go, retreat.
+
+        Args:
+            tracking_error: Standard deviation of the wander of each axis [m].
+        """
+        back = np.array([0.0, -1.0, 0.0])
+        drawn = PULL_LENGTH * back
+        start = hanging + APPROACH_LENGTH * back
+        end = drawn + RETREAT_LENGTH * back
+        times = [APPROACH, REACHED, GRASP, LIFTED, PULLED, RETREAT, RETREATED, END]
+        points = np.array([start, hanging, hanging, 0 * back, drawn, drawn, end, end])
+        amplitude = rng.normal(size=(WANDER_TONES, 3))
+        amplitude *= tracking_error * np.sqrt(2 / np.sum(amplitude**2, axis=0))
+        return cls(
+            path=CubicHermiteSpline(times, points, np.zeros_like(points)),
+            amplitude=amplitude,
+            frequency=rng.uniform(*WANDER_BAND, (WANDER_TONES, 1)),
+            phase=rng.uniform(0, 2 * np.pi, (WANDER_TONES, 3)),
+            opening_time=max(opening_time, 1e-3),
+        )
+
+    def position(self, time: np.ndarray | float, derivative: int = 0) -> np.ndarray:
+        """Position, velocity or acceleration (derivative 0, 1, 2) at times (...), shape (..., 3)."""
+        rate = 2 * np.pi * self.frequency
+        angle = rate * np.asarray(time)[..., None, None] + self.phase + derivative * np.pi / 2
+        wander = np.sum(self.amplitude * rate**derivative * np.sin(angle), axis=-2)
+        return self.path(time, derivative) + wander
+
+    def grip(self, time: np.ndarray | float) -> np.ndarray:
+        """How firmly the pads press, 1 when closed, 0 when open, while the fingers open."""
+        return np.clip(1 - (np.asarray(time) - OPEN) / self.opening_time, 0.0, 1.0)
+
+    def finger(self, time: np.ndarray) -> np.ndarray:
+        """Position of each finger joint [m]."""
+        closing = np.interp(time, [REACHED, REACHED + CLOSING_TIME], [0.0, 1.0])
+        closed = np.where(np.asarray(time) < OPEN, closing, self.grip(time))
+        return FINGER_OPEN + (FINGER_CLOSED - FINGER_OPEN) * closed
+
+
+def pull_history(step: float) -> np.ndarray:
+    """Drawn distance, 0 to 1, every `step` seconds from the start of the pull to the release."""
+    part = np.clip(np.arange(0, OPEN - PULL + step / 2, step) / (PULLED - PULL), 0, 1)
+    return part**2 * (3 - 2 * part)

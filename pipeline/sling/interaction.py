@@ -1,0 +1,130 @@
+"""The recorded interaction in simulation: hang, grasp, follow the hand, let go, swing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from pipeline.episode import Episode
+from pipeline.sling.model import Sling, hanging_guess, material
+from pipeline.sling.solver import (
+    FAILURE,
+    FREE,
+    HELD,
+    NOT_CONVERGED,
+    OPENING,
+    RELAX,
+    SLIPPED,
+    Schedule,
+    run,
+    steps,
+)
+
+RELAX_STEPS = 40
+GRASP_BLEND = 0.5  # s in which the held node moves from where the band hung to the hand's path
+
+
+@dataclass(frozen=True)
+class Rollouts:
+    """N simulated interactions on the episode's clock, frame O.
+
+    Attributes:
+        times: Ends of the steps [s], shape (S,); irregular.
+        force: Of the band on the gripper [N], shape (N, S, 3).
+        cloud_time: The camera's stamps [s], shape (K,).
+        center_line: Nodes of the band at those stamps [m], shape (N, K, layers, 3), float32.
+        failure: None, or why this rollout counts for nothing, length N.
+    """
+
+    times: np.ndarray
+    force: np.ndarray
+    cloud_time: np.ndarray
+    center_line: np.ndarray
+    failure: list[str | None]
+
+
+def schedule_of(sling: Sling, episode: Episode, refine: int = 1) -> Schedule:
+    """Steps of one episode; the same for every theta.
+
+    The pads' normal force falls to zero over `finger_opening_time`, and is gone at the episode's
+    release time: then the measured force is gone too, whatever the friction.
+    """
+    size = sling.steps
+    clear = episode.release_time
+    opens = clear - sling.finger_opening_time
+    end = max(episode.time[-1], episode.cloud_time[-1]) + 1e-3
+
+    def grid(first: float, last: float, step: float) -> np.ndarray:
+        return np.linspace(first, last, max(int(np.ceil((last - first) / step * refine - 1e-9)), 1) + 1)
+
+    recoil_end = min(clear + size.recoil_time, end)
+    relax = steps(np.arange(RELAX_STEPS + 1) * 0.05, 0.05, hold=FREE, mode=RELAX)
+    relax[:, 11] = episode.grasp_time
+    held = steps(grid(episode.grasp_time, opens, size.grip_step), 1, hold=HELD)
+    opening_times = grid(opens, clear, size.recoil_step)
+    opening = steps(opening_times, held[-1, 0], hold=OPENING, order=2)
+    recoil = steps(
+        grid(clear, recoil_end, size.recoil_step), opening[-1, 0], hold=FREE, order=2
+    )
+    swing = steps(grid(recoil_end, end, size.swing_step), recoil[-1, 0], hold=FREE, order=2)
+    held[:, 9] = sling.grip_force
+    opening[:, 9] = sling.grip_force * (clear - opening[:, 11]) / sling.finger_opening_time
+    table = np.vstack([relax, held, opening, recoil, swing])
+
+    hand = CubicSpline(episode.time, episode.position, axis=0)
+    inside = np.clip(table[:, 11], episode.time[0], episode.time[-1])
+    table[:, 6:9] = hand(inside)
+    part = np.clip((table[:, 11] - episode.grasp_time) / GRASP_BLEND, 0, 1)
+    table[:, 10] = 1 - part**3 * (10 - 15 * part + 6 * part**2)
+    return Schedule(table, first_free=RELAX_STEPS + len(held) + len(opening))
+
+
+def interact(
+    sling: Sling,
+    episode: Episode,
+    thetas: np.ndarray,
+    *,
+    device: str = "cpu",
+    workers: int = 1,
+    refine: int = 1,
+    double: bool = False,
+) -> Rollouts:
+    """Simulate the episode's interaction with physical thetas (N, 5).
+
+    Args:
+        workers: Threads, on the CPU; results do not depend on their number.
+        refine: How many times finer the steps are than `sling` says.
+    """
+    thetas = np.atleast_2d(thetas)
+    schedule = schedule_of(sling, episode, refine)
+    times = schedule.times
+    frame_steps = np.searchsorted(times, episode.cloud_time).clip(RELAX_STEPS - 1, len(times) - 1)
+    before = times[frame_steps] - schedule.table[frame_steps, 0]
+    weights = np.clip((episode.cloud_time - before) / schedule.table[frame_steps, 0], 0, 1)
+    weights[frame_steps < RELAX_STEPS] = 1.0
+    result = run(
+        sling,
+        schedule,
+        material(thetas, sling.radius),
+        hanging_guess(sling),
+        np.zeros((len(thetas), 16)),
+        frame_steps=frame_steps,
+        frame_weights=weights,
+        device=device,
+        workers=workers,
+        double=double,
+    )
+    reasons = {
+        0: None,
+        NOT_CONVERGED: "the simulation did not converge",
+        SLIPPED: "the band slipped out of the fingers",
+    }
+    return Rollouts(
+        times=times[RELAX_STEPS - 1 :],
+        force=result.output[:, RELAX_STEPS - 1 :, :3],
+        cloud_time=episode.cloud_time,
+        center_line=result.frames,
+        failure=[reasons[int(round(code))] for code in result.lane_state[:, FAILURE]],
+    )

@@ -1,0 +1,160 @@
+"""What is simulated: a band clamped at the fork's tips, and the five parameters of its material."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+GRAVITY = 9.81
+THETA = (
+    "youngs_modulus",
+    "poissons_ratio",
+    "elasticity_damping",
+    "dynamic_friction",
+    "damping_scale",
+)
+
+
+@dataclass(frozen=True)
+class Sling:
+    """Geometry and mass of a clamped band, and the resolution it is simulated with.
+
+    Attributes:
+        edges: Even number of edges of the rod; the hand holds the node in the middle.
+        rest_length, radius, mass: Of the band between the clamps [m, m, kg].
+        half_width: Half the distance of the fork's tips [m].
+        fork_height: Of the tips above the floor [m].
+        clamp_direction: Unit vector along which the band leaves both tips, shape (3,).
+        projectile_mass, grip_force, finger_opening_time: As in params.yaml `setup` [kg, N, s].
+        steps: The step sizes, as in params.yaml `sling`.
+    """
+
+    edges: int
+    rest_length: float
+    radius: float
+    mass: float
+    half_width: float
+    fork_height: float
+    clamp_direction: np.ndarray
+    projectile_mass: float
+    grip_force: float
+    finger_opening_time: float
+    steps: object
+
+    @classmethod
+    def of(cls, band, setup, resolution) -> Sling:
+        """Make it from params.yaml's `bands.<band>`, `setup` and `sling`."""
+        direction = np.asarray(setup.clamp_direction, float)
+        return cls(
+            edges=resolution.edges,
+            rest_length=band.rest_length,
+            radius=band.diameter / 2,
+            mass=band.mass,
+            half_width=setup.fork_width / 2,
+            fork_height=setup.fork_height,
+            clamp_direction=direction / np.linalg.norm(direction),
+            projectile_mass=setup.projectile_mass,
+            grip_force=setup.grip_force,
+            finger_opening_time=setup.finger_opening_time,
+            steps=resolution,
+        )
+
+    @property
+    def layers(self) -> int:
+        return self.edges + 1
+
+    @property
+    def middle(self) -> int:
+        return self.edges // 2
+
+    @property
+    def edge_length(self) -> float:
+        return self.rest_length / self.edges
+
+    @property
+    def area(self) -> float:
+        return np.pi * self.radius**2
+
+    @property
+    def tips(self) -> np.ndarray:
+        """Both ends of the band, shape (2, 3)."""
+        return np.array([[-self.half_width, 0.0, 0.0], [self.half_width, 0.0, 0.0]])
+
+
+def material(thetas: np.ndarray, radius: float) -> np.ndarray:
+    """Parameters of rod.h for physical thetas (N, 5): mu, lam, d, s, 2 x friction, cb; shape (N, 6).
+
+    mu is the shear modulus and lam the volume modulus of the stable neo-Hookean law without its
+    logarithm (Smith, de Goes, Kim 2018): first Lame parameter plus mu, so that E and nu are the
+    small-strain ones.
+    """
+    young, poisson, damping, friction, scale = np.asarray(thetas, float).T
+    mu = young / (2 * (1 + poisson))
+    lam = young * poisson / ((1 + poisson) * (1 - 2 * poisson)) + mu
+    bending = (1 + poisson) * radius**2 / 2
+    return np.stack([mu, lam, damping, scale, 2 * friction, bending], axis=1)
+
+
+def _transport(normal: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Carry `normal` along the smallest rotation that takes unit vector `start` to `end`."""
+    axis = np.cross(start, end)
+    cosine = float(start @ end)
+    if cosine < -0.999999:
+        return -normal
+    return normal + np.cross(axis, normal) + np.cross(axis, np.cross(axis, normal)) / (1 + cosine)
+
+
+def clamp_frames(sling: Sling) -> np.ndarray:
+    """Directors a, b in the first and the last clamp, shape (2, 2, 3); a x b points along the band."""
+    tangents = sling.clamp_direction, -sling.clamp_direction
+    normal = np.array([0.0, 1.0, 0.0])
+    frames = []
+    for tangent in tangents:
+        a = normal - (normal @ tangent) * tangent
+        if np.linalg.norm(a) < 1e-6:
+            a = np.array([0.0, 0.0, 1.0])
+        a /= np.linalg.norm(a)
+        frames.append([a, np.cross(tangent, a)])
+    return np.array(frames)
+
+
+def layers_of(sling: Sling, nodes: np.ndarray) -> np.ndarray:
+    """Unknowns (layers, 9) of a band through `nodes` (layers, 3): stretched edges thin evenly."""
+    frames = clamp_frames(sling)
+    tangents = sling.clamp_direction, -sling.clamp_direction
+    state = np.zeros((sling.layers, 9))
+    state[:, :3] = nodes
+    edges = np.diff(nodes, axis=0)
+    for i, edge in enumerate(edges):
+        length = np.linalg.norm(edge)
+        end = 0 if i < sling.middle else 1
+        direction = edge / length
+        thin = (length / sling.edge_length) ** -0.5
+        a = _transport(frames[end, 0], tangents[end], direction)
+        state[i, 3:6] = thin * a
+        state[i, 6:9] = thin * np.cross(direction, a)
+    state[-1, 3:9] = frames[1].ravel()
+    return state
+
+
+def hanging_guess(sling: Sling) -> np.ndarray:
+    """A U below the tips: two legs and a half circle, shape (layers, 9)."""
+    half, length = sling.half_width, sling.rest_length
+    leg = max((length - np.pi * half) / 2, 0.0)
+    arc = np.linspace(0, length, sling.layers)
+    nodes = np.zeros((sling.layers, 3))
+    angle = np.clip((arc - leg) / (length - 2 * leg), 0, 1) * np.pi
+    nodes[:, 0] = -half * np.cos(angle)
+    nodes[:, 2] = -np.minimum(np.minimum(arc, length - arc), leg)
+    nodes[:, 2] -= half * np.sin(angle)
+    return layers_of(sling, nodes)
+
+
+def drawn_guess(sling: Sling, draw: np.ndarray) -> np.ndarray:
+    """Two straight halves from the tips to the draw (y, z), shape (layers, 9)."""
+    middle = np.array([0.0, draw[0], draw[1]])
+    part = np.linspace(0, 1, sling.middle + 1)[:, None]
+    first = sling.tips[0] + part * (middle - sling.tips[0])
+    second = middle + part * (sling.tips[1] - middle)
+    return layers_of(sling, np.vstack([first, second[1:]]))

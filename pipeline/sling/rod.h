@@ -1,0 +1,428 @@
+// The sling as an extensible director rod, stepped implicitly; one text for 16 CPU lanes and one CUDA thread.
+//
+// A layer i holds the node r_i and the directors a_i, b_i of the edge between r_i and r_i+1: 9 unknowns.
+// With g_i = (r_i+1 - r_i) / ds, the deformation gradient of an edge is F = [g a b], J = det F, and
+//
+//   W_edge  = A ds [ mu/2 (|F|^2 - 3) - mu (J - 1) + lam/2 (J - 1)^2 ]        (stable neo-Hookean)
+//   W_joint = mu A / (2 ds) [ cb (|a+ - a-|^2 + |b+ - b-|^2) - 2 (cb - ct) tau^2 ]
+//   tau = (a+.b- - b+.a-)/2 (twist),  ct = R^2/4 (G I_p),  cb = (1 + nu) R^2/2 (E I)
+//
+// where -/+ are the edges on both sides of a node. Viscous stress is d times the rate of the elastic
+// stress, with the shape part scaled by s. In logarithmic rates e_k = k.k'/|k|^2 (k = g, a, b), less
+// their mean, and p = lam (J - 1) - mu, the tangent of W_edge gives the dissipation potential
+//
+//   D_edge  = A ds d/2 [ K J'^2 + s ( sum_k (mu |k|^2 + q) e_k^2 + q sum angle rates^2 ) ],  q = max(-pJ, 0), K = lam - mu/3
+//   D_joint = mu A/(2 ds) d s [ cb (k1'^2 + k2'^2) + 2 ct tau'^2 ]
+//   k1 = (b- + b+)/2 . (a+ x a-),  k2 = (a- + a+)/2 . (b- x b+)               (bends)
+//
+// which no rigid motion changes and no state makes negative. Its coefficients, and the gradient of tau,
+// are taken at the predicted state, so that they are quadratic in the unknowns. A step solves, for all layers at once,
+//
+//   M (x - xh)/(beta h)^2 + dW/dx + dD/dx' = 0,   x' = (x - y)/(beta h),
+//   y = c1 x_n - c2 x_n-1,   xh = y + beta h (c1 v_n - c2 v_n-1) + (beta h)^2 gravity
+//
+// (backward Euler: beta = c1 = 1, c2 = 0; variable-step BDF2 otherwise) by Newton's method on the
+// block-tridiagonal Hessian with a direct LDL' solve; where it is indefinite, its diagonal is shifted.
+//
+// Wants the macros SC (float or double), W (lanes), L (layers = edges + 1), MID (the held layer).
+
+#define N 9
+#define LAYER_WORK (N * N + N * (N + 1) / 2 + N)
+
+#if defined(__CUDA_ARCH__)
+typedef SC real;
+const int block = tid / W, lane = tid % W;
+#define ROW(array, size) (array.data + (size_t)block * (size) * W + lane)
+#define AT(p, i) (p)[(size_t)(i) * W]
+#define SQRT(x) sqrt(x)
+#define ALL(mask) (mask)
+#else
+typedef SC real __attribute__((vector_size(sizeof(SC) * W), aligned(sizeof(SC))));
+const int block = tid;
+#define ROW(array, size) ((real*)array.data + (size_t)block * (size))
+#define AT(p, i) (p)[i]
+auto root = [](real x) -> real { real y; for (int k = 0; k < W; ++k) y[k] = __builtin_sqrt(x[k]); return y; };
+auto every = [](auto mask) -> bool { bool all = true; for (int k = 0; k < W; ++k) all &= (mask[k] != 0); return all; };
+#define SQRT(x) root(x)
+#define ALL(mask) every(mask)
+#endif
+const real zero = real() * (SC)0, one = zero + (SC)1;
+auto maximum = [](real x, real y) -> real { return x > y ? x : y; };
+auto minimum = [](real x, real y) -> real { return x < y ? x : y; };
+auto magnitude = [&](real x) -> real { return x < zero ? -x : x; };
+auto dot = [](const real* x, const real* y) -> real { return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]; };
+auto cross = [](const real* x, const real* y, real* z) {
+  z[0] = x[1] * y[2] - x[2] * y[1]; z[1] = x[2] * y[0] - x[0] * y[2]; z[2] = x[0] * y[1] - x[1] * y[0]; };
+
+const SC ds = geometry.data[0], area = geometry.data[1], radius2 = geometry.data[2];
+const SC node_mass = geometry.data[3], director_mass = geometry.data[4], gravity = geometry.data[5];
+const SC tolerance = geometry.data[6], step_limit = geometry.data[7];
+const int max_iterations = (int)geometry.data[8];
+
+auto X = ROW(state, 6 * L * N), X1 = X + (&AT(X, L * N) - &AT(X, 0)), X2 = X1 + (X1 - X), V1 = X2 + (X1 - X),
+     V2 = V1 + (X1 - X), XP = V2 + (X1 - X);
+auto WORK = ROW(work, L * LAYER_WORK);
+auto PAR = ROW(parameter, 6);
+auto OUT = ROW(output, 4 * steps);
+auto LANE = ROW(lane_state, 16);
+auto FRAME = ROW(frames, 3 * L * n_frames);
+
+const real mu = AT(PAR, 0), lam = AT(PAR, 1), bulk = lam - mu / (SC)3, d = AT(PAR, 2), s = AT(PAR, 3), friction = AT(PAR, 4);
+const real cb = AT(PAR, 5);  // (1 + nu) R^2 / 2
+const SC ct = radius2 / 4;
+const real volume = zero + area * ds;
+const real balance = (SC)3e-2 * node_mass * gravity + (SC)1e-5 * mu * area;  // N
+const SC node_shift = node_mass * (SC)2.5e5;  // the inertia of a 2 ms step
+
+// lane state: 0 attached, 1-3 slip direction, 4 failure, 5 failed step, 6-8 grasp offset,
+// 9 projectile mass carried, 10 leaving time, 11-13 leaving position, 14-15 leaving velocity (y, z)
+real attached = AT(LANE, 0), failure = AT(LANE, 4), payload = AT(LANE, 9);
+
+for (int step = first_step; step < last_step; ++step) {
+  const SC* T = schedule.data + (size_t)step * 12;
+  const SC h = T[0], c1 = T[1], c2 = T[2], bh = T[3] * h;  // beta h
+  const int mode = (int)T[4], hold = (int)T[5];            // mode 0: relax; hold 0: free, 1: held, 2: opening
+  const SC limit = T[9], blend = T[10], time = T[11];
+  const SC ibh = (SC)1 / bh, ibh2 = ibh * ibh;
+
+  // the hand takes hold of the band where it is, and leads it to its own path
+  if (hold == 1) for (int c = 0; c < 3; ++c) {
+    const real first = one - attached;
+    AT(LANE, 6 + c) = first * (AT(X1, MID * N + c) - T[6 + c]) + attached * AT(LANE, 6 + c);
+  }
+  if (hold == 1) attached = one;
+  if (hold == 0) attached = zero;
+
+  // predicted state
+  for (int j = 0; j < L * N; ++j) {
+    const real x1 = AT(X1, j), x = x1 + h * AT(V1, j);
+    AT(XP, j) = x;
+    AT(X, j) = x;
+  }
+  for (int c = 0; c < 3; ++c) {
+    const real target = zero + T[6 + c] + blend * AT(LANE, 6 + c);
+    const int j = MID * N + c;
+    const real x = attached > zero ? target : AT(X, j);
+    AT(X, j) = x; AT(XP, j) = x;
+  }
+  const real freed = one - attached;
+
+  real residual_mid[3], reaction[3], before_mid[3][N], at_mid[6][3], after_mid[3][3], change = zero, settled = failure != zero ? one : zero, shift = zero;
+  for (int c = 0; c < 3; ++c) reaction[c] = zero;
+  int iteration = 0;
+  for (; iteration < max_iterations; ++iteration) {
+    real D[N][N], O[N][N], D1[N][N], r[N], r1[N], eliminated[N], indefinite = zero, imbalance = zero, poison = zero;  // poison is no number as soon as anything is
+    for (int m = 0; m < N; ++m) { r1[m] = eliminated[m] = zero; for (int n = 0; n < N; ++n) D1[m][n] = zero; }
+    for (int i = 0; i < L; ++i) {
+      for (int m = 0; m < N; ++m) {
+        r[m] = r1[m]; r1[m] = zero;
+        for (int n = 0; n < N; ++n) { D[m][n] = D1[m][n]; D1[m][n] = zero; O[m][n] = zero; }
+      }
+      // inertia and gravity
+      for (int m = 0; m < N; ++m) {
+        const int j = i * N + m;
+        const real y = c1 * AT(X1, j) - c2 * AT(X2, j), yv = c1 * AT(V1, j) - c2 * AT(V2, j);
+        real mass = zero + (m < 3 ? node_mass : director_mass);
+        if (i == MID && m < 3) mass = mass + payload;
+        real xh = y + bh * yv;
+        if (m == 2) xh = xh - gravity * bh * bh;
+        const real f = mass * ibh2 * (AT(X, j) - xh);
+        r[m] += f; D[m][m] += mass * ibh2 + shift * (m < 3 ? zero + node_shift : volume * mu);
+        if (i == MID && m < 3) residual_mid[m] += f;
+      }
+      if (i < L - 1) {
+        // ---- edge i: k = 0, 1, 2 are g, a, b; x now, xp predicted, xt rates
+        real x[3][3], xp[3][3], xt[3][3];
+        for (int c = 0; c < 3; ++c) {
+          const int j = i * N + c;
+          for (int k = 0; k < 3; ++k) {
+            const int q = j + 3 * k;
+            real now = AT(X, q), predicted = AT(XP, q), y = c1 * AT(X1, q) - c2 * AT(X2, q);
+            if (k == 0) {
+              const int q1 = q + N;
+              now = (AT(X, q1) - now) / ds; predicted = (AT(XP, q1) - predicted) / ds;
+              y = (c1 * AT(X1, q1) - c2 * AT(X2, q1) - y) / ds;
+            }
+            x[k][c] = now; xp[k][c] = predicted; xt[k][c] = (now - y) * ibh;
+          }
+        }
+        real C[3][3], Cp[3][3], l2[3], q2[3];  // cofactors
+        for (int k = 0; k < 3; ++k) {
+          cross(x[(k + 1) % 3], x[(k + 2) % 3], C[k]); cross(xp[(k + 1) % 3], xp[(k + 2) % 3], Cp[k]);
+          l2[k] = dot(xp[k], xp[k]); q2[k] = dot(x[k], x[k]);
+        }
+        const real J = dot(x[0], C[0]), Jp = dot(xp[0], Cp[0]);
+        const real p = lam * (J - (SC)1) - mu;
+        const real pc = minimum(maximum(p, (SC)-1.5 * mu), (SC)0.25 * mu);
+        const real q = maximum(-(lam * (Jp - (SC)1) - mu) * Jp, zero);
+        const real Jt = dot(Cp[0], xt[0]) + dot(Cp[1], xt[1]) + dot(Cp[2], xt[2]);
+        real e[3], w[3], il2[3];
+        for (int k = 0; k < 3; ++k) { il2[k] = one / maximum(l2[k], zero + (SC)1e-4); e[k] = dot(xp[k], xt[k]) * il2[k]; w[k] = mu * l2[k] + q; }
+        const real mean = (e[0] + e[1] + e[2]) / (SC)3;
+        real t[3]; for (int k = 0; k < 3; ++k) t[k] = w[k] * (e[k] - mean);
+        const real t_mean = (t[0] + t[1] + t[2]) / (SC)3, w_sum = w[0] + w[1] + w[2];
+        real sh[3];  // weight of the rate of k.l, with k = index, l = index + 1
+        for (int k = 0; k < 3; ++k) sh[k] = q * il2[k] * il2[(k + 1) % 3];
+        const real dh = d * ibh, dsh = dh * s;
+
+        real f[3][3];
+        for (int k = 0; k < 3; ++k) {
+          const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+          const real rate1 = sh[k] * (dot(xp[k], xt[k1]) + dot(xp[k1], xt[k]));
+          const real rate2 = sh[k2] * (dot(xp[k], xt[k2]) + dot(xp[k2], xt[k]));
+          for (int c = 0; c < 3; ++c)
+            f[k][c] = volume * (mu * x[k][c] + p * C[k][c] + d * (bulk * Jt * Cp[k][c]
+                      + s * ((t[k] - t_mean) * il2[k] * xp[k][c] + rate1 * xp[k1][c] + rate2 * xp[k2][c])));
+        }
+        for (int c = 0; c < 3; ++c) {
+          const real fg = f[0][c] / ds;
+          r[c] -= fg; r1[c] += fg; r[3 + c] += f[1][c]; r[6 + c] += f[2][c];
+          if (i == MID - 1) residual_mid[c] = fg;
+          if (i == MID) residual_mid[c] -= fg;
+        }
+        // Hessian in (g, a, b), lower blocks k >= l
+        for (int k = 0; k < 3; ++k) for (int l = 0; l <= k; ++l) {
+          real K[3][3];
+          real wd = -(w[k] + w[l]) / (SC)3 + w_sum / (SC)9; if (k == l) wd += w[k];
+          wd = dsh * wd * il2[k] * il2[l];
+          for (int m = 0; m < 3; ++m) for (int n = 0; n < 3; ++n)
+            K[m][n] = lam * C[k][m] * C[l][n] + dh * bulk * Cp[k][m] * Cp[l][n] + wd * xp[k][m] * xp[l][n];
+          if (k == l) {
+            const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+            const real s1 = dsh * sh[k], s2 = dsh * sh[k2];
+            for (int m = 0; m < 3; ++m) {
+              K[m][m] += mu;
+              for (int n = 0; n < 3; ++n) K[m][n] += s1 * xp[k1][m] * xp[k1][n] + s2 * xp[k2][m] * xp[k2][n];
+            }
+          } else {
+            const int o = 3 - k - l;                    // the third column
+            const real sign = (l + 1) % 3 == k ? one : -one;  // d(l x k) by the column order
+            const real sk = dsh * sh[(l + 1) % 3 == k ? l : k];
+            const real z[3] = {sign * pc * x[o][0], sign * pc * x[o][1], sign * pc * x[o][2]};
+            for (int m = 0; m < 3; ++m) for (int n = 0; n < 3; ++n) K[m][n] += sk * xp[l][m] * xp[k][n];
+            K[0][1] -= z[2]; K[0][2] += z[1]; K[1][0] += z[2]; K[1][2] -= z[0]; K[2][0] -= z[1]; K[2][1] += z[0];
+          }
+          for (int m = 0; m < 3; ++m) for (int n = 0; n < 3; ++n) {
+            const real v = volume * K[m][n];
+            if (k == 0) { const real u = v / (ds * ds); D[m][n] += u; D1[m][n] += u; O[m][n] -= u; }
+            else if (l == 0) { const real u = v / ds; D[3 * k + m][n] -= u; O[n][3 * k + m] += u; }
+            else D[3 * k + m][3 * l + n] += v;
+          }
+        }
+        // ---- joints: at node i + 1, and at the first clamp; 0, 1 are a, b of the side before, 2, 3 after
+        for (int end = (i == 0 ? -1 : 0); end < 1; ++end) {
+          real y[4][3], yp[4][3], yt[4][3];
+          for (int v = 0; v < 4; ++v) for (int c = 0; c < 3; ++c) {
+            const int layer = v < 2 ? i + end : i + end + 1, j = layer * N + 3 + 3 * (v % 2) + c;
+            if (layer < 0) { y[v][c] = yp[v][c] = zero + clamp.data[3 * v + c]; yt[v][c] = zero; }
+            else {
+              y[v][c] = AT(X, j); yp[v][c] = AT(XP, j);
+              yt[v][c] = (y[v][c] - (c1 * AT(X1, j) - c2 * AT(X2, j))) * ibh;
+            }
+          }
+          real a[3], b[3], k1[4][3], k2[4][3], tw[4][3];  // gradients of the bends and of the twist
+          for (int c = 0; c < 3; ++c) { a[c] = (SC)0.5 * (yp[0][c] + yp[2][c]); b[c] = (SC)0.5 * (yp[1][c] + yp[3][c]); }
+          cross(b, yp[2], k1[0]); cross(yp[0], b, k1[2]); cross(yp[2], yp[0], k1[1]);
+          cross(yp[3], a, k2[1]); cross(a, yp[1], k2[3]); cross(yp[1], yp[3], k2[0]);
+          for (int c = 0; c < 3; ++c) {
+            k1[1][c] = k1[3][c] = (SC)0.5 * k1[1][c]; k2[0][c] = k2[2][c] = (SC)0.5 * k2[0][c];
+            tw[0][c] = (SC)-0.5 * yp[3][c]; tw[1][c] = (SC)0.5 * yp[2][c];
+            tw[2][c] = (SC)0.5 * yp[1][c]; tw[3][c] = (SC)-0.5 * yp[0][c];
+          }
+          real rate1 = zero, rate2 = zero, rate3 = zero, size = zero;
+          real twist = (SC)-0.5 * (dot(yp[2], yp[1]) - dot(yp[3], yp[0]));  // tau is bilinear: tw.y counts it twice
+          for (int v = 0; v < 4; ++v) {
+            rate1 += dot(k1[v], yt[v]); rate2 += dot(k2[v], yt[v]); rate3 += dot(tw[v], yt[v]);
+            twist += dot(tw[v], y[v]); size += dot(tw[v], tw[v]);
+          }
+          const SC weight = (end < 0 || i == L - 2) ? (SC)2 : (SC)1;  // a clamp is half an edge away
+          const real k = mu * (weight * area / ds), kb = k * cb, kd = kb * d * s, ktd = (SC)2 * k * ct * d * s;
+          const real kt = minimum((SC)2 * (kb - k * ct), (SC)1.9 * kb / maximum(size, zero + (SC)1e-3));
+          const real f1 = kd * rate1, f2 = kd * rate2, f3 = ktd * rate3 - kt * twist;
+          const real h12 = kd * ibh, h3 = ktd * ibh - kt;
+          for (int v = 0; v < 4; ++v) {
+            if (v < 2 && end < 0) continue;
+            for (int c = 0; c < 3; ++c) {
+              const real force = kb * (y[v][c] - y[(v + 2) % 4][c]) + f1 * k1[v][c] + f2 * k2[v][c] + f3 * tw[v][c];
+              const int m = 3 + 3 * (v % 2) + c;
+              const bool here = v < 2 || end < 0;
+              if (here) { r[m] += force; D[m][m] += kb; } else { r1[m] += force; D1[m][m] += kb; O[m][m] -= kb; }
+              for (int u = 0; u <= v; ++u) {
+                if (u < 2 && end < 0) continue;
+                for (int n = 0; n < 3; ++n) {
+                  const real value = h12 * (k1[v][c] * k1[u][n] + k2[v][c] * k2[u][n]) + h3 * tw[v][c] * tw[u][n];
+                  const int m2 = 3 + 3 * (u % 2) + n;
+                  if (here) D[m][m2] += value; else if (u < 2) O[m][m2] += value; else D1[m][m2] += value;
+                }
+              }
+            }
+          }
+        }
+      }
+      // prescribed: the nodes in the clamps, the far clamp's directors, the held node
+      if (i == 0 || i == L - 1) {
+        const int fixed = i == 0 ? 3 : N;
+        for (int m = 0; m < fixed; ++m) {
+          r[m] = eliminated[m] = zero;
+          for (int n = 0; n < N; ++n) { D[m][n] = zero; D[n][m] = zero; O[n][m] = zero; }
+          D[m][m] = one;
+        }
+      }
+      if (i == L - 2) for (int m = 0; m < N; ++m) { r1[m] = zero; for (int n = 0; n < N; ++n) O[m][n] = zero; }
+      if (i == MID) {
+        for (int m = 0; m < 3; ++m) { for (int n = 0; n < 6; ++n) at_mid[n][m] = D[3 + n][m]; for (int n = 0; n < 3; ++n) after_mid[n][m] = O[n][m]; }
+        for (int m = 0; m < 3; ++m) {
+          // pads that slip pull along the slip direction with what friction they have left
+          if (hold == 2) r[m] += freed * limit * friction * AT(LANE, 1 + m);
+          r[m] = r[m] * freed; eliminated[m] = eliminated[m] * freed;
+          for (int n = 0; n < N; ++n) { if (n != m) { D[m][n] = D[m][n] * freed; D[n][m] = D[n][m] * freed; } O[n][m] = O[n][m] * freed; }
+          D[m][m] = D[m][m] * freed + attached;
+        }
+      }
+      if (i == MID - 1) for (int m = 0; m < 3; ++m) for (int n = 0; n < N; ++n) { before_mid[m][n] = O[m][n]; O[m][n] = O[m][n] * freed; }
+
+      for (int m = 0; m < N; ++m) {
+        const real f = r[m] - eliminated[m];
+        imbalance = maximum(imbalance, magnitude(f) / (m < 3 ? (SC)1 : ds)); poison += f * zero;
+      }
+
+      // LDL' of the block, then Schur complement into the next layer
+      real inverse[N];
+      for (int m = 0; m < N; ++m) {
+        for (int n = 0; n < m; ++n) { real v = D[m][n]; for (int k = 0; k < n; ++k) v -= D[m][k] * D[n][k]; D[m][n] = v; }
+        const real whole = magnitude(D[m][m]);
+        real v = D[m][m];
+        for (int n = 0; n < m; ++n) { const real u = D[m][n] * inverse[n]; v -= u * D[m][n]; D[m][n] = u; }
+        indefinite = v > zero ? indefinite : one;
+        inverse[m] = one / (magnitude(v) > (SC)1e-7 * whole ? v : whole);
+        real z = r[m]; for (int k = 0; k < m; ++k) z -= D[m][k] * r[k]; r[m] = z;
+      }
+      if (i < L - 1) {
+        for (int m = 0; m < N; ++m) for (int k = 1; k < N; ++k) { real v = O[m][k]; for (int j = 0; j < k; ++j) v -= D[k][j] * O[m][j]; O[m][k] = v; }
+        for (int m = 0; m < N; ++m) {
+          real row[N], v = r1[m];
+          for (int k = 0; k < N; ++k) { row[k] = O[m][k] * inverse[k]; v -= row[k] * r[k]; }
+          eliminated[m] = v - r1[m]; r1[m] = v;
+          for (int n = 0; n <= m; ++n) { real u = D1[m][n]; for (int k = 0; k < N; ++k) u -= row[k] * O[n][k]; D1[m][n] = u; }
+        }
+      }
+      int at = i * LAYER_WORK;
+      for (int m = 0; m < N; ++m) for (int n = 0; n < N; ++n) AT(WORK, at++) = O[m][n];
+      for (int m = 0; m < N; ++m) { for (int n = 0; n < m; ++n) AT(WORK, at++) = D[m][n]; AT(WORK, at++) = inverse[m]; }
+      for (int m = 0; m < N; ++m) AT(WORK, at++) = r[m];
+    }
+    // back substitution; the change of a layer stays in the work array
+    real dx[N], z[N];
+    change = zero;
+    for (int i = L - 1; i >= 0; --i) {
+      const int o = i * LAYER_WORK, l = o + N * N, v = l + N * (N + 1) / 2;
+      for (int m = 0; m < N; ++m) z[m] = AT(WORK, v + m);
+      for (int m = 0; m < N; ++m) z[m] = z[m] * AT(WORK, l + m * (m + 1) / 2 + m);
+      if (i < L - 1) for (int m = 0; m < N; ++m) {
+        real u = zero;
+        for (int k = 0; k < N; ++k) u += AT(WORK, o + k * N + m) * dx[k];
+        z[m] -= u * AT(WORK, l + m * (m + 1) / 2 + m);
+      }
+      for (int m = N - 1; m >= 0; --m) for (int n = 0; n < m; ++n) z[n] -= AT(WORK, l + m * (m + 1) / 2 + n) * z[m];
+      for (int m = 0; m < N; ++m) {
+        dx[m] = z[m]; AT(WORK, v + m) = z[m];
+        poison += z[m] * zero;
+        change = maximum(change, magnitude(z[m]) * (m < 3 ? (SC)1 : ds));  // a director counts as a turn of its edge
+      }
+    }
+    // lanes that have settled stay as they are, so that a lane never depends on its neighbours
+    change += poison; imbalance += poison;
+    // a step that an indefinite Hessian gives, or that goes far, is not made: the Hessian is shifted
+    const real refused = maximum(change < zero + (SC)5 * step_limit ? zero : one, change < zero + (SC)2 * tolerance ? zero : indefinite);
+    const real enough = tolerance * (shift > zero ? zero + (SC)10 : one);
+    shift = refused > zero ? maximum((SC)4 * shift, zero + (SC)0.25) : (shift < zero + (SC)0.1 ? zero : (SC)0.25 * shift);
+    const real scale = (one - settled) * (one - refused) * minimum(one, step_limit / maximum(change, zero + (SC)1e-12));
+    for (int i = 0; i < L; ++i) {
+      const int v = i * LAYER_WORK + N * N + N * (N + 1) / 2;
+      for (int m = 0; m < N; ++m) { const real u = scale * AT(WORK, v + m); AT(X, i * N + m) -= scale > zero ? u : zero; }
+    }
+    // the held node's reaction after this step, to first order: it has no unknowns of its own
+    for (int m = 0; m < 3; ++m) {
+      const int v = MID * LAYER_WORK + N * N + N * (N + 1) / 2;
+      real u = zero;
+      for (int n = 0; n < N; ++n) u += before_mid[m][n] * AT(WORK, v - LAYER_WORK + n);
+      for (int n = 0; n < 6; ++n) u += at_mid[n][m] * AT(WORK, v + 3 + n);
+      for (int n = 0; n < 3; ++n) u += after_mid[n][m] * AT(WORK, v + LAYER_WORK + n);
+      reaction[m] = settled > zero ? reaction[m] : residual_mid[m] - scale * u;
+    }
+    settled = change < enough ? maximum(settled, one - refused) : settled;
+    settled = imbalance < balance ? one : settled;
+    if (ALL(settled > zero)) break;
+  }
+  // a lane that did not converge, or is no number, has failed for good
+  const real bad = settled > zero ? zero : one;
+  AT(LANE, 5) = failure != zero ? AT(LANE, 5) : zero + (SC)step;
+  failure = failure != zero ? failure : bad;
+
+  // the force of the band on the hand, and whether the pads still hold it
+  real force[3];
+  for (int c = 0; c < 3; ++c) force[c] = -reaction[c];
+  const real pull = SQRT(dot(force, force)), capacity = limit * friction;
+  if (hold == 1) {  // slipping out while the fingers are closed
+    const real slipped = pull > capacity ? one : zero;
+    failure = failure != zero ? failure : (SC)2 * slipped;
+  }
+  if (hold == 2) {
+    for (int c = 0; c < 3; ++c) {
+      force[c] = attached > zero ? force[c] : capacity * AT(LANE, 1 + c);
+      AT(LANE, 1 + c) = attached > zero ? force[c] / maximum(pull, zero + (SC)1e-9) : AT(LANE, 1 + c);
+    }
+    attached = pull > capacity ? zero : attached;
+  }
+  if (hold == 0) for (int c = 0; c < 3; ++c) force[c] = zero;
+  for (int c = 0; c < 3; ++c) AT(OUT, 4 * step + c) = force[c];
+
+  // the projectile leaves at the first pull: contact = m (acceleration + gravity) along the launch direction
+  if (hold == 0 && payload_steps > 0) {
+    real contact = zero, position[3], velocity[3];
+    for (int c = 0; c < 3; ++c) {
+      const int j = MID * N + c;
+      const real y = c1 * AT(X1, j) - c2 * AT(X2, j), yv = c1 * AT(V1, j) - c2 * AT(V2, j);
+      position[c] = AT(X, j); velocity[c] = (position[c] - y) * ibh;
+      contact += payload * ((velocity[c] - yv) * ibh + (c == 2 ? gravity : (SC)0)) * AT(LANE, 1 + c);
+    }
+    AT(OUT, 4 * step + 3) = contact;
+    const real before = step > first_free ? AT(OUT, 4 * step - 1) : contact;
+    real w = before / maximum(before - contact, zero + (SC)1e-9);
+    w = minimum(maximum(w, zero), one);
+    const real leaves = (payload > zero ? one : zero) * (contact > zero ? zero : one);
+    for (int c = 1; c < 3; ++c) {
+      const int j = MID * N + c;
+      AT(LANE, 10 + c) = leaves > zero ? AT(X1, j) + w * (position[c] - AT(X1, j)) : AT(LANE, 10 + c);
+      AT(LANE, 12 + c) = leaves > zero ? AT(V1, j) + w * (velocity[c] - AT(V1, j)) : AT(LANE, 12 + c);
+    }
+    AT(LANE, 10) = leaves > zero ? time - ((SC)1 - w) * h : AT(LANE, 10);
+    payload = leaves > zero ? zero : payload;
+    failure = failure != zero ? failure : -leaves;  // done: -1 marks a finished launch
+  }
+
+  // centre lines at the camera's stamps within this step
+  for (int k = frame_first.data[step]; k < frame_first.data[step + 1]; ++k) {
+    const SC w = frame_weight.data[k];
+    for (int i = 0; i < L; ++i) for (int c = 0; c < 3; ++c) {
+      const int j = i * N + c;
+      AT(FRAME, (k * L + i) * 3 + c) = AT(X1, j) + w * (AT(X, j) - AT(X1, j));
+    }
+  }
+  for (int j = 0; j < L * N; ++j) {
+    const real y = c1 * AT(X1, j) - c2 * AT(X2, j), now = AT(X, j);
+    const real v = mode == 0 ? zero : (now - y) * ibh;
+    AT(X2, j) = mode == 0 ? now : AT(X1, j); AT(X1, j) = now;
+    AT(V2, j) = mode == 0 ? zero : AT(V1, j); AT(V1, j) = v;
+  }
+  AT(OUT, 4 * step + 3) = payload_steps > 0 ? AT(OUT, 4 * step + 3) : zero + (SC)iteration;
+  if (payload_steps > 0 && ALL(failure != zero)) break;
+}
+AT(LANE, 0) = attached; AT(LANE, 4) = failure; AT(LANE, 9) = payload;
+
+#undef N
+#undef LAYER_WORK
+#undef ROW
+#undef AT
+#undef SQRT
+#undef ALL

@@ -1,0 +1,44 @@
+"""θ files: the identified parameters of a band as JSON, or the same written by hand.
+
+{"band": "...", "theta": {"youngs_modulus": ..., ... all five}}  and, where a stage wrote it,
+"method", "loss": {"geom", "force", "work", "total"}, "rollouts", "confidence"
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.errors import UserError
+from pipeline.sling.model import THETA
+
+
+def load_theta(path: Path, band: str) -> dict:
+    """Read and check a θ file. Raises UserError."""
+    path = Path(path)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise UserError(
+            f"{path}: no such file; `dvc repro theta@{band}-<method>` writes data/theta/{band}/"
+        ) from error
+    except (OSError, ValueError) as error:
+        raise UserError(f"{path}: cannot be read as JSON ({error})") from error
+    if not isinstance(content, dict) or content.get("band") != band:
+        raise UserError(f'{path}: must hold an object with "band": "{band}"')
+    theta = content.get("theta")
+    if not isinstance(theta, dict) or set(theta) != set(THETA):
+        raise UserError(f'{path}: "theta" must hold exactly {", ".join(THETA)}')
+    for name, value in theta.items():
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not number or not math.isfinite(value) or value < 0:
+            raise UserError(f"{path}: theta.{name} must be a number of at least 0, got {value!r}")
+    return content
+
+
+def vector(content: dict) -> np.ndarray:
+    """θ in the simulator's order, physical units, shape (5,)."""
+    return np.array([content["theta"][name] for name in THETA], float)

@@ -52,11 +52,11 @@ for (int e = lane; e < EDGES; e += THREADS) {
 }
 SYNC();
 
-// measured to simulated: each point to the surface around its nearest edge
+// measured to simulated: each point to the surface of the union of all edges' tubes
 real total = zero, count = zero;
 for (int b = first; b < last; ++b) {
   const real x = ROW(b, 0), y = ROW(b, 1), z = ROW(b, 2), weight = ROW(b, 3);
-  real nearest = zero + 1e30f, thickness = zero;
+  real nearest = zero + 1e30f;
   for (int e = 0; e < EDGES; ++e) {
     const float* t = tube[e];
     const real dx = x - t[0], dy = y - t[1], dz = z - t[2];
@@ -64,12 +64,10 @@ for (int b = first; b < last; ++b) {
     part = part < 0.0f ? zero : part;
     part = part > 1.0f ? zero + 1.0f : part;
     const real ex = dx - part * t[3], ey = dy - part * t[4], ez = dz - part * t[5];
-    const real square = ex * ex + ey * ey + ez * ez;
-    thickness = square < nearest ? zero + t[9] : thickness;
-    nearest = square < nearest ? square : nearest;
+    const real gap = ROOT(ex * ex + ey * ey + ez * ez) - t[9];
+    nearest = gap < nearest ? gap : nearest;
   }
-  const real gap = ROOT(nearest) - thickness;
-  total += weight * (gap < 0.0f ? -gap : gap);
+  total += weight * (nearest < 0.0f ? -nearest : nearest);
   count += weight;
 }
 const float measured = sum(total) / sum(count);

@@ -1,8 +1,9 @@
 """Distance between measured point clouds and simulated bands, for a batch of rollouts.
 
-A band is a tube around its centre line. Measured to simulated: each point's distance to the tube's
-surface. Simulated to measured: for points on the ridge of the tube that faces the camera, the
-distance to the nearest measured point; what the camera cannot see counts for nothing.
+A band is a tube around its centre line, one piece an edge. Measured to simulated: each point's
+distance to the surface of the nearest piece. Simulated to measured: for points on the ridge of the
+tube that faces the camera, the distance to the nearest measured point; what the camera cannot see
+counts for nothing.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -87,7 +88,7 @@ def load_batch(path: Path) -> Evaluation | None:
                 total=arrays["total"],
                 failure=[str(reason) or None for reason in arrays["failure"]],
             )
-    except (OSError, ValueError, KeyError, EOFError):
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
 
 

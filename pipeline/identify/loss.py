@@ -106,7 +106,7 @@ class EpisodeLoss:
 
         `taut` is NaN where the episode has no frame in the recoil.
         """
-        force = np.einsum("ts,nsc->ntc", self._filter(rollouts.times), rollouts.force)
+        force = self._filter(rollouts.times) @ rollouts.force  # (T, S) @ (N, S, 3)
         gap = self.force - self._smooth(force)  # (N, T, 3)
         power = np.einsum("ntc,tc->nt", gap, self.velocity)
         frames = np.minimum(self.chamfer(rollouts.center_line), self.frame_cap)  # (N, K)

@@ -26,8 +26,11 @@ class Transform:
         return cls(Rotation.identity(), np.zeros(3))
 
     def apply(self, points: np.ndarray) -> np.ndarray:
-        """Points, shape (3,) or (N, 3)."""
-        return np.asarray(points) @ self.rotation.as_matrix().T + self.translation
+        """Points, shape (3,) or (N, 3), in their own precision."""
+        points = np.asarray(points)
+        kind = np.result_type(points, np.float32)
+        matrix, offset = self.rotation.as_matrix().astype(kind), self.translation.astype(kind)
+        return points @ matrix.T + offset
 
     def __matmul__(self, other: Transform) -> Transform:
         """First `other`, then this."""

@@ -107,11 +107,12 @@ class Camera:
     frame: str
 
     def rays(self) -> np.ndarray:
-        """Direction of each pixel with z = 1, shape (H, W, 2)."""
+        """What each pixel looks along, scaled to z = 1, shape (H, W, 3)."""
         u, v = np.meshgrid(np.arange(self.width), np.arange(self.height))
         pixels = np.stack([u, v], axis=-1).reshape(-1, 1, 2).astype(np.float64)
         rays = cv2.undistortPoints(pixels, self.matrix, self.distortion)
-        return rays.reshape(self.height, self.width, 2)
+        rays = cv2.convertPointsToHomogeneous(rays)
+        return rays.reshape(self.height, self.width, 3)
 
     def project(self, points: np.ndarray) -> np.ndarray:
         """Pixels (u, v), shape (N, 2), of points in the camera's frame, shape (N, 3), z > 0."""

@@ -9,16 +9,23 @@ from typing import Protocol
 
 import cv2
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
 from pipeline.errors import UserError
-from pipeline.recording.view import Frame, Scene, View
+from pipeline.recording.view import Frame, Scene, View, length
 
 LEARNING_FRAMES = 80
+BACKGROUND = 0.8  # share of the time that the band may not spend at one pixel
+FAR = 100.0  # m, where the depth is unknown
 BINS = 16  # of each Lab axis
+ENOUGH = 200  # pixels to learn colours from
+TOLD_APART = 0.8  # balanced accuracy from which colours count
 THICKNESS = 1.9  # diameters: what is wider in the picture is no band
-RIDGE = 0.5  # diameters by which the band stands out from what is around it
-TAUT = 1.05  # stretch from which the held band is two straight lines
+LOW_RIDGE = 0.5  # diameters by which the band stands out from what is around it
+HIGH_RIDGE = 3.0  # the same where colours do not help: more than the shapes of a hand do
+OFF_LINES = 3.0  # diameters: the taut band is a straight line, and calibrations are not perfect
 HAND = 0.025  # m around the tool centre point that the fingers take
+FINGER = 0.04  # m: a finger around the pads, where colours do not help
 PALM = (0.30, 0.12)  # m: length and radius of what follows behind the fingers
 
 
@@ -42,125 +49,132 @@ class RidgeMask:
     colours are the arm's. Elsewhere a pixel is the band's if it
     - lies where a band of that length can be, above the floor (which rejects shadows),
     - stands out from its surroundings and is as thin as the band (which rejects the arm),
-    - is nearer than what is always seen there (which rejects the fork),
+    - is nearer than what is usually seen there (which rejects the fork),
     - is not in the hand, and has a colour of the band rather than of the arm.
+    Where the colours do not tell the two apart, more room around the hand is left out instead.
     """
 
     def __init__(self, view: View):
         self.scene = view.scene
         self.focal = float(view.recording.depth_camera.matrix[0, 0])
-        self.noise = 0.0
-        learning = [f for _, f in view.frames(every=max(1, len(view) // LEARNING_FRAMES))]
-        if not learning:
+        frames = [frame for _, frame in view.frames(every=max(1, len(view) // LEARNING_FRAMES))]
+        if not frames:
             raise UserError(f"{view.recording.path}: no camera frame in the window can be decoded")
-        self.background = _background(np.stack([frame.depth for frame in learning]))
-        self.likeness = _likeness(*self._samples(learning))
+        self.background = _background(np.stack([frame.depth for frame in frames]))
+        self.likeness = _likeness(*self._samples(frames))
 
     def mask(self, frame: Frame) -> np.ndarray:
-        found = self._candidates(frame)
-        if self.likeness is not None:
-            found &= self.likeness[_bins(frame.color)] > 0.5
-        return _large_enough(found, self._pixels(frame)[found])
+        scene, colors_tell = self.scene, self.likeness is not None
+        found = self._candidates(frame, LOW_RIDGE if colors_tell else HIGH_RIDGE)
+        rows, columns = np.nonzero(found)
+        points = frame.points[rows, columns]
+        if colors_tell:
+            keep = ~_in_hand(points, scene, frame.time, HAND)
+            keep &= self.likeness[_bins(frame.color[rows, columns])] > 0.5
+        else:
+            room = FINGER + scene.signals.opening_at(frame.time) / 2
+            keep = ~_in_hand(points, scene, frame.time, room)
+        if scene.taut(frame.time):
+            keep &= distance_to_lines(points, scene, frame.time) < OFF_LINES * scene.diameter
+        found[rows[~keep], columns[~keep]] = False
+        return _large_enough(found, self.focal * scene.diameter / frame.depth[found])
 
-    def _candidates(self, frame: Frame) -> np.ndarray:
-        """Thin, new and near pixels outside the hand."""
-        found = frame.near & self._thin(frame)
-        found &= frame.depth < self.background - RIDGE * self.scene.diameter
-        return found & ~_in_hand(frame.points, self.scene, frame.time)
+    def _candidates(self, frame: Frame, ridge: float) -> np.ndarray:
+        """Thin, new and near pixels, shape (H, W).
 
-    def _pixels(self, frame: Frame) -> np.ndarray:
-        """Diameter of a band in pixels at each pixel's depth."""
-        return self.focal * self.scene.diameter / np.maximum(frame.depth, 0.05)
-
-    def _thin(self, frame: Frame) -> np.ndarray:
-        """Pixels nearer than a closing of the depth, which fills whatever is narrower than it."""
-        far = np.where(frame.depth > 0, frame.depth, 1e2).astype(np.float32)
-        width = THICKNESS * self._pixels(frame)
-        sizes = 2 * np.round(width / 2).astype(int) + 1
-        thin = np.zeros(far.shape, bool)
-        for size in np.unique(sizes[frame.near]):
+        They stand out by `ridge` diameters; just before the fork, where no arm fits, by LOW_RIDGE.
+        """
+        before = (self.background - frame.depth) / self.scene.diameter
+        new = frame.near & (before > LOW_RIDGE)
+        if not new.any():
+            return new
+        far = np.where(frame.depth > 0, frame.depth, FAR).astype(np.float32)
+        width = THICKNESS * self.focal * self.scene.diameter / far
+        sizes = 2 * np.round(width / 2).astype(np.int16) + 1
+        ridges = np.where(before < 2 * ridge, min(ridge, LOW_RIDGE), ridge)
+        stands_out = (ridges * self.scene.diameter).astype(np.float32)
+        thin = np.zeros_like(new)
+        for size in np.unique(sizes[new]):
+            # A closing of the depth fills whatever is nearer and narrower than its kernel.
             kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (int(size), int(size)))
             filled = cv2.morphologyEx(far, cv2.MORPH_CLOSE, kernel)
-            thin |= (sizes == size) & (filled - far > RIDGE * self.scene.diameter)
-        return thin
+            thin |= (sizes == size) & (filled - far > stands_out)
+        return new & thin
 
     def _samples(self, frames: list[Frame]) -> tuple[np.ndarray, np.ndarray]:
-        """Lab bins of pixels that are surely the band's, and of others that move."""
+        """Lab bins, shape (3, S), of pixels that are surely the band's, and of others that move."""
+        diameter = self.scene.diameter
         band, other = [], []
         for frame in frames:
-            if not self.scene.holds(frame.time) or self.scene.stretch(frame.time) < TAUT:
+            if not self.scene.taut(frame.time):
                 continue
-            bins = _bins(frame.color)
-            off = _off_lines(frame.points, self.scene, frame.time)
-            moving = frame.near & (frame.depth < self.background - 2 * self.scene.diameter)
-            sure = self._candidates(frame) & (off < 1.5 * self.scene.diameter)
-            rest = moving & (off > 3 * self.scene.diameter)
-            band.append(np.stack([axis[sure] for axis in bins]))
-            other.append(np.stack([axis[rest] for axis in bins]))
-        empty = np.zeros((3, 0), int)
-        return np.hstack(band or [empty]), np.hstack(other or [empty])
+            moving = frame.near & (frame.depth < self.background - 2 * diameter)
+            rest = frame.color[moving][_off(frame, moving, self.scene) > 3 * diameter]
+            thin = self._candidates(frame, HIGH_RIDGE)
+            sure = frame.color[thin][_off(frame, thin, self.scene) < 1.5 * diameter]
+            band.append(np.stack(_bins(sure)))
+            other.append(np.stack(_bins(rest)))
+        empty = np.zeros((3, 0), np.intp)
+        return np.hstack([empty, *band]), np.hstack([empty, *other])
 
 
 def _background(depths: np.ndarray) -> np.ndarray:
-    """What is seen at each pixel behind all that moves: a high percentile over time, (H, W)."""
-    known = np.where(depths > 0, depths, 0)
-    ordered = np.sort(known, axis=0)
-    background = ordered[int(0.9 * (len(ordered) - 1))]
-    return np.where(background > 0, background, np.inf)
+    """What is seen at each pixel behind all that moves, (H, W) from (F, H, W); inf if unknown."""
+    rank = int(BACKGROUND * (len(depths) - 1))
+    return np.partition(np.where(depths > 0, depths, np.inf), rank, axis=0)[rank]
 
 
-def _bins(color: np.ndarray) -> tuple[np.ndarray, ...]:
-    lab = cv2.cvtColor(color, cv2.COLOR_BGR2LAB)
-    return tuple(np.moveaxis(lab // (256 // BINS), -1, 0).astype(np.intp))
+def _bins(colors: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Lab bins of BGR pixels, three arrays (S,) from (S, 3)."""
+    if not len(colors):
+        return (np.zeros(0, np.intp),) * 3
+    lab = cv2.cvtColor(colors[None], cv2.COLOR_BGR2LAB)[0]
+    return tuple((lab // (256 // BINS)).T.astype(np.intp))
 
 
 def _likeness(band: np.ndarray, other: np.ndarray) -> np.ndarray | None:
-    """Share of the band in each colour bin, (B, B, B); None where colours do not tell it apart."""
-    if band.shape[1] < 200 or other.shape[1] < 200:
+    """Share of the band in each Lab bin, (B, B, B); None where colours do not tell it apart."""
+    if min(band.shape[1], other.shape[1]) < ENOUGH:
         return None
     counts = []
     for samples in (band, other):
-        histogram = np.zeros((BINS,) * 3, np.float64)
+        histogram = np.zeros((BINS,) * 3)
         np.add.at(histogram, tuple(samples), 1.0)
-        for axis in range(3):  # neighbours are alike
-            padded = np.pad(histogram, [(1, 1) if a == axis else (0, 0) for a in range(3)], "edge")
-            parts = [np.take(padded, np.arange(BINS) + shift, axis) for shift in range(3)]
-            histogram = 0.25 * parts[0] + 0.5 * parts[1] + 0.25 * parts[2]
+        histogram = gaussian_filter(histogram, 0.7, mode="nearest")  # neighbours are alike
         counts.append(histogram / histogram.sum() + 1e-6)
     share = counts[0] / (counts[0] + counts[1])
-    right = (share[tuple(band)] > 0.5).mean() + (share[tuple(other)] <= 0.5).mean()
-    return share if right / 2 > 0.8 else None
+    right = np.mean(share[tuple(band)] > 0.5) + np.mean(share[tuple(other)] <= 0.5)
+    return share if right / 2 > TOLD_APART else None
 
 
-def _off_lines(points: np.ndarray, scene: Scene, time: float) -> np.ndarray:
-    """Distance of points from the lines tip to hand, without their ends; inf beyond the ends."""
-    hand = scene.signals.hand(time)
-    distances = []
+def _off(frame: Frame, pixels: np.ndarray, scene: Scene) -> np.ndarray:
+    return distance_to_lines(frame.points[pixels], scene, frame.time)
+
+
+def distance_to_lines(points: np.ndarray, scene: Scene, time: float) -> np.ndarray:
+    """Distance of points (S, 3) from the straight lines tip to hand, shape (S,)."""
+    hand, distances = scene.signals.hand(time), []
     for tip in scene.tips:
-        way = hand - tip
-        length = np.linalg.norm(way)
-        along = (points - tip) @ (way / length)
-        off = np.linalg.norm(points - tip - along[..., None] * (way / length), axis=-1)
-        inside = (along > 0.1 * length) & (along < 0.85 * length)
-        distances.append(np.where(inside, off, np.where(off < 0.05, 0.02, np.inf)))
+        way = (hand - tip) / np.linalg.norm(hand - tip)
+        along = np.clip((points - tip) @ way, 0, np.linalg.norm(hand - tip))
+        distances.append(length(points - tip - along[:, None] * way))
     return np.minimum(*distances)
 
 
-def _in_hand(points: np.ndarray, scene: Scene, time: float) -> np.ndarray:
-    """Around the tool centre point, and behind it along the tool's axis."""
+def _in_hand(points: np.ndarray, scene: Scene, time: float, room: float) -> np.ndarray:
+    """Around the tool centre point, and behind it along the tool's axis, shape (S,)."""
     away = points - scene.signals.hand(time)
     behind = -(away @ scene.signals.tool_axis)
-    radius = np.sqrt(np.maximum((away**2).sum(axis=-1) - behind**2, 0))
-    palm = (behind > HAND) & (behind < PALM[0]) & (radius < PALM[1])
-    return palm | ((away**2).sum(axis=-1) < HAND**2)
+    aside = np.sqrt(np.maximum((away**2).sum(axis=-1) - behind**2, 0))
+    palm = (behind > room) & (behind < PALM[0]) & (aside < PALM[1])
+    return palm | (length(away) < room)
 
 
 def _large_enough(found: np.ndarray, diameters: np.ndarray) -> np.ndarray:
     """Without specks: parts smaller than a piece of band as long as it is thick."""
     if not found.any():
         return found
-    least = float(np.median(diameters)) ** 2
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(found.astype(np.uint8), None, None, None, 8)
-    keep = stats[:, cv2.CC_STAT_AREA] >= least
-    keep[0] = False
-    return keep[labels]
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(found.astype(np.uint8), connectivity=8)
+    large = stats[:, cv2.CC_STAT_AREA] >= np.median(diameters) ** 2
+    large[0] = False
+    return large[labels]

@@ -13,8 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from pipeline.errors import UserError
-from pipeline.recording import images
-from pipeline.recording.container import Channel, Container, read_container, sha256
+from pipeline.recording.container import Container, read_container, sha256
 from pipeline.recording.decode import decoder
 from pipeline.recording.frames import Transform, TransformTree
 from pipeline.recording.images import Camera
@@ -103,7 +102,12 @@ class Recording:
 
 def read_recording(path: Path, setup: Setup) -> Recording:
     """Read and check a recording. Raises UserError with one line about what is missing or wrong."""
-    container = read_container(Path(path))
+    return recording_of(read_container(Path(path)), setup)
+
+
+def recording_of(container: Container, setup: Setup) -> Recording:
+    """As `read_recording`, from a file that was read already."""
+    path = container.path
     chosen = choose(container, setup.topics)
     streams = {
         role: _stream(path, chosen[role], read)
@@ -118,7 +122,7 @@ def read_recording(path: Path, setup: Setup) -> Recording:
     }
     _same_clock(path, streams)
     return Recording(
-        path=Path(path),
+        path=path,
         wrench=streams["wrench"],
         pose=streams["pose"],
         gripper=streams.get("gripper"),
@@ -227,6 +231,3 @@ def _readable(decode, payload: bytes) -> list:
         return list(decode(payload).transforms)
     except Exception:  # a damaged message: a transform that is missed is asked for later
         return []
-
-
-__all__ = ["Channel", "Recording", "Stream", "images", "read_recording"]

@@ -54,6 +54,10 @@ class Signals:
         axes = [np.interp(times, self.path_time, axis) for axis in self.path.T]
         return np.stack(axes, axis=-1)
 
+    def opening_at(self, time: float) -> float:
+        """Distance between the fingers [m], 0 where it was not recorded."""
+        return float(np.nan_to_num(np.interp(time, self.time, self.opening)))
+
 
 def signals_of(
     recording: Recording, geometry: Geometry, episode: object, force: object
@@ -123,7 +127,7 @@ def _signals(recording: Recording, geometry: Geometry, episode: object, filter: 
         "flipped": bool(sign < 0),
         "turn": turn,
         "rate": rate,
-        "cutoff": cutoff,
+        "cutoff_hz": cutoff,
         "release_resolution": release.resolution,
         "velocity_window": SMOOTHING,
     }

@@ -15,7 +15,14 @@ from pipeline.recording.signals import Signals
 
 PAIRING = 0.5  # of a frame's period: colour and depth further apart are not one picture
 SPARE = 0.05  # of the length, for the accuracy of what was measured
+TAUT = 1.05  # stretch from which the held band is two straight lines
+UNKNOWN = 1000.0  # m, where the depth is not known
 RECOIL = 0.5  # s after the release in which the band may be longer than when it hangs
+
+
+def length(vectors: np.ndarray) -> np.ndarray:
+    """Euclidean length along the last axis, faster than numpy.linalg.norm on short ones."""
+    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
 
 
 @dataclass(frozen=True)
@@ -67,6 +74,10 @@ class Scene:
         hand = self.signals.hand(time)
         return float(np.linalg.norm(self.tips - hand, axis=1).sum()) / self.rest_length
 
+    def taut(self, time: float) -> bool:
+        """Whether the hand draws the band into two straight lines."""
+        return self.holds(time) and self.stretch(time) > TAUT
+
     def reach(self, time: float) -> float:
         """No point of the band is further from both tips together than this [m]."""
         length = 1.0
@@ -97,7 +108,7 @@ class View:
         self.times = np.array([times[k] for k, _ in self.index])
         self.damaged: set[int] = set()
         self.window = self._window()
-        self.rays = recording.depth_camera.rays()[self.window].astype(np.float32)
+        self.rays = recording.depth_camera.rays()[self.window].astype(np.float32)  # (H, W, 3)
 
     def __len__(self) -> int:
         return len(self.index)
@@ -122,16 +133,14 @@ class View:
             self.damaged.add(number)
             return None
         depth = depth[self.window]
-        seen = np.concatenate([self.rays, np.ones_like(self.rays[..., :1])], axis=-1)
-        seen = seen * np.where(depth > 0, depth, 1e3)[..., None]  # in the depth camera
-        rotation = self.geometry.camera.rotation.as_matrix().astype(np.float32)
-        points = seen @ rotation.T + self.geometry.camera.translation.astype(np.float32)
+        seen = self.rays * np.where(depth > 0, depth, np.float32(UNKNOWN))[..., None]
+        points = self.geometry.camera.apply(seen.reshape(-1, 3)).reshape(seen.shape)
         time = float(self.times[number])
         return Frame(time, self._colors(color, seen), depth, points, self._near(points, time))
 
     def _near(self, points: np.ndarray, time: float) -> np.ndarray:
         left, right = self.scene.tips.astype(np.float32)
-        way = np.linalg.norm(points - left, axis=-1) + np.linalg.norm(points - right, axis=-1)
+        way = length(points - left) + length(points - right)
         above = points[..., 2] > self.scene.floor + 2 * self.scene.diameter
         return (way < self.scene.reach(time)) & above
 

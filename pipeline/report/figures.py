@@ -14,6 +14,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 import pandas as pd  # noqa: E402
+from matplotlib.ticker import LogFormatter  # noqa: E402
 
 from pipeline.episode import Episode  # noqa: E402
 from pipeline.files import replacing  # noqa: E402
@@ -124,7 +125,7 @@ def clouds(path: Path, episode: Episode, replays: dict[str, Replay], diameter: f
 def landings(path: Path, trials: pd.DataFrame, methods: list[str]) -> None:
     """Landings against their prediction; ± 5 % is shaded."""
     with plt.rc_context(STYLE):
-        figure, ax = plt.subplots(figsize=(4.6, 4.4))
+        figure, ax = plt.subplots(figsize=(4.6, 5.2))
         trials = trials[trials.landing_y.notna() & trials.predicted_y.notna()]
         both = trials[["landing_y", "predicted_y"]].to_numpy()
         low, high = (0, 1) if both.size == 0 else (0.95 * both.min(), 1.05 * both.max())
@@ -146,7 +147,7 @@ def landings(path: Path, trials: pd.DataFrame, methods: list[str]) -> None:
         kinds = " and ".join(sorted(set(trials.kind))) or "no"
         ax.set(xlabel=f"{kinds} landing [m]", ylabel="predicted landing [m]")
         ax.set(xlim=(low, high), ylim=(low, high), aspect="equal")
-        ax.legend(loc="upper left", fontsize=7)
+        figure.legend(loc="outside lower center", fontsize=8)
         _save(figure, path)
 
 
@@ -162,7 +163,8 @@ def convergence(path: Path, results: dict[str, Result]) -> None:
             later = np.flatnonzero(result.history.phase.to_numpy() != result.history.phase.iloc[0])
             if later.size:
                 ax.plot(rollouts[later[0]], best[later[0]], "o", ms=5, color=color(number))
-        ax.set(xlabel="rollouts (dot: CMA-ES takes over)", ylabel="best loss so far", yscale="log")
+        ax.set(xlabel="rollouts (dot: CMA-ES takes over)", ylabel="best loss so far")
+        _log_axis(ax)
         ax.legend()
         _save(figure, path)
 
@@ -178,8 +180,8 @@ def training(path: Path, results: dict[str, Result]) -> None:
         ax.set(
             xlabel="PPO iteration (line: the aim of 1 cm)",
             ylabel="mean |landing − target| [cm]",
-            yscale="log",
         )
+        _log_axis(ax)
         ax.legend()
         _save(figure, path)
 
@@ -210,6 +212,7 @@ def landing_map(
         figure, ax = plt.subplots(figsize=(6, 4.6))
         landing = landed.landing_y.reshape(y.shape)
         ax.set_facecolor("0.8")
+        ax.grid(False)
         if np.isfinite(landing).any():
             filled = ax.contourf(y, z, landing, levels=24, cmap="viridis")
             figure.colorbar(filled, label="simulated landing [m] (grey: the launch fails)")
@@ -224,6 +227,13 @@ def landing_map(
         ax.set(xlim=(fine_y[0], fine_y[-1]), ylim=(fine_z[0], fine_z[-1]))
         figure.legend(loc="outside lower center", ncols=2, fontsize=8)
         _save(figure, path)
+
+
+def _log_axis(ax: plt.Axes) -> None:
+    """Logarithmic y axis with plain numbers."""
+    ax.set_yscale("log")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.5, 0.5)))
 
 
 def _save(figure: plt.Figure, path: Path) -> None:

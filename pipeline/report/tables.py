@@ -80,8 +80,8 @@ def landings(results: Results, band: str, kind: str) -> Table | None:
                 kind,
                 *(_spread(errors[target], "std") for target in targets),
                 _spread(total, "pooled_std"),
-                _centimetres(total["std"]),
-                _centimetres(total["bias"], signed=True),
+                _number(100 * total["std"], ".2f"),
+                _number(100 * total["bias"], "+.2f"),
                 f"{total['failed']} of {total['launches']}",
             ]
         )
@@ -212,9 +212,27 @@ def losses(results: Results, params) -> Table:
     return heads, rows
 
 
+def aims(result: Result, targets: np.ndarray, draws: np.ndarray) -> Table:
+    """The policy's draws, shape (N, 2) [m], for targets [m], and what its simulator says."""
+    landed = result.landing_map(draws)
+    heads = ["target [m]", "draw y, z [m]", "predicted [m]", "hold force [N]"]
+    rows = [
+        [f"{target:.3f}", f"{y:.4f}, {z:.4f}", _number(landing, ".3f", reason), f"{force:.1f}"]
+        for target, (y, z), landing, force, reason in zip(
+            targets,
+            draws,
+            landed.landing_y,
+            landed.hold_force,
+            (result.landing_map.reasons[code] for code in landed.failure),
+            strict=True,
+        )
+    ]
+    return heads, rows
+
+
 def policies(results: Results) -> Table:
     """How each policy converged in its own simulator, and how well its map interpolates."""
-    heads = ["band", "method", "converged", "mean error", "largest error", "map error (largest)"]
+    heads = ["band", "method", "converged", "mean error [cm]", "largest", "map error", "largest"]
     rows = []
     for result in each(results):
         training, near = result.card["training"], result.card["landing_map"]["target_range"]
@@ -223,9 +241,11 @@ def policies(results: Results) -> Table:
                 result.band,
                 result.method,
                 "yes" if training["converged"] else "**no**",
-                _centimetres(training["mean_error_m"]),
-                _centimetres(training["max_error_m"]),
-                f"{_centimetres(near['mean_error_m'])} ({_centimetres(near['max_error_m'])})",
+                *(
+                    _number(value and 100 * value, ".2f")
+                    for source in (training, near)
+                    for value in (source["mean_error_m"], source["max_error_m"])
+                ),
             ]
         )
     return heads, rows
@@ -235,7 +255,7 @@ def metrics(results: Results) -> dict:
     """What `dvc metrics show` shows: losses and landing errors by band and method."""
     content: dict = {}
     for result in each(results):
-        entry: dict = {"loss": result.theta.get("loss", {}).get("total")}
+        entry: dict = {"loss": _rounded(result.theta.get("loss", {}).get("total"), 1)}
         entry["policy_error_cm"] = _rounded(result.card["training"]["mean_error_m"], 100)
         for kind, trials in result.trials.groupby("kind", sort=True):
             if kind != "predicted" and trials.target.notna().any():
@@ -263,19 +283,13 @@ def _physical(name: str, value: float) -> str:
 
 
 def _spread(one: dict, deviation: str) -> str:
-    """Mean ± deviation [cm], N/A where every launch failed; partial failures are counted."""
+    """Mean ± deviation in cm, N/A where every launch failed; partial failures are counted."""
     if one["failed"] == one["launches"]:
         return "N/A"
     failed = f" ({one['failed']} failed)" if one["failed"] else ""
     if not np.isfinite(one[deviation]):
-        return f"{100 * one['mean']:.2f} cm{failed}"
-    return f"{100 * one['mean']:.2f} ± {100 * one[deviation]:.2f} cm{failed}"
-
-
-def _centimetres(value: float | None, signed: bool = False) -> str:
-    if value is None or not np.isfinite(value):
-        return "–"
-    return f"{100 * value:{'+' if signed else ''}.2f} cm"
+        return f"{100 * one['mean']:.2f}{failed}"
+    return f"{100 * one['mean']:.2f} ± {100 * one[deviation]:.2f}{failed}"
 
 
 def _share(part: dict) -> str:

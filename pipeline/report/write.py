@@ -43,7 +43,7 @@ def write(params, root: str | Path = ".") -> None:
     for band in params.run.bands:
         _draw_figures(params, results, band, root)
     parts = [INTRODUCTION, _summary(params, results), _identified(params, results)]
-    parts += [_band(params, results, band) for band in params.run.bands]
+    parts += [_band(params, results, band, root) for band in params.run.bands]
     parts += [_policies(params, results), _paper(), _budget(params, results)]
     write_json(folder / "metrics.json", tables.metrics(results))
     write_text(folder / "README.md", "\n".join(parts))
@@ -114,7 +114,7 @@ comparable where their weights differ.
 {markdown(tables.losses(results, params))}"""
 
 
-def _band(params, results: Results, band: str) -> str:
+def _band(params, results: Results, band: str, root: Path) -> str:
     about = params.bands[band]
     text = [
         f"## {band}\n",
@@ -129,12 +129,12 @@ def _band(params, results: Results, band: str) -> str:
     ):
         if table:
             text.append(
-                f"### {title}\n\n{words} Mean ± deviation of |landing − target|; a launch"
-                f" that fails or lands outside y = {tables.TARGET_AREA[0]} –"
-                f" {tables.TARGET_AREA[1]} m is counted as failed and left out of the mean.\n\n"
-                f"{markdown(table)}"
+                f"### {title}\n\n{words} Mean ± deviation of |landing − target| in cm, and the"
+                f" bias, the mean of landing − target. A launch that fails or lands outside"
+                f" y = {tables.TARGET_AREA[0]} – {tables.TARGET_AREA[1]} m is counted as failed and"
+                f" left out of the mean.\n\n{markdown(table)}"
             )
-    text.append(_point_by_point(results, band))
+    text += _point_by_point(results, band)
     if _compared(results, band):
         text.append(f"![predicted and actual landings](figures/{band}-landings.png)\n")
     text.append(
@@ -149,15 +149,17 @@ def _band(params, results: Results, band: str) -> str:
         "### Policy\n\n"
         f"![training](figures/{band}-training.png)\n"
     )
-    for method in results.methods[band]:
-        text.append(
-            f"{method}: where every draw lands in its simulator, and what the policy draws.\n"
-        )
+    targets = np.array(params.trials.targets)
+    for method, result in results.methods[band].items():
+        draws = policy_draws(root / "data" / "policies" / band / method, targets)
+        text.append(f"{method}: its draws for the targets of the trials, in its own simulator:\n")
+        text.append(markdown(tables.aims(result, targets, draws)))
+        text.append("Where each draw of the box lands there, and the policy's path over it:\n")
         text.append(f"![landing map](figures/{band}-{method}-map.png)\n")
     return "\n".join(text)
 
 
-def _point_by_point(results: Results, band: str) -> str:
+def _point_by_point(results: Results, band: str) -> list[str]:
     text = []
     summary = tables.prediction_summary(results, band)
     if summary:
@@ -176,7 +178,7 @@ def _point_by_point(results: Results, band: str) -> str:
                         "No landing of this band has been measured. Launch from these draws and put"
                         f" the landings into `data/trials/measured/{band}.csv` to compare.\n"
                     )
-    return "\n".join(text)
+    return text
 
 
 def _policies(params, results: Results) -> str:
@@ -186,7 +188,8 @@ def _policies(params, results: Results) -> str:
 
 PPO on the launches of each calibrated simulator, targets {low:g} – {high:g} m. Converged: the mean
 error of the deterministic policy over 256 targets is at most 1 cm in its own simulator. Training
-reads landings off a map of simulated launches; the map's own error is in the last column.
+reads landings off a map of simulated launches; the map's own error, within the
+range of targets, is in the last two columns.
 
 {markdown(tables.policies(results))}"""
 
@@ -194,16 +197,16 @@ reads landings off a map of simulated launches; the map's own error is in the la
 def _paper() -> str:
     heads = ["band", "method", *(f"g = {target:g} m" for target in paper.TARGETS), "all targets"]
     rows = [
-        [band, method, *(f"{c[0]:.2f} ± {c[1]:.2f} cm" if c else "N/A" for c in cells)]
+        [band, method, *(f"{c[0]:.2f} ± {c[1]:.2f}" if c else "N/A" for c in cells)]
         for (band, method), cells in paper.LANDING.items()
     ]
     return f"""\
 ## The paper's own numbers
 
-Landing errors that the authors of Sling2Sim2Real measured on their robot, with their bands. They
-are not results of this run: other rubber, another rig, real launches. Their row "without covariance
-and multi-start" averages 7.17 cm by its own cells, a tie with the full method, though 7.83 is
-printed.
+Landing errors [cm] that the authors of Sling2Sim2Real measured on their robot, with their bands.
+They are not results of this run: other rubber, another rig, real launches. Their row "without
+covariance and multi-start" averages 7.17 by its own cells, a tie with the full method, though 7.83
+is printed.
 
 {markdown((heads, rows))}"""
 

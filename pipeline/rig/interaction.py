@@ -38,7 +38,7 @@ def hang(string: ElasticString, tolerance: float) -> np.ndarray:
     """Nodes of the band that hangs from its clamps, shape (nodes, 3)."""
     reach = np.linalg.norm(string.clamps[1] - string.clamps[0]) / 2
     depth = np.sqrt(max((string.length / 2) ** 2 - reach**2, 0.0))
-    return string.settled(bent_at(string, np.array([0.0, 0.0, -depth])), tolerance, held=False)
+    return string.at_rest(bent_at(string, np.array([0.0, 0.0, -depth])), tolerance)[:, :3]
 
 
 def pull_and_release(
@@ -77,6 +77,7 @@ def pull_and_release(
     held_times, held = string.integrate(
         y, np.concatenate([[GRASP], wanted, [last]]), rig.tolerance, pull=pull, event=margin
     )
+    held_times, held = held_times[1:], held[1:]  # the first shows the jolt of the grasp alone
     slip = float(held_times[-1])
     if slip < OPEN:
         raise UserError(

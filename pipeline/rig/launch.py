@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from pipeline.rig.string import GRAVITY, ElasticString
-from pipeline.rig.world import pulled, resting, string_of
+from pipeline.rig.world import bent_at, pulled, string_of
 
 if TYPE_CHECKING:
     from pipeline.params import Params
@@ -58,7 +58,10 @@ def launch_from(string: ElasticString, params: Params, aim: np.ndarray) -> Trial
     taut = string.length / 2
     if np.linalg.norm(aim - string.clamps[0]) <= taut:
         return Trial(float("nan"), "too short: the drawn band is slack", 0.0)
-    y = drawn_state(string, aim, tolerance)
+    _, stress, memory = pulled(string, aim)
+    y = string.at_rest(
+        bent_at(string, aim), tolerance, held=True, memory=memory[-1] / stress[-1]
+    )
     hold_force = float(np.linalg.norm(string.on_hand(y, np.zeros(3))))
     limit = params.setup.max_force
     if hold_force > limit:
@@ -84,12 +87,6 @@ def launch_from(string: ElasticString, params: Params, aim: np.ndarray) -> Trial
         reason = "too short: the projectile fell before the fork"
         return Trial(float("nan"), reason, hold_force, speed, angle)
     return Trial(landing, None, hold_force, speed, angle)
-
-
-def drawn_state(string: ElasticString, aim: np.ndarray, tolerance: float) -> np.ndarray:
-    """The band at rest, held at `aim` after the pull and the pause of the recording."""
-    stress, memory = pulled(string, aim)[1:]
-    return string.state(resting(string, aim, tolerance), memory[-1] / stress[-1])
 
 
 def fly(position: np.ndarray, velocity: np.ndarray, floor: float, drag: float) -> float:

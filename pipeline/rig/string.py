@@ -23,6 +23,7 @@ AIR_DENSITY = 1.2  # kg/m3
 CYLINDER_DRAG = 1.1  # coefficient of a cylinder across the wind
 NUDGE = 1e-7  # of the difference quotients, in m, m/s and MPa
 SETTLING_TIME = 4.0
+FOREVER = 1e9  # s
 GRADING = 0.75  # edges are 1 - GRADING to 1 + GRADING of their mean
 
 
@@ -217,12 +218,28 @@ class ElasticString:
             states = np.vstack([states, solution.y_events[0]])
         return found, states.reshape(-1, *shape)
 
-    def settled(self, x: np.ndarray, tolerance: float, *, held: bool) -> np.ndarray:
-        """Nodes (nodes, 3) where the band comes to rest from x, its middle held or not."""
-        sticky = replace(self, damping=2 * np.sqrt(-GRAVITY[2] / (self.length / 2)))
+    def at_rest(
+        self,
+        x: np.ndarray,
+        tolerance: float,
+        *,
+        held: bool = False,
+        memory: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """The state in which the band comes to rest from nodes x (nodes, 3).
+
+        Args:
+            held: The middle stays where it is.
+            memory: w_k / P of every edge (K,); None: all is relaxed.
+        """
+        rubber = self.rubber
+        excess = 0.0 if memory is None else float(rubber.weights @ (1 - memory))
+        frozen = replace(rubber, relaxation=np.array([[excess, FOREVER]]))
+        sticky = replace(self, rubber=frozen, damping=2 * np.sqrt(-GRAVITY[2] / (self.length / 2)))
         still = (lambda t: np.zeros(3)) if held else None
-        times = np.array([0.0, SETTLING_TIME])
-        return sticky.integrate(sticky.state(x), times, tolerance, pull=still)[1][-1, :, :3]
+        start = sticky.state(x, np.zeros(1))
+        end = sticky.integrate(start, np.array([0.0, SETTLING_TIME]), tolerance, pull=still)[1][-1]
+        return self.state(end[:, :3], memory)
 
     def energy(self, y: np.ndarray) -> float:
         """Motion, height, strain and bending of one state [J]; not what the memories hold."""

@@ -59,7 +59,8 @@ def _string_of(
         unit.stiffness * total[peak]
     )  # of straight halves; the band's turns add a few per cent
     guess = with_scale(hidden.peak_force / (2 * tension))
-    y = guess.state(resting(guess, path[peak], tolerance), memory[peak] / stress[peak])
+    drawn = bent_at(guess, path[peak])
+    y = guess.at_rest(drawn, tolerance, held=True, memory=memory[peak] / stress[peak])
     force = guess.on_hand(y, np.zeros(3))[1]
     return with_scale(guess.rubber.scale * hidden.peak_force / force)
 
@@ -77,11 +78,6 @@ def pulled(string: ElasticString, drawn: np.ndarray) -> tuple[np.ndarray, np.nda
     half = np.linalg.norm(path - string.clamps[0], axis=1)
     stretch = np.maximum(half / (string.length / 2), 1.0)
     return path, nominal_stress(stretch)[0], string.rubber.memory(stretch, HISTORY_STEP)
-
-
-def resting(string: ElasticString, middle: np.ndarray, tolerance: float) -> np.ndarray:
-    """Nodes of the band at rest while it is held at `middle` (3,), shape (nodes, 3)."""
-    return string.settled(bent_at(string, middle), tolerance, held=True)
 
 
 def bent_at(string: ElasticString, middle: np.ndarray) -> np.ndarray:

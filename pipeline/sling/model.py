@@ -25,7 +25,8 @@ class Sling:
         rest_length, radius, mass: Of the band between the clamps [m, m, kg].
         half_width: Half the distance of the fork's tips [m].
         fork_height: Of the tips above the floor [m].
-        clamp_direction: Unit vector along which the band leaves both tips, shape (3,).
+        clamp_direction: Unit vector along which the band leaves the tip at -x, shape (3,); it leaves
+            the other tip along the mirror image.
         projectile_mass, grip_force, finger_opening_time: As in params.yaml `setup` [kg, N, s].
         steps: The step sizes, as in params.yaml `sling`.
     """
@@ -105,12 +106,17 @@ def _transport(normal: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.nda
     return normal + np.cross(axis, normal) + np.cross(axis, np.cross(axis, normal)) / (1 + cosine)
 
 
+def clamp_tangents(sling: Sling) -> np.ndarray:
+    """Unit tangents of the band in the first and the last clamp, shape (2, 3)."""
+    first = sling.clamp_direction
+    return np.array([first, [first[0], -first[1], -first[2]]])
+
+
 def clamp_frames(sling: Sling) -> np.ndarray:
     """Directors a, b in the first and the last clamp, shape (2, 2, 3); a x b points along the band."""
-    tangents = sling.clamp_direction, -sling.clamp_direction
     normal = np.array([0.0, 1.0, 0.0])
     frames = []
-    for tangent in tangents:
+    for tangent in clamp_tangents(sling):
         a = normal - (normal @ tangent) * tangent
         if np.linalg.norm(a) < 1e-6:
             a = np.array([0.0, 0.0, 1.0])
@@ -122,7 +128,7 @@ def clamp_frames(sling: Sling) -> np.ndarray:
 def layers_of(sling: Sling, nodes: np.ndarray) -> np.ndarray:
     """Unknowns (layers, 9) of a band through `nodes` (layers, 3): stretched edges thin evenly."""
     frames = clamp_frames(sling)
-    tangents = sling.clamp_direction, -sling.clamp_direction
+    tangents = clamp_tangents(sling)
     state = np.zeros((sling.layers, 9))
     state[:, :3] = nodes
     edges = np.diff(nodes, axis=0)

@@ -8,15 +8,14 @@
 //   tau = (a+.b- - b+.a-)/2 (twist),  ct = R^2/4 (G I_p),  cb = (1 + nu) R^2/2 (E I)
 //
 // where -/+ are the edges on both sides of a node. Viscous stress is d times the rate of the elastic
-// stress, with the shape part scaled by s. In logarithmic rates e_k = k.k'/|k|^2 (k = g, a, b), less
-// their mean, and p = lam (J - 1) - mu, the tangent of W_edge gives the dissipation potential
+// (nominal) stress: the tangent of W at the predicted state, applied to the rates. Its shape part is
+// scaled by s, the volume part K J'^2 (K = lam - mu/3) is not, and the coefficient p = lam (J - 1) - mu
+// is bounded by mu / max(|g|, |a|, |b|), so that a slack band dissipates too:
 //
-//   D_edge  = A ds d/2 [ K J'^2 + s ( sum_k (mu |k|^2 + q) e_k^2 + q sum angle rates^2 ) ],  q = max(-pJ, 0), K = lam - mu/3
-//   D_joint = mu A/(2 ds) d s [ cb (k1'^2 + k2'^2) + 2 ct tau'^2 ]
-//   k1 = (b- + b+)/2 . (a+ x a-),  k2 = (a- + a+)/2 . (b- x b+)               (bends)
+//   D_edge = A ds d/2 [ K J'^2 + s ( mu |F'|^2 + p d2J(F', F') + mu/3 J'^2 ) ],  D_joint: d s/2 times
+//   the quadratic form of W_joint in the rates.
 //
-// which no rigid motion changes and no state makes negative. Its coefficients, and the gradient of tau,
-// are taken at the predicted state, so that they are quadratic in the unknowns. A step solves, for all layers at once,
+// A step solves, for all layers at once,
 //
 //   M (x - xh)/(beta h)^2 + dW/dx + dD/dx' = 0,   x' = (x - y)/(beta h),
 //   y = c1 x_n - c2 x_n-1,   xh = y + beta h (c1 v_n - c2 v_n-1) + (beta h)^2 gravity
@@ -146,34 +145,32 @@ for (int step = first_step; step < last_step; ++step) {
             x[k][c] = now; xp[k][c] = predicted; xt[k][c] = (now - y) * ibh;
           }
         }
-        real C[3][3], Cp[3][3], l2[3], q2[3];  // cofactors
+        real C[3][3], Cp[3][3], l2[3];  // cofactors, predicted squares
         for (int k = 0; k < 3; ++k) {
           cross(x[(k + 1) % 3], x[(k + 2) % 3], C[k]); cross(xp[(k + 1) % 3], xp[(k + 2) % 3], Cp[k]);
-          l2[k] = dot(xp[k], xp[k]); q2[k] = dot(x[k], x[k]);
+          l2[k] = dot(xp[k], xp[k]);
         }
         const real J = dot(x[0], C[0]), Jp = dot(xp[0], Cp[0]);
         const real p = lam * (J - (SC)1) - mu;
         const real pc = minimum(maximum(p, (SC)-1.5 * mu), (SC)0.25 * mu);
-        const real q = maximum(-(lam * (Jp - (SC)1) - mu) * Jp, zero);
+        // the same coefficient at the predicted state, bounded so that no rate gains energy
+        const real longest = maximum(maximum(l2[0], l2[1]), maximum(l2[2], zero + (SC)1e-6));
+        const real bound = mu / SQRT(longest);
+        const real pv = minimum(maximum(lam * (Jp - (SC)1) - mu, -bound), bound);
         const real Jt = dot(Cp[0], xt[0]) + dot(Cp[1], xt[1]) + dot(Cp[2], xt[2]);
-        real e[3], w[3], il2[3];
-        for (int k = 0; k < 3; ++k) { il2[k] = one / maximum(l2[k], zero + (SC)1e-4); e[k] = dot(xp[k], xt[k]) * il2[k]; w[k] = mu * l2[k] + q; }
-        const real mean = (e[0] + e[1] + e[2]) / (SC)3;
-        real t[3]; for (int k = 0; k < 3; ++k) t[k] = w[k] * (e[k] - mean);
-        const real t_mean = (t[0] + t[1] + t[2]) / (SC)3, w_sum = w[0] + w[1] + w[2];
-        real sh[3];  // weight of the rate of k.l, with k = index, l = index + 1
-        for (int k = 0; k < 3; ++k) sh[k] = q * il2[k] * il2[(k + 1) % 3];
-        const real dh = d * ibh, dsh = dh * s;
-
-        real f[3][3];
+        const real dh = d * ibh, dsh = dh * s, volumetric = bulk + s * mu / (SC)3;
+        real turned[3][3];  // d2J applied to the rates
         for (int k = 0; k < 3; ++k) {
           const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-          const real rate1 = sh[k] * (dot(xp[k], xt[k1]) + dot(xp[k1], xt[k]));
-          const real rate2 = sh[k2] * (dot(xp[k], xt[k2]) + dot(xp[k2], xt[k]));
-          for (int c = 0; c < 3; ++c)
-            f[k][c] = volume * (mu * x[k][c] + p * C[k][c] + d * (bulk * Jt * Cp[k][c]
-                      + s * ((t[k] - t_mean) * il2[k] * xp[k][c] + rate1 * xp[k1][c] + rate2 * xp[k2][c])));
+          real u[3], v[3];
+          cross(xt[k1], xp[k2], u); cross(xp[k1], xt[k2], v);
+          for (int c = 0; c < 3; ++c) turned[k][c] = u[c] + v[c];
         }
+
+        real f[3][3];
+        for (int k = 0; k < 3; ++k) for (int c = 0; c < 3; ++c)
+          f[k][c] = volume * (mu * x[k][c] + p * C[k][c]
+                    + d * (volumetric * Jt * Cp[k][c] + s * (mu * xt[k][c] + pv * turned[k][c])));
         for (int c = 0; c < 3; ++c) {
           const real fg = f[0][c] / ds;
           r[c] -= fg; r1[c] += fg; r[3 + c] += f[1][c]; r[6 + c] += f[2][c];
@@ -183,23 +180,14 @@ for (int step = first_step; step < last_step; ++step) {
         // Hessian in (g, a, b), lower blocks k >= l
         for (int k = 0; k < 3; ++k) for (int l = 0; l <= k; ++l) {
           real K[3][3];
-          real wd = -(w[k] + w[l]) / (SC)3 + w_sum / (SC)9; if (k == l) wd += w[k];
-          wd = dsh * wd * il2[k] * il2[l];
           for (int m = 0; m < 3; ++m) for (int n = 0; n < 3; ++n)
-            K[m][n] = lam * C[k][m] * C[l][n] + dh * bulk * Cp[k][m] * Cp[l][n] + wd * xp[k][m] * xp[l][n];
+            K[m][n] = lam * C[k][m] * C[l][n] + dh * volumetric * Cp[k][m] * Cp[l][n];
           if (k == l) {
-            const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-            const real s1 = dsh * sh[k], s2 = dsh * sh[k2];
-            for (int m = 0; m < 3; ++m) {
-              K[m][m] += mu;
-              for (int n = 0; n < 3; ++n) K[m][n] += s1 * xp[k1][m] * xp[k1][n] + s2 * xp[k2][m] * xp[k2][n];
-            }
+            for (int m = 0; m < 3; ++m) K[m][m] += mu + dsh * mu;
           } else {
-            const int o = 3 - k - l;                    // the third column
-            const real sign = (l + 1) % 3 == k ? one : -one;  // d(l x k) by the column order
-            const real sk = dsh * sh[(l + 1) % 3 == k ? l : k];
-            const real z[3] = {sign * pc * x[o][0], sign * pc * x[o][1], sign * pc * x[o][2]};
-            for (int m = 0; m < 3; ++m) for (int n = 0; n < 3; ++n) K[m][n] += sk * xp[l][m] * xp[k][n];
+            const int o = 3 - k - l;                                  // the third column
+            const real sign = (l + 1) % 3 == k ? one : -one;          // by the order of the columns
+            real z[3]; for (int c = 0; c < 3; ++c) z[c] = sign * (pc * x[o][c] + dsh * pv * xp[o][c]);
             K[0][1] -= z[2]; K[0][2] += z[1]; K[1][0] += z[2]; K[1][2] -= z[0]; K[2][0] -= z[1]; K[2][1] += z[0];
           }
           for (int m = 0; m < 3; ++m) for (int n = 0; n < 3; ++n) {
@@ -220,37 +208,31 @@ for (int step = first_step; step < last_step; ++step) {
               yt[v][c] = (y[v][c] - (c1 * AT(X1, j) - c2 * AT(X2, j))) * ibh;
             }
           }
-          real a[3], b[3], k1[4][3], k2[4][3], tw[4][3];  // gradients of the bends and of the twist
-          for (int c = 0; c < 3; ++c) { a[c] = (SC)0.5 * (yp[0][c] + yp[2][c]); b[c] = (SC)0.5 * (yp[1][c] + yp[3][c]); }
-          cross(b, yp[2], k1[0]); cross(yp[0], b, k1[2]); cross(yp[2], yp[0], k1[1]);
-          cross(yp[3], a, k2[1]); cross(a, yp[1], k2[3]); cross(yp[1], yp[3], k2[0]);
+          real tw[4][3];  // gradient of the twist; tau is bilinear, so that tw.y counts it twice
           for (int c = 0; c < 3; ++c) {
-            k1[1][c] = k1[3][c] = (SC)0.5 * k1[1][c]; k2[0][c] = k2[2][c] = (SC)0.5 * k2[0][c];
             tw[0][c] = (SC)-0.5 * yp[3][c]; tw[1][c] = (SC)0.5 * yp[2][c];
             tw[2][c] = (SC)0.5 * yp[1][c]; tw[3][c] = (SC)-0.5 * yp[0][c];
           }
-          real rate1 = zero, rate2 = zero, rate3 = zero, size = zero;
-          real twist = (SC)-0.5 * (dot(yp[2], yp[1]) - dot(yp[3], yp[0]));  // tau is bilinear: tw.y counts it twice
+          real twist = (SC)-0.5 * (dot(yp[2], yp[1]) - dot(yp[3], yp[0])), size = zero;
           for (int v = 0; v < 4; ++v) {
-            rate1 += dot(k1[v], yt[v]); rate2 += dot(k2[v], yt[v]); rate3 += dot(tw[v], yt[v]);
-            twist += dot(tw[v], y[v]); size += dot(tw[v], tw[v]);
+            twist += dot(tw[v], y[v]) + d * s * dot(tw[v], yt[v]); size += dot(tw[v], tw[v]);
           }
           const SC weight = (end < 0 || i == L - 2) ? (SC)2 : (SC)1;  // a clamp is half an edge away
-          const real k = mu * (weight * area / ds), kb = k * cb, kd = kb * d * s, ktd = (SC)2 * k * ct * d * s;
+          const real k = mu * (weight * area / ds), kb = k * cb;
           const real kt = minimum((SC)2 * (kb - k * ct), (SC)1.9 * kb / maximum(size, zero + (SC)1e-3));
-          const real f1 = kd * rate1, f2 = kd * rate2, f3 = ktd * rate3 - kt * twist;
-          const real h12 = kd * ibh, h3 = ktd * ibh - kt;
+          const real hb = kb * (one + dsh), ht = kt * (one + dsh);
           for (int v = 0; v < 4; ++v) {
             if (v < 2 && end < 0) continue;
             for (int c = 0; c < 3; ++c) {
-              const real force = kb * (y[v][c] - y[(v + 2) % 4][c]) + f1 * k1[v][c] + f2 * k2[v][c] + f3 * tw[v][c];
+              const int w = (v + 2) % 4;
+              const real force = kb * (y[v][c] - y[w][c] + d * s * (yt[v][c] - yt[w][c])) - kt * twist * tw[v][c];
               const int m = 3 + 3 * (v % 2) + c;
               const bool here = v < 2 || end < 0;
-              if (here) { r[m] += force; D[m][m] += kb; } else { r1[m] += force; D1[m][m] += kb; O[m][m] -= kb; }
+              if (here) { r[m] += force; D[m][m] += hb; } else { r1[m] += force; D1[m][m] += hb; O[m][m] -= hb; }
               for (int u = 0; u <= v; ++u) {
                 if (u < 2 && end < 0) continue;
                 for (int n = 0; n < 3; ++n) {
-                  const real value = h12 * (k1[v][c] * k1[u][n] + k2[v][c] * k2[u][n]) + h3 * tw[v][c] * tw[u][n];
+                  const real value = -ht * tw[v][c] * tw[u][n];
                   const int m2 = 3 + 3 * (u % 2) + n;
                   if (here) D[m][m2] += value; else if (u < 2) O[m][m2] += value; else D1[m][m2] += value;
                 }

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from threading import Lock
 
 import numpy as np
 
 from pipeline.sling.model import GRAVITY, Sling, clamp_frames
 
+_compiling = Lock()
 LANES = {"cpu": 16, "cuda": 32}
 NOT_CONVERGED, SLIPPED, LEFT = 1, 2, -1  # lane_state[4] as rod.h sets it
 OFFSET, PAYLOAD, LEAVING, DIRECTION, FAILURE = slice(6, 9), 9, slice(10, 15), slice(1, 4), 4
@@ -110,6 +112,8 @@ def run(
     lanes = LANES[kind] // (2 if double and kind == "cpu" else 1)
     count, dtype = len(parameters), np.float64 if double else np.float32
     kernel = rod_kernel(sling.layers, sling.middle, double, lanes)
+    with _compiling:
+        kernel.module.load(wp.get_device(device))
     table = schedule.table.astype(dtype)
     node_mass = sling.mass / sling.edges
     geometry = np.array(

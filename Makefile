@@ -1,0 +1,26 @@
+# Each target works first on a fresh clone: it sets up .venv where that is missing or out of date.
+.PHONY: setup run test lint validate clean
+.DEFAULT_GOAL := run
+
+setup: .venv/ready
+
+.venv/ready: pyproject.toml constraints.txt tools/setup.sh
+	@bash tools/setup.sh
+
+run: setup            # everything that is stale, by the budget of params.yaml
+	PATH="$(CURDIR)/.venv/bin:$$PATH" dvc repro
+
+test: setup
+	.venv/bin/python -m pytest
+
+lint: setup
+	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
+
+validate: setup       # slow campaigns; their results are committed
+	.venv/bin/pip install --disable-pip-version-check -q -e '.[dev,validation]' -c constraints.txt
+	.venv/bin/python -m pytest -m validation
+
+clean:                # all but data, checkpoints and DVC's cache
+	rm -rf .venv build *.egg-info .hypothesis .pytest_cache .ruff_cache
+	find . -name __pycache__ -not -path './.dvc/*' -prune -exec rm -rf {} +

@@ -1,0 +1,98 @@
+"""One recording to one `Episode`: the whole way from MCAP to signals and clouds in frame O."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.episode import Episode
+from pipeline.recording.cloud import Clouds, clouds_of
+from pipeline.recording.geometry import Geometry, geometry_of
+from pipeline.recording.reader import Recording, read_recording
+from pipeline.recording.signals import Signals, signals_of
+from pipeline.recording.view import Scene, View
+
+
+@dataclass(frozen=True)
+class Processed:
+    """Every step's result, for those who report on a recording."""
+
+    recording: Recording
+    geometry: Geometry
+    signals: Signals
+    scene: Scene
+    clouds: Clouds
+
+
+def process(path: Path, band: object, params: object) -> Processed:
+    """Read, resolve frames, find events, mask. `band` is one of params.bands. Raises UserError."""
+    return process_recording(read_recording(path, params.setup), band, params)
+
+
+def process_recording(recording: Recording, band: object, params: object) -> Processed:
+    """As `process`, from a recording that was read already."""
+    geometry = geometry_of(recording, params.setup)
+    signals = signals_of(recording, geometry, params.episode, params.force)
+    scene = Scene.of(band, params.setup, signals)
+    view = View(recording, geometry, scene, params.episode.duration)
+    return Processed(recording, geometry, signals, scene, clouds_of(view, params.cloud))
+
+
+def build_episode(path: Path, band_name: str, params: object) -> Episode:
+    """The episode of a recording. Raises UserError with one line where it cannot be used."""
+    return episode_of(process(path, params.bands[band_name], params), band_name, params)
+
+
+def episode_of(done: Processed, band_name: str, params: object) -> Episode:
+    signals, clouds, recording = done.signals, done.clouds, done.recording
+    setup, band = params.setup, params.bands[band_name]
+    metadata = {
+        "setup": {
+            "fork_width": setup.fork_width,
+            "fork_height": setup.fork_height,
+            "band": {
+                "mass": band.mass,
+                "diameter": band.diameter,
+                "rest_length": band.rest_length,
+            },
+        },
+        "input": {
+            "sha256": recording.sha256,
+            "start_ns": signals.origin,
+            "topics": {role: stream.topic for role, stream in recording.streams.items()},
+            "frames": done.geometry.sources,
+            "delays": {role: stream.delay for role, stream in recording.streams.items()},
+            "lost": {role: stream.lost for role, stream in recording.streams.items()},
+            "missing": {role: stream.missing for role, stream in recording.streams.items()},
+            "losses": recording.losses,
+        },
+        "preprocessing": {
+            **signals.facts,
+            "cutoff": params.force.cutoff,
+            "cutoff_unit": params.force.cutoff_unit,
+            "mask": params.cloud.mask,
+            "mask_colors": clouds.color_counts,
+            "points": params.cloud.points,
+            "statistical_neighbors": params.cloud.statistical_neighbors,
+            "statistical_ratio": params.cloud.statistical_ratio,
+            "radius": params.cloud.radius,
+            "radius_neighbors": params.cloud.radius_neighbors,
+            "empty_clouds": clouds.empty,
+            "damaged_frames": clouds.damaged,
+            "unpaired_frames": clouds.unpaired,
+        },
+    }
+    return Episode(
+        band=band_name,
+        time=signals.time,
+        position=signals.position,
+        velocity=signals.velocity,
+        force=signals.force,
+        opening=signals.opening,
+        cloud_time=clouds.time,
+        clouds=clouds.points,
+        grasp_time=signals.grasp_time,
+        release_time=signals.release_time,
+        camera=done.geometry.camera.translation,
+        metadata=metadata,
+    )

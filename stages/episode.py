@@ -1,0 +1,30 @@
+"""Turn one band's recording into its episode: signals and clouds on one clock, in frame O.
+
+    python -m stages.episode band1
+
+Reads data/raw/<band>.mcap; writes data/episodes/<band>/: signals.parquet and clouds.parquet.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from pipeline import errors
+from pipeline.params import load
+from pipeline.recording.build import build_episode
+
+
+def main() -> None:
+    (band,) = sys.argv[1:]
+    episode = build_episode(Path("data/raw", f"{band}.mcap"), band, load())
+    episode.save(Path("data/episodes", band))
+    force = episode.metadata["preprocessing"]["peak_force"]
+    print(
+        f"{band}: grasp {episode.grasp_time:.3f} s, release {episode.release_time:.4f} s,"
+        f" peak force {force:.2f} N, {len(episode.clouds)} clouds"
+    )
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -1,0 +1,21 @@
+"""Write reports/README.md, its pictures and metrics from everything that params.run names.
+
+    python -m stages.report
+
+Fails, and says which stage is missing, where an expected input is not there.
+"""
+
+from __future__ import annotations
+
+from pipeline import errors
+from pipeline.params import load
+from pipeline.report.write import write
+
+
+def main() -> None:
+    write(load())
+    print("wrote reports/README.md")
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -1,0 +1,74 @@
+"""Notes what a stage reads of params.yaml; Python runs this first where it lies on PYTHONPATH.
+
+tests/test_pipeline.py compares the notes, `$AUDIT/<stage>.json`, with dvc.yaml's `params:`.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+read: set[str] = set()
+
+
+class Section:
+    """A stand-in for a section of the parameters that notes each leaf as it is read."""
+
+    def __init__(self, section: object, path: str = "") -> None:
+        self._section, self._path = section, path
+
+    def __getattr__(self, name: str) -> object:
+        if name == "model_dump_json":  # a checkpoint's fingerprint: no result depends on it
+            return self._section.model_dump_json
+        if name not in type(self._section).model_fields:  # another method may read everything
+            read.add(self._path)
+            return getattr(self._section, name)
+        return noted(getattr(self._section, name), f"{self._path}.{name}".lstrip("."))
+
+    def __iter__(self) -> Iterator[tuple[str, object]]:
+        return ((name, getattr(self, name)) for name in type(self._section).model_fields)
+
+
+class Entries(Mapping):
+    """The same for a mapping by names, such as `bands`."""
+
+    def __init__(self, entries: dict, path: str) -> None:
+        self._entries, self._path = entries, path
+
+    def __getitem__(self, name: str) -> object:
+        return noted(self._entries[name], f"{self._path}.{name}")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+
+def noted(value: object, path: str) -> object:
+    if isinstance(value, dict):
+        return Entries(value, path)
+    if hasattr(type(value), "model_fields"):
+        return Section(value, path)
+    read.add(path)
+    return value
+
+
+def install() -> None:
+    module, *arguments = sys.orig_argv[2:]
+    stage = module.removeprefix("stages.") + ("@" if arguments else "") + "-".join(arguments)
+    sys.path.insert(0, os.getcwd())
+    from pipeline import params
+
+    load = params.load
+    params.load = lambda *path: Section(load(*path))
+    file = Path(os.environ["AUDIT"], f"{stage}.json")
+    atexit.register(lambda: file.write_text(json.dumps(sorted(read))))
+
+
+if sys.orig_argv[1:2] == ["-m"] and sys.orig_argv[2].startswith("stages."):
+    install()

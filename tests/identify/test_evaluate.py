@@ -1,0 +1,98 @@
+"""Batches of parameters: slicing, workers, failures."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.errors import UserError
+from pipeline.identify import session
+from pipeline.identify.evaluate import Evaluator, Penalty
+from pipeline.identify.loss import TERMS, EpisodeLoss
+from pipeline.identify.space import Space
+from tests.identify import toy
+
+EPISODE = toy.episode()
+SPACE = Space(
+    ("offset", "pull"), np.array([0.0, 0.1]), np.array([0.01, 10]), np.array([0, 1], bool)
+)
+
+
+def simulate(sling, episode, thetas, device):
+    """A band `offset` away and a force `pull`; beyond 8 mm it fails, beyond 9 N it is NaN."""
+    assert (sling, episode, device) == (toy.SLING, EPISODE, "cpu")
+    offset, pull = thetas.T
+    result = toy.rollouts(episode, count=len(thetas))
+    result.center_line[..., 2] -= offset[:, None, None].astype(np.float32)
+    result.force[..., 0] = np.where(pull > 9, np.nan, pull)[:, None]
+    result.failure = ["too far" if far else None for far in offset > 0.008]
+    return result
+
+
+def evaluator(workers: int) -> Evaluator:
+    loss = EpisodeLoss(
+        EPISODE,
+        radius=toy.RADIUS,
+        rest_length=toy.LENGTH,
+        weights={"geom": 1.0, "force": 0.5, "work": 1.0, "taut": 0.0},
+        cutoff=toy.CUTOFF,
+    )
+    return Evaluator(EPISODE, toy.SLING, loss, SPACE, workers=workers, simulate=simulate)
+
+
+def test_losses_of_a_batch() -> None:
+    """Physical values in, weighted sum out; the unit cube is what was asked."""
+    unit = np.array([[0.5, 0.5], [0.0, 0.0]])
+    found = evaluator(1)(unit)
+    np.testing.assert_array_equal(found.unit, unit)
+    np.testing.assert_allclose(found.theta, [[0.005, 1.0], [0.0, 0.1]])
+    np.testing.assert_allclose(found.terms["geom"], [0.5, 0.0], atol=0.01)
+    np.testing.assert_allclose(found.terms["force"], [1.0, 0.1])
+    np.testing.assert_allclose(found.total, found.terms["geom"] + 0.5 * found.terms["force"])
+    assert found.failure == [None, None]
+
+
+def test_the_number_of_workers_changes_nothing() -> None:
+    unit = np.random.default_rng(1).random((67, 2))
+    one, three = evaluator(1)(unit), evaluator(3)(unit)
+    np.testing.assert_array_equal(one.total, three.total)
+    assert one.failure == three.failure
+    for name in TERMS:
+        np.testing.assert_array_equal(one.terms[name], three.terms[name])
+
+
+def test_failures_are_infinite_and_have_a_reason() -> None:
+    found = evaluator(2)(np.array([[0.9, 0.5], [0.5, 0.999], [0.5, 0.5]]))
+    assert found.failure == ["too far", "the loss is not finite", None]
+    np.testing.assert_array_equal(np.isinf(found.total), [True, True, False])
+    assert np.isnan(found.terms["geom"][:2]).all()
+
+
+def test_a_failure_counts_twice_the_worst_so_far() -> None:
+    penalty = Penalty()
+    np.testing.assert_array_equal(penalty(np.array([1.0, np.inf, 3.0])), [1, 6, 3])
+    np.testing.assert_array_equal(penalty(np.array([2.0, np.inf])), [2, 6])
+    np.testing.assert_array_equal(penalty(np.array([5.0, np.inf])), [5, 10])
+    assert np.isfinite(Penalty()(np.array([np.inf]))).all()
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "two", "1.5", "²"])
+def test_an_impossible_number_of_workers_is_refused(text: str, monkeypatch) -> None:
+    monkeypatch.setenv("SLING_WORKERS", text)
+    with pytest.raises(UserError, match="SLING_WORKERS"):
+        session.workers()
+
+
+def test_an_unknown_device_is_refused(monkeypatch) -> None:
+    monkeypatch.setenv("SLING_DEVICE", "tpu")
+    with pytest.raises(UserError, match="SLING_DEVICE"):
+        session.device()
+
+
+@pytest.mark.parametrize(("band", "method"), [("no", "yes"), ("yes", "no")])
+def test_an_unknown_band_or_method_is_refused(band: str, method: str) -> None:
+    params = SimpleNamespace(bands={"yes": None}, methods={"yes": None})
+    with pytest.raises(UserError, match=r"params.yaml has no (bands|methods)\.no"):
+        session.evaluator(params, band, method)

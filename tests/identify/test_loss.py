@@ -1,0 +1,156 @@
+"""Loss terms on episodes whose offsets are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.errors import UserError
+from pipeline.identify.loss import TERMS, EpisodeLoss, taut_frames
+from pipeline.signal import average, lowpass
+from tests.identify import toy
+
+ONES = dict.fromkeys(TERMS, 1.0)
+
+
+def loss_of(episode, **changes) -> EpisodeLoss:
+    options = {"weights": {**ONES, "taut": 0.0}, "cutoff": toy.CUTOFF, **changes}
+    return EpisodeLoss(episode, radius=toy.RADIUS, rest_length=toy.LENGTH, **options)
+
+
+def recoil(y, release: float = 1.0, step: float = 0.02) -> dict:
+    """Frames whose clouds lie at the given y, the first of them at the release."""
+    clouds = [toy.facing() + [0, value, 0] for value in y]
+    return {
+        "clouds": clouds,
+        "cloud_time": release + step * np.arange(len(y)),
+        "release_time": release,
+    }
+
+
+def test_a_perfect_simulation_costs_nothing() -> None:
+    episode = toy.episode()
+    terms = loss_of(episode).terms(toy.rollouts(episode, count=3))
+    for name in ("geom", "force", "work"):
+        np.testing.assert_allclose(terms[name], np.zeros(3), atol=1e-2)
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_one_centimetre_reads_one(symmetric: bool) -> None:
+    """Shifted by 1 cm away from the camera, both directions are 1 cm apart."""
+    episode = toy.episode()
+    lines = toy.rollouts(episode, shift=(0, 0, -0.01))
+    terms = loss_of(episode, symmetric=symmetric).terms(lines)
+    assert terms["geom"][0] == pytest.approx(1.0, abs=0.01)
+
+
+def test_one_newton_reads_one() -> None:
+    """In any direction, at irregular steps, through filter and median; work counts along v."""
+    episode = toy.episode()
+    for force in ((1, 0, 0), (0, -1, 0), (0.6, 0, 0.8)):
+        terms = loss_of(episode).terms(toy.rollouts(episode, force=force))
+        assert terms["force"][0] == pytest.approx(1.0, abs=1e-9)
+        duration = (len(episode.time) - 1) * toy.PERIOD
+        assert terms["work"][0] == pytest.approx(abs(force[1]) * 0.1 * duration, abs=1e-9)
+
+
+def test_work_cancels_where_force_does_not() -> None:
+    """+1 N on the way out and -1 N on the way back at the same speed: no net work."""
+    episode = toy.episode()
+    force = np.zeros((60, 3))
+    force[:30, 1], force[30:, 1] = 1, -1
+    terms = loss_of(toy.episode(force=force)).terms(toy.rollouts(episode))
+    assert terms["force"][0] == pytest.approx(1.0)
+    assert terms["work"][0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_simulated_force_goes_the_way_of_a_recorded_one() -> None:
+    """The 1 kHz force of a sudden release, recorded and simulated, leaves no difference."""
+    episode = toy.episode(samples=100)
+    times = np.arange(0, 3.0 + 1e-9, 1e-3)
+    raw = np.zeros((len(times), 3))
+    raw[:, 1] = np.where((times > 0.3) & (times < 2.4), 12 * np.sin(times), 0)
+    recorded = average(times, lowpass(raw, 1000.0, toy.CUTOFF), 0.0, toy.PERIOD, 100)
+    episode = toy.episode(samples=100, force=recorded)
+    simulated = toy.rollouts(episode)
+    simulated.times, simulated.force = times, raw[None]
+    terms = loss_of(episode).terms(simulated)
+    assert terms["force"][0] < 1e-9
+    assert terms["work"][0] < 1e-9
+    # The unfiltered force is something else: the filter is not left out on both sides.
+    unfiltered = average(times, raw, 0.0, toy.PERIOD, 100)
+    other = loss_of(toy.episode(samples=100, force=unfiltered), median_window=1).terms(simulated)
+    assert other["force"][0] > 1e-3
+
+
+def test_median_filters_both_sides() -> None:
+    """A spike of one sample vanishes; without the filter it counts."""
+    force = np.zeros((60, 3))
+    force[30, 0] = 60.0
+    episode = toy.episode(force=force)
+    assert loss_of(episode).terms(toy.rollouts(episode))["force"][0] == 0
+    unfiltered = loss_of(episode, median_window=1).terms(toy.rollouts(episode))
+    assert unfiltered["force"][0] == pytest.approx(1.0)
+
+
+def test_taut_counts_only_the_frames_of_the_recoil() -> None:
+    """From the release until the middle crosses the fork plane; the swing back is not taut."""
+    y = [-0.4, -0.3, -0.1, 0.02, 0.1, -0.05, -0.1]
+    episode = toy.episode(**recoil(y))
+    np.testing.assert_array_equal(taut_frames(episode), [0, 1, 1, 0, 0, 0, 0])
+    lines = toy.rollouts(episode)
+    lines.center_line[0, :, :, 1] += np.array(y, np.float32)[:, None]
+    lines.center_line[0, [1, 2], :, 2] -= 0.01  # 1 cm off in the recoil alone
+    loss = loss_of(episode, weights={"geom": 0, "force": 0, "work": 0, "taut": 2.0})
+    terms = loss.terms(lines)
+    assert terms["taut"][0] == pytest.approx(1.0, abs=0.01)
+    assert terms["geom"][0] == pytest.approx(2 / 7, abs=0.01)
+    assert loss.total(terms)[0] == 2 * terms["taut"][0]
+
+
+def test_recoil_with_frames_that_do_not_show_the_middle() -> None:
+    """An empty frame decides nothing and counts for nothing; late frames never count."""
+    content = recoil([-0.4, -0.3, -0.2, -0.1, -0.05])
+    content["clouds"][1] = np.zeros((0, 3))
+    content["cloud_time"][4] = 2.0
+    episode = toy.episode(**content)
+    np.testing.assert_array_equal(taut_frames(episode), [0, 1, 1, 1, 0])
+    np.testing.assert_array_equal(loss_of(episode).taut, [0, 0, 1, 1, 0])
+
+
+def test_an_episode_without_taut_frames() -> None:
+    """It serves methods that do not weigh them, and is refused by name for those that do."""
+    episode = toy.episode(**recoil([-0.4, 0.1]))
+    assert np.isnan(loss_of(episode).terms(toy.rollouts(episode))["taut"][0])
+    with pytest.raises(UserError, match="toy.*taut"):
+        loss_of(episode, weights=ONES)
+
+
+def test_empty_frames_are_left_out() -> None:
+    """The term is the mean over the frames that show the band; an episode of none is refused."""
+    episode = toy.episode(frames=4)
+    clouds = [*episode.clouds[:2], np.zeros((0, 3)), np.zeros((0, 3))]
+    shifted = toy.rollouts(episode, shift=(0, 0, -0.01))
+    some = loss_of(toy.episode(frames=4, clouds=clouds)).terms(shifted)
+    np.testing.assert_allclose(some["geom"], loss_of(episode).terms(shifted)["geom"])
+    with pytest.raises(UserError, match="no camera frame"):
+        loss_of(toy.episode(frames=4, clouds=[np.zeros((0, 3))] * 4))
+
+
+def test_a_frame_counts_for_no_more_than_its_cap() -> None:
+    episode = toy.episode(frames=4)
+    lines = toy.rollouts(episode)
+    lines.center_line[0, 0, :, 2] -= 1.0
+    assert loss_of(episode).terms(lines)["geom"][0] == pytest.approx(25, rel=0.01)
+    assert loss_of(episode, frame_cap=0.02).terms(lines)["geom"][0] == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_broken_rollout_breaks_no_other() -> None:
+    episode = toy.episode()
+    pair = toy.rollouts(episode, count=2)
+    pair.force[1], pair.center_line[1] = np.nan, np.nan
+    loss = loss_of(episode)
+    terms = loss.terms(pair)
+    total = loss.total(terms)
+    assert np.isfinite(total[0])
+    assert not np.isfinite(total[1])

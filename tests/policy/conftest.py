@@ -1,0 +1,41 @@
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from pipeline.policy.landing_map import LandingMap
+from tests.policy import toy
+
+SETTINGS = SimpleNamespace(
+    seed=1,
+    targets=(1.425, 2.425),
+    envs=512,
+    steps=8,
+    iterations=50,
+    hidden=(256, 128, 64),
+    learning_rate=1e-3,
+    init_std=0.5,
+    final_std=0.02,
+    reward=SimpleNamespace(height=5.0, scale=1.0, penalty=1.0),
+)
+
+
+@pytest.fixture(scope="session")
+def settings() -> SimpleNamespace:
+    return SETTINGS
+
+
+@pytest.fixture(scope="session")
+def toy_map() -> LandingMap:
+    """With a force limit that cuts the box, so that training meets failures."""
+    return LandingMap.simulate(
+        toy.launch, draw_y=toy.DRAW_Y, draw_z=toy.DRAW_Z, size=(33, 25), max_force=15.0
+    )
+
+
+@pytest.fixture(scope="session")
+def trained(toy_map):
+    from pipeline.policy.train import train
+
+    return train(toy_map, SETTINGS)

@@ -1,0 +1,93 @@
+"""Aiming with an exported toy policy: the closed form says where the draw lands."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.errors import UserError
+from pipeline.policy.aim import aim, policy_draws
+from pipeline.policy.export import write_onnx
+from pipeline.sling.model import THETA
+from tests.policy import toy
+
+PARAMS = SimpleNamespace(
+    bands={"toy": None},
+    methods={"none": None, "other": None},
+    policy=SimpleNamespace(targets=(1.425, 2.425)),
+    trials=SimpleNamespace(actuation_error=0.001),
+    setup=SimpleNamespace(max_force=15.0),
+)
+
+
+@pytest.fixture(scope="module")
+def root(trained, tmp_path_factory):
+    root = tmp_path_factory.mktemp("root")
+    write_onnx(trained.policy, root / "data/policies/toy/none/policy.onnx")
+    file = root / "data/theta/toy/none.json"
+    file.parent.mkdir(parents=True)
+    file.write_text(json.dumps({"band": "toy", "theta": dict.fromkeys(THETA, 0.4)}))
+    return root
+
+
+def shoot(root, target: float, launcher=toy.launch, **settings) -> dict:
+    params = SimpleNamespace(**{**vars(PARAMS), **settings})
+    return aim(params, "toy", "none", target, root, launcher=launcher)
+
+
+def test_the_draw_lands_on_the_target(root) -> None:
+    answer = shoot(root, 1.925)
+    draw = np.array([[answer["draw_y_m"], answer["draw_z_m"]]])
+    truth = toy.launch(draw)
+    assert truth.landing_y[0] == pytest.approx(1.925, abs=0.02)
+    assert answer["predicted_landing_m"] == pytest.approx(truth.landing_y[0], abs=1e-6)
+    assert answer["hold_force_n"] == pytest.approx(truth.hold_force[0], abs=1e-6)
+    assert answer["warnings"] == []
+    np.testing.assert_allclose(policy_draws(root / "data/policies/toy/none", [1.925]), draw)
+
+
+def test_nine_landings_of_ten_lie_in_the_interval(root) -> None:
+    answer = shoot(root, 1.925)
+    draw = np.array([answer["draw_y_m"], answer["draw_z_m"]])
+    spread = draw + np.random.default_rng(0).normal(0, 0.001, (4000, 2))
+    low, high = answer["interval_90_m"]
+    landing = toy.launch(spread).landing_y
+    assert 0.88 < ((landing > low) & (landing < high)).mean() < 0.92
+
+
+def test_warns_outside_the_trained_range_and_above_the_force(root) -> None:
+    assert "trained for targets" in shoot(root, 2.7)["warnings"][0]
+    weak = SimpleNamespace(max_force=1.0)
+    assert any("setup.max_force" in line for line in shoot(root, 1.925, setup=weak)["warnings"])
+
+
+def test_a_failed_launch_has_no_prediction(root) -> None:
+    def broken(draws: np.ndarray):
+        launched = toy.launch(draws)
+        launched.failure = ["it broke"] * len(draws)
+        return launched
+
+    answer = shoot(root, 1.925, launcher=broken)
+    assert answer["predicted_landing_m"] is None and answer["interval_90_m"] is None
+    assert any("it broke" in line for line in answer["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("band", "method", "message"),
+    [
+        ("none", "none", "band none: not in params.yaml, which has toy"),
+        ("toy", "missing", "method missing: not in params.yaml"),
+        ("toy", "other", "dvc repro theta@toy"),
+    ],
+)
+def test_says_what_is_missing(root, band: str, method: str, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        aim(PARAMS, band, method, 1.925, root, launcher=toy.launch)
+
+
+def test_says_which_stage_trains_the_policy(root, tmp_path) -> None:
+    with pytest.raises(UserError, match="dvc repro policy@toy-none"):
+        policy_draws(tmp_path / "data/policies/toy/none", np.array([1.9]))

@@ -1,0 +1,114 @@
+"""A finished run of a band that was never there: every input of the report, small and synthetic."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from ruamel.yaml import YAML
+from torch import nn
+
+from pipeline.episode import Episode
+from pipeline.params import load
+from pipeline.policy.export import write_onnx
+from pipeline.policy.landing_map import LandingMap
+from pipeline.policy.train import Policy
+from pipeline.policy.trials import SCHEMA
+from tests.policy import toy
+
+BAND, METHOD = "toy", "sling2sim2real"
+THETA = {
+    "youngs_modulus": 3e5,
+    "poissons_ratio": 0.45,
+    "elasticity_damping": 3e-3,
+    "dynamic_friction": 0.5,
+    "damping_scale": 0.7,
+}
+
+
+def episode() -> Episode:
+    time = np.linspace(0.015, 8.985, 300)
+    stamps = np.arange(90) / 10
+    line = np.stack([np.linspace(-0.14, 0.14, 25), np.full(25, -0.2), np.zeros(25)], 1)
+    nothing = np.zeros((300, 3))
+    force = np.stack([0 * time, np.where(time < 8, time, 0), np.sin(time)], 1)
+    return Episode(
+        BAND, time, nothing + [0, -0.4, 0], nothing, force, 0 * time, stamps,
+        [line.astype(np.float32)] * 90, 1.0, 8.0, np.array([1.0, 0, 0]),
+    )  # fmt: skip
+
+
+def launches() -> pd.DataFrame:
+    rows = [(1.725, 1.745), (1.725, 1.695), (1.925, 1.965), (2.125, None)]
+    return pd.DataFrame(
+        {
+            "band": BAND,
+            "method": METHOD,
+            "kind": "measured",
+            "target": [target for target, _ in rows],
+            "trial": [1, 2, 1, 1],
+            "draw_y": -0.3,
+            "draw_z": -0.2,
+            "predicted_y": [1.725, 1.725, 1.925, 2.125],
+            "predicted_failure": None,
+            "landing_y": [landing for _, landing in rows],
+            "hold_force": 9.0,
+            "failure": [None, None, None, "did not land"],
+            "stretch": [1.4, 1.4, 1.7, 1.8],
+            "recorded_stretch": 1.63,
+        }
+    )
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """A project folder with params.yaml and everything that the report reads."""
+    yaml = YAML()
+    content = yaml.load(Path("params.yaml"))
+    content["run"].update(bands=[BAND], rig=[], methods=[METHOD])
+    content["bands"][BAND] = {
+        "source": "recording",
+        "mass": 0.04,
+        "diameter": 0.01,
+        "rest_length": 0.52,
+    }
+    yaml.dump(content, tmp_path / "params.yaml")
+    data = tmp_path / "data"
+    for name in ("history", "refined", "theta", "trials"):
+        (data / name / BAND).mkdir(parents=True)
+    episode().save(data / "episodes" / BAND)
+    for phase, total in (("history", [3.0, np.inf, 2.0]), ("refined", [2.5, 1.25])):
+        rows = pd.DataFrame({"method": METHOD, "phase": phase, "total": total})
+        rows.to_parquet(data / phase / BAND / f"{METHOD}.parquet")
+    loss = {"geom": 0.5, "force": 0.25, "work": 0.5, "taut": 0.1, "total": 1.25}
+    theta = {"band": BAND, "method": METHOD, "theta": THETA, "loss": loss, "rollouts": 5}
+    (data / "theta" / BAND / f"{METHOD}.json").write_text(json.dumps(theta))
+
+    folder = data / "policies" / BAND / METHOD
+    chart = LandingMap.simulate(
+        toy.launch, draw_y=toy.DRAW_Y, draw_z=toy.DRAW_Z, size=(9, 9), max_force=15.0
+    )
+    chart.save(folder / "map.parquet")
+    pd.DataFrame({"iteration": [1, 2], "mean_error": [0.3, 0.004]}).to_parquet(
+        folder / "training.parquet"
+    )
+    card = {
+        "training": {"converged": True, "mean_error_m": 0.004, "max_error_m": 0.01},
+        "landing_map": chart.validation((1.425, 2.425)),
+    }
+    (folder / "card.json").write_text(json.dumps(card))
+    torch.manual_seed(0)
+    network = nn.Sequential(nn.Linear(1, 8), nn.ELU(), nn.Linear(8, 2))
+    write_onnx(Policy(network, (1.425, 2.425), chart), folder / "policy.onnx")
+    frame = launches()
+    frame.to_parquet(data / "trials" / BAND / f"{METHOD}.parquet", schema=SCHEMA)
+    return tmp_path
+
+
+@pytest.fixture
+def params(root: Path):
+    return load(root / "params.yaml")

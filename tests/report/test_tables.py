@@ -1,0 +1,96 @@
+"""Tables from constructed launches whose means are known by hand."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+
+from pipeline.report import paper
+from pipeline.report.tables import (
+    at_edge,
+    landing_errors,
+    markdown,
+    prediction_error,
+    predictions,
+)
+
+
+def trials(rows: list[tuple], kind: str = "measured") -> pd.DataFrame:
+    """Rows of target, landing, failure, predicted, stretch."""
+    frame = pd.DataFrame(rows, columns=["target", "landing_y", "failure", "predicted_y", "stretch"])
+    return frame.assign(
+        kind=kind, recorded_stretch=1.6, draw_y=-0.3, draw_z=-0.2, hold_force=9.0,
+        predicted_failure=None,
+    )  # fmt: skip
+
+
+def test_landing_errors_by_hand() -> None:
+    launched = trials(
+        [
+            (1.9, 1.90 + 0.01, None, 1.9, 1.4),
+            (1.9, 1.90 - 0.03, None, 1.9, 1.4),
+            (2.1, 2.10 + 0.10, None, 2.1, 1.4),
+            (2.1, 2.10 + 0.14, None, 2.1, 1.4),
+            (2.1, math.nan, "holding takes 31 N", 2.1, 1.4),
+            (2.1, 2.50, None, 2.1, 1.4),  # beyond the target area
+            (math.nan, 1.0, None, 1.1, 1.4),  # aimed at nothing
+        ]
+    )
+    errors = landing_errors(launched)
+    near, far, total = errors[1.9], errors[2.1], errors["all"]
+    assert (near["launches"], near["failed"]) == (2, 0)
+    assert near["mean"] == pytest.approx(0.02) and near["bias"] == pytest.approx(-0.01)
+    assert near["std"] == pytest.approx(0.02 / math.sqrt(2))
+    assert (far["launches"], far["failed"]) == (4, 2)
+    assert far["mean"] == pytest.approx(0.12)
+    assert far["std"] == pytest.approx(0.04 / math.sqrt(2))
+    assert (total["launches"], total["failed"]) == (6, 2)
+    assert total["mean"] == pytest.approx(0.07) and total["bias"] == pytest.approx(0.055)
+    assert total["pooled_std"] == pytest.approx(math.sqrt((0.02**2 / 2 + 0.04**2 / 2) / 2))
+    deviations = [0.01 - 0.07, 0.03 - 0.07, 0.10 - 0.07, 0.14 - 0.07]
+    assert total["std"] == pytest.approx(math.sqrt(sum(d**2 for d in deviations) / 3))
+
+
+def test_all_failed_has_no_mean() -> None:
+    errors = landing_errors(trials([(1.9, math.nan, "fell", 1.9, 1.4)] * 3))
+    assert errors["all"]["failed"] == 3 and math.isnan(errors["all"]["mean"])
+
+
+def test_prediction_error_inside_and_beyond() -> None:
+    launched = trials(
+        [
+            (math.nan, 2.0, None, 2.1, 1.4),  # + 5 %
+            (math.nan, 2.0, None, 1.98, 1.6),  # - 1 %, at the limit
+            (math.nan, 4.0, None, 3.6, 1.7),  # - 10 %
+            (math.nan, 4.0, None, math.nan, 1.9),  # no prediction
+        ]
+    )
+    error = prediction_error(launched)
+    assert error["inside"]["mean"] == pytest.approx(0.03) and error["inside"]["launches"] == 2
+    assert error["beyond"]["mean"] == pytest.approx(0.10) and error["beyond"]["launches"] == 1
+    assert error["all"]["mean"] == pytest.approx(0.16 / 3)
+    text = markdown(predictions(launched))
+    assert "+5.0%" in text and "-10.0%" in text and text.count("(beyond)") == 2
+
+
+def test_edge_of_the_box_on_both_scales() -> None:
+    log = SimpleNamespace(low=1e-4, high=1e-2, scale="log")
+    line = SimpleNamespace(low=0.0, high=1.0, scale="linear")
+    assert at_edge(1.01e-4, log) and not at_edge(1.2e-4, log) and at_edge(1e-2, log)
+    assert at_edge(0.995, line) and not at_edge(0.98, line)
+
+
+def test_markdown_has_one_line_a_row() -> None:
+    assert markdown((["a", "b"], [["1", "2"]])) == "| a | b |\n| --- | --- |\n| 1 | 2 |\n"
+
+
+@pytest.mark.parametrize("key", [key for key, cells in paper.LANDING.items() if cells[0]])
+def test_the_papers_rows_average_to_what_it_prints(key) -> None:
+    """One row does not, and the report says so."""
+    *targets, total = paper.LANDING[key]
+    mean = sum(cell[0] for cell in targets) / 3
+    exception = key[1] == "without covariance and multi-start"
+    assert (abs(mean - total[0]) > 0.01) == exception

@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.params import Params
+from pipeline.rig.launch import fly, launch, launch_from
+from pipeline.rig.world import string_of
+
+DRAW = (-0.30, -0.15)
+
+
+def test_flight_is_the_parabola() -> None:
+    y, z, vy, vz, floor = -0.1, -0.05, 4.0, 1.5, -0.52
+    time = (vz + np.sqrt(vz**2 + 2 * 9.81 * (z - floor))) / 9.81
+    landing = fly(np.array([y, z]), np.array([vy, vz]), floor, 0.0)
+    assert np.isclose(landing, y + vy * time, rtol=1e-8)
+
+
+def test_drag_shortens_the_flight() -> None:
+    """Against small explicit steps."""
+    position, velocity, k, step = np.zeros(2), np.array([6.0, 2.0]), 0.02, 2e-5
+    landing = fly(position, velocity, -0.52, k)
+    while position[1] > -0.52:
+        position = position + step * velocity
+        velocity = velocity + step * ([0.0, -9.81] - k * np.hypot(*velocity) * velocity)
+    assert np.isclose(landing, position[0], rtol=1e-4)
+    assert landing < 0.99 * fly(np.zeros(2), np.array([6.0, 2.0]), -0.52, 0.0)
+
+
+def test_equal_seeds_give_equal_errors(coarse: Params) -> None:
+    first, again, other = (launch("band1", coarse, DRAW, seed) for seed in (3, 3, 4))
+    assert first == again
+    assert first.landing_y != other.landing_y
+    exact = launch("band1", coarse, DRAW, None)
+    assert abs(first.landing_y - exact.landing_y) < 0.1  # 1 mm is about 2 cm
+
+
+def test_pouch_pushes_until_the_band_slackens(coarse: Params) -> None:
+    """The projectile takes less than the drawn band holds, and most of it."""
+    string = string_of(coarse, "band1")
+    trial = launch("band1", coarse, DRAW, None)
+    distances = np.linspace(1.0, 0.6, 9)
+    force = [
+        launch_from(string, coarse, s * np.array([0.0, *DRAW])).hold_force for s in distances
+    ]
+    length = np.hypot(*DRAW) * distances
+    stored = -np.trapezoid(force, length)
+    energy = coarse.setup.projectile_mass * trial.speed**2 / 2
+    assert 0.5 * stored < energy < stored
+    assert np.isclose(trial.angle, np.arctan2(-DRAW[1], -DRAW[0]), atol=0.15)
+
+
+def test_failures_say_why(coarse: Params) -> None:
+    weak_arm = coarse.model_copy(
+        update={"setup": coarse.setup.model_copy(update={"max_force": 5.0})}
+    )
+    strong = launch("band1", weak_arm, DRAW, None)
+    assert strong.failure.startswith("holding takes")
+    assert strong.hold_force > 5 and np.isnan(strong.landing_y)
+    assert "slack" in launch("band1", coarse, (-0.15, -0.1), None).failure
+
+
+@pytest.mark.slow
+def test_landing_is_converged(params: Params) -> None:
+    """Half the edges or ten times the tolerance move a landing by less than half a per cent."""
+    string, aim = string_of(params, "band1"), np.array([0.0, *DRAW])
+    best = launch_from(string, params, aim).landing_y
+    coarser = launch_from(replace(string, edges=60), params, aim).landing_y
+    loose = params.model_copy(update={"rig": params.rig.model_copy(update={"tolerance": 1e-5})})
+    assert np.isclose(coarser, best, rtol=5e-3)
+    assert np.isclose(launch_from(string, loose, aim).landing_y, best, rtol=1e-4)

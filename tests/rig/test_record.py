@@ -1,0 +1,174 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pipeline.errors import UserError
+from pipeline.params import Params
+from pipeline.rig.interaction import Interaction
+from pipeline.rig.record import record
+
+SCALE = 0.25  # of the pictures
+COUNTS = {
+    "/tf_static": 1,
+    "/franka_gripper/joint_states": 500,
+    "/franka_robot_state_broadcaster/current_pose": 10_000,
+    "/ft_sensor/wrench": 10_000,
+}
+PICTURES = [
+    "/camera/color/image_raw/compressed",
+    "/camera/color/camera_info",
+    "/camera/depth/camera_info",
+    "/camera/depth/image_raw/compressedDepth",
+]
+
+
+@pytest.fixture(scope="module")
+def recorded(
+    coarse: Params, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, Interaction]:
+    path = tmp_path_factory.mktemp("raw") / "band1.mcap"
+    return path, record(coarse, "band1", path, picture_scale=SCALE)
+
+
+@pytest.fixture(scope="module")
+def messages(recorded: tuple[Path, Interaction]) -> dict[str, list[Any]]:
+    """Decoded by another library than the one that wrote them."""
+    from mcap_ros2.reader import read_ros2_messages
+
+    topics: dict[str, list[Any]] = {}
+    for message in read_ros2_messages(recorded[0]):
+        topics.setdefault(message.channel.topic, []).append(message.ros_msg)
+    return topics
+
+
+def seconds(message: Any) -> float:
+    return message.header.stamp.sec - 1_760_000_000 + message.header.stamp.nanosec * 1e-9
+
+
+def rotation(quaternion: Any) -> Rotation:
+    return Rotation.from_quat([quaternion.x, quaternion.y, quaternion.z, quaternion.w])
+
+
+def vector(of: Any) -> np.ndarray:
+    return np.array([of.x, of.y, of.z])
+
+
+def transforms(messages: dict[str, list[Any]]) -> dict[str, Any]:
+    return {one.child_frame_id: one.transform for one in messages["/tf_static"][0].transforms}
+
+
+def test_topics_and_counts(messages: dict[str, list[Any]]) -> None:
+    assert set(messages) == {*COUNTS, *PICTURES}
+    for topic, count in COUNTS.items():
+        assert len(messages[topic]) == count
+    frames = {len(messages[topic]) for topic in PICTURES}
+    assert len(frames) == 1 and 280 <= frames.pop() < 299  # some are dropped
+    stamps = np.array([seconds(m) for m in messages["/ft_sensor/wrench"]])
+    np.testing.assert_allclose(np.diff(stamps), 1e-3, atol=1e-6)
+
+
+def test_same_schemas_as_a_lab_writes(recorded: tuple[Path, Interaction], shared: Path) -> None:
+    from mcap.reader import make_reader
+
+    def schemas(path: Path) -> dict[str, tuple]:
+        with open(path, "rb") as stream:
+            summary = make_reader(stream).get_summary()
+        return {
+            channel.topic: (
+                channel.message_encoding,
+                summary.schemas[channel.schema_id].name,
+                summary.schemas[channel.schema_id].encoding,
+                summary.schemas[channel.schema_id].data.strip(),
+            )
+            for channel in summary.channels.values()
+        }
+
+    assert schemas(recorded[0]) == schemas(shared / "recordings" / "orange.mcap")
+
+
+def test_readable_by_rosbags(recorded: tuple[Path, Interaction]) -> None:
+    from mcap.reader import make_reader
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    with open(recorded[0], "rb") as stream:
+        schema, _, message = next(make_reader(stream).iter_messages(["/ft_sensor/wrench"]))
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(schema.data.decode(), schema.name))
+    wrench = store.deserialize_cdr(message.data, schema.name)
+    assert wrench.header.frame_id == "ft_sensor"
+
+
+def test_force_peaks_as_ordered(messages: dict[str, list[Any]], coarse: Params) -> None:
+    """As a lab would see it: turned into frame O by /tf_static and the pose, tared, smoothed."""
+    frames = transforms(messages)
+    pose = messages["/franka_robot_state_broadcaster/current_pose"][0].pose
+    turn = (
+        rotation(frames["panda_link0"].rotation)
+        * rotation(pose.orientation)
+        * rotation(frames["ft_sensor"].rotation)
+    )
+    wrench = np.array([vector(m.wrench.force) for m in messages["/ft_sensor/wrench"]])
+    force = turn.apply(wrench)
+    force -= force[:900].mean(axis=0)
+    smooth = np.convolve(force[:, 1], np.ones(50) / 50, "same")
+    peak = coarse.rig.bands["band1"].peak_force
+    assert np.isclose(smooth.max(), peak, rtol=0.01)
+    assert 5.5 < np.argmax(smooth) / 1000 < 6.5
+    assert np.abs(smooth[8100:9900]).max() < 0.1
+    assert smooth[7900] < 0.99 * smooth.max()  # it relaxes in the pause
+
+
+def test_hand_goes_where_it_should(messages: dict[str, list[Any]]) -> None:
+    base = transforms(messages)["panda_link0"]
+    poses = messages["/franka_robot_state_broadcaster/current_pose"]
+    position = np.array([vector(m.pose.position) for m in poses])
+    position = rotation(base.rotation).apply(position) + vector(base.translation)
+    for time, expected in ((2.0, [0, 0, 0]), (7.0, [0, -0.4, 0])):
+        np.testing.assert_allclose(position[round(1000 * time)], expected, atol=1.5e-3)
+
+
+def test_pictures_show_the_band_where_it_is(
+    messages: dict[str, list[Any]], recorded: tuple[Path, Interaction]
+) -> None:
+    """Blue pixels with depth, through the camera's info and /tf_static, lie on the true band."""
+    import cv2
+
+    frames = transforms(messages)
+    base, camera = frames["panda_link0"], frames["camera_color_optical_frame"]
+    colors, info, _, depths = (messages[topic] for topic in PICTURES)
+    k = np.array(info[0].k).reshape(3, 3)
+    seen = 0
+    for color, depth, line in list(zip(colors, depths, recorded[1].lines, strict=True))[::20]:
+        picture = cv2.imdecode(np.frombuffer(color.data, np.uint8), cv2.IMREAD_COLOR).astype(int)
+        blue = picture[..., 0] - picture[..., 1:].max(axis=-1) > 40
+        metres = cv2.imdecode(np.frombuffer(depth.data[12:], np.uint8), -1) / 1000
+        rows, columns = np.nonzero(blue & (metres > 0))
+        pixels = np.stack([columns, rows, np.ones(len(rows))])
+        points = (np.linalg.solve(k, pixels) * metres[rows, columns]).T
+        points = rotation(camera.rotation).apply(points) + vector(camera.translation)
+        points = rotation(base.rotation).apply(points) + vector(base.translation)
+        dense = np.concatenate([np.linspace(a, b, 20) for a, b in zip(line, line[1:])])
+        gaps = np.linalg.norm(points[:, None] - dense[None], axis=-1).min(axis=1)
+        assert 0.002 < np.median(gaps) < 0.007  # about its radius
+        seen += len(points)
+    assert seen > 500
+
+
+def test_same_seed_same_bytes(
+    coarse: Params, recorded: tuple[Path, Interaction], tmp_path: Path
+) -> None:
+    record(coarse, "band1", tmp_path / "again.mcap", picture_scale=SCALE)
+    assert (tmp_path / "again.mcap").read_bytes() == recorded[0].read_bytes()
+
+
+def test_a_slippery_band_is_refused(coarse: Params, tmp_path: Path) -> None:
+    rig = coarse.rig.model_copy(update={"pad_friction": 0.1})
+    slippery = coarse.model_copy(update={"rig": rig})
+    with pytest.raises(UserError, match="pad_friction"):
+        record(slippery, "band1", tmp_path / "no.mcap", picture_scale=SCALE)
+    assert not list(tmp_path.iterdir())

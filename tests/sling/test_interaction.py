@@ -1,0 +1,96 @@
+"""The recorded interaction: parameters, friction, robustness, independence of the batch."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.sling import THETA, interact
+
+BASE = np.array([2e5, 0.42, 3e-3, 0.6, 0.6])
+BOX = np.array([[3e4, 1e7], [0.30, 0.49], [1e-4, 5e-2], [0.05, 1.0], [0.0, 1.0]])
+
+
+def random_thetas(count: int, seed: int) -> np.ndarray:
+    unit = np.random.default_rng(seed).uniform(size=(count, 5))
+    theta = BOX[:, 0] + unit * (BOX[:, 1] - BOX[:, 0])
+    for k in (0, 2):
+        theta[:, k] = BOX[k, 0] * (BOX[k, 1] / BOX[k, 0]) ** unit[:, k]
+    return theta
+
+
+@pytest.mark.parametrize("index", range(5))
+def test_every_parameter_changes_the_episode(sling, episode, index):
+    other = BASE.copy()
+    other[index] = BOX[index].mean() if index not in (0, 2) else 2 * BASE[index]
+    rollouts = interact(sling, episode, np.array([BASE, other]))
+    assert rollouts.failure == [None, None]
+    force = np.abs(rollouts.force[0] - rollouts.force[1]).max()
+    line = np.abs(rollouts.center_line[0] - rollouts.center_line[1]).max()
+    assert force > 0.01 or line > 1e-3, THETA[index]
+
+
+def test_hand_is_followed_and_force_ends_with_the_release(sling, episode):
+    rollouts = interact(sling, episode, BASE)
+    held = (rollouts.cloud_time > 1.0) & (rollouts.cloud_time < 2.35)
+    hand = np.stack(
+        [np.interp(rollouts.cloud_time, episode.time, column) for column in episode.position.T], 1
+    )
+    middle = rollouts.center_line[0, :, sling.middle]
+    assert np.abs(middle - hand)[held].max() < 2e-3
+    force = rollouts.force[0]
+    assert np.all(force[rollouts.times < episode.grasp_time] == 0)
+    assert np.all(force[rollouts.times > episode.release_time + 1e-6] == 0)
+    full = np.argmin(np.abs(rollouts.times - 2.3))
+    assert force[full, 1] > 5 and abs(force[full, 0]) < 0.05
+
+
+def test_weak_pads_lose_the_band_during_the_pull(sling, episode):
+    theta = BASE.copy()
+    theta[3] = 0.05
+    assert interact(sling, episode, theta).failure == ["the band slipped out of the fingers"]
+
+
+def test_less_friction_lets_go_earlier(sling, episode):
+    theta = np.array([BASE, BASE])
+    theta[:, 3] = 0.3, 1.0
+    force = interact(sling, episode, theta).force[:, :, 1]
+    opening = (force[0] > 0) & (force[1] > 0)
+    last = np.flatnonzero(opening)[-1]
+    assert force[0, last] < force[1, last]
+
+
+def test_result_depends_on_neither_neighbours_nor_workers(sling, episode):
+    thetas = random_thetas(20, seed=3)
+    together = interact(sling, episode, thetas, workers=2)
+    alone = interact(sling, episode, thetas[7])
+    assert np.array_equal(together.force[7], alone.force[0])
+    assert np.array_equal(together.center_line[7], alone.center_line[0])
+
+
+def test_random_thetas_converge_or_say_why_not(strong_grip, episode):
+    """1,000 of the whole box: no number that is none, and nearly none that fails."""
+    rollouts = interact(strong_grip, episode, random_thetas(1000, seed=1), workers=2)
+    good = np.array([reason is None for reason in rollouts.failure])
+    assert np.isfinite(rollouts.force[good]).all()
+    assert np.isfinite(rollouts.center_line[good]).all()
+    assert (~good).sum() <= 2
+
+
+def test_finer_steps_give_the_same_recoil(sling, episode):
+    coarse = interact(sling, episode, BASE)
+    fine = interact(sling, episode, BASE, refine=5, double=True)
+    recoil = (coarse.cloud_time > 2.4) & (coarse.cloud_time < 2.47)
+    gap = np.linalg.norm(coarse.center_line - fine.center_line, axis=3)[0]
+    assert gap[recoil].max() < 4e-3
+    held = (coarse.cloud_time > 2.2) & (coarse.cloud_time < 2.4)
+    assert gap[held].max() < 1e-3
+
+
+def test_release_time_moves_the_recoil(sling, episode):
+    later = replace(episode, release_time=episode.release_time + 0.01)
+    lines = [interact(sling, e, BASE).center_line[0] for e in (episode, later)]
+    frame = np.searchsorted(episode.cloud_time, 2.43)
+    assert lines[0][frame, sling.middle, 1] > lines[1][frame, sling.middle, 1] + 0.01

@@ -1,0 +1,76 @@
+"""Launches: ballistics in closed form, convergence, energy, failures by name."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from .reference import energy
+
+from pipeline.sling import launch
+from pipeline.sling.launch import ballistic_landing
+from pipeline.sling.model import GRAVITY, drawn_guess
+
+THETA = [2.5e5, 0.45, 2e-3, 0.5, 1.0]
+DRAW = [-0.38, -0.2]
+
+
+def test_ballistic_landing_in_closed_form():
+    angle, speed, height = np.deg2rad(35.0), 4.0, 0.52
+    drop = np.sqrt((speed * np.sin(angle)) ** 2 + 2 * GRAVITY * height)
+    expected = speed * np.cos(angle) * (speed * np.sin(angle) + drop) / GRAVITY
+    landing = ballistic_landing(0.0, 0.0, speed * np.cos(angle), speed * np.sin(angle), -height)
+    assert landing == pytest.approx(expected, rel=1e-12)
+
+
+def test_landing_is_the_flight_from_the_leaving_state(sling):
+    shot = launch(sling, THETA, DRAW)
+    assert shot.failure == [None]
+    vy = shot.speed[0] * np.cos(shot.angle[0])
+    vz = shot.speed[0] * np.sin(shot.angle[0])
+    y = ballistic_landing(shot.leave_y[0], shot.leave_z[0], vy, vz, -sling.fork_height)
+    assert shot.landing_y[0] == pytest.approx(y, rel=1e-9)
+    assert -0.3 < shot.leave_y[0] < -0.1  # the band goes slack about 0.2 m before the fork
+
+
+def test_launch_is_converged_in_time(sling):
+    rng = np.random.default_rng(5)
+    thetas = np.column_stack(
+        [
+            10 ** rng.uniform(5.2, 6.2, 16),
+            rng.uniform(0.3, 0.49, 16),
+            10 ** rng.uniform(-3.5, -2.2, 16),
+            np.full(16, 0.5),
+            rng.uniform(0, 1, 16),
+        ]
+    )
+    draws = np.column_stack([rng.uniform(-0.45, -0.33, 16), rng.uniform(-0.3, -0.1, 16)])
+    coarse = launch(sling, thetas, draws, workers=2)
+    fine = launch(sling, thetas, draws, refine=10, double=True, workers=2)
+    assert coarse.failure == fine.failure == [None] * 16
+    assert coarse.speed == pytest.approx(fine.speed, rel=5e-3)
+
+
+def test_projectile_gets_no_more_than_the_stored_energy(sling):
+    """Little damping: most of the energy; much damping: less of it; never more than there is."""
+    stored = energy(sling, THETA, drawn_guess(sling, np.array(DRAW)))
+    speeds = []
+    for damping in (1e-4, 5e-3, 2e-2):
+        theta = [*THETA[:2], damping, *THETA[3:]]
+        shot = launch(sling, theta, DRAW)
+        lifted = sling.projectile_mass * GRAVITY * (shot.leave_z[0] - DRAW[1])
+        assert sling.projectile_mass / 2 * shot.speed[0] ** 2 + lifted < stored
+        speeds.append(shot.speed[0])
+    assert speeds[0] > speeds[1] > speeds[2]
+
+
+def test_failures_have_names(sling):
+    strong = launch(sling, [5e6, 0.45, 2e-3, 0.5, 1.0], DRAW, max_force=30.0)
+    assert "30 N" in strong.failure[0] and np.isnan(strong.landing_y[0])
+    assert strong.hold_force[0] > 30
+    slack = launch(sling, THETA, [-0.15, -0.05])
+    assert slack.failure[0] is not None and np.isnan(slack.landing_y[0])
+
+
+def test_farther_draws_land_farther(sling):
+    landings = launch(sling, THETA, [[-0.34, -0.2], [-0.38, -0.2], [-0.42, -0.2]]).landing_y
+    assert np.all(np.diff(landings) > 0.2)

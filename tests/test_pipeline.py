@@ -1,0 +1,182 @@
+"""The whole DAG on a tiny budget, in a copy of the project: what runs, and what runs again."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+ROOT = Path(__file__).parents[1]
+TINY = {
+    "run.methods": ["sling2sim2real"],
+    "cloud.points": 100,
+    "optimizer.population": 6,
+    "optimizer.generations": 2,
+    "optimizer.k_nn": 6,
+    "optimizer.k_top": 2,
+    "optimizer.cma_population": 4,
+    "optimizer.cma_rollouts": 8,
+    "policy.map_size": [7, 7],
+    "policy.envs": 32,
+    "policy.iterations": 3,
+    "trials.targets": [1.925],
+    "trials.repeats": 1,
+}
+EVERYTHING = {
+    "record@band1",
+    "episode@band1",
+    "history@band1-sling2sim2real",
+    "clusters@band1-sling2sim2real",
+    "refined@band1-sling2sim2real",
+    "theta@band1-sling2sim2real",
+    "policy@band1-sling2sim2real",
+    "trials@band1-sling2sim2real",
+    "report",
+}
+AFTER_HISTORY = EVERYTHING - {"record@band1", "episode@band1", "history@band1-sling2sim2real"}
+
+
+class Copy:
+    """A copy of the project's files in a Git repository of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.environment = {
+            **os.environ,
+            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+            "OMP_NUM_THREADS": "1",
+            "DVC_SITE_CACHE_DIR": str(folder.parent / "site"),
+            "PYTHONPATH": str(ROOT / "tests" / "audit"),
+            "AUDIT": str(folder.parent / "audit"),
+        }
+        (folder.parent / "audit").mkdir()
+        listed = subprocess.run(
+            ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+            cwd=ROOT,
+            capture_output=True,
+            check=True,
+            text=True,
+        ).stdout
+        for name in filter(None, listed.split("\0")):
+            if (ROOT / name).is_file() and name != "dvc.lock":
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(ROOT / name, folder / name)
+        self.set(TINY)
+        self("git", "init", "-q")
+        self("git", "config", "user.name", "Test")
+        self("git", "config", "user.email", "test@example.org")
+        self.commit()
+
+    def __call__(self, *command: str) -> str:
+        done = subprocess.run(
+            command, cwd=self.folder, env=self.environment, capture_output=True, text=True
+        )
+        assert done.returncode == 0, f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}"
+        return done.stdout
+
+    def set(self, values: dict) -> None:
+        yaml, path = YAML(), self.folder / "params.yaml"
+        content = yaml.load(path)
+        for key, value in values.items():
+            section, name = key.split(".")
+            content[section][name] = value
+        yaml.dump(content, path)
+
+    def commit(self) -> None:
+        self("git", "add", "--all")
+        self("git", "commit", "-q", "-m", "state")
+
+    def dvc(self, *arguments: str) -> set[str]:
+        """Run DVC; the stages that really ran."""
+        return set(re.findall(r"^Running stage '(.+)':$", self("dvc", *arguments), re.MULTILINE))
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Copy:
+    copy = Copy(tmp_path_factory.mktemp("project") / "copy")
+    assert copy.dvc("repro") == EVERYTHING
+    return copy
+
+
+@pytest.mark.slow
+def test_a_run_leaves_only_its_lock_and_report_for_git(project: Copy) -> None:
+    """DVC keeps its hands off .gitignore, and nothing else lies about."""
+    changed = {line[3:] for line in project("git", "status", "--porcelain", "-uall").splitlines()}
+    assert "dvc.lock" in changed
+    assert all(name == "dvc.lock" or name.startswith("reports/") for name in changed)
+
+
+def covers(listed: str, read: str) -> bool:
+    return f"{read}.".startswith(f"{listed}.")
+
+
+@pytest.mark.slow
+def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
+    """Neither more, or it would run in vain, nor less, or a change would do nothing."""
+    stages = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
+    everything_read = set()
+    for name in EVERYTHING:
+        step, *item = name.split("@")
+        band, _, method = item[0].partition("-") if item else ("", "", "")
+        listed = [
+            key.replace("${item.band}", band).replace("${item.method}", method)
+            for key in stages[step].get("params", [])
+        ]
+        read = json.loads((project.folder.parent / "audit" / f"{name}.json").read_text())
+        unlisted = [key for key in read if not any(covers(one, key) for one in listed)]
+        assert not unlisted, f"{name} reads parameters that dvc.yaml does not list"
+        unread = [one for one in listed if not any(covers(one, key) for key in read)]
+        assert not unread, f"dvc.yaml lists parameters that {name} does not read"
+        everything_read.update(read)
+    content = YAML(typ="safe").load(project.folder / "params.yaml")
+    keys = {f"{section}.{key}" for section, value in content.items() for key in value}
+    keys -= {f"methods.{name}" for name in content["methods"]} - {"methods.sling2sim2real"}
+    idle = {key for key in keys if not any(covers(key, read) for read in everything_read)}
+    assert not idle, "parameters that do nothing"
+
+
+@pytest.mark.slow
+def test_a_second_run_does_nothing(project: Copy) -> None:
+    assert project.dvc("repro") == set()
+
+
+@pytest.mark.slow
+def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
+    """Forced once more from the history on, every recorded hash stays."""
+    before = (project.folder / "dvc.lock").read_text()
+    reports = {
+        file: file.read_bytes()
+        for file in (project.folder / "reports").rglob("*")
+        if file.is_file()
+    }
+    shutil.rmtree(project.folder / ".checkpoints", ignore_errors=True)
+    ran = project.dvc(
+        "repro",
+        "--force",
+        "--no-run-cache",
+        "--downstream",
+        *sorted(stage for stage in EVERYTHING if stage.startswith("history")),
+    )
+    assert ran == EVERYTHING - {"record@band1", "episode@band1"}
+    assert (project.folder / "dvc.lock").read_text() == before
+    for file, content in reports.items():
+        assert file.read_bytes() == content, file
+
+
+@pytest.mark.slow
+def test_a_variation_of_k_top_keeps_the_history(project: Copy) -> None:
+    project.commit()
+    ran = project.dvc("exp", "run", "-S", "optimizer.k_top=1")
+    assert ran <= AFTER_HISTORY
+    # What follows them runs only where their outputs differ from the ones before.
+    assert ran >= {"clusters@band1-sling2sim2real", "refined@band1-sling2sim2real"}
+    assert {"theta@band1-sling2sim2real"} <= ran
+    content = YAML(typ="safe").load(project.folder / "params.yaml")
+    assert content["optimizer"]["k_top"] == 1

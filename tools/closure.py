@@ -1,0 +1,97 @@
+"""Which project files does a stage run? Checks dvc.yaml's code dependencies, or mends them.
+
+DVC re-runs a stage when a listed file changes; it cannot see Python's imports. This lists every
+project file that a stage's script imports, at any depth and inside functions too, with the native
+sources beside them.
+
+    python tools/closure.py          # says what differs; exit status 1 if anything does
+    python tools/closure.py --fix    # rewrite the code dependencies, comments kept
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import sys
+from pathlib import Path
+
+from ruamel.yaml import YAML
+
+ROOT = Path(__file__).parents[1]
+CODE = ("pipeline/", "stages/")
+NATIVE = (".h", ".cpp")
+
+
+def files_of(module: str, root: Path = ROOT) -> list[Path]:
+    """Files that `import module` runs: the module and its packages; none if it is not ours."""
+    parts = module.split(".")
+    packages = [root.joinpath(*parts[:n], "__init__.py") for n in range(1, len(parts) + 1)]
+    leaf = root.joinpath(*parts).with_suffix(".py")
+    if not (leaf.is_file() or packages[-1].is_file()):
+        return []
+    return [file for file in (*packages, leaf) if file.is_file()]
+
+
+def imports(file: Path, root: Path = ROOT) -> set[Path]:
+    """Project files that `file` imports itself, with native sources that lie beside a module."""
+    package = file.relative_to(root).parent.parts
+    found: set[Path] = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), str(file))):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = [*package[: len(package) + 1 - node.level]] if node.level else []
+            base = ".".join([*base, *filter(None, [node.module])])
+            names = [base, *(f"{base}.{alias.name}" for alias in node.names)]
+        else:
+            continue
+        found.update(file for name in names for file in files_of(name, root))
+    return found
+
+
+def closure(script: Path, root: Path = ROOT) -> list[str]:
+    """All project files that `script` may run, itself included, sorted, relative to `root`."""
+    seen: set[Path] = set()
+    queue = {script}
+    while queue:
+        file = queue.pop()
+        seen.add(file)
+        queue |= imports(file, root) - seen
+    native = {
+        beside for file in seen for beside in file.parent.iterdir() if beside.suffix in NATIVE
+    }
+    return sorted(file.relative_to(root).as_posix() for file in seen | native)
+
+
+def script_of(stage: dict, root: Path = ROOT) -> Path:
+    """The script of `python -m stages.NAME ...`."""
+    return root / (stage["cmd"].split()[2].replace(".", "/") + ".py")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--fix", action="store_true", help="rewrite dvc.yaml")
+    fix = parser.parse_args().fix
+    yaml = YAML()
+    yaml.width, yaml.preserve_quotes = 100, True
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    path = ROOT / "dvc.yaml"
+    content = yaml.load(path)
+    stale = False
+    for name, stage in content["stages"].items():
+        if not script_of(stage).is_file():
+            print(f"{name}: there is no {script_of(stage).relative_to(ROOT)}")
+            return 1
+        code = closure(script_of(stage))
+        listed = [dep for dep in stage["deps"] if dep.startswith(CODE)]
+        for file in sorted(set(listed) ^ set(code)):
+            print(f"{name}: {'-' if file in listed else '+'} {file}")
+        stale |= listed != code
+        stage["deps"][:] = [dep for dep in stage["deps"] if dep not in listed] + code
+    if fix and stale:
+        yaml.dump(content, path)
+    return int(stale and not fix)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

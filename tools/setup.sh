@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# Make .venv with everything the project needs; `make setup` calls this when something changed.
+# Another Python: PYTHON=/path/to/python3.12 make setup
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+fail() { echo "error: $*" >&2; exit 1; }
+
+# apt WHY PACKAGE...: install packages where we may, else print the command and stop.
+apt() {
+    local why=$1 install="apt-get install -y --no-install-recommends ${*:2}"
+    if ! command -v apt-get >/dev/null; then
+        fail "$why: install what Debian calls ${*:2}, then run make again"
+    elif [ "$(id -u)" != 0 ]; then
+        fail "$why. Run: sudo sh -c 'apt-get update && $install', then make again"
+    fi
+    apt-get update -q >&2 && DEBIAN_FRONTEND=noninteractive $install >&2
+}
+
+# Shims answer to names that they cannot run, so each candidate is run.
+python=""
+for candidate in ${PYTHON:-python3.12 python3.11 python3}; do
+    if "$candidate" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))' \
+        2>/dev/null; then
+        python=$candidate
+        break
+    fi
+done
+[ -n "$python" ] || fail "Python 3.11 or 3.12 is needed and ${PYTHON:-python3} is not;" \
+    "install one, or name it: PYTHON=/path/to/python3.12 make setup"
+
+if [ ! -x .venv/bin/pip ]; then
+    "$python" -c 'import ensurepip' 2>/dev/null ||
+        apt "Python's venv is missing" "$("$python" -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')"
+    rm -rf .venv
+    "$python" -m venv .venv
+fi
+.venv/bin/pip install --disable-pip-version-check -q -e '.[dev]' -c constraints.txt
+
+needs_libraries() { ! .venv/bin/python -c 'import open3d' >/dev/null 2>.venv/open3d.log; }
+if needs_libraries; then
+    grep -q 'cannot open shared object' .venv/open3d.log || fail "$(tail -n 1 .venv/open3d.log)"
+    apt "Open3D needs system libraries" libgl1 libegl1 libgomp1 libidn2-0 libusb-1.0-0 libx11-6
+    ! needs_libraries || fail "$(tail -n 1 .venv/open3d.log)"
+fi
+touch .venv/ready

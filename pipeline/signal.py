@@ -1,4 +1,4 @@
-"""The filter and the averaging that measured and simulated forces pass alike (numpy, scipy only)."""
+"""The filter and the averaging that measured and simulated forces pass alike."""
 
 from __future__ import annotations
 

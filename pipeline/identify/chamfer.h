@@ -38,6 +38,7 @@ const float* nodes = line.data + (size_t)item * (EDGES + 1) * 3;
 
 // of each edge: start (3), vector (3), vector / length^2 (3), radius (stretched at constant volume)
 SHARED float tube[EDGES][10];
+SYNC();  // a block may have had another frame before
 for (int e = lane; e < EDGES; e += THREADS) {
   float square = 0.0f;
   for (int c = 0; c < 3; ++c) {

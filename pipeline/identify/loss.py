@@ -136,8 +136,9 @@ class EpisodeLoss:
             if self._cached is None or not np.array_equal(self._cached[0], times):
                 start = self.time[0] - self.period / 2
                 columns = []
-                for chosen in np.array_split(np.eye(len(times)), -(-len(times) // 128), axis=1):
-                    grid, signal = uniform(times, chosen, RATE)
+                for first in range(0, len(times), 128):
+                    pulses = np.eye(len(times), min(128, len(times) - first), -first)
+                    grid, signal = uniform(times, pulses, RATE)
                     signal = lowpass(signal, RATE, self.cutoff)
                     columns.append(average(grid, signal, start, self.period, len(self.time)))
                 self._cached = times, np.hstack(columns)

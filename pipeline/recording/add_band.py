@@ -9,6 +9,8 @@ from pathlib import Path
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.nodes import ScalarNode
+from ruamel.yaml.representer import RoundTripRepresenter
 
 from pipeline.errors import UserError
 from pipeline.files import replacing, write_text
@@ -91,11 +93,17 @@ def _checked(recording: Path, params: Params, name: str) -> dict[str, object]:
     return report.signals
 
 
+def _null(representer: RoundTripRepresenter, _: None) -> ScalarNode:
+    """Written out as it stands in the file, where ruamel would leave it empty."""
+    return representer.represent_scalar("tag:yaml.org,2002:null", "null")
+
+
 def _with_band(path: Path, name: str, band: dict[str, object]) -> str:
     """The text of params.yaml with the band in `bands` and in `run.bands`, all else as it was."""
     yaml = YAML()
     yaml.preserve_quotes = True
     yaml.width = 10_000
+    yaml.representer.add_representer(type(None), _null)
     content = yaml.load(path.read_text(encoding="utf-8"))
     if name not in content["bands"]:
         entry = CommentedMap(band)

@@ -10,6 +10,8 @@ from pipeline.errors import UserError
 
 SIGMAS = 6.0
 LEAST_PULL = 0.5  # N: below it nothing was drawn
+LEAST_STROKE = 0.002  # m: fingers that move less than this did not move
+OPENS = 0.5  # s by which the gripper's topic may come late
 LEAD_IN = 0.2  # s at least
 
 
@@ -106,6 +108,7 @@ def find_grasp(
         UserError: if the band was in the hand from the start.
     """
     if gripper is not None:
+        _let_go(*gripper, release)
         grasp = _closed(*gripper, release)
         if grasp is not None:
             return grasp
@@ -120,6 +123,19 @@ def find_grasp(
     return float(t[rising[0]])
 
 
+def _let_go(t: np.ndarray, opening: np.ndarray, release: float) -> None:
+    """The fingers must open when the force drops. Raises UserError where they stay closed."""
+    after = (t > release) & (t < release + OPENS)
+    held = (t < release) & (t > release - 1.0)
+    if after.sum() < 3 or not held.any() or np.ptp(opening) < LEAST_STROKE:
+        return
+    if opening[after].max() < np.median(opening[held]) + 0.2 * np.ptp(opening):
+        raise UserError(
+            f"the force drops at {release:.3f} s but the gripper stays closed: the band slipped out"
+            " or tore, record again with a firmer grip"
+        )
+
+
 def _closed(t: np.ndarray, opening: np.ndarray, release: float) -> float | None:
     """First sample after which the fingers stay within a tenth of their stroke from closed."""
     before = t < release - 0.05
@@ -127,7 +143,7 @@ def _closed(t: np.ndarray, opening: np.ndarray, release: float) -> float | None:
         return None
     closed = np.median(opening[before & (t > release - 1.0)])
     stroke = np.max(opening[before]) - closed
-    if stroke < 0.002:  # it never moved
+    if stroke < LEAST_STROKE:
         return None
     wide = np.flatnonzero(opening[before] > closed + stroke / 10)
     return float(t[wide[-1] + 1]) if wide[-1] + 1 < before.sum() else None

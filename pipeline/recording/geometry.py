@@ -1,4 +1,4 @@
-"""Where everything stands: the robot's base, the cameras and the force sensor, by /tf_static or params."""
+"""Where base, cameras and force sensor stand, by params or /tf_static."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.errors import UserError
-from pipeline.recording.frames import Transform
+from pipeline.recording.frames import Transform, TransformTree
 from pipeline.recording.reader import Recording
 
 FORK = "fork"
@@ -85,8 +85,8 @@ def _between_cameras(recording: Recording, color_frame: str, depth_frame: str) -
     return found
 
 
-def _tool_frame(tree, wrench_frame: str) -> str:
-    """PoseStamped does not say which frame it moves: one named like a tool, else the sensor's root."""
+def _tool_frame(tree: TransformTree, wrench_frame: str) -> str:
+    """PoseStamped does not say which frame moves: one named like a tool, else the root."""
     rigid = [frame for frame in tree.frames if tree.between(frame, wrench_frame) is not None]
     named = [frame for frame in rigid if set(frame.lower().split("_")) & set(TOOLS)]
     roots = [frame for frame in rigid if tree.is_root(frame)]

@@ -59,9 +59,7 @@ def depth(message: object) -> np.ndarray:
     if "rvl" in message.format.lower():
         raise Undecodable("compressedDepth in RVL is not supported, record it as PNG")
     _, scale, offset = DEPTH_HEADER.unpack_from(bytes(message.data[: DEPTH_HEADER.size]))
-    packed = _unpacked(
-        message.data[DEPTH_HEADER.size :], cv2.IMREAD_UNCHANGED, message.format
-    )
+    packed = _unpacked(message.data[DEPTH_HEADER.size :], cv2.IMREAD_UNCHANGED, message.format)
     if not message.format.startswith("32FC1"):
         return _metres(packed)
     with np.errstate(divide="ignore"):

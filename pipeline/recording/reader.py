@@ -96,7 +96,8 @@ class Recording:
 
     @property
     def streams(self) -> dict[str, Stream]:
-        found = {role: getattr(self, role) for role in ("wrench", "pose", "gripper", "color", "depth")}
+        roles = ("wrench", "pose", "gripper", "color", "depth")
+        found = {role: getattr(self, role) for role in roles}
         return {role: stream for role, stream in found.items() if stream}
 
 

@@ -59,9 +59,7 @@ class Signals:
         return float(np.nan_to_num(np.interp(time, self.time, self.opening)))
 
 
-def signals_of(
-    recording: Recording, geometry: Geometry, episode: object, force: object
-) -> Signals:
+def signals_of(recording: Recording, geometry: Geometry, episode: object, force: object) -> Signals:
     """Turn raw streams into samples. `episode` and `force` are those sections of params.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Camera frames as the mask sees them: the part of the picture where the band can be, in frame O."""
+"""Camera frames as the mask sees them: where the band can be, in frame O."""
 
 from __future__ import annotations
 
@@ -155,8 +155,9 @@ class View:
 
     def _registered(self, color: np.ndarray) -> bool:
         a, b = self.recording.color_camera, self.recording.depth_camera
-        same = a.frame == b.frame and color.shape[:2] == (b.height, b.width)
-        return same and np.allclose(a.matrix, b.matrix) and np.array_equal(a.distortion, b.distortion)
+        if a.frame != b.frame or color.shape[:2] != (b.height, b.width):
+            return False
+        return np.allclose(a.matrix, b.matrix) and np.array_equal(a.distortion, b.distortion)
 
     def _window(self) -> tuple[slice, slice]:
         """The rectangle of the depth image that sees where the band can be."""

@@ -99,16 +99,19 @@ def radius(string: ElasticString, line: np.ndarray) -> np.ndarray:
 
 
 class Clock:
-    """When messages are received: late, and jittering as best-effort networks do."""
+    """When messages are received: late and jittering, each source's in their order."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng = rng
+        self.last: dict[str, int] = {}
 
     def __call__(self, time: float, source: str) -> tuple[int, int]:
         """Stamp and time of receipt [ns] of a message of `time` [s]."""
         stamp = EPOCH + round(time * 1e9)
         jitter = self.rng.exponential(JITTER[source]) if source in JITTER else 0
-        return stamp, stamp + DELAYS[source] + round(jitter)
+        received = stamp + DELAYS[source] + round(jitter)
+        self.last[source] = max(received, self.last.get(source, 0))
+        return stamp, self.last[source]
 
 
 def add_frames(bag: BagWriter, robot: Robot, believed: Camera) -> None:

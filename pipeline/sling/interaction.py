@@ -107,7 +107,7 @@ def interact(
     result = run(
         sling,
         schedule,
-        material(thetas, sling.radius),
+        material(sling, thetas),
         hanging_guess(sling),
         np.zeros((len(thetas), 16)),
         frame_steps=frame_steps,

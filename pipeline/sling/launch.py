@@ -11,11 +11,11 @@ from pipeline.sling.solver import (
     DIRECTION,
     FAILURE,
     FREE,
-    HELD,
     LEAVING,
     LEFT,
     OFFSET,
     PAYLOAD,
+    POUCH,
     RELAX,
     Schedule,
     run,
@@ -56,8 +56,7 @@ def ballistic_landing(y, z, vy, vz, floor: float):
 
 def schedule_of(sling: Sling, refine: int = 1) -> Schedule:
     """Relax at the draw, then recoil in second-order steps."""
-    relax = steps(np.arange(RELAX_STEPS + 1) * 0.05, 0.05, hold=HELD, mode=RELAX)
-    relax[:, 9] = 1e9  # no pads in a launch: it cannot slip
+    relax = steps(np.arange(RELAX_STEPS + 1) * 0.05, 0.05, hold=POUCH, mode=RELAX)
     relax[:, 10] = 1.0
     h = sling.steps.launch_step / refine
     count = int(round(sling.steps.launch_time / h))
@@ -95,7 +94,7 @@ def launch(
     result = run(
         sling,
         schedule_of(sling, refine),
-        material(thetas, sling.radius),
+        material(sling, thetas),
         np.stack([drawn_guess(sling, draw) for draw in draws]),
         lane_state,
         payload=True,

@@ -27,6 +27,8 @@ class Sling:
         fork_height: Of the tips above the floor [m].
         clamp_direction: Unit vector along which the band leaves the tip at -x, shape (3,); it leaves
             the other tip along the mirror image.
+        flexural_rigidity: E I of the band where it was measured [N m^2]; None takes a solid round
+            band's, which follows Young's modulus.
         projectile_mass, grip_force, finger_opening_time: As in params.yaml `setup` [kg, N, s].
         steps: The step sizes, as in params.yaml `sling`.
     """
@@ -38,15 +40,23 @@ class Sling:
     half_width: float
     fork_height: float
     clamp_direction: np.ndarray
+    flexural_rigidity: float | None
     projectile_mass: float
     grip_force: float
     finger_opening_time: float
     steps: object
 
     @classmethod
-    def of(cls, band, setup, resolution) -> Sling:
-        """Make it from params.yaml's `bands.<band>`, `setup` and `sling`."""
-        direction = np.asarray(setup.clamp_direction, float)
+    def of(cls, band, setup, resolution, mounting: dict | None = None) -> Sling:
+        """Make it from params.yaml's `bands.<band>`, `setup` and `sling`.
+
+        Args:
+            mounting: What the slack band shows of itself (pipeline/identify/mounting.py):
+                `clamp_direction` and `flexural_rigidity`; without it, the setup's clamp direction
+                and a solid round band.
+        """
+        mounting = mounting or {}
+        direction = np.asarray(mounting.get("clamp_direction", setup.clamp_direction), float)
         return cls(
             edges=resolution.edges,
             rest_length=band.rest_length,
@@ -55,6 +65,7 @@ class Sling:
             half_width=setup.fork_width / 2,
             fork_height=setup.fork_height,
             clamp_direction=direction / np.linalg.norm(direction),
+            flexural_rigidity=mounting.get("flexural_rigidity"),
             projectile_mass=setup.projectile_mass,
             grip_force=setup.grip_force,
             finger_opening_time=setup.finger_opening_time,
@@ -83,7 +94,7 @@ class Sling:
         return np.array([[-self.half_width, 0.0, 0.0], [self.half_width, 0.0, 0.0]])
 
 
-def material(thetas: np.ndarray, radius: float) -> np.ndarray:
+def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
     """Parameters of rod.h for physical thetas (N, 5): mu, lam, d, s, 2 x friction, cb; shape (N, 6).
 
     mu is the shear modulus and lam the volume modulus of the stable neo-Hookean law without its
@@ -93,7 +104,10 @@ def material(thetas: np.ndarray, radius: float) -> np.ndarray:
     young, poisson, damping, friction, scale = np.asarray(thetas, float).T
     mu = young / (2 * (1 + poisson))
     lam = young * poisson / ((1 + poisson) * (1 - 2 * poisson)) + mu
-    bending = (1 + poisson) * radius**2 / 2
+    if sling.flexural_rigidity is None:
+        bending = (1 + poisson) * sling.radius**2 / 2
+    else:
+        bending = sling.flexural_rigidity / (mu * sling.area)
     return np.stack([mu, lam, damping, scale, 2 * friction, bending], axis=1)
 
 
@@ -112,11 +126,14 @@ def clamp_tangents(sling: Sling) -> np.ndarray:
     return np.array([first, [first[0], -first[1], -first[2]]])
 
 
-def clamp_frames(sling: Sling) -> np.ndarray:
-    """Directors a, b in the first and the last clamp, shape (2, 2, 3); a x b points along the band."""
+def fixed_frames(sling: Sling) -> np.ndarray:
+    """Directors a, b in the first clamp, the last and the fingers, shape (3, 2, 3).
+
+    a x b points along the band; the fingers hold it along the fork.
+    """
     normal = np.array([0.0, 1.0, 0.0])
     frames = []
-    for tangent in clamp_tangents(sling):
+    for tangent in [*clamp_tangents(sling), np.array([1.0, 0.0, 0.0])]:
         a = normal - (normal @ tangent) * tangent
         if np.linalg.norm(a) < 1e-6:
             a = np.array([0.0, 0.0, 1.0])
@@ -127,7 +144,7 @@ def clamp_frames(sling: Sling) -> np.ndarray:
 
 def layers_of(sling: Sling, nodes: np.ndarray) -> np.ndarray:
     """Unknowns (layers, 9) of a band through `nodes` (layers, 3): stretched edges thin evenly."""
-    frames = clamp_frames(sling)
+    frames = fixed_frames(sling)
     tangents = clamp_tangents(sling)
     state = np.zeros((sling.layers, 9))
     state[:, :3] = nodes

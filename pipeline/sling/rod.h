@@ -80,16 +80,17 @@ real attached = AT(LANE, 0), failure = AT(LANE, 4), payload = AT(LANE, 9);
 for (int step = first_step; step < last_step; ++step) {
   const SC* T = schedule.data + (size_t)step * 12;
   const SC h = T[0], c1 = T[1], c2 = T[2], bh = T[3] * h;  // beta h
-  const int mode = (int)T[4], hold = (int)T[5];            // mode 0: relax; hold 0: free, 1: held, 2: opening
+  const int mode = (int)T[4], hold = (int)T[5];            // mode 0: relax; hold 0: free, 1: held,
+                                                           // 2: fingers opening, 3: held in a pouch
   const SC limit = T[9], blend = T[10], time = T[11];
   const SC ibh = (SC)1 / bh, ibh2 = ibh * ibh;
 
   // the hand takes hold of the band where it is, and leads it to its own path
-  if (hold == 1) for (int c = 0; c < 3; ++c) {
+  if (hold == 1 || hold == 3) for (int c = 0; c < 3; ++c) {
     const real first = one - attached;
     AT(LANE, 6 + c) = first * (AT(X1, MID * N + c) - T[6 + c]) + attached * AT(LANE, 6 + c);
   }
-  if (hold == 1) attached = one;
+  if (hold == 1 || hold == 3) attached = one;
   if (hold == 0) attached = zero;
 
   // predicted state
@@ -104,7 +105,7 @@ for (int step = first_step; step < last_step; ++step) {
     const real x = attached > zero ? target : AT(X, j);
     AT(X, j) = x; AT(XP, j) = x;
   }
-  const real freed = one - attached;
+  const real freed = one - attached, gripped = hold == 3 ? zero : attached;
 
   real residual_mid[3], reaction[3], before_mid[3][N], at_mid[6][3], after_mid[3][3], change = zero, settled = failure != zero ? one : zero, shift = zero;
   for (int c = 0; c < 3; ++c) reaction[c] = zero;
@@ -197,12 +198,17 @@ for (int step = first_step; step < last_step; ++step) {
             else D[3 * k + m][3 * l + n] += v;
           }
         }
-        // ---- joints: at node i + 1, and at the first clamp; 0, 1 are a, b of the side before, 2, 3 after
-        for (int end = (i == 0 ? -1 : 0); end < 1; ++end) {
+        // ---- joints; 0, 1 are a, b of the side before, 2, 3 of the side after. One side may be a frame that
+        // does not move: a clamp, or the fingers, which hold the middle node's direction while they hold it
+        for (int kind = 0; kind < 4; ++kind) {  // 0: to the next edge, 1: clamp before, 2: fingers after, 3: before
+          if ((kind == 1 && i != 0) || (kind == 2 && i != MID - 1) || (kind == 3 && i != MID)) continue;
+          const int frame = kind == 0 ? -1 : (kind == 1 ? 0 : 12);
+          const bool fixed_before = kind == 1 || kind == 3, fixed_after = kind == 2;
           real y[4][3], yp[4][3], yt[4][3];
           for (int v = 0; v < 4; ++v) for (int c = 0; c < 3; ++c) {
-            const int layer = v < 2 ? i + end : i + end + 1, j = layer * N + 3 + 3 * (v % 2) + c;
-            if (layer < 0) { y[v][c] = yp[v][c] = zero + clamp.data[3 * v + c]; yt[v][c] = zero; }
+            const bool fixed = v < 2 ? fixed_before : fixed_after;
+            const int layer = v < 2 || fixed_before ? i : i + 1, j = layer * N + 3 + 3 * (v % 2) + c;
+            if (fixed) { y[v][c] = yp[v][c] = zero + clamp.data[frame + 3 * (v % 2) + c]; yt[v][c] = zero; }
             else {
               y[v][c] = AT(X, j); yp[v][c] = AT(XP, j);
               yt[v][c] = (y[v][c] - (c1 * AT(X1, j) - c2 * AT(X2, j))) * ibh;
@@ -217,20 +223,22 @@ for (int step = first_step; step < last_step; ++step) {
           for (int v = 0; v < 4; ++v) {
             twist += dot(tw[v], y[v]) + d * s * dot(tw[v], yt[v]); size += dot(tw[v], tw[v]);
           }
-          const SC weight = (end < 0 || i == L - 2) ? (SC)2 : (SC)1;  // a clamp is half an edge away
+          real weight = zero + (kind > 0 || i == L - 2 ? (SC)2 : (SC)1);  // a fixed frame is half an edge away
+          if (kind == 0 && i == MID - 1) weight = weight * (one - gripped);
+          if (kind > 1) weight = weight * gripped;
           const real k = mu * (weight * area / ds), kb = k * cb;
           const real kt = minimum((SC)2 * (kb - k * ct), (SC)1.9 * kb / maximum(size, zero + (SC)1e-3));
           const real hb = kb * (one + dsh), ht = kt * (one + dsh);
           for (int v = 0; v < 4; ++v) {
-            if (v < 2 && end < 0) continue;
+            if (v < 2 ? fixed_before : fixed_after) continue;
             for (int c = 0; c < 3; ++c) {
               const int w = (v + 2) % 4;
               const real force = kb * (y[v][c] - y[w][c] + d * s * (yt[v][c] - yt[w][c])) - kt * twist * tw[v][c];
               const int m = 3 + 3 * (v % 2) + c;
-              const bool here = v < 2 || end < 0;
+              const bool here = v < 2 || fixed_before;
               if (here) { r[m] += force; D[m][m] += hb; } else { r1[m] += force; D1[m][m] += hb; O[m][m] -= hb; }
               for (int u = 0; u <= v; ++u) {
-                if (u < 2 && end < 0) continue;
+                if (u < 2 && fixed_before) continue;
                 for (int n = 0; n < 3; ++n) {
                   const real value = -ht * tw[v][c] * tw[u][n];
                   const int m2 = 3 + 3 * (u % 2) + n;

@@ -8,7 +8,7 @@ from threading import Lock
 
 import numpy as np
 
-from pipeline.sling.model import GRAVITY, Sling, clamp_frames
+from pipeline.sling.model import GRAVITY, Sling, fixed_frames
 
 _compiling = Lock()
 LANES = {"cpu": 16, "cuda": 32}
@@ -34,7 +34,7 @@ class Schedule:
 
 
 RELAX, MOVE = 0, 1
-FREE, HELD, OPENING = 0, 1, 2
+FREE, HELD, OPENING, POUCH = 0, 1, 2, 3
 
 
 def steps(times, previous: float, *, hold: int, order: int = 1, mode: int = MOVE) -> np.ndarray:
@@ -130,7 +130,7 @@ def run(
     n_frames = len(frame_steps)
     blocks = [_interleave(rows, lanes, dtype) for rows in (parameters, states, lane_state)]
     n_blocks = len(blocks[0])
-    shared = [geometry, clamp_frames(sling).astype(dtype).ravel(), table.ravel(), first, weights]
+    shared = [geometry, fixed_frames(sling).astype(dtype).ravel(), table.ravel(), first, weights]
     shared = [wp.array(array, device=device) for array in shared]
 
     def slice_of(part: slice):

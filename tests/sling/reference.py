@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.sling.model import GRAVITY, clamp_frames, material
+from pipeline.sling.model import GRAVITY, fixed_frames, material
 
 
 def energy(sling, theta, layers: np.ndarray) -> float:
     """Elastic and gravitational energy [J] of one band in state `layers` (L, 9)."""
-    mu, lam, _, _, _, bending = material(np.array([theta]), sling.radius)[0]
+    mu, lam, _, _, _, bending = material(sling, np.array([theta]))[0]
     torsion, ds, area = sling.radius**2 / 4, sling.edge_length, sling.area
     nodes, a, b = layers[:, :3], layers[:-1, 3:6], layers[:-1, 6:9]
     g = np.diff(nodes, axis=0) / ds
@@ -18,7 +18,7 @@ def energy(sling, theta, layers: np.ndarray) -> float:
     total = (
         mu / 2 * (squares - 3) - mu * (volume_ratio - 1) + lam / 2 * (volume_ratio - 1) ** 2
     ).sum() * (area * ds)
-    frames = clamp_frames(sling)
+    frames = fixed_frames(sling)[:2]
     a = np.vstack([frames[:1, 0], a, frames[1:, 0]])
     b = np.vstack([frames[:1, 1], b, frames[1:, 1]])
     weight = np.ones(len(a) - 1)

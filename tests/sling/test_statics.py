@@ -21,7 +21,7 @@ def relaxed(sling, theta, start, double=True):
     result = run(
         sling,
         Schedule(table, first_free=0),
-        material(np.array([theta]), sling.radius),
+        material(sling, np.array([theta])),
         start,
         np.zeros((1, 16)),
         double=double,
@@ -36,7 +36,7 @@ def test_pull_force_is_that_of_a_neo_hookean_string(sling, young, poisson):
     """Within 0.5 % of 2 A mu (l - J/l^2) cos, J = 1 + mu/lam (1 - 1/l), where bending is small."""
     light = replace(sling, mass=1e-4, projectile_mass=1e-6)
     theta = [young, poisson, 2e-3, 0.5, 1.0]
-    mu, lam = material(np.array([theta]), sling.radius)[0, :2]
+    mu, lam = material(sling, np.array([theta]))[0, :2]
     for depth in (0.40, 0.55):
         half = np.hypot(depth, sling.half_width)
         stretch = 2 * half / sling.rest_length

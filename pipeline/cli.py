@@ -57,7 +57,7 @@ def parser() -> argparse.ArgumentParser:
         return sub
 
     sub = command(run_add_band, "check a recording and add its band to params.yaml")
-    sub.add_argument("name", help="what to call the band: letters, digits and _")
+    sub.add_argument("name", help="what to call the band: small letters, digits and _")
     sub.add_argument("--recording", type=Path, required=True, metavar="FILE.mcap")
     sub.add_argument("--mass", type=positive, required=True, metavar="KG", help="on a scale")
     sub.add_argument("--diameter", type=positive, default=0.010, metavar="M", help="default 0.010")
@@ -137,13 +137,14 @@ def readable(value: object) -> str:
 def run_add_band(arguments: argparse.Namespace) -> tuple[str, int]:
     from pipeline.recording.add_band import add_band
 
-    add_band(
+    done = add_band(
         arguments.name,
         arguments.recording,
         mass=arguments.mass,
         diameter=arguments.diameter,
         rest_length=arguments.rest_length,
     )
+    return done, 0
 
 
 def run_check(arguments: argparse.Namespace) -> tuple[str, int]:
@@ -151,13 +152,13 @@ def run_check(arguments: argparse.Namespace) -> tuple[str, int]:
     from pipeline.recording.check import check_recording
 
     report = check_recording(arguments.recording, load())
-    return (report.to_json() if arguments.json else report.to_text()), 0
+    return report.to_json() if arguments.json else report.to_text(), int(not report.usable)
 
 
 def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
     from pipeline.params import load
     from pipeline.sling.launch import launch
-    from pipeline.sling.model import Sling
+    from pipeline.sling.model import load_sling
     from pipeline.theta import load_theta, vector
 
     params = load()
@@ -165,7 +166,7 @@ def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
         known = ", ".join(params.bands)
         raise UserError(f"band {arguments.band}: not in params.yaml, which has {known}")
     theta = vector(load_theta(arguments.theta, arguments.band))
-    sling = Sling.of(params.bands[arguments.band], params.setup, params.sling)
+    sling = load_sling(params, arguments.band)
     result = launch(sling, theta, arguments.draw, max_force=params.setup.max_force)
     return shown(
         {

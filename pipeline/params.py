@@ -280,7 +280,7 @@ class Rig(Section):
     seed: Seed
     edges: Annotated[int, Range(4, 1000)]
     tolerance: Annotated[float, Range(1e-10, 1e-3)]
-    pad_friction: Annotated[float, Range(1e-3, 10)]
+    pad_friction: Annotated[float, Range(0.05, 10)]
     tracking_error: Annotated[float, Range(0, 0.01)]
     projectile_drag: Annotated[float, Range(0, 0.01)]
     base: Pose

@@ -1,6 +1,6 @@
 """Record one of the virtual rig's bands: data/raw/<band>.mcap.
 
-    python -m stages.record band1
+python -m stages.record band1
 """
 
 from __future__ import annotations

@@ -58,7 +58,8 @@ def test_attributes_are_the_keys_of_the_file() -> None:
             for key, value in node.items():
                 compare(value, view[key] if isinstance(view, dict) else getattr(view, key))
         elif isinstance(node, list):
-            assert list(view) == node
+            for value, entry in zip(node, view, strict=True):
+                compare(value, entry)
         else:
             assert view == node
 

@@ -101,6 +101,19 @@ class EpisodeLoss:
             device=device,
         )
 
+    @classmethod
+    def plain(cls, params, episode: Episode, sling) -> EpisodeLoss:
+        """Geometry and force alone, for a part of an episode."""
+        return cls(
+            episode,
+            radius=sling.radius,
+            rest_length=sling.rest_length,
+            weights={"geom": 1.0, "force": 1.0, "work": 0.0, "taut": 0.0},
+            cutoff=cutoff_hz(params.force.cutoff, params.force.cutoff_unit),
+            median_window=params.loss.median_window,
+            symmetric=params.loss.chamfer == "symmetric",
+        )
+
     def terms(self, rollouts) -> dict[str, np.ndarray]:
         """Each term of N rollouts, shape (N,); NaN or infinite where a rollout is.
 

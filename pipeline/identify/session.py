@@ -24,7 +24,7 @@ from pipeline.identify.loss import EpisodeLoss
 from pipeline.identify.progress import Progress
 from pipeline.identify.space import Space
 from pipeline.sling import model as sling_module
-from pipeline.sling.model import Sling
+from pipeline.sling.model import load_sling, mounting_path
 
 SOURCES = (
     Path(__file__).parent,
@@ -47,6 +47,7 @@ def session(
         fingerprint(
             *SOURCES,
             *(folder / name for name in ("signals.parquet", "clouds.parquet")),
+            mounting_path(band),
             *(
                 section.model_dump_json()
                 for section in (
@@ -73,13 +74,8 @@ def evaluator(params, band: str, method: str) -> Evaluator:
     for section, key in (("bands", band), ("methods", method)):
         if key not in getattr(params, section):
             raise UserError(f"params.yaml has no {section}.{key}")
-    try:
-        episode = Episode.load(Path("data/episodes", band))
-    except FileNotFoundError as error:
-        raise UserError(
-            f"{error.filename}: missing; `dvc repro episode@{band}` makes it"
-        ) from error
-    sling = Sling.of(params.bands[band], params.setup, params.sling)
+    episode = load_episode(band)
+    sling = load_sling(params, band)
     return Evaluator(
         episode,
         sling,
@@ -88,6 +84,16 @@ def evaluator(params, band: str, method: str) -> Evaluator:
         device=device(),
         workers=workers(),
     )
+
+
+def load_episode(band: str) -> Episode:
+    """The recorded episode of a band. Raises UserError where it is missing."""
+    try:
+        return Episode.load(Path("data/episodes", band))
+    except FileNotFoundError as error:
+        raise UserError(
+            f"{error.filename}: missing; `dvc repro episode@{band}` makes it"
+        ) from error
 
 
 def device() -> str:

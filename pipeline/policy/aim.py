@@ -96,14 +96,16 @@ def aim(
     }
 
 
-def simulator(params, band: str, theta: np.ndarray, max_force: float = np.inf):
+def simulator(
+    params, band: str, theta: np.ndarray, max_force: float = np.inf, root: str | Path = "."
+):
     """Function that launches draws, shape (N, 2) [m], in the simulator calibrated with `theta`."""
     import os
 
     from pipeline.sling.launch import launch
-    from pipeline.sling.model import Sling
+    from pipeline.sling.model import load_sling
 
-    sling = Sling.of(params.bands[band], params.setup, params.sling)
+    sling = load_sling(params, band, root)
     workers = os.cpu_count() or 1
 
     def launcher(draws: np.ndarray):

@@ -55,24 +55,26 @@ def add_band(
     recording, params_path = Path(recording), Path(params_path)
     raw = Path(root, "data", "raw", f"{name}.mcap")
     before = load(params_path)
-    text = _with_band(
-        params_path,
-        name,
-        {"source": "recording", "mass": mass, "diameter": diameter, "rest_length": rest_length},
-    )
-    after = parse(text, str(params_path))
-    known = before.bands.get(name)
-    if known is not None and known != after.bands[name]:
+    band = {
+        "source": "recording",
+        "mass": mass,
+        "diameter": diameter,
+        "rest_length": rest_length,
+    }
+    known = name in before.bands
+    if known and before.bands[name].model_dump() != band:
         raise UserError(
             f"{params_path}: bands.{name} is there already with other values: choose another name,"
             " or edit it"
         )
+    text = _with_band(params_path, name, band)
+    after = parse(text, str(params_path))
     if not recording.is_file():
         raise UserError(f"{recording}: no such file")
     same = raw.exists() and sha256(raw) == sha256(recording)
     if raw.exists() and not same:
         raise UserError(f"{raw} is there already with other content: choose another name")
-    if same and known is not None and name in before.run.bands:
+    if same and known and name in before.run.bands:
         return f"{name} is there already: nothing to do"
 
     facts = _checked(recording, after, name)

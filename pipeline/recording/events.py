@@ -10,6 +10,7 @@ from pipeline.errors import UserError
 
 SIGMAS = 6.0
 LEAST_PULL = 0.5  # N: below it nothing was drawn
+SUDDEN = 0.5  # share of the drop that a release takes within a few hundredths of a second
 LEAST_STROKE = 0.002  # m: fingers that move less than this did not move
 OPENS = 0.5  # s by which the gripper's topic may come late
 LEAD_IN = 0.2  # s at least
@@ -58,13 +59,14 @@ def find_release(t: np.ndarray, force: np.ndarray) -> Release:
     before = (sums[center - near + 1] - sums[center - far]) / (far - near + 1)
     after = (sums[center + far + 1] - sums[center + near]) / (far - near + 1)
     jump = np.linalg.norm(before - after, axis=1)
-    coarse = center[int(np.argmax(jump))]
+    steepest = int(np.argmax(jump))
+    coarse = center[steepest]
 
     quiet = slice(max(0, coarse - 6 * far), coarse - far)
     settled = slice(min(coarse + far, len(t) - 1), min(coarse + 6 * far, len(t)))
     hold, free = force[quiet].mean(axis=0), force[settled].mean(axis=0)
     drop = float(np.linalg.norm(hold - free))
-    if drop < LEAST_PULL:
+    if drop < LEAST_PULL or jump[steepest] < SUDDEN * drop:
         raise UserError(
             f"the force never drops by {LEAST_PULL} N at once: no release of a drawn band is in it"
         )
@@ -77,19 +79,24 @@ def find_release(t: np.ndarray, force: np.ndarray) -> Release:
     half = window.start + int(np.argmax(along[window] < level - drop / 2))
     held = np.flatnonzero(along[:half] > level - threshold)
     first = int(held[-1]) + 1 if len(held) else half
-    return Release(_onset(t, along, first, level, drop), period, hold, noise, drop)
+    fall = (level - along) / drop
+    return Release(_onset(t, fall, first, threshold / drop), period, hold, noise, drop)
 
 
-def _onset(t: np.ndarray, along: np.ndarray, first: int, level: float, drop: float) -> float:
-    """Follow the first third of the fall back to the held level."""
+def _onset(t: np.ndarray, fall: np.ndarray, first: int, threshold: float) -> float:
+    """Follow the first third of the fall (0 held, 1 gone) back to where it began."""
     last = first
-    while last + 1 < len(t) and along[last] > level - drop / 3:
+    while last + 1 < len(t) and fall[last] < 1 / 3:
         last += 1
-    if last - first < 1:  # all at once: the first sample that has fallen
+    if last == first and fall[first + 1] - fall[first] > 1 / 4:
+        last += 1  # still falling: two samples tell how fast
+    if last == first:
+        return float(t[first])  # all at once: the first sample that has fallen
+    slope, offset = np.polyfit(t[first : last + 1] - t[first], fall[first : last + 1], 1)
+    if slope <= 0:
         return float(t[first])
-    slope, offset = np.polyfit(t[first : last + 1] - t[first], along[first : last + 1], 1)
-    back = (level - offset) / slope if slope < 0 else 0.0
-    return float(t[first] + np.clip(back, t[first - 1] - t[first] - 0.01, 0.0))
+    earliest = t[first - 1] - threshold / slope  # the sample before had hardly fallen
+    return float(np.clip(t[first] - offset / slope, earliest, t[first]))
 
 
 def find_grasp(

@@ -33,9 +33,9 @@ def replay(params, band: str, episode: Episode, theta: np.ndarray) -> Replay:
         UserError: θ fails in simulation.
     """
     from pipeline.sling.interaction import interact
-    from pipeline.sling.model import Sling
+    from pipeline.sling.model import load_sling
 
-    sling = Sling.of(params.bands[band], params.setup, params.sling)
+    sling = load_sling(params, band)
     rollouts = interact(sling, episode, theta[None])
     if rollouts.failure[0]:
         raise UserError(f"theta of {band}: {rollouts.failure[0]}; `dvc repro theta` makes it anew")

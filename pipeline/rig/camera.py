@@ -1,4 +1,4 @@
-"""The RGB-D camera: rays through a pinhole, Lambert's shading without shadows, time-of-flight flaws.
+"""The RGB-D camera: rays through a pinhole, shading without shadows, flaws of time of flight.
 
 Depth is registered to colour: both share one optical frame (x right, y down, z ahead).
 """
@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.rig.scene import Mesh
+from pipeline.rig.sensors import direction
 
 if TYPE_CHECKING:
     from pipeline.params import RigCamera
@@ -27,7 +28,7 @@ EDGE = 0.03  # m between neighbours, from which on pixels are unsure
 
 @dataclass(frozen=True)
 class Picture:
-    """Colour (H, W, 3) from 0 to 1, RGB, and depth along the optical axis (H, W) [m], inf: nothing."""
+    """RGB from 0 to 1 (H, W, 3), and depth along the optical axis (H, W) [m], inf for nothing."""
 
     color: np.ndarray
     depth: np.ndarray
@@ -62,8 +63,8 @@ class Camera:
     def misplaced(self, settings: RigCamera, rng: np.random.Generator) -> Camera:
         """Where a calibration with small errors believes the camera to be."""
         return Camera(
-            self.position + rng.normal(0, settings.translation_error, 3),
-            self.rotation * Rotation.from_rotvec(rng.normal(0, settings.rotation_error, 3)),
+            self.position + settings.translation_error * direction(rng),
+            self.rotation * Rotation.from_rotvec(settings.rotation_error * direction(rng)),
             self.focal,
             self.size,
         )
@@ -116,9 +117,7 @@ def exposed(color: np.ndarray, settings: RigCamera, rng: np.random.Generator) ->
     return np.clip(255 * color + noise, 0, 255).astype(np.uint8)
 
 
-def measured_depth(
-    depth: np.ndarray, settings: RigCamera, rng: np.random.Generator
-) -> np.ndarray:
+def measured_depth(depth: np.ndarray, settings: RigCamera, rng: np.random.Generator) -> np.ndarray:
     """Millimetres as a time-of-flight camera gives them, 0: none; uint16 (H, W).
 
     Noise grows with the square of the distance; at edges some pixels are lost and some fly between

@@ -1,4 +1,4 @@
-"""The recorded interaction in the rig's own physics: hang, grasp, lift, pull, pause, slip, swing."""
+"""The recorded interaction in the rig's physics: hang, grasp, lift, pull, pause, slip, swing."""
 
 from __future__ import annotations
 

@@ -42,8 +42,8 @@ def launch(
     """Launch from the commanded draw (y, z).
 
     Args:
-        trial_seed: Of the actuation error (`trials.actuation_error`, normal in y and z): equal seeds
-            give every method the same error. None: none.
+        trial_seed: Of the actuation error (`trials.actuation_error`, normal in y and z); equal
+            seeds give every method the same error. None: no error.
     """
     aim = np.array([0.0, *draw])
     if trial_seed is not None:
@@ -59,9 +59,7 @@ def launch_from(string: ElasticString, params: Params, aim: np.ndarray) -> Trial
     if np.linalg.norm(aim - string.clamps[0]) <= taut:
         return Trial(float("nan"), "too short: the drawn band is slack", 0.0)
     _, stress, memory = pulled(string, aim)
-    y = string.at_rest(
-        bent_at(string, aim), tolerance, held=True, memory=memory[-1] / stress[-1]
-    )
+    y = string.at_rest(bent_at(string, aim), tolerance, held=True, memory=memory[-1] / stress[-1])
     hold_force = float(np.linalg.norm(string.on_hand(y, np.zeros(3))))
     limit = params.setup.max_force
     if hold_force > limit:

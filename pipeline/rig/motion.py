@@ -1,4 +1,4 @@
-"""What the robot does: a path through waypoints, small tracking errors, fingers that close and open.
+"""What the robot does: a path through waypoints, tracking errors, fingers that close and open.
 
 Positions are of the tool centre point between the finger tips, in frame O. Each leg is a cubic
 with rest at both ends; smooth wander is added to what is commanded, and the pose reports the sum.
@@ -70,7 +70,7 @@ class Motion:
         )
 
     def position(self, time: np.ndarray | float, derivative: int = 0) -> np.ndarray:
-        """Position, velocity or acceleration (derivative 0, 1, 2) at times (...), shape (..., 3)."""
+        """Position, or a derivative of it by time, at times (...) [s], shape (..., 3)."""
         rate = 2 * np.pi * self.frequency
         angle = rate * np.asarray(time)[..., None, None] + self.phase + derivative * np.pi / 2
         wander = np.sum(self.amplitude * rate**derivative * np.sin(angle), axis=-2)

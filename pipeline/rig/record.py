@@ -138,9 +138,7 @@ def add_frames(bag: BagWriter, robot: Robot, believed: Camera) -> None:
                 robot.in_base(believed.position),
                 robot.base.inv() * believed.rotation,
             ),
-            transform(
-                "panda_hand_tcp", "ft_sensor", [0, 0, -SENSOR_LEVER], robot.sensor_in_tool
-            ),
+            transform("panda_hand_tcp", "ft_sensor", [0, 0, -SENSOR_LEVER], robot.sensor_in_tool),
         ]
     )
     bag.add("/tf_static", message, EPOCH, EPOCH)

@@ -1,8 +1,8 @@
 """The rig's rubber: Ogden's law in the shape of Treloar's vulcanised rubber, with relaxation.
 
-Nominal stress at stretch l:  P(l) = sum_i mu_i (l^(a_i - 1) - l^(-a_i/2 - 1))      (incompressible)
-Quasi-linear viscoelasticity: sigma(t) = P + sum_k g_k (P - w_k) + eta dP/dt,  w_k' = (P - w_k)/tau_k
-so a branch k carries g_k P at once and forgets it over tau_k, and eta is the loss of what is faster.
+Nominal stress at stretch l (incompressible): P(l) = sum_i mu_i (l^(a_i - 1) - l^(-a_i/2 - 1))
+Quasi-linear viscoelasticity: sigma = P + sum_k g_k (P - w_k) + eta dP/dt, w_k' = (P - w_k)/tau_k
+so that branch k carries g_k P at once and forgets it over tau_k; eta stands for what is faster.
 """
 
 from __future__ import annotations

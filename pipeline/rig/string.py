@@ -149,9 +149,10 @@ class ElasticString:
         return rates
 
     def on_hand(self, y: np.ndarray, pull: np.ndarray) -> np.ndarray:
-        """Force of the band on a hand that holds its middle, states (..., nodes, 6 + K) -> (..., 3).
+        """Force of the band on the hand that holds its middle, shape (..., 3) [N].
 
         Args:
+            y: States (..., nodes, 6 + K).
             pull: Acceleration of the hand, shape (..., 3).
         """
         force = np.moveaxis(self.forces(np.moveaxis(y, (-2, -1), (0, 1)))[0], (0, 1), (-2, -1))

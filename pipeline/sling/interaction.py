@@ -48,29 +48,32 @@ class Rollouts:
 def schedule_of(sling: Sling, episode: Episode, refine: int = 1) -> Schedule:
     """Steps of one episode; the same for every theta.
 
-    The pads' normal force falls to zero over `finger_opening_time`, and is gone at the episode's
-    release time: then the measured force is gone too, whatever the friction.
+    At the episode's release time the band begins to slip between the opening fingers: the force
+    shows that moment, whatever the friction. From then on the friction that is left falls as the
+    pads' normal force does, which is gone after `finger_opening_time`.
     """
     size = sling.steps
-    clear = episode.release_time
-    opens = clear - sling.finger_opening_time
+    release = episode.release_time
+    clear = release + sling.finger_opening_time
     end = max(episode.time[-1], episode.cloud_time[-1]) + 1e-3
 
     def grid(first: float, last: float, step: float) -> np.ndarray:
         return np.linspace(first, last, max(int(np.ceil((last - first) / step * refine - 1e-9)), 1) + 1)
 
-    recoil_end = min(clear + size.recoil_time, end)
+    recoil_end = max(min(clear + size.recoil_time, end), clear + size.recoil_step)
     relax = steps(np.arange(RELAX_STEPS + 1) * 0.05, 0.05, hold=FREE, mode=RELAX)
     relax[:, 11] = episode.grasp_time
-    held = steps(grid(episode.grasp_time, opens, size.grip_step), 1, hold=HELD)
-    opening_times = grid(opens, clear, size.recoil_step)
+    held = steps(grid(episode.grasp_time, release, size.grip_step), 1, hold=HELD)
+    opening_times = grid(release, clear, size.recoil_step)
     opening = steps(opening_times, held[-1, 0], hold=OPENING, order=2)
     recoil = steps(
         grid(clear, recoil_end, size.recoil_step), opening[-1, 0], hold=FREE, order=2
     )
-    swing = steps(grid(recoil_end, end, size.swing_step), recoil[-1, 0], hold=FREE, order=2)
+    swing = np.zeros((0, 12))
+    if end > recoil_end:
+        swing = steps(grid(recoil_end, end, size.swing_step), recoil[-1, 0], hold=FREE, order=2)
     held[:, 9] = sling.grip_force
-    opening[:, 9] = sling.grip_force * (clear - opening[:, 11]) / sling.finger_opening_time
+    opening[:, 9] = sling.grip_force * (opening[:, 11] - release) / sling.finger_opening_time
     table = np.vstack([relax, held, opening, recoil, swing])
 
     hand = CubicSpline(episode.time, episode.position, axis=0)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -27,8 +29,8 @@ class Sling:
         fork_height: Of the tips above the floor [m].
         clamp_direction: Unit vector along which the band leaves the tip at -x, shape (3,); it leaves
             the other tip along the mirror image.
-        flexural_rigidity: E I of the band where it was measured [N m^2]; None takes a solid round
-            band's, which follows Young's modulus.
+        flexural_rigidity: E I of the band where it was measured [N m^2], one or one a theta; None
+            takes a solid round band's, which follows Young's modulus.
         projectile_mass, grip_force, finger_opening_time: As in params.yaml `setup` [kg, N, s].
         steps: The step sizes, as in params.yaml `sling`.
     """
@@ -92,6 +94,17 @@ class Sling:
     def tips(self) -> np.ndarray:
         """Both ends of the band, shape (2, 3)."""
         return np.array([[-self.half_width, 0.0, 0.0], [self.half_width, 0.0, 0.0]])
+
+
+def mounting_path(band: str, root: str | Path = ".") -> Path:
+    return Path(root, "data", "mounting", f"{band}.json")
+
+
+def load_sling(params, band: str, root: str | Path = ".") -> Sling:
+    """The sling of a band of params.yaml, mounted as its recording shows where that was fitted."""
+    path = mounting_path(band, root)
+    mounting = json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+    return Sling.of(params.bands[band], params.setup, params.sling, mounting)
 
 
 def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:

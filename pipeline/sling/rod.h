@@ -73,8 +73,9 @@ const real volume = zero + area * ds;
 const real balance = (SC)3e-2 * node_mass * gravity + (SC)1e-5 * mu * area;  // N
 const SC node_shift = node_mass * (SC)2.5e5;  // the inertia of a 2 ms step
 
-// lane state: 0 attached, 1-3 slip direction, 4 failure, 5 failed step, 6-8 grasp offset,
-// 9 projectile mass carried, 10 leaving time, 11-13 leaving position, 14-15 leaving velocity (y, z)
+// lane state: 0 attached, 1-3 direction of the pull (of the launch), 4 failure, 5 failed step, 6-8 grasp
+// offset, 9 projectile mass carried, 10 leaving time, 11-12 leaving position and 13-14 velocity (y, z),
+// 15 pull at the release
 real attached = AT(LANE, 0), failure = AT(LANE, 4), payload = AT(LANE, 9);
 
 for (int step = first_step; step < last_step; ++step) {
@@ -91,7 +92,9 @@ for (int step = first_step; step < last_step; ++step) {
     AT(LANE, 6 + c) = first * (AT(X1, MID * N + c) - T[6 + c]) + attached * AT(LANE, 6 + c);
   }
   if (hold == 1 || hold == 3) attached = one;
-  if (hold == 0) attached = zero;
+  if (hold == 0 || hold == 2) attached = zero;
+  // what the pads can hold: all of it while they are closed, then less and less of the pull at the release
+  const real capacity = hold == 2 ? maximum(AT(LANE, 15) - limit * friction, zero) : limit * friction;
 
   // predicted state
   for (int j = 0; j < L * N; ++j) {
@@ -262,8 +265,8 @@ for (int step = first_step; step < last_step; ++step) {
       if (i == MID) {
         for (int m = 0; m < 3; ++m) { for (int n = 0; n < 6; ++n) at_mid[n][m] = D[3 + n][m]; for (int n = 0; n < 3; ++n) after_mid[n][m] = O[n][m]; }
         for (int m = 0; m < 3; ++m) {
-          // pads that slip pull along the slip direction with what friction they have left
-          if (hold == 2) r[m] += freed * limit * friction * AT(LANE, 1 + m);
+          // open pads hold the band back with what friction they have left
+          if (hold == 2) r[m] += capacity * AT(LANE, 1 + m);
           r[m] = r[m] * freed; eliminated[m] = eliminated[m] * freed;
           for (int n = 0; n < N; ++n) { if (n != m) { D[m][n] = D[m][n] * freed; D[n][m] = D[n][m] * freed; } O[n][m] = O[n][m] * freed; }
           D[m][m] = D[m][m] * freed + attached;
@@ -352,18 +355,13 @@ for (int step = first_step; step < last_step; ++step) {
   // the force of the band on the hand, and whether the pads still hold it
   real force[3];
   for (int c = 0; c < 3; ++c) force[c] = -reaction[c];
-  const real pull = SQRT(dot(force, force)), capacity = limit * friction;
-  if (hold == 1) {  // slipping out while the fingers are closed
-    const real slipped = pull > capacity ? one : zero;
-    failure = failure != zero ? failure : (SC)2 * slipped;
+  if (hold == 1) {
+    const real pull = SQRT(dot(force, force));
+    failure = failure != zero ? failure : (SC)2 * (pull > capacity ? one : zero);  // slipped out of closed fingers
+    AT(LANE, 15) = pull;
+    for (int c = 0; c < 3; ++c) AT(LANE, 1 + c) = force[c] / maximum(pull, zero + (SC)1e-9);
   }
-  if (hold == 2) {
-    for (int c = 0; c < 3; ++c) {
-      force[c] = attached > zero ? force[c] : capacity * AT(LANE, 1 + c);
-      AT(LANE, 1 + c) = attached > zero ? force[c] / maximum(pull, zero + (SC)1e-9) : AT(LANE, 1 + c);
-    }
-    attached = pull > capacity ? zero : attached;
-  }
+  if (hold == 2) for (int c = 0; c < 3; ++c) force[c] = capacity * AT(LANE, 1 + c);
   if (hold == 0) for (int c = 0; c < 3; ++c) force[c] = zero;
   for (int c = 0; c < 3; ++c) AT(OUT, 4 * step + c) = force[c];
 

@@ -1,6 +1,7 @@
 """Notes what a stage reads of params.yaml; Python runs this first where it lies on PYTHONPATH.
 
-tests/test_pipeline.py compares the notes, `$AUDIT/<stage>.json`, with dvc.yaml's `params:`.
+tests/test_pipeline.py compares the notes, `$AUDIT/<stage>.<process>.json`, with the `params:` of
+dvc.yaml.
 """
 
 from __future__ import annotations
@@ -58,17 +59,19 @@ def noted(value: object, path: str) -> object:
     return value
 
 
-def install() -> None:
-    module, *arguments = sys.orig_argv[2:]
-    stage = module.removeprefix("stages.") + ("@" if arguments else "") + "-".join(arguments)
+def install(stage: str) -> None:
+    os.environ["AUDITED"] = stage
     sys.path.insert(0, os.getcwd())
     from pipeline import params
 
     load = params.load
     params.load = lambda *path: Section(load(*path))
-    file = Path(os.environ["AUDIT"], f"{stage}.json")
+    file = Path(os.environ["AUDIT"], f"{stage}.{os.getpid()}.json")
     atexit.register(lambda: file.write_text(json.dumps(sorted(read))))
 
 
 if sys.orig_argv[1:2] == ["-m"] and sys.orig_argv[2].startswith("stages."):
-    install()
+    module, *item = sys.orig_argv[2:]
+    install("@".join(filter(None, (module.removeprefix("stages."), "-".join(item)))))
+elif "AUDITED" in os.environ:  # a process that a stage started
+    install(os.environ["AUDITED"])

@@ -30,7 +30,7 @@ TYPES = {
 START = 1_700_000_000 * 10**9
 TIPS = np.array([[-0.1375, 0, 0], [0.1375, 0, 0]])
 FLOOR, REST, RADIUS = -0.52, 0.52, 0.005
-SIZE, FOCAL = (320, 240), 250.0
+SIZE, FOCAL, FPS = (320, 240), 250.0, 15
 CAMERA = Rotation.from_matrix(  # optical frame: z forward, y down, looking at the fork from a side
     np.stack([[-0.5, 0.866, 0], [0.4, 0.231, -0.887], [-0.768, -0.4434, -0.4619]]).T
 )
@@ -62,7 +62,7 @@ class Truth:
         low, lift = -0.195, _ease((t - self.grasp - 0.1) / (self.lifted - self.grasp - 0.1))
         pull = _ease((t - self.lifted) / (self.drawn - self.lifted))
         away = 0.06 * max(0.0, t - self.release)
-        approach = 0.08 * (1 - _ease(t / (self.grasp - 0.1)))
+        approach = 0.08 * (1 - _ease(t / max(self.grasp - 0.1, 0.05)))
         return np.array([0.0, -self.draw * pull - away - approach, low * (1 - lift)])
 
     def holds(self, t: float) -> bool:
@@ -140,7 +140,7 @@ def write_bag(
         events = [(k / rate, "wrench") for k in range(int(truth.end * rate))]
         events += [(k / 200, "pose") for k in range(int(truth.end * 200))]
         events += [(k / 50, "gripper") for k in range(int(truth.end * 50))]
-        events += [(0.004 + k / 30, "frame") for k in range(int(truth.end * 30))]
+        events += [(0.004 + k / FPS, "frame") for k in range(int(truth.end * FPS))]
         for t, kind in sorted(events):
             if kind == "wrench":
                 force = (HAND * SENSOR).inv().apply(truth.sign * truth.force(t)) + truth.bias

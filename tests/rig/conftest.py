@@ -17,7 +17,7 @@ def params() -> Params:
 @pytest.fixture(scope="session")
 def coarse(params: Params) -> Params:
     """The same world, integrated quickly."""
-    rig = params.rig.model_copy(update={"edges": 40, "tolerance": 1e-5})
+    rig = params.rig.model_copy(update={"edges": 40, "tolerance": 1e-4})
     return params.model_copy(update={"rig": rig})
 
 

@@ -12,7 +12,7 @@ from pipeline.params import Params
 from pipeline.rig.interaction import Interaction
 from pipeline.rig.record import record
 
-SCALE = 0.25  # of the pictures
+SCALE = 0.4  # of the pictures
 COUNTS = {
     "/tf_static": 1,
     "/franka_gripper/joint_states": 500,
@@ -28,9 +28,7 @@ PICTURES = [
 
 
 @pytest.fixture(scope="module")
-def recorded(
-    coarse: Params, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Path, Interaction]:
+def recorded(coarse: Params, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Interaction]:
     path = tmp_path_factory.mktemp("raw") / "band1.mcap"
     return path, record(coarse, "band1", path, picture_scale=SCALE)
 
@@ -152,9 +150,12 @@ def test_pictures_show_the_band_where_it_is(
         points = (np.linalg.solve(k, pixels) * metres[rows, columns]).T
         points = rotation(camera.rotation).apply(points) + vector(camera.translation)
         points = rotation(base.rotation).apply(points) + vector(base.translation)
-        dense = np.concatenate([np.linspace(a, b, 20) for a, b in zip(line, line[1:])])
+        dense = np.concatenate(
+            [np.linspace(a, b, 20) for a, b in zip(line[:-1], line[1:], strict=True)]
+        )
         gaps = np.linalg.norm(points[:, None] - dense[None], axis=-1).min(axis=1)
-        assert 0.002 < np.median(gaps) < 0.007  # about its radius
+        # its radius is 4 to 5 mm; the calibration errs by at most 1 mm + 0.1 degrees of 1 m
+        assert 0.002 < np.median(gaps) < 0.0085
         seen += len(points)
     assert seen > 500
 

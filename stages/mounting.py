@@ -1,0 +1,41 @@
+"""Fit how the band leaves its clamps and how stiff it bends, to the slack part of the recording.
+
+    python -m stages.mounting band1
+
+Reads data/episodes/<band>/; writes data/mounting/<band>.json.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from pipeline import errors
+from pipeline.files import write_json
+from pipeline.identify.loss import EpisodeLoss
+from pipeline.identify.mounting import fit_mounting
+from pipeline.identify.session import load_episode, workers
+from pipeline.params import load
+from pipeline.sling.model import Sling
+
+
+def main() -> None:
+    (band,) = sys.argv[1:]
+    params = load()
+    sling = Sling.of(params.bands[band], params.setup, params.sling)
+    content = fit_mounting(
+        sling,
+        load_episode(band),
+        lambda part: EpisodeLoss.plain(params, part, sling),
+        workers=workers() or os.cpu_count() or 1,
+    )
+    write_json(Path("data/mounting", f"{band}.json"), content)
+    print(
+        f"{band}: clamps at {content['clamp_angle_deg']:.1f} deg, bending"
+        f" {content['relative_rigidity']:.2f} of a solid round band's"
+    )
+
+
+if __name__ == "__main__":
+    errors.run(main)

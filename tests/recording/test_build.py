@@ -1,0 +1,202 @@
+"""Episodes of recordings whose truth is a formula."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from pipeline.episode import Episode
+from pipeline.errors import UserError
+from pipeline.recording.build import build_episode
+from pipeline.recording.check import check_recording
+from pipeline.recording.geometry import geometry_of
+from pipeline.recording.reader import read_recording
+from pipeline.recording.signals import signals_of
+from tests.recording.bag import EYE, RADIUS, Truth, write_bag
+
+
+@pytest.fixture(scope="module")
+def episode(seen, params) -> Episode:
+    return build_episode(seen[0], "band1", params)
+
+
+def signals(path, params):
+    recording = read_recording(path, params.setup)
+    geometry = geometry_of(recording, params.setup)
+    return signals_of(recording, geometry, params.episode, params.force)
+
+
+def test_force_and_motion(episode, seen) -> None:
+    truth = seen[1]
+    t = episode.time
+    calm = np.abs(t - truth.release) > 0.06  # where the low pass does not smear the drop
+    force = np.array([truth.force(time) for time in t])
+    np.testing.assert_allclose(episode.force[calm], force[calm], atol=0.15)  # 20 N, and a kink
+    assert episode.force[:, 1].max() > 15
+    hand = np.array([truth.hand(time) for time in t])
+    np.testing.assert_allclose(episode.position, hand, atol=3e-4)
+    speed = np.array([(truth.hand(x + 1e-4) - truth.hand(x - 1e-4)) / 2e-4 for x in t])
+    np.testing.assert_allclose(episode.velocity, speed, atol=0.025)
+    np.testing.assert_allclose(episode.camera, EYE, atol=1e-9)
+
+
+def test_events(episode, seen) -> None:
+    truth = seen[1]
+    assert episode.release_time == pytest.approx(truth.release, abs=1e-3)
+    assert episode.grasp_time == pytest.approx(truth.grasp, abs=0.021)
+    assert episode.opening[0] == pytest.approx(0.08) and episode.opening[60] == pytest.approx(0.016)
+
+
+LOOKS = {
+    "orange": {},
+    "white beside a white arm": {"band": (225, 225, 225), "arm": 230},
+    "dark in the dark": {"band": (40, 35, 35), "floor": 45, "arm": 60},
+    "blue on a light floor": {"band": (180, 60, 30), "floor": 190},
+}
+
+
+@pytest.mark.parametrize("look", LOOKS)
+def test_clouds_lie_on_the_band_and_cover_it(look, episode, seen, params, tmp_path) -> None:
+    truth = Truth(**LOOKS[look])
+    if LOOKS[look]:
+        path = tmp_path / "look.mcap"
+        write_bag(path, truth, rate=500)
+        episode = build_episode(path, "band1", params)
+    assert len(episode.clouds) == 54
+    off, covered = [], []
+    for time, cloud in zip(episode.cloud_time, episode.clouds, strict=True):
+        line = truth.center_line(time)
+        gaps = np.linalg.norm(cloud[:, None] - line[None], axis=-1)
+        off.append(gaps.min(axis=1) - RADIUS)
+        if truth.drawn < time < truth.release - 0.01:
+            away = np.linalg.norm(line - truth.hand(time), axis=1) > 0.035
+            covered.append(np.mean(gaps.min(axis=0)[away] < 3 * RADIUS))
+    off = np.concatenate(off)
+    assert np.median(np.abs(off)) <= 0.003
+    assert np.mean(off < 0.02) > 0.95
+    assert np.mean(covered) >= 0.9
+
+
+def test_the_other_sign_is_flipped_and_said(tmp_path, params, blind) -> None:
+    path = tmp_path / "other.mcap"
+    write_bag(path, Truth(sign=-1.0), cameras=False, rate=500)
+    flipped, usual = signals(path, params), signals(blind[0], params)
+    assert flipped.facts["flipped"] and not usual.facts["flipped"]
+    np.testing.assert_allclose(flipped.force, usual.force, atol=0.1)
+
+
+def test_a_wrench_in_the_base_frame(tmp_path, params, blind) -> None:
+    """The same force, given in the robot's base, is the same episode."""
+    from tests.recording.bag import BASE, HAND, SENSOR
+
+    turn = BASE[0].inv() * HAND * SENSOR
+
+    def in_base(kind: str, stamp: int, message):
+        if kind == "wrench":
+            f = message.wrench.force
+            f.x, f.y, f.z = map(float, turn.apply([f.x, f.y, f.z]))
+            message.header.frame_id = "base"
+        return message
+
+    path = tmp_path / "base.mcap"
+    write_bag(path, cameras=False, rate=500, change=in_base)
+    np.testing.assert_allclose(
+        signals(path, params).force, signals(blind[0], params).force, atol=1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    ("truth", "words"),
+    [
+        (Truth(end=3.3), "after the release"),
+        (Truth(grasp=0.1, lifted=0.6), "empty hand"),
+        (Truth(stiffness=0.0), "no release"),
+        (Truth(draw=0.02, stiffness=400.0), "not behind the fork|no release"),
+    ],
+)
+def test_recordings_that_cannot_be_used(tmp_path, params, truth, words) -> None:
+    path = tmp_path / "bad.mcap"
+    write_bag(path, truth, cameras=False, rate=500)
+    with pytest.raises(UserError, match=words) as caught:
+        signals(path, params)
+    assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
+
+
+def test_a_window_that_is_too_long_or_too_short(blind, params) -> None:
+    for duration, words in ((8.0, "record for longer"), (1.5, "pull faster")):
+        episode = params.episode.model_copy(update={"duration": duration})
+        with pytest.raises(UserError, match=words):
+            signals(blind[0], params.model_copy(update={"episode": episode}))
+
+
+def test_a_hand_that_turns_is_refused(tmp_path, params) -> None:
+    def turn(kind: str, stamp: int, message):
+        if kind == "pose":
+            angle = 0.4 * ((stamp // 10**6) % 4000) / 4000
+            q = message.pose.orientation
+            from scipy.spatial.transform import Rotation
+
+            turned = Rotation.from_rotvec([0, 0, angle]) * Rotation.from_quat([q.x, q.y, q.z, q.w])
+            q.x, q.y, q.z, q.w = map(float, turned.as_quat())
+        return message
+
+    path = tmp_path / "turning.mcap"
+    write_bag(path, cameras=False, rate=500, change=turn)
+    with pytest.raises(UserError, match="turns by"):
+        signals(path, params)
+
+
+def test_a_wrong_frame_of_the_wrench_is_noticed(tmp_path, params) -> None:
+    def rename(kind: str, stamp: int, message):
+        if kind == "wrench":
+            message.header.frame_id = "base"  # it is not: the values are the sensor's
+        return message
+
+    path = tmp_path / "frame.mcap"
+    write_bag(path, cameras=False, rate=500, change=rename)
+    with pytest.raises(UserError, match="away from the fork"):
+        signals(path, params)
+
+
+def test_bytes_are_reproducible_and_come_back(episode, seen, params, tmp_path) -> None:
+    episode.save(tmp_path / "a")
+    build_episode(seen[0], "band1", params).save(tmp_path / "b")
+    for name in ("signals.parquet", "clouds.parquet"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+    back = Episode.load(tmp_path / "a")
+    np.testing.assert_array_equal(back.force, episode.force)
+    np.testing.assert_array_equal(back.clouds[50], episode.clouds[50])
+    assert back.metadata == json.loads(json.dumps(episode.metadata))
+    assert back.metadata["input"]["topics"]["wrench"] == "/ft/wrench"
+
+
+def test_an_unknown_mask_is_refused_by_name(seen, params) -> None:
+    cloud = params.cloud.model_copy(update={"mask": "sam3"})
+    with pytest.raises(UserError, match="sam3"):
+        build_episode(seen[0], "band1", params.model_copy(update={"cloud": cloud}))
+
+
+def test_the_report_of_a_good_recording(seen, params) -> None:
+    path, truth = seen
+    report = check_recording(path, params)
+    assert report.usable
+    content = json.loads(report.to_json())
+    assert content["signals"]["release_s"] == pytest.approx(truth.release, abs=1e-3)
+    peak = np.linalg.norm(truth.force(truth.release - 0.01))
+    assert content["signals"]["peak_force_n"] == pytest.approx(peak, rel=0.02)
+    assert content["cloud"]["taut_coverage"] > 0.9
+    assert content["cloud"]["taut_offset_m"] == pytest.approx(RADIUS, abs=0.002)
+    text = report.to_text()
+    assert "/ft/wrench" in text and text.endswith("can be used")
+
+
+def test_the_report_of_a_bad_recording(tmp_path, params) -> None:
+    path = tmp_path / "bad.mcap"
+    write_bag(path, cameras=False, rate=500, without=("wrench",))
+    report = check_recording(path, params)
+    assert not report.usable
+    assert "no force" in json.loads(report.to_json())["problem"]
+    assert "cannot be used: no force" in report.to_text()
+    assert "/arm/current_pose" in report.to_text()

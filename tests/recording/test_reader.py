@@ -1,0 +1,212 @@
+"""Reading: what another library wrote comes back; damage is noticed; bad input is one line."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from pipeline.errors import UserError
+from pipeline.recording.build import build_episode
+from pipeline.recording.geometry import geometry_of
+from pipeline.recording.reader import read_recording
+from tests.recording.bag import START, write_bag
+
+
+def read(path: Path, params, **topics: str):
+    setup = params.setup
+    if topics:
+        setup = setup.model_copy(update={"topics": setup.topics.model_copy(update=topics)})
+    return read_recording(path, setup)
+
+
+def test_what_another_library_decodes_is_what_we_read(blind, params) -> None:
+    path, _ = blind
+    recording = read(path, params)
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        forces = [
+            (m.header.stamp.sec * 10**9 + m.header.stamp.nanosec, m.wrench.force.x)
+            for *_, m in reader.iter_decoded_messages(topics=["/ft/wrench"])
+        ]
+    np.testing.assert_array_equal(recording.wrench.stamp, [stamp for stamp, _ in forces])
+    np.testing.assert_array_equal(recording.wrench.values[:, 0], [x for _, x in forces])
+    assert recording.wrench.frame == "ft_sensor"
+    assert {role: stream.topic for role, stream in recording.streams.items()} == {
+        "wrench": "/ft/wrench",
+        "pose": "/arm/current_pose",
+        "gripper": "/gripper/joint_states",
+        "color": "/camera/color/compressed",
+        "depth": "/camera/depth/compressedDepth",
+    }
+    assert recording.losses == []
+    assert recording.gripper.values[0, 0] == pytest.approx(0.08)
+
+
+@pytest.mark.parametrize("compression", ["NONE", "LZ4"])
+def test_other_compressions(tmp_path, params, blind, compression) -> None:
+    from mcap.writer import CompressionType
+
+    path = tmp_path / "other.mcap"
+    write_bag(path, cameras=False, rate=500, compression=CompressionType[compression])
+    other, usual = read(path, params), read(blind[0], params)
+    np.testing.assert_array_equal(other.wrench.values, usual.wrench.values)
+
+
+def test_a_truncated_file_gives_what_is_there(blind, tmp_path, params) -> None:
+    content = blind[0].read_bytes()
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(content[: int(0.6 * len(content))])
+    whole, cut = read(blind[0], params), read(path, params)
+    assert "cut off" in cut.losses[0]
+    count = len(cut.wrench.stamp)
+    assert 0.3 * len(whole.wrench.stamp) < count < len(whole.wrench.stamp)
+    np.testing.assert_array_equal(cut.wrench.values, whole.wrench.values[:count])
+
+
+def test_a_damaged_chunk_is_dropped_and_the_rest_is_kept(blind, tmp_path, params) -> None:
+    content = bytearray(blind[0].read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path = tmp_path / "damaged.mcap"
+    path.write_bytes(content)
+    whole, damaged = read(blind[0], params), read(path, params)
+    assert any("1 damaged chunk" in loss for loss in damaged.losses)
+    kept = np.isin(whole.wrench.stamp, damaged.wrench.stamp)
+    assert 0.5 < kept.mean() < 1
+    np.testing.assert_array_equal(damaged.wrench.values, whole.wrench.values[kept])
+
+
+def test_nan_doubled_and_shuffled_wrenches(tmp_path, params) -> None:
+    stamps = []
+
+    def spoil(kind: str, stamp: int, message):
+        if kind == "wrench":
+            stamps.append(stamp)
+            number = len(stamps)
+            if number == 100:
+                message.wrench.force.x = float("nan")
+            elif number in (200, 201):  # swap two stamps
+                message.header = _at(stamp + (2_000_000 if number == 200 else -2_000_000))
+            elif number == 301:  # the stamp of the one before
+                message.header = _at(stamp - 2_000_000)
+        return message
+
+    path = tmp_path / "spoilt.mcap"
+    write_bag(path, cameras=False, rate=500, change=spoil)
+    wrench = read(path, params).wrench
+    assert np.all(np.diff(wrench.stamp) > 0)
+    assert wrench.lost == 2
+    assert len(wrench.stamp) == len(stamps) - 2
+    assert np.isfinite(wrench.values).all()
+
+
+def _at(stamp: int) -> SimpleNamespace:
+    time = SimpleNamespace(sec=stamp // 10**9, nanosec=stamp % 10**9)
+    return SimpleNamespace(stamp=time, frame_id="ft_sensor")
+
+
+def test_another_clock_is_noticed(tmp_path, params) -> None:
+    def shift(kind: str, stamp: int, message):
+        if kind in ("color", "depth"):
+            message.header = _at(stamp - START)  # seconds since the camera's start
+        return message
+
+    path = tmp_path / "clocks.mcap"
+    write_bag(path, cameras=False, rate=500, change=shift)
+    with pytest.raises(UserError, match="clock"):
+        read(path, params)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("wrench", "no force"),
+        ("pose", "no end-effector pose"),
+        ("color", "no colour images"),
+        ("depth", "no depth images"),
+        ("info", "no camera info"),
+    ],
+)
+def test_a_missing_topic_is_named(tmp_path, params, kind, words) -> None:
+    path = tmp_path / "lacking.mcap"
+    write_bag(path, cameras=False, rate=500, without=(kind,))
+    with pytest.raises(UserError, match=words) as caught:
+        read(path, params)
+    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_missing_transforms_are_named_and_params_replace_them(tmp_path, params, blind) -> None:
+    path = tmp_path / "lacking.mcap"
+    write_bag(path, cameras=False, rate=500, without=("tf",))
+    recording = read(path, params)
+    with pytest.raises(UserError, match="setup.base_to_fork"):
+        geometry_of(recording, params.setup)
+
+    known = geometry_of(read(blind[0], params), params.setup)
+    poses = {
+        name: (*pose.translation, *pose.rotation.as_quat())
+        for name, pose in (
+            ("base_to_fork", known.base.inverse()),
+            ("camera_to_fork", known.camera.inverse()),
+        )
+    }
+    given = geometry_of(recording, params.setup.model_copy(update=poses))
+    np.testing.assert_allclose(given.base.apply([1, 2, 3]), known.base.apply([1, 2, 3]))
+    np.testing.assert_allclose(given.camera.apply([1, 2, 3]), known.camera.apply([1, 2, 3]))
+
+
+def test_topics_by_name(blind, params) -> None:
+    assert read(blind[0], params, wrench="/ft/wrench").wrench.topic == "/ft/wrench"
+    with pytest.raises(UserError, match="no topic /nothing"):
+        read(blind[0], params, wrench="/nothing")
+    with pytest.raises(UserError, match="is a geometry_msgs/msg/PoseStamped"):
+        read(blind[0], params, wrench="/arm/current_pose")
+
+
+def test_files_that_are_no_recordings(tmp_path, params) -> None:
+    missing, empty, text = (tmp_path / name for name in ("missing", "empty", "text"))
+    empty.touch()
+    text.write_text("not a recording " * 100)
+    bare = tmp_path / "bare"
+    bare.write_bytes(b"\x89MCAP0\r\n")
+    for path, words in (
+        (missing, "cannot be read"),
+        (tmp_path, "cannot be read"),
+        (empty, "not an MCAP"),
+        (text, "not an MCAP"),
+        (bare, "no topics"),
+    ):
+        with pytest.raises(UserError, match=words):
+            read(path, params)
+
+
+def test_random_damage_is_an_episode_or_one_line(blind, tmp_path, params) -> None:
+    content = blind[0].read_bytes()
+    random = np.random.default_rng(5)
+    path = tmp_path / "mutated.mcap"
+    for _ in range(12):
+        mutated = bytearray(content)
+        for place in random.integers(8, len(content), 3):
+            mutated[place] = random.integers(256)
+        path.write_bytes(mutated[: random.integers(len(content) // 2, len(content) + 1)])
+        try:
+            read(path, params)
+        except UserError as error:
+            assert "\n" not in str(error)
+
+
+def test_black_pictures_are_an_empty_mask(blind, params) -> None:
+    with pytest.raises(UserError, match="empty mask"):
+        build_episode(blind[0], "band1", params)
+
+
+def test_reading_leaves_the_file_alone(blind, tmp_path, params) -> None:
+    copy = tmp_path / "copy.mcap"
+    shutil.copy(blind[0], copy)
+    read(copy, params)
+    assert copy.read_bytes() == blind[0].read_bytes()

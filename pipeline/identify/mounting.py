@@ -21,7 +21,7 @@ from pipeline.sling.model import Sling
 
 ANGLE = (-30.0, 60.0)  # of the clamps, towards the middle of the fork [deg]
 RIGIDITY = (0.1, 20.0)  # relative to a solid round band
-TAUT = 0.05  # of the peak force: below it the band is slack
+TAUT = 0.05  # of the peak force, above the band's weight: below it the band is slack
 UNITS = {"geom": 0.1, "force": 0.1}  # 1 mm of shape weighs as much as 0.1 N
 POISSON = 0.45  # while the band is slack, any will do
 
@@ -30,7 +30,8 @@ def slack_part(episode: Episode) -> Episode:
     """The episode until the band is taut. Raises UserError where it never hangs slack."""
     size = np.linalg.norm(episode.force, axis=1)
     held = (episode.time > episode.grasp_time) & (episode.time < episode.release_time)
-    taut = held & (size > max(TAUT * size[held].max(), 1.5 * np.median(size[held][:30])))
+    peak, weight = size[held].max(), np.median(size[held][:30])
+    taut = held & (size > TAUT * peak + min(1.5 * weight, 0.2 * peak))
     if not taut.any():
         raise UserError(f"episode of {episode.band}: the hand's force never rises")
     end = episode.time[np.argmax(taut)]

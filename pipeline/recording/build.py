@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.episode import Episode
+from pipeline.errors import UserError
 from pipeline.recording.cloud import Clouds, clouds_of
 from pipeline.recording.geometry import Geometry, geometry_of
 from pipeline.recording.reader import Recording, read_recording
@@ -40,10 +41,14 @@ def process_recording(recording: Recording, band: object, params: object) -> Pro
 
 def build_episode(path: Path, band_name: str, params: object) -> Episode:
     """The episode of a recording. Raises UserError with one line where it cannot be used."""
+    if band_name not in params.bands:
+        known = ", ".join(params.bands)
+        raise UserError(f"band {band_name}: not in params.yaml, which has {known}")
     return episode_of(process(path, params.bands[band_name], params), band_name, params)
 
 
 def episode_of(done: Processed, band_name: str, params: object) -> Episode:
+    """The episode, with everything in its metadata that was chosen on the way."""
     signals, clouds, recording = done.signals, done.clouds, done.recording
     setup, band = params.setup, params.bands[band_name]
     metadata = {

@@ -146,9 +146,10 @@ def _let_go(t: np.ndarray, opening: np.ndarray, release: float) -> None:
 def _closed(t: np.ndarray, opening: np.ndarray, release: float) -> float | None:
     """First sample after which the fingers stay within a tenth of their stroke from closed."""
     before = t < release - 0.05
-    if before.sum() < 3:
+    holding = before & (t > release - 1.0)
+    if not holding.any():
         return None
-    closed = np.median(opening[before & (t > release - 1.0)])
+    closed = np.median(opening[holding])
     stroke = np.max(opening[before]) - closed
     if stroke < LEAST_STROKE:
         return None

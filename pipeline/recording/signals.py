@@ -101,6 +101,8 @@ def _signals(recording: Recording, geometry: Geometry, episode: object, filter: 
     force, tare = _tared(t, raw, grasp, release)
     force = rotation.apply(force)
     held = (t > release.time - 0.5) & (t < release.time - MARGIN / 5)
+    if not held.any():
+        raise UserError(f"no force in the half second before the release at {release.time:.3f} s")
     hold = force[held].mean(axis=0)
     hand = np.array([np.interp(release.time, pose_t, axis) for axis in path.T])
     sign = _sign(hold, hand)

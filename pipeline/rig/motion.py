@@ -11,14 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-APPROACH, REACHED, GRASP, LIFTED, PULL, PULLED, OPEN, RETREAT, RETREATED = (
-    *(0.0, 0.8, 1.0, 2.0, 2.0, 6.0, 8.0, 8.3, 9.3),
-)
-END = 10.0
+# Seconds from the start of the recording.
+REACHED, GRASP = 0.8, 1.0  # the hand is there and its fingers close; they hold the band
+PULL, PULLED = 2.0, 6.0  # the middle is at the tips' height; it is drawn
+OPEN = 8.0  # the fingers begin to open
+RETREAT, RETREATED, END = 8.3, 9.3, 10.0
 PULL_LENGTH = 0.40
 APPROACH_LENGTH = 0.10  # m behind the hanging band, where the hand starts
 RETREAT_LENGTH = 0.06
-CLOSING_TIME = 0.1  # the fingers close from REACHED on
+TRAVEL_TIME = 0.1  # of the fingers, which close from REACHED and open from OPEN on
 FINGER_OPEN, FINGER_CLOSED = 0.04, 0.008  # of each finger joint
 WANDER_TONES = 6
 WANDER_BAND = 0.1, 1.5  # Hz
@@ -31,7 +32,7 @@ class Motion:
     Attributes:
         path: Commanded position, a piecewise polynomial.
         amplitude, frequency, phase: Of the wander, shapes (tones, 3), (tones, 1), (tones, 3).
-        opening_time: From the first motion of the opening fingers until they are open [s].
+        opening_time: From the first motion of the opening fingers until they press no more [s].
     """
 
     path: CubicHermiteSpline
@@ -57,7 +58,7 @@ class Motion:
         drawn = PULL_LENGTH * back
         start = hanging + APPROACH_LENGTH * back
         end = drawn + RETREAT_LENGTH * back
-        times = [APPROACH, REACHED, GRASP, LIFTED, PULLED, RETREAT, RETREATED, END]
+        times = [0.0, REACHED, GRASP, PULL, PULLED, RETREAT, RETREATED, END]
         points = np.array([start, hanging, hanging, 0 * back, drawn, drawn, end, end])
         amplitude = rng.normal(size=(WANDER_TONES, 3))
         amplitude *= tracking_error * np.sqrt(2 / np.sum(amplitude**2, axis=0))
@@ -77,13 +78,13 @@ class Motion:
         return self.path(time, derivative) + wander
 
     def grip(self, time: np.ndarray | float) -> np.ndarray:
-        """How firmly the pads press, 1 when closed, 0 when open, while the fingers open."""
+        """How firmly the closed pads press, from 1 to 0 as the fingers begin to open."""
         return np.clip(1 - (np.asarray(time) - OPEN) / self.opening_time, 0.0, 1.0)
 
     def finger(self, time: np.ndarray) -> np.ndarray:
         """Position of each finger joint [m]."""
-        closing = np.interp(time, [REACHED, REACHED + CLOSING_TIME], [0.0, 1.0])
-        closed = np.where(np.asarray(time) < OPEN, closing, self.grip(time))
+        turns = [REACHED, REACHED + TRAVEL_TIME, OPEN, OPEN + TRAVEL_TIME]
+        closed = np.interp(time, turns, [0.0, 1.0, 1.0, 0.0])
         return FINGER_OPEN + (FINGER_CLOSED - FINGER_OPEN) * closed
 
 

@@ -55,9 +55,8 @@ def _string_of(
     path, stress, memory = pulled(unit, np.array([0.0, -PULL_LENGTH, 0.0]))
     total = stress + (stress[:, None] - memory) @ unit.rubber.weights
     peak = np.argmax(total)
-    tension = (
-        unit.stiffness * total[peak]
-    )  # of straight halves; the band's turns add a few per cent
+    # Straight halves pulling along y: a guess that the band's turns at clamps and hand spoil a bit.
+    tension = unit.stiffness * total[peak]
     guess = with_scale(hidden.peak_force / (2 * tension))
     drawn = bent_at(guess, path[peak])
     y = guess.at_rest(drawn, tolerance, held=True, memory=memory[peak] / stress[peak])

@@ -58,7 +58,9 @@ def schedule_of(sling: Sling, episode: Episode, refine: int = 1) -> Schedule:
     end = max(episode.time[-1], episode.cloud_time[-1]) + 1e-3
 
     def grid(first: float, last: float, step: float) -> np.ndarray:
-        return np.linspace(first, last, max(int(np.ceil((last - first) / step * refine - 1e-9)), 1) + 1)
+        return np.linspace(
+            first, last, max(int(np.ceil((last - first) / step * refine - 1e-9)), 1) + 1
+        )
 
     recoil_end = max(min(clear + size.recoil_time, end), clear + size.recoil_step)
     relax = steps(np.arange(RELAX_STEPS + 1) * 0.05, 0.05, hold=FREE, mode=RELAX)
@@ -66,9 +68,7 @@ def schedule_of(sling: Sling, episode: Episode, refine: int = 1) -> Schedule:
     held = steps(grid(episode.grasp_time, release, size.grip_step), 1, hold=HELD)
     opening_times = grid(release, clear, size.recoil_step)
     opening = steps(opening_times, held[-1, 0], hold=OPENING, order=2)
-    recoil = steps(
-        grid(clear, recoil_end, size.recoil_step), opening[-1, 0], hold=FREE, order=2
-    )
+    recoil = steps(grid(clear, recoil_end, size.recoil_step), opening[-1, 0], hold=FREE, order=2)
     swing = np.zeros((0, 12))
     if end > recoil_end:
         swing = steps(grid(recoil_end, end, size.swing_step), recoil[-1, 0], hold=FREE, order=2)

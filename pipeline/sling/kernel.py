@@ -6,7 +6,7 @@ from pathlib import Path
 import warp as wp
 
 TEXT = Path(__file__).with_name("rod.h")
-wp.config.quiet = True
+wp.config.log_level = wp.LOG_WARNING
 wp.config.enable_backward = False
 
 

@@ -154,8 +154,7 @@ def run(
             block_dim=lanes,
         )  # fmt: skip
         return [
-            array.numpy().reshape(size, -1, lanes)
-            for array in (own[1], own[2], output, frames)
+            array.numpy().reshape(size, -1, lanes) for array in (own[1], own[2], output, frames)
         ]
 
     if kind == "cuda" or workers == 1 or n_blocks == 1:

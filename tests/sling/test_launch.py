@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from .reference import energy
 
 from pipeline.sling import launch
 from pipeline.sling.launch import ballistic_landing
 from pipeline.sling.model import GRAVITY, drawn_guess
+
+from .reference import energy
 
 THETA = [2.5e5, 0.45, 2e-3, 0.5, 1.0]
 DRAW = [-0.38, -0.2]

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from .reference import gradient
 
 from pipeline.sling import launch
 from pipeline.sling.model import GRAVITY, hanging_guess, layers_of, material
 from pipeline.sling.solver import FREE, RELAX, Schedule, run, steps
+
+from .reference import gradient
 
 THETA = [5e5, 0.45, 2e-3, 0.5, 1.0]
 

@@ -1,9 +1,10 @@
 """How a band hangs: what its slack shape and force show before it is stretched.
 
-The five elastic parameters leave open how the band leaves its clamps and how stiff it is in bending
-(a hose, a braid or a strip is no solid round cylinder). Both matter for the recoil, and the recording
-shows them while the band is slack: hanging, lifted, and on its way until it is taut. Two numbers are
-fitted to that part alone, before any search: the flexural rigidity E I and the angle at the clamps.
+The five elastic parameters leave open how the band leaves its clamps and how stiff it is in
+bending (a hose, a braid or a strip is no solid round cylinder). Both matter for the recoil, and the
+recording shows them while the band is slack: hanging, lifted, and on its way until it is taut. Two
+numbers are fitted to that part alone, before any search: the flexural rigidity E I and the angle at
+the clamps.
 """
 
 from __future__ import annotations
@@ -38,8 +39,8 @@ def slack_part(episode: Episode) -> Episode:
     count, frames = int(np.sum(episode.time < end)), int(np.sum(episode.cloud_time < end))
     if end - episode.grasp_time < 0.3 or frames < 10:
         raise UserError(
-            f"episode of {episode.band}: the band is taut within {end - episode.grasp_time:.2f} s of"
-            " the grasp; record it from hanging slack"
+            f"episode of {episode.band}: the band is taut within {end - episode.grasp_time:.2f} s"
+            " of the grasp; record it from hanging slack"
         )
     return replace(
         episode,
@@ -70,8 +71,9 @@ def nominal_young(sling: Sling, episode: Episode) -> float:
     pull = np.linalg.norm((legs / lengths[:, None]).sum(axis=0))
     if stretch < 1.05:
         raise UserError(
-            f"episode of {episode.band}: the hand holds the band at {stretch:.2f} of its rest length"
-            f" ({sling.rest_length} m); check bands.{episode.band}.rest_length and the extrinsics"
+            f"episode of {episode.band}: the hand holds the band at {stretch:.2f} of its rest"
+            f" length ({sling.rest_length} m); check bands.{episode.band}.rest_length and the"
+            " extrinsics"
         )
     tension = np.linalg.norm(force) / pull
     return float(3 * tension / (sling.area * (stretch - stretch**-2)))

@@ -10,6 +10,7 @@ from pipeline.errors import UserError
 
 SIGMAS = 6.0
 LEAST_PULL = 0.5  # N: below it nothing was drawn
+GAP = 3.5  # periods of the force around the release
 SUDDEN = 0.5  # share of the drop that a release takes within a few hundredths of a second
 LEAST_STROKE = 0.002  # m: fingers that move less than this did not move
 OPENS = 0.5  # s by which the gripper's topic may come late
@@ -79,8 +80,14 @@ def find_release(t: np.ndarray, force: np.ndarray) -> Release:
     half = window.start + int(np.argmax(along[window] < level - drop / 2))
     held = np.flatnonzero(along[:half] > level - threshold)
     first = int(held[-1]) + 1 if len(held) else half
+    resolution = float(t[first] - t[first - 1])
+    if resolution > GAP * period:
+        raise UserError(
+            f"force is missing for {1e3 * resolution:.0f} ms around the release at {t[first]:.3f} s:"
+            " its time cannot be told, record again"
+        )
     fall = (level - along) / drop
-    return Release(_onset(t, fall, first, threshold / drop), period, hold, noise, drop)
+    return Release(_onset(t, fall, first, threshold / drop), resolution, hold, noise, drop)
 
 
 def _onset(t: np.ndarray, fall: np.ndarray, first: int, threshold: float) -> float:

@@ -76,7 +76,7 @@ def launch(
     refine: int = 1,
     double: bool = False,
 ) -> Launches:
-    """Launch the projectile from draws (N, 2) with physical thetas (N, 5); one of each also fits all.
+    """Launch the projectile from draws (N, 2) with physical thetas (N, 5); one of each fits all.
 
     Args:
         max_force: A draw that takes more is a failed launch [N].

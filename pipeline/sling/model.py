@@ -27,8 +27,8 @@ class Sling:
         rest_length, radius, mass: Of the band between the clamps [m, m, kg].
         half_width: Half the distance of the fork's tips [m].
         fork_height: Of the tips above the floor [m].
-        clamp_direction: Unit vector along which the band leaves the tip at -x, shape (3,); it leaves
-            the other tip along the mirror image.
+        clamp_direction: Unit vector along which the band leaves the tip at -x, shape (3,); it
+            leaves the other tip along the mirror image.
         flexural_rigidity: E I of the band where it was measured [N m^2], one or one a theta; None
             takes a solid round band's, which follows Young's modulus.
         projectile_mass, grip_force, finger_opening_time: As in params.yaml `setup` [kg, N, s].
@@ -108,7 +108,7 @@ def load_sling(params, band: str, root: str | Path = ".") -> Sling:
 
 
 def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
-    """Parameters of rod.h for physical thetas (N, 5): mu, lam, d, s, 2 x friction, cb; shape (N, 6).
+    """Parameters of rod.h for physical thetas (N, 5): mu, lam, d, s, 2 friction, cb; (N, 6).
 
     mu is the shear modulus and lam the volume modulus of the stable neo-Hookean law without its
     logarithm (Smith, de Goes, Kim 2018): first Lame parameter plus mu, so that E and nu are the

@@ -45,6 +45,15 @@ def test_ringing_and_a_bump_before_do_not_move_the_release() -> None:
     assert abs(find_release(t, force).time - 7.5) <= 1e-3
 
 
+def test_a_gap_at_the_release_is_refused_and_one_elsewhere_is_not() -> None:
+    t, force = pull(7.5, 0.0, 0.03, 3)
+    there = (t < 7.48) | (t > 7.51)
+    with pytest.raises(UserError, match="missing for 3[0-9] ms around the release"):
+        find_release(t[there], force[there])
+    elsewhere = (t < 6.0) | (t > 6.5)
+    assert abs(find_release(t[elsewhere], force[elsewhere]).time - 7.5) <= 1e-3
+
+
 def test_no_release() -> None:
     t, force = pull(20.0, 0.0, 0.03, 1)
     with pytest.raises(UserError, match="no release"):

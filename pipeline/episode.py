@@ -99,9 +99,7 @@ class Episode:
         def vectors(name: str) -> np.ndarray:
             return np.stack([signals[f"{name}_{axis}"].to_numpy() for axis in "xyz"], axis=1)
 
-        points = [
-            np.asarray(row.as_py(), np.float32).reshape(-1, 3) for row in clouds["points"]
-        ]
+        points = [np.asarray(row.as_py(), np.float32).reshape(-1, 3) for row in clouds["points"]]
         header.pop("frame"), header.pop("sample_period")
         return cls(
             band=header.pop("band"),

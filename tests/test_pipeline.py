@@ -28,6 +28,9 @@ TINY = {
     "policy.iterations": 3,
     "trials.targets": [1.925],
     "trials.repeats": 1,
+    "rig.edges": 40,
+    "rig.tolerance": 1e-4,
+    "rig.camera.drop_rate": 0.6,
 }
 EVERYTHING = {
     "record@band1",
@@ -87,8 +90,11 @@ class Copy:
         yaml, path = YAML(), self.folder / "params.yaml"
         content = yaml.load(path)
         for key, value in values.items():
-            section, name = key.split(".")
-            content[section][name] = value
+            *sections, name = key.split(".")
+            node = content
+            for section in sections:
+                node = node[section]
+            node[name] = value
         yaml.dump(content, path)
 
     def commit(self) -> None:

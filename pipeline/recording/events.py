@@ -83,8 +83,8 @@ def find_release(t: np.ndarray, force: np.ndarray) -> Release:
     resolution = float(t[first] - t[first - 1])
     if resolution > GAP * period:
         raise UserError(
-            f"force is missing for {1e3 * resolution:.0f} ms around the release at {t[first]:.3f} s:"
-            " its time cannot be told, record again"
+            f"force is missing for {1e3 * resolution:.0f} ms around the release at"
+            f" {t[first]:.3f} s: its time cannot be told, record again"
         )
     fall = (level - along) / drop
     return Release(_onset(t, fall, first, threshold / drop), resolution, hold, noise, drop)

@@ -57,11 +57,15 @@ class RidgeMask:
     def __init__(self, view: View):
         self.scene = view.scene
         self.focal = float(view.recording.depth_camera.matrix[0, 0])
-        frames = [frame for _, frame in view.frames(every=max(1, len(view) // LEARNING_FRAMES))]
-        if not frames:
+        depths, taut = [], []
+        for _, frame in view.frames(every=max(1, len(view) // LEARNING_FRAMES)):
+            depths.append(frame.depth)
+            if self.scene.taut(frame.time):
+                taut.append(frame)
+        if not depths:
             raise UserError(f"{view.recording.path}: no camera frame in the window can be decoded")
-        self.background = _background(np.stack([frame.depth for frame in frames]))
-        self.likeness = _likeness(*self._samples(frames))
+        self.background = _background(np.stack(depths))
+        self.likeness = _likeness(*self._samples(taut))
 
     def mask(self, frame: Frame) -> np.ndarray:
         scene, colors_tell = self.scene, self.likeness is not None
@@ -91,7 +95,7 @@ class RidgeMask:
         far = np.where(frame.depth > 0, frame.depth, FAR).astype(np.float32)
         width = THICKNESS * self.focal * self.scene.diameter / far
         sizes = 2 * np.round(width / 2).astype(np.int16) + 1
-        ridges = np.where(before < 2 * ridge, min(ridge, LOW_RIDGE), ridge)
+        ridges = np.where(before < 2 * ridge, LOW_RIDGE, ridge)
         stands_out = (ridges * self.scene.diameter).astype(np.float32)
         thin = np.zeros_like(new)
         for size in np.unique(sizes[new]):
@@ -106,8 +110,6 @@ class RidgeMask:
         diameter = self.scene.diameter
         band, other = [], []
         for frame in frames:
-            if not self.scene.taut(frame.time):
-                continue
             moving = frame.near & (frame.depth < self.background - 2 * diameter)
             rest = frame.color[moving][_off(frame, moving, self.scene) > 3 * diameter]
             thin = self._candidates(frame, HIGH_RIDGE)

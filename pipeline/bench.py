@@ -8,9 +8,11 @@ the loss compares with are points on one simulated band.
 from __future__ import annotations
 
 import os
+import platform
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from importlib.metadata import version
 
 import numpy as np
 from scipy.stats import qmc
@@ -77,6 +79,24 @@ def available(device: str) -> bool:
     import warp as wp
 
     return device in {str(one) for one in wp.get_devices()} | {"cpu"}
+
+
+def environment(device: str) -> dict:
+    """What a figure belongs to: device, its name, command and versions."""
+    import warp as wp
+
+    name = platform.processor() or platform.machine()
+    if device.startswith("cuda"):
+        name = wp.get_device(device).name
+    packages = ("warp-lang", "numpy", "scipy")
+    return {
+        "device": device,
+        "device_name": name,
+        "cores": os.cpu_count(),
+        "command": f"sling bench --device {device} --json",
+        "versions": {"python": platform.python_version()}
+        | {package: version(package) for package in packages},
+    }
 
 
 def seconds(run: Callable[[], object]) -> float:

@@ -158,7 +158,7 @@ def run_check(arguments: argparse.Namespace) -> tuple[str, int]:
 def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
     from pipeline.params import load
     from pipeline.sling.launch import launch
-    from pipeline.sling.model import load_sling
+    from pipeline.sling.model import load_sling, mounting_path
     from pipeline.theta import load_theta, vector
 
     params = load()
@@ -166,6 +166,12 @@ def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
         known = ", ".join(params.bands)
         raise UserError(f"band {arguments.band}: not in params.yaml, which has {known}")
     theta = vector(load_theta(arguments.theta, arguments.band))
+    if not mounting_path(arguments.band).exists():
+        print(
+            f"note: {mounting_path(arguments.band)} is missing, so the band hangs as `setup` says;"
+            f" `dvc repro mounting@{arguments.band}` fits it to a recording",
+            file=sys.stderr,
+        )
     sling = load_sling(params, arguments.band)
     result = launch(sling, theta, arguments.draw, max_force=params.setup.max_force)
     return shown(
@@ -187,12 +193,12 @@ def run_aim(arguments: argparse.Namespace) -> tuple[str, int]:
 
 
 def run_bench(arguments: argparse.Namespace) -> tuple[str, int]:
-    from pipeline.bench import bench
+    from pipeline.bench import bench, environment
     from pipeline.params import load
 
     entries = bench(load(), device=arguments.device)
     if arguments.json:
-        return json.dumps({"device": arguments.device, "batches": entries}), 0
+        return json.dumps(environment(arguments.device) | {"batches": entries}), 0
     lines = ["  ".join(entries[0])]
     lines += ["  ".join(f"{value:{len(key)}.0f}" for key, value in e.items()) for e in entries]
     return "\n".join(lines), 0

@@ -95,7 +95,7 @@ def launch(
         sling,
         schedule_of(sling, refine),
         material(sling, thetas),
-        np.stack([drawn_guess(sling, draw) for draw in draws]),
+        drawn_guess(sling, draws),
         lane_state,
         payload=True,
         device=device,

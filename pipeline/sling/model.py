@@ -125,12 +125,11 @@ def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
 
 
 def _transport(normal: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Carry `normal` along the smallest rotation that takes unit vector `start` to `end`."""
+    """Carry `normal` (3,) along the smallest rotations from unit `start` (3,) to `end` (..., 3)."""
     axis = np.cross(start, end)
-    cosine = float(start @ end)
-    if cosine < -0.999999:
-        return -normal
-    return normal + np.cross(axis, normal) + np.cross(axis, np.cross(axis, normal)) / (1 + cosine)
+    cosine = (end @ start)[..., None]
+    turned = np.cross(axis, normal)
+    return normal + turned + np.cross(axis, turned) / np.maximum(1 + cosine, 1e-6)
 
 
 def clamp_tangents(sling: Sling) -> np.ndarray:
@@ -156,21 +155,18 @@ def fixed_frames(sling: Sling) -> np.ndarray:
 
 
 def layers_of(sling: Sling, nodes: np.ndarray) -> np.ndarray:
-    """Unknowns (layers, 9) of a band through `nodes` (layers, 3): stretched edges thin evenly."""
-    frames = fixed_frames(sling)
-    tangents = clamp_tangents(sling)
-    state = np.zeros((sling.layers, 9))
-    state[:, :3] = nodes
-    edges = np.diff(nodes, axis=0)
-    for i, edge in enumerate(edges):
-        length = np.linalg.norm(edge)
-        end = 0 if i < sling.middle else 1
-        direction = edge / length
-        thin = (length / sling.edge_length) ** -0.5
-        a = _transport(frames[end, 0], tangents[end], direction)
-        state[i, 3:6] = thin * a
-        state[i, 6:9] = thin * np.cross(direction, a)
-    state[-1, 3:9] = frames[1].ravel()
+    """Unknowns (..., L, 9) of bands through `nodes` (..., L, 3): stretched edges thin evenly."""
+    frames, tangents = fixed_frames(sling), clamp_tangents(sling)
+    state = np.zeros((*nodes.shape[:-1], 9))
+    state[..., :3] = nodes
+    edges = np.diff(nodes, axis=-2)
+    length = np.linalg.norm(edges, axis=-1, keepdims=True)
+    direction, thin = edges / length, (length / sling.edge_length) ** -0.5
+    for end, half in enumerate((slice(None, sling.middle), slice(sling.middle, sling.edges))):
+        a = _transport(frames[end, 0], tangents[end], direction[..., half, :])
+        state[..., half, 3:6] = thin[..., half, :] * a
+        state[..., half, 6:9] = thin[..., half, :] * np.cross(direction[..., half, :], a)
+    state[..., -1, 3:9] = frames[1].ravel()
     return state
 
 
@@ -187,10 +183,10 @@ def hanging_guess(sling: Sling) -> np.ndarray:
     return layers_of(sling, nodes)
 
 
-def drawn_guess(sling: Sling, draw: np.ndarray) -> np.ndarray:
-    """Two straight halves from the tips to the draw (y, z), shape (layers, 9)."""
-    middle = np.array([0.0, draw[0], draw[1]])
+def drawn_guess(sling: Sling, draws: np.ndarray) -> np.ndarray:
+    """Two straight halves from the tips to each draw (N, 2), shape (N, layers, 9)."""
+    middle = np.column_stack([np.zeros(len(draws)), draws])[:, None]
     part = np.linspace(0, 1, sling.middle + 1)[:, None]
     first = sling.tips[0] + part * (middle - sling.tips[0])
     second = middle + part * (sling.tips[1] - middle)
-    return layers_of(sling, np.vstack([first, second[1:]]))
+    return layers_of(sling, np.concatenate([first, second[:, 1:]], axis=1))

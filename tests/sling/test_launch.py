@@ -53,7 +53,7 @@ def test_launch_is_converged_in_time(sling):
 
 def test_projectile_gets_no_more_than_the_stored_energy(sling):
     """Little damping: most of the energy; much damping: less of it; never more than there is."""
-    stored = energy(sling, THETA, drawn_guess(sling, np.array(DRAW)))
+    stored = energy(sling, THETA, drawn_guess(sling, np.array([DRAW]))[0])
     speeds = []
     for damping in (1e-4, 5e-3, 2e-2):
         theta = [*THETA[:2], damping, *THETA[3:]]

@@ -112,6 +112,7 @@ class Cloud(Section):
 
 class Sling(Section):
     edges: Annotated[int, Range(4, 400)]
+    grading: Annotated[float, Range(1, 20)]
     grip_step: Step
     recoil_step: Step
     recoil_time: Annotated[float, Range(1e-3, 10)]

@@ -36,6 +36,10 @@ const int item = tid / THREADS, frame = item % frames;
 const int first = frame_blocks.data[frame], last = frame_blocks.data[frame + 1];
 const float* nodes = line.data + (size_t)item * (EDGES + 1) * 3;
 
+const float* rest = rest_edges.data;
+float rest_length = 0.0f;
+for (int e = 0; e < EDGES; ++e) rest_length += rest[e];
+
 // of each edge: start (3), vector (3), vector / length^2 (3), radius (stretched at constant volume)
 SHARED float tube[EDGES][10];
 SYNC();  // a block may have had another frame before
@@ -46,10 +50,10 @@ for (int e = lane; e < EDGES; e += THREADS) {
     tube[e][3 + c] = nodes[3 * e + 3 + c] - nodes[3 * e + c];
     square += tube[e][3 + c] * tube[e][3 + c];
   }
-  const float least_square = rest_edge * rest_edge * 0.0625f;  // a slack edge grows no thicker than twice
+  const float least_square = rest[e] * rest[e] * 0.0625f;  // a slack edge grows no thicker than twice
   square = square > least_square ? square : least_square;
   for (int c = 0; c < 3; ++c) tube[e][6 + c] = tube[e][3 + c] / square;
-  tube[e][9] = radius * sqrtf(rest_edge / sqrtf(square));
+  tube[e][9] = radius * sqrtf(rest[e] / sqrtf(square));
 }
 SYNC();
 
@@ -94,9 +98,9 @@ for (int k = 0; k < EDGES * SAMPLES; ++k) {
     const real square = dx * dx + dy * dy + dz * dz;
     nearest = square < nearest ? square : nearest;
   }
-  simulated += sqrtf(least(nearest));
+  simulated += sqrtf(least(nearest)) * rest[k / SAMPLES];  // each for its share of the band
 }
-simulated /= (float)(EDGES * SAMPLES);
+simulated /= rest_length * (float)SAMPLES;
 #endif
 if (lane == 0) { errors.data[2 * (size_t)item] = measured; errors.data[2 * (size_t)item + 1] = simulated; }
 

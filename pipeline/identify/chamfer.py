@@ -23,7 +23,7 @@ class Chamfer:
         camera: np.ndarray,
         *,
         radius: float,
-        rest_length: float,
+        rest_length: float | np.ndarray,
         symmetric: bool = True,
         device: str = "cpu",
     ) -> None:
@@ -33,11 +33,12 @@ class Chamfer:
             clouds: Points of each frame [m], K arrays of shape (P, 3); an empty one counts as NaN.
             camera: Its position [m], shape (3,).
             radius, rest_length: Of the unstretched band [m]; it thins where it is stretched, as
-                an incompressible body does.
+                an incompressible body does. One length is shared evenly by the edges; an array
+                gives each edge its own.
             symmetric: The mean of both directions; else measured to simulated alone.
         """
         self.camera = np.asarray(camera, float)
-        self.radius, self.rest_length = float(radius), float(rest_length)
+        self.radius, self.rest_length = float(radius), np.asarray(rest_length, np.float32)
         self.symmetric, self.device = symmetric, device
         self.frames = len(clouds)
         self._lanes = LANES["cuda" if device.startswith("cuda") else "cpu"]
@@ -58,6 +59,9 @@ class Chamfer:
             self._on_device = [wp.array(array, device=self.device) for array in self._packed]
         line = wp.array(np.ascontiguousarray(center_line, np.float32).ravel(), device=self.device)
         errors = wp.zeros(count * frames * 2, dtype=wp.float32, device=self.device)
+        rest = self.rest_length
+        if rest.ndim == 0:
+            rest = np.full(nodes - 1, rest / (nodes - 1), np.float32)
         threads = 32 if self._lanes == 32 else 1
         wp.launch(
             kernel,
@@ -67,7 +71,7 @@ class Chamfer:
                 *self._on_device,
                 frames,
                 self.radius,
-                self.rest_length / (nodes - 1),
+                wp.array(rest, device=self.device),
                 wp.vec3(*self.camera),
                 errors,
             ],

@@ -26,7 +26,7 @@ def chamfer_kernel(edges: int, samples: int, both: bool, lanes: int):
         frame_blocks: integers,
         frames: int,
         radius: float,
-        rest_edge: float,
+        rest_edges: floats,
         camera: wp.vec3,
         errors: floats,
     ): ...
@@ -38,10 +38,10 @@ def chamfer_kernel(edges: int, samples: int, both: bool, lanes: int):
         frame_blocks: integers,
         frames: int,
         radius: float,
-        rest_edge: float,
+        rest_edges: floats,
         camera: wp.vec3,
         errors: floats,
     ):
-        distances(wp.tid(), line, points, frame_blocks, frames, radius, rest_edge, camera, errors)
+        distances(wp.tid(), line, points, frame_blocks, frames, radius, rest_edges, camera, errors)
 
     return run

@@ -36,7 +36,7 @@ class EpisodeLoss:
         episode: Episode,
         *,
         radius: float,
-        rest_length: float,
+        rest_length: float | np.ndarray,
         weights: dict[str, float],
         cutoff: float,
         median_window: int = 7,
@@ -47,7 +47,7 @@ class EpisodeLoss:
         """Prepare the recorded side.
 
         Args:
-            radius, rest_length: Of the unstretched band [m].
+            radius, rest_length: Of the unstretched band [m]; the length whole or by edges.
             weights: Of each of TERMS; a term that weighs nothing is still computed.
             cutoff: Of the low-pass that the recorded force went through [Hz].
             median_window: Samples of the median filter on forces and velocity, odd.
@@ -93,7 +93,7 @@ class EpisodeLoss:
         return cls(
             episode,
             radius=sling.radius,
-            rest_length=sling.rest_length,
+            rest_length=sling.edge_lengths,
             weights=dict(params.methods[method].weights),
             cutoff=cutoff_hz(params.force.cutoff, params.force.cutoff_unit),
             median_window=params.loss.median_window,
@@ -107,7 +107,7 @@ class EpisodeLoss:
         return cls(
             episode,
             radius=sling.radius,
-            rest_length=sling.rest_length,
+            rest_length=sling.edge_lengths,
             weights={"geom": 1.0, "force": 1.0, "work": 0.0, "taut": 0.0},
             cutoff=cutoff_hz(params.force.cutoff, params.force.cutoff_unit),
             median_window=params.loss.median_window,

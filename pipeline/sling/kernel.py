@@ -23,6 +23,7 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int):
     def rod(
         tid: int,
         geometry: array,
+        lengths: array,
         clamp: array,
         schedule: array,
         parameter: array,
@@ -44,6 +45,7 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int):
     @wp.kernel(module="unique")
     def run(
         geometry: array,
+        lengths: array,
         clamp: array,
         schedule: array,
         parameter: array,
@@ -62,9 +64,9 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int):
         payload_steps: int,
     ):
         rod(
-            wp.tid(), geometry, clamp, schedule, parameter, state, work, lane_state, output, frames,
-            frame_first, frame_weight, n_frames, steps, first_step, last_step, first_free,
-            payload_steps,
+            wp.tid(), geometry, lengths, clamp, schedule, parameter, state, work,
+            lane_state, output, frames, frame_first, frame_weight, n_frames, steps, first_step,
+            last_step, first_free, payload_steps,
         )  # fmt: skip
 
     return run

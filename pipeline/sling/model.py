@@ -32,7 +32,7 @@ class Sling:
         flexural_rigidity: E I of the band where it was measured [N m^2], one or one a theta; None
             takes a solid round band's, which follows Young's modulus.
         projectile_mass, grip_force, finger_opening_time: As in params.yaml `setup` [kg, N, s].
-        steps: The step sizes, as in params.yaml `sling`.
+        steps: The step sizes and the mesh's grading, as in params.yaml `sling`.
     """
 
     edges: int
@@ -83,8 +83,21 @@ class Sling:
         return self.edges // 2
 
     @property
-    def edge_length(self) -> float:
-        return self.rest_length / self.edges
+    def edge_lengths(self) -> np.ndarray:
+        """Rest length of each edge [m], shape (edges,).
+
+        A taut band turns within sqrt(E I / tension), a few millimetres, at the clamps and in the
+        hand: there the edges are `grading` times shorter than midway between them.
+        """
+        place = (np.arange(self.middle) + 0.5) / self.middle
+        half = 1 + (self.steps.grading - 1) * np.sin(np.pi * place) ** 2
+        sizes = np.concatenate([half, half])
+        return self.rest_length * sizes / sizes.sum()
+
+    @property
+    def arc(self) -> np.ndarray:
+        """Rest length from the first clamp to each node [m], shape (layers,)."""
+        return np.concatenate([[0.0], np.cumsum(self.edge_lengths)])
 
     @property
     def area(self) -> float:
@@ -161,7 +174,7 @@ def layers_of(sling: Sling, nodes: np.ndarray) -> np.ndarray:
     state[..., :3] = nodes
     edges = np.diff(nodes, axis=-2)
     length = np.linalg.norm(edges, axis=-1, keepdims=True)
-    direction, thin = edges / length, (length / sling.edge_length) ** -0.5
+    direction, thin = edges / length, (length / sling.edge_lengths[:, None]) ** -0.5
     for end, half in enumerate((slice(None, sling.middle), slice(sling.middle, sling.edges))):
         a = _transport(frames[end, 0], tangents[end], direction[..., half, :])
         state[..., half, 3:6] = thin[..., half, :] * a
@@ -174,7 +187,7 @@ def hanging_guess(sling: Sling) -> np.ndarray:
     """A U below the tips: two legs and a half circle, shape (layers, 9)."""
     half, length = sling.half_width, sling.rest_length
     leg = max((length - np.pi * half) / 2, 0.0)
-    arc = np.linspace(0, length, sling.layers)
+    arc = sling.arc
     nodes = np.zeros((sling.layers, 3))
     angle = np.clip((arc - leg) / (length - 2 * leg), 0, 1) * np.pi
     nodes[:, 0] = -half * np.cos(angle)
@@ -186,7 +199,7 @@ def hanging_guess(sling: Sling) -> np.ndarray:
 def drawn_guess(sling: Sling, draws: np.ndarray) -> np.ndarray:
     """Two straight halves from the tips to each draw (N, 2), shape (N, layers, 9)."""
     middle = np.column_stack([np.zeros(len(draws)), draws])[:, None]
-    part = np.linspace(0, 1, sling.middle + 1)[:, None]
+    part = (sling.arc / sling.arc[sling.middle])[: sling.middle + 1, None]
     first = sling.tips[0] + part * (middle - sling.tips[0])
-    second = middle + part * (sling.tips[1] - middle)
+    second = sling.tips[1] + part[::-1] * (middle - sling.tips[1])
     return layers_of(sling, np.concatenate([first, second[:, 1:]], axis=1))

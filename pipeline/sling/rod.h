@@ -1,10 +1,11 @@
 // The sling as an extensible director rod, stepped implicitly; one text for 16 CPU lanes and one CUDA thread.
 //
 // A layer i holds the node r_i and the directors a_i, b_i of the edge between r_i and r_i+1: 9 unknowns.
-// With g_i = (r_i+1 - r_i) / ds, the deformation gradient of an edge is F = [g a b], J = det F, and
+// With g_i = (r_i+1 - r_i) / ds, the deformation gradient of an edge is F = [g a b], J = det F. Each edge
+// has its own rest length ds, a joint the length l between the middles of its edges, and
 //
 //   W_edge  = A ds [ mu/2 (|F|^2 - 3) - mu (J - 1) + lam/2 (J - 1)^2 ]        (stable neo-Hookean)
-//   W_joint = mu A / (2 ds) [ cb (|a+ - a-|^2 + |b+ - b-|^2) - 2 (cb - ct) tau^2 ]
+//   W_joint = mu A / (2 l) [ cb (|a+ - a-|^2 + |b+ - b-|^2) - 2 (cb - ct) tau^2 ]
 //   tau = (a+.b- - b+.a-)/2 (twist),  ct = R^2/4 (G I_p),  cb = (1 + nu) R^2/2 (E I)
 //
 // where -/+ are the edges on both sides of a node. Viscous stress is d times the rate of the elastic
@@ -53,10 +54,11 @@ auto dot = [](const real* x, const real* y) -> real { return x[0] * y[0] + x[1] 
 auto cross = [](const real* x, const real* y, real* z) {
   z[0] = x[1] * y[2] - x[2] * y[1]; z[1] = x[2] * y[0] - x[0] * y[2]; z[2] = x[0] * y[1] - x[1] * y[0]; };
 
-const SC ds = geometry.data[0], area = geometry.data[1], radius2 = geometry.data[2];
-const SC node_mass = geometry.data[3], director_mass = geometry.data[4], gravity = geometry.data[5];
-const SC tolerance = geometry.data[6], step_limit = geometry.data[7];
-const int max_iterations = (int)geometry.data[8];
+const SC mean_edge = geometry.data[0], area = geometry.data[1], radius2 = geometry.data[2];
+const SC line_mass = geometry.data[3], gravity = geometry.data[4], node_mass = line_mass * mean_edge;
+const SC* edge = lengths.data;  // rest length of each edge
+const SC tolerance = geometry.data[5], step_limit = geometry.data[6];
+const int max_iterations = (int)geometry.data[7];
 
 auto X = ROW(state, 6 * L * N), X1 = X + (&AT(X, L * N) - &AT(X, 0)), X2 = X1 + (X1 - X), V1 = X2 + (X1 - X),
      V2 = V1 + (X1 - X), XP = V2 + (X1 - X);
@@ -69,7 +71,6 @@ auto FRAME = ROW(frames, 3 * L * n_frames);
 const real mu = AT(PAR, 0), lam = AT(PAR, 1), bulk = lam - mu / (SC)3, d = AT(PAR, 2), s = AT(PAR, 3), friction = AT(PAR, 4);
 const real cb = AT(PAR, 5);  // (1 + nu) R^2 / 2
 const SC ct = radius2 / 4;
-const real volume = zero + area * ds;
 const real balance = (SC)3e-2 * node_mass * gravity + (SC)1e-5 * mu * area;  // N
 const SC node_shift = node_mass * (SC)2.5e5;  // the inertia of a 2 ms step
 
@@ -125,16 +126,19 @@ for (int step = first_step; step < last_step; ++step) {
       for (int m = 0; m < N; ++m) {
         const int j = i * N + m;
         const real y = c1 * AT(X1, j) - c2 * AT(X2, j), yv = c1 * AT(V1, j) - c2 * AT(V2, j);
-        real mass = zero + (m < 3 ? node_mass : director_mass);
+        real mass = zero + line_mass * (m < 3 ? (SC)0.5 * ((i ? edge[i - 1] : (SC)0) + (i < L - 1 ? edge[i] : (SC)0))
+                                              : (i < L - 1 ? edge[i] : edge[i - 1]) * radius2 / 4);
         if (i == MID && m < 3) mass = mass + payload;
         real xh = y + bh * yv;
         if (m == 2) xh = xh - gravity * bh * bh;
         const real f = mass * ibh2 * (AT(X, j) - xh);
-        r[m] += f; D[m][m] += mass * ibh2 + shift * (m < 3 ? zero + node_shift : volume * mu);
+        r[m] += f; D[m][m] += mass * ibh2 + shift * (m < 3 ? zero + node_shift : mu * (area * mean_edge));
         if (i == MID && m < 3) residual_mid[m] += f;
       }
       if (i < L - 1) {
         // ---- edge i: k = 0, 1, 2 are g, a, b; x now, xp predicted, xt rates
+        const SC ds = edge[i];
+        const real volume = zero + area * ds;
         real x[3][3], xp[3][3], xt[3][3];
         for (int c = 0; c < 3; ++c) {
           const int j = i * N + c;
@@ -226,10 +230,11 @@ for (int step = first_step; step < last_step; ++step) {
           for (int v = 0; v < 4; ++v) {
             twist += dot(tw[v], y[v]) + d * s * dot(tw[v], yt[v]); size += dot(tw[v], tw[v]);
           }
-          real weight = zero + (kind > 0 || i == L - 2 ? (SC)2 : (SC)1);  // a fixed frame is half an edge away
+          const SC apart = (SC)0.5 * (kind > 0 || i == L - 2 ? ds : ds + edge[i + 1]);  // a fixed frame is half an edge away
+          real weight = one;
           if (kind == 0 && i == MID - 1) weight = weight * (one - gripped);
           if (kind > 1) weight = weight * gripped;
-          const real k = mu * (weight * area / ds), kb = k * cb;
+          const real k = mu * (weight * area / apart), kb = k * cb;
           const real kt = minimum((SC)2 * (kb - k * ct), (SC)1.9 * kb / maximum(size, zero + (SC)1e-3));
           const real hb = kb * (one + dsh), ht = kt * (one + dsh);
           for (int v = 0; v < 4; ++v) {
@@ -276,7 +281,7 @@ for (int step = first_step; step < last_step; ++step) {
 
       for (int m = 0; m < N; ++m) {
         const real f = r[m] - eliminated[m];
-        imbalance = maximum(imbalance, magnitude(f) / (m < 3 ? (SC)1 : ds)); poison += f * zero;
+        imbalance = maximum(imbalance, magnitude(f) / (m < 3 ? (SC)1 : mean_edge)); poison += f * zero;
       }
 
       // LDL' of the block, then Schur complement into the next layer
@@ -320,7 +325,7 @@ for (int step = first_step; step < last_step; ++step) {
       for (int m = 0; m < N; ++m) {
         dx[m] = z[m]; AT(WORK, v + m) = z[m];
         poison += z[m] * zero;
-        change = maximum(change, magnitude(z[m]) * (m < 3 ? (SC)1 : ds));  // a director counts as a turn of its edge
+        change = maximum(change, magnitude(z[m]) * (m < 3 ? (SC)1 : mean_edge));  // a director counts as a turn of its edge
       }
     }
     // lanes that have settled stay as they are, so that a lane never depends on its neighbours

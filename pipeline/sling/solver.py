@@ -115,11 +115,10 @@ def run(
     with _compiling:
         kernel.module.load(wp.get_device(device))
     table = schedule.table.astype(dtype)
-    node_mass = sling.mass / sling.edges
     geometry = np.array(
         [
-            sling.edge_length, sling.area, sling.radius**2, node_mass,
-            node_mass * sling.radius**2 / 4, GRAVITY, tolerance, 0.004, max_iterations,
+            sling.rest_length / sling.edges, sling.area, sling.radius**2,
+            sling.mass / sling.rest_length, GRAVITY, tolerance, 0.004, max_iterations,
         ],
         dtype,
     )  # fmt: skip
@@ -130,7 +129,15 @@ def run(
     n_frames = len(frame_steps)
     blocks = [_interleave(rows, lanes, dtype) for rows in (parameters, states, lane_state)]
     n_blocks = len(blocks[0])
-    shared = [geometry, fixed_frames(sling).astype(dtype).ravel(), table.ravel(), first, weights]
+    lengths = sling.edge_lengths.astype(dtype)
+    shared = [
+        geometry,
+        lengths,
+        fixed_frames(sling).astype(dtype).ravel(),
+        table.ravel(),
+        first,
+        weights,
+    ]
     shared = [wp.array(array, device=device) for array in shared]
 
     def slice_of(part: slice):
@@ -146,9 +153,8 @@ def run(
             kernel,
             dim=size * (lanes if kind == "cuda" else 1),
             inputs=[
-                shared[0], shared[1], shared[2], own[0], own[1], work, own[2], output, frames,
-                shared[3], shared[4], n_frames, len(table), 0, len(table), schedule.first_free,
-                int(payload),
+                *shared[:4], own[0], own[1], work, own[2], output, frames, *shared[4:],
+                n_frames, len(table), 0, len(table), schedule.first_free, int(payload),
             ],
             device=device,
             block_dim=lanes,

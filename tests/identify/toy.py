@@ -17,7 +17,9 @@ from pipeline.identify.regions import Region, find_regions
 RADIUS, LENGTH, LAYERS = 0.005, 0.4, 25
 PERIOD = 0.03
 CUTOFF = 35.65
-SLING = SimpleNamespace(radius=RADIUS, rest_length=LENGTH)
+SLING = SimpleNamespace(
+    radius=RADIUS, rest_length=LENGTH, edge_lengths=np.full(LAYERS - 1, LENGTH / (LAYERS - 1))
+)
 
 NAMES = ("a", "b", "c", "d", "e")
 CENTRE = np.array([0.3, 0.62, 0.45, 0.8, 0.55])

@@ -17,8 +17,7 @@ lint: setup
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 
-validate: setup       # slow campaigns; their results are committed
-	.venv/bin/pip install --disable-pip-version-check -q -e '.[dev,validation]' -c constraints.txt
+validate: setup       # slow campaigns; their results, in reports/validation/, are committed
 	.venv/bin/python -m pytest -m validation
 
 clean:                # all but data, checkpoints and DVC's cache

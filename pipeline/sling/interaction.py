@@ -15,14 +15,14 @@ from pipeline.sling.solver import (
     HELD,
     NOT_CONVERGED,
     OPENING,
-    RELAX,
+    RELAX_STEPS,
     SLIPPED,
     Schedule,
+    relaxation,
     run,
     steps,
 )
 
-RELAX_STEPS = 40
 GRASP_BLEND = 0.5  # s in which the held node moves from where the band hung to the hand's path
 
 
@@ -63,13 +63,13 @@ def schedule_of(sling: Sling, episode: Episode, refine: int = 1) -> Schedule:
         )
 
     recoil_end = max(min(clear + size.recoil_time, end), clear + size.recoil_step)
-    relax = steps(np.arange(RELAX_STEPS + 1) * 0.05, 0.05, hold=FREE, mode=RELAX)
+    relax = relaxation(FREE)
     relax[:, 11] = episode.grasp_time
     held = steps(grid(episode.grasp_time, release, size.grip_step), 1, hold=HELD)
     opening_times = grid(release, clear, size.recoil_step)
     opening = steps(opening_times, held[-1, 0], hold=OPENING, order=2)
     recoil = steps(grid(clear, recoil_end, size.recoil_step), opening[-1, 0], hold=FREE, order=2)
-    swing = np.zeros((0, 12))
+    swing = np.zeros((0, 13))
     if end > recoil_end:
         swing = steps(grid(recoil_end, end, size.swing_step), recoil[-1, 0], hold=FREE, order=2)
     held[:, 9] = sling.grip_force

@@ -16,13 +16,12 @@ from pipeline.sling.solver import (
     OFFSET,
     PAYLOAD,
     POUCH,
-    RELAX,
+    RELAX_STEPS,
     Schedule,
+    relaxation,
     run,
     steps,
 )
-
-RELAX_STEPS = 16
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ def ballistic_landing(y, z, vy, vz, floor: float):
 
 def schedule_of(sling: Sling, refine: int = 1) -> Schedule:
     """Relax at the draw, then recoil in second-order steps."""
-    relax = steps(np.arange(RELAX_STEPS + 1) * 0.05, 0.05, hold=POUCH, mode=RELAX)
+    relax = relaxation(POUCH)
     relax[:, 10] = 1.0
     h = sling.steps.launch_step / refine
     count = int(round(sling.steps.launch_time / h))

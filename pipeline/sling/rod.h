@@ -69,8 +69,6 @@ auto LANE = ROW(lane_state, 16);
 auto FRAME = ROW(frames, 3 * L * n_frames);
 
 const real mu = AT(PAR, 0), lam = AT(PAR, 1), bulk = lam - mu / (SC)3, d = AT(PAR, 2), s = AT(PAR, 3), friction = AT(PAR, 4);
-const real cb = AT(PAR, 5);  // (1 + nu) R^2 / 2
-const SC ct = radius2 / 4;
 const real balance = (SC)3e-2 * node_mass * gravity + (SC)1e-5 * mu * area;  // N
 const SC node_shift = node_mass * (SC)2.5e5;  // the inertia of a 2 ms step
 
@@ -80,11 +78,13 @@ const SC node_shift = node_mass * (SC)2.5e5;  // the inertia of a 2 ms step
 real attached = AT(LANE, 0), failure = AT(LANE, 4), payload = AT(LANE, 9);
 
 for (int step = first_step; step < last_step; ++step) {
-  const SC* T = schedule.data + (size_t)step * 12;
+  const SC* T = schedule.data + (size_t)step * 13;
   const SC h = T[0], c1 = T[1], c2 = T[2], bh = T[3] * h;  // beta h
   const int mode = (int)T[4], hold = (int)T[5];            // mode 0: relax; hold 0: free, 1: held,
                                                            // 2: fingers opening, 3: held in a pouch
   const SC limit = T[9], blend = T[10], time = T[11];
+  const real cb = AT(PAR, 5) * T[12];  // (1 + nu) R^2 / 2, or as measured; guesses relax with less first
+  const SC ct = radius2 / 4 * T[12];
   const SC ibh = (SC)1 / bh, ibh2 = ibh * ibh;
 
   // the hand takes hold of the band where it is, and leads it to its own path
@@ -333,7 +333,7 @@ for (int step = first_step; step < last_step; ++step) {
     // a step that an indefinite Hessian gives, or that goes far, is not made: the Hessian is shifted
     const real refused = maximum(change < zero + (SC)5 * step_limit ? zero : one, change < zero + (SC)2 * tolerance ? zero : indefinite);
     const real enough = tolerance * (shift > zero ? zero + (SC)10 : one);
-    shift = refused > zero ? maximum((SC)4 * shift, zero + (SC)0.25) : (shift < zero + (SC)0.1 ? zero : (SC)0.25 * shift);
+    shift = refused > zero ? maximum((SC)4 * shift, zero + (SC)0.25) : (shift < zero + (SC)0.05 ? zero : (SC)0.5 * shift);
     const real scale = (one - settled) * (one - refused) * minimum(one, step_limit / maximum(change, zero + (SC)1e-12));
     for (int i = 0; i < L; ++i) {
       const int v = i * LAYER_WORK + N * N + N * (N + 1) / 2;

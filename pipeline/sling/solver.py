@@ -21,7 +21,8 @@ class Schedule:
     """The steps that all lanes of a batch take.
 
     Attributes:
-        table: h, c1, c2, beta, mode, hold, target x y z, normal force, blend, time; shape (S, 12).
+        table: h, c1, c2, beta, mode, hold, target x y z, normal force, blend, time, share of the
+            bending stiffness; shape (S, 13).
         first_free: Index of the first step after the release.
     """
 
@@ -37,22 +38,38 @@ RELAX, MOVE = 0, 1
 FREE, HELD, OPENING, POUCH = 0, 1, 2, 3
 
 
+RELAX_STEPS = 40
+
+
+def relaxation(hold: int) -> np.ndarray:
+    """Rows that bring a guess to rest, shape (RELAX_STEPS, 13): steps without speed, ever longer.
+
+    Guesses have kinks. Inertia holds the first steps near them, and the bending stiffness comes in
+    little by little; the last steps are statics.
+    """
+    ramp = RELAX_STEPS - 12
+    sizes = np.concatenate([np.geomspace(2e-3, 0.05, ramp), np.full(12, 0.05)])
+    table = steps(np.concatenate([[0.0], np.cumsum(sizes)]), sizes[0], hold=hold, mode=RELAX)
+    table[:ramp, 12] = np.geomspace(0.01, 1, ramp)
+    return table
+
+
 def steps(times, previous: float, *, hold: int, order: int = 1, mode: int = MOVE) -> np.ndarray:
-    """Rows of a schedule table that end at `times`, shape (S, 12): backward Euler or BDF2.
+    """Rows of a schedule table that end at `times`, shape (S, 13): backward Euler or BDF2.
 
     Args:
         previous: Length of the step before the first one [s], for variable-step BDF2.
     """
     times = np.asarray(times, float)
     h = np.diff(times)
-    table = np.zeros((len(h), 12))
+    table = np.zeros((len(h), 13))
     ratio = h / np.concatenate([[previous], h[:-1]])
     table[:, 0], table[:, 1], table[:, 3] = h, 1, 1
     if order == 2:
         table[:, 1] = (1 + ratio) ** 2 / (1 + 2 * ratio)
         table[:, 2] = ratio**2 / (1 + 2 * ratio)
         table[:, 3] = (1 + ratio) / (1 + 2 * ratio)
-    table[:, 4], table[:, 5], table[:, 11] = mode, hold, times[1:]
+    table[:, 4], table[:, 5], table[:, 11], table[:, 12] = mode, hold, times[1:], 1
     return table
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.sling import launch
 from pipeline.sling.model import GRAVITY, hanging_guess, layers_of, material
-from pipeline.sling.solver import FREE, RELAX, Schedule, run, steps
+from pipeline.sling.solver import FREE, Schedule, relaxation, run
 
 from .reference import gradient
 
@@ -18,7 +18,7 @@ THETA = [5e5, 0.45, 2e-3, 0.5, 1.0]
 
 def relaxed(sling, theta, start, double=True):
     """Layers (L, 9) at rest under gravity, from `start`."""
-    table = steps(np.arange(61) * 0.05, 0.05, hold=FREE, mode=RELAX)
+    table = relaxation(FREE)
     result = run(
         sling,
         Schedule(table, first_free=0),

@@ -158,7 +158,7 @@ def run_check(arguments: argparse.Namespace) -> tuple[str, int]:
 def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
     from pipeline.params import load
     from pipeline.sling.launch import launch
-    from pipeline.sling.model import load_sling, mounting_path
+    from pipeline.sling.model import load_sling
     from pipeline.theta import load_theta, vector
 
     params = load()
@@ -166,12 +166,6 @@ def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
         known = ", ".join(params.bands)
         raise UserError(f"band {arguments.band}: not in params.yaml, which has {known}")
     theta = vector(load_theta(arguments.theta, arguments.band))
-    if not mounting_path(arguments.band).exists():
-        print(
-            f"note: {mounting_path(arguments.band)} is missing, so the band hangs as `setup` says;"
-            f" `dvc repro mounting@{arguments.band}` fits it to a recording",
-            file=sys.stderr,
-        )
     sling = load_sling(params, arguments.band)
     result = launch(sling, theta, arguments.draw, max_force=params.setup.max_force)
     return shown(

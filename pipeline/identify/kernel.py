@@ -6,7 +6,7 @@ from pathlib import Path
 import warp as wp
 
 TEXT = Path(__file__).with_name("chamfer.h")
-wp.config.log_level = wp.LOG_WARNING
+wp.config.log_level = wp.LOG_ERROR
 wp.config.enable_backward = False
 
 

@@ -127,6 +127,11 @@ def fit_mounting(sling: Sling, episode: Episode, make_loss, *, workers: int) -> 
             ),
         )
     value, angle, rigidity = min(found, (start, 0.0, 1.0))
+    if not np.isfinite(value):
+        raise UserError(
+            f"episode of {episode.band}: no simulation of its slack part converges; check"
+            f" bands.{episode.band} (mass, diameter, rest_length) and the extrinsics"
+        )
     return {
         "clamp_direction": mounted(angle).tolist(),
         "flexural_rigidity": solid * rigidity,
@@ -134,5 +139,5 @@ def fit_mounting(sling: Sling, episode: Episode, make_loss, *, workers: int) -> 
         "relative_rigidity": rigidity,
         "nominal_youngs_modulus": young,
         "slack_until": float(part.time[-1]),
-        "loss": {"solid_and_vertical": start, "fitted": value},
+        "loss": {"solid_and_vertical": start if np.isfinite(start) else None, "fitted": value},
     }

@@ -31,7 +31,8 @@ class Launches:
     Attributes:
         landing_y: Where the projectile meets the floor, shape (N,).
         speed, angle: Of the projectile as it leaves the pouch [m/s, rad above the horizon].
-        hold_force: Of the drawn band on the hand, shape (N,); known for failed launches too.
+        hold_force: Of the drawn band on the hand, shape (N,); known for failed launches too,
+            but for those that did not converge.
         leave_time: After the release [s].
         leave_y, leave_z: Where it leaves.
         failure: None, or the reason, length N.
@@ -102,12 +103,13 @@ def launch(
         double=double,
     )
     hold_force = np.linalg.norm(result.output[:, RELAX_STEPS - 1, :3].astype(float), axis=1)
+    code = np.round(result.lane_state[:, FAILURE])
+    hold_force[code > 0] = np.nan
     time, y, z, vy, vz = result.lane_state[:, LEAVING].astype(float).T
     landing = ballistic_landing(y, z, vy, vz, -sling.fork_height)
-    code = np.round(result.lane_state[:, FAILURE])
     failure: list[str | None] = []
     for i in range(count):
-        if not np.isfinite(hold_force[i]) or code[i] > 0:
+        if not np.isfinite(hold_force[i]):
             failure.append("the simulation did not converge")
         elif hold_force[i] > max_force:
             failure.append(f"holding takes {hold_force[i]:.1f} N, more than {max_force:g} N")

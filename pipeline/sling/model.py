@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
+from pipeline.errors import UserError
 
 GRAVITY = 9.81
 THETA = (
@@ -116,7 +119,21 @@ def mounting_path(band: str, root: str | Path = ".") -> Path:
 def load_sling(params, band: str, root: str | Path = ".") -> Sling:
     """The sling of a band of params.yaml, mounted as its recording shows where that was fitted."""
     path = mounting_path(band, root)
-    mounting = json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+    mounting = None
+    if path.exists():
+        try:
+            mounting = json.loads(path.read_text(encoding="utf-8"))
+            mounting["clamp_direction"], mounting["flexural_rigidity"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise UserError(
+                f"{path}: damaged; `dvc repro --force mounting@{band}` makes it anew"
+            ) from error
+    else:
+        print(
+            f"note: {path} is missing, so the band hangs as `setup` says; `dvc repro"
+            f" mounting@{band}` fits it to a recording",
+            file=sys.stderr,
+        )
     return Sling.of(params.bands[band], params.setup, params.sling, mounting)
 
 

@@ -23,7 +23,8 @@ pytestmark = pytest.mark.validation
 COUNT, BATCH, SEED = 10_000, 500, 1
 DEFAULT_GRIP = LAUNCHES = 2_000
 HELD_FAST = 1e5  # N: at this force of the pads no band slips out
-ALLOWED = 10  # failures
+SLIPPED = "the band slipped out of the fingers"
+ALLOWED = 10  # failures, other than slipping out
 
 
 def survey(sling, episode, thetas: np.ndarray, progress) -> dict:
@@ -94,8 +95,9 @@ def test_random_thetas_converge_or_say_why_not(params, progress, record) -> None
     surveys = {"held_fast": held, "default_grip": gripped, "launches": launched}
     not_finite = {name: one["not_finite_among_the_good"] for name, one in surveys.items()}
     failures = sum(held["failures"].values())
-    other = {reason for reason in gripped["failures"] if "slipped" not in reason}
-    met = not any(not_finite.values()) and failures <= ALLOWED
+    slipped = gripped["failures"].get(SLIPPED, 0)
+    other = sum(gripped["failures"].values()) - slipped
+    met = not any(not_finite.values()) and failures <= ALLOWED and other <= ALLOWED
     record(
         "robustness",
         asked=f"Of {COUNT} random θ of the default box on the bench's pull-and-release, held fast:"
@@ -117,4 +119,4 @@ def test_random_thetas_converge_or_say_why_not(params, progress, record) -> None
     )
     assert not any(not_finite.values()), not_finite
     assert failures <= ALLOWED, held["failed"]
-    assert other <= set(held["failures"]), other
+    assert other <= ALLOWED, gripped["failures"]

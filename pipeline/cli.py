@@ -18,6 +18,7 @@ from pipeline import errors
 from pipeline.errors import UserError
 
 DEFAULT_METHOD = "sling2sim2real"
+FURTHEST_TARGET, FURTHEST_DRAW = 100.0, 2.0  # m
 
 
 def main() -> None:
@@ -80,7 +81,7 @@ def parser() -> argparse.ArgumentParser:
     sub = command(run_aim, "say where to draw for a target, by the trained policy")
     sub.add_argument("--band", required=True)
     sub.add_argument("--method", default=DEFAULT_METHOD, help=f"default {DEFAULT_METHOD}")
-    sub.add_argument("--target", type=positive, required=True, metavar="M", help="along the floor")
+    sub.add_argument("--target", type=target, required=True, metavar="M", help="along the floor")
     sub.add_argument("--json", action="store_true")
 
     sub = command(run_bench, "measure rollouts and launches a second")
@@ -104,6 +105,14 @@ def number(text: str) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f"must be a number, got {text!r}")
+    return value
+
+
+def target(text: str) -> float:
+    """A distance along the floor that a slingshot may be asked for [m]."""
+    value = positive(text)
+    if value > FURTHEST_TARGET:
+        raise argparse.ArgumentTypeError(f"must be at most {FURTHEST_TARGET:g} m, got {text}")
     return value
 
 
@@ -165,6 +174,14 @@ def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
     if arguments.band not in params.bands:
         known = ", ".join(params.bands)
         raise UserError(f"band {arguments.band}: not in params.yaml, which has {known}")
+    floor = -params.setup.fork_height
+    if arguments.draw[1] < floor:
+        raise UserError(
+            f"--draw: z = {arguments.draw[1]:g} m lies below the floor, z = {floor:g} m"
+            " (setup.fork_height in params.yaml)"
+        )
+    if math.hypot(*arguments.draw) > FURTHEST_DRAW:
+        raise UserError(f"--draw: must be at most {FURTHEST_DRAW:g} m from the fork")
     theta = vector(load_theta(arguments.theta, arguments.band))
     sling = load_sling(params, arguments.band)
     result = launch(sling, theta, arguments.draw, max_force=params.setup.max_force)

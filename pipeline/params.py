@@ -10,7 +10,7 @@ import math
 from pathlib import Path
 from typing import Annotated, Generic, Literal, TypeVar
 
-from pydantic import ValidationError, model_validator
+from pydantic import AfterValidator, ValidationError, model_validator
 from ruamel.yaml import YAML, YAMLError
 
 from pipeline.errors import UserError
@@ -34,6 +34,17 @@ from pipeline.schema import (
 Distance = Annotated[float, Range(0.1, 20)]  # along the floor, m
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound")
+# y of the paper's fixed target of 1 m by 1 m: a landing outside is a failure, so trials aim inside.
+TARGET_AREA = (1.425, 2.425)
+
+
+def _is_free(name: str) -> str:
+    if name.lower() == "measured":
+        raise refusal("data/trials/measured holds measured landings, choose another name")
+    return name
+
+
+BandName = Annotated[Name, AfterValidator(_is_free)]
 
 
 class Run(Section):
@@ -299,7 +310,7 @@ class Rig(Section):
 
 class Params(Section):
     run: Run
-    bands: Annotated[dict[Name, Band], FILLED]
+    bands: Annotated[dict[BandName, Band], FILLED]
     setup: Setup
     episode: Episode
     force: Force
@@ -332,12 +343,27 @@ class Params(Section):
         return self
 
     @model_validator(mode="after")
+    def _bands_reach_across(self) -> Params:
+        for name, band in self.bands.items():
+            if band.rest_length <= self.setup.fork_width:
+                raise refusal(
+                    f"bands.{name}.rest_length: {band.rest_length:g} must be longer than"
+                    f" setup.fork_width, {self.setup.fork_width:g}"
+                )
+        return self
+
+    @model_validator(mode="after")
     def _trials_are_trained(self) -> Params:
         low, high = self.policy.targets
         for target in self.trials.targets:
             if not low <= target <= high:
                 raise refusal(
                     f"trials.targets: {target} lies outside policy.targets [{low}, {high}]"
+                )
+            if not TARGET_AREA[0] <= target <= TARGET_AREA[1]:
+                raise refusal(
+                    f"trials.targets: {target} lies outside the target on the floor,"
+                    f" {list(TARGET_AREA)}, where every landing counts as failed"
                 )
         return self
 

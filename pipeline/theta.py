@@ -7,13 +7,23 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.errors import UserError
+from pipeline.params import Parameters
+from pipeline.schema import Range
 from pipeline.sling.model import THETA
+
+
+def _limits(name: str) -> Range:
+    """How far params.yaml lets the box of the search reach."""
+    box = Parameters.model_fields[name].annotation
+    return next(one for one in box.model_fields["low"].metadata if isinstance(one, Range))
+
+
+LIMITS = {name: _limits(name) for name in THETA}
 
 
 def load_theta(path: Path, band: str) -> dict:
@@ -25,7 +35,7 @@ def load_theta(path: Path, band: str) -> dict:
         raise UserError(
             f"{path}: no such file; `dvc repro theta@{band}-<method>` writes data/theta/{band}/"
         ) from error
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise UserError(f"{path}: cannot be read as JSON ({error})") from error
     if not isinstance(content, dict) or content.get("band") != band:
         raise UserError(f'{path}: must hold an object with "band": "{band}"')
@@ -34,8 +44,12 @@ def load_theta(path: Path, band: str) -> dict:
         raise UserError(f'{path}: "theta" must hold exactly {", ".join(THETA)}')
     for name, value in theta.items():
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not math.isfinite(value) or value < 0:
-            raise UserError(f"{path}: theta.{name} must be a number of at least 0, got {value!r}")
+        low, high = LIMITS[name].low, LIMITS[name].high
+        if not number or not low <= value <= high:
+            raise UserError(
+                f"{path}: theta.{name} must be a number between {low:g} and {high:g},"
+                f" got {repr(value)[:60]}"
+            )
     return content
 
 

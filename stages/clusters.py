@@ -7,20 +7,20 @@ Reads data/history/<band>/<method>.parquet; writes data/clusters/<band>/<method>
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from pipeline import errors
 from pipeline.identify.history import History
 from pipeline.identify.regions import find_regions, save_regions
-from pipeline.params import load
 from pipeline.sling.model import THETA
+from pipeline.stage import expect, started
 
 
 def main() -> None:
-    band, method = sys.argv[1:]
-    optimizer = load().optimizer
-    history = History.load(method, THETA, Path("data/history", band, f"{method}.parquet"))
+    params, band, method = started("band", "method")
+    optimizer = params.optimizer
+    source = expect(Path("data/history", band, f"{method}.parquet"), f"history@{band}-{method}")
+    history = History.load(method, THETA, source)
     regions = find_regions(
         history.unit,
         history.total,

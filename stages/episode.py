@@ -7,17 +7,16 @@ Reads data/raw/<band>.mcap; writes data/episodes/<band>/: signals.parquet and cl
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from pipeline import errors
-from pipeline.params import load
 from pipeline.recording.build import build_episode
+from pipeline.stage import started
 
 
 def main() -> None:
-    (band,) = sys.argv[1:]
-    episode = build_episode(Path("data/raw", f"{band}.mcap"), band, load())
+    params, band = started("band")
+    episode = build_episode(Path("data/raw", f"{band}.mcap"), band, params)
     episode.save(Path("data/episodes", band))
     force = episode.metadata["preprocessing"]["peak_force"]
     print(

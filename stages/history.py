@@ -8,20 +8,18 @@ Reads data/episodes/<band>/; writes data/history/<band>/<method>.parquet. Killed
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from pipeline import errors
 from pipeline.identify.explore import explore
 from pipeline.identify.history import History
 from pipeline.identify.session import session
-from pipeline.params import load
 from pipeline.sling.model import THETA
+from pipeline.stage import started
 
 
 def main() -> None:
-    band, method = sys.argv[1:]
-    params = load()
+    params, band, method = started("band", "method")
     history = History(method, THETA)
     with session("history", band, method, params, params.optimizer.generations + 1) as evaluate:
         explore(evaluate, params.optimizer, history)

@@ -8,7 +8,6 @@ Reads data/episodes/<band>/; writes data/mounting/<band>.json.
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 
 from pipeline import errors
@@ -16,13 +15,12 @@ from pipeline.files import write_json
 from pipeline.identify.loss import EpisodeLoss
 from pipeline.identify.mounting import fit_mounting
 from pipeline.identify.session import load_episode, workers
-from pipeline.params import load
 from pipeline.sling.model import Sling
+from pipeline.stage import started
 
 
 def main() -> None:
-    (band,) = sys.argv[1:]
-    params = load()
+    params, band = started("band")
     sling = Sling.of(params.bands[band], params.setup, params.sling)
     content = fit_mounting(
         sling,

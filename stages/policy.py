@@ -8,7 +8,6 @@ policy.pt (metres to metres), card.json, map.parquet (the simulated launches) an
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pyarrow as pa
@@ -16,17 +15,16 @@ import pyarrow.parquet as pq
 
 from pipeline import errors
 from pipeline.files import replacing, write_json
-from pipeline.params import load
 from pipeline.policy.aim import simulator
 from pipeline.policy.export import card, write_onnx, write_torchscript
 from pipeline.policy.landing_map import LandingMap
 from pipeline.policy.train import train
+from pipeline.stage import started
 from pipeline.theta import load_theta, vector
 
 
 def main() -> None:
-    band, method = sys.argv[1:]
-    params = load()
+    params, band, method = started("band", "method")
     theta = load_theta(Path("data/theta", band, f"{method}.json"), band)
     folder = Path("data/policies", band, method)
 

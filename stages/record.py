@@ -5,20 +5,16 @@ python -m stages.record band1
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 from pipeline.errors import UserError, run
-from pipeline.params import load
 from pipeline.rig.record import record
+from pipeline.stage import started
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("band")
-    band = parser.parse_args().band
-    params = load()
-    if band not in params.bands or params.bands[band].source != "rig":
+    params, band = started("band")
+    if params.bands[band].source != "rig":
         raise UserError(f"{band}: not a band with source: rig in params.yaml")
     if band not in params.rig.bands:
         raise UserError(f"{band}: rig.bands in params.yaml does not say what it is made of")

@@ -9,7 +9,6 @@ SLING_WORKERS say where it runs.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from pipeline import errors
@@ -17,14 +16,14 @@ from pipeline.identify.history import History
 from pipeline.identify.refine import iterations, refine
 from pipeline.identify.regions import load_regions
 from pipeline.identify.session import session
-from pipeline.params import load
 from pipeline.sling.model import THETA
+from pipeline.stage import expect, started
 
 
 def main() -> None:
-    band, method = sys.argv[1:]
-    params = load()
-    regions = load_regions(Path("data/clusters", band, f"{method}.json"))
+    params, band, method = started("band", "method")
+    source = expect(Path("data/clusters", band, f"{method}.json"), f"clusters@{band}-{method}")
+    regions = load_regions(source)
     batches = iterations(params.optimizer, len(regions))
     history = History(method, THETA)
     with session("refined", band, method, params, batches) as evaluate:

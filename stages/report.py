@@ -8,12 +8,13 @@ Fails, and says which stage is missing, where an expected input is not there.
 from __future__ import annotations
 
 from pipeline import errors
-from pipeline.params import load
 from pipeline.report.write import write
+from pipeline.stage import started
 
 
 def main() -> None:
-    write(load())
+    (params,) = started()
+    write(params)
     print("wrote reports/README.md")
 
 

@@ -8,18 +8,21 @@ data/theta/<band>/<method>.json.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from pipeline import errors
 from pipeline.files import write_json
 from pipeline.identify.history import History, theta_content
 from pipeline.sling.model import THETA
+from pipeline.stage import expect, started
 
 
 def main() -> None:
-    band, method = sys.argv[1:]
-    sources = [Path("data", phase, band, f"{method}.parquet") for phase in ("history", "refined")]
+    _, band, method = started("band", "method")
+    sources = [
+        expect(Path("data", phase, band, f"{method}.parquet"), f"{phase}@{band}-{method}")
+        for phase in ("history", "refined")
+    ]
     content = theta_content(History.load(method, THETA, *sources), band)
     write_json(Path("data/theta", band, f"{method}.json"), content)
     values = ", ".join(f"{name} {value:.4g}" for name, value in content["theta"].items())

@@ -10,7 +10,6 @@ recorded band the calibrated simulator predicts the measured launches, or else t
 
 from __future__ import annotations
 
-import sys
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
@@ -23,15 +22,15 @@ from pipeline.episode import Episode
 from pipeline.params import load
 from pipeline.policy import trials
 from pipeline.policy.aim import policy_draws, simulator
+from pipeline.stage import expect_episode, started
 from pipeline.theta import load_theta, vector
 
 
 def main() -> None:
-    band, method = sys.argv[1:]
-    params = load()
+    params, band, method = started("band", "method")
     about, fork_width = params.bands[band], params.setup.fork_width
     theta = load_theta(Path("data/theta", band, f"{method}.json"), band)
-    episode = Episode.load(Path("data/episodes", band))
+    episode = Episode.load(expect_episode(band))
     measured = Path("data/trials/measured", f"{band}.csv")
 
     launches = []

@@ -85,6 +85,8 @@ def test_results_are_json_or_lines() -> None:
         ("launch --theta t.json --band band1 --draw -0.30,-0.17", "joined by ="),
         ("launch --theta t.json --band band1 --draw=0.30,-0.17", "y must be below 0"),
         ("launch --theta t.json --band band1 --draw=-0.30", "must be Y,Z such as"),
+        ("aim --band band1 --target inf", "must be a number, got 'inf'"),
+        ("aim --band band1 --target 1e30", "must be at most 100 m"),
         ("aim --band band1 --target far", "must be a number, got 'far'"),
         ("add-band new --recording new.mcap --mass 0", "must be above 0"),
     ],
@@ -98,6 +100,8 @@ def test_a_command_line_that_makes_no_sense(arguments: str, expected: str) -> No
     [
         ("launch --theta none.json --band band1 --draw=-0.30,-0.17", "none.json: no such file"),
         ("launch --theta none.json --band band9 --draw=-0.30,-0.17", "band band9: not in params"),
+        ("launch --theta none.json --band band1 --draw=-0.30,-0.60", "lies below the floor"),
+        ("launch --theta none.json --band band1 --draw=-2.30,0", "at most 2 m from the fork"),
         ("aim --band band9 --target 1.925", "band band9: not in params.yaml"),
         ("aim --band band1 --method best --target 1.925", "method best: not in params.yaml"),
         ("check none.mcap", "none.mcap"),

@@ -127,6 +127,9 @@ def test_exact_lines() -> None:
         ("loss.median_window", 6, "loss: median_window must be odd"),
         ("episode.tail", 59.0, "episode: tail must be less"),
         ("trials.targets", [0.5], "trials.targets: 0.5 lies outside policy.targets"),
+        ("trials.targets", [1.5, 2.6], "trials.targets: 2.6 lies outside"),
+        ("bands", {"measured": CONTENT["bands"]["band1"]}, "bands.measured: data/trials/measured"),
+        ("bands.band1.rest_length", 0.2, "bands.band1.rest_length: 0.2 must be longer than setup."),
         ("policy.hidden", [], "policy.hidden: must not be empty"),
         ("loss", 3, "loss: must be a mapping"),
         ("weather", 3, "weather: unknown key"),
@@ -141,6 +144,13 @@ def test_what_is_refused_and_how_it_is_said(path: str, value: object, expected: 
     message = refusal(changed(tuple(path.split(".")), value))
     assert message.startswith("params.yaml: ")
     assert expected in message
+
+
+def test_targets_beyond_the_paper_area_are_refused_though_trained() -> None:
+    text = TEXT.replace("targets: [1.425, 2.425]", "targets: [1.0, 3.0]")
+    assert parse(text).policy.targets == (1.0, 3.0)
+    far = text.replace("targets: [1.725,", "targets: [2.8,")
+    assert "trials.targets: 2.8 lies outside the target on the floor" in refusal(far)
 
 
 def test_broken_yaml_is_refused_with_its_line() -> None:

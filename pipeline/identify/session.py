@@ -25,6 +25,7 @@ from pipeline.identify.progress import Progress
 from pipeline.identify.space import Space
 from pipeline.sling import model as sling_module
 from pipeline.sling.model import load_sling, mounting_path
+from pipeline.stage import expect_episode
 
 SOURCES = (
     Path(__file__).parent,
@@ -88,12 +89,8 @@ def evaluator(params, band: str, method: str) -> Evaluator:
 
 def load_episode(band: str) -> Episode:
     """The recorded episode of a band. Raises UserError where it is missing."""
-    try:
-        return Episode.load(Path("data/episodes", band))
-    except FileNotFoundError as error:
-        raise UserError(
-            f"{error.filename}: missing; `dvc repro episode@{band}` makes it"
-        ) from error
+    expect_episode(band)
+    return Episode.load(Path("data/episodes", band))
 
 
 def device() -> str:

@@ -16,21 +16,27 @@ def policy_draws(folder: Path, targets: np.ndarray) -> np.ndarray:
     """Draws (y, z) [m], shape (N, 2), of the exported policy in `folder` for targets [m], (N,).
 
     Raises:
-        UserError: The policy is not there.
+        UserError: The policy is not there, or damaged.
     """
     import onnxruntime
 
     path = Path(folder) / "policy.onnx"
+    band, method = path.parts[-3:-1]
     if not path.is_file():
-        band, method = path.parts[-3:-1]
         raise UserError(f"{path}: no such file; `dvc repro policy@{band}-{method}` trains it")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
-    session = onnxruntime.InferenceSession(
-        path.read_bytes(), options, providers=["CPUExecutionProvider"]
-    )
+    options.log_severity_level = 4  # what is wrong is said below
     targets = np.asarray(targets, np.float32)[:, None]
-    return session.run(["draw"], {"target": targets})[0].astype(float)
+    try:
+        session = onnxruntime.InferenceSession(
+            path.read_bytes(), options, providers=["CPUExecutionProvider"]
+        )
+        return session.run(["draw"], {"target": targets})[0].astype(float)
+    except Exception as error:  # onnxruntime has an error of its own for each kind of damage
+        raise UserError(
+            f"{path}: damaged; `dvc repro --force policy@{band}-{method}` makes it anew"
+        ) from error
 
 
 def aim(

@@ -62,29 +62,35 @@ def read_measured(path: Path, method: str) -> list[dict]:
     Columns draw_y_m, draw_z_m, landing_y_m, and where known target_m and method. An empty
     landing_y_m is a launch that did not land. Raises UserError.
     """
-    with open(path, encoding="utf-8-sig", newline="") as file:
-        reader = csv.DictReader(file)
-        names = [name.strip() for name in reader.fieldnames or []]
-        reader.fieldnames = names
-        missing = [name for name in REQUIRED if name not in names]
-        unknown = [name for name in names if name not in REQUIRED + OPTIONAL]
-        if missing or unknown:
-            what = f"lacks the column {missing[0]}" if missing else f"unknown column {unknown[0]!r}"
-            raise UserError(f"{path}: {what}; columns are {','.join(REQUIRED + OPTIONAL)}")
-        rows = []
-        for line, cells in enumerate(reader, start=2):
-            row = {name: (cells.get(name) or "").strip() for name in REQUIRED + OPTIONAL}
-            if row["method"] not in ("", method):
-                continue
-            numbers = {name: _cell(path, line, name, row) for name in (*REQUIRED, "target_m")}
-            if numbers["draw_y_m"] is None or numbers["draw_z_m"] is None:
-                raise UserError(f"{path}, line {line}: a draw needs draw_y_m and draw_z_m")
-            if numbers["draw_y_m"] >= 0:
-                raise UserError(
-                    f"{path}, line {line}: draw_y_m must be below 0 (behind the fork),"
-                    f" got {numbers['draw_y_m']:g}"
-                )
-            rows.append(numbers)
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            reader = csv.DictReader(file)
+            names = [name.strip() for name in reader.fieldnames or []]
+            reader.fieldnames = names
+            lines = list(enumerate(reader, start=2))
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: not UTF-8 text, save it as CSV (UTF-8)") from error
+    except (OSError, csv.Error) as error:
+        raise UserError(f"{path}: cannot be read as CSV ({error})") from error
+    missing = [name for name in REQUIRED if name not in names]
+    unknown = [name for name in names if name not in REQUIRED + OPTIONAL]
+    if missing or unknown:
+        what = f"lacks the column {missing[0]}" if missing else f"unknown column {unknown[0]!r}"
+        raise UserError(f"{path}: {what}; columns are {','.join(REQUIRED + OPTIONAL)}")
+    rows = []
+    for line, cells in lines:
+        row = {name: (cells.get(name) or "").strip() for name in REQUIRED + OPTIONAL}
+        if row["method"] not in ("", method):
+            continue
+        numbers = {name: _cell(path, line, name, row) for name in (*REQUIRED, "target_m")}
+        if numbers["draw_y_m"] is None or numbers["draw_z_m"] is None:
+            raise UserError(f"{path}, line {line}: a draw needs draw_y_m and draw_z_m")
+        if numbers["draw_y_m"] >= 0:
+            raise UserError(
+                f"{path}, line {line}: draw_y_m must be below 0 (behind the fork),"
+                f" got {numbers['draw_y_m']:g}"
+            )
+        rows.append(numbers)
     return rows
 
 

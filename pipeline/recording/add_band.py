@@ -16,7 +16,7 @@ from pipeline.errors import UserError
 from pipeline.files import replacing, write_text
 from pipeline.params import Params, load, parse
 from pipeline.recording.check import check_recording
-from pipeline.recording.container import sha256
+from pipeline.recording.container import expect_file, sha256
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -69,8 +69,7 @@ def add_band(
         )
     text = _with_band(params_path, name, band)
     after = parse(text, str(params_path))
-    if not recording.is_file():
-        raise UserError(f"{recording}: no such file")
+    expect_file(recording)
     same = raw.exists() and sha256(raw) == sha256(recording)
     if raw.exists() and not same:
         raise UserError(f"{raw} is there already with other content: choose another name")

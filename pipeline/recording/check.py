@@ -85,16 +85,22 @@ def check_recording(path: Path, params: object, band: object | None = None) -> R
     """
     container = read_container(Path(path))
     report = Report(str(path), sha256(path), None, container.losses, _topics(container))
+    about = band or ANY_BAND
     try:
         recording = recording_of(container, params.setup)
         _add_roles(report.topics, recording)
-        done = process_recording(recording, band or ANY_BAND, params)
+        done = process_recording(recording, about, params)
     except UserError as error:
         report.problem = str(error).removeprefix(f"{path}: ")
         return report
     report.frames = done.geometry.sources
     report.signals = _signal_facts(done)
     report.cloud = _cloud_facts(done)
+    if report.cloud["taut_coverage"] is None:
+        report.problem = (
+            f"no picture shows the band drawn taut at a rest length of {about.rest_length:g} m,"
+            f" {'check it' if band else 'which is assumed here'}, or record a longer pull"
+        )
     return report
 
 

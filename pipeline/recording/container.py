@@ -42,9 +42,20 @@ class Container:
     losses: list[str]
 
 
+def expect_file(path: Path) -> None:
+    """Raises UserError where `path` is no file with something in it."""
+    if path.is_dir():
+        raise UserError(f"{path}: is a folder, name the .mcap file in it")
+    if not path.exists():
+        raise UserError(f"{path}: no such file")
+    if path.is_file() and not path.stat().st_size:
+        raise UserError(f"{path}: is empty, record it again")
+
+
 def read_container(path: Path) -> Container:
     """Read every intact message. Raises UserError where there is nothing to read."""
     path = Path(path)
+    expect_file(path)
     try:
         with path.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:

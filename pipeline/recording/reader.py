@@ -144,6 +144,8 @@ def _force(message: object) -> tuple[float, ...]:
 
 def _pose(message: object) -> tuple[float, ...]:
     p, q = message.pose.position, message.pose.orientation
+    if not np.linalg.norm([q.x, q.y, q.z, q.w]) > 1e-6:
+        raise ValueError("the quaternion has no length")
     return p.x, p.y, p.z, q.x, q.y, q.z, q.w
 
 
@@ -222,8 +224,9 @@ def _transforms(container: Container) -> TransformTree:
             for payload in channel.payloads:
                 for one in _readable(decode, payload):
                     p, q = one.transform.translation, one.transform.rotation
-                    pose = Transform.of([p.x, p.y, p.z, q.x, q.y, q.z, q.w])
-                    tree.add(one.header.frame_id, one.child_frame_id, pose)
+                    pose = [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
+                    if np.all(np.isfinite(pose)) and np.linalg.norm(pose[3:]) > 1e-6:
+                        tree.add(one.header.frame_id, one.child_frame_id, Transform.of(pose))
     return tree
 
 

@@ -62,13 +62,14 @@ def force(path: Path, episode: Episode, replays: dict[str, Replay]) -> None:
 
 
 def moments(episode: Episode) -> dict[str, int]:
-    """Frames to look at: hang, held at full draw, first of the recoil, swing."""
+    """Frames to look at: hang, held at full draw, first that shows the recoil, swing."""
     stamps = episode.cloud_time
 
     def nearest(time: float) -> int:
         return int(np.abs(stamps - time).argmin())
 
-    after = int(np.searchsorted(stamps, episode.release_time, side="right"))
+    moved = episode.release_time + 0.01  # by then the band has left the hand by some centimetres
+    after = int(np.searchsorted(stamps, moved, side="right"))
     return {
         "hanging": nearest(max(stamps[0], episode.grasp_time - 0.1)),
         "held at full draw": nearest(episode.release_time - 0.2),

@@ -9,8 +9,8 @@ from pathlib import Path
 import pandas as pd
 
 from pipeline.episode import Episode
-from pipeline.errors import UserError
 from pipeline.policy.landing_map import LandingMap
+from pipeline.stage import expect
 from pipeline.theta import load_theta
 
 
@@ -57,7 +57,7 @@ def gather(params, root: str | Path = ".") -> Results:
     data = Path(root) / "data"
     episodes, methods = {}, {}
     for band in params.run.bands:
-        _expect(data / "episodes" / band / "signals.parquet", f"episode@{band}")
+        expect(data / "episodes" / band / "signals.parquet", f"episode@{band}")
         episodes[band] = Episode.load(data / "episodes" / band)
         methods[band] = {name: _result(data, band, name) for name in params.run.methods}
     return Results(episodes, methods)
@@ -65,7 +65,7 @@ def gather(params, root: str | Path = ".") -> Results:
 
 def _result(data: Path, band: str, method: str) -> Result:
     def path(step: str, name: str, stage: str) -> Path:
-        return _expect(data / step / band / name, f"{stage}@{band}-{method}")
+        return expect(data / step / band / name, f"{stage}@{band}-{method}")
 
     policy = f"{method}/"
     history = [
@@ -81,11 +81,3 @@ def _result(data: Path, band: str, method: str) -> Result:
         landing_map=LandingMap.load(path("policies", policy + "map.parquet", "policy")),
         trials=pd.read_parquet(path("trials", f"{method}.parquet", "trials")),
     )
-
-
-def _expect(path: Path, stage: str) -> Path:
-    if not path.is_file():
-        raise UserError(
-            f"{path}: missing, though params.yaml's run: expects it; `dvc repro {stage}` makes it"
-        )
-    return path

@@ -12,11 +12,12 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
+from pipeline.params import TARGET_AREA
 from pipeline.report import paper
 from pipeline.report.results import Result, Results
 from pipeline.sling.model import THETA
 
-TARGET_AREA = (1.425, 2.425)  # y of the fixed target of 1 m by 1 m; a landing outside is a failure
+AIM = 0.05  # mean error of predicted landings inside the recorded stretch, share of the distance
 Table = tuple[list[str], list[list[str]]]
 NAMES = {
     "youngs_modulus": "E [Pa]",
@@ -108,7 +109,7 @@ def landings(results: Results, band: str, kind: str) -> Table | None:
 def predictions(trials: pd.DataFrame) -> Table:
     """Predicted beside measured landing, launch by launch, with the error in % of distance."""
     measured = bool(trials.landing_y.notna().any() or trials.failure.notna().any())
-    heads = ["draw y, z [m]", "stretch", "hold force [N]", "predicted [m]"]
+    heads = ["draw y, z [m]", "stretch", "hold force, predicted [N]", "predicted [m]"]
     heads += ["measured [m]", "error"] if measured else ["target [m]"]
     rows = []
     for trial in trials.itertuples():
@@ -129,11 +130,14 @@ def predictions(trials: pd.DataFrame) -> Table:
 
 
 def prediction_error(trials: pd.DataFrame) -> dict[str, dict]:
-    """Mean and largest |predicted / measured - 1| inside and beyond the recorded stretch.
+    """Errors predicted / measured - 1 inside and beyond the recorded stretch.
 
-    Keys "inside", "beyond", "all", each with launches, mean and max (fractions, NaN if none).
+    Keys "inside", "beyond", "all", each with `launches` (those compared), `unpredicted` (their
+    simulation failed) of `tried`, and over those compared the mean and max of the error's size and
+    its signed mean, `bias` (fractions, NaN if none).
     """
-    error = (trials.predicted_y / trials.landing_y - 1).abs()
+    signed = trials.predicted_y / trials.landing_y - 1
+    error = signed.abs()
     inside = trials.stretch <= trials.recorded_stretch
     parts = {"inside": inside, "beyond": ~inside, "all": pd.Series(True, index=trials.index)}
     return {
@@ -141,6 +145,9 @@ def prediction_error(trials: pd.DataFrame) -> dict[str, dict]:
             "launches": int((chosen & error.notna()).sum()),
             "mean": float(error[chosen].mean()),
             "max": float(error[chosen].max()),
+            "bias": float(signed[chosen].mean()),
+            "tried": int(chosen.sum()),
+            "unpredicted": int((chosen & trials.predicted_y.isna()).sum()),
         }
         for name, chosen in parts.items()
     }
@@ -153,8 +160,17 @@ def prediction_summary(results: Results, band: str) -> Table | None:
         trials = result.trials[result.trials.kind == "measured"]
         if not trials.empty:
             parts = prediction_error(trials)
-            rows.append([method, *(_share(parts[name]) for name in ("inside", "beyond", "all"))])
-    heads = ["method", "inside the recorded stretch", "beyond it", "all launches"]
+            total = parts["all"]
+            rows.append(
+                [
+                    method,
+                    *(_share(parts[name]) for name in ("inside", "beyond", "all")),
+                    _number(100 * total["bias"], "+.1f"),
+                    f"{total['unpredicted']} of {total['tried']}",
+                ]
+            )
+    heads = ["method", "inside the recorded stretch", "beyond it", "all launches", "bias [%]"]
+    heads += ["not predicted"]
     return (heads, rows) if rows else None
 
 
@@ -217,7 +233,12 @@ def aims(result: Result, targets: np.ndarray, draws: np.ndarray) -> Table:
     landed = result.landing_map(draws)
     heads = ["target [m]", "draw y, z [m]", "predicted [m]", "hold force [N]"]
     rows = [
-        [f"{target:.3f}", f"{y:.4f}, {z:.4f}", _number(landing, ".3f", reason), f"{force:.1f}"]
+        [
+            f"{target:.3f}",
+            f"{y:.4f}, {z:.4f}",
+            _number(landing, ".3f", reason),
+            _number(force, ".1f"),
+        ]
         for target, (y, z), landing, force, reason in zip(
             targets,
             draws,
@@ -265,6 +286,8 @@ def metrics(results: Results) -> dict:
             if kind == "measured":
                 for part, error in prediction_error(trials).items():
                     entry[f"prediction_error_{part}_percent"] = _rounded(error["mean"], 100)
+                    entry[f"prediction_bias_{part}_percent"] = _rounded(error["bias"], 100)
+                    entry[f"unpredicted_{part}"] = error["unpredicted"]
         content.setdefault(result.band, {})[result.method] = entry
     return content
 

@@ -56,6 +56,11 @@ def _summary(params, results: Results) -> str:
             best = result.theta.get("loss", {}).get("total")
             said = [f"loss {best:.4g} after {len(result.history)} rollouts"] if best else []
             said += _landed(result.trials, "virtual") + _landed(result.trials, "measured")
+            unpredicted = int(result.trials.predicted_y.isna().sum())
+            if unpredicted:
+                said.append(
+                    f"{unpredicted} of {len(result.trials)} launches could not be predicted"
+                )
             if result.trials.landing_y.isna().all():
                 said.append("no launch to compare its predictions with")
             lines.append(f"- **{band}, {method}**: {'; '.join(said)}.")
@@ -84,8 +89,26 @@ def _landed(trials: pd.DataFrame, kind: str) -> list[str]:
             for part, where in (("inside", "inside the recorded stretch"), ("beyond", "beyond it"))
             if error[part]["launches"]
         ]
-        said.append(f"measured landings are predicted within {' and '.join(parts)} on average")
+        if parts:
+            bias = 100 * error["all"]["bias"]
+            said.append(
+                f"measured landings are predicted within {' and '.join(parts)} on average,"
+                f" with a bias of {bias:+.1f} %"
+            )
+        said.append(_aim(error["inside"]))
     return said
+
+
+def _aim(inside: dict) -> str:
+    """Whether the measured landings inside the recorded stretch are predicted well enough."""
+    aim = f"the aim, at most {100 * tables.AIM:g} % of the distance inside the recorded stretch,"
+    if not inside["tried"]:
+        return f"{aim} cannot be judged: no launch lies there"
+    if inside["unpredicted"]:
+        return f"{aim} is **not** met: {inside['unpredicted']} launches there are not predicted"
+    if not inside["launches"]:
+        return f"{aim} cannot be judged: no launch landed there"
+    return f"{aim} is {'met' if inside['mean'] <= tables.AIM else '**not** met'}"
 
 
 def _identified(params, results: Results) -> str:
@@ -165,7 +188,9 @@ def _point_by_point(results: Results, band: str) -> list[str]:
     if summary:
         text.append(
             "### Predicted and measured landings\n\nThe measured landings took no part in the"
-            " identification. Error in per cent of the measured distance; *beyond* marks draws that"
+            " identification. Error in per cent of the measured distance; bias is its signed mean,"
+            " predicted less measured; *not predicted* are launches whose simulation fails, which"
+            " the means leave out; *beyond* marks draws that"
             " stretch the band further than the recording did.\n\n" + markdown(summary)
         )
     for method, result in results.methods[band].items():

@@ -29,7 +29,8 @@ def root(trained, tmp_path_factory):
     write_onnx(trained.policy, root / "data/policies/toy/none/policy.onnx")
     file = root / "data/theta/toy/none.json"
     file.parent.mkdir(parents=True)
-    file.write_text(json.dumps({"band": "toy", "theta": dict.fromkeys(THETA, 0.4)}))
+    theta = dict.fromkeys(THETA, 0.4) | {"youngs_modulus": 4e5}
+    file.write_text(json.dumps({"band": "toy", "theta": theta}))
     return root
 
 
@@ -86,6 +87,17 @@ def test_a_failed_launch_has_no_prediction(root) -> None:
 def test_says_what_is_missing(root, band: str, method: str, message: str) -> None:
     with pytest.raises(UserError, match=message):
         aim(PARAMS, band, method, 1.925, root, launcher=toy.launch)
+
+
+def test_a_damaged_policy_is_one_line(root, tmp_path) -> None:
+    whole = (root / "data/policies/toy/none/policy.onnx").read_bytes()
+    file = tmp_path / "data/policies/toy/none/policy.onnx"
+    file.parent.mkdir(parents=True)
+    for damaged in (whole[: len(whole) // 2], b"not a network" * 20, b""):
+        file.write_bytes(damaged)
+        with pytest.raises(UserError, match="damaged; `dvc repro --force policy@toy-") as error:
+            policy_draws(file.parent, np.array([1.9]))
+        assert "\n" not in str(error.value)
 
 
 def test_says_which_stage_trains_the_policy(root, tmp_path) -> None:

@@ -61,6 +61,21 @@ def test_refuses_a_bad_csv(tmp_path, text: str, message: str) -> None:
         read_measured(file, "ours")
 
 
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.1,1\n".encode("utf-16"), "not UTF-8"),
+        (b"draw_y_m,draw_z_m,landing_y_m,method\n-0.3,-0.1,1,m\xfcller\n", "not UTF-8"),
+        (b"draw_y_m,draw_z_m,landing_y_m\n" + b"1" * 200_000, "cannot be read as CSV"),
+    ],
+)
+def test_refuses_a_file_that_is_no_csv(tmp_path, content: bytes, message: str) -> None:
+    file = tmp_path / "toy.csv"
+    file.write_bytes(content)
+    with pytest.raises(UserError, match=message):
+        read_measured(file, "ours")
+
+
 def test_a_table_counts_trials_by_target_and_keeps_what_failed_empty() -> None:
     predicted = SimpleNamespace(
         landing_y=np.array([1.9, np.nan, 2.0]),

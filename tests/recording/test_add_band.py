@@ -83,6 +83,11 @@ def test_a_band_is_added_and_nothing_else_changes(project, seen) -> None:
         ({"rest_length": float("nan")}, "rest_length"),
         ({"recording": Path("missing.mcap")}, "no such file"),
         ({"recording": Path("params.yaml")}, "not an MCAP"),
+        ({"recording": Path("tests")}, "tests: is a folder"),
+        ({"recording": Path("/dev/null")}, "not an MCAP"),
+        ({"name": "measured"}, "bands.measured: data/trials/measured"),
+        ({"rest_length": 0.2}, "bands.red.rest_length: 0.2 must be longer"),
+        ({"rest_length": 1.2}, "no picture shows the band drawn taut at a rest length of 1.2 m"),
     ],
 )
 def test_bad_input_writes_nothing(project, seen, changes, words) -> None:
@@ -91,6 +96,12 @@ def test_bad_input_writes_nothing(project, seen, changes, words) -> None:
         add(project, **{"recording": seen[0], **changes})
     assert "\n" not in str(caught.value)
     assert content(project) == before
+
+
+def test_an_empty_recording_is_said_to_be_empty(project) -> None:
+    (project / "empty.mcap").touch()
+    with pytest.raises(UserError, match="empty.mcap: is empty"):
+        add(project, project / "empty.mcap")
 
 
 def test_a_recording_that_cannot_be_used_writes_nothing(project, blind) -> None:

@@ -105,6 +105,36 @@ def test_nan_doubled_and_shuffled_wrenches(tmp_path, params) -> None:
     assert np.isfinite(wrench.values).all()
 
 
+def test_poses_and_transforms_without_a_rotation(tmp_path, params) -> None:
+    """Some publishers leave the quaternion at zero."""
+    poses = []
+
+    def spoil(kind: str, stamp: int, message):
+        if kind == "pose":
+            poses.append(stamp)
+            if len(poses) in (10, 20, 30):
+                message.pose.orientation = SimpleNamespace(x=0.0, y=0.0, z=0.0, w=0.0)
+        elif kind == "tf":
+            message.transforms[0].transform.rotation = SimpleNamespace(x=0.0, y=0.0, z=0.0, w=0.0)
+        return message
+
+    path = tmp_path / "unturned.mcap"
+    write_bag(path, cameras=False, rate=500, change=spoil)
+    recording = read(path, params)
+    assert recording.pose.lost == 3 and len(recording.pose.stamp) == len(poses) - 3
+    with pytest.raises(UserError, match="setup.base_to_fork"):
+        geometry_of(recording, params.setup)
+
+    def spoil_all(kind: str, stamp: int, message):
+        if kind == "pose":
+            message.pose.orientation = SimpleNamespace(x=0.0, y=0.0, z=0.0, w=0.0)
+        return message
+
+    write_bag(path, cameras=False, rate=500, change=spoil_all)
+    with pytest.raises(UserError, match="fewer than two readable"):
+        read(path, params)
+
+
 def _at(stamp: int) -> SimpleNamespace:
     time = SimpleNamespace(sec=stamp // 10**9, nanosec=stamp % 10**9)
     return SimpleNamespace(stamp=time, frame_id="ft_sensor")
@@ -175,9 +205,9 @@ def test_files_that_are_no_recordings(tmp_path, params) -> None:
     bare = tmp_path / "bare"
     bare.write_bytes(b"\x89MCAP0\r\n")
     for path, words in (
-        (missing, "cannot be read"),
-        (tmp_path, "cannot be read"),
-        (empty, "not an MCAP"),
+        (missing, "no such file"),
+        (tmp_path, "is a folder"),
+        (empty, "is empty"),
         (text, "not an MCAP"),
         (bare, "no topics"),
     ):

@@ -72,6 +72,10 @@ def test_prediction_error_inside_and_beyond() -> None:
     assert error["inside"]["mean"] == pytest.approx(0.03) and error["inside"]["launches"] == 2
     assert error["beyond"]["mean"] == pytest.approx(0.10) and error["beyond"]["launches"] == 1
     assert error["all"]["mean"] == pytest.approx(0.16 / 3)
+    assert error["inside"]["bias"] == pytest.approx(0.02)
+    assert error["beyond"]["bias"] == pytest.approx(-0.10)
+    assert (error["beyond"]["unpredicted"], error["beyond"]["tried"]) == (1, 2)
+    assert error["inside"]["unpredicted"] == 0
     text = markdown(predictions(launched))
     assert "+5.0%" in text and "-10.0%" in text and text.count("(beyond)") == 2
 

@@ -7,9 +7,11 @@ import re
 import shutil
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from pipeline.errors import UserError
+from pipeline.policy.trials import SCHEMA
 from pipeline.report import write as writing
 from pipeline.report.replay import Replay
 from tests.report.conftest import BAND, METHOD
@@ -37,6 +39,30 @@ def test_the_report_is_complete_and_equal_twice(root, params) -> None:
     shutil.rmtree(root / "reports")
     writing.write(params, root)
     assert {f: f.read_bytes() for f in (root / "reports").rglob("*") if f.is_file()} == first
+
+
+def test_a_failed_prediction_is_named(root, params) -> None:
+    file = root / "data" / "trials" / BAND / f"{METHOD}.parquet"
+    good = pd.read_parquet(file)
+    writing.write(params, root)
+    text = (root / "reports" / "README.md").read_text()
+    assert "could not be predicted" not in text and "stretch, is met" in text
+    bad = good.assign(
+        predicted_y=[1.725, None, 1.925, 2.125],
+        predicted_failure=[None, "the simulation did not converge", None, None],
+        hold_force=[9.0, None, 9.0, 9.0],
+    )
+    bad.to_parquet(file, schema=SCHEMA)
+    writing.write(params, root)
+    text = (root / "reports" / "README.md").read_text()
+    assert "1 of 4 launches could not be predicted" in text
+    assert "**not** met: 1 launches there are not predicted" in text
+    assert "| 1 of 4 |" in text and "hold force, predicted [N]" in text
+    assert "| 1.40 | – | the simulation did not converge |" in text
+    far = good.assign(predicted_y=2 * good.predicted_y)
+    far.to_parquet(file, schema=SCHEMA)
+    writing.write(params, root)
+    assert "stretch, is **not** met" in (root / "reports" / "README.md").read_text()
 
 
 def test_metrics_are_the_numbers_of_the_tables(root, params) -> None:

@@ -1,0 +1,45 @@
+"""What every stage's script begins with: its arguments, params.yaml, and inputs that are there."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from pipeline.errors import UserError
+from pipeline.params import Params, load
+
+
+def arguments(*names: str) -> list[str]:
+    """As many arguments as `names` (band, method); anything else prints the usage and exits 2."""
+    given = sys.argv[1:]
+    if len(given) != len(names) or any(one.startswith("-") for one in given):
+        script = f"stages.{Path(sys.argv[0]).stem}"
+        print(" ".join(["usage: python -m", script, *map(str.upper, names)]), file=sys.stderr)
+        sys.exit(2)
+    return given
+
+
+def started(*names: str) -> tuple[Params, *tuple[str, ...]]:
+    """params.yaml and the stage's arguments, each of which it must know. Raises UserError."""
+    given = arguments(*names)
+    params = load()
+    for name, value in zip(names, given, strict=True):
+        known = getattr(params, f"{name}s")
+        if value not in known:
+            raise UserError(f"{name} {value}: not in params.yaml, which has {', '.join(known)}")
+    return params, *given
+
+
+def expect(path: Path, stage: str) -> Path:
+    """`path`, which `stage` makes. Raises UserError where it is missing."""
+    if not path.is_file():
+        raise UserError(f"{path}: missing; `dvc repro {stage}` makes it")
+    return path
+
+
+def expect_episode(band: str) -> Path:
+    """Folder of the band's episode. Raises UserError where it is missing."""
+    folder = Path("data/episodes", band)
+    for name in ("signals.parquet", "clouds.parquet"):
+        expect(folder / name, f"episode@{band}")
+    return folder

@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-ROOT = Path(__file__).parents[1]
+from tests.project import ROOT, copy_project
+
 TINY = {
     "run.methods": ["sling2sim2real"],
     "cloud.points": 100,
@@ -62,17 +63,7 @@ class Copy:
             "AUDIT": str(folder.parent / "audit"),
         }
         (folder.parent / "audit").mkdir()
-        listed = subprocess.run(
-            ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
-            cwd=ROOT,
-            capture_output=True,
-            check=True,
-            text=True,
-        ).stdout
-        for name in filter(None, listed.split("\0")):
-            if (ROOT / name).is_file() and name != "dvc.lock":
-                (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy(ROOT / name, folder / name)
+        copy_project(folder)
         self.set(TINY)
         self("git", "init", "-q")
         self("git", "config", "user.name", "Test")

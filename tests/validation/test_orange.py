@@ -18,10 +18,10 @@ import pytest
 
 from pipeline.recording.add_band import add_band
 from pipeline.report.tables import prediction_error
+from tests.project import ROOT, copy_project
 
 pytestmark = pytest.mark.validation
 
-ROOT = Path(__file__).parents[2]
 RECORDING = ROOT.parent / "shared/recordings/orange.mcap"
 LANDINGS = RECORDING.with_name("orange_landings.csv")
 BAND, MASS = "orange", 0.0408  # kg, as its note says
@@ -30,17 +30,7 @@ OURS, LIMIT = "sling2sim2real_taut", 0.05
 
 def copy_of_the_project(folder: Path) -> Path:
     """What Git would commit, in a repository of its own, as DVC wants it."""
-    listed = subprocess.run(
-        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
-        cwd=ROOT,
-        capture_output=True,
-        check=True,
-        text=True,
-    ).stdout
-    for name in filter(None, listed.split("\0")):
-        if (ROOT / name).is_file() and name != "dvc.lock":
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(ROOT / name, folder / name)
+    copy_project(folder)
     subprocess.run(["git", "init", "-q"], cwd=folder, check=True)
     return folder
 

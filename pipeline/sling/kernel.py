@@ -35,6 +35,7 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int):
         frame_first: indices,
         frame_weight: array,
         n_frames: int,
+        frame_width: int,
         steps: int,
         first_step: int,
         last_step: int,
@@ -57,6 +58,7 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int):
         frame_first: indices,
         frame_weight: array,
         n_frames: int,
+        frame_width: int,
         steps: int,
         first_step: int,
         last_step: int,
@@ -65,7 +67,7 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int):
     ):
         rod(
             wp.tid(), geometry, lengths, clamp, schedule, parameter, state, work,
-            lane_state, output, frames, frame_first, frame_weight, n_frames, steps, first_step,
+            lane_state, output, frames, frame_first, frame_weight, n_frames, frame_width, steps, first_step,
             last_step, first_free, payload_steps,
         )  # fmt: skip
 

@@ -36,6 +36,8 @@ class Sling:
             takes a solid round band's, which follows Young's modulus.
         projectile_mass, grip_force, finger_opening_time: As in params.yaml `setup` [kg, N, s].
         steps: The step sizes and the mesh's grading, as in params.yaml `sling`.
+        clamped: Whether the first and the last end are held; experiments on a free band let go.
+        clamp_twist: Of the last clamp about the band, against the first [rad].
     """
 
     edges: int
@@ -50,6 +52,8 @@ class Sling:
     grip_force: float
     finger_opening_time: float
     steps: object
+    clamped: tuple[bool, bool] = (True, True)
+    clamp_twist: float = 0.0
 
     @classmethod
     def of(cls, band, setup, resolution, mounting: dict | None = None) -> Sling:
@@ -181,6 +185,9 @@ def fixed_frames(sling: Sling) -> np.ndarray:
             a = np.array([0.0, 0.0, 1.0])
         a /= np.linalg.norm(a)
         frames.append([a, np.cross(tangent, a)])
+    a, b = frames[1]
+    cosine, sine = np.cos(sling.clamp_twist), np.sin(sling.clamp_twist)
+    frames[1] = [cosine * a + sine * b, cosine * b - sine * a]
     return np.array(frames)
 
 

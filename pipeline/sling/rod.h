@@ -59,6 +59,7 @@ const SC line_mass = geometry.data[3], gravity = geometry.data[4], node_mass = l
 const SC* edge = lengths.data;  // rest length of each edge
 const SC tolerance = geometry.data[5], step_limit = geometry.data[6];
 const int max_iterations = (int)geometry.data[7];
+const bool first_clamped = geometry.data[8] > 0, last_clamped = geometry.data[9] > 0;
 
 auto X = ROW(state, 6 * L * N), X1 = X + (&AT(X, L * N) - &AT(X, 0)), X2 = X1 + (X1 - X), V1 = X2 + (X1 - X),
      V2 = V1 + (X1 - X), XP = V2 + (X1 - X);
@@ -66,7 +67,7 @@ auto WORK = ROW(work, L * LAYER_WORK);
 auto PAR = ROW(parameter, 6);
 auto OUT = ROW(output, 4 * steps);
 auto LANE = ROW(lane_state, 16);
-auto FRAME = ROW(frames, 3 * L * n_frames);
+auto FRAME = ROW(frames, frame_width * L * n_frames);
 
 const real mu = AT(PAR, 0), lam = AT(PAR, 1), bulk = lam - mu / (SC)3, d = AT(PAR, 2), s = AT(PAR, 3), friction = AT(PAR, 4);
 const real balance = (SC)3e-2 * node_mass * gravity + (SC)1e-5 * mu * area;  // N
@@ -232,6 +233,7 @@ for (int step = first_step; step < last_step; ++step) {
           }
           const SC apart = (SC)0.5 * (kind > 0 || i == L - 2 ? ds : ds + edge[i + 1]);  // a fixed frame is half an edge away
           real weight = one;
+          if ((kind == 1 && !first_clamped) || (kind == 0 && i == L - 2 && !last_clamped)) weight = zero;
           if (kind == 0 && i == MID - 1) weight = weight * (one - gripped);
           if (kind > 1) weight = weight * gripped;
           const real k = mu * (weight * area / apart), kb = k * cb;
@@ -259,14 +261,15 @@ for (int step = first_step; step < last_step; ++step) {
       }
       // prescribed: the nodes in the clamps, the far clamp's directors, the held node
       if (i == 0 || i == L - 1) {
-        const int fixed = i == 0 ? 3 : N;
-        for (int m = 0; m < fixed; ++m) {
+        // the layer of the last clamp has no edge of its own: its directors are the clamp's
+        const int begin = (i == 0 ? first_clamped : last_clamped) ? 0 : 3;
+        for (int m = begin; m < (i == 0 ? 3 : N); ++m) {
           r[m] = eliminated[m] = zero;
           for (int n = 0; n < N; ++n) { D[m][n] = zero; D[n][m] = zero; O[n][m] = zero; }
           D[m][m] = one;
         }
       }
-      if (i == L - 2) for (int m = 0; m < N; ++m) { r1[m] = zero; for (int n = 0; n < N; ++n) O[m][n] = zero; }
+      if (i == L - 2) for (int m = last_clamped ? 0 : 3; m < N; ++m) { r1[m] = zero; for (int n = 0; n < N; ++n) O[m][n] = zero; }
       if (i == MID) {
         for (int m = 0; m < 3; ++m) { for (int n = 0; n < 6; ++n) at_mid[n][m] = D[3 + n][m]; for (int n = 0; n < 3; ++n) after_mid[n][m] = O[n][m]; }
         for (int m = 0; m < 3; ++m) {
@@ -394,12 +397,12 @@ for (int step = first_step; step < last_step; ++step) {
     failure = failure != zero ? failure : -leaves;  // done: -1 marks a finished launch
   }
 
-  // centre lines at the camera's stamps within this step
+  // centre lines (with a frame_width of 9 all unknowns) at the camera's stamps within this step
   for (int k = frame_first.data[step]; k < frame_first.data[step + 1]; ++k) {
     const SC w = frame_weight.data[k];
-    for (int i = 0; i < L; ++i) for (int c = 0; c < 3; ++c) {
+    for (int i = 0; i < L; ++i) for (int c = 0; c < frame_width; ++c) {
       const int j = i * N + c;
-      AT(FRAME, (k * L + i) * 3 + c) = AT(X1, j) + w * (AT(X, j) - AT(X1, j));
+      AT(FRAME, (k * L + i) * frame_width + c) = AT(X1, j) + w * (AT(X, j) - AT(X1, j));
     }
   }
   for (int j = 0; j < L * N; ++j) {

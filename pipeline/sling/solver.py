@@ -87,7 +87,7 @@ def _separate(array: np.ndarray, count: int) -> np.ndarray:
 
 @dataclass
 class Result:
-    """State (N, layers, 9), lane_state (N, 16), output (N, S, 4), frames (N, K, layers, 3)."""
+    """State (N, layers, 9), lane_state (N, 16), output (N, S, 4), frames (N, K, layers, width)."""
 
     state: np.ndarray
     lane_state: np.ndarray
@@ -104,6 +104,8 @@ def run(
     *,
     frame_steps=(),
     frame_weights=(),
+    frame_width: int = 3,
+    gravity: float = GRAVITY,
     payload: bool = False,
     device: str = "cpu",
     double: bool = False,
@@ -118,6 +120,7 @@ def run(
         state: Initial layers, shape (N, layers, 9) or (layers, 9).
         lane_state: As documented in rod.h, shape (N, 16).
         frame_steps, frame_weights: Step in which each frame falls and its place in it, shape (K,).
+        frame_width: 3 for centre lines, 9 for all unknowns of each layer.
         payload: The launch of a projectile (lane_state[:, 9]) is followed until it leaves.
         workers: Threads, on the CPU; a result does not depend on their number.
     """
@@ -135,7 +138,8 @@ def run(
     geometry = np.array(
         [
             sling.rest_length / sling.edges, sling.area, sling.radius**2,
-            sling.mass / sling.rest_length, GRAVITY, tolerance, 0.004, max_iterations,
+            sling.mass / sling.rest_length, gravity, tolerance, 0.004, max_iterations,
+            *sling.clamped,
         ],
         dtype,
     )  # fmt: skip
@@ -164,14 +168,14 @@ def run(
         work = wp.empty(size * lanes * sling.layers * 135, dtype=scalar, device=device)
         output = wp.zeros(size * lanes * len(table) * 4, dtype=scalar, device=device)
         frames = wp.zeros(
-            size * lanes * max(n_frames, 1) * sling.layers * 3, dtype=scalar, device=device
+            size * lanes * max(n_frames, 1) * sling.layers * frame_width, dtype=scalar, device=device
         )
         wp.launch(
             kernel,
             dim=size * (lanes if kind == "cuda" else 1),
             inputs=[
                 *shared[:4], own[0], own[1], work, own[2], output, frames, *shared[4:],
-                n_frames, len(table), 0, len(table), schedule.first_free, int(payload),
+                n_frames, frame_width, len(table), 0, len(table), schedule.first_free, int(payload),
             ],
             device=device,
             block_dim=lanes,
@@ -193,5 +197,7 @@ def run(
         state=states[:, sling.layers * 9 : 2 * sling.layers * 9].reshape(count, -1, 9),
         lane_state=lane_state,
         output=output.reshape(count, len(table), 4),
-        frames=frames[:, : n_frames * sling.layers * 3].reshape(count, n_frames, sling.layers, 3),
+        frames=frames[:, : n_frames * sling.layers * frame_width].reshape(
+            count, n_frames, sling.layers, frame_width
+        ),
     )

@@ -1,23 +1,32 @@
-"""rod.h as a Warp kernel, one for each mesh. (Warp reads annotations: no postponed ones here.)"""
+"""The native text of the simulator as a Warp kernel, one for each mesh.
+
+(Warp reads annotations: no postponed ones here.)
+"""
 
 from functools import lru_cache
 from pathlib import Path
 
 import warp as wp
 
-TEXT = Path(__file__).with_name("rod.h")
+PARTS = ("lanes.h", "state.h", "rod.h", "step.h")
+UNKNOWNS = 9
 wp.config.log_level = wp.LOG_ERROR
 wp.config.enable_backward = False
 
 
 @lru_cache
-def rod_kernel(layers: int, middle: int, double: bool, lanes: int):
-    """Compile rod.h for a mesh; Warp keeps the binary in its cache."""
+def rod_kernel(layers: int, middle: int, double: bool, lanes: int, team: int):
+    """Compile the native text for a mesh; Warp keeps the binary in its cache."""
     scalar = wp.float64 if double else wp.float32
     array, indices = wp.array(dtype=scalar), wp.array(dtype=wp.int32)
-    macros = {"SC": "double" if double else "float", "W": lanes, "L": layers, "MID": middle}
-    defines = "".join(f"#define {name} {value}\n" for name, value in macros.items())
-    text = "\n" + defines + TEXT.read_text() + "".join(f"#undef {name}\n" for name in macros)
+    macros = {
+        "SC": "double" if double else "float", "W": lanes, "T": team, "N": UNKNOWNS,
+        "L": layers, "MID": middle,
+    }  # fmt: skip
+    text = "\n" + "".join(f"#define {name} {value}\n" for name, value in macros.items())
+    text += "".join(Path(__file__).with_name(part).read_text(encoding="utf-8") for part in PARTS)
+    defined = {line.split()[1].partition("(")[0] for line in text.splitlines() if line.startswith("#define")}
+    text += "\n" + "".join(f"#undef {name}\n" for name in sorted(defined))
 
     @wp.func_native(text)
     def rod(
@@ -28,6 +37,7 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int):
         schedule: array,
         parameter: array,
         state: array,
+        scratch: array,
         work: array,
         lane_state: array,
         output: array,
@@ -37,8 +47,6 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int):
         n_frames: int,
         frame_width: int,
         steps: int,
-        first_step: int,
-        last_step: int,
         first_free: int,
         payload_steps: int,
     ): ...
@@ -51,6 +59,7 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int):
         schedule: array,
         parameter: array,
         state: array,
+        scratch: array,
         work: array,
         lane_state: array,
         output: array,
@@ -60,15 +69,13 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int):
         n_frames: int,
         frame_width: int,
         steps: int,
-        first_step: int,
-        last_step: int,
         first_free: int,
         payload_steps: int,
     ):
         rod(
-            wp.tid(), geometry, lengths, clamp, schedule, parameter, state, work,
-            lane_state, output, frames, frame_first, frame_weight, n_frames, frame_width, steps, first_step,
-            last_step, first_free, payload_steps,
+            wp.tid(), geometry, lengths, clamp, schedule, parameter, state, scratch, work,
+            lane_state, output, frames, frame_first, frame_weight, n_frames, frame_width, steps,
+            first_free, payload_steps,
         )  # fmt: skip
 
     return run

@@ -11,9 +11,9 @@ from pipeline.sling.solver import (
     DIRECTION,
     FAILURE,
     FREE,
+    LANE_STATE,
     LEAVING,
     LEFT,
-    OFFSET,
     PAYLOAD,
     POUCH,
     RELAX_STEPS,
@@ -86,8 +86,7 @@ def launch(
     count = max(len(thetas), len(draws))
     thetas = np.broadcast_to(thetas, (count, 5))
     draws = np.broadcast_to(draws, (count, 2))
-    lane_state = np.zeros((count, 16))
-    lane_state[:, OFFSET][:, 1:] = draws
+    lane_state = np.zeros((count, LANE_STATE))
     distance = np.linalg.norm(draws, axis=1, keepdims=True)
     lane_state[:, DIRECTION][:, 1:] = -draws / np.maximum(distance, 1e-9)
     lane_state[:, PAYLOAD] = sling.projectile_mass

@@ -1,6 +1,6 @@
-// The sling as an extensible director rod, stepped implicitly; one text for 16 CPU lanes and one CUDA thread.
+// The element: an extensible director rod.
 //
-// A layer i holds the node r_i and the directors a_i, b_i of the edge between r_i and r_i+1: 9 unknowns.
+// Layer i holds the node r_i and the directors a_i, b_i of the edge between r_i and r_i+1: 9 unknowns.
 // With g_i = (r_i+1 - r_i) / ds, the deformation gradient of an edge is F = [g a b], J = det F. Each edge
 // has its own rest length ds, a joint the length l between the middles of its edges, and
 //
@@ -16,409 +16,181 @@
 //   D_edge = A ds d/2 [ K J'^2 + s ( mu |F'|^2 + p d2J(F', F') + mu/3 J'^2 ) ],  D_joint: d s/2 times
 //   the quadratic form of W_joint in the rates.
 //
-// A step solves, for all layers at once,
-//
-//   M (x - xh)/(beta h)^2 + dW/dx + dD/dx' = 0,   x' = (x - y)/(beta h),
-//   y = c1 x_n - c2 x_n-1,   xh = y + beta h (c1 v_n - c2 v_n-1) + (beta h)^2 gravity
-//
-// (backward Euler: beta = c1 = 1, c2 = 0; variable-step BDF2 otherwise) by Newton's method on the
-// block-tridiagonal Hessian with a direct LDL' solve; where it is indefinite, its diagonal is shifted.
-//
-// Wants the macros SC (float or double), W (lanes), L (layers = edges + 1), MID (the held layer).
+// For step.h: what one layer adds to the Hessian and the residual (stage_layer), as columns (column).
 
-#define N 9
-#define LAYER_WORK (N * N + N * (N + 1) / 2 + N)
-
+// a staged layer: its own block (lower triangle), stretch between nodes, gradient of the twist on both sides of
+// the joint, coefficients of bending and twist, residual of this layer and of the next
+enum { OWN = 0, STRETCH = 45, TWIST = 51, TWIST_NEXT = 57, BEND = 63, TWISTING = 64, FORCE = 65, FORCE_NEXT = 74, STAGED = 83 };
 #if defined(__CUDA_ARCH__)
-typedef SC real;
-const int block = tid / W, lane = tid % W;
-#define ROW(array, size) (array.data + (size_t)block * (size) * W + lane)
-#define AT(p, i) (p)[(size_t)(i) * W]
-#define SQRT(x) sqrt(x)
-#define ALL(mask) (mask)
+__shared__ SC staged[STAGED * 33], felt[54 * TEAMS];
+#define PUT(v) staged[(v) * 33 + lane]
+#define GET(v, j) staged[(v) * 33 + team * T + (j)]
+#define HAND(v) felt[(v) * TEAMS + team]
 #else
-typedef SC real __attribute__((vector_size(sizeof(SC) * W), aligned(sizeof(SC))));
-const int block = tid;
-#define ROW(array, size) ((real*)array.data + (size_t)block * (size))
-#define AT(p, i) (p)[i]
-auto root = [](real x) -> real { real y; for (int k = 0; k < W; ++k) y[k] = __builtin_sqrt(x[k]); return y; };
-auto every = [](auto mask) -> bool { bool all = true; for (int k = 0; k < W; ++k) all &= (mask[k] != 0); return all; };
-#define SQRT(x) root(x)
-#define ALL(mask) every(mask)
+real staged[STAGED], felt[54];
+#define PUT(v) staged[v]
+#define GET(v, j) staged[v]
+#define HAND(v) felt[v]
 #endif
-const real zero = real() * (SC)0, one = zero + (SC)1;
-auto maximum = [](real x, real y) -> real { return x > y ? x : y; };
-auto minimum = [](real x, real y) -> real { return x < y ? x : y; };
-auto magnitude = [&](real x) -> real { return x < zero ? -x : x; };
-auto dot = [](const real* x, const real* y) -> real { return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]; };
-auto cross = [](const real* x, const real* y, real* z) {
-  z[0] = x[1] * y[2] - x[2] * y[1]; z[1] = x[2] * y[0] - x[0] * y[2]; z[2] = x[0] * y[1] - x[1] * y[0]; };
+#define LOWER(m, n) ((m) >= (n) ? (m) * ((m) + 1) / 2 + (n) : (n) * ((n) + 1) / 2 + (m))
 
-const SC mean_edge = geometry.data[0], area = geometry.data[1], radius2 = geometry.data[2];
-const SC line_mass = geometry.data[3], gravity = geometry.data[4], node_mass = line_mass * mean_edge;
-const SC* edge = lengths.data;  // rest length of each edge
-const SC tolerance = geometry.data[5], step_limit = geometry.data[6];
-const int max_iterations = (int)geometry.data[7];
-const bool first_clamped = geometry.data[8] > 0, last_clamped = geometry.data[9] > 0;
 
-auto X = ROW(state, 6 * L * N), X1 = X + (&AT(X, L * N) - &AT(X, 0)), X2 = X1 + (X1 - X), V1 = X2 + (X1 - X),
-     V2 = V1 + (X1 - X), XP = V2 + (X1 - X);
-auto WORK = ROW(work, L * LAYER_WORK);
-auto PAR = ROW(parameter, 6);
-auto OUT = ROW(output, 4 * steps);
-auto LANE = ROW(lane_state, 16);
-auto FRAME = ROW(frames, frame_width * L * n_frames);
+// which unknowns have an equation: not a node that is clamped or held, nor the directors of the last layer, which
+// has no edge (they are the clamp's)
+auto moves = [&](int i, int m) -> bool {
+  if (m >= 3) return i < L - 1;
+  return i == 0 ? !first_clamped : i == L - 1 ? !last_clamped : !(i == MID && attached);
+};
+auto mass_of = [&](int i, int m) -> real {
+  const SC before = i ? edge[i - 1] : (SC)0, after = i < L - 1 ? edge[i] : (SC)0;
+  const SC length = m < 3 ? (SC)0.5 * (before + after) : (i < L - 1 ? after : before) * radius2 / 4;
+  return zero + line_mass * length + (i == MID && m < 3 ? payload : zero);
+};
 
-const real mu = AT(PAR, 0), lam = AT(PAR, 1), bulk = lam - mu / (SC)3, d = AT(PAR, 2), s = AT(PAR, 3), friction = AT(PAR, 4);
-const real balance = (SC)3e-2 * node_mass * gravity + (SC)1e-5 * mu * area;  // N
-const SC node_shift = node_mass * (SC)2.5e5;  // the inertia of a 2 ms step
-
-// lane state: 0 attached, 1-3 direction of the pull (of the launch), 4 failure, 5 failed step, 6-8 grasp
-// offset, 9 projectile mass carried, 10 leaving time, 11-12 leaving position and 13-14 velocity (y, z),
-// 15 pull at the release
-real attached = AT(LANE, 0), failure = AT(LANE, 4), payload = AT(LANE, 9);
-
-for (int step = first_step; step < last_step; ++step) {
-  const SC* T = schedule.data + (size_t)step * 13;
-  const SC h = T[0], c1 = T[1], c2 = T[2], bh = T[3] * h;  // beta h
-  const int mode = (int)T[4], hold = (int)T[5];            // mode 0: relax; hold 0: free, 1: held,
-                                                           // 2: fingers opening, 3: held in a pouch
-  const SC limit = T[9], blend = T[10], time = T[11];
-  const real cb = AT(PAR, 5) * T[12];  // (1 + nu) R^2 / 2, or as measured; guesses relax with less first
-  const SC ct = radius2 / 4 * T[12];
-  const SC ibh = (SC)1 / bh, ibh2 = ibh * ibh;
-
-  // the hand takes hold of the band where it is, and leads it to its own path
-  if (hold == 1 || hold == 3) for (int c = 0; c < 3; ++c) {
-    const real first = one - attached;
-    AT(LANE, 6 + c) = first * (AT(X1, MID * N + c) - T[6 + c]) + attached * AT(LANE, 6 + c);
+auto stage_layer = [&](int i) {
+  real own[45], f[N], f_next[N];
+  UNROLL for (int m = 0; m < 45; ++m) own[m] = zero;
+  UNROLL for (int m = 0; m < N; ++m) f_next[m] = zero;
+  // ---- inertia and gravity of the node and the directors
+  UNROLL for (int m = 0; m < N; ++m) {
+    const real mass = mass_of(i, m);
+    f[m] = mass * ibh2 * (X(m, i) - XH(m, i));
+    own[LOWER(m, m)] = mass * ibh2 + shift * (m < 3 ? zero + node_shift : mu * (area * mean_edge));
   }
-  if (hold == 1 || hold == 3) attached = one;
-  if (hold == 0 || hold == 2) attached = zero;
-  // what the pads can hold: all of it while they are closed, then less and less of the pull at the release
-  const real capacity = hold == 2 ? maximum(AT(LANE, 15) - limit * friction, zero) : limit * friction;
-
-  // predicted state
-  for (int j = 0; j < L * N; ++j) {
-    const real x1 = AT(X1, j), x = x1 + h * AT(V1, j);
-    AT(XP, j) = x;
-    AT(X, j) = x;
-  }
-  for (int c = 0; c < 3; ++c) {
-    const real target = zero + T[6 + c] + blend * AT(LANE, 6 + c);
-    const int j = MID * N + c;
-    const real x = attached > zero ? target : AT(X, j);
-    AT(X, j) = x; AT(XP, j) = x;
-  }
-  const real freed = one - attached, gripped = hold == 3 ? zero : attached;
-
-  real residual_mid[3], reaction[3], before_mid[3][N], at_mid[6][3], after_mid[3][3], change = zero, settled = failure != zero ? one : zero, shift = zero;
-  for (int c = 0; c < 3; ++c) reaction[c] = zero;
-  int iteration = 0;
-  for (; iteration < max_iterations; ++iteration) {
-    real D[N][N], O[N][N], D1[N][N], r[N], r1[N], eliminated[N], indefinite = zero, imbalance = zero, poison = zero;  // poison is no number as soon as anything is
-    for (int m = 0; m < N; ++m) { r1[m] = eliminated[m] = zero; for (int n = 0; n < N; ++n) D1[m][n] = zero; }
-    for (int i = 0; i < L; ++i) {
-      for (int m = 0; m < N; ++m) {
-        r[m] = r1[m]; r1[m] = zero;
-        for (int n = 0; n < N; ++n) { D[m][n] = D1[m][n]; D1[m][n] = zero; O[m][n] = zero; }
-      }
-      // inertia and gravity
-      for (int m = 0; m < N; ++m) {
-        const int j = i * N + m;
-        const real y = c1 * AT(X1, j) - c2 * AT(X2, j), yv = c1 * AT(V1, j) - c2 * AT(V2, j);
-        real mass = zero + line_mass * (m < 3 ? (SC)0.5 * ((i ? edge[i - 1] : (SC)0) + (i < L - 1 ? edge[i] : (SC)0))
-                                              : (i < L - 1 ? edge[i] : edge[i - 1]) * radius2 / 4);
-        if (i == MID && m < 3) mass = mass + payload;
-        real xh = y + bh * yv;
-        if (m == 2) xh = xh - gravity * bh * bh;
-        const real f = mass * ibh2 * (AT(X, j) - xh);
-        r[m] += f; D[m][m] += mass * ibh2 + shift * (m < 3 ? zero + node_shift : mu * (area * mean_edge));
-        if (i == MID && m < 3) residual_mid[m] += f;
-      }
-      if (i < L - 1) {
-        // ---- edge i: k = 0, 1, 2 are g, a, b; x now, xp predicted, xt rates
-        const SC ds = edge[i];
-        const real volume = zero + area * ds;
-        real x[3][3], xp[3][3], xt[3][3];
-        for (int c = 0; c < 3; ++c) {
-          const int j = i * N + c;
-          for (int k = 0; k < 3; ++k) {
-            const int q = j + 3 * k;
-            real now = AT(X, q), predicted = AT(XP, q), y = c1 * AT(X1, q) - c2 * AT(X2, q);
-            if (k == 0) {
-              const int q1 = q + N;
-              now = (AT(X, q1) - now) / ds; predicted = (AT(XP, q1) - predicted) / ds;
-              y = (c1 * AT(X1, q1) - c2 * AT(X2, q1) - y) / ds;
-            }
-            x[k][c] = now; xp[k][c] = predicted; xt[k][c] = (now - y) * ibh;
-          }
-        }
-        real C[3][3], Cp[3][3], l2[3];  // cofactors, predicted squares
-        for (int k = 0; k < 3; ++k) {
-          cross(x[(k + 1) % 3], x[(k + 2) % 3], C[k]); cross(xp[(k + 1) % 3], xp[(k + 2) % 3], Cp[k]);
-          l2[k] = dot(xp[k], xp[k]);
-        }
-        const real J = dot(x[0], C[0]), Jp = dot(xp[0], Cp[0]);
-        const real p = lam * (J - (SC)1) - mu;
-        const real pc = minimum(maximum(p, (SC)-1.5 * mu), (SC)0.25 * mu);
-        // the same coefficient at the predicted state, bounded so that no rate gains energy
-        const real longest = maximum(maximum(l2[0], l2[1]), maximum(l2[2], zero + (SC)1e-6));
-        const real bound = mu / SQRT(longest);
-        const real pv = minimum(maximum(lam * (Jp - (SC)1) - mu, -bound), bound);
-        const real Jt = dot(Cp[0], xt[0]) + dot(Cp[1], xt[1]) + dot(Cp[2], xt[2]);
-        const real dh = d * ibh, dsh = dh * s, volumetric = bulk + s * mu / (SC)3;
-        real turned[3][3];  // d2J applied to the rates
-        for (int k = 0; k < 3; ++k) {
-          const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-          real u[3], v[3];
-          cross(xt[k1], xp[k2], u); cross(xp[k1], xt[k2], v);
-          for (int c = 0; c < 3; ++c) turned[k][c] = u[c] + v[c];
-        }
-
-        real f[3][3];
-        for (int k = 0; k < 3; ++k) for (int c = 0; c < 3; ++c)
-          f[k][c] = volume * (mu * x[k][c] + p * C[k][c]
-                    + d * (volumetric * Jt * Cp[k][c] + s * (mu * xt[k][c] + pv * turned[k][c])));
-        for (int c = 0; c < 3; ++c) {
-          const real fg = f[0][c] / ds;
-          r[c] -= fg; r1[c] += fg; r[3 + c] += f[1][c]; r[6 + c] += f[2][c];
-          if (i == MID - 1) residual_mid[c] = fg;
-          if (i == MID) residual_mid[c] -= fg;
-        }
-        // Hessian in (g, a, b), lower blocks k >= l
-        for (int k = 0; k < 3; ++k) for (int l = 0; l <= k; ++l) {
-          real K[3][3];
-          for (int m = 0; m < 3; ++m) for (int n = 0; n < 3; ++n)
-            K[m][n] = lam * C[k][m] * C[l][n] + dh * volumetric * Cp[k][m] * Cp[l][n];
-          if (k == l) {
-            for (int m = 0; m < 3; ++m) K[m][m] += mu + dsh * mu;
-          } else {
-            const int o = 3 - k - l;                                  // the third column
-            const real sign = (l + 1) % 3 == k ? one : -one;          // by the order of the columns
-            real z[3]; for (int c = 0; c < 3; ++c) z[c] = sign * (pc * x[o][c] + dsh * pv * xp[o][c]);
-            K[0][1] -= z[2]; K[0][2] += z[1]; K[1][0] += z[2]; K[1][2] -= z[0]; K[2][0] -= z[1]; K[2][1] += z[0];
-          }
-          for (int m = 0; m < 3; ++m) for (int n = 0; n < 3; ++n) {
-            const real v = volume * K[m][n];
-            if (k == 0) { const real u = v / (ds * ds); D[m][n] += u; D1[m][n] += u; O[m][n] -= u; }
-            else if (l == 0) { const real u = v / ds; D[3 * k + m][n] -= u; O[n][3 * k + m] += u; }
-            else D[3 * k + m][3 * l + n] += v;
-          }
-        }
-        // ---- joints; 0, 1 are a, b of the side before, 2, 3 of the side after. One side may be a frame that
-        // does not move: a clamp, or the fingers, which hold the middle node's direction while they hold it
-        for (int kind = 0; kind < 4; ++kind) {  // 0: to the next edge, 1: clamp before, 2: fingers after, 3: before
-          if ((kind == 1 && i != 0) || (kind == 2 && i != MID - 1) || (kind == 3 && i != MID)) continue;
-          const int frame = kind == 0 ? -1 : (kind == 1 ? 0 : 12);
-          const bool fixed_before = kind == 1 || kind == 3, fixed_after = kind == 2;
-          real y[4][3], yp[4][3], yt[4][3];
-          for (int v = 0; v < 4; ++v) for (int c = 0; c < 3; ++c) {
-            const bool fixed = v < 2 ? fixed_before : fixed_after;
-            const int layer = v < 2 || fixed_before ? i : i + 1, j = layer * N + 3 + 3 * (v % 2) + c;
-            if (fixed) { y[v][c] = yp[v][c] = zero + clamp.data[frame + 3 * (v % 2) + c]; yt[v][c] = zero; }
-            else {
-              y[v][c] = AT(X, j); yp[v][c] = AT(XP, j);
-              yt[v][c] = (y[v][c] - (c1 * AT(X1, j) - c2 * AT(X2, j))) * ibh;
-            }
-          }
-          real tw[4][3];  // gradient of the twist; tau is bilinear, so that tw.y counts it twice
-          for (int c = 0; c < 3; ++c) {
-            tw[0][c] = (SC)-0.5 * yp[3][c]; tw[1][c] = (SC)0.5 * yp[2][c];
-            tw[2][c] = (SC)0.5 * yp[1][c]; tw[3][c] = (SC)-0.5 * yp[0][c];
-          }
-          real twist = (SC)-0.5 * (dot(yp[2], yp[1]) - dot(yp[3], yp[0])), size = zero;
-          for (int v = 0; v < 4; ++v) {
-            twist += dot(tw[v], y[v]) + d * s * dot(tw[v], yt[v]); size += dot(tw[v], tw[v]);
-          }
-          const SC apart = (SC)0.5 * (kind > 0 || i == L - 2 ? ds : ds + edge[i + 1]);  // a fixed frame is half an edge away
-          real weight = one;
-          if ((kind == 1 && !first_clamped) || (kind == 0 && i == L - 2 && !last_clamped)) weight = zero;
-          if (kind == 0 && i == MID - 1) weight = weight * (one - gripped);
-          if (kind > 1) weight = weight * gripped;
-          const real k = mu * (weight * area / apart), kb = k * cb;
-          const real kt = minimum((SC)2 * (kb - k * ct), (SC)1.9 * kb / maximum(size, zero + (SC)1e-3));
-          const real hb = kb * (one + dsh), ht = kt * (one + dsh);
-          for (int v = 0; v < 4; ++v) {
-            if (v < 2 ? fixed_before : fixed_after) continue;
-            for (int c = 0; c < 3; ++c) {
-              const int w = (v + 2) % 4;
-              const real force = kb * (y[v][c] - y[w][c] + d * s * (yt[v][c] - yt[w][c])) - kt * twist * tw[v][c];
-              const int m = 3 + 3 * (v % 2) + c;
-              const bool here = v < 2 || fixed_before;
-              if (here) { r[m] += force; D[m][m] += hb; } else { r1[m] += force; D1[m][m] += hb; O[m][m] -= hb; }
-              for (int u = 0; u <= v; ++u) {
-                if (u < 2 && fixed_before) continue;
-                for (int n = 0; n < 3; ++n) {
-                  const real value = -ht * tw[v][c] * tw[u][n];
-                  const int m2 = 3 + 3 * (u % 2) + n;
-                  if (here) D[m][m2] += value; else if (u < 2) O[m][m2] += value; else D1[m][m2] += value;
-                }
-              }
-            }
-          }
-        }
-      }
-      // prescribed: the nodes in the clamps, the far clamp's directors, the held node
-      if (i == 0 || i == L - 1) {
-        // the layer of the last clamp has no edge of its own: its directors are the clamp's
-        const int begin = (i == 0 ? first_clamped : last_clamped) ? 0 : 3;
-        for (int m = begin; m < (i == 0 ? 3 : N); ++m) {
-          r[m] = eliminated[m] = zero;
-          for (int n = 0; n < N; ++n) { D[m][n] = zero; D[n][m] = zero; O[n][m] = zero; }
-          D[m][m] = one;
-        }
-      }
-      if (i == L - 2) for (int m = last_clamped ? 0 : 3; m < N; ++m) { r1[m] = zero; for (int n = 0; n < N; ++n) O[m][n] = zero; }
-      if (i == MID) {
-        for (int m = 0; m < 3; ++m) { for (int n = 0; n < 6; ++n) at_mid[n][m] = D[3 + n][m]; for (int n = 0; n < 3; ++n) after_mid[n][m] = O[n][m]; }
-        for (int m = 0; m < 3; ++m) {
-          // open pads hold the band back with what friction they have left
-          if (hold == 2) r[m] += capacity * AT(LANE, 1 + m);
-          r[m] = r[m] * freed; eliminated[m] = eliminated[m] * freed;
-          for (int n = 0; n < N; ++n) { if (n != m) { D[m][n] = D[m][n] * freed; D[n][m] = D[n][m] * freed; } O[n][m] = O[n][m] * freed; }
-          D[m][m] = D[m][m] * freed + attached;
-        }
-      }
-      if (i == MID - 1) for (int m = 0; m < 3; ++m) for (int n = 0; n < N; ++n) { before_mid[m][n] = O[m][n]; O[m][n] = O[m][n] * freed; }
-
-      for (int m = 0; m < N; ++m) {
-        const real f = r[m] - eliminated[m];
-        imbalance = maximum(imbalance, magnitude(f) / (m < 3 ? (SC)1 : mean_edge)); poison += f * zero;
-      }
-
-      // LDL' of the block, then Schur complement into the next layer
-      real inverse[N];
-      for (int m = 0; m < N; ++m) {
-        for (int n = 0; n < m; ++n) { real v = D[m][n]; for (int k = 0; k < n; ++k) v -= D[m][k] * D[n][k]; D[m][n] = v; }
-        const real whole = magnitude(D[m][m]);
-        real v = D[m][m];
-        for (int n = 0; n < m; ++n) { const real u = D[m][n] * inverse[n]; v -= u * D[m][n]; D[m][n] = u; }
-        indefinite = v > zero ? indefinite : one;
-        inverse[m] = one / (magnitude(v) > (SC)1e-7 * whole ? v : whole);
-        real z = r[m]; for (int k = 0; k < m; ++k) z -= D[m][k] * r[k]; r[m] = z;
-      }
-      if (i < L - 1) {
-        for (int m = 0; m < N; ++m) for (int k = 1; k < N; ++k) { real v = O[m][k]; for (int j = 0; j < k; ++j) v -= D[k][j] * O[m][j]; O[m][k] = v; }
-        for (int m = 0; m < N; ++m) {
-          real row[N], v = r1[m];
-          for (int k = 0; k < N; ++k) { row[k] = O[m][k] * inverse[k]; v -= row[k] * r[k]; }
-          eliminated[m] = v - r1[m]; r1[m] = v;
-          for (int n = 0; n <= m; ++n) { real u = D1[m][n]; for (int k = 0; k < N; ++k) u -= row[k] * O[n][k]; D1[m][n] = u; }
-        }
-      }
-      int at = i * LAYER_WORK;
-      for (int m = 0; m < N; ++m) for (int n = 0; n < N; ++n) AT(WORK, at++) = O[m][n];
-      for (int m = 0; m < N; ++m) { for (int n = 0; n < m; ++n) AT(WORK, at++) = D[m][n]; AT(WORK, at++) = inverse[m]; }
-      for (int m = 0; m < N; ++m) AT(WORK, at++) = r[m];
+  if (i < L - 1) {
+    // ---- edge i: k = 0, 1, 2 are g, a, b; x now, xp predicted, xt rates
+    const SC ds = edge[i];
+    const real volume = zero + area * ds;
+    real x[3][3], xp[3][3], xt[3][3];
+    UNROLL for (int k = 0; k < 3; ++k) UNROLL for (int c = 0; c < 3; ++c) {
+      const int q = 3 * k + c;
+      real now = X(q, i), predicted = XP(q, i), y = Y(q, i);
+      if (k == 0) { now = (X(q, i + 1) - now) / ds; predicted = (XP(q, i + 1) - predicted) / ds; y = (Y(q, i + 1) - y) / ds; }
+      x[k][c] = now; xp[k][c] = predicted; xt[k][c] = (now - y) * ibh;
     }
-    // back substitution; the change of a layer stays in the work array
-    real dx[N], z[N];
-    change = zero;
-    for (int i = L - 1; i >= 0; --i) {
-      const int o = i * LAYER_WORK, l = o + N * N, v = l + N * (N + 1) / 2;
-      for (int m = 0; m < N; ++m) z[m] = AT(WORK, v + m);
-      for (int m = 0; m < N; ++m) z[m] = z[m] * AT(WORK, l + m * (m + 1) / 2 + m);
-      if (i < L - 1) for (int m = 0; m < N; ++m) {
-        real u = zero;
-        for (int k = 0; k < N; ++k) u += AT(WORK, o + k * N + m) * dx[k];
-        z[m] -= u * AT(WORK, l + m * (m + 1) / 2 + m);
-      }
-      for (int m = N - 1; m >= 0; --m) for (int n = 0; n < m; ++n) z[n] -= AT(WORK, l + m * (m + 1) / 2 + n) * z[m];
-      for (int m = 0; m < N; ++m) {
-        dx[m] = z[m]; AT(WORK, v + m) = z[m];
-        poison += z[m] * zero;
-        change = maximum(change, magnitude(z[m]) * (m < 3 ? (SC)1 : mean_edge));  // a director counts as a turn of its edge
+    real C[3][3], Cp[3][3], square = zero;  // cofactors; the longest column, squared
+    UNROLL for (int k = 0; k < 3; ++k) {
+      cross(x[(k + 1) % 3], x[(k + 2) % 3], C[k]); cross(xp[(k + 1) % 3], xp[(k + 2) % 3], Cp[k]);
+      square = maximum(square, dot(xp[k], xp[k]));
+    }
+    const real J = dot(x[0], C[0]), Jp = dot(xp[0], Cp[0]);
+    const real p = lam * (J - (SC)1) - mu;
+    const real pc = minimum(maximum(p, (SC)-1.5 * mu), (SC)0.25 * mu);
+    // the same coefficient at the predicted state, bounded so that no rate gains energy
+    const real bound = mu / SQRT(maximum(square, zero + (SC)1e-6));
+    const real pv = minimum(maximum(lam * (Jp - (SC)1) - mu, -bound), bound);
+    const real Jt = dot(Cp[0], xt[0]) + dot(Cp[1], xt[1]) + dot(Cp[2], xt[2]);
+    const real volumetric = bulk + s * mu / (SC)3;
+    UNROLL for (int k = 0; k < 3; ++k) {
+      const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+      real u[3], v[3];  // d2J applied to the rates
+      cross(xt[k1], xp[k2], u); cross(xp[k1], xt[k2], v);
+      UNROLL for (int c = 0; c < 3; ++c) {
+        const real force = volume * (mu * x[k][c] + p * C[k][c]
+                           + d * (volumetric * Jt * Cp[k][c] + s * (mu * xt[k][c] + pv * (u[c] + v[c]))));
+        if (k == 0) { f[c] -= force / ds; f_next[c] = force / ds; } else f[3 * k + c] += force;
       }
     }
-    // lanes that have settled stay as they are, so that a lane never depends on its neighbours
-    change += poison; imbalance += poison;
-    // a step that an indefinite Hessian gives, or that goes far, is not made: the Hessian is shifted
-    const real refused = maximum(change < zero + (SC)5 * step_limit ? zero : one, change < zero + (SC)2 * tolerance ? zero : indefinite);
-    const real enough = tolerance * (shift > zero ? zero + (SC)10 : one);
-    shift = refused > zero ? maximum((SC)4 * shift, zero + (SC)0.25) : (shift < zero + (SC)0.05 ? zero : (SC)0.5 * shift);
-    const real scale = (one - settled) * (one - refused) * minimum(one, step_limit / maximum(change, zero + (SC)1e-12));
-    for (int i = 0; i < L; ++i) {
-      const int v = i * LAYER_WORK + N * N + N * (N + 1) / 2;
-      for (int m = 0; m < N; ++m) { const real u = scale * AT(WORK, v + m); AT(X, i * N + m) -= scale > zero ? u : zero; }
+    // Hessian in (g, a, b), lower blocks k >= l
+    UNROLL for (int k = 0; k < 3; ++k) UNROLL for (int l = 0; l <= k; ++l) {
+      real K[3][3];
+      UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n < 3; ++n)
+        K[m][n] = lam * C[k][m] * C[l][n] + dh * volumetric * Cp[k][m] * Cp[l][n];
+      if (k == l) {
+        UNROLL for (int m = 0; m < 3; ++m) K[m][m] += mu + dsh * mu;
+      } else {
+        const int o = 3 - k - l;                                  // the third column
+        const real sign = (l + 1) % 3 == k ? one : -one;          // by the order of the columns
+        real z[3];
+        UNROLL for (int c = 0; c < 3; ++c) z[c] = sign * (pc * x[o][c] + dsh * pv * xp[o][c]);
+        K[0][1] -= z[2]; K[0][2] += z[1]; K[1][0] += z[2]; K[1][2] -= z[0]; K[2][0] -= z[1]; K[2][1] += z[0];
+      }
+      UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n < 3; ++n) {
+        if (k == l && n > m) continue;
+        const real v = volume * K[m][n];
+        if (k == 0) { PUT(STRETCH + LOWER(m, n)) = v / (ds * ds); own[LOWER(m, n)] += v / (ds * ds); }
+        else if (l == 0) own[LOWER(3 * k + m, n)] = -v / ds;
+        else own[LOWER(3 * k + m, 3 * l + n)] += v;
+      }
     }
-    // the held node's reaction after this step, to first order: it has no unknowns of its own
-    for (int m = 0; m < 3; ++m) {
-      const int v = MID * LAYER_WORK + N * N + N * (N + 1) / 2;
-      real u = zero;
-      for (int n = 0; n < N; ++n) u += before_mid[m][n] * AT(WORK, v - LAYER_WORK + n);
-      for (int n = 0; n < 6; ++n) u += at_mid[n][m] * AT(WORK, v + 3 + n);
-      for (int n = 0; n < 3; ++n) u += after_mid[n][m] * AT(WORK, v + LAYER_WORK + n);
-      reaction[m] = settled > zero ? reaction[m] : residual_mid[m] - scale * u;
+    if (i == MID - 1 || i == MID) {  // what the hand feels of this edge
+      const int side = i - MID + 1;
+      UNROLL for (int c = 0; c < 3; ++c) HAND(27 * side + c) = f_next[c];
+      UNROLL for (int c = 0; c < 6; ++c) HAND(27 * side + 3 + c) = PUT(STRETCH + c);
+      UNROLL for (int m = 0; m < 6; ++m) UNROLL for (int n = 0; n < 3; ++n) HAND(27 * side + 9 + 3 * m + n) = own[LOWER(3 + m, n)];
     }
-    settled = change < enough ? maximum(settled, one - refused) : settled;
-    settled = imbalance < balance ? one : settled;
-    if (ALL(settled > zero)) break;
+    // ---- joints: to the next edge; first, where there is one, from a frame that does not move (a clamp, or
+    // the fingers, which hold the middle node's direction while they hold it). `from` and `to` are 6 numbers:
+    // a, b of the side before and the side after
+    const bool from_frame = (i == 0 && first_clamped) || (i == MID && gripped);
+    for (int joint = from_frame ? 0 : 1; joint < 2; ++joint) {
+      const bool fixed_from = joint == 0, fixed_to = joint == 1 && i == MID - 1 && gripped;
+      const SC* frame = clamp.data + (i == 0 ? 0 : 12);
+      real from[6], from_p[6], from_t[6], to[6], to_p[6], to_t[6];
+      UNROLL for (int c = 0; c < 6; ++c) {
+        const int next = fixed_from ? i : i + 1;
+        from[c] = X(3 + c, i); from_p[c] = XP(3 + c, i); from_t[c] = (from[c] - Y(3 + c, i)) * ibh;
+        to[c] = X(3 + c, next); to_p[c] = XP(3 + c, next); to_t[c] = (to[c] - Y(3 + c, next)) * ibh;
+        if (fixed_from) { from[c] = from_p[c] = zero + frame[c]; from_t[c] = zero; }
+        if (fixed_to) { to[c] = to_p[c] = zero + frame[c]; to_t[c] = zero; }
+      }
+      real tw[6], tw_next[6];  // gradient of the twist; tau is bilinear, so that tw.y counts it twice
+      UNROLL for (int c = 0; c < 3; ++c) {
+        tw[c] = (SC)-0.5 * to_p[3 + c]; tw[3 + c] = (SC)0.5 * to_p[c];
+        tw_next[c] = (SC)0.5 * from_p[3 + c]; tw_next[3 + c] = (SC)-0.5 * from_p[c];
+      }
+      real twist = (SC)-0.5 * (dot(to_p, from_p + 3) - dot(to_p + 3, from_p)), size = zero;
+      UNROLL for (int c = 0; c < 6; ++c) {
+        twist += tw[c] * from[c] + tw_next[c] * to[c] + d * s * (tw[c] * from_t[c] + tw_next[c] * to_t[c]);
+        size += tw[c] * tw[c] + tw_next[c] * tw_next[c];
+      }
+      const SC apart = (SC)0.5 * (fixed_from || fixed_to || i == L - 2 ? ds : ds + edge[i + 1]);  // a frame is half an edge away
+      const real weight = zero + (joint == 1 && i == L - 2 && !last_clamped ? (SC)0 : (SC)1);
+      const real k = mu * (weight * area / apart), kb = k * cb;
+      const real kt = minimum((SC)2 * (kb - k * ct), (SC)1.9 * kb / maximum(size, zero + (SC)1e-3));
+      const real hb = kb * (one + dsh), ht = kt * (one + dsh);
+      if (fixed_from) {
+        UNROLL for (int m = 0; m < 6; ++m) {
+          f[3 + m] += kb * (to[m] - from[m] + d * s * (to_t[m] - from_t[m])) - kt * twist * tw_next[m];
+          own[LOWER(3 + m, 3 + m)] += hb;
+          UNROLL for (int n = 0; n <= m; ++n) own[LOWER(3 + m, 3 + n)] -= ht * tw_next[m] * tw_next[n];
+        }
+      } else {
+        const real coupled = zero + (fixed_to ? (SC)0 : (SC)1);
+        UNROLL for (int m = 0; m < 6; ++m) {
+          const real bend = kb * (from[m] - to[m] + d * s * (from_t[m] - to_t[m]));
+          f[3 + m] += bend - kt * twist * tw[m];
+          f_next[3 + m] = coupled * (-bend - kt * twist * tw_next[m]);
+          own[LOWER(3 + m, 3 + m)] += hb;
+          UNROLL for (int n = 0; n <= m; ++n) own[LOWER(3 + m, 3 + n)] -= ht * tw[m] * tw[n];
+          PUT(TWIST + m) = tw[m]; PUT(TWIST_NEXT + m) = tw_next[m];
+        }
+        PUT(BEND) = coupled * hb; PUT(TWISTING) = coupled * ht;
+      }
+    }
   }
-  // a lane that did not converge, or is no number, has failed for good
-  const real bad = settled > zero ? zero : one;
-  AT(LANE, 5) = failure != zero ? AT(LANE, 5) : zero + (SC)step;
-  failure = failure != zero ? failure : bad;
+  UNROLL for (int m = 0; m < 45; ++m) PUT(OWN + m) = own[m];
+  UNROLL for (int m = 0; m < N; ++m) { PUT(FORCE + m) = f[m]; PUT(FORCE_NEXT + m) = f_next[m]; }
+};
 
-  // the force of the band on the hand, and whether the pads still hold it
-  real force[3];
-  for (int c = 0; c < 3; ++c) force[c] = -reaction[c];
-  if (hold == 1) {
-    const real pull = SQRT(dot(force, force));
-    failure = failure != zero ? failure : (SC)2 * (pull > capacity ? one : zero);  // slipped out of closed fingers
-    AT(LANE, 15) = pull;
-    for (int c = 0; c < 3; ++c) AT(LANE, 1 + c) = force[c] / maximum(pull, zero + (SC)1e-9);
-  }
-  if (hold == 2) for (int c = 0; c < 3; ++c) force[c] = capacity * AT(LANE, 1 + c);
-  if (hold == 0) for (int c = 0; c < 3; ++c) force[c] = zero;
-  for (int c = 0; c < 3; ++c) AT(OUT, 4 * step + c) = force[c];
-
-  // the projectile leaves at the first pull: contact = m (acceleration + gravity) along the launch direction
-  if (hold == 0 && payload_steps > 0) {
-    real contact = zero, position[3], velocity[3];
-    for (int c = 0; c < 3; ++c) {
-      const int j = MID * N + c;
-      const real y = c1 * AT(X1, j) - c2 * AT(X2, j), yv = c1 * AT(V1, j) - c2 * AT(V2, j);
-      position[c] = AT(X, j); velocity[c] = (position[c] - y) * ibh;
-      contact += payload * ((velocity[c] - yv) * ibh + (c == 2 ? gravity : (SC)0)) * AT(LANE, 1 + c);
-    }
-    AT(OUT, 4 * step + 3) = contact;
-    const real before = step > first_free ? AT(OUT, 4 * step - 1) : contact;
-    real w = before / maximum(before - contact, zero + (SC)1e-9);
-    w = minimum(maximum(w, zero), one);
-    const real leaves = (payload > zero ? one : zero) * (contact > zero ? zero : one);
-    for (int c = 1; c < 3; ++c) {
-      const int j = MID * N + c;
-      AT(LANE, 10 + c) = leaves > zero ? AT(X1, j) + w * (position[c] - AT(X1, j)) : AT(LANE, 10 + c);
-      AT(LANE, 12 + c) = leaves > zero ? AT(V1, j) + w * (velocity[c] - AT(V1, j)) : AT(LANE, 12 + c);
-    }
-    AT(LANE, 10) = leaves > zero ? time - ((SC)1 - w) * h : AT(LANE, 10);
-    payload = leaves > zero ? zero : payload;
-    failure = failure != zero ? failure : -leaves;  // done: -1 marks a finished launch
-  }
-
-  // centre lines (with a frame_width of 9 all unknowns) at the camera's stamps within this step
-  for (int k = frame_first.data[step]; k < frame_first.data[step + 1]; ++k) {
-    const SC w = frame_weight.data[k];
-    for (int i = 0; i < L; ++i) for (int c = 0; c < frame_width; ++c) {
-      const int j = i * N + c;
-      AT(FRAME, (k * L + i) * frame_width + c) = AT(X1, j) + w * (AT(X, j) - AT(X1, j));
+// column c of a staged layer: D of its block, U of the transposed coupling with the next layer (what its unknown c
+// feels of this layer), and what is carried into the next layer's block; c = N is the residual
+auto column = [&](int j, int c, real* D, real* U, real* carry) {
+  if (c >= N) {
+    UNROLL for (int m = 0; m < N; ++m) { D[m] = zero; U[m] = GET(FORCE + m, j); carry[m] = GET(FORCE_NEXT + m, j); }
+  } else {
+    UNROLL for (int m = FIRST_ROW(c); m < N; ++m) D[m] = GET(OWN + LOWER(m, c), j);
+    if (c < 3) {
+      UNROLL for (int m = 0; m < 3; ++m) { carry[m] = GET(STRETCH + LOWER(m, c), j); U[m] = -carry[m]; }
+      UNROLL for (int m = 3; m < N; ++m) { carry[m] = zero; U[m] = -GET(OWN + LOWER(m, c), j); }
+    } else {
+      const real mine = GET(TWISTING, j) * GET(TWIST_NEXT + c - 3, j), bend = GET(BEND, j);
+      UNROLL for (int m = 0; m < 3; ++m) { carry[m] = zero; U[m] = zero; }
+      UNROLL for (int m = 0; m < 6; ++m) {
+        const real diagonal = m == c - 3 ? bend : zero;
+        carry[3 + m] = diagonal - mine * GET(TWIST_NEXT + m, j);
+        U[3 + m] = -diagonal - mine * GET(TWIST + m, j);
+      }
     }
   }
-  for (int j = 0; j < L * N; ++j) {
-    const real y = c1 * AT(X1, j) - c2 * AT(X2, j), now = AT(X, j);
-    const real v = mode == 0 ? zero : (now - y) * ibh;
-    AT(X2, j) = mode == 0 ? now : AT(X1, j); AT(X1, j) = now;
-    AT(V2, j) = mode == 0 ? zero : AT(V1, j); AT(V1, j) = v;
-  }
-  AT(OUT, 4 * step + 3) = payload_steps > 0 ? AT(OUT, 4 * step + 3) : zero + (SC)iteration;
-  if (payload_steps > 0 && ALL(failure != zero)) break;
-}
-AT(LANE, 0) = attached; AT(LANE, 4) = failure; AT(LANE, 9) = payload;
-
-#undef N
-#undef LAYER_WORK
-#undef ROW
-#undef AT
-#undef SQRT
-#undef ALL
+};

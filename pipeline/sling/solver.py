@@ -11,9 +11,9 @@ import numpy as np
 from pipeline.sling.model import GRAVITY, Sling, fixed_frames
 
 _compiling = Lock()
-LANES = {"cpu": 16, "cuda": 32}
-NOT_CONVERGED, SLIPPED, LEFT = 1, 2, -1  # lane_state[4] as rod.h sets it
-OFFSET, PAYLOAD, LEAVING, DIRECTION, FAILURE = slice(6, 9), 9, slice(10, 15), slice(1, 4), 4
+LANES, TEAM = 16, 10  # slings in a CPU thread's SIMD lanes; GPU threads that share a sling
+NOT_CONVERGED, SLIPPED, LEFT = 1, 2, -1  # lane_state[4] as state.h says
+DIRECTION, PAYLOAD, FAILURE, LEAVING, LANE_STATE = slice(0, 3), 3, 4, slice(6, 11), 11
 
 
 @dataclass
@@ -73,9 +73,9 @@ def steps(times, previous: float, *, hold: int, order: int = 1, mode: int = MOVE
     return table
 
 
-def _interleave(rows: np.ndarray, lanes: int, dtype) -> np.ndarray:
-    """(N, k) -> (blocks, k, lanes); the last block repeats the last row."""
-    blocks = -(-len(rows) // lanes)
+def _interleave(rows: np.ndarray, lanes: int, together: int, dtype) -> np.ndarray:
+    """(N, k) -> (blocks, k, lanes); the last row fills up to a multiple of `together` blocks."""
+    blocks = -(-len(rows) // (lanes * together)) * together
     padded = np.concatenate([rows, np.repeat(rows[-1:], blocks * lanes - len(rows), axis=0)])
     return np.ascontiguousarray(padded.reshape(blocks, lanes, -1).transpose(0, 2, 1), dtype)
 
@@ -128,10 +128,11 @@ def run(
 
     from pipeline.sling.kernel import rod_kernel
 
-    kind = "cuda" if device.startswith("cuda") else "cpu"
-    lanes = LANES[kind] // (2 if double and kind == "cpu" else 1)
-    count, dtype = len(parameters), np.float64 if double else np.float32
-    kernel = rod_kernel(sling.layers, sling.middle, double, lanes)
+    on_gpu, dtype = device.startswith("cuda"), np.float64 if double else np.float32
+    lanes, team = (1, TEAM) if on_gpu else (LANES // (2 if double else 1), 1)
+    together = 32 // team if on_gpu else 1  # blocks that a warp steps
+    count, layers = len(parameters), sling.layers
+    kernel = rod_kernel(layers, sling.middle, double, lanes, team)
     with _compiling:
         kernel.module.load(wp.get_device(device))
     table = schedule.table.astype(dtype)
@@ -143,61 +144,61 @@ def run(
         ],
         dtype,
     )  # fmt: skip
-    state = np.broadcast_to(state, (count, sling.layers, 9)).reshape(count, -1)
-    states = np.concatenate([state] * 3 + [np.zeros_like(state)] * 2 + [state], axis=1)
+    state = np.broadcast_to(state, (count, layers, 9)).swapaxes(1, 2).reshape(count, -1)
     first = np.searchsorted(frame_steps, np.arange(len(table) + 1)).astype(np.int32)
     weights = np.asarray(frame_weights, dtype) if len(frame_weights) else np.zeros(1, dtype)
     n_frames = len(frame_steps)
-    blocks = [_interleave(rows, lanes, dtype) for rows in (parameters, states, lane_state)]
+    blocks = [
+        _interleave(values, lanes, together, dtype) for values in (parameters, state, lane_state)
+    ]
     n_blocks = len(blocks[0])
-    lengths = sling.edge_lengths.astype(dtype)
     shared = [
         geometry,
-        lengths,
+        sling.edge_lengths.astype(dtype),
         fixed_frames(sling).astype(dtype).ravel(),
         table.ravel(),
         first,
         weights,
     ]
     shared = [wp.array(array, device=device) for array in shared]
+    scalar = wp.float64 if double else wp.float32
+    kept = layers * 19 * (32 if on_gpu else 10 * lanes) // together
 
     def slice_of(part: slice):
-        own = [wp.array(array[part].ravel(), device=device) for array in blocks]
+        parameter, state, lane = (wp.array(array[part].ravel(), device=device) for array in blocks)
         size = len(blocks[0][part])
-        scalar = wp.float64 if double else wp.float32
-        work = wp.empty(size * lanes * sling.layers * 135, dtype=scalar, device=device)
+        scratch = wp.empty(size * lanes * layers * 81, dtype=scalar, device=device)
+        work = wp.empty(size * kept + 32, dtype=scalar, device=device)
         output = wp.zeros(size * lanes * len(table) * 4, dtype=scalar, device=device)
         frames = wp.zeros(
-            size * lanes * max(n_frames, 1) * sling.layers * frame_width, dtype=scalar, device=device
+            size * lanes * max(n_frames, 1) * layers * frame_width, dtype=scalar, device=device
         )
         wp.launch(
             kernel,
-            dim=size * (lanes if kind == "cuda" else 1),
+            dim=size // together * 32 if on_gpu else size,
             inputs=[
-                *shared[:4], own[0], own[1], work, own[2], output, frames, *shared[4:],
-                n_frames, frame_width, len(table), 0, len(table), schedule.first_free, int(payload),
+                *shared[:4], parameter, state, scratch, work, lane, output, frames, *shared[4:],
+                n_frames, frame_width, len(table), schedule.first_free, int(payload),
             ],
             device=device,
-            block_dim=lanes,
+            block_dim=32,
         )  # fmt: skip
-        return [
-            array.numpy().reshape(size, -1, lanes) for array in (own[1], own[2], output, frames)
-        ]
+        return [array.numpy().reshape(size, -1, lanes) for array in (state, lane, output, frames)]
 
-    if kind == "cuda" or workers == 1 or n_blocks == 1:
+    if on_gpu or workers == 1 or n_blocks == 1:
         parts = [slice_of(slice(None))]
     else:
         slices = [slice(i, i + 1) for i in range(n_blocks)]
         with ThreadPoolExecutor(workers) as pool:
             parts = list(pool.map(slice_of, slices))
-    states, lane_state, output, frames = (
+    state, lane_state, output, frames = (
         _separate(np.concatenate(arrays), count) for arrays in zip(*parts, strict=True)
     )
     return Result(
-        state=states[:, sling.layers * 9 : 2 * sling.layers * 9].reshape(count, -1, 9),
+        state=state.reshape(count, 9, layers).swapaxes(1, 2),
         lane_state=lane_state,
         output=output.reshape(count, len(table), 4),
-        frames=frames[:, : n_frames * sling.layers * frame_width].reshape(
-            count, n_frames, sling.layers, frame_width
+        frames=frames[:, : n_frames * layers * frame_width].reshape(
+            count, n_frames, layers, frame_width
         ),
     )

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.sling import launch
 from pipeline.sling.model import GRAVITY, hanging_guess, layers_of, material
-from pipeline.sling.solver import FREE, Schedule, relaxation, run
+from pipeline.sling.solver import FREE, LANE_STATE, Schedule, relaxation, run
 
 from .reference import gradient
 
@@ -24,7 +24,7 @@ def relaxed(sling, theta, start, double=True):
         Schedule(table, first_free=0),
         material(sling, np.array([theta])),
         start,
-        np.zeros((1, 16)),
+        np.zeros((1, LANE_STATE)),
         double=double,
     )
     assert result.lane_state[0, 4] == 0

@@ -1,0 +1,53 @@
+// What a sling is made of, where its state is kept, and what holds during a step.
+
+const int ROW_LENGTH = (N + 3) / 4 * 4;
+const int SAVED = 2 * N + 1;  // numbers kept of a column for the back substitution: multipliers, coupling, solution
+const SC mean_edge = geometry.data[0], area = geometry.data[1], radius2 = geometry.data[2];
+const SC line_mass = geometry.data[3], gravity = geometry.data[4], node_mass = line_mass * mean_edge;
+const SC* edge = lengths.data;  // rest length of each edge
+const SC tolerance = geometry.data[5], step_limit = geometry.data[6];
+const int max_iterations = (int)geometry.data[7];
+const bool first_clamped = geometry.data[8] > 0, last_clamped = geometry.data[9] > 0;
+
+const SC node_shift = node_mass * (SC)2.5e5;  // the inertia of a 2 ms step
+auto PAR = ROW(parameter, 6);
+const real mu = PAR[0], lam = PAR[1], bulk = lam - mu / (SC)3, d = PAR[2], s = PAR[3], friction = PAR[4];
+
+// unknown k of layer i: now, predicted, the y and xh of step.h, Newton's change, and of the two steps before
+auto INITIAL = ROW(state, N * L);
+auto STATE = ROW(scratch, 9 * N * L);
+#define FIELD(f, k, i) STATE[((f) * N + (k)) * L + (i)]
+#define X(k, i) FIELD(0, k, i)
+#define XP(k, i) FIELD(1, k, i)
+#define Y(k, i) FIELD(2, k, i)
+#define XH(k, i) FIELD(3, k, i)
+#define DX(k, i) FIELD(4, k, i)
+#define X1(k, i) FIELD(5, k, i)
+#define X2(k, i) FIELD(6, k, i)
+#define V1(k, i) FIELD(7, k, i)
+#define V2(k, i) FIELD(8, k, i)
+auto OUT = ROW(output, 4 * steps);
+auto FRAME = ROW(frames, frame_width * L * n_frames);
+auto KEPT = SAVE;
+#define KEEP(i, row, q) KEPT[((i) * SAVED + (row)) * SAVE_STRIDE + (q)]
+
+#if defined(__CUDA_ARCH__)
+__shared__ SC rows[2 * TEAMS * (N + 1) * ROW_LENGTH];  // a layer's columns, for the whole team; two layers in turn
+#define SHARED(c, k) rows[(((i & 1) * TEAMS + team) * (N + 1) + (c)) * ROW_LENGTH + (k)]
+#define SHARE(U) if (member <= N) { UNROLL for (int k = 0; k < N; ++k) SHARED(member, k) = U[0][k]; } SYNC
+#else
+#define SHARED(c, k) U[c][k]
+#define SHARE(U)
+#endif
+
+// lane state: 0-2 direction of the launch, 3 mass of the projectile, 4 failure (1 not converged, 2 slipped, -1: the
+// projectile has left), 5 its step, 6 leaving time, 7-8 leaving position and 9-10 velocity (y, z)
+auto LANE = ROW(lane_state, 11);
+real direction[3], leaving[5], payload = LANE[3], failure = zero, failed_step = zero;
+UNROLL for (int c = 0; c < 3; ++c) direction[c] = LANE[c];
+UNROLL for (int c = 0; c < 5; ++c) leaving[c] = zero;
+
+// of the step under way
+SC ibh = 0, ibh2 = 0, ct = 0;     // 1 / (beta h), its square; torsion
+bool attached = false, gripped = false;  // the hand leads the middle node; its pads hold the direction as well
+real cb = zero, dh = zero, dsh = zero, shift = zero;          // bending, d / (beta h), that times s, shift of the Hessian

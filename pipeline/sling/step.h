@@ -62,7 +62,7 @@ for (int step = 0; step < steps; ++step) {
         SYNC;
       }
       const bool special = i == 0 || i == MID - 1 || i == MID || i >= L - 2;
-      for (int q = 0; q < COLUMNS; ++q) {
+      UNROLL for (int q = 0; q < COLUMNS; ++q) {
         const int c = q + member;
         column(j, c, D[q], U[q], carry[q]);
         if (c >= N) {  // the residual; U is what elimination leaves of it
@@ -90,7 +90,7 @@ for (int step = 0; step < steps; ++step) {
       }
       // LDL' of the block, pivot by pivot, with the columns of the coupling
       real whole[COLUMNS], inverse[N], inverse_own[COLUMNS];
-      for (int q = 0; q < COLUMNS; ++q) {
+      UNROLL for (int q = 0; q < COLUMNS; ++q) {
         whole[q] = COLUMNS > 1 ? magnitude(D[q][q < N ? q : 0]) : zero;
         inverse_own[q] = zero;
         if (COLUMNS == 1) UNROLL for (int m = 0; m < N; ++m) whole[q] = m == member ? magnitude(D[q][m]) : whole[q];

@@ -87,7 +87,7 @@ def _separate(array: np.ndarray, count: int) -> np.ndarray:
 
 @dataclass
 class Result:
-    """State (N, layers, 9), lane_state (N, 16), output (N, S, 4), frames (N, K, layers, width)."""
+    """State (N, layers, 9), lane_state (N, LANE_STATE), output (N, S, 4), frames (N, K, layers, width)."""
 
     state: np.ndarray
     lane_state: np.ndarray
@@ -118,7 +118,7 @@ def run(
     Args:
         parameters: As `model.material` gives them, shape (N, 6).
         state: Initial layers, shape (N, layers, 9) or (layers, 9).
-        lane_state: As documented in rod.h, shape (N, 16).
+        lane_state: As documented in state.h, shape (N, LANE_STATE).
         frame_steps, frame_weights: Step in which each frame falls and its place in it, shape (K,).
         frame_width: 3 for centre lines, 9 for all unknowns of each layer.
         payload: The launch of a projectile (lane_state[:, 9]) is followed until it leaves.
@@ -127,6 +127,9 @@ def run(
     import warp as wp
 
     from pipeline.sling.kernel import rod_kernel
+
+    if lane_state.shape != (len(parameters), LANE_STATE):
+        raise ValueError(f"lane_state: {lane_state.shape} is not ({len(parameters)}, {LANE_STATE})")
 
     on_gpu, dtype = device.startswith("cuda"), np.float64 if double else np.float32
     lanes, team = (1, TEAM) if on_gpu else (LANES // (2 if double else 1), 1)
@@ -192,7 +195,8 @@ def run(
         with ThreadPoolExecutor(workers) as pool:
             parts = list(pool.map(slice_of, slices))
     state, lane_state, output, frames = (
-        _separate(np.concatenate(arrays), count) for arrays in zip(*parts, strict=True)
+        _separate(np.concatenate(arrays) if len(arrays) > 1 else arrays[0], count)
+        for arrays in zip(*parts, strict=True)
     )
     return Result(
         state=state.reshape(count, 9, layers).swapaxes(1, 2),

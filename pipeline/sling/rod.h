@@ -59,13 +59,13 @@ auto stage_layer = [&](int i) {
   }
   if (i < L - 1) {
     // ---- edge i: k = 0, 1, 2 are g, a, b; x now, xp predicted, xt rates
-    const SC ds = edge[i];
+    const SC ds = edge[i], per_ds = (SC)1 / ds;
     const real volume = zero + area * ds;
     real x[3][3], xp[3][3], xt[3][3];
     UNROLL for (int k = 0; k < 3; ++k) UNROLL for (int c = 0; c < 3; ++c) {
       const int q = 3 * k + c;
       real now = X(q, i), predicted = XP(q, i), y = Y(q, i);
-      if (k == 0) { now = (X(q, i + 1) - now) / ds; predicted = (XP(q, i + 1) - predicted) / ds; y = (Y(q, i + 1) - y) / ds; }
+      if (k == 0) { now = (X(q, i + 1) - now) * per_ds; predicted = (XP(q, i + 1) - predicted) * per_ds; y = (Y(q, i + 1) - y) * per_ds; }
       x[k][c] = now; xp[k][c] = predicted; xt[k][c] = (now - y) * ibh;
     }
     real C[3][3], Cp[3][3], square = zero;  // cofactors; the longest column, squared
@@ -76,6 +76,7 @@ auto stage_layer = [&](int i) {
     const real J = dot(x[0], C[0]), Jp = dot(xp[0], Cp[0]);
     const real p = lam * (J - (SC)1) - mu;
     const real pc = minimum(maximum(p, (SC)-1.5 * mu), (SC)0.25 * mu);
+    inexact = pc == p ? inexact : one;
     // the same coefficient at the predicted state, bounded so that no rate gains energy
     const real bound = mu / SQRT(maximum(square, zero + (SC)1e-6));
     const real pv = minimum(maximum(lam * (Jp - (SC)1) - mu, -bound), bound);
@@ -88,7 +89,7 @@ auto stage_layer = [&](int i) {
       UNROLL for (int c = 0; c < 3; ++c) {
         const real force = volume * (mu * x[k][c] + p * C[k][c]
                            + d * (volumetric * Jt * Cp[k][c] + s * (mu * xt[k][c] + pv * (u[c] + v[c]))));
-        if (k == 0) { f[c] -= force / ds; f_next[c] = force / ds; } else f[3 * k + c] += force;
+        if (k == 0) { f[c] -= force * per_ds; f_next[c] = force * per_ds; } else f[3 * k + c] += force;
       }
     }
     // Hessian in (g, a, b), lower blocks k >= l
@@ -108,8 +109,8 @@ auto stage_layer = [&](int i) {
       UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n < 3; ++n) {
         if (k == l && n > m) continue;
         const real v = volume * K[m][n];
-        if (k == 0) { PUT(STRETCH + LOWER(m, n)) = v / (ds * ds); own[LOWER(m, n)] += v / (ds * ds); }
-        else if (l == 0) own[LOWER(3 * k + m, n)] = -v / ds;
+        if (k == 0) { PUT(STRETCH + LOWER(m, n)) = v * (per_ds * per_ds); own[LOWER(m, n)] += v * (per_ds * per_ds); }
+        else if (l == 0) own[LOWER(3 * k + m, n)] = -v * per_ds;
         else own[LOWER(3 * k + m, 3 * l + n)] += v;
       }
     }
@@ -146,7 +147,7 @@ auto stage_layer = [&](int i) {
       }
       const SC apart = (SC)0.5 * (fixed_from || fixed_to || i == L - 2 ? ds : ds + edge[i + 1]);  // a frame is half an edge away
       const real weight = zero + (joint == 1 && i == L - 2 && !last_clamped ? (SC)0 : (SC)1);
-      const real k = mu * (weight * area / apart), kb = k * cb;
+      const real k = mu * weight * (area / apart), kb = k * cb;
       const real kt = minimum((SC)2 * (kb - k * ct), (SC)1.9 * kb / maximum(size, zero + (SC)1e-3));
       const real hb = kb * (one + dsh), ht = kt * (one + dsh);
       if (fixed_from) {
@@ -176,21 +177,19 @@ auto stage_layer = [&](int i) {
 // column c of a staged layer: D of its block, U of the transposed coupling with the next layer (what its unknown c
 // feels of this layer), and what is carried into the next layer's block; c = N is the residual
 auto column = [&](int j, int c, real* D, real* U, real* carry) {
-  if (c >= N) {
-    UNROLL for (int m = 0; m < N; ++m) { D[m] = zero; U[m] = GET(FORCE + m, j); carry[m] = GET(FORCE_NEXT + m, j); }
-  } else {
-    UNROLL for (int m = FIRST_ROW(c); m < N; ++m) D[m] = GET(OWN + LOWER(m, c), j);
-    if (c < 3) {
-      UNROLL for (int m = 0; m < 3; ++m) { carry[m] = GET(STRETCH + LOWER(m, c), j); U[m] = -carry[m]; }
-      UNROLL for (int m = 3; m < N; ++m) { carry[m] = zero; U[m] = -GET(OWN + LOWER(m, c), j); }
-    } else {
-      const real mine = GET(TWISTING, j) * GET(TWIST_NEXT + c - 3, j), bend = GET(BEND, j);
-      UNROLL for (int m = 0; m < 3; ++m) { carry[m] = zero; U[m] = zero; }
-      UNROLL for (int m = 0; m < 6; ++m) {
-        const real diagonal = m == c - 3 ? bend : zero;
-        carry[3 + m] = diagonal - mine * GET(TWIST_NEXT + m, j);
-        U[3 + m] = -diagonal - mine * GET(TWIST + m, j);
-      }
-    }
+  const bool residual = c >= N, node = c < 3, director = !residual && !node;
+  const real bend = GET(BEND, j), twisting = -GET(TWISTING, j) * GET(TWIST_NEXT + (director ? c - 3 : 0), j);
+  UNROLL for (int m = FIRST_ROW(residual ? 0 : c); m < N; ++m) D[m] = GET(OWN + LOWER(m, residual ? 0 : c), j);
+  UNROLL for (int m = 0; m < 3; ++m) {
+    const int stretch = STRETCH + LOWER(m, node ? c : 0);
+    const real here = GET(residual ? FORCE + m : stretch, j), there = GET(residual ? FORCE_NEXT + m : stretch, j);
+    U[m] = residual ? here : node ? -here : zero;
+    carry[m] = director ? zero : there;
+  }
+  UNROLL for (int m = 3; m < N; ++m) {
+    const real here = GET((residual ? FORCE : TWIST - 3) + m, j), there = GET((residual ? FORCE_NEXT : TWIST_NEXT - 3) + m, j);
+    const real diagonal = m == c ? bend : zero;
+    U[m] = residual ? here : node ? -D[m] : twisting * here - diagonal;
+    carry[m] = residual ? there : node ? zero : twisting * there + diagonal;
   }
 };

@@ -143,7 +143,7 @@ def run(
         [
             sling.rest_length / sling.edges, sling.area, sling.radius**2,
             sling.mass / sling.rest_length, gravity, tolerance, 0.004, max_iterations,
-            *sling.clamped,
+            *sling.clamped, sling.edge_lengths.min(),
         ],
         dtype,
     )  # fmt: skip

@@ -6,6 +6,7 @@ const SC mean_edge = geometry.data[0], area = geometry.data[1], radius2 = geomet
 const SC line_mass = geometry.data[3], gravity = geometry.data[4], node_mass = line_mass * mean_edge;
 const SC* edge = lengths.data;  // rest length of each edge
 const SC tolerance = geometry.data[5], step_limit = geometry.data[6];
+const SC shortest_edge = geometry.data[10];
 const int max_iterations = (int)geometry.data[7];
 const bool first_clamped = geometry.data[8] > 0, last_clamped = geometry.data[9] > 0;
 
@@ -32,7 +33,7 @@ auto KEPT = SAVE;
 #define KEEP(i, row, q) KEPT[((i) * SAVED + (row)) * SAVE_STRIDE + (q)]
 
 #if defined(__CUDA_ARCH__)
-__shared__ SC rows[2 * TEAMS * (N + 1) * ROW_LENGTH];  // a layer's columns, for the whole team; two layers in turn
+__shared__ __align__(16) SC rows[2 * TEAMS * (N + 1) * ROW_LENGTH];  // a layer's columns, for the whole team; two layers in turn
 #define SHARED(c, k) rows[(((i & 1) * TEAMS + team) * (N + 1) + (c)) * ROW_LENGTH + (k)]
 #define SHARE(U) if (member <= N) { UNROLL for (int k = 0; k < N; ++k) SHARED(member, k) = U[0][k]; } SYNC
 #else
@@ -50,4 +51,4 @@ UNROLL for (int c = 0; c < 5; ++c) leaving[c] = zero;
 // of the step under way
 SC ibh = 0, ibh2 = 0, ct = 0;     // 1 / (beta h), its square; torsion
 bool attached = false, gripped = false;  // the hand leads the middle node; its pads hold the direction as well
-real cb = zero, dh = zero, dsh = zero, shift = zero;          // bending, d / (beta h), that times s, shift of the Hessian
+real cb = zero, dh = zero, dsh = zero, shift = zero, inexact = zero;          // bending, d / (beta h), that times s, shift of the Hessian

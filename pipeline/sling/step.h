@@ -6,6 +6,7 @@
 // (backward Euler: beta = c1 = 1, c2 = 0; variable-step BDF2 otherwise) by Newton's method on the
 // block-tridiagonal Hessian with a direct LDL' solve; where it is indefinite, its diagonal is shifted.
 
+const SC close = sqrt(0.25 * tolerance * shortest_edge);  // from here on Newton's next change is below the tolerance
 const real balance = (SC)3e-2 * node_mass * gravity + (SC)1e-5 * mu * area;  // N
 for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
   const real x = INITIAL[k * L + i];
@@ -51,7 +52,7 @@ for (int step = 0; step < steps; ++step) {
   for (; iteration < max_iterations; ++iteration) {
     // ---- assembly, a layer a member, and elimination, layer after layer
     real D[COLUMNS][N], U[COLUMNS][N], carry[COLUMNS][N], next[COLUMNS][N], raw[N];
-    real indefinite = zero, imbalance = zero, poison = zero;  // poison is no number as soon as anything is
+    real indefinite = zero, imbalance = zero, poison = zero; inexact = zero;  // poison is no number as soon as anything is
     for (int q = 0; q < COLUMNS; ++q) UNROLL for (int m = 0; m < N; ++m) next[q][m] = zero;
     UNROLL for (int m = 0; m < N; ++m) raw[m] = zero;
     for (int i = 0; i < L; ++i) {
@@ -96,9 +97,9 @@ for (int step = 0; step < steps; ++step) {
         if (COLUMNS == 1) UNROLL for (int m = 0; m < N; ++m) whole[q] = m == member ? magnitude(D[q][m]) : whole[q];
       }
       UNROLL for (int k = 0; k < N; ++k) {
-        const real pivot = OF(D, k, k), before = AT_MEMBER(whole, k);
+        const real pivot = OF(D, k, k);
         indefinite = pivot > zero ? indefinite : one;
-        inverse[k] = one / (magnitude(pivot) > (SC)1e-7 * before ? pivot : before);
+        inverse[k] = one / pivot;
         real multiplier[N];
         UNROLL for (int m = k + 1; m < N; ++m) multiplier[m] = OF(D, k, m) * inverse[k];
         UNROLL for (int q = 0; q < COLUMNS; ++q) {
@@ -109,7 +110,7 @@ for (int step = 0; step < steps; ++step) {
           }
           UNROLL for (int m = k + 1; m < N; ++m) U[q][m] -= multiplier[m] * U[q][k];
           if (COLUMNS == 1) {
-            inverse_own[q] = c == k ? inverse[k] : inverse_own[q];
+            inverse_own[q] = c == k || k == 0 ? inverse[k] : inverse_own[q];
             UNROLL for (int m = k + 1; m < N; ++m) D[q][m] = c == k ? multiplier[m] : D[q][m];
           }
         }
@@ -167,11 +168,12 @@ for (int step = 0; step < steps; ++step) {
     }
     change = poison == zero ? change : zero + (SC)1e30;
     imbalance = poison == zero ? imbalance : zero + (SC)1e30;
-    change = team_maximum(change); imbalance = team_maximum(imbalance);
+    change = team_maximum(change); imbalance = team_maximum(imbalance); inexact = team_maximum(inexact);
     SYNC;
     // a step that an indefinite Hessian gives, or that goes far, is not made: the Hessian is shifted
     const real refused = maximum(change < zero + (SC)5 * step_limit ? zero : one, change < zero + (SC)2 * tolerance ? zero : indefinite);
-    const real enough = tolerance * (shift > zero ? zero + (SC)10 : one);
+    // with the exact Hessian, convergence is quadratic
+    const real enough = shift > zero ? zero + (SC)10 * tolerance : inexact > zero ? zero + tolerance : zero + close;
     shift = refused > zero ? maximum((SC)4 * shift, zero + (SC)0.25) : (shift < zero + (SC)0.05 ? zero : (SC)0.5 * shift);
     // lanes that have settled stay as they are, so that a lane never depends on its neighbours
     const real scale = (one - settled) * (one - refused) * minimum(one, step_limit / maximum(change, zero + (SC)1e-12));

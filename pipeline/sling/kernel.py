@@ -9,7 +9,8 @@ from pathlib import Path
 import warp as wp
 
 PARTS = ("lanes.h", "state.h", "rod.h", "step.h")
-UNKNOWNS = 9
+UNKNOWNS = 9  # of a layer
+SAVED = 2 * UNKNOWNS + 1  # numbers of a column that the back substitution needs
 wp.config.log_level = wp.LOG_ERROR
 wp.config.enable_backward = False
 
@@ -25,7 +26,8 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int, team: int):
     }  # fmt: skip
     text = "\n" + "".join(f"#define {name} {value}\n" for name, value in macros.items())
     text += "".join(Path(__file__).with_name(part).read_text(encoding="utf-8") for part in PARTS)
-    defined = {line.split()[1].partition("(")[0] for line in text.splitlines() if line.startswith("#define")}
+    lines = [line.split() for line in text.splitlines() if line.startswith("#define")]
+    defined = {words[1].partition("(")[0] for words in lines}
     text += "\n" + "".join(f"#undef {name}\n" for name in sorted(defined))
 
     @wp.func_native(text)
@@ -48,10 +50,11 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int, team: int):
         frame_width: int,
         steps: int,
         first_free: int,
-        payload_steps: int,
+        launching: int,
     ): ...
 
-    @wp.kernel(module="unique")
+    # approximate reciprocals do for Newton's method; on the CPU the option would drop checks for NaN
+    @wp.kernel(module="unique", module_options={"fast_math": team > 1})
     def run(
         geometry: array,
         lengths: array,
@@ -70,12 +73,12 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int, team: int):
         frame_width: int,
         steps: int,
         first_free: int,
-        payload_steps: int,
+        launching: int,
     ):
         rod(
             wp.tid(), geometry, lengths, clamp, schedule, parameter, state, scratch, work,
             lane_state, output, frames, frame_first, frame_weight, n_frames, frame_width, steps,
-            first_free, payload_steps,
+            first_free, launching,
         )  # fmt: skip
 
     return run

@@ -11,6 +11,7 @@ from pipeline.sling.solver import (
     DIRECTION,
     FAILURE,
     FREE,
+    HELD_FORCE,
     LANE_STATE,
     LEAVING,
     LEFT,
@@ -96,12 +97,12 @@ def launch(
         material(sling, thetas),
         drawn_guess(sling, draws),
         lane_state,
-        payload=True,
+        launching=True,
         device=device,
         workers=workers,
         double=double,
     )
-    hold_force = np.linalg.norm(result.output[:, RELAX_STEPS - 1, :3].astype(float), axis=1)
+    hold_force = np.linalg.norm(result.lane_state[:, HELD_FORCE].astype(float), axis=1)
     code = np.round(result.lane_state[:, FAILURE])
     hold_force[code > 0] = np.nan
     time, y, z, vy, vz = result.lane_state[:, LEAVING].astype(float).T

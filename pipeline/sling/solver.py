@@ -13,7 +13,8 @@ from pipeline.sling.model import GRAVITY, Sling, fixed_frames
 _compiling = Lock()
 LANES, TEAM = 16, 10  # slings in a CPU thread's SIMD lanes; GPU threads that share a sling
 NOT_CONVERGED, SLIPPED, LEFT = 1, 2, -1  # lane_state[4] as state.h says
-DIRECTION, PAYLOAD, FAILURE, LEAVING, LANE_STATE = slice(0, 3), 3, 4, slice(6, 11), 11
+DIRECTION, PAYLOAD, FAILURE, LEAVING, HELD_FORCE = slice(0, 3), 3, 4, slice(6, 11), slice(11, 14)
+LANE_STATE = 14
 
 
 @dataclass
@@ -80,14 +81,24 @@ def _interleave(rows: np.ndarray, lanes: int, together: int, dtype) -> np.ndarra
     return np.ascontiguousarray(padded.reshape(blocks, lanes, -1).transpose(0, 2, 1), dtype)
 
 
-def _separate(array: np.ndarray, count: int) -> np.ndarray:
-    """(blocks, k, lanes) -> (N, k)."""
-    return array.transpose(0, 2, 1).reshape(-1, array.shape[1])[:count]
+def _separate(array: np.ndarray) -> np.ndarray:
+    """(blocks, k, lanes) -> (slings, k)."""
+    blocks, width, lanes = array.shape
+    return array.transpose(0, 2, 1).reshape(blocks * lanes, width)
 
 
 @dataclass
 class Result:
-    """State (N, layers, 9), lane_state (N, LANE_STATE), output (N, S, 4), frames (N, K, layers, width)."""
+    """Of N slings through S steps, K frames recorded.
+
+    Attributes:
+        state: At the end, shape (N, layers, 9).
+        lane_state: As documented in state.h, shape (N, LANE_STATE).
+        output: Force on the hand and Newton iterations of each step, shape (N, S, 4); empty for
+            launches.
+        frames: Shape (N, K, layers, width). This and `output` are what is long: from a GPU they
+            come as Warp arrays that stay there, if asked for.
+    """
 
     state: np.ndarray
     lane_state: np.ndarray
@@ -106,8 +117,9 @@ def run(
     frame_weights=(),
     frame_width: int = 3,
     gravity: float = GRAVITY,
-    payload: bool = False,
+    launching: bool = False,
     device: str = "cpu",
+    fetch: bool = True,
     double: bool = False,
     workers: int = 1,
     tolerance: float = 2e-6,
@@ -121,88 +133,97 @@ def run(
         lane_state: As documented in state.h, shape (N, LANE_STATE).
         frame_steps, frame_weights: Step in which each frame falls and its place in it, shape (K,).
         frame_width: 3 for centre lines, 9 for all unknowns of each layer.
-        payload: The launch of a projectile (lane_state[:, 9]) is followed until it leaves.
+        launching: The projectile (lane_state[:, PAYLOAD]) is followed until it leaves.
+        fetch: Copy what is long from a GPU.
         workers: Threads, on the CPU; a result does not depend on their number.
+        tolerance: Newton's change that is small enough [m].
     """
     import warp as wp
 
-    from pipeline.sling.kernel import rod_kernel
+    from pipeline.sling.kernel import SAVED, UNKNOWNS, rod_kernel
 
     if lane_state.shape != (len(parameters), LANE_STATE):
         raise ValueError(f"lane_state: {lane_state.shape} is not ({len(parameters)}, {LANE_STATE})")
-
-    on_gpu, dtype = device.startswith("cuda"), np.float64 if double else np.float32
+    on_gpu = device.startswith("cuda")
+    dtype, scalar = (np.float64, wp.float64) if double else (np.float32, wp.float32)
     lanes, team = (1, TEAM) if on_gpu else (LANES // (2 if double else 1), 1)
-    together = 32 // team if on_gpu else 1  # blocks that a warp steps
-    count, layers = len(parameters), sling.layers
+    together = 32 // team if on_gpu else 1  # rows of slings that one thread (one warp) steps
+    count, layers, n_steps, n_frames = (
+        len(parameters), sling.layers, len(schedule.table), len(frame_steps),
+    )  # fmt: skip
     kernel = rod_kernel(layers, sling.middle, double, lanes, team)
     with _compiling:
         kernel.module.load(wp.get_device(device))
-    table = schedule.table.astype(dtype)
-    geometry = np.array(
-        [
-            sling.rest_length / sling.edges, sling.area, sling.radius**2,
-            sling.mass / sling.rest_length, gravity, tolerance, 0.004, max_iterations,
-            *sling.clamped, sling.edge_lengths.min(),
-        ],
-        dtype,
-    )  # fmt: skip
-    state = np.broadcast_to(state, (count, layers, 9)).swapaxes(1, 2).reshape(count, -1)
-    first = np.searchsorted(frame_steps, np.arange(len(table) + 1)).astype(np.int32)
-    weights = np.asarray(frame_weights, dtype) if len(frame_weights) else np.zeros(1, dtype)
-    n_frames = len(frame_steps)
-    blocks = [
+
+    geometry = [
+        sling.rest_length / sling.edges, sling.area, sling.radius**2,
+        sling.mass / sling.rest_length, gravity, tolerance, 0.004, max_iterations,
+        *sling.clamped, sling.edge_lengths.min(),
+    ]  # fmt: skip
+    first = np.searchsorted(frame_steps, np.arange(n_steps + 1)).astype(np.int32)
+    common = [
+        wp.array(np.ravel(values).astype(dtype), device=device)
+        for values in (geometry, sling.edge_lengths, fixed_frames(sling), schedule.table)
+    ]
+    stamps = [
+        wp.array(first, device=device),
+        wp.array(np.append(frame_weights, 0.0).astype(dtype), device=device),
+    ]
+    state = np.broadcast_to(state, (count, layers, UNKNOWNS)).swapaxes(1, 2).reshape(count, -1)
+    rows = [
         _interleave(values, lanes, together, dtype) for values in (parameters, state, lane_state)
     ]
-    n_blocks = len(blocks[0])
-    shared = [
-        geometry,
-        sling.edge_lengths.astype(dtype),
-        fixed_frames(sling).astype(dtype).ravel(),
-        table.ravel(),
-        first,
-        weights,
-    ]
-    shared = [wp.array(array, device=device) for array in shared]
-    scalar = wp.float64 if double else wp.float32
-    kept = layers * 19 * (32 if on_gpu else 10 * lanes) // together
 
-    def slice_of(part: slice):
-        parameter, state, lane = (wp.array(array[part].ravel(), device=device) for array in blocks)
-        size = len(blocks[0][part])
-        scratch = wp.empty(size * lanes * layers * 81, dtype=scalar, device=device)
-        work = wp.empty(size * kept + 32, dtype=scalar, device=device)
-        output = wp.zeros(size * lanes * len(table) * 4, dtype=scalar, device=device)
-        frames = wp.zeros(
-            size * lanes * max(n_frames, 1) * layers * frame_width, dtype=scalar, device=device
+    widths = {
+        "state": UNKNOWNS * layers,
+        "lane_state": LANE_STATE,
+        "output": 0 if launching else 4 * n_steps,
+        "frames": n_frames * layers * frame_width,
+    }
+
+    def part(begin: int, end: int) -> list:
+        """Step the rows of slings from `begin` to `end`; arrays (slings, width)."""
+        size = end - begin
+
+        def empty(*shape: int):
+            return wp.empty(int(np.prod(shape)), dtype=scalar, device=device)
+
+        parameter, state, lane = (
+            wp.array(values[begin:end].ravel(), device=device) for values in rows
         )
+        scratch = empty(size, 9 * UNKNOWNS * layers, lanes)
+        saved = empty(size // together, layers * SAVED, 32 if on_gpu else (UNKNOWNS + 1) * lanes)
+        output, frames = empty(size, widths["output"], lanes), empty(size, widths["frames"], lanes)
         wp.launch(
             kernel,
-            dim=size // together * 32 if on_gpu else size,
+            dim=size // together * (32 if on_gpu else 1),
             inputs=[
-                *shared[:4], parameter, state, scratch, work, lane, output, frames, *shared[4:],
-                n_frames, frame_width, len(table), schedule.first_free, int(payload),
+                *common, parameter, state, scratch, saved, lane, output, frames, *stamps,
+                n_frames, frame_width, n_steps, schedule.first_free, int(launching),
             ],
             device=device,
             block_dim=32,
         )  # fmt: skip
-        return [array.numpy().reshape(size, -1, lanes) for array in (state, lane, output, frames)]
+        arrays = dict(zip(widths, (state, lane, output, frames), strict=True))
+        stays = () if fetch or not on_gpu else ("output", "frames")
+        return [
+            array.reshape((size, widths[name]))
+            if name in stays
+            else _separate(array.numpy().reshape(size, widths[name], lanes))
+            for name, array in arrays.items()
+        ]
 
-    if on_gpu or workers == 1 or n_blocks == 1:
-        parts = [slice_of(slice(None))]
+    n_rows = len(rows[0])
+    if on_gpu or workers == 1 or n_rows == 1:
+        arrays = part(0, n_rows)
     else:
-        slices = [slice(i, i + 1) for i in range(n_blocks)]
         with ThreadPoolExecutor(workers) as pool:
-            parts = list(pool.map(slice_of, slices))
-    state, lane_state, output, frames = (
-        _separate(np.concatenate(arrays) if len(arrays) > 1 else arrays[0], count)
-        for arrays in zip(*parts, strict=True)
-    )
+            parts = list(pool.map(lambda row: part(row, row + 1), range(n_rows)))
+        arrays = [np.concatenate(values) for values in zip(*parts, strict=True)]
+    state, lane_state, output, frames = (array[:count] for array in arrays)
     return Result(
-        state=state.reshape(count, 9, layers).swapaxes(1, 2),
+        state=state.reshape((count, UNKNOWNS, layers)).swapaxes(1, 2),
         lane_state=lane_state,
-        output=output.reshape(count, len(table), 4),
-        frames=frames[:, : n_frames * layers * frame_width].reshape(
-            count, n_frames, layers, frame_width
-        ),
+        output=output.reshape((count, 0 if launching else n_steps, 4)),
+        frames=frames.reshape((count, n_frames, layers, frame_width)),
     )

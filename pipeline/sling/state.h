@@ -29,21 +29,29 @@ auto STATE = ROW(scratch, 9 * N * L);
 #define V2(k, i) FIELD(8, k, i)
 auto OUT = ROW(output, 4 * steps);
 auto FRAME = ROW(frames, frame_width * L * n_frames);
-auto KEPT = SAVE;
-#define KEEP(i, row, q) KEPT[((i) * SAVED + (row)) * SAVE_STRIDE + (q)]
+auto SAVE_ROWS = SAVE;
+#define KEEP(i, row, q) SAVE_ROWS[((i) * SAVED + (row)) * SAVE_STRIDE + (q)]
 
 #if defined(__CUDA_ARCH__)
 __shared__ __align__(16) SC rows[2 * TEAMS * (N + 1) * ROW_LENGTH];  // a layer's columns, for the whole team; two layers in turn
 #define SHARED(c, k) rows[(((i & 1) * TEAMS + team) * (N + 1) + (c)) * ROW_LENGTH + (k)]
 #define SHARE(U) if (member <= N) { UNROLL for (int k = 0; k < N; ++k) SHARED(member, k) = U[0][k]; } SYNC
+// the back substitution reads a layer ahead, so that it need not wait for the memory
+#define BEGIN_KEPT SC now[SAVED], ahead[SAVED]; UNROLL for (int r = 1; r < SAVED; ++r) ahead[r] = KEEP(L - 1, r, 0)
+#define NEXT_KEPT(i) UNROLL for (int r = 1; r < SAVED; ++r) { now[r] = ahead[r]; ahead[r] = KEEP(i ? i - 1 : 0, r, 0); }
+#define KEPT(i, row, q) now[row]
 #else
+#define BEGIN_KEPT
+#define NEXT_KEPT(i)
+#define KEPT(i, row, q) KEEP(i, row, q)
 #define SHARED(c, k) U[c][k]
 #define SHARE(U)
 #endif
 
 // lane state: 0-2 direction of the launch, 3 mass of the projectile, 4 failure (1 not converged, 2 slipped, -1: the
-// projectile has left), 5 its step, 6 leaving time, 7-8 leaving position and 9-10 velocity (y, z)
-auto LANE = ROW(lane_state, 11);
+// projectile has left), 5 its step, 6 leaving time, 7-8 leaving position and 9-10 velocity (y, z),
+// 11-13 force on the hand when it last held
+auto LANE = ROW(lane_state, 14);
 real direction[3], leaving[5], payload = LANE[3], failure = zero, failed_step = zero;
 UNROLL for (int c = 0; c < 3; ++c) direction[c] = LANE[c];
 UNROLL for (int c = 0; c < 5; ++c) leaving[c] = zero;

@@ -13,7 +13,8 @@ for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
   X1(k, i) = x; X2(k, i) = x; V1(k, i) = zero; V2(k, i) = zero; X(k, i) = x;
 }
 SYNC;
-real offset[3] = {zero, zero, zero}, pull = zero, contact_before = zero;  // of the hand; of the pouch
+real offset[3] = {zero, zero, zero}, pull = zero, held[3] = {zero, zero, zero};  // of the hand
+real contact_before = zero;  // of the pouch
 
 for (int step = 0; step < steps; ++step) {
   const SC* row = schedule.data + (size_t)step * 13;
@@ -141,19 +142,21 @@ for (int step = 0; step < steps; ++step) {
     real x[COLUMNS];
     for (int q = 0; q < COLUMNS; ++q) x[q] = zero;
     change = zero;
+    BEGIN_KEPT;
     for (int i = L - 1; i >= 0; --i) {
+      NEXT_KEPT(i);
       real z[COLUMNS];
       UNROLL for (int q = 0; q < COLUMNS; ++q) {
         if (COLUMNS > 1 && q == N) continue;
-        z[q] = KEEP(i, 2 * N, q);
-        if (i < L - 1) UNROLL for (int m = 0; m < N; ++m) z[q] -= KEEP(i, N + m, q) * AT_MEMBER(x, m);
+        z[q] = KEPT(i, 2 * N, q);
+        if (i < L - 1) UNROLL for (int m = 0; m < N; ++m) z[q] -= KEPT(i, N + m, q) * AT_MEMBER(x, m);
       }
       UNROLL for (int k = N - 1; k > 0; --k) {
         const real known = AT_MEMBER(z, k);
         UNROLL for (int q = 0; q < COLUMNS; ++q) {
           const int c = q + member;
-          if (COLUMNS == 1) z[q] -= (c < k ? KEEP(i, k, q) : zero) * known;
-          else if (c < k) z[q] -= KEEP(i, k, q) * known;
+          if (COLUMNS == 1) z[q] -= (c < k ? KEPT(i, k, q) : zero) * known;
+          else if (c < k) z[q] -= KEPT(i, k, q) * known;
         }
       }
       UNROLL for (int q = 0; q < COLUMNS; ++q) {
@@ -214,8 +217,8 @@ for (int step = 0; step < steps; ++step) {
   }
 
   // the projectile leaves at the first pull: contact = m (acceleration + gravity) along the launch direction
-  real contact = zero;
-  if (hold == 0 && payload_steps > 0) {
+  if (hold == 0 && launching) {
+    real contact = zero;
     real position[3], velocity[3];
     UNROLL for (int c = 0; c < 3; ++c) {
       const real v = (X(c, MID) - Y(c, MID)) * ibh, yv = c1 * V1(c, MID) - c2 * V2(c, MID);
@@ -234,9 +237,10 @@ for (int step = 0; step < steps; ++step) {
     failure = failure != zero ? failure : -leaves;  // done: -1 marks a finished launch
     contact_before = contact;
   }
-  if (member == 0) {
+  if (attached) UNROLL for (int c = 0; c < 3; ++c) held[c] = force[c];
+  if (member == 0 && !launching) {
     UNROLL for (int c = 0; c < 3; ++c) OUT[4 * step + c] = force[c];
-    OUT[4 * step + 3] = payload_steps > 0 ? contact : zero + (SC)iteration;
+    OUT[4 * step + 3] = zero + (SC)(iteration + 1);
   }
   SYNC;
 
@@ -251,11 +255,12 @@ for (int step = 0; step < steps; ++step) {
     X2(k, i) = relax ? now : X1(k, i); X1(k, i) = now;
     V2(k, i) = relax ? zero : V1(k, i); V1(k, i) = v;
   }
-  if (payload_steps > 0 && ALL(failure != zero)) break;
+  if (launching && ALL(failure != zero)) break;
 }
 
 for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) INITIAL[k * L + i] = X1(k, i);
 if (member == 0) {
   LANE[3] = payload; LANE[4] = failure; LANE[5] = failed_step;
   UNROLL for (int c = 0; c < 5; ++c) LANE[6 + c] = leaving[c];
+  UNROLL for (int c = 0; c < 3; ++c) LANE[11 + c] = held[c];
 }

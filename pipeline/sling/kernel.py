@@ -8,7 +8,7 @@ from pathlib import Path
 
 import warp as wp
 
-PARTS = ("lanes.h", "state.h", "rod.h", "step.h")
+PARTS = ("lanes.h", "state.h", "material.h", "rod.h", "step.h")
 UNKNOWNS = 9  # of a layer
 SAVED = 2 * UNKNOWNS + 1  # numbers of a column that the back substitution needs
 wp.config.log_level = wp.LOG_ERROR

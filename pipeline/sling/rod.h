@@ -1,20 +1,14 @@
 // The element: an extensible director rod.
 //
 // Layer i holds the node r_i and the directors a_i, b_i of the edge between r_i and r_i+1: 9 unknowns.
-// With g_i = (r_i+1 - r_i) / ds, the deformation gradient of an edge is F = [g a b], J = det F. Each edge
-// has its own rest length ds, a joint the length l between the middles of its edges, and
+// With g_i = (r_i+1 - r_i) / ds, the deformation gradient of an edge is F = [g a b], of the material of
+// material.h. Each edge has its own rest length ds, a joint the length l between the middles of its edges, and
 //
-//   W_edge  = A ds [ mu/2 (|F|^2 - 3) - mu (J - 1) + lam/2 (J - 1)^2 ]        (stable neo-Hookean)
 //   W_joint = mu A / (2 l) [ cb (|a+ - a-|^2 + |b+ - b-|^2) - 2 (cb - ct) tau^2 ]
 //   tau = (a+.b- - b+.a-)/2 (twist),  ct = R^2/4 (G I_p),  cb = (1 + nu) R^2/2 (E I)
 //
-// where -/+ are the edges on both sides of a node. Viscous stress is d times the rate of the elastic
-// (nominal) stress: the tangent of W at the predicted state, applied to the rates. Its shape part is
-// scaled by s, the volume part K J'^2 (K = lam - mu/3) is not, and the coefficient p = lam (J - 1) - mu
-// is bounded by mu / max(|g|, |a|, |b|), so that a slack band dissipates too:
-//
-//   D_edge = A ds d/2 [ K J'^2 + s ( mu |F'|^2 + p d2J(F', F') + mu/3 J'^2 ) ],  D_joint: d s/2 times
-//   the quadratic form of W_joint in the rates.
+// where -/+ are the edges on both sides of a node; it is damped by d s/2 times the same form in the rates, and
+// the twist is taken to first order about the predicted state.
 //
 // For step.h: what one layer adds to the Hessian and the residual (stage_layer), as columns (column).
 
@@ -68,52 +62,20 @@ auto stage_layer = [&](int i) {
       if (k == 0) { now = (X(q, i + 1) - now) * per_ds; predicted = (XP(q, i + 1) - predicted) * per_ds; y = (Y(q, i + 1) - y) * per_ds; }
       x[k][c] = now; xp[k][c] = predicted; xt[k][c] = (now - y) * ibh;
     }
-    real C[3][3], Cp[3][3], square = zero;  // cofactors; the longest column, squared
-    UNROLL for (int k = 0; k < 3; ++k) {
-      cross(x[(k + 1) % 3], x[(k + 2) % 3], C[k]); cross(xp[(k + 1) % 3], xp[(k + 2) % 3], Cp[k]);
-      square = maximum(square, dot(xp[k], xp[k]));
+    real stress[3][3], K[6][3][3];
+    material(x, xp, xt, stress, K);
+    UNROLL for (int c = 0; c < 3; ++c) {
+      f_next[c] = volume * stress[0][c] * per_ds; f[c] -= f_next[c];
+      f[3 + c] += volume * stress[1][c]; f[6 + c] += volume * stress[2][c];
     }
-    const real J = dot(x[0], C[0]), Jp = dot(xp[0], Cp[0]);
-    const real p = lam * (J - (SC)1) - mu;
-    const real pc = minimum(maximum(p, (SC)-1.5 * mu), (SC)0.25 * mu);
-    inexact = pc == p ? inexact : one;
-    // the same coefficient at the predicted state, bounded so that no rate gains energy
-    const real bound = mu / SQRT(maximum(square, zero + (SC)1e-6));
-    const real pv = minimum(maximum(lam * (Jp - (SC)1) - mu, -bound), bound);
-    const real Jt = dot(Cp[0], xt[0]) + dot(Cp[1], xt[1]) + dot(Cp[2], xt[2]);
-    const real volumetric = bulk + s * mu / (SC)3;
-    UNROLL for (int k = 0; k < 3; ++k) {
-      const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-      real u[3], v[3];  // d2J applied to the rates
-      cross(xt[k1], xp[k2], u); cross(xp[k1], xt[k2], v);
-      UNROLL for (int c = 0; c < 3; ++c) {
-        const real force = volume * (mu * x[k][c] + p * C[k][c]
-                           + d * (volumetric * Jt * Cp[k][c] + s * (mu * xt[k][c] + pv * (u[c] + v[c]))));
-        if (k == 0) { f[c] -= force * per_ds; f_next[c] = force * per_ds; } else f[3 * k + c] += force;
-      }
-    }
-    // Hessian in (g, a, b), lower blocks k >= l
-    UNROLL for (int k = 0; k < 3; ++k) UNROLL for (int l = 0; l <= k; ++l) {
-      real K[3][3];
-      UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n < 3; ++n)
-        K[m][n] = lam * C[k][m] * C[l][n] + dh * volumetric * Cp[k][m] * Cp[l][n];
-      if (k == l) {
-        UNROLL for (int m = 0; m < 3; ++m) K[m][m] += mu + dsh * mu;
-      } else {
-        const int o = 3 - k - l;                                  // the third column
-        const real sign = (l + 1) % 3 == k ? one : -one;          // by the order of the columns
-        real z[3];
-        UNROLL for (int c = 0; c < 3; ++c) z[c] = sign * (pc * x[o][c] + dsh * pv * xp[o][c]);
-        K[0][1] -= z[2]; K[0][2] += z[1]; K[1][0] += z[2]; K[1][2] -= z[0]; K[2][0] -= z[1]; K[2][1] += z[0];
-      }
+    UNROLL for (int k = 0; k < 3; ++k) UNROLL for (int l = 0; l <= k; ++l)
       UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n < 3; ++n) {
         if (k == l && n > m) continue;
-        const real v = volume * K[m][n];
+        const real v = volume * K[k * (k + 1) / 2 + l][m][n];
         if (k == 0) { PUT(STRETCH + LOWER(m, n)) = v * (per_ds * per_ds); own[LOWER(m, n)] += v * (per_ds * per_ds); }
         else if (l == 0) own[LOWER(3 * k + m, n)] = -v * per_ds;
         else own[LOWER(3 * k + m, 3 * l + n)] += v;
       }
-    }
     if (i == MID - 1 || i == MID) {  // what the hand feels of this edge
       const int side = i - MID + 1;
       UNROLL for (int c = 0; c < 3; ++c) HAND(27 * side + c) = f_next[c];

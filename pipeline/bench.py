@@ -59,7 +59,7 @@ def bench(params, device: str = "cpu") -> list[dict]:
         thetas = space.to_physical(unit)
         work: dict[str, Callable[[], object]] = {
             "rollouts_per_s": lambda t=thetas: interact(
-                sling, episode, t, device=device, workers=workers
+                sling, episode, t, device=device, workers=workers, fetch=False
             ),
             "rollouts_with_loss_per_s": lambda u=unit: evaluate(u),
             "launches_per_s": lambda t=thetas: launch(

@@ -46,7 +46,7 @@ class Chamfer:
         self._on_device = None
 
     def __call__(self, center_line: np.ndarray) -> np.ndarray:
-        """Distances [m], shape (N, K), of centre lines [m], shape (N, K, L, 3)."""
+        """Distances [m], shape (N, K), of centre lines [m], shape (N, K, L, 3), here or on a GPU."""
         import warp as wp
 
         from pipeline.identify.kernel import chamfer_kernel
@@ -57,7 +57,10 @@ class Chamfer:
         kernel = chamfer_kernel(nodes - 1, SAMPLES, self.symmetric, self._lanes)
         if self._on_device is None:
             self._on_device = [wp.array(array, device=self.device) for array in self._packed]
-        line = wp.array(np.ascontiguousarray(center_line, np.float32).ravel(), device=self.device)
+        if isinstance(center_line, np.ndarray):
+            center_line = np.ascontiguousarray(center_line, np.float32)
+            center_line = wp.array(center_line, device=self.device)
+        line = center_line.flatten()
         errors = wp.zeros(count * frames * 2, dtype=wp.float32, device=self.device)
         rest = self.rest_length
         if rest.ndim == 0:

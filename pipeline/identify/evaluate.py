@@ -6,6 +6,7 @@ import os
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -49,7 +50,7 @@ class Evaluator:
         *,
         device: str = "cpu",
         workers: int | None = None,
-        simulate=interact,
+        simulate=partial(interact, fetch=False),
     ) -> None:
         """Keep what every batch needs.
 
@@ -58,7 +59,7 @@ class Evaluator:
             simulate: Called as `simulate(sling, episode, thetas, device=device)`.
         """
         self.space, self.loss = space, loss
-        self._simulate = lambda thetas: simulate(sling, episode, thetas, device=device)
+        self._simulate = partial(simulate, sling, episode, device=device)
         on_gpu = device.startswith("cuda")
         self._slice = SLICE["cuda" if on_gpu else "cpu"]
         self._pool = ThreadPoolExecutor(1 if on_gpu else workers or os.cpu_count())

@@ -119,7 +119,9 @@ class EpisodeLoss:
 
         `taut` is NaN where the episode has no frame in the recoil.
         """
-        force = self._filter(rollouts.times) @ rollouts.force  # (T, S) @ (N, S, 3)
+        force = rollouts.force
+        force = force if isinstance(force, np.ndarray) else force.numpy()
+        force = self._filter(rollouts.times) @ force  # (T, S) @ (N, S, 3)
         gap = self.force - self._smooth(force)  # (N, T, 3)
         power = np.einsum("ntc,tc->nt", gap, self.velocity)
         frames = np.minimum(self.chamfer(rollouts.center_line), self.frame_cap)  # (N, K)

@@ -92,6 +92,7 @@ def interact(
     *,
     device: str = "cpu",
     workers: int = 1,
+    fetch: bool = True,
     refine: int = 1,
     double: bool = False,
 ) -> Rollouts:
@@ -99,6 +100,7 @@ def interact(
 
     Args:
         workers: Threads, on the CPU; results do not depend on their number.
+        fetch: Copy forces and centre lines from a GPU; else they stay there as Warp arrays.
         refine: How many times finer the steps are than `sling` says.
     """
     thetas = np.atleast_2d(thetas)
@@ -117,6 +119,7 @@ def interact(
         frame_steps=frame_steps,
         frame_weights=weights,
         device=device,
+        fetch=fetch,
         workers=workers,
         double=double,
     )

@@ -26,7 +26,7 @@ from pipeline.sling.interaction import interact
 from pipeline.sling.launch import launch
 from pipeline.sling.model import Sling
 
-BATCHES = {"cpu": (16, 64, 128), "cuda": (256, 1024, 4096)}
+BATCHES = {"cpu": (16, 64, 128), "cuda": (64, 1024, 16384)}
 DRAW = 0.35  # m
 GRASP, LIFTED, DRAWN, RELEASE = 1.0, 2.0, 6.0, 8.0  # s
 

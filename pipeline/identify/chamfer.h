@@ -22,7 +22,7 @@ auto least = [](float x) -> float { for (int o = 16; o > 0; o >>= 1) x = fminf(x
 #define LANES CPU_LANES
 #define SHARED
 #define SYNC()
-typedef float real __attribute__((vector_size(4 * LANES), aligned(4)));
+typedef float real __attribute__((vector_size(4 * LANES)));
 const int lane = 0;
 #define ROW(block, row) (*(const real*)(points.data + ((size_t)(block) * 4 + (row)) * LANES))
 #define ROOT(x) root(x)
@@ -79,26 +79,33 @@ const float measured = sum(total) / sum(count);
 float simulated = 0.0f;
 
 #if BOTH
-// simulated to measured: points on the ridge of the tube that faces the camera
-for (int k = 0; k < EDGES * SAMPLES; ++k) {
-  const float* t = tube[k / SAMPLES];
-  const float part = ((float)(k % SAMPLES) + 0.5f) / (float)SAMPLES;
-  float p[3], view[3], along = 0.0f, norm = 0.0f;
-  for (int c = 0; c < 3; ++c) {
-    p[c] = t[c] + part * t[3 + c];
-    view[c] = camera[c] - p[c];
-    along += view[c] * t[6 + c];
+// simulated to measured: points on the ridge of the tube that faces the camera, those of an edge at once
+for (int e = 0; e < EDGES; ++e) {
+  const float* t = tube[e];
+  float p[SAMPLES][3];
+  real nearest[SAMPLES];
+  for (int k = 0; k < SAMPLES; ++k) {
+    const float part = ((float)k + 0.5f) / (float)SAMPLES;
+    float view[3], along = 0.0f, norm = 0.0f;
+    for (int c = 0; c < 3; ++c) {
+      p[k][c] = t[c] + part * t[3 + c];
+      view[c] = camera[c] - p[k][c];
+      along += view[c] * t[6 + c];
+    }
+    for (int c = 0; c < 3; ++c) { view[c] -= along * t[3 + c]; norm += view[c] * view[c]; }
+    norm = t[9] / sqrtf(norm + 1e-12f);
+    for (int c = 0; c < 3; ++c) p[k][c] += norm * view[c];
+    nearest[k] = zero + 1e30f;
   }
-  for (int c = 0; c < 3; ++c) { view[c] -= along * t[3 + c]; norm += view[c] * view[c]; }
-  norm = t[9] / sqrtf(norm + 1e-12f);
-  for (int c = 0; c < 3; ++c) p[c] += norm * view[c];
-  real nearest = zero + 1e30f;
   for (int b = first; b < last; ++b) {
-    const real dx = ROW(b, 0) - p[0], dy = ROW(b, 1) - p[1], dz = ROW(b, 2) - p[2];
-    const real square = dx * dx + dy * dy + dz * dz;
-    nearest = square < nearest ? square : nearest;
+    const real x = ROW(b, 0), y = ROW(b, 1), z = ROW(b, 2);
+    for (int k = 0; k < SAMPLES; ++k) {
+      const real dx = x - p[k][0], dy = y - p[k][1], dz = z - p[k][2];
+      const real square = dx * dx + dy * dy + dz * dz;
+      nearest[k] = square < nearest[k] ? square : nearest[k];
+    }
   }
-  simulated += sqrtf(least(nearest)) * rest[k / SAMPLES];  // each for its share of the band
+  for (int k = 0; k < SAMPLES; ++k) simulated += sqrtf(least(nearest[k])) * rest[e];  // each for its share
 }
 simulated /= rest_length * (float)SAMPLES;
 #endif

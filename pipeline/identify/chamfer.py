@@ -46,10 +46,11 @@ class Chamfer:
         self._on_device = None
 
     def __call__(self, center_line: np.ndarray) -> np.ndarray:
-        """Distances [m], shape (N, K), of centre lines [m], shape (N, K, L, 3), here or on a GPU."""
+        """Distances [m], shape (N, K), of centre lines [m] on the CPU or `device`, (N, K, L, 3)."""
         import warp as wp
 
         from pipeline.identify.kernel import chamfer_kernel
+        from pipeline.native import launch
 
         count, frames, nodes, _ = center_line.shape
         if frames != self.frames:
@@ -65,22 +66,10 @@ class Chamfer:
         rest = self.rest_length
         if rest.ndim == 0:
             rest = np.full(nodes - 1, rest / (nodes - 1), np.float32)
-        threads = 32 if self._lanes == 32 else 1
-        wp.launch(
-            kernel,
-            dim=count * frames * threads,
-            inputs=[
-                line,
-                *self._on_device,
-                frames,
-                self.radius,
-                wp.array(rest, device=self.device),
-                wp.vec3(*self.camera),
-                errors,
-            ],
-            device=self.device,
-            block_dim=threads,
-        )
+        rest = wp.array(rest, device=self.device)
+        camera = wp.vec3(*self.camera)
+        inputs = [line, *self._on_device, frames, self.radius, rest, camera, errors]
+        launch(kernel, count * frames, inputs, self.device)
         both = errors.numpy().reshape(count, frames, 2).astype(float)
         return both.mean(axis=2) if self.symmetric else both[:, :, 0]
 

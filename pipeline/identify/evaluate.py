@@ -15,7 +15,9 @@ from pipeline.identify.loss import TERMS, EpisodeLoss
 from pipeline.identify.space import Space
 from pipeline.sling.interaction import interact
 
-SLICE = {"cpu": 16, "cuda": 2048}  # rollouts a call: the lanes of a CPU vector; what memory holds
+SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
+
+simulated = partial(interact, fetch=False)  # the loss is computed where the rollouts are
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Evaluator:
         *,
         device: str = "cpu",
         workers: int | None = None,
-        simulate=partial(interact, fetch=False),
+        simulate=simulated,
     ) -> None:
         """Keep what every batch needs.
 
@@ -63,7 +65,6 @@ class Evaluator:
         on_gpu = device.startswith("cuda")
         self._slice = SLICE["cuda" if on_gpu else "cpu"]
         self._pool = ThreadPoolExecutor(1 if on_gpu else workers or os.cpu_count())
-        self._compiled = False
 
     def __call__(self, unit: np.ndarray) -> Evaluation:
         """Evaluate points of the unit cube, shape (N, D)."""
@@ -71,11 +72,7 @@ class Evaluator:
         unit = np.array(unit, float)
         theta = self.space.to_physical(unit)
         slices = [theta[i : i + self._slice] for i in range(0, len(theta), self._slice)]
-        parts = []
-        if not self._compiled:  # kernels are compiled and loaded once, not by two threads at a time
-            parts, slices = [self._evaluate(slices[0])], slices[1:]
-            self._compiled = True
-        parts += self._pool.map(self._evaluate, slices)
+        parts = list(self._pool.map(self._evaluate, slices))
         terms = {name: np.concatenate([part[0][name] for part in parts]) for name in TERMS}
         failure = [reason for part in parts for reason in part[1]]
         failed = np.array([reason is not None for reason in failure])

@@ -16,6 +16,7 @@ import threading
 
 import numpy as np
 from scipy.ndimage import median_filter
+from scipy.sparse import csr_array
 
 from pipeline.episode import Episode
 from pipeline.errors import UserError
@@ -82,7 +83,7 @@ class EpisodeLoss:
                 f"episode of {episode.band}: no camera frame between the release and the fork"
                 " plane; choose a method whose weights.taut is 0"
             )
-        self._cached: tuple[np.ndarray, np.ndarray] | None = None
+        self._cached: tuple[np.ndarray, csr_array] | None = None
         self._lock = threading.Lock()
 
     @classmethod
@@ -121,7 +122,9 @@ class EpisodeLoss:
         """
         force = rollouts.force
         force = force if isinstance(force, np.ndarray) else force.numpy()
-        force = self._filter(rollouts.times) @ force  # (T, S) @ (N, S, 3)
+        force = force.transpose(1, 0, 2)  # (S, N, 3)
+        force = self._filter(rollouts.times) @ force.reshape(len(force), -1)
+        force = force.reshape(len(force), -1, 3).transpose(1, 0, 2)  # (N, T, 3)
         gap = self.force - self._smooth(force)  # (N, T, 3)
         power = np.einsum("ntc,tc->nt", gap, self.velocity)
         frames = np.minimum(self.chamfer(rollouts.center_line), self.frame_cap)  # (N, K)
@@ -142,10 +145,11 @@ class EpisodeLoss:
         window = (1,) * (signal.ndim - 2) + (self.median_window, 1)
         return median_filter(signal, size=window, mode="nearest")
 
-    def _filter(self, times: np.ndarray) -> np.ndarray:
+    def _filter(self, times: np.ndarray) -> csr_array:
         """Matrix (T, S) from forces at simulated times (S,) to the episode's filtered samples.
 
-        It is the recorded force's way (interpolation, low-pass, averages), which is linear.
+        It is the recorded force's way (interpolation, low-pass, averages), which is linear, and
+        forgets: weights that no rounding would show are left out.
         """
         with self._lock:
             if self._cached is None or not np.array_equal(self._cached[0], times):
@@ -156,7 +160,8 @@ class EpisodeLoss:
                     grid, signal = uniform(times, pulses, RATE)
                     signal = lowpass(signal, RATE, self.cutoff)
                     columns.append(average(grid, signal, start, self.period, len(self.time)))
-                self._cached = times, np.hstack(columns)
+                weights = np.hstack(columns)
+                self._cached = times, csr_array(np.where(np.abs(weights) > 1e-18, weights, 0))
             return self._cached[1]
 
 

@@ -3,32 +3,31 @@
 (Warp reads annotations: no postponed ones here.)
 """
 
-from functools import lru_cache
 from pathlib import Path
 
 import warp as wp
 
+from pipeline.native import built_once, text_of
+
 PARTS = ("lanes.h", "state.h", "material.h", "rod.h", "step.h")
 UNKNOWNS = 9  # of a layer
 SAVED = 2 * UNKNOWNS + 1  # numbers of a column that the back substitution needs
-wp.config.log_level = wp.LOG_ERROR
-wp.config.enable_backward = False
 
 
-@lru_cache
+@built_once
 def rod_kernel(layers: int, middle: int, double: bool, lanes: int, team: int):
     """Compile the native text for a mesh; Warp keeps the binary in its cache."""
     scalar = wp.float64 if double else wp.float32
     array, indices = wp.array(dtype=scalar), wp.array(dtype=wp.int32)
-    macros = {
-        "SC": "double" if double else "float", "W": lanes, "T": team, "N": UNKNOWNS,
-        "L": layers, "MID": middle,
-    }  # fmt: skip
-    text = "\n" + "".join(f"#define {name} {value}\n" for name, value in macros.items())
-    text += "".join(Path(__file__).with_name(part).read_text(encoding="utf-8") for part in PARTS)
-    lines = [line.split() for line in text.splitlines() if line.startswith("#define")]
-    defined = {words[1].partition("(")[0] for words in lines}
-    text += "\n" + "".join(f"#undef {name}\n" for name in sorted(defined))
+    text = text_of(
+        *(Path(__file__).with_name(part) for part in PARTS),
+        SC="double" if double else "float",
+        W=lanes,
+        T=team,
+        N=UNKNOWNS,
+        L=layers,
+        MID=middle,
+    )
 
     @wp.func_native(text)
     def rod(
@@ -53,7 +52,7 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int, team: int):
         launching: int,
     ): ...
 
-    # approximate reciprocals do for Newton's method; on the CPU the option would drop checks for NaN
+    # approximate reciprocals do for Newton's method; on the CPU it would drop the checks for NaN
     @wp.kernel(module="unique", module_options={"fast_math": team > 1})
     def run(
         geometry: array,

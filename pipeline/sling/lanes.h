@@ -31,7 +31,7 @@ auto team_maximum = [&](real x) -> real {
   return x;
 };
 #else
-typedef SC real __attribute__((vector_size(sizeof(SC) * W), aligned(sizeof(SC))));
+typedef SC real __attribute__((vector_size(sizeof(SC) * W)));
 #define COLUMNS (N + 1)
 const int sling = tid, member = 0;
 #define ROW(array, size) ((real*)array.data + (size_t)sling * (size))

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from threading import Lock
 
 import numpy as np
 
 from pipeline.sling.model import GRAVITY, Sling, fixed_frames
 
-_compiling = Lock()
 LANES, TEAM = 16, 10  # slings in a CPU thread's SIMD lanes; GPU threads that share a sling
 NOT_CONVERGED, SLIPPED, LEFT = 1, 2, -1  # lane_state[4] as state.h says
 DIRECTION, PAYLOAD, FAILURE, LEAVING, HELD_FORCE = slice(0, 3), 3, 4, slice(6, 11), slice(11, 14)
@@ -140,6 +138,7 @@ def run(
     """
     import warp as wp
 
+    from pipeline.native import launch
     from pipeline.sling.kernel import SAVED, UNKNOWNS, rod_kernel
 
     if lane_state.shape != (len(parameters), LANE_STATE):
@@ -152,8 +151,6 @@ def run(
         len(parameters), sling.layers, len(schedule.table), len(frame_steps),
     )  # fmt: skip
     kernel = rod_kernel(layers, sling.middle, double, lanes, team)
-    with _compiling:
-        kernel.module.load(wp.get_device(device))
 
     geometry = [
         sling.rest_length / sling.edges, sling.area, sling.radius**2,
@@ -194,16 +191,11 @@ def run(
         scratch = empty(size, 9 * UNKNOWNS * layers, lanes)
         saved = empty(size // together, layers * SAVED, 32 if on_gpu else (UNKNOWNS + 1) * lanes)
         output, frames = empty(size, widths["output"], lanes), empty(size, widths["frames"], lanes)
-        wp.launch(
-            kernel,
-            dim=size // together * (32 if on_gpu else 1),
-            inputs=[
-                *common, parameter, state, scratch, saved, lane, output, frames, *stamps,
-                n_frames, frame_width, n_steps, schedule.first_free, int(launching),
-            ],
-            device=device,
-            block_dim=32,
-        )  # fmt: skip
+        inputs = [
+            *common, parameter, state, scratch, saved, lane, output, frames, *stamps,
+            n_frames, frame_width, n_steps, schedule.first_free, int(launching),
+        ]  # fmt: skip
+        launch(kernel, size // together, inputs, device)
         arrays = dict(zip(widths, (state, lane, output, frames), strict=True))
         stays = () if fetch or not on_gpu else ("output", "frames")
         return [

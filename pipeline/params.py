@@ -122,8 +122,10 @@ class Cloud(Section):
 
 
 class Sling(Section):
+    mesh: Literal["rod", "tetrahedra"]
     edges: Annotated[int, Range(4, 400)]
     grading: Annotated[float, Range(1, 20)]
+    tet_edges: Annotated[int, Range(4, 400)]
     grip_step: Step
     recoil_step: Step
     recoil_time: Annotated[float, Range(1e-3, 10)]
@@ -132,9 +134,10 @@ class Sling(Section):
     launch_time: Annotated[float, Range(0.01, 10)]
 
     @model_validator(mode="after")
-    def _middle_is_a_node(self) -> Sling:
-        if self.edges % 2:
-            raise refusal("edges must be even: the hand holds the middle node")
+    def _middle_is_a_layer(self) -> Sling:
+        for name in ("edges", "tet_edges"):
+            if getattr(self, name) % 2:
+                raise refusal(f"{name} must be even: the hand holds the middle")
         return self
 
 

@@ -1,4 +1,4 @@
-"""The native text of the simulator as a Warp kernel, one for each mesh.
+"""The native text of the simulator as a Warp kernel, one for each element and mesh.
 
 (Warp reads annotations: no postponed ones here.)
 """
@@ -8,32 +8,34 @@ from pathlib import Path
 import warp as wp
 
 from pipeline.native import built_once, text_of
-
-PARTS = ("lanes.h", "state.h", "material.h", "rod.h", "step.h")
-UNKNOWNS = 9  # of a layer
-SAVED = 2 * UNKNOWNS + 1  # numbers of a column that the back substitution needs
+from pipeline.sling.tetrahedra import CORNERS
 
 
 @built_once
-def rod_kernel(layers: int, middle: int, double: bool, lanes: int, team: int):
+def sling_kernel(
+    element: str, unknowns: int, layers: int, middle: int, double: bool, lanes: int, team: int
+):
     """Compile the native text for a mesh; Warp keeps the binary in its cache."""
     scalar = wp.float64 if double else wp.float32
     array, indices = wp.array(dtype=scalar), wp.array(dtype=wp.int32)
+    parts = ("lanes.h", "state.h", "material.h", f"{element}.h", "step.h")
+    tetrahedra = {} if element == "rod" else {"TETS": len(CORNERS), "CORNERS": _braced(CORNERS)}
     text = text_of(
-        *(Path(__file__).with_name(part) for part in PARTS),
+        *(Path(__file__).with_name(part) for part in parts),
         SC="double" if double else "float",
         W=lanes,
         T=team,
-        N=UNKNOWNS,
+        N=unknowns,
         L=layers,
         MID=middle,
+        **tetrahedra,
     )
 
     @wp.func_native(text)
-    def rod(
+    def sling(
         tid: int,
         geometry: array,
-        lengths: array,
+        mesh: array,
         clamp: array,
         schedule: array,
         parameter: array,
@@ -56,7 +58,7 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int, team: int):
     @wp.kernel(module="unique", module_options={"fast_math": team > 1})
     def run(
         geometry: array,
-        lengths: array,
+        mesh: array,
         clamp: array,
         schedule: array,
         parameter: array,
@@ -74,10 +76,15 @@ def rod_kernel(layers: int, middle: int, double: bool, lanes: int, team: int):
         first_free: int,
         launching: int,
     ):
-        rod(
-            wp.tid(), geometry, lengths, clamp, schedule, parameter, state, scratch, work,
+        sling(
+            wp.tid(), geometry, mesh, clamp, schedule, parameter, state, scratch, work,
             lane_state, output, frames, frame_first, frame_weight, n_frames, frame_width, steps,
             first_free, launching,
         )  # fmt: skip
 
     return run
+
+
+def _braced(table) -> str:
+    """A table of integers as C writes it."""
+    return str(table.tolist()).translate(str.maketrans("[]", "{}"))

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import UserError
+from pipeline.sling import tetrahedra
 
 GRAVITY = 9.81
+ROD, TETRAHEDRA = "rod", "tetrahedra"  # meshes: rod.h, tetrahedra.h
 THETA = (
     "youngs_modulus",
     "poissons_ratio",
@@ -26,18 +28,21 @@ class Sling:
     """Geometry and mass of a clamped band, and the resolution it is simulated with.
 
     Attributes:
-        edges: Even number of edges of the rod; the hand holds the node in the middle.
+        edges: Even number of edges along the band; the hand holds the layer in the middle.
         rest_length, radius, mass: Of the band between the clamps [m, m, kg].
         half_width: Half the distance of the fork's tips [m].
         fork_height: Of the tips above the floor [m].
         clamp_direction: Unit vector along which the band leaves the tip at -x, shape (3,); it
             leaves the other tip along the mirror image.
         flexural_rigidity: E I of the band where it was measured [N m^2], one or one a theta; None
-            takes a solid round band's, which follows Young's modulus.
+            takes a solid round band's, which follows Young's modulus. Tetrahedra are solid and
+            round: they bend as their mesh does, whatever was measured.
         projectile_mass, grip_force, finger_opening_time: As in params.yaml `setup` [kg, N, s].
         steps: The step sizes and the mesh's grading, as in params.yaml `sling`.
         clamped: Whether the first and the last end are held; experiments on a free band let go.
         clamp_twist: Of the last clamp about the band, against the first [rad].
+        mesh: ROD, or TETRAHEDRA: a solid cylinder, whose edges are equally long. What of the band
+            is inside the clamps does not deform there, so that the mesh ends at them.
     """
 
     edges: int
@@ -54,6 +59,7 @@ class Sling:
     steps: object
     clamped: tuple[bool, bool] = (True, True)
     clamp_twist: float = 0.0
+    mesh: str = ROD
 
     @classmethod
     def of(cls, band, setup, resolution, mounting: dict | None = None) -> Sling:
@@ -67,7 +73,7 @@ class Sling:
         mounting = mounting or {}
         direction = np.asarray(mounting.get("clamp_direction", setup.clamp_direction), float)
         return cls(
-            edges=resolution.edges,
+            edges=resolution.edges if resolution.mesh == ROD else resolution.tet_edges,
             rest_length=band.rest_length,
             radius=band.diameter / 2,
             mass=band.mass,
@@ -79,6 +85,7 @@ class Sling:
             grip_force=setup.grip_force,
             finger_opening_time=setup.finger_opening_time,
             steps=resolution,
+            mesh=resolution.mesh,
         )
 
     @property
@@ -90,12 +97,19 @@ class Sling:
         return self.edges // 2
 
     @property
+    def unknowns(self) -> int:
+        """Of a layer: a node and two directors, or the places of a section's vertices."""
+        return 9 if self.mesh == ROD else tetrahedra.UNKNOWNS
+
+    @property
     def edge_lengths(self) -> np.ndarray:
         """Rest length of each edge [m], shape (edges,).
 
         A taut band turns within sqrt(E I / tension), a few millimetres, at the clamps and in the
-        hand: there the edges are `grading` times shorter than midway between them.
+        hand: there the rod's edges are `grading` times shorter than midway between them.
         """
+        if self.mesh == TETRAHEDRA:
+            return np.full(self.edges, self.rest_length / self.edges)
         place = (np.arange(self.middle) + 0.5) / self.middle
         half = 1 + (self.steps.grading - 1) * np.sin(np.pi * place) ** 2
         sizes = np.concatenate([half, half])
@@ -142,7 +156,7 @@ def load_sling(params, band: str, root: str | Path = ".") -> Sling:
 
 
 def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
-    """Parameters of rod.h for physical thetas (N, 5): mu, lam, d, s, 2 friction, cb; (N, 6).
+    """What state.h takes for physical thetas (N, 5): mu, lam, d, s, 2 friction, cb; (N, 6).
 
     mu is the shear modulus and lam the volume modulus of the stable neo-Hookean law without its
     logarithm (Smith, de Goes, Kim 2018): first Lame parameter plus mu, so that E and nu are the
@@ -192,23 +206,26 @@ def fixed_frames(sling: Sling) -> np.ndarray:
 
 
 def layers_of(sling: Sling, nodes: np.ndarray) -> np.ndarray:
-    """Unknowns (..., L, 9) of bands through `nodes` (..., L, 3): stretched edges thin evenly."""
+    """Unknowns (..., L, unknowns) of bands through `nodes` (..., L, 3), thin where stretched."""
     frames, tangents = fixed_frames(sling), clamp_tangents(sling)
-    state = np.zeros((*nodes.shape[:-1], 9))
-    state[..., :3] = nodes
+    directors = np.zeros((*nodes.shape[:-2], sling.layers + 1, 2, 3))  # of edges and both clamps
     edges = np.diff(nodes, axis=-2)
     length = np.linalg.norm(edges, axis=-1, keepdims=True)
     direction, thin = edges / length, (length / sling.edge_lengths[:, None]) ** -0.5
     for end, half in enumerate((slice(None, sling.middle), slice(sling.middle, sling.edges))):
         a = _transport(frames[end, 0], tangents[end], direction[..., half, :])
-        state[..., half, 3:6] = thin[..., half, :] * a
-        state[..., half, 6:9] = thin[..., half, :] * np.cross(direction[..., half, :], a)
-    state[..., -1, 3:9] = frames[1].ravel()
-    return state
+        pair = np.stack([a, np.cross(direction[..., half, :], a)], axis=-2)
+        directors[..., 1:-1, :, :][..., half, :, :] = thin[..., half, :, None] * pair
+    directors[..., 0, :, :], directors[..., -1, :, :] = frames[:2]
+    if sling.mesh == TETRAHEDRA:
+        between = (directors[..., 1:, :, :] + directors[..., :-1, :, :]) / 2
+        between[..., [0, -1], :, :] = frames[:2]
+        return tetrahedra.layers(nodes, between[..., 0, :], between[..., 1, :], sling.radius)
+    return np.concatenate([nodes, directors[..., 1:, :, :].reshape(*nodes.shape[:-1], 6)], axis=-1)
 
 
 def hanging_guess(sling: Sling) -> np.ndarray:
-    """A U below the tips: two legs and a half circle, shape (layers, 9)."""
+    """A U below the tips: two legs and a half circle, shape (layers, unknowns)."""
     half, length = sling.half_width, sling.rest_length
     leg = max((length - np.pi * half) / 2, 0.0)
     arc = sling.arc
@@ -221,7 +238,7 @@ def hanging_guess(sling: Sling) -> np.ndarray:
 
 
 def drawn_guess(sling: Sling, draws: np.ndarray) -> np.ndarray:
-    """Two straight halves from the tips to each draw (N, 2), shape (N, layers, 9)."""
+    """Two straight halves from the tips to each draw (N, 2), shape (N, layers, unknowns)."""
     middle = np.column_stack([np.zeros(len(draws)), draws])[:, None]
     part = (sling.arc / sling.arc[sling.middle])[: sling.middle + 1, None]
     first = sling.tips[0] + part * (middle - sling.tips[0])

@@ -10,7 +10,13 @@
 // where -/+ are the edges on both sides of a node; it is damped by d s/2 times the same form in the rates, and
 // the twist is taken to first order about the predicted state.
 //
-// For step.h: what one layer adds to the Hessian and the residual (stage_layer), as columns (column).
+// For step.h: what one layer adds to the Hessian and the residual (stage_layer), as columns (column), and what
+// else depends on the element: which unknowns are places (the first ones), their masses, and the hand's hold.
+
+const int PLACES = 3;  // of the node; the other unknowns are directors
+const real balance = (SC)3e-2 * node_mass * gravity + (SC)1e-5 * mu * area;  // N; what is less counts for nothing
+auto share = [](int) -> SC { return 1; };             // of a place in the layer's mass
+auto in_hand = [](int) -> SC { return 0; };           // a place from the hand's, while it is held
 
 // a staged layer: its own block (lower triangle), stretch between nodes, gradient of the twist on both sides of
 // the joint, coefficients of bending and twist, residual of this layer and of the next
@@ -39,6 +45,19 @@ auto mass_of = [&](int i, int m) -> real {
   const SC before = i ? edge[i - 1] : (SC)0, after = i < L - 1 ? edge[i] : (SC)0;
   const SC length = m < 3 ? (SC)0.5 * (before + after) : (i < L - 1 ? after : before) * radius2 / 4;
   return zero + line_mass * length + (i == MID && m < 3 ? payload : zero);
+};
+// of the hand on the node that it leads, after Newton's change times `scale`, to first order
+auto hand_force = [&](int c, real scale) -> real {
+  real force = mass_of(MID, c) * ibh2 * (X(c, MID) - XH(c, MID));
+  UNROLL for (int side = 0; side < 2; ++side) {
+    const int e = MID - 1 + side;
+    real after = zero;
+    UNROLL for (int n = 0; n < 3; ++n) after += HAND(27 * side + 3 + LOWER(c, n)) * (DX(n, e + 1) - DX(n, e));
+    UNROLL for (int n = 0; n < 6; ++n) after -= HAND(27 * side + 9 + 3 * n + c) * DX(3 + n, e);
+    after = HAND(27 * side + c) - scale * after;
+    force += side ? -after : after;
+  }
+  return force;
 };
 
 auto stage_layer = [&](int i) {

@@ -1,4 +1,4 @@
-"""Runs rod.h through Warp: builds the kernel for a mesh, lays out the lanes, steps a schedule."""
+"""Runs the native text through Warp: the kernel for a mesh, lanes in rows, steps of a schedule."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.sling.model import GRAVITY, Sling, fixed_frames
+from pipeline.errors import UserError
+from pipeline.sling import tetrahedra
+from pipeline.sling.model import GRAVITY, TETRAHEDRA, Sling, fixed_frames
 
 LANES, TEAM = 16, 10  # slings in a CPU thread's SIMD lanes; GPU threads that share a sling
 NOT_CONVERGED, SLIPPED, LEFT = 1, 2, -1  # lane_state[4] as state.h says
@@ -90,7 +92,7 @@ class Result:
     """Of N slings through S steps, K frames recorded.
 
     Attributes:
-        state: At the end, shape (N, layers, 9).
+        state: At the end, shape (N, layers, unknowns).
         lane_state: As documented in state.h, shape (N, LANE_STATE).
         output: Force on the hand and Newton iterations of each step, shape (N, S, 4); empty for
             launches.
@@ -127,52 +129,60 @@ def run(
 
     Args:
         parameters: As `model.material` gives them, shape (N, 6).
-        state: Initial layers, shape (N, layers, 9) or (layers, 9).
+        state: Initial layers, shape (N, layers, unknowns) or (layers, unknowns).
         lane_state: As documented in state.h, shape (N, LANE_STATE).
         frame_steps, frame_weights: Step in which each frame falls and its place in it, shape (K,).
-        frame_width: 3 for centre lines, 9 for all unknowns of each layer.
+        frame_width: 3 for centre lines, `sling.unknowns` for all of each layer.
         launching: The projectile (lane_state[:, PAYLOAD]) is followed until it leaves.
         fetch: Copy what is long from a GPU.
         workers: Threads, on the CPU; a result does not depend on their number.
         tolerance: Newton's change that is small enough [m].
+
+    Raises:
+        UserError: Tetrahedra on a GPU.
     """
     import warp as wp
 
     from pipeline.native import launch
-    from pipeline.sling.kernel import SAVED, UNKNOWNS, rod_kernel
+    from pipeline.sling.kernel import sling_kernel
 
     if lane_state.shape != (len(parameters), LANE_STATE):
         raise ValueError(f"lane_state: {lane_state.shape} is not ({len(parameters)}, {LANE_STATE})")
     on_gpu = device.startswith("cuda")
+    if on_gpu and sling.mesh == TETRAHEDRA:
+        raise UserError("sling.mesh: tetrahedra run on the CPU alone; on a GPU take the rod")
     dtype, scalar = (np.float64, wp.float64) if double else (np.float32, wp.float32)
     lanes, team = (1, TEAM) if on_gpu else (LANES // (2 if double else 1), 1)
     together = 32 // team if on_gpu else 1  # rows of slings that one thread (one warp) steps
-    count, layers, n_steps, n_frames = (
-        len(parameters), sling.layers, len(schedule.table), len(frame_steps),
-    )  # fmt: skip
-    kernel = rod_kernel(layers, sling.middle, double, lanes, team)
+    layers, unknowns = sling.layers, sling.unknowns
+    count, n_steps, n_frames = len(parameters), len(schedule.table), len(frame_steps)
+    kernel = sling_kernel(sling.mesh, unknowns, layers, sling.middle, double, lanes, team)
 
+    mesh, shortest = sling.edge_lengths, sling.edge_lengths.min()
+    if sling.mesh == TETRAHEDRA:
+        mesh = np.concatenate([mesh, tetrahedra.table(sling.radius)])
+        shortest = min(shortest, sling.radius)
     geometry = [
         sling.rest_length / sling.edges, sling.area, sling.radius**2,
         sling.mass / sling.rest_length, gravity, tolerance, 0.004, max_iterations,
-        *sling.clamped, sling.edge_lengths.min(),
+        *sling.clamped, shortest,
     ]  # fmt: skip
     first = np.searchsorted(frame_steps, np.arange(n_steps + 1)).astype(np.int32)
     common = [
         wp.array(np.ravel(values).astype(dtype), device=device)
-        for values in (geometry, sling.edge_lengths, fixed_frames(sling), schedule.table)
+        for values in (geometry, mesh, fixed_frames(sling), schedule.table)
     ]
     stamps = [
         wp.array(first, device=device),
         wp.array(np.append(frame_weights, 0.0).astype(dtype), device=device),
     ]
-    state = np.broadcast_to(state, (count, layers, UNKNOWNS)).swapaxes(1, 2).reshape(count, -1)
+    state = np.broadcast_to(state, (count, layers, unknowns)).swapaxes(1, 2).reshape(count, -1)
     rows = [
         _interleave(values, lanes, together, dtype) for values in (parameters, state, lane_state)
     ]
 
     widths = {
-        "state": UNKNOWNS * layers,
+        "state": unknowns * layers,
         "lane_state": LANE_STATE,
         "output": 0 if launching else 4 * n_steps,
         "frames": n_frames * layers * frame_width,
@@ -188,8 +198,9 @@ def run(
         parameter, state, lane = (
             wp.array(values[begin:end].ravel(), device=device) for values in rows
         )
-        scratch = empty(size, 9 * UNKNOWNS * layers, lanes)
-        saved = empty(size // together, layers * SAVED, 32 if on_gpu else (UNKNOWNS + 1) * lanes)
+        scratch = empty(size, 9 * unknowns * layers, lanes)
+        columns = 32 if on_gpu else (unknowns + 1) * lanes
+        saved = empty(size // together, layers * (2 * unknowns + 1), columns)
         output, frames = empty(size, widths["output"], lanes), empty(size, widths["frames"], lanes)
         inputs = [
             *common, parameter, state, scratch, saved, lane, output, frames, *stamps,
@@ -214,7 +225,7 @@ def run(
         arrays = [np.concatenate(values) for values in zip(*parts, strict=True)]
     state, lane_state, output, frames = (array[:count] for array in arrays)
     return Result(
-        state=state.reshape((count, UNKNOWNS, layers)).swapaxes(1, 2),
+        state=state.reshape((count, unknowns, layers)).swapaxes(1, 2),
         lane_state=lane_state,
         output=output.reshape((count, 0 if launching else n_steps, 4)),
         frames=frames.reshape((count, n_frames, layers, frame_width)),

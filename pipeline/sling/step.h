@@ -6,14 +6,24 @@
 // (backward Euler: beta = c1 = 1, c2 = 0; variable-step BDF2 otherwise) by Newton's method on the
 // block-tridiagonal Hessian with a direct LDL' solve; where it is indefinite, its diagonal is shifted.
 
+#if N > 9  // unrolled, it would take minutes to compile
+#undef UNROLL
+#define UNROLL
+#endif
+
 const SC close = sqrt(0.25 * tolerance * shortest_edge);  // from here on Newton's next change is below the tolerance
-const real balance = (SC)3e-2 * node_mass * gravity + (SC)1e-5 * mu * area;  // N
 for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
   const real x = INITIAL[k * L + i];
   X1(k, i) = x; X2(k, i) = x; V1(k, i) = zero; V2(k, i) = zero; X(k, i) = x;
 }
 SYNC;
-real offset[3] = {zero, zero, zero}, pull = zero, held[3] = {zero, zero, zero};  // of the hand
+real offset[PLACES], pull = zero, held[3] = {zero, zero, zero};  // of the hand
+UNROLL for (int m = 0; m < PLACES; ++m) offset[m] = zero;
+auto middle = [&](const real* unknowns, int c) -> real {  // of the held layer: the mean of its places
+  real mean = share(0) * unknowns[c * L];
+  UNROLL for (int m = 3; m < PLACES; m += 3) mean += share(m) * unknowns[(m + c) * L];
+  return mean;
+};
 real contact_before = zero;  // of the pouch
 
 for (int step = 0; step < steps; ++step) {
@@ -29,10 +39,11 @@ for (int step = 0; step < steps; ++step) {
   // the hand takes hold of the band where it is, and leads it to its own path
   const bool was_attached = attached;
   attached = hold == 1 || hold == 3; gripped = hold == 1;
-  real target[3];
-  UNROLL for (int c = 0; c < 3; ++c) {
-    if (attached && !was_attached) offset[c] = X1(c, MID) - row[6 + c];
-    target[c] = zero + row[6 + c] + blend * offset[c];
+  real target[PLACES];
+  UNROLL for (int m = 0; m < PLACES; ++m) {
+    const SC place = row[6 + m % 3] + in_hand(m);
+    if (attached && !was_attached) offset[m] = X1(m, MID) - place;
+    target[m] = zero + place + blend * offset[m];
   }
   // what the pads can hold: all of it while they are closed, then less and less of the pull at the release
   const real capacity = hold == 2 ? maximum(pull - limit * friction, zero) : limit * friction;
@@ -40,10 +51,10 @@ for (int step = 0; step < steps; ++step) {
   // predicted state, and what the step starts from
   for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
     const real x1 = X1(k, i), v1 = V1(k, i), y = c1 * x1 - c2 * X2(k, i);
-    const bool led = k < 3 && i == MID && attached;
-    const real x = led ? target[k < 3 ? k : 0] : x1 + h * v1;
+    const bool led = k < PLACES && i == MID && attached;
+    const real x = led ? target[k < PLACES ? k : 0] : x1 + h * v1;
     X(k, i) = x; XP(k, i) = x; Y(k, i) = y;
-    XH(k, i) = y + bh * (c1 * v1 - c2 * V2(k, i)) - (k == 2 ? gravity * bh * bh : (SC)0);
+    XH(k, i) = y + bh * (c1 * v1 - c2 * V2(k, i)) - (k < PLACES && k % 3 == 2 ? gravity * bh * bh : (SC)0);
   }
   SYNC;
 
@@ -72,11 +83,11 @@ for (int step = 0; step < steps; ++step) {
             const real f = U[q][m] + raw[m];
             raw[m] = carry[q][m];
             if (moves(i, m)) {
-              imbalance = maximum(imbalance, magnitude(f) / (m < 3 ? (SC)1 : mean_edge)); poison += f * zero;
+              imbalance = maximum(imbalance, magnitude(f) / (m < PLACES ? (SC)1 : mean_edge)); poison += f * zero;
             }
             U[q][m] += next[q][m];
             // open pads hold the band back with what friction they have left
-            if (i == MID && hold == 2 && m < 3) U[q][m] += capacity * direction[m < 3 ? m : 0];
+            if (i == MID && hold == 2 && m < PLACES) U[q][m] += share(m) * capacity * direction[m % 3];
           }
         } else {
           UNROLL for (int m = FIRST_ROW(c); m < N; ++m) D[q][m] += next[q][m];
@@ -165,7 +176,7 @@ for (int step = 0; step < steps; ++step) {
         if (c < N) {
           DX(c, i) = x[q];
           poison += x[q] * zero;
-          change = maximum(change, magnitude(x[q]) * (c < 3 ? (SC)1 : mean_edge));  // a director counts as a turn of its edge
+          change = maximum(change, magnitude(x[q]) * (c < PLACES ? (SC)1 : mean_edge));  // a director counts as a turn of its edge
         }
       }
     }
@@ -180,17 +191,8 @@ for (int step = 0; step < steps; ++step) {
     shift = refused > zero ? maximum((SC)4 * shift, zero + (SC)0.25) : (shift < zero + (SC)0.05 ? zero : (SC)0.5 * shift);
     // lanes that have settled stay as they are, so that a lane never depends on its neighbours
     const real scale = (one - settled) * (one - refused) * minimum(one, step_limit / maximum(change, zero + (SC)1e-12));
-    // the force of the hand on the node it leads, after this step, to first order: it has no unknowns of its own
     if (attached) UNROLL for (int c = 0; c < 3; ++c) {
-      real force = mass_of(MID, c) * ibh2 * (X(c, MID) - XH(c, MID));
-      UNROLL for (int side = 0; side < 2; ++side) {
-        const int e = MID - 1 + side;
-        real after = zero;
-        UNROLL for (int n = 0; n < 3; ++n) after += HAND(27 * side + 3 + LOWER(c, n)) * (DX(n, e + 1) - DX(n, e));
-        UNROLL for (int n = 0; n < 6; ++n) after -= HAND(27 * side + 9 + 3 * n + c) * DX(3 + n, e);
-        after = HAND(27 * side + c) - scale * after;
-        force += side ? -after : after;
-      }
+      const real force = hand_force(c, scale);
       reaction[c] = settled > zero ? reaction[c] : force;
     }
     SYNC;
@@ -221,16 +223,18 @@ for (int step = 0; step < steps; ++step) {
     real contact = zero;
     real position[3], velocity[3];
     UNROLL for (int c = 0; c < 3; ++c) {
-      const real v = (X(c, MID) - Y(c, MID)) * ibh, yv = c1 * V1(c, MID) - c2 * V2(c, MID);
-      position[c] = X(c, MID); velocity[c] = v;
+      const real x = middle(&X(0, MID), c), v = (x - middle(&Y(0, MID), c)) * ibh;
+      const real yv = c1 * middle(&V1(0, MID), c) - c2 * middle(&V2(0, MID), c);
+      position[c] = x; velocity[c] = v;
       contact += payload * ((v - yv) * ibh + (c == 2 ? gravity : (SC)0)) * direction[c];
     }
     const real before = step > first_free ? contact_before : contact;
     const real w = minimum(maximum(before / maximum(before - contact, zero + (SC)1e-9), zero), one);
     const real leaves = (payload > zero ? one : zero) * (contact > zero ? zero : one);
     UNROLL for (int c = 1; c < 3; ++c) {
-      leaving[c] = leaves > zero ? X1(c, MID) + w * (position[c] - X1(c, MID)) : leaving[c];
-      leaving[2 + c] = leaves > zero ? V1(c, MID) + w * (velocity[c] - V1(c, MID)) : leaving[2 + c];
+      const real before_x = middle(&X1(0, MID), c), before_v = middle(&V1(0, MID), c);
+      leaving[c] = leaves > zero ? before_x + w * (position[c] - before_x) : leaving[c];
+      leaving[2 + c] = leaves > zero ? before_v + w * (velocity[c] - before_v) : leaving[2 + c];
     }
     leaving[0] = leaves > zero ? time - ((SC)1 - w) * h : leaving[0];
     payload = leaves > zero ? zero : payload;

@@ -1,0 +1,45 @@
+"""What tetrahedra.h knows of its mesh: a section of a centre and a hexagon, three tets a prism."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.sling.cylinder import cylinder, volumes
+
+VERTICES = 7  # of a layer
+UNKNOWNS = 3 * VERTICES
+CORNERS = cylinder([0.0, 1.0], 1.0)[1]  # of the slab between two layers, shape (18, 4)
+
+
+def section(radius: float) -> np.ndarray:
+    """Places of a layer's vertices along its directors a and b [m], shape (VERTICES, 2)."""
+    return cylinder([0.0, 1.0], 2 * radius)[0][0, :, 1:]
+
+
+def shares() -> np.ndarray:
+    """Of each vertex in the mass of its layer, shape (VERTICES,).
+
+    A quarter of each tetrahedron's mass: as much from the slab before a layer as from the one after
+    where both are equally long.
+    """
+    vertices, corners = cylinder([0.0, 1.0], 1.0)
+    quarter = np.repeat(volumes(vertices, corners), 4)
+    mass = np.bincount(corners.ravel(), quarter).reshape(2, VERTICES).sum(axis=0)
+    return mass / mass.sum()
+
+
+def table(radius: float) -> np.ndarray:
+    """Numbers of the mesh in the order that tetrahedra.h says, of a slab 1 m long."""
+    vertices, corners = cylinder([0.0, 1.0], 2 * radius)
+    places = vertices.reshape(-1, 3)[corners]
+    inverse = np.linalg.inv(places[:, 1:] - places[:, :1])  # columns: gradients of corners 1 to 3
+    gradients = np.concatenate([-inverse.sum(axis=2)[:, None], inverse.swapaxes(1, 2)], axis=1)
+    parts = (shares(), section(radius), volumes(vertices, corners), gradients)
+    return np.concatenate([np.ravel(part) for part in parts])
+
+
+def layers(nodes: np.ndarray, a: np.ndarray, b: np.ndarray, radius: float) -> np.ndarray:
+    """Unknowns (..., L, UNKNOWNS) of sections at `nodes` with directors `a`, `b` (..., L, 3)."""
+    first, second = section(radius).T[:, :, None]
+    vertices = nodes[..., None, :] + first * a[..., None, :] + second * b[..., None, :]
+    return vertices.reshape(*nodes.shape[:-1], UNKNOWNS)

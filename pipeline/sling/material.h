@@ -11,8 +11,9 @@
 //
 //   D = d/2 [ K J'^2 + s ( mu |F'|^2 + p d2J(F', F') + mu/3 J'^2 ) ]
 
-// F now, predicted, and its rate -> stress (columns) and its derivative, K[k (k + 1) / 2 + l] for columns k >= l
-auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&xt)[3][3], real (&stress)[3][3], real (&K)[6][3][3]) {
+// F now, predicted, and its rate -> stress (columns) and its derivative, K[k (k + 1) / 2 + l] for columns k >= l,
+// exact as long as p / mu is between `least` and `most`
+auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&xt)[3][3], SC least, SC most, real (&stress)[3][3], real (&K)[6][3][3]) {
   real C[3][3], Cp[3][3], square = zero;  // cofactors; the longest column, squared
   UNROLL for (int k = 0; k < 3; ++k) {
     cross(x[(k + 1) % 3], x[(k + 2) % 3], C[k]); cross(xp[(k + 1) % 3], xp[(k + 2) % 3], Cp[k]);
@@ -21,7 +22,7 @@ auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&
   const real J = dot(x[0], C[0]), Jp = dot(xp[0], Cp[0]);
   const real p = lam * (J - (SC)1) - mu;
   // far from rest Newton's method takes a smaller part of what may be negative
-  const real pc = minimum(maximum(p, (SC)-1.5 * mu), (SC)0.25 * mu);
+  const real pc = minimum(maximum(p, least * mu), most * mu);
   inexact = pc == p ? inexact : one;
   const real bound = mu / SQRT(maximum(square, zero + (SC)1e-6));
   const real pv = minimum(maximum(lam * (Jp - (SC)1) - mu, -bound), bound);

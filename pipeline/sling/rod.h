@@ -82,7 +82,7 @@ auto stage_layer = [&](int i) {
       x[k][c] = now; xp[k][c] = predicted; xt[k][c] = (now - y) * ibh;
     }
     real stress[3][3], K[6][3][3];
-    material(x, xp, xt, stress, K);
+    material(x, xp, xt, (SC)-1.5, (SC)0.25, stress, K);
     UNROLL for (int c = 0; c < 3; ++c) {
       f_next[c] = volume * stress[0][c] * per_ds; f[c] -= f_next[c];
       f[3 + c] += volume * stress[1][c]; f[6 + c] += volume * stress[2][c];

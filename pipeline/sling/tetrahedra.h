@@ -69,7 +69,8 @@ auto stage_slab = [&](int i) {
         }
       }
     }
-    material(F, Fp, Ft, stress, K);
+    // locked tetrahedra have pressures of either sign
+    material(F, Fp, Ft, (SC)-20, (SC)20, stress, K);
     const SC volume = volumes[t] * ds;
     for (int b = 0; b < 4; ++b) {
       const int vb = corners[t][b] % VERTICES, above_b = corners[t][b] / VERTICES;

@@ -109,8 +109,8 @@ for (int step = 0; step < steps; ++step) {
             const real a = COLUMNS == 1 ? (c > k ? D[q][k] : zero) : D[k][c < N ? c : 0];
             UNROLL for (int m = k + 1; m < N; ++m) if (COLUMNS == 1 || m >= c) D[q][m] -= multiplier[m] * a;
           }
-          UNROLL for (int m = k + 1; m < N; ++m) U[q][m] -= multiplier[m] * U[q][k];
           if (COLUMNS == 1) {
+            UNROLL for (int m = k + 1; m < N; ++m) U[q][m] -= multiplier[m] * U[q][k];
             inverse_own[q] = c == k || k == 0 ? inverse[k] : inverse_own[q];
             UNROLL for (int m = k + 1; m < N; ++m) D[q][m] = c == k ? multiplier[m] : D[q][m];
           }
@@ -120,6 +120,8 @@ for (int step = 0; step < steps; ++step) {
           for (int m = k + 1; m < N; ++m) D[k < COLUMNS ? k : 0][m] = multiplier[m];
         }
       }
+      if (COLUMNS > 1) UNROLL for (int q = 0; q < COLUMNS; ++q)
+        UNROLL for (int k = 0; k < N; ++k) UNROLL for (int m = k + 1; m < N; ++m) U[q][m] -= D[k < COLUMNS ? k : 0][m] * U[q][k];
       SHARE(U);
       // Schur complement into the next layer; what the back substitution needs is kept
       UNROLL for (int q = 0; q < COLUMNS; ++q) {

@@ -12,7 +12,7 @@ from pipeline.sling.model import GRAVITY, Sling, fixed_frames
 LANES, TEAM = 16, 10  # slings in a CPU thread's SIMD lanes; GPU threads that share a sling
 NOT_CONVERGED, SLIPPED, LEFT = 1, 2, -1  # lane_state[4] as state.h says
 DIRECTION, PAYLOAD, FAILURE, LEAVING, HELD_FORCE = slice(0, 3), 3, 4, slice(6, 11), slice(11, 14)
-LANE_STATE = 14
+ITERATIONS, LANE_STATE = 14, 15
 
 
 @dataclass
@@ -85,6 +85,29 @@ def _separate(array: np.ndarray) -> np.ndarray:
     return array.transpose(0, 2, 1).reshape(blocks * lanes, width)
 
 
+def _widths(
+    sling: Sling, n_steps: int, n_frames: int, frame_width: int, launching: bool, on_gpu: bool
+) -> dict[str, int]:
+    """Numbers that each array holds of one sling."""
+    from pipeline.sling.kernel import SAVED, UNKNOWNS
+
+    columns = -(-32 // (32 // TEAM)) if on_gpu else UNKNOWNS + 1  # a warp's spare threads count
+    return {
+        "state": UNKNOWNS * sling.layers,
+        "lane_state": LANE_STATE,
+        "scratch": 9 * UNKNOWNS * sling.layers,
+        "saved": SAVED * sling.layers * columns,
+        "output": 0 if launching else 4 * n_steps,
+        "frames": n_frames * sling.layers * frame_width,
+    }
+
+
+def memory(sling: Sling, schedule: Schedule, n_frames: int, device: str = "cpu") -> int:
+    """Bytes that one rollout takes in single precision while it is simulated."""
+    on_gpu = device.startswith("cuda")
+    return 4 * sum(_widths(sling, len(schedule.table), n_frames, 3, False, on_gpu).values())
+
+
 @dataclass
 class Result:
     """Of N slings through S steps, K frames recorded.
@@ -139,7 +162,7 @@ def run(
     import warp as wp
 
     from pipeline.native import launch
-    from pipeline.sling.kernel import SAVED, UNKNOWNS, rod_kernel
+    from pipeline.sling.kernel import UNKNOWNS, rod_kernel
 
     if lane_state.shape != (len(parameters), LANE_STATE):
         raise ValueError(f"lane_state: {lane_state.shape} is not ({len(parameters)}, {LANE_STATE})")
@@ -171,32 +194,24 @@ def run(
         _interleave(values, lanes, together, dtype) for values in (parameters, state, lane_state)
     ]
 
-    widths = {
-        "state": UNKNOWNS * layers,
-        "lane_state": LANE_STATE,
-        "output": 0 if launching else 4 * n_steps,
-        "frames": n_frames * layers * frame_width,
-    }
+    widths = _widths(sling, n_steps, n_frames, frame_width, launching, on_gpu)
 
     def part(begin: int, end: int) -> list:
         """Step the rows of slings from `begin` to `end`; arrays (slings, width)."""
         size = end - begin
-
-        def empty(*shape: int):
-            return wp.empty(int(np.prod(shape)), dtype=scalar, device=device)
-
         parameter, state, lane = (
             wp.array(values[begin:end].ravel(), device=device) for values in rows
         )
-        scratch = empty(size, 9 * UNKNOWNS * layers, lanes)
-        saved = empty(size // together, layers * SAVED, 32 if on_gpu else (UNKNOWNS + 1) * lanes)
-        output, frames = empty(size, widths["output"], lanes), empty(size, widths["frames"], lanes)
+        scratch, saved, output, frames = (
+            wp.empty(size * lanes * widths[name], dtype=scalar, device=device)
+            for name in ("scratch", "saved", "output", "frames")
+        )
         inputs = [
             *common, parameter, state, scratch, saved, lane, output, frames, *stamps,
             n_frames, frame_width, n_steps, schedule.first_free, int(launching),
         ]  # fmt: skip
         launch(kernel, size // together, inputs, device)
-        arrays = dict(zip(widths, (state, lane, output, frames), strict=True))
+        arrays = {"state": state, "lane_state": lane, "output": output, "frames": frames}
         stays = () if fetch or not on_gpu else ("output", "frames")
         return [
             array.reshape((size, widths[name]))

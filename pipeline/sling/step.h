@@ -15,6 +15,7 @@ for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
 SYNC;
 real offset[3] = {zero, zero, zero}, pull = zero, held[3] = {zero, zero, zero};  // of the hand
 real contact_before = zero;  // of the pouch
+int iterations = 0;
 
 for (int step = 0; step < steps; ++step) {
   const SC* row = schedule.data + (size_t)step * 13;
@@ -204,6 +205,7 @@ for (int step = 0; step < steps; ++step) {
     settled = imbalance < balance ? one : settled;
     if (ALL(settled > zero)) break;
   }
+  iterations += iteration + 1;
   SYNC;
   // a lane that did not converge, or is no number, has failed for good
   failed_step = failure != zero ? failed_step : zero + (SC)step;
@@ -265,4 +267,5 @@ if (member == 0) {
   LANE[3] = payload; LANE[4] = failure; LANE[5] = failed_step;
   UNROLL for (int c = 0; c < 5; ++c) LANE[6 + c] = leaving[c];
   UNROLL for (int c = 0; c < 3; ++c) LANE[11 + c] = held[c];
+  LANE[14] = zero + (SC)iterations;
 }

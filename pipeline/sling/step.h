@@ -7,6 +7,7 @@
 // block-tridiagonal Hessian with a direct LDL' solve; where it is indefinite, its diagonal is shifted.
 
 const SC close = sqrt(0.25 * tolerance * shortest_edge);  // from here on Newton's next change is below the tolerance
+const SC per_edge = (SC)1 / mean_edge;
 const real balance = (SC)3e-2 * node_mass * gravity + (SC)1e-5 * mu * area;  // N
 for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
   const real x = INITIAL[k * L + i];
@@ -53,35 +54,33 @@ for (int step = 0; step < steps; ++step) {
   int iteration = 0;
   for (; iteration < max_iterations; ++iteration) {
     // ---- assembly, a layer a member, and elimination, layer after layer
-    real D[COLUMNS][N], U[COLUMNS][N], carry[COLUMNS][N], next[COLUMNS][N], raw[N];
+    real D[COLUMNS][N], U[COLUMNS][N], carry[COLUMNS][N], next[COLUMNS][N], before[N];
     real indefinite = zero, imbalance = zero, poison = zero; inexact = zero;  // poison is no number as soon as anything is
     for (int q = 0; q < COLUMNS; ++q) UNROLL for (int m = 0; m < N; ++m) next[q][m] = zero;
-    UNROLL for (int m = 0; m < N; ++m) raw[m] = zero;
+    UNROLL for (int m = 0; m < N; ++m) before[m] = zero;
     for (int i = 0; i < L; ++i) {
       const int j = i % T;
       if (j == 0) {
         SYNC;
         if (i + member < L) stage_layer(i + member);
         SYNC;
+        // the residual as it is, before elimination mixes it
+        if (i + member < L) UNROLL for (int m = 0; m < N; ++m) {
+          const real f = GET(FORCE + m, member) + (member ? GET(FORCE_NEXT + m, member - 1) : before[m]);
+          if (moves(i + member, m)) {
+            imbalance = maximum(imbalance, magnitude(f) * (m < 3 ? (SC)1 : per_edge)); poison += f * zero;
+          }
+        }
+        UNROLL for (int m = 0; m < N; ++m) before[m] = GET(FORCE_NEXT + m, T - 1);
       }
       const bool special = i == 0 || i == MID - 1 || i == MID || i >= L - 2;
       UNROLL for (int q = 0; q < COLUMNS; ++q) {
         const int c = q + member;
         column(j, c, D[q], U[q], carry[q]);
-        if (c >= N) {  // the residual; U is what elimination leaves of it
-          UNROLL for (int m = 0; m < N; ++m) {
-            const real f = U[q][m] + raw[m];
-            raw[m] = carry[q][m];
-            if (moves(i, m)) {
-              imbalance = maximum(imbalance, magnitude(f) / (m < 3 ? (SC)1 : mean_edge)); poison += f * zero;
-            }
-            U[q][m] += next[q][m];
-            // open pads hold the band back with what friction they have left
-            if (i == MID && hold == 2 && m < 3) U[q][m] += capacity * direction[m < 3 ? m : 0];
-          }
-        } else {
-          UNROLL for (int m = FIRST_ROW(c); m < N; ++m) D[q][m] += next[q][m];
-        }
+        // open pads hold the band back with what friction they have left
+        if (i == MID && hold == 2 && c >= N) UNROLL for (int m = 0; m < 3; ++m) U[q][m] += capacity * direction[m];
+        if (c >= N) { UNROLL for (int m = 0; m < N; ++m) U[q][m] += next[q][m]; }
+        else { UNROLL for (int m = FIRST_ROW(c); m < N; ++m) D[q][m] += next[q][m]; }
         if (special) {
           const bool mine = c >= N || moves(i, c), mine_next = c >= N || (i < L - 1 && moves(i + 1, c));
           UNROLL for (int m = 0; m < N; ++m) {

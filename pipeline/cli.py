@@ -204,15 +204,13 @@ def run_aim(arguments: argparse.Namespace) -> tuple[str, int]:
 
 
 def run_bench(arguments: argparse.Namespace) -> tuple[str, int]:
-    from pipeline.bench import bench, environment
+    from pipeline.bench import bench, environment, table
     from pipeline.params import load
 
-    entries = bench(load(), device=arguments.device)
+    result = bench(load(), device=arguments.device)
     if arguments.json:
-        return json.dumps(environment(arguments.device) | {"batches": entries}), 0
-    lines = ["  ".join(entries[0])]
-    lines += ["  ".join(f"{value:{len(key)}.0f}" for key, value in e.items()) for e in entries]
-    return "\n".join(lines), 0
+        return json.dumps(environment(arguments.device) | result), 0
+    return table(result), 0
 
 
 def finite(value: float) -> float | None:

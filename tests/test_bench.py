@@ -28,9 +28,14 @@ def test_the_yardstick_is_held_drawn_and_let_go() -> None:
 
 def test_it_counts_rollouts_and_launches(monkeypatch) -> None:
     monkeypatch.setitem(bench.BATCHES, "cpu", (2, 4))
-    entries = bench.bench(PARAMS)
-    assert [entry["environments"] for entry in entries] == [2, 4]
-    for entry in entries:
-        assert len(entry) == 4
+    monkeypatch.setattr(bench.os, "cpu_count", lambda: 1)
+    result = bench.bench(PARAMS)
+    assert [entry["environments"] for entry in result["batches"]] == [2, 4]
+    for entry in result["batches"]:
         assert all(np.isfinite(value) and value > 0 for value in entry.values())
         assert entry["rollouts_with_loss_per_s"] < entry["launches_per_s"]
+    steps = result["yardstick"]["steps"]
+    assert steps["held"] == round((bench.RELEASE - bench.GRASP) / PARAMS.sling.grip_step)
+    assert result["yardstick"]["newton_iterations"] >= sum(steps.values())
+    assert 0 < result["first_start_s"]["cached"] < result["first_start_s"]["empty_cache"]
+    assert str(steps["recoil"]) in bench.table(result)

@@ -13,6 +13,7 @@ from pipeline.sling.solver import (
     FAILURE,
     FREE,
     HELD,
+    ITERATIONS,
     LANE_STATE,
     NOT_CONVERGED,
     OPENING,
@@ -37,6 +38,7 @@ class Rollouts:
         cloud_time: The camera's stamps [s], shape (K,).
         center_line: Nodes of the band at those stamps [m], shape (N, K, layers, 3), float32.
         failure: None, or why this rollout counts for nothing, length N.
+        iterations: Newton steps it took, shape (N,); those of a SIMD vector or a warp together.
     """
 
     times: np.ndarray
@@ -44,6 +46,7 @@ class Rollouts:
     cloud_time: np.ndarray
     center_line: np.ndarray
     failure: list[str | None]
+    iterations: np.ndarray | None = None
 
 
 def schedule_of(sling: Sling, episode: Episode, refine: int = 1) -> Schedule:
@@ -134,4 +137,5 @@ def interact(
         cloud_time=episode.cloud_time,
         center_line=result.frames,
         failure=[reasons[int(round(code))] for code in result.lane_state[:, FAILURE]],
+        iterations=result.lane_state[:, ITERATIONS].astype(int),
     )

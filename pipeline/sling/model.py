@@ -205,23 +205,38 @@ def fixed_frames(sling: Sling) -> np.ndarray:
     return np.array(frames)
 
 
+def _directors(sling: Sling, end: int, direction: np.ndarray, stretch: np.ndarray) -> np.ndarray:
+    """Directors (..., 6) of edges along unit `direction` (..., 3), turned from a clamp's frame.
+
+    A stretched edge thins, its volume the same.
+    """
+    turned = _transport(fixed_frames(sling)[end, 0], clamp_tangents(sling)[end], direction)
+    both = np.concatenate([turned, np.cross(direction, turned)], axis=-1)
+    return both * stretch[..., None] ** -0.5
+
+
 def layers_of(sling: Sling, nodes: np.ndarray) -> np.ndarray:
-    """Unknowns (..., L, unknowns) of bands through `nodes` (..., L, 3), thin where stretched."""
-    frames, tangents = fixed_frames(sling), clamp_tangents(sling)
-    directors = np.zeros((*nodes.shape[:-2], sling.layers + 1, 2, 3))  # of edges and both clamps
+    """Unknowns (..., L, unknowns) of bands through `nodes` (..., L, 3)."""
+    state = np.zeros((*nodes.shape[:-1], 9))
+    state[..., :3] = nodes
     edges = np.diff(nodes, axis=-2)
-    length = np.linalg.norm(edges, axis=-1, keepdims=True)
-    direction, thin = edges / length, (length / sling.edge_lengths[:, None]) ** -0.5
-    for end, half in enumerate((slice(None, sling.middle), slice(sling.middle, sling.edges))):
-        a = _transport(frames[end, 0], tangents[end], direction[..., half, :])
-        pair = np.stack([a, np.cross(direction[..., half, :], a)], axis=-2)
-        directors[..., 1:-1, :, :][..., half, :, :] = thin[..., half, :, None] * pair
-    directors[..., 0, :, :], directors[..., -1, :, :] = frames[:2]
-    if sling.mesh == TETRAHEDRA:
-        between = (directors[..., 1:, :, :] + directors[..., :-1, :, :]) / 2
-        between[..., [0, -1], :, :] = frames[:2]
-        return tetrahedra.layers(nodes, between[..., 0, :], between[..., 1, :], sling.radius)
-    return np.concatenate([nodes, directors[..., 1:, :, :].reshape(*nodes.shape[:-1], 6)], axis=-1)
+    length = np.linalg.norm(edges, axis=-1)
+    direction, stretch = edges / length[..., None], length / sling.edge_lengths
+    for end, half in enumerate((slice(0, sling.middle), slice(sling.middle, sling.edges))):
+        state[..., half, 3:] = _directors(sling, end, direction[..., half, :], stretch[..., half])
+    state[..., -1, 3:] = fixed_frames(sling)[1].ravel()
+    return _meshed(sling, state)
+
+
+def _meshed(sling: Sling, rod: np.ndarray) -> np.ndarray:
+    """Unknowns of the sling's mesh for a rod's (..., L, 9): sections lie between their edges."""
+    if sling.mesh == ROD:
+        return rod
+    frames = fixed_frames(sling)[:2].reshape(2, 6)
+    after = rod[..., 3:]
+    directors = (after + np.roll(after, 1, axis=-2)) / 2
+    directors[..., [0, -1], :] = frames
+    return tetrahedra.layers(rod[..., :3], directors, sling.radius)
 
 
 def hanging_guess(sling: Sling) -> np.ndarray:
@@ -239,8 +254,16 @@ def hanging_guess(sling: Sling) -> np.ndarray:
 
 def drawn_guess(sling: Sling, draws: np.ndarray) -> np.ndarray:
     """Two straight halves from the tips to each draw (N, 2), shape (N, layers, unknowns)."""
-    middle = np.column_stack([np.zeros(len(draws)), draws])[:, None]
+    middle = np.column_stack([np.zeros(len(draws)), draws])
     part = (sling.arc / sling.arc[sling.middle])[: sling.middle + 1, None]
-    first = sling.tips[0] + part * (middle - sling.tips[0])
-    second = sling.tips[1] + part[::-1] * (middle - sling.tips[1])
-    return layers_of(sling, np.concatenate([first, second[:, 1:]], axis=1))
+    state = np.zeros((len(draws), sling.layers, 9), np.float32)
+    halves = slice(0, sling.middle + 1), slice(sling.middle, None)
+    for end, (half, tip) in enumerate(zip(halves, sling.tips, strict=True)):
+        span = middle - tip
+        state[:, half, :3] = tip + (part if end == 0 else part[::-1]) * span[:, None]
+        length = np.linalg.norm(span, axis=1)
+        direction = span / (length if end == 0 else -length)[:, None]
+        stretch = length / (sling.rest_length / 2)
+        state[:, half, 3:] = _directors(sling, end, direction, stretch)[:, None]
+    state[:, -1, 3:] = fixed_frames(sling)[1].ravel()
+    return _meshed(sling, state)

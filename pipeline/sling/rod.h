@@ -32,6 +32,8 @@ real staged[STAGED], felt[54];
 #define GET(v, j) staged[v]
 #define HAND(v) felt[v]
 #endif
+#define RESIDUAL(m, j) GET(FORCE + (m), j)
+#define RESIDUAL_NEXT(m, j) GET(FORCE_NEXT + (m), j)
 #define LOWER(m, n) ((m) >= (n) ? (m) * ((m) + 1) / 2 + (n) : (n) * ((n) + 1) / 2 + (m))
 
 

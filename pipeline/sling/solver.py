@@ -14,7 +14,7 @@ from pipeline.sling.model import GRAVITY, TETRAHEDRA, Sling, fixed_frames
 LANES, TEAM = 16, 10  # slings in a CPU thread's SIMD lanes; GPU threads that share a sling
 NOT_CONVERGED, SLIPPED, LEFT = 1, 2, -1  # lane_state[4] as state.h says
 DIRECTION, PAYLOAD, FAILURE, LEAVING, HELD_FORCE = slice(0, 3), 3, 4, slice(6, 11), slice(11, 14)
-LANE_STATE = 14
+ITERATIONS, LANE_STATE = 14, 15
 
 
 @dataclass
@@ -85,6 +85,28 @@ def _separate(array: np.ndarray) -> np.ndarray:
     """(blocks, k, lanes) -> (slings, k)."""
     blocks, width, lanes = array.shape
     return array.transpose(0, 2, 1).reshape(blocks * lanes, width)
+
+
+def _widths(
+    sling: Sling, n_steps: int, n_frames: int, frame_width: int, launching: bool, on_gpu: bool
+) -> dict[str, int]:
+    """Numbers that each array holds of one sling."""
+    # of a GPU, a warp's spare threads count
+    columns = -(-32 // (32 // TEAM)) if on_gpu else sling.unknowns + 1
+    return {
+        "state": sling.unknowns * sling.layers,
+        "lane_state": LANE_STATE,
+        "scratch": 9 * sling.unknowns * sling.layers,
+        "saved": (2 * sling.unknowns + 1) * sling.layers * columns,
+        "output": 0 if launching else 4 * n_steps,
+        "frames": n_frames * sling.layers * frame_width,
+    }
+
+
+def memory(sling: Sling, schedule: Schedule, n_frames: int, device: str = "cpu") -> int:
+    """Bytes that one rollout takes in single precision while it is simulated."""
+    on_gpu = device.startswith("cuda")
+    return 4 * sum(_widths(sling, len(schedule.table), n_frames, 3, False, on_gpu).values())
 
 
 @dataclass
@@ -181,33 +203,24 @@ def run(
         _interleave(values, lanes, together, dtype) for values in (parameters, state, lane_state)
     ]
 
-    widths = {
-        "state": unknowns * layers,
-        "lane_state": LANE_STATE,
-        "output": 0 if launching else 4 * n_steps,
-        "frames": n_frames * layers * frame_width,
-    }
+    widths = _widths(sling, n_steps, n_frames, frame_width, launching, on_gpu)
 
     def part(begin: int, end: int) -> list:
         """Step the rows of slings from `begin` to `end`; arrays (slings, width)."""
         size = end - begin
-
-        def empty(*shape: int):
-            return wp.empty(int(np.prod(shape)), dtype=scalar, device=device)
-
         parameter, state, lane = (
             wp.array(values[begin:end].ravel(), device=device) for values in rows
         )
-        scratch = empty(size, 9 * unknowns * layers, lanes)
-        columns = 32 if on_gpu else (unknowns + 1) * lanes
-        saved = empty(size // together, layers * (2 * unknowns + 1), columns)
-        output, frames = empty(size, widths["output"], lanes), empty(size, widths["frames"], lanes)
+        scratch, saved, output, frames = (
+            wp.empty(size * lanes * widths[name], dtype=scalar, device=device)
+            for name in ("scratch", "saved", "output", "frames")
+        )
         inputs = [
             *common, parameter, state, scratch, saved, lane, output, frames, *stamps,
             n_frames, frame_width, n_steps, schedule.first_free, int(launching),
         ]  # fmt: skip
         launch(kernel, size // together, inputs, device)
-        arrays = dict(zip(widths, (state, lane, output, frames), strict=True))
+        arrays = {"state": state, "lane_state": lane, "output": output, "frames": frames}
         stays = () if fetch or not on_gpu else ("output", "frames")
         return [
             array.reshape((size, widths[name]))

@@ -12,6 +12,7 @@
 #endif
 
 const SC close = sqrt(0.25 * tolerance * shortest_edge);  // from here on Newton's next change is below the tolerance
+const SC per_edge = (SC)1 / mean_edge;
 for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
   const real x = INITIAL[k * L + i];
   X1(k, i) = x; X2(k, i) = x; V1(k, i) = zero; V2(k, i) = zero; X(k, i) = x;
@@ -25,6 +26,7 @@ auto middle = [&](const real* unknowns, int c) -> real {  // of the held layer: 
   return mean;
 };
 real contact_before = zero;  // of the pouch
+int iterations = 0;
 
 for (int step = 0; step < steps; ++step) {
   const SC* row = schedule.data + (size_t)step * 13;
@@ -63,35 +65,33 @@ for (int step = 0; step < steps; ++step) {
   int iteration = 0;
   for (; iteration < max_iterations; ++iteration) {
     // ---- assembly, a layer a member, and elimination, layer after layer
-    real D[COLUMNS][N], U[COLUMNS][N], carry[COLUMNS][N], next[COLUMNS][N], raw[N];
+    real D[COLUMNS][N], U[COLUMNS][N], carry[COLUMNS][N], next[COLUMNS][N], before[N];
     real indefinite = zero, imbalance = zero, poison = zero; inexact = zero;  // poison is no number as soon as anything is
     for (int q = 0; q < COLUMNS; ++q) UNROLL for (int m = 0; m < N; ++m) next[q][m] = zero;
-    UNROLL for (int m = 0; m < N; ++m) raw[m] = zero;
+    UNROLL for (int m = 0; m < N; ++m) before[m] = zero;
     for (int i = 0; i < L; ++i) {
       const int j = i % T;
       if (j == 0) {
         SYNC;
         if (i + member < L) stage_layer(i + member);
         SYNC;
+        // the residual as it is, before elimination mixes it
+        if (i + member < L) UNROLL for (int m = 0; m < N; ++m) {
+          const real f = RESIDUAL(m, member) + (member ? RESIDUAL_NEXT(m, member - 1) : before[m]);
+          if (moves(i + member, m)) {
+            imbalance = maximum(imbalance, magnitude(f) * (m < PLACES ? (SC)1 : per_edge)); poison += f * zero;
+          }
+        }
+        UNROLL for (int m = 0; m < N; ++m) before[m] = RESIDUAL_NEXT(m, T - 1);
       }
       const bool special = i == 0 || i == MID - 1 || i == MID || i >= L - 2;
       UNROLL for (int q = 0; q < COLUMNS; ++q) {
         const int c = q + member;
         column(j, c, D[q], U[q], carry[q]);
-        if (c >= N) {  // the residual; U is what elimination leaves of it
-          UNROLL for (int m = 0; m < N; ++m) {
-            const real f = U[q][m] + raw[m];
-            raw[m] = carry[q][m];
-            if (moves(i, m)) {
-              imbalance = maximum(imbalance, magnitude(f) / (m < PLACES ? (SC)1 : mean_edge)); poison += f * zero;
-            }
-            U[q][m] += next[q][m];
-            // open pads hold the band back with what friction they have left
-            if (i == MID && hold == 2 && m < PLACES) U[q][m] += share(m) * capacity * direction[m % 3];
-          }
-        } else {
-          UNROLL for (int m = FIRST_ROW(c); m < N; ++m) D[q][m] += next[q][m];
-        }
+        // open pads hold the band back with what friction they have left
+        if (i == MID && hold == 2 && c >= N) UNROLL for (int m = 0; m < PLACES; ++m) U[q][m] += share(m) * capacity * direction[m % 3];
+        if (c >= N) { UNROLL for (int m = 0; m < N; ++m) U[q][m] += next[q][m]; }
+        else { UNROLL for (int m = FIRST_ROW(c); m < N; ++m) D[q][m] += next[q][m]; }
         if (special) {
           const bool mine = c >= N || moves(i, c), mine_next = c >= N || (i < L - 1 && moves(i + 1, c));
           UNROLL for (int m = 0; m < N; ++m) {
@@ -120,8 +120,8 @@ for (int step = 0; step < steps; ++step) {
             const real a = COLUMNS == 1 ? (c > k ? D[q][k] : zero) : D[k][c < N ? c : 0];
             UNROLL for (int m = k + 1; m < N; ++m) if (COLUMNS == 1 || m >= c) D[q][m] -= multiplier[m] * a;
           }
-          UNROLL for (int m = k + 1; m < N; ++m) U[q][m] -= multiplier[m] * U[q][k];
           if (COLUMNS == 1) {
+            UNROLL for (int m = k + 1; m < N; ++m) U[q][m] -= multiplier[m] * U[q][k];
             inverse_own[q] = c == k || k == 0 ? inverse[k] : inverse_own[q];
             UNROLL for (int m = k + 1; m < N; ++m) D[q][m] = c == k ? multiplier[m] : D[q][m];
           }
@@ -131,6 +131,8 @@ for (int step = 0; step < steps; ++step) {
           for (int m = k + 1; m < N; ++m) D[k < COLUMNS ? k : 0][m] = multiplier[m];
         }
       }
+      if (COLUMNS > 1) UNROLL for (int q = 0; q < COLUMNS; ++q)
+        UNROLL for (int k = 0; k < N; ++k) UNROLL for (int m = k + 1; m < N; ++m) U[q][m] -= D[k < COLUMNS ? k : 0][m] * U[q][k];
       SHARE(U);
       // Schur complement into the next layer; what the back substitution needs is kept
       UNROLL for (int q = 0; q < COLUMNS; ++q) {
@@ -204,6 +206,7 @@ for (int step = 0; step < steps; ++step) {
     settled = imbalance < balance ? one : settled;
     if (ALL(settled > zero)) break;
   }
+  iterations += iteration + 1;
   SYNC;
   // a lane that did not converge, or is no number, has failed for good
   failed_step = failure != zero ? failed_step : zero + (SC)step;
@@ -267,4 +270,5 @@ if (member == 0) {
   LANE[3] = payload; LANE[4] = failure; LANE[5] = failed_step;
   UNROLL for (int c = 0; c < 5; ++c) LANE[6 + c] = leaving[c];
   UNROLL for (int c = 0; c < 3; ++c) LANE[11 + c] = held[c];
+  LANE[14] = zero + (SC)iterations;
 }

@@ -37,6 +37,8 @@ auto mass_of = [&](int i, int m) -> real {
 // a staged layer: Hessian of its own unknowns, of the next layer's, and across, by columns (on the diagonal the lower
 // triangle); residual of this layer and of the next
 real own[N][N], following[N][N], across[N][N], force_here[N], force_there[N];
+#define RESIDUAL(m, j) force_here[m]
+#define RESIDUAL_NEXT(m, j) force_there[m]
 // of the slabs on both sides of the hand: force on the held layer, and what it has of the other layer's unknowns
 real felt[2][3], felt_of[2][3][N];
 

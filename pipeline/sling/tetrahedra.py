@@ -38,8 +38,8 @@ def table(radius: float) -> np.ndarray:
     return np.concatenate([np.ravel(part) for part in parts])
 
 
-def layers(nodes: np.ndarray, a: np.ndarray, b: np.ndarray, radius: float) -> np.ndarray:
-    """Unknowns (..., L, UNKNOWNS) of sections at `nodes` with directors `a`, `b` (..., L, 3)."""
-    first, second = section(radius).T[:, :, None]
-    vertices = nodes[..., None, :] + first * a[..., None, :] + second * b[..., None, :]
+def layers(nodes: np.ndarray, directors: np.ndarray, radius: float) -> np.ndarray:
+    """Unknowns (..., L, UNKNOWNS) of sections at `nodes` (..., L, 3), directors a, b (..., L, 6)."""
+    pairs = directors.reshape(*nodes.shape[:-1], 2, 3)
+    vertices = nodes[..., None, :] + section(radius) @ pairs
     return vertices.reshape(*nodes.shape[:-1], UNKNOWNS)

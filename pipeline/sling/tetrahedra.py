@@ -39,7 +39,7 @@ def table(radius: float) -> np.ndarray:
 
 
 def layers(nodes: np.ndarray, directors: np.ndarray, radius: float) -> np.ndarray:
-    """Unknowns (..., L, UNKNOWNS) of sections at `nodes` (..., L, 3), directors a, b (..., L, 6)."""
+    """Unknowns (..., L, UNKNOWNS) of sections at `nodes` (..., L, 3), directors (..., L, 6)."""
     pairs = directors.reshape(*nodes.shape[:-1], 2, 3)
     vertices = nodes[..., None, :] + section(radius) @ pairs
     return vertices.reshape(*nodes.shape[:-1], UNKNOWNS)

@@ -86,6 +86,7 @@ def parser() -> argparse.ArgumentParser:
 
     sub = command(run_bench, "measure rollouts and launches a second")
     sub.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
+    sub.add_argument("--peers", action="store_true", help="MuJoCo and Newton beside ours")
     sub.add_argument("--json", action="store_true")
     return top
 
@@ -207,6 +208,14 @@ def run_bench(arguments: argparse.Namespace) -> tuple[str, int]:
     from pipeline.bench import bench, environment, table
     from pipeline.params import load
 
+    if arguments.peers:
+        from pipeline.peers import bench as peers
+
+        entries = peers.bench_peers(load(), arguments.device)
+        if arguments.json:
+            command = f"sling bench --peers --device {arguments.device} --json"
+            return json.dumps(environment(arguments.device, command) | {"peers": entries}), 0
+        return peers.table(entries), 0
     result = bench(load(), device=arguments.device)
     if arguments.json:
         return json.dumps(environment(arguments.device) | result), 0

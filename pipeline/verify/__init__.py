@@ -1,0 +1,1 @@
+"""What `sling verify` holds the simulator against, figure by figure."""

@@ -1,0 +1,79 @@
+"""One definition of a check, for the report and for the tests alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Check:
+    """A figure of the simulator and what it may be at most.
+
+    Attributes:
+        name: What is compared.
+        against: What it is held against: a closed form, the twin, finer steps.
+        value: How far off it is, or the figure itself, in `unit`.
+        limit: The most it may be; None states the figure only.
+        note: What a reader of the figure should know.
+    """
+
+    name: str
+    against: str
+    value: float
+    unit: str
+    limit: float | None = None
+    note: str = ""
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the figure keeps its limit; what is no number never does. None without limit."""
+        if self.limit is None:
+            return None
+        return bool(math.isfinite(self.value) and self.value <= self.limit)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A theme of the report.
+
+    Attributes:
+        text: Markdown before the table.
+        pictures: Files in reports/figures/ and their captions.
+        details: What else reports/simulator.json keeps.
+    """
+
+    title: str
+    checks: list[Check]
+    text: str = ""
+    pictures: dict[str, str] = field(default_factory=dict)
+    details: dict = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Where checks run.
+
+    Attributes:
+        params: params.yaml.
+        figures: Folder for pictures; None draws none.
+    """
+
+    params: object
+    device: str = "cpu"
+    workers: int = 1
+    figures: Path | None = None
+
+
+def off(value, expected) -> float:
+    """Largest deviation from `expected` in percent of it; NaN where a value is none."""
+    ratio = np.asarray(value, float) / np.asarray(expected, float) - 1
+    return float(100 * np.abs(ratio).max())
+
+
+def unmet(checks: Iterable[Check]) -> list[Check]:
+    return [check for check in checks if check.met is False]

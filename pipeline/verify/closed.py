@@ -1,0 +1,97 @@
+"""Closed forms that the simulator is held against.
+
+The law is the stable neo-Hookean one without its logarithm (Smith, de Goes and Kim 2018, eq. 14 and
+its Lame parameters, section 3.4), with J = det F:
+
+    W = mu/2 (|F|^2 - 3) - mu (J - 1) + lam/2 (J - 1)^2
+
+Uniaxial stress, F = diag(l, q, q): no stress across, mu q + (lam (J - 1) - mu) l q = 0, gives
+J = 1 + mu/lam (1 - 1/l), and along the band the nominal stress P = mu (l - J / l^2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.sling.model import Sling, material
+
+
+@dataclass(frozen=True)
+class String:
+    """A straight band that neither bends nor weighs: a theta in uniaxial stress.
+
+    Attributes:
+        mu, lam: As `model.material` gives them [Pa].
+        damping, scale: d [s] and s.
+    """
+
+    sling: Sling
+    mu: float
+    lam: float
+    damping: float
+    scale: float
+
+    @classmethod
+    def of(cls, sling: Sling, theta) -> String:
+        return cls(sling, *map(float, material(sling, np.array([theta]))[0, :4]))
+
+    def volume(self, stretch):
+        """J at a stretch."""
+        return 1 + self.mu / self.lam * (1 - 1 / np.asarray(stretch))
+
+    def force(self, stretch):
+        """Pull [N] at a stretch."""
+        stretch = np.asarray(stretch)
+        return self.sling.area * self.mu * (stretch - self.volume(stretch) / stretch**2)
+
+    def tangents(self, stretch: float) -> tuple[np.ndarray, np.ndarray]:
+        """Second derivatives by (stretch, section ratio q) of W, and its shape part; (2, 2) [Pa].
+
+        The shape part is what is left without the volume's (lam - mu/3) J'^2.
+        """
+        j = self.volume(stretch)
+        q = np.sqrt(j / stretch)
+        p = self.lam * (j - 1) - self.mu
+        slope = np.array([q**2, 2 * stretch * q])  # of J
+        turn = np.array([[0.0, 2 * q], [2 * q, 2 * stretch]])
+        common = self.mu * np.diag([1.0, 2.0]) + p * turn
+        volume = np.outer(slope, slope)
+        return common + self.lam * volume, common + self.mu / 3 * volume
+
+    def axial(self, stretch: float) -> tuple[float, float]:
+        """Stiffness k [N/m] and damping c [N s/m] of the middle node along the stretched band.
+
+        Both halves act, k = 4 A / L dP/dl. The section follows the stretch without stress across,
+        dq/dl = -W_lq / W_qq, as long as d is short against the period; then, with w = (1, dq/dl),
+        k is w.H w and c is w.V w, V = d ((lam - mu/3) (dJ)^2 + s H_shape).
+        """
+        whole, shape = self.tangents(stretch)
+        w = np.array([1.0, -whole[0, 1] / whole[1, 1]])
+        per_length = 4 * self.sling.area / self.sling.rest_length
+        viscous = self.damping * (whole - shape + self.scale * shape)
+        return per_length * w @ whole @ w, per_length * w @ viscous @ w
+
+    def transverse(self, stretch: float) -> tuple[float, float]:
+        """The same across the band, k = 4 T / (l L): only the shape turns, so c = s d k."""
+        k = 4 * float(self.force(stretch)) / (stretch * self.sling.rest_length)
+        return k, self.scale * self.damping * k
+
+
+def cantilever(load: float, length: float, rigidity: float) -> float:
+    """Tip of a cantilever under an even load [N/m]: q L^4 / (8 E I)."""
+    return load * length**4 / (8 * rigidity)
+
+
+def clamped_beam(load: float, length: float, rigidity: float) -> float:
+    """Middle of a beam clamped at both ends under an even load [N/m]: q L^4 / (384 E I)."""
+    return load * length**4 / (384 * rigidity)
+
+
+def oscillation(time: np.ndarray, mass: float, k: float, c: float, start: float) -> np.ndarray:
+    """m x'' + c x' + k x = 0 from rest at `start`, under-damped."""
+    decay = c / (2 * mass)
+    rate = np.sqrt(k / mass - decay**2)
+    angle = rate * time
+    return start * np.exp(-decay * time) * (np.cos(angle) + decay / rate * np.sin(angle))

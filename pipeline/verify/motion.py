@@ -1,0 +1,157 @@
+"""Free motion: what falls freely falls as the steps say, and momentum is kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.sling.model import GRAVITY, Sling
+from pipeline.sling.solver import FREE, steps
+from pipeline.verify.check import Bench, Check, Section
+from pipeline.verify.experiment import TIGHT, band_of, launched, move, straight, straight_guess
+from pipeline.verify.twin import Twin
+
+ROUNDING = 1e-11
+THETA = (5e5, 0.45, 2e-3, 0.5, 1.0)
+
+
+def uneven(count: int) -> np.ndarray:
+    """Ends of steps between 0.5 and 2 ms, from 0, shape (count + 1,)."""
+    return np.append(0.0, np.cumsum(1e-3 * 2.0 ** np.sin(np.arange(count))))
+
+
+def fall_of_a_point(times: np.ndarray, order: int) -> np.ndarray:
+    """Height of a point mass from rest at 0 by the textbook's formulas, shape (S + 1,).
+
+    Backward Euler, or the second-order backward differentiation formula for uneven steps: the
+    derivative at the newest point of the parabola through the last three (the first step is
+    backward Euler's).
+    """
+    z, v = [0.0], [0.0]
+    for n in range(1, len(times)):
+        used = 1 if order == 1 or n == 1 else 2
+        apart = times[n - used : n + 1] - times[n]
+        weights = np.linalg.solve(np.vander(apart, increasing=True).T, np.eye(used + 1)[1])
+
+        def newest(past: list[float], rate: float, weights=weights, used=used) -> float:
+            return (rate - weights[:-1] @ past[-used:]) / weights[-1]
+
+        v.append(newest(v, -GRAVITY))
+        z.append(newest(z, v[-1]))
+    return np.array(z)
+
+
+def loose_band(bench: Bench) -> Sling:
+    sling = band_of(bench)
+    return straight(sling, sling.rest_length, clamped=(False, False))
+
+
+def free_fall(bench: Bench, count: int = 60) -> list[Check]:
+    sling, times = loose_band(bench), uneven(count)
+    checks = []
+    for order, name in ((1, "backward Euler"), (2, "second order, uneven steps")):
+        table = steps(times, times[1], hold=FREE, order=order)
+        table[0, 1:4] = 1, 0, 1
+        motion = move(bench, sling, THETA, table, straight_guess(sling), **TIGHT)
+        miss = np.abs(motion.x[0, :, :, 2] - fall_of_a_point(times, order)[1:, None]).max()
+        fallen = -motion.x[0, -1, 0, 2]
+        checks.append(
+            Check(
+                f"height in free fall, {name}",
+                "the steps' own solution for a point mass",
+                float(miss / fallen),
+                "of the fall",
+                ROUNDING,
+                f"{count} steps, {100 * fallen:.2g} cm, both ends free, double precision",
+            )
+        )
+    return checks
+
+
+def momenta(twin: Twin, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Linear and angular momentum (..., 3) about the origin; the sections' turning included."""
+    moving = twin.mass * v
+    linear = moving[..., :3].sum(-2)
+    parts = [
+        np.cross(x[..., k : k + 3], moving[..., k : k + 3])[..., : None if k == 0 else -1, :]
+        for k in (0, 3, 6)
+    ]
+    return linear, sum(part.sum(-2) for part in parts)
+
+
+def recoil(bench: Bench, h: float, order: int, damping: float, span: float = 0.02):
+    """Momenta of a bent, stretched band let go at rest, in shares of what its parts have.
+
+    Returns:
+        Largest linear and largest angular momentum that appear.
+    """
+    sling = loose_band(bench)
+    layers = straight_guess(replace(sling, half_width=1.3 * sling.half_width))
+    place = np.linspace(-1, 1, sling.layers)
+    layers[:, 1] += 0.05 * (1 - place**2) + 0.02 * place**3
+    layers[:, 2] += 0.03 * np.sin(2 * place)
+    theta = (THETA[0], THETA[1], damping, *THETA[3:])
+    table = launched(h, int(round(span / h)), order)
+    motion = move(bench, sling, theta, table, layers, gravity=0.0, **TIGHT)
+    x, v = motion.x[0], motion.v[0]
+    twin = Twin(sling, theta, gravity=0.0)
+    linear, angular = momenta(twin, x, v)
+    moving = np.abs(twin.mass * v)
+    speed = moving[..., :3].sum((-2, -1)).max()
+    turning = np.linalg.norm(np.cross(x[..., :3], (twin.mass * v)[..., :3]), axis=-1).sum(-1).max()
+    return (
+        float(np.linalg.norm(linear, axis=-1).max() / speed),
+        float(np.linalg.norm(angular, axis=-1).max() / turning),
+    )
+
+
+def momentum(bench: Bench) -> list[Check]:
+    """Linear momentum to rounding; angular momentum as far as the steps and the damping keep it."""
+    step = bench.params.sling.recoil_step
+    checks = []
+    for order, name in ((1, "backward Euler"), (2, "second order")):
+        linear, coarse = recoil(bench, step, order, 0.0)
+        _, fine = recoil(bench, step / 2, order, 0.0)
+        checks.append(
+            Check(
+                f"linear momentum out of nothing, {name}",
+                "conservation",
+                linear,
+                "of the parts'",
+                ROUNDING,
+                "recoil of a bent, stretched band with free ends, double precision",
+            )
+        )
+        checks.append(
+            Check(
+                f"angular momentum out of nothing, {name}, no damping",
+                "conservation",
+                coarse,
+                "of the parts'",
+                None,
+                f"steps of {1e3 * step:g} ms; half of them leave {fine:.2g}: order"
+                f" {np.log2(coarse / fine):.1f}",
+            )
+        )
+    _, damped = recoil(bench, step, 2, THETA[2])
+    checks.append(
+        Check(
+            f"angular momentum out of nothing, second order, d {1e3 * THETA[2]:g} ms",
+            "conservation",
+            damped,
+            "of the parts'",
+            None,
+            "the rate of the nominal stress is not that of a rigidly turning observer: damping as"
+            " it is defined brakes the turning of a stretched band too",
+        )
+    )
+    return checks
+
+
+def section(bench: Bench) -> Section:
+    return Section(
+        "Free motion",
+        [*free_fall(bench), *momentum(bench)],
+        "A band whose ends are free, in double precision.",
+    )

@@ -1,0 +1,192 @@
+"""The rod of pipeline/sling/rod.h in plain NumPy, float64, written a second time.
+
+A state x has shape (..., L, 9): per layer the node and the directors a, b of the edge behind it.
+The columns of the deformation gradients, F = [g a b], and the differences of neighbouring frames
+are linear in x; everything else is algebra on them. Leading axes are a batch. Nothing here is fast:
+tests and `sling verify` hold rod.h against it, and measure energies with it.
+
+A step keeps some coefficients at the predicted state, as rod.h does: those of the viscous forces,
+and the twist of a joint, which is linear about it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.sling.model import GRAVITY, Sling, fixed_frames, material
+
+
+def cofactor(f: np.ndarray) -> np.ndarray:
+    """Gradient of det [f0 f1 f2] by each column, shape (..., 3, 3); columns lie in axis -2."""
+    return np.cross(np.roll(f, -1, axis=-2), np.roll(f, -2, axis=-2))
+
+
+def cofactor_rate(f: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Second derivative of det at f, applied to `rate`: the quadratic cofactor, polarised."""
+    return cofactor(f + rate) - cofactor(f) - cofactor(rate)
+
+
+def _spin(pair: np.ndarray) -> np.ndarray:
+    """(a, b) -> (b, -a): 2 tau = (a+, b+) . spin(a-, b-)."""
+    return np.stack([pair[..., 1, :], -pair[..., 0, :]], axis=-2)
+
+
+def _sum(product: np.ndarray) -> np.ndarray:
+    return product.sum(axis=(-2, -1))
+
+
+@dataclass(frozen=True)
+class Twin:
+    """One band with one theta.
+
+    Attributes:
+        gravity: Along -z [m/s^2].
+        payload: Mass at the middle node [kg].
+        gripped: The fingers hold the direction of the middle.
+        share: Of the bending and twisting stiffness; guesses relax with less first.
+    """
+
+    sling: Sling
+    theta: tuple[float, ...]
+    gravity: float = GRAVITY
+    payload: float = 0.0
+    gripped: bool = False
+    share: float = 1.0
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """mu, lam, d, s of rod.h."""
+        return tuple(material(self.sling, np.array([self.theta]))[0, :4])
+
+    # ---- edges
+
+    def columns(self, x: np.ndarray) -> np.ndarray:
+        """g, a, b of each edge, shape (..., E, 3, 3)."""
+        g = np.diff(x[..., :3], axis=-2) / self.sling.edge_lengths[:, None]
+        return np.stack([g, x[..., :-1, 3:6], x[..., :-1, 6:9]], axis=-2)
+
+    def _to_layers(self, stress: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+        """Forces on the unknowns from those on columns (..., E, 3, 3) and edge directors."""
+        force = np.zeros((*stress.shape[:-3], self.sling.layers, 9), stress.dtype)
+        force[..., :-1, :3] -= stress[..., 0, :]
+        force[..., 1:, :3] += stress[..., 0, :]
+        volume = self.sling.edge_lengths[:, None, None]
+        force[..., :-1, 3:] += (volume * stress[..., 1:, :] + pairs).reshape(*stress.shape[:-2], 6)
+        return force
+
+    def stress(self, x: np.ndarray) -> np.ndarray:
+        """Nominal stress times the area, by column [N]: A (mu F + p cof F)."""
+        mu, lam, _, _ = self.parameters
+        f = self.columns(x)
+        cof = cofactor(f)
+        p = lam * ((f[..., 0, :] * cof[..., 0, :]).sum(-1) - 1) - mu
+        return self.sling.area * (mu * f + p[..., None, None] * cof)
+
+    def viscous_stress(self, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """d times the rate of the nominal stress at state `at`, shape part scaled by s, times A."""
+        mu, lam, d, s = self.parameters
+        f, turn = self.columns(at), self.columns(rate)
+        cof = cofactor(f)
+        volume_rate = _sum(cof * turn)[..., None, None]
+        bound = mu / np.sqrt(np.maximum((f**2).sum(-1).max(-1), 1e-6))
+        p = np.clip(lam * ((f[..., 0, :] * cof[..., 0, :]).sum(-1) - 1) - mu, -bound, bound)
+        shape = mu * turn + p[..., None, None] * cofactor_rate(f, turn) + mu / 3 * volume_rate * cof
+        return self.sling.area * d * ((lam - mu / 3) * volume_rate * cof + s * shape)
+
+    # ---- joints: between neighbouring frames; one that does not move has no length
+
+    def _frames(self, x: np.ndarray, fixed: float) -> np.ndarray:
+        """Pairs a, b along the band, those of clamps (and fingers) times `fixed` among them."""
+        pairs = x[..., :-1, 3:].reshape(*x.shape[:-2], self.sling.edges, 2, 3)
+        first, last, fingers = fixed * fixed_frames(self.sling)
+        middle = self.sling.middle
+        hand = [np.broadcast_to(fingers, (*x.shape[:-2], 1, 2, 3))] if self.gripped else []
+        ends = [np.broadcast_to(end, (*x.shape[:-2], 1, 2, 3)) for end in (first, last)]
+        return np.concatenate(
+            [ends[0], pairs[..., :middle, :, :], *hand, pairs[..., middle:, :, :], ends[1]], axis=-3
+        )
+
+    def _stiffness(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of each joint in bending and in twist [N m], shape (joints,)."""
+        sling, middle = self.sling, self.sling.middle
+        sizes = [0.0, *sling.edge_lengths[:middle], *([0.0] if self.gripped else [])]
+        sizes = np.array([*sizes, *sling.edge_lengths[middle:], 0.0])
+        per_length = self.share * sling.area * self.parameters[0] * 2 / (sizes[1:] + sizes[:-1])
+        per_length[[0, -1]] *= sling.clamped
+        bending = material(sling, np.array([self.theta]))[0, 5]
+        return bending * per_length, sling.radius**2 / 4 * per_length
+
+    def _joint_forces(self, x, rate, at, bounded: bool) -> np.ndarray:
+        """On the directors of the edges, shape (..., E, 2, 3), the twist linear about `at`."""
+        _, _, d, s = self.parameters
+        bend, torsion = self._stiffness()
+        near, moving, turn = (self._frames(at, 1), self._frames(x, 1), self._frames(rate, 0))
+        moving = moving + d * s * turn
+        after, before = _spin(near[..., :-1, :, :]) / 2, -_spin(near[..., 1:, :, :]) / 2
+        twist = _sum(after * moving[..., 1:, :, :] + before * moving[..., :-1, :, :])
+        twist = twist - _sum(after * near[..., 1:, :, :])
+        loss = 2 * (bend - torsion)
+        if bounded:  # so that neither energy nor dissipation of a joint is negative
+            size = _sum(after**2 + before**2)
+            loss = np.minimum(loss, 1.9 * bend / np.maximum(size, 1e-3))
+        pull = bend[:, None, None] * np.diff(moving, axis=-3)
+        twist = (loss * twist)[..., None, None]
+        on_after, on_before = pull - twist * after, -pull - twist * before
+        force = on_after[..., :-1, :, :] + on_before[..., 1:, :, :]
+        if self.gripped:  # the frame between the two edges in the middle is the fingers'
+            force = np.delete(force, self.sling.middle, axis=-3)
+        return force
+
+    # ---- energies and forces
+
+    def elastic(self, x: np.ndarray) -> np.ndarray:
+        """Stored energy [J], shape (...)."""
+        mu, lam, _, _ = self.parameters
+        f = self.columns(x)
+        j = np.linalg.det(f)
+        density = mu / 2 * (_sum(f**2) - 3) - mu * (j - 1) + lam / 2 * (j - 1) ** 2
+        edges = (density * self.sling.area * self.sling.edge_lengths).sum(-1)
+        bend, torsion = self._stiffness()
+        frames = self._frames(x, 1)
+        twist = _sum(frames[..., 1:, :, :] * _spin(frames[..., :-1, :, :])) / 2
+        joints = bend * _sum(np.diff(frames, axis=-3) ** 2) - 2 * (bend - torsion) * twist**2
+        return edges + joints.sum(-1) / 2
+
+    def gradient(self, x: np.ndarray) -> np.ndarray:
+        """Of the stored energy, shape (..., L, 9)."""
+        return self._to_layers(
+            self.stress(x), self._joint_forces(x, np.zeros_like(x), x, bounded=False)
+        )
+
+    def internal(self, x: np.ndarray, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """Elastic and viscous forces of a step: the latter at, the twist about the state `at`."""
+        return self._to_layers(
+            self.stress(x) + self.viscous_stress(rate, at),
+            self._joint_forces(x, rate, at, bounded=True),
+        )
+
+    def viscous(self, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """Viscous forces alone; `rate` times them is the dissipated power [W]."""
+        return self.internal(at, rate, at) - self.internal(at, np.zeros_like(rate), at)
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Inertia of each unknown, shape (L, 9): halves of edges, and their sections' directors."""
+        sling, ds = self.sling, self.sling.edge_lengths
+        line = sling.mass / sling.rest_length
+        mass = np.zeros((sling.layers, 9))
+        mass[:, :3] = line * (np.append(ds, 0) + np.append(0, ds))[:, None] / 2
+        mass[:, 3:] = line * np.append(ds, ds[-1])[:, None] * sling.radius**2 / 4
+        mass[sling.middle, :3] += self.payload
+        return mass
+
+    def kinetic(self, v: np.ndarray) -> np.ndarray:
+        moving = v.copy()
+        moving[..., -1, 3:] = 0  # no edge of its own
+        return (self.mass * moving**2).sum(axis=(-2, -1)) / 2
+
+    def weight(self, x: np.ndarray) -> np.ndarray:
+        """Energy in gravity [J]."""
+        return self.gravity * (self.mass[:, 2] * x[..., 2]).sum(-1)

@@ -1,0 +1,46 @@
+"""The tetrahedral mesh fills the cylinder once, without gaps."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from pipeline.sling.cylinder import cylinder, layers, section, volumes
+
+
+@pytest.mark.parametrize("rings", [1, 2, 3])
+def test_mesh_fills_the_round_band_and_neighbours_share_faces(rings):
+    vertices, tetrahedra = cylinder(layers(0.55, 21, 0.015), 0.010, rings)
+    volume = volumes(vertices, tetrahedra)
+    assert volume.min() > 0
+    assert volume.sum() == pytest.approx(np.pi * 0.005**2 * 0.55)
+
+    faces = Counter(
+        tuple(sorted(np.delete(corners, corner))) for corners in tetrahedra for corner in range(4)
+    )
+    outside = 2 * 6 * rings * 20 + 2 * 6 * rings**2  # of the hull and of both ends
+    assert Counter(faces.values()) == {
+        1: outside,
+        2: (4 * len(tetrahedra) - outside) // 2,
+    }
+
+
+def test_the_papers_mesh_has_900_tetrahedra_in_layers_of_seven():
+    arc = layers(0.55, 51, 0.015)
+    vertices, tetrahedra = cylinder(arc, 0.010)
+    assert vertices.shape == (51, 7, 3)
+    assert tetrahedra.shape == (900, 4)
+    assert arc[[0, 1, -2, -1]] == pytest.approx([-0.015, 0.0, 0.52, 0.535])
+    assert np.ptp(tetrahedra // 7, axis=1).max() == 1  # each lies between two layers
+
+
+def test_section_bends_like_a_circle():
+    points, triangles = section(0.005)
+    corners = points[triangles]
+    area = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 2
+    # second moment of a triangle: area / 12 (sum of squares + square of the sum)
+    squares = (corners**2).sum(axis=1) + corners.sum(axis=1) ** 2
+    moments = (area[:, None] / 12 * squares).sum(axis=0)
+    assert moments == pytest.approx(np.full(2, np.pi * 0.005**4 / 4), rel=0.01)

@@ -23,8 +23,10 @@ from pipeline.sling.model import (
 from pipeline.sling.solver import (
     FAILURE,
     FREE,
+    HELD,
     HELD_FORCE,
     LANE_STATE,
+    OPENING,
     PAYLOAD,
     RELAX_STEPS,
     Schedule,
@@ -217,3 +219,53 @@ def test_mesh_is_chosen_in_params_and_not_for_a_gpu(params):
     assert Sling.of(band, params.setup, params.sling).unknowns == 9
     with pytest.raises(UserError, match="CPU"):
         launch(solid, THETA, DRAW, device="cuda:0")
+
+
+def held_steps(solid, count=20):
+    """Rows that hold a drawn band at rest, and that move the hand by 1 m/s."""
+    relax = relaxation(HELD)
+    moving = steps(0.005 * np.arange(count + 1), 0.005, hold=HELD)
+    relax[:, 6:9] = 0.0, *DRAW
+    moving[:, 6:9] = np.array([0.0, *DRAW]) - np.outer(np.arange(1, count + 1), [0.0, 5e-3, 0.0])
+    for table in (relax, moving):
+        table[:, 9], table[:, 10] = 1e4, 0.0
+    return relax, moving
+
+
+def stepped(solid, table, **options):
+    return run(
+        solid,
+        Schedule(table, first_free=len(table)),
+        material(solid, np.array([THETA])),
+        drawn_guess(solid, np.array([DRAW])),
+        np.zeros((1, LANE_STATE)),
+        frame_steps=np.arange(len(table)),
+        frame_weights=np.ones(len(table)),
+        frame_width=solid.unknowns,
+        **options,
+    )
+
+
+def test_force_of_a_moving_hand_is_converged(solid):
+    """Within 1e-4 of Newton's method to rounding, though it stops much sooner."""
+    table = np.vstack(held_steps(solid))
+    quick, exact = (stepped(solid, table, double=True, tolerance=t) for t in (2e-6, 1e-12))
+    force = exact.output[0, RELAX_STEPS:, :3]
+    assert exact.output[0, :, 3].sum() > 1.3 * quick.output[0, :, 3].sum()
+    assert np.abs(quick.output[0, RELAX_STEPS:, :3] - force).max() < 1e-4 * np.abs(force).max()
+
+
+def test_held_section_is_the_rest_section_across_the_fork(solid):
+    section = stepped(solid, held_steps(solid)[0]).frames[0, -1, solid.middle].reshape(7, 3)
+    rest = cylinder([0.0, 1.0], 2 * solid.radius)[0][0]
+    assert section - section[0] == pytest.approx(rest, abs=1e-6)
+
+
+def test_pads_that_open_without_friction_to_lose_hold_the_band_where_it_is(solid):
+    """Friction that makes up for the whole pull, shared by the section's vertices as their mass."""
+    relax, moving = held_steps(solid)
+    opening = moving.copy()
+    opening[:, 0], opening[:, 5], opening[:, 9] = 2.5e-4, OPENING, 0.0
+    frames = stepped(solid, np.vstack([relax, opening])).frames[0, RELAX_STEPS - 1 :]
+    shift = frames[:, solid.middle].reshape(-1, 7, 3).mean(axis=1) - frames[0, solid.middle, :3]
+    assert np.abs(shift).max() < 1e-3

@@ -18,7 +18,7 @@ def sling_kernel(
     """Compile the native text for a mesh; Warp keeps the binary in its cache."""
     scalar = wp.float64 if double else wp.float32
     array, indices = wp.array(dtype=scalar), wp.array(dtype=wp.int32)
-    parts = ("lanes.h", "state.h", "material.h", f"{element}.h", "step.h")
+    parts = ("lanes.h", "state.h", "material.h", f"{element}.h", "solve.h", "step.h")
     tetrahedra = {} if element == "rod" else {"TETS": len(CORNERS), "CORNERS": _braced(CORNERS)}
     text = text_of(
         *(Path(__file__).with_name(part) for part in parts),

@@ -9,7 +9,8 @@
 #if defined(__CUDA_ARCH__)
 typedef SC real;
 #define TEAMS (32 / T)
-#define COLUMNS 1                                        // columns of a block that a thread has
+#define COLUMNS 1                                        // columns of a block that a thread has, the residual's too
+#define OWN_ROWS 1                                       // rows of the solution that it has
 const int lane = tid % 32, team = lane / T < TEAMS ? lane / T : TEAMS - 1;
 const int sling = tid / 32 * TEAMS + team;
 const int member = lane < TEAMS * T ? lane - team * T : 1000;  // spare threads find no work
@@ -33,6 +34,7 @@ auto team_maximum = [&](real x) -> real {
 #else
 typedef SC real __attribute__((vector_size(sizeof(SC) * W)));
 #define COLUMNS (N + 1)
+#define OWN_ROWS N
 const int sling = tid, member = 0;
 #define ROW(array, size) ((real*)array.data + (size_t)sling * (size))
 #define SAVE ((real*)work.data + (size_t)sling * (L * SAVED) * COLUMNS)
@@ -44,7 +46,11 @@ auto all_lanes = [](auto mask) -> bool { bool all = true; for (int k = 0; k < W;
 auto root = [](real x) -> real { real y; for (int k = 0; k < W; ++k) y[k] = __builtin_sqrt(x[k]); return y; };
 #define ALL(mask) all_lanes(mask)
 #define SQRT(x) root(x)
+#if N > 9
+#define UNROLL                                           // it would take minutes to compile
+#else
 #define UNROLL _Pragma("clang loop unroll(full)")
+#endif
 #define FIRST_ROW(c) (c)
 auto team_maximum = [](real x) -> real { return x; };
 #endif

@@ -10,7 +10,7 @@
 // where -/+ are the edges on both sides of a node; it is damped by d s/2 times the same form in the rates, and
 // the twist is taken to first order about the predicted state.
 //
-// For step.h: what one layer adds to the Hessian and the residual (stage_layer), as columns (column), and what
+// For solve.h and step.h: what one layer adds to the Hessian and the residual (stage_layer), as columns (column), and what
 // else depends on the element: which unknowns are places (the first ones), their masses, and the hand's hold.
 
 const int PLACES = 3;  // of the node; the other unknowns are directors
@@ -35,7 +35,6 @@ real staged[STAGED], felt[54];
 #define RESIDUAL(m, j) GET(FORCE + (m), j)
 #define RESIDUAL_NEXT(m, j) GET(FORCE_NEXT + (m), j)
 #define LOWER(m, n) ((m) >= (n) ? (m) * ((m) + 1) / 2 + (n) : (n) * ((n) + 1) / 2 + (m))
-
 
 // which unknowns have an equation: not a node that is clamped or held, nor the directors of the last layer, which
 // has no edge (they are the clamp's)

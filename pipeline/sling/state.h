@@ -4,6 +4,7 @@ const int ROW_LENGTH = (N + 3) / 4 * 4;
 const int SAVED = 2 * N + 1;  // numbers kept of a column for the back substitution: multipliers, coupling, solution
 const SC mean_edge = geometry.data[0], area = geometry.data[1], radius2 = geometry.data[2];
 const SC line_mass = geometry.data[3], gravity = geometry.data[4], node_mass = line_mass * mean_edge;
+const SC per_edge = (SC)1 / mean_edge;
 const SC* edge = mesh.data;  // rest length of each edge; after them, what else the element wants
 const SC tolerance = geometry.data[5], step_limit = geometry.data[6];
 const SC shortest_edge = geometry.data[10];  // or radius, where that is shorter and meshed
@@ -57,6 +58,9 @@ UNROLL for (int c = 0; c < 3; ++c) direction[c] = LANE[c];
 UNROLL for (int c = 0; c < 5; ++c) leaving[c] = zero;
 
 // of the step under way
-SC ibh = 0, ibh2 = 0, ct = 0;     // 1 / (beta h), its square; torsion
-bool attached = false, gripped = false;  // the hand leads the middle layer's places; its pads hold the direction as well
-real cb = zero, dh = zero, dsh = zero, shift = zero, inexact = zero;          // bending, d / (beta h), that times s, shift of the Hessian
+SC ibh = 0, ibh2 = 0, ct = 0;              // 1 / (beta h), its square; torsion
+bool attached = false, gripped = false;    // the hand leads the middle layer's places; its pads hold the direction as well
+bool opening = false;                      // its fingers open
+real capacity = zero;                      // what the pads can hold [N]
+real cb = zero, dh = zero, dsh = zero;     // bending, d / (beta h), that times s
+real shift = zero, inexact = zero;         // of the Hessian: what is added to its diagonal, whether it is not exact

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.identify.space import Space
-from pipeline.sling.model import Sling, drawn_guess, fixed_frames, hanging_guess
+from pipeline.sling.model import Sling, drawn_guess, hanging_guess
 from pipeline.sling.solver import FREE, HELD, OPENING, POUCH, relaxation, steps
 from pipeline.verify.check import Bench, Check, Section
 from pipeline.verify.experiment import (
@@ -38,6 +38,7 @@ class Scene:
 
     Attributes:
         before: None where the steps begin from the guess itself.
+        turned: How far the sections are turned about the band before the steps, in its middle.
     """
 
     sling: Sling
@@ -46,11 +47,12 @@ class Scene:
     before: Sling | None = None
     hold: int = FREE
     payload: float = 0.0
+    turned: float = 0.0
 
 
-def _turned(sling: Sling, layers: np.ndarray) -> np.ndarray:
-    """Layers (L, 9) with their sections turned about the band, most in its middle."""
-    angle = 0.3 * np.sin(np.pi * sling.arc / sling.rest_length)[:, None]
+def _turned(sling: Sling, layers: np.ndarray, most: float) -> np.ndarray:
+    """Layers (L, 9) with their sections turned about the band, by `most` in its middle."""
+    angle = most * np.sin(np.pi * sling.arc / sling.rest_length)[:, None]
     a, b = layers[:, 3:6], layers[:, 6:]
     turned = np.cos(angle) * a + np.sin(angle) * b, np.cos(angle) * b - np.sin(angle) * a
     return np.hstack([layers[:, :3], *turned])
@@ -81,7 +83,7 @@ def scenes(sling: Sling) -> dict[str, Scene]:
             hold=POUCH,
             payload=sling.projectile_mass,
         ),
-        "twisted and let go": Scene(taut, launched(0.0005, 12, 1), _turned(taut, start)),
+        "twisted and let go": Scene(taut, launched(0.0005, 12, 1), start, before=taut, turned=0.3),
         "stretched and let go at both ends": Scene(loose, launched(0.0005, 12), start, before=taut),
     }
 
@@ -97,7 +99,7 @@ def compare(bench: Bench, thetas: np.ndarray) -> dict[str, tuple[float, float]]:
                 table = relaxation(scene.hold)
                 table[:, 6:9] = scene.guess[scene.sling.middle, :3]
                 start = rest(bench, scene.before, theta, start, table=table, double=True)
-            start[-1, 3:] = fixed_frames(scene.sling)[1].ravel()
+            start = _turned(scene.sling, start, scene.turned)
             options = {"payload": scene.payload}
             motion = move(bench, scene.sling, theta, scene.table, start, **options, **TIGHT)
             band = Twin(scene.sling, tuple(theta), **options)

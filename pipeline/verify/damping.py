@@ -132,7 +132,7 @@ def growth(bench: Bench, count: int = 48) -> list[Check]:
                 f"rise above the start, {label}, {1e3 * h:g} ms",
                 "energy never grows without work",
                 max(rise, 0.0),
-                "of the energy at the start",
+                "of the start",
                 ROUNDING,
                 note,
             )
@@ -142,7 +142,7 @@ def growth(bench: Bench, count: int = 48) -> list[Check]:
                 f"rise in any one step, {label}, {1e3 * h:g} ms",
                 "energy never grows without work",
                 max(wobble, 0.0),
-                "of the energy at the start",
+                "of the start",
                 ROUNDING if order == 1 else None,
                 note if order == 1 else "two-step method: its energy may sway from step to step",
             )

@@ -76,7 +76,7 @@ def oscillation(path: Path, cases: dict[str, tuple[np.ndarray, np.ndarray, np.nd
             )
             ax.set(title=name, xlabel="time [s]")
         np.atleast_1d(axes)[0].set_ylabel("displacement [mm]")
-        np.atleast_1d(axes)[0].legend(loc="lower right")
+        np.atleast_1d(axes)[-1].legend(loc="upper right")
         _save(figure, path)
 
 

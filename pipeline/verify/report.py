@@ -10,11 +10,9 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-import pipeline.sling
 from pipeline.bench import available, environment
 from pipeline.errors import UserError
 from pipeline.files import replacing, write_json, write_text
-from pipeline.identify.checkpoint import fingerprint
 from pipeline.verify import (
     agreement,
     damping,
@@ -41,7 +39,7 @@ bend with E I and twist with G J of the round section. Viscous stress is d times
 elastic stress, its shape part times s. Each step, backward Euler in the hand and second order \
 (BDF2) after the release, is solved by Newton's method on the whole band.
 
-Device {device}, {device_name}; {seconds:.0f} s in all.
+Device {device}, {device_name}; commit {commit}; {seconds:.0f} s in all.
 """
 SECTIONS: dict[str, Callable[..., Section]] = {
     "at rest": statics.section,
@@ -79,8 +77,9 @@ def verify(
         jobs = SECTIONS | {
             title: partial(section, progress=progress) for title, section in CAMPAIGNS.items()
         }
-        for number, (title, section) in enumerate((jobs | (extra or {})).items(), 1):
-            progress(f"{number}/{len(jobs | (extra or {}))} {title}")
+        jobs |= extra or {}
+        for number, (title, section) in enumerate(jobs.items(), 1):
+            progress(f"{number}/{len(jobs)} {title}")
             began = time.perf_counter()
             try:
                 sections.append(section(bench))
@@ -92,10 +91,8 @@ def verify(
         for picture in sorted(Path(figures).glob("*.png")):
             with replacing(root / "reports/figures" / picture.name) as temporary:
                 temporary.write_bytes(picture.read_bytes())
-    about = environment(device) | {
-        "command": f"sling verify --device {device}",
-        "seconds": round(time.perf_counter() - start, 1),
-        "simulator": fingerprint(Path(pipeline.sling.__file__).parent)[:12],
+    about = environment(device, f"sling verify --device {device}") | {
+        "seconds": round(time.perf_counter() - start, 1)
     }
     write_text(root / "reports/simulator.md", markdown(sections, about))
     write_json(root / "reports/simulator.json", about | {"sections": list(map(_entry, sections))})
@@ -120,7 +117,7 @@ def markdown(sections: list[Section], about: dict) -> str:
         met=limited - missed,
         limited=limited,
         missed=f", {missed} not" if missed else "",
-        **{key: about[key] for key in ("device", "device_name", "seconds")},
+        **{key: about[key] for key in ("device", "device_name", "commit", "seconds")},
     )
     return "\n".join([head, *map(_part, sections)])
 
@@ -158,7 +155,7 @@ def limit(check: Check) -> str:
 def _short(value: float) -> str:
     if not math.isfinite(value):
         return "no number"
-    return "0" if value == 0 else f"{value:.2g}" if abs(value) < 10 else f"{value:.4g}"
+    return "0" if value == 0 else f"{value:.2g}" if abs(value) < 0.1 else f"{value:.4g}"
 
 
 def _entry(section: Section) -> dict:

@@ -222,15 +222,20 @@ def _milliseconds(seconds: float, of_rod: float) -> str:
     return f"{1e3 * seconds:.3g} ms" + (f" (× {ratio:.0f})" if ratio > 1.5 else "")
 
 
+def _known(value: float) -> float | None:
+    """What JSON can hold."""
+    return float(f"{value:.5g}") if np.isfinite(value) else None
+
+
 def section(bench: Bench) -> Section:
     """On the CPU, whatever the other checks run on."""
     columns = {name: measure(bench, sling) for name, sling in slings(bench.params).items()}
     rod = next(iter(columns.values()))
     details = {
         name: {
-            "pull_over_string": one.pull.tolist(),
-            "bending_over_euler_bernoulli": one.bending.tolist(),
-            "against_the_rod": {key: float(value) for key, value in compare(one, rod).items()},
+            "pull_over_string": list(map(_known, one.pull)),
+            "bending_over_euler_bernoulli": list(map(_known, one.bending)),
+            "against_the_rod": {key: _known(value) for key, value in compare(one, rod).items()},
             "cpu_s_a_rollout": one.rollout_seconds,
             "cpu_s_a_launch": one.launch_seconds,
             "bytes_a_rollout": one.memory,

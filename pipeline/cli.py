@@ -84,6 +84,9 @@ def parser() -> argparse.ArgumentParser:
     sub.add_argument("--target", type=target, required=True, metavar="M", help="along the floor")
     sub.add_argument("--json", action="store_true")
 
+    sub = command(run_verify, "hold the simulator against closed forms, finer steps, other engines")
+    sub.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
+
     sub = command(run_bench, "measure rollouts and launches a second")
     sub.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
     sub.add_argument("--peers", action="store_true", help="MuJoCo and Newton beside ours")
@@ -202,6 +205,17 @@ def run_aim(arguments: argparse.Namespace) -> tuple[str, int]:
     from pipeline.policy.aim import aim
 
     return shown(aim(load(), arguments.band, arguments.method, arguments.target), arguments.json)
+
+
+def run_verify(arguments: argparse.Namespace) -> tuple[str, int]:
+    from pipeline.params import load
+    from pipeline.peers import checks as peers
+    from pipeline.verify.report import summary, verify
+
+    text, missed = summary(
+        verify(load(), arguments.device, extra={"against MuJoCo": peers.section})
+    )
+    return text, int(missed > 0)
 
 
 def run_bench(arguments: argparse.Namespace) -> tuple[str, int]:

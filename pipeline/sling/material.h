@@ -6,18 +6,21 @@
 //
 // and the nominal stress mu F + p cof F, p = lam (J - 1) - mu. Viscous stress is d times the rate of the elastic
 // stress: the tangent of W at the predicted state, applied to the rates F'. Its shape part is scaled by s, the
-// volume part K J'^2 (K = lam - mu/3) is not, and p in it is bounded by mu / max |xk|, so that a slack band
-// dissipates too:
+// volume part K J'^2 (K = lam - mu/3) is not. p in it is bounded so that every state dissipates: with a bound m on
+// the largest principal stretch (the root of the largest row sum of |xk.xl|, exact where nothing shears)
+//
+//   -mu/m (1 + min(max(J, 0), 1)^2)/2  <=  p  <=  0.7 mu/m
 //
 //   D = d/2 [ K J'^2 + s ( mu |F'|^2 + p d2J(F', F') + mu/3 J'^2 ) ]
 
 // F now, predicted, and its rate -> stress (columns) and its derivative, K[k (k + 1) / 2 + l] for columns k >= l,
 // exact as long as p / mu is between `least` and `most`
 auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&xt)[3][3], SC least, SC most, real (&stress)[3][3], real (&K)[6][3][3]) {
-  real C[3][3], Cp[3][3], square = zero;  // cofactors; the longest column, squared
+  real C[3][3], Cp[3][3], square = zero;  // cofactors; m squared
   UNROLL for (int k = 0; k < 3; ++k) {
     cross(x[(k + 1) % 3], x[(k + 2) % 3], C[k]); cross(xp[(k + 1) % 3], xp[(k + 2) % 3], Cp[k]);
-    square = maximum(square, dot(xp[k], xp[k]));
+    const real shear = magnitude(dot(xp[k], xp[(k + 1) % 3])) + magnitude(dot(xp[k], xp[(k + 2) % 3]));
+    square = maximum(square, dot(xp[k], xp[k]) + shear);
   }
   const real J = dot(x[0], C[0]), Jp = dot(xp[0], Cp[0]);
   const real p = lam * (J - (SC)1) - mu;
@@ -25,7 +28,8 @@ auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&
   const real pc = minimum(maximum(p, least * mu), most * mu);
   inexact = pc == p ? inexact : one;
   const real bound = mu / SQRT(maximum(square, zero + (SC)1e-6));
-  const real pv = minimum(maximum(lam * (Jp - (SC)1) - mu, -bound), bound);
+  const real kept = minimum(maximum(Jp, zero), one);
+  const real pv = minimum(maximum(lam * (Jp - (SC)1) - mu, (SC)-0.5 * bound * (one + kept * kept)), (SC)0.7 * bound);
   const real Jt = dot(Cp[0], xt[0]) + dot(Cp[1], xt[1]) + dot(Cp[2], xt[2]);
   const real volumetric = bulk + s * mu / (SC)3;
   UNROLL for (int k = 0; k < 3; ++k) {

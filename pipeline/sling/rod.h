@@ -7,8 +7,9 @@
 //   W_joint = mu A / (2 l) [ cb (|a+ - a-|^2 + |b+ - b-|^2) - 2 (cb - ct) tau^2 ]
 //   tau = (a+.b- - b+.a-)/2 (twist),  ct = R^2/4 (G I_p),  cb = (1 + nu) R^2/2 (E I)
 //
-// where -/+ are the edges on both sides of a node; it is damped by d s/2 times the same form in the rates, and
-// the twist is taken to first order about the predicted state.
+// where -/+ are the edges on both sides of a node, and the twist is taken to first order about the predicted state.
+// d s/2 times the first, bending form in the rates damps it: with the twist's part of it, neighbours that are turned
+// far from each other would gain energy.
 //
 // For solve.h and step.h: what one layer adds to the Hessian and the residual (stage_layer), as columns (column), and what
 // else depends on the element: which unknowns are places (the first ones), their masses, and the hand's hold.
@@ -124,14 +125,14 @@ auto stage_layer = [&](int i) {
       }
       real twist = (SC)-0.5 * (dot(to_p, from_p + 3) - dot(to_p + 3, from_p)), size = zero;
       UNROLL for (int c = 0; c < 6; ++c) {
-        twist += tw[c] * from[c] + tw_next[c] * to[c] + d * s * (tw[c] * from_t[c] + tw_next[c] * to_t[c]);
+        twist += tw[c] * from[c] + tw_next[c] * to[c];
         size += tw[c] * tw[c] + tw_next[c] * tw_next[c];
       }
       const SC apart = (SC)0.5 * (fixed_from || fixed_to || i == L - 2 ? ds : ds + edge[i + 1]);  // a frame is half an edge away
       const real weight = zero + (joint == 1 && i == L - 2 && !last_clamped ? (SC)0 : (SC)1);
       const real k = mu * weight * (area / apart), kb = k * cb;
       const real kt = minimum((SC)2 * (kb - k * ct), (SC)1.9 * kb / maximum(size, zero + (SC)1e-3));
-      const real hb = kb * (one + dsh), ht = kt * (one + dsh);
+      const real hb = kb * (one + dsh), ht = kt;
       if (fixed_from) {
         UNROLL for (int m = 0; m < 6; ++m) {
           f[3 + m] += kb * (to[m] - from[m] + d * s * (to_t[m] - from_t[m])) - kt * twist * tw_next[m];

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.sling.model import GRAVITY, Sling, fixed_frames, layers_of, material
+from pipeline.sling.model import GRAVITY, ROD, Sling, fixed_frames, layers_of, material
 from pipeline.sling.solver import (
     FAILURE,
     FREE,
@@ -47,9 +47,10 @@ class Motion:
 
 
 def band_of(bench: Bench) -> Sling:
-    """The first band of params.yaml in the default resolution, as a round solid band mounts."""
+    """The first band of params.yaml as a rod of the default resolution, round and solid."""
     params = bench.params
-    return Sling.of(params.bands[next(iter(params.bands))], params.setup, params.sling)
+    resolution = params.sling.model_copy(update={"mesh": ROD})
+    return Sling.of(params.bands[next(iter(params.bands))], params.setup, resolution)
 
 
 def straight(sling: Sling, length: float, **changes) -> Sling:

@@ -16,6 +16,7 @@ from pipeline.files import replacing, write_json, write_text
 from pipeline.verify import (
     agreement,
     damping,
+    elements,
     energy,
     launches,
     motion,
@@ -31,7 +32,7 @@ HEAD = """\
 `sling verify` writes this page: {met} of {limited} limits are kept{missed}. Figures without a \
 limit are stated for what they tell. [simulator.json](simulator.json) keeps figures and environment.
 
-**What is solved.** A band is an extensible director rod: each edge has a deformation gradient \
+**What is solved.** A band is by default an extensible director rod: each edge has a deformation gradient \
 F = [g a b] of its stretch and its section, with the stable neo-Hookean law without its logarithm \
 (Smith, de Goes and Kim 2018), W = μ/2 (|F|² − 3) − μ (J − 1) + λ/2 (J − 1)², J = det F; λ is the \
 first Lamé parameter plus μ, so that E and ν are the small-strain ones. Joints between edges \
@@ -48,6 +49,7 @@ SECTIONS: dict[str, Callable[..., Section]] = {
     "free motion": motion.section,
     "energy": energy.section,
     "the five parameters": parameters.section,
+    "rod and tetrahedra": elements.section,
 }
 CAMPAIGNS = {"launches": launches.section, "random parameters": robustness.section}
 

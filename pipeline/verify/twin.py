@@ -90,8 +90,12 @@ class Twin:
         f, turn = self.columns(at), self.columns(rate)
         cof = cofactor(f)
         volume_rate = _sum(cof * turn)[..., None, None]
-        bound = mu / np.sqrt(np.maximum((f**2).sum(-1).max(-1), 1e-6))
-        p = np.clip(lam * ((f[..., 0, :] * cof[..., 0, :]).sum(-1) - 1) - mu, -bound, bound)
+        # Gershgorin's bound on the largest principal stretch; less in compression
+        longest = np.abs(np.einsum("...kc,...lc->...kl", f, f)).sum(-1).max(-1)
+        bound = mu / np.sqrt(np.maximum(longest, 1e-6))
+        j = (f[..., 0, :] * cof[..., 0, :]).sum(-1)
+        least = -bound * (1 + np.clip(j, 0, 1) ** 2) / 2
+        p = np.clip(lam * (j - 1) - mu, least, 0.7 * bound)
         shape = mu * turn + p[..., None, None] * cofactor_rate(f, turn) + mu / 3 * volume_rate * cof
         return self.sling.area * d * ((lam - mu / 3) * volume_rate * cof + s * shape)
 
@@ -123,7 +127,6 @@ class Twin:
         _, _, d, s = self.parameters
         bend, torsion = self._stiffness()
         near, moving, turn = (self._frames(at, 1), self._frames(x, 1), self._frames(rate, 0))
-        moving = moving + d * s * turn
         after, before = _spin(near[..., :-1, :, :]) / 2, -_spin(near[..., 1:, :, :]) / 2
         twist = _sum(after * moving[..., 1:, :, :] + before * moving[..., :-1, :, :])
         twist = twist - _sum(after * near[..., 1:, :, :])
@@ -131,7 +134,7 @@ class Twin:
         if bounded:  # so that neither energy nor dissipation of a joint is negative
             size = _sum(after**2 + before**2)
             loss = np.minimum(loss, 1.9 * bend / np.maximum(size, 1e-3))
-        pull = bend[:, None, None] * np.diff(moving, axis=-3)
+        pull = bend[:, None, None] * np.diff(moving + d * s * turn, axis=-3)
         twist = (loss * twist)[..., None, None]
         on_after, on_before = pull - twist * after, -pull - twist * before
         force = on_after[..., :-1, :, :] + on_before[..., 1:, :, :]

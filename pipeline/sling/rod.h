@@ -15,7 +15,6 @@
 // else depends on the element: which unknowns are places (the first ones), their masses, and the hand's hold.
 
 const int PLACES = 3;  // of the node; the other unknowns are directors
-const real balance = (SC)3e-2 * node_mass * gravity + (SC)1e-5 * mu * area;  // N; what is less counts for nothing
 auto share = [](int) -> SC { return 1; };             // of a place in the layer's mass
 auto in_hand = [](int) -> SC { return 0; };           // a place from the hand's, while it is held
 

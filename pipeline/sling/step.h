@@ -7,6 +7,8 @@
 // where that is indefinite, its diagonal is shifted.
 
 const SC close = sqrt(0.25 * tolerance * shortest_edge);  // from here on Newton's next change is below the tolerance
+// a residual that counts for nothing [N]: by default 3 % of a node's weight, and what a strain of 1e-5 takes
+const real balance = tolerance * (SC)(3.0 / PLACES) * ((SC)1.5e4 * node_mass * gravity + (SC)5 * mu * area);
 real offset[PLACES], pull = zero, held[3] = {zero, zero, zero};  // of the hand; the force on it when it last held
 UNROLL for (int m = 0; m < PLACES; ++m) offset[m] = zero;
 real contact_before = zero;  // of the pouch

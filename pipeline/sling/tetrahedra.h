@@ -20,7 +20,6 @@ const SC* sections = shares + VERTICES;
 const SC* volumes = sections + 2 * VERTICES;
 const SC* gradients = volumes + TETS;
 
-const real balance = ((SC)3e-2 * node_mass * gravity + (SC)1e-5 * mu * area) / (SC)VERTICES;  // N; what is less counts for nothing
 auto share = [&](int m) -> SC { return shares[m / 3]; };
 auto in_hand = [&](int m) -> SC {  // the section lies in the fingers' frame
   const SC* frame = clamp.data + 12;

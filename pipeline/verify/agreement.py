@@ -22,7 +22,7 @@ from pipeline.verify.experiment import (
 from pipeline.verify.march import march
 from pipeline.verify.twin import Twin
 
-LIMIT = 1e-5  # of the band's motion, or of its pull: rod.h stops at 1e-5 mu A of imbalance
+LIMIT = 1e-7  # of the band's motion, or of its pull
 SEED = 7
 
 

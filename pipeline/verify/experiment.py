@@ -22,7 +22,7 @@ from pipeline.sling.solver import (
 )
 from pipeline.verify.check import Bench
 
-TIGHT = {"double": True, "tolerance": 1e-9}  # rod.h as exact as it gets
+TIGHT = {"double": True, "tolerance": 1e-12}  # the kernel as exact as it gets
 
 
 @dataclass(frozen=True)

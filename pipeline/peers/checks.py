@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from pipeline.errors import UserError
 from pipeline.peers import mujoco_flex
 from pipeline.sling.interaction import interact
 from pipeline.sling.launch import launch
-from pipeline.sling.model import Sling
+from pipeline.sling.model import TETRAHEDRA, Sling
 from pipeline.verify.check import Bench, Check, Section
 
 THETA = np.array([2.2e5, 0.30, 3e-3, 1.0, 1.0])
@@ -40,7 +40,9 @@ its path and the band does not slip in it; the projectile is a mass at the middl
 rest, let go at once and gone at the first pull; there is no air. What is left of a difference while
 the band is slack, and where it becomes taut, is mostly the bending of coarse tetrahedra: it is
 several times too stiff, the more so the closer Poisson's ratio is to 0.5, and finer sections come
-closer to our figures."""
+closer to our figures. With `sling.mesh: tetrahedra` both engines have the very same mesh, and what
+is left is integrator and solver."""
+SAME_MESH = {"edges": 52, "grading": 1.0}  # of `tet_edges`, evenly spaced
 
 
 @dataclass(frozen=True)
@@ -156,21 +158,23 @@ def pull_checks(result: Pull, title: str, fine: bool) -> list[Check]:
     ]
 
 
-def launch_check(bench: Bench, cases=LAUNCHES, step: float = 2.5e-4) -> Check:
+def launch_check(
+    bench: Bench, cases=LAUNCHES, step: float = 2.5e-4, title: str = "", **mesh
+) -> Check:
     """The largest difference of the landings of `cases`, as listed in LAUNCHES."""
     sling = sling_of(bench)
     thetas = np.array([[young, poisson, d, 1.0, 1.0] for young, poisson, d, _ in cases])
     draws = np.array([draw for *_, draw in cases])
     ours = launch(sling, thetas, draws, device=bench.device)
     theirs = [
-        mujoco_flex.launch(sling, theta, draw, step)
+        mujoco_flex.launch(sling, theta, draw, step, **mesh)
         for theta, draw in zip(thetas, draws, strict=True)
     ]
     landing = 100 * (np.array([one.landing_y for one in theirs]) / ours.landing_y - 1)
     speed = 100 * (np.array([one.speed for one in theirs]) / ours.speed - 1)
     hold = 100 * (np.array([one.hold_force for one in theirs]) / ours.hold_force - 1)
     return Check(
-        f"landing of {len(cases)} launches, the largest difference",
+        f"landing of {len(cases)} launches, the largest difference{title}",
         "MuJoCo 3D flex",
         float(np.abs(landing).max()),
         "%",
@@ -191,6 +195,9 @@ def section(bench: Bench) -> Section:
             title = f"Poisson's ratio {poisson:.2f}, {900 * rings**2} tetrahedra"
             checks += pull_checks(results[-1], title, fine)
         checks.append(launch_check(bench))
+        same, title = solid(bench), ", the same 936 tetrahedra in both"
+        checks += pull_checks(pull(same, theta, **SAME_MESH), f"Poisson's ratio 0.45{title}", True)
+        checks.append(launch_check(same, title=title, **SAME_MESH))
     except UserError as error:
         return Section("Against MuJoCo", [], f"Not compared: {error}.")
     pictures = {}
@@ -230,6 +237,12 @@ def draw(result: Pull, path) -> None:
     side.legend(ncols=2, loc="upper left")
     figure.savefig(path, dpi=110)
     plt.close(figure)
+
+
+def solid(bench: Bench) -> Bench:
+    """The same with our own tetrahedra in place of the rod."""
+    resolution = bench.params.sling.model_copy(update={"mesh": TETRAHEDRA})
+    return replace(bench, params=bench.params.model_copy(update={"sling": resolution}))
 
 
 def sling_of(bench: Bench) -> Sling:

@@ -17,7 +17,8 @@ lint: setup
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 
-validate: setup       # slow campaigns; their results, in reports/validation/, are committed
+validate: setup       # slow campaigns; their results, in reports/, are committed
+	.venv/bin/sling verify
 	.venv/bin/python -m pytest -m validation
 
 clean:                # all but data, checkpoints and DVC's cache

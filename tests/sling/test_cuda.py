@@ -37,3 +37,21 @@ def test_launches_agree_with_the_cpu(sling):
     cpu, gpu = launch(sling, theta, draws), launch(sling, theta, draws, device="cuda:0")
     assert cpu.failure == gpu.failure
     assert gpu.landing_y == pytest.approx(cpu.landing_y, rel=1e-3)
+
+
+def test_what_stays_on_the_gpu_is_what_is_fetched(strong_grip, episode):
+    """Forces and centre lines of 65 slings, which fill no warp."""
+    thetas = random_thetas(65, seed=5)
+    stays = interact(strong_grip, episode, thetas, device="cuda:0", fetch=False)
+    fetched = interact(strong_grip, episode, thetas, device="cuda:0")
+    assert not isinstance(stays.center_line, np.ndarray)
+    assert np.array_equal(stays.center_line.numpy(), fetched.center_line)
+    assert np.array_equal(stays.force.numpy(), fetched.force)
+
+
+def test_result_depends_on_no_neighbour_on_the_gpu(strong_grip, episode):
+    thetas = random_thetas(20, seed=3)
+    together = interact(strong_grip, episode, thetas, device="cuda:0")
+    alone = interact(strong_grip, episode, thetas[7], device="cuda:0")
+    assert np.array_equal(together.force[7], alone.force[0])
+    assert np.array_equal(together.center_line[7], alone.center_line[0])

@@ -202,8 +202,8 @@ def section(bench: Bench) -> Section:
         return Section("Against MuJoCo", [], f"Not compared: {error}.")
     pictures = {}
     if bench.figures:
-        draw(results[1], bench.figures / "simulator-mujoco.png")
-        pictures["simulator-mujoco.png"] = (
+        draw(results[1], bench.figures / "mujoco.png")
+        pictures["mujoco.png"] = (
             "The hand's force and the band seen from the side and from the front: ours (lines) and"
             " MuJoCo's (dashes)."
         )

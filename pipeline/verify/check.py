@@ -43,7 +43,7 @@ class Section:
 
     Attributes:
         text: Markdown before the table.
-        pictures: Files in reports/figures/ and their captions.
+        pictures: Files in reports/simulator/ and their captions.
         details: What else reports/simulator.json keeps.
     """
 

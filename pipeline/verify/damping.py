@@ -231,8 +231,8 @@ def section(bench: Bench) -> Section:
             stiffness = (2 * np.pi * frequency) ** 2 + decay**2
             closed = oscillation(time, 1.0, stiffness, 2 * decay, place[0])
             cases[f"{('along', 'across')[axis]}, s {scale:g}"] = time, place, closed
-        figures.oscillation(bench.figures / "simulator-decay.png", cases)
-        pictures["simulator-decay.png"] = (
+        figures.oscillation(bench.figures / "decay.png", cases)
+        pictures["decay.png"] = (
             "A mass of 0.5 kg at the middle of a stretched band, let go 5 mm off its place along or"
             " across the band, at d 40 ms: simulator (dots) and the damped oscillator (lines)."
         )

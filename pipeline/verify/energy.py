@@ -161,8 +161,8 @@ def section(bench: Bench) -> Section:
     done = balance(bench)
     pictures = {}
     if bench.figures:
-        figures.balance(bench.figures / "simulator-energy.png", done)
-        pictures["simulator-energy.png"] = (
+        figures.balance(bench.figures / "energy.png", done)
+        pictures["energy.png"] = (
             "Where the hand's work goes: a pull of 0.35 m in 4 s, a pause, the release at 8 s, and"
             " (right) the first 100 ms after it."
         )

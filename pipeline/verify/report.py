@@ -91,7 +91,7 @@ def verify(
                 progress(f"  NOT MET: {check.name}: {figure(check)}, limit {limit(check)}")
             progress(f"  {time.perf_counter() - began:.0f} s")
         for picture in sorted(Path(figures).glob("*.png")):
-            with replacing(root / "reports/figures" / picture.name) as temporary:
+            with replacing(root / "reports/simulator" / picture.name) as temporary:
                 temporary.write_bytes(picture.read_bytes())
     about = environment(device, f"sling verify --device {device}") | {
         "seconds": round(time.perf_counter() - start, 1)
@@ -136,7 +136,7 @@ def _part(section: Section) -> str:
             "",
         ]
     for name, caption in section.pictures.items():
-        lines += [f"![{caption}](figures/{name})", "", f"*{caption}*", ""]
+        lines += [f"![{caption}](simulator/{name})", "", f"*{caption}*", ""]
     return "\n".join(lines)
 
 

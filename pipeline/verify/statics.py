@@ -209,8 +209,8 @@ def section(bench: Bench) -> Section:
     pictures = {}
     if bench.figures:
         stretch = np.linspace(1.1, 2.2, 12)
-        figures.pull(bench.figures / "simulator-pull.png", stretch, curves(bench, stretch))
-        pictures["simulator-pull.png"] = (
+        figures.pull(bench.figures / "pull.png", stretch, curves(bench, stretch))
+        pictures["pull.png"] = (
             "Pull of a straight string over its stretch, in single precision: simulator (dots) and"
             " closed form (lines), and their difference."
         )

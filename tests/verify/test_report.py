@@ -28,8 +28,8 @@ def test_report_and_figures(bench, tmp_path, monkeypatch):
         raise UserError("mujoco is not installed")
 
     def drawn(where):
-        (where.figures / "simulator-x.png").write_bytes(b"png")
-        return Section("Drawn", [KEPT], "Text.", {"simulator-x.png": "a picture"})
+        (where.figures / "x.png").write_bytes(b"png")
+        return Section("Drawn", [KEPT], "Text.", {"x.png": "a picture"})
 
     monkeypatch.setattr(report, "SECTIONS", {"drawn": drawn})
     monkeypatch.setattr(report, "CAMPAIGNS", {})
@@ -41,7 +41,7 @@ def test_report_and_figures(bench, tmp_path, monkeypatch):
     assert "| beam | 3.4 % | ≤ 3 % | **no** |" in text
     assert "## Against MuJoCo\n\nNot run: mujoco is not installed." in text
     assert "1 of 2 limits are kept, 1 not" in text
-    assert (tmp_path / "reports/figures/simulator-x.png").read_bytes() == b"png"
+    assert (tmp_path / "reports/simulator/x.png").read_bytes() == b"png"
     kept = json.loads((tmp_path / "reports/simulator.json").read_text("utf-8"))
     assert kept["sections"][2]["checks"][0]["met"] is False and kept["device"] == "cpu"
     assert any("NOT MET: beam" in line for line in lines)

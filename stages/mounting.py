@@ -15,15 +15,14 @@ from pipeline.files import write_json
 from pipeline.identify.loss import EpisodeLoss
 from pipeline.identify.mounting import fit_mounting
 from pipeline.identify.session import load_episode, workers
-from pipeline.sling.model import ROD, Sling
+from pipeline.sling.model import Sling
 from pipeline.stage import started
 
 
 def main() -> None:
     params, band = started("band")
     # with the rod, whatever simulates afterwards: a solid mesh has no rigidity to fit
-    resolution = params.sling.model_copy(update={"mesh": ROD})
-    sling = Sling.of(params.bands[band], params.setup, resolution)
+    sling = Sling.of(params.bands[band], params.setup, params.sling, as_rod=True)
     content = fit_mounting(
         sling,
         load_episode(band),

@@ -8,7 +8,7 @@ from importlib.metadata import version
 import numpy as np
 from scipy.stats import qmc
 
-from pipeline.bench import DRAWN, available, pull_and_release
+from pipeline.bench import DRAWN, available, pull_and_release, yardstick
 from pipeline.errors import UserError
 from pipeline.identify.space import Space
 from pipeline.peers import mujoco_flex
@@ -39,7 +39,7 @@ def bench_peers(params, device: str = "cpu") -> list[dict]:
     if kind not in ENVIRONMENTS or not available(device):
         raise UserError(f"device {device}: not there; cpu is, and cuda:0 where there is a GPU")
     band = params.bands[next(iter(params.bands))]
-    sling = Sling.of(band, params.setup, params.sling)
+    sling = yardstick(band, params)
     episode = pull_and_release(next(iter(params.bands)), params.episode, sling)
     space = Space.of(params.parameters)
     core = _ours(sling, episode, space, "cpu")

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pipeline.episode import Episode
+from pipeline.errors import UserError
 from pipeline.sling.model import Sling, hanging_guess, material
 from pipeline.sling.solver import (
     FAILURE,
@@ -59,7 +60,12 @@ def schedule_of(sling: Sling, episode: Episode, refine: int = 1) -> Schedule:
     size = sling.steps
     release = episode.release_time
     clear = release + sling.finger_opening_time
-    end = max(episode.time[-1], episode.cloud_time[-1]) + 1e-3
+    end = max(episode.time[-1], *episode.cloud_time[-1:]) + 1e-3
+    if release <= episode.grasp_time:
+        raise UserError(
+            f"episode of {episode.band}: released at {release:g} s, grasped at"
+            f" {episode.grasp_time:g} s; a recording needs a pull between them"
+        )
 
     def grid(first: float, last: float, step: float) -> np.ndarray:
         return np.linspace(

@@ -62,18 +62,25 @@ class Sling:
     mesh: str = ROD
 
     @classmethod
-    def of(cls, band, setup, resolution, mounting: dict | None = None) -> Sling:
+    def of(
+        cls, band, setup, resolution, mounting: dict | None = None, *, as_rod: bool = False
+    ) -> Sling:
         """Make it from params.yaml's `bands.<band>`, `setup` and `sling`.
 
         Args:
             mounting: What the slack band shows of itself (pipeline/identify/mounting.py):
                 `clamp_direction` and `flexural_rigidity`; without it, the setup's clamp direction
                 and a solid round band.
+            as_rod: Whatever mesh the resolution asks for.
         """
         mounting = mounting or {}
+        mesh, edges = ROD, resolution.edges
+        if not as_rod:
+            mesh = resolution.mesh
+            edges = {ROD: edges, TETRAHEDRA: resolution.tet_edges}[mesh]
         direction = np.asarray(mounting.get("clamp_direction", setup.clamp_direction), float)
         return cls(
-            edges=resolution.edges if resolution.mesh == ROD else resolution.tet_edges,
+            edges=edges,
             rest_length=band.rest_length,
             radius=band.diameter / 2,
             mass=band.mass,
@@ -85,7 +92,7 @@ class Sling:
             grip_force=setup.grip_force,
             finger_opening_time=setup.finger_opening_time,
             steps=resolution,
-            mesh=resolution.mesh,
+            mesh=mesh,
         )
 
     @property

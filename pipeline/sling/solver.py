@@ -13,8 +13,8 @@ from pipeline.sling.model import GRAVITY, TETRAHEDRA, Sling, fixed_frames
 
 LANES, TEAM = 16, 10  # slings in a CPU thread's SIMD lanes; GPU threads that share a sling
 NOT_CONVERGED, SLIPPED, LEFT = 1, 2, -1  # lane_state[4] as state.h says
-DIRECTION, PAYLOAD, FAILURE, LEAVING, HELD_FORCE = slice(0, 3), 3, 4, slice(6, 11), slice(11, 14)
-ITERATIONS, LANE_STATE = 14, 15
+DIRECTION, PAYLOAD, FAILURE, LEAVING, HELD_FORCE = slice(0, 3), 3, 4, slice(5, 10), slice(10, 13)
+ITERATIONS, LANE_STATE = 13, 14
 
 
 @dataclass

@@ -50,10 +50,10 @@ __shared__ __align__(16) SC rows[2 * TEAMS * (N + 1) * ROW_LENGTH];  // a layer'
 #endif
 
 // lane state: 0-2 direction of the launch, 3 mass of the projectile, 4 failure (1 not converged, 2 slipped, -1: the
-// projectile has left), 5 its step, 6 leaving time, 7-8 leaving position and 9-10 velocity (y, z),
-// 11-13 force on the hand when it last held, 14 Newton iterations of it and its neighbours
-auto LANE = ROW(lane_state, 15);
-real direction[3], leaving[5], payload = LANE[3], failure = zero, failed_step = zero;
+// projectile has left), 5 leaving time, 6-7 leaving position and 8-9 velocity (y, z), 10-12 force on the hand when it
+// last held, 13 Newton iterations of it and its neighbours
+auto LANE = ROW(lane_state, 14);
+real direction[3], leaving[5], payload = LANE[3], failure = zero;
 UNROLL for (int c = 0; c < 3; ++c) direction[c] = LANE[c];
 UNROLL for (int c = 0; c < 5; ++c) leaving[c] = zero;
 

@@ -87,7 +87,6 @@ for (int step = 0; step < steps; ++step) {
   iterations += iteration;
   SYNC;
   // a lane that did not converge, or is no number, has failed for good
-  failed_step = failure != zero ? failed_step : zero + (SC)step;
   failure = failure != zero ? failure : (settled > zero ? zero : one);
 
   // ---- the force of the band on the hand, and whether the pads still hold it
@@ -141,13 +140,14 @@ for (int step = 0; step < steps; ++step) {
     X2(k, i) = relax ? now : X1(k, i); X1(k, i) = now;
     V2(k, i) = relax ? zero : V1(k, i); V1(k, i) = v;
   }
+  SYNC;
   if (launching && ALL(failure != zero)) break;
 }
 
 for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) INITIAL[k * L + i] = X1(k, i);
 if (member == 0) {
-  LANE[3] = payload; LANE[4] = failure; LANE[5] = failed_step;
-  UNROLL for (int c = 0; c < 5; ++c) LANE[6 + c] = leaving[c];
-  UNROLL for (int c = 0; c < 3; ++c) LANE[11 + c] = held[c];
-  LANE[14] = zero + (SC)iterations;
+  LANE[3] = payload; LANE[4] = failure;
+  UNROLL for (int c = 0; c < 5; ++c) LANE[5 + c] = leaving[c];
+  UNROLL for (int c = 0; c < 3; ++c) LANE[10 + c] = held[c];
+  LANE[13] = zero + (SC)iterations;
 }

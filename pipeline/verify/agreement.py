@@ -1,4 +1,4 @@
-"""rod.h against its NumPy twin: the same steps of the same bands, in double precision."""
+"""The kernel against its NumPy twin: the same steps of the same bands, in double precision."""
 
 from __future__ import annotations
 

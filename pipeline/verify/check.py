@@ -45,6 +45,7 @@ class Section:
         text: Markdown before the table.
         pictures: Files in reports/simulator/ and their captions.
         details: What else reports/simulator.json keeps.
+        not_run: Why there is nothing; empty where there is.
     """
 
     title: str
@@ -52,6 +53,7 @@ class Section:
     text: str = ""
     pictures: dict[str, str] = field(default_factory=dict)
     details: dict = field(default_factory=dict)
+    not_run: str = ""
 
 
 @dataclass(frozen=True)

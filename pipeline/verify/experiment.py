@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.sling.model import GRAVITY, ROD, Sling, fixed_frames, layers_of, material
+from pipeline.sling.model import GRAVITY, Sling, fixed_frames, layers_of, material
 from pipeline.sling.solver import (
     FAILURE,
     FREE,
@@ -49,8 +49,8 @@ class Motion:
 def band_of(bench: Bench) -> Sling:
     """The first band of params.yaml as a rod of the default resolution, round and solid."""
     params = bench.params
-    resolution = params.sling.model_copy(update={"mesh": ROD})
-    return Sling.of(params.bands[next(iter(params.bands))], params.setup, resolution)
+    band = params.bands[next(iter(params.bands))]
+    return Sling.of(band, params.setup, params.sling, as_rod=True)
 
 
 def straight(sling: Sling, length: float, **changes) -> Sling:

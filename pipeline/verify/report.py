@@ -1,4 +1,7 @@
-"""`sling verify`: every check of the simulator, as reports/simulator.md and simulator.json."""
+"""`sling verify`: every check of the simulator, as reports/simulator.md and simulator.json.
+
+Another device than the CPU has pages of its own, such as reports/simulator-cuda-0.md.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,7 @@ HEAD = """\
 # The simulator, held against what is known
 
 `sling verify` writes this page: {met} of {limited} limits are kept{missed}. Figures without a \
-limit are stated for what they tell. [simulator.json](simulator.json) keeps figures and environment.
+limit are stated for what they tell. [{name}.json]({name}.json) keeps figures and environment.
 
 **What is solved.** A band is by default an extensible director rod: each edge has a deformation \
 gradient F = [g a b] of its stretch and its section, with the stable neo-Hookean law without its \
@@ -74,6 +77,7 @@ def verify(
     if not available(device):
         raise UserError(f"device {device}: not there; cpu is, and cuda:0 where there is a GPU")
     start, sections = time.perf_counter(), []
+    name = "simulator" if device == "cpu" else f"simulator-{device.replace(':', '-')}"
     with tempfile.TemporaryDirectory() as figures:
         bench = Bench(params, device, os.cpu_count() or 1, Path(figures))
         jobs = SECTIONS | {
@@ -86,18 +90,19 @@ def verify(
             try:
                 sections.append(section(bench))
             except UserError as error:
-                sections.append(Section(title, [], f"Not run: {error}."))
+                sections.append(Section(title, [], not_run=str(error)))
+                progress(f"  not run: {error}")
             for check in unmet(sections[-1].checks):
                 progress(f"  NOT MET: {check.name}: {figure(check)}, limit {limit(check)}")
             progress(f"  {time.perf_counter() - began:.0f} s")
         for picture in sorted(Path(figures).glob("*.png")):
-            with replacing(root / "reports/simulator" / picture.name) as temporary:
+            with replacing(root / "reports" / name / picture.name) as temporary:
                 temporary.write_bytes(picture.read_bytes())
     about = environment(device, f"sling verify --device {device}") | {
         "seconds": round(time.perf_counter() - start, 1)
     }
-    write_text(root / "reports/simulator.md", markdown(sections, about))
-    write_json(root / "reports/simulator.json", about | {"sections": list(map(_entry, sections))})
+    write_text(root / f"reports/{name}.md", markdown(sections, about, name))
+    write_json(root / f"reports/{name}.json", about | {"sections": list(map(_entry, sections))})
     return sections
 
 
@@ -107,25 +112,29 @@ def summary(sections: list[Section]) -> tuple[str, int]:
     missed = unmet(checks)
     limited = sum(check.met is not None for check in checks)
     lines = [f"not met: {check.name}: {figure(check)}, limit {limit(check)}" for check in missed]
-    lines.append(f"{limited - len(missed)} of {limited} limits kept; reports/simulator.md")
+    lines += [f"not run: {one.title}: {one.not_run}" for one in sections if one.not_run]
+    lines.append(f"{limited - len(missed)} of {limited} limits kept")
     return "\n".join(lines), len(missed)
 
 
-def markdown(sections: list[Section], about: dict) -> str:
-    """The whole page."""
+def markdown(sections: list[Section], about: dict, name: str) -> str:
+    """The whole page; `name` is that of its pictures' folder and of the JSON beside it."""
     checks = [check for section in sections for check in section.checks]
     missed, limited = len(unmet(checks)), sum(check.met is not None for check in checks)
     head = HEAD.format(
         met=limited - missed,
         limited=limited,
         missed=f", {missed} not" if missed else "",
+        name=name,
         **{key: about[key] for key in ("device", "device_name", "commit", "seconds")},
     )
-    return "\n".join([head, *map(_part, sections)])
+    return "\n".join([head, *(_part(section, name) for section in sections)])
 
 
-def _part(section: Section) -> str:
+def _part(section: Section, folder: str) -> str:
     lines = [f"## {section.title}", ""]
+    if section.not_run:
+        lines += [f"Not run: {section.not_run}.", ""]
     if section.text:
         lines += [section.text, ""]
     if section.checks:
@@ -136,7 +145,7 @@ def _part(section: Section) -> str:
             "",
         ]
     for name, caption in section.pictures.items():
-        lines += [f"![{caption}](simulator/{name})", "", f"*{caption}*", ""]
+        lines += [f"![{caption}]({folder}/{name})", "", f"*{caption}*", ""]
     return "\n".join(lines)
 
 
@@ -176,4 +185,5 @@ def _entry(section: Section) -> dict:
             for check in section.checks
         ],
         "details": section.details,
+        "not_run": section.not_run or None,
     }

@@ -80,18 +80,20 @@ def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> li
             off(*straight_pull(bench, stretch, theta, STRING)),
             "%",
             PULL_LIMIT,
-            f"{len(theta)} pairs, E 0.03–10 MPa, ν 0.30–0.49, single precision",
+            f"a string {STRING} times thinner than the band; {len(theta)} pairs,"
+            " E 0.03–10 MPa, ν 0.30–0.49, single precision",
         )
         for stretch in stretches
     ]
     checks.append(
         Check(
-            f"the same of the whole band at stretch {stretches[0]:g}",
+            f"pull of the band itself at stretch {stretches[0]:g}, worst of E and ν",
             against,
             off(*straight_pull(bench, stretches[0], theta)),
             "%",
             None,
-            "clamp and fingers keep their sections from thinning, which stiffens it: no string",
+            "full thickness; clamp and fingers keep their sections from thinning, which stiffens it:"
+            " no string",
         )
     )
     width, length = band_of(bench).half_width, band_of(bench).rest_length
@@ -211,13 +213,14 @@ def section(bench: Bench) -> Section:
         stretch = np.linspace(1.1, 2.2, 12)
         figures.pull(bench.figures / "pull.png", stretch, curves(bench, stretch))
         pictures["pull.png"] = (
-            "Pull of a straight string over its stretch, in single precision: simulator (dots) and"
-            " closed form (lines), and their difference."
+            f"Pull of a straight string, {STRING} times thinner than the band, over its stretch, in"
+            " single precision: simulator (dots) and closed form (lines), and their difference."
         )
     return Section(
         "At rest",
         [*pull(bench), *beams(bench), *torsion(bench)],
         "A straight band, drawn, loaded by its weight, or twisted at a clamp, after it has come to"
-        " rest. Beams are light enough to stay nearly straight.",
+        f" rest. The string is a band {STRING} times thinner: the sections that clamp and fingers"
+        " hold hardly count there. Beams are light enough to stay nearly straight.",
         pictures,
     )

@@ -57,7 +57,7 @@ class Twin:
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """mu, lam, d, s of rod.h."""
+        """mu, lam, d, s of state.h."""
         return tuple(material(self.sling, np.array([self.theta]))[0, :4])
 
     # ---- edges

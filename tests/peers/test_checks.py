@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import sys
 
+import pytest
+
+from pipeline.errors import UserError
 from pipeline.params import load
 from pipeline.peers import checks
 from pipeline.verify.check import Bench
@@ -11,6 +14,10 @@ from pipeline.verify.check import Bench
 
 def test_without_mujoco_the_section_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    section = checks.section(Bench(load()))
-    assert not section.checks
-    assert "pip install -e '.[validation]'" in section.text
+    with pytest.raises(UserError, match="pip install"):
+        checks.section(Bench(load()))
+
+
+def test_our_tetrahedra_are_compared_on_the_cpu_whatever_the_device():
+    same = checks.solid(Bench(load(), device="cuda:0"))
+    assert same.device == "cpu" and same.params.sling.mesh == "tetrahedra"

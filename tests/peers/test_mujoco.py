@@ -59,5 +59,5 @@ def test_a_launch_lands_at_the_same_place(bench):
 @pytest.mark.validation
 def test_the_whole_comparison(bench):
     section = checks.section(bench)
-    assert len(section.checks) == 7
+    assert len(section.checks) == 10
     assert not unmet(section.checks)

@@ -47,6 +47,7 @@ def test_report_and_figures(bench, tmp_path, monkeypatch):
     assert any("NOT MET: beam" in line for line in lines)
     summary, missed = report.summary(sections)
     assert missed == 1 and "1 of 2 limits kept" in summary
+    assert "not run: Against MuJoCo: mujoco is not installed" in summary
 
 
 def test_unknown_device_is_refused(bench, tmp_path):

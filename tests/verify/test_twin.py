@@ -1,4 +1,4 @@
-"""The twin's forces are its energy's slope, and rod.h takes the same steps within 1e-5."""
+"""The twin's forces are its energy's slope, and the kernel takes the same steps within 1e-7."""
 
 from __future__ import annotations
 

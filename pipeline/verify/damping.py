@@ -21,6 +21,7 @@ from pipeline.verify.experiment import (
     straight,
     straight_guess,
 )
+from pipeline.verify.statics import STRING
 from pipeline.verify.twin import Twin
 
 SEED = 11
@@ -107,11 +108,11 @@ def recoil_energies(
         first = motion.start[k]
         total = twin.elastic(motion.x[k]) + twin.kinetic(motion.v[k])
         energies.append(np.append(twin.elastic(first), total) / twin.elastic(first))
-    return np.array(energies)
+    return np.reshape(energies, (-1, steps + 1))
 
 
 def growth(bench: Bench, count: int = 48) -> list[Check]:
-    """Energy of rod.h's own steps from random states."""
+    """Energy of the kernel's own steps from random states of every kind."""
     size = bench.params.sling
     checks = []
     for label, order, h in (
@@ -119,19 +120,20 @@ def growth(bench: Bench, count: int = 48) -> list[Check]:
         ("second order", 2, size.recoil_step),
         ("second order", 2, size.swing_step),
     ):
-        rise, wobble, total, kept = 0.0, 0.0, 0, 0
-        for kind in ("near rest", "stretched", "slack"):
-            for clamped in (True, False):
-                energy = recoil_energies(bench, kind, order, h, clamped, count)
-                rise = max(rise, float((energy - 1).max()))
-                wobble = max(wobble, float(np.diff(energy, axis=1).max()))
-                total, kept = total + count, kept + len(energy)
-        note = f"{kept} of {total} random states and θ; the others failed with a reason"
+        energies = {
+            kind: np.concatenate(
+                [recoil_energies(bench, kind, order, h, ends, count) for ends in (True, False)]
+            )
+            for kind in STATES
+        }
+        every = np.concatenate(list(energies.values()))
+        kept = ", ".join(f"{len(energy)} {kind}" for kind, energy in energies.items())
+        note = f"kept of {2 * count} random states and θ each: {kept}; the others are marked failed"
         checks.append(
             Check(
                 f"rise above the start, {label}, {1e3 * h:g} ms",
                 "energy never grows without work",
-                max(rise, 0.0),
+                float(np.max(every - 1, initial=0.0)),
                 "of the start",
                 ROUNDING,
                 note,
@@ -141,7 +143,7 @@ def growth(bench: Bench, count: int = 48) -> list[Check]:
             Check(
                 f"rise in any one step, {label}, {1e3 * h:g} ms",
                 "energy never grows without work",
-                max(wobble, 0.0),
+                float(np.max(np.diff(every, axis=1), initial=0.0)),
                 "of the start",
                 ROUNDING if order == 1 else None,
                 note if order == 1 else "two-step method: its energy may sway from step to step",
@@ -169,7 +171,7 @@ def oscillate(
         Time and displacement (S,), (frequency [1/s], decay [1/s]) as fitted and in closed form.
     """
     sling = band_of(bench)
-    sling = replace(sling, radius=sling.radius / 5, mass=sling.mass / 20)
+    sling = replace(sling, radius=sling.radius / STRING, mass=sling.mass / 20)
     sling = straight(sling, sling.rest_length * stretch)
     amplitude = 0.01 * sling.rest_length
     string = String.of(sling, theta)
@@ -239,10 +241,13 @@ def section(bench: Bench) -> Section:
     return Section(
         "Damping",
         [*oscillator(bench), *dissipation(bench), *growth(bench)],
-        "A heavy middle of a stretched, light band decays as k and c in closed form say"
+        "A heavy middle of a stretched, light string, a band made"
+        f" {STRING} times thinner, decays as k and c in closed form say"
         " (`pipeline/verify/closed.py`). Dissipation is a quadratic form of the rates, whose lowest"
         " eigenvalue is taken in random states of the whole band, near rest and far from it; and"
         " random states are let go without gravity, ends clamped or free, to see whether the"
-        " simulator's own steps ever gain energy.",
+        " simulator's own steps ever gain energy. Those that do not converge are marked failed and"
+        " left out: most of the inverted states, turned inside out, and more than half of those"
+        " far from rest.",
         pictures,
     )

@@ -1,4 +1,4 @@
-"""Steps of the twin: Newton's method to machine precision on the equations at the head of step.h."""
+"""Steps of the twin: Newton's method to machine precision on the equations of step.h."""
 
 from __future__ import annotations
 

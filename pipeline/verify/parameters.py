@@ -13,8 +13,10 @@ from pipeline.verify.check import Bench, Check, Section, off
 from pipeline.verify.closed import String
 from pipeline.verify.damping import oscillate
 from pipeline.verify.experiment import band_of, move, settling, straight, straight_guess
+from pipeline.verify.statics import STRING
 
 THETA = (6e5, 0.45, 5e-3, 0.6, 0.8)
+THIN = f"a string {STRING} times thinner than the band"
 SLIP = "the band slipped out of the fingers"
 
 
@@ -47,9 +49,9 @@ def young(bench: Bench) -> list[Check]:
 
 
 def poisson(bench: Bench, stretch: float = 1.5) -> list[Check]:
-    """Volume of a straight, held band, and the pull at given E, from nu 0.30 to 0.49."""
+    """Volume of a straight, held string, and its pull at given E, from nu 0.30 to 0.49."""
     sling = band_of(bench)
-    sling = replace(sling, radius=sling.radius / 5)
+    sling = replace(sling, radius=sling.radius / STRING)
     half = sling.rest_length / 2
     sling = straight(sling, (stretch + 1) * half)
     target = (stretch * half - sling.half_width, 0.0, 0.0)
@@ -68,12 +70,12 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Check]:
     ratio = float(strings[1].force(stretch) / strings[0].force(stretch))
     return [
         Check(
-            "volume that a band gains at stretch 1.5, ν 0.30 and 0.49",
+            f"volume that a string gains at stretch {stretch:g}, ν 0.30 and 0.49",
             "J − 1 = μ/λ (1 − 1/l)",
             off(volume - 1, expected - 1),
             "%",
             1.0,
-            f"{100 * (volume[0] - 1):.2f} % and {100 * (volume[1] - 1):.2f} %",
+            f"{100 * (volume[0] - 1):.2f} % and {100 * (volume[1] - 1):.2f} %; {THIN}",
         ),
         Check(
             "pull at ν 0.49 over that at ν 0.30, same E",
@@ -81,7 +83,7 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Check]:
             off(pull[1] / pull[0], ratio),
             "%",
             0.5,
-            f"{pull[1] / pull[0]:.4f}",
+            f"{pull[1] / pull[0]:.4f}; {THIN}",
         ),
     ]
 
@@ -106,7 +108,7 @@ def damping(bench: Bench) -> list[Check]:
             off(twice / base, 2.0),
             "%",
             1.0,
-            f"{twice / base:.4f}; along the band, ν 0.30, s 1",
+            f"{twice / base:.4f}; along the band, ν 0.30, s 1; {THIN}",
         ),
         Check(
             "decay lost from s = 1 to s = 0.5",
@@ -114,7 +116,7 @@ def damping(bench: Bench) -> list[Check]:
             off((base - half) / (base - none), 0.5),
             "%",
             1.0,
-            f"{(base - half) / (base - none):.4f} of what is lost from 1 to 0",
+            f"{(base - half) / (base - none):.4f} of what is lost from 1 to 0; {THIN}",
         ),
         Check(
             "decay that is left at s = 0, over that at s = 1",
@@ -122,7 +124,7 @@ def damping(bench: Bench) -> list[Check]:
             off(none / base, volume),
             "%",
             2.0,
-            f"{none / base:.4f}, closed form {volume:.4f}",
+            f"{none / base:.4f}, closed form {volume:.4f}; {THIN}",
         ),
     ]
 

@@ -1,22 +1,48 @@
-"""Random parameter vectors of the whole box: a rollout is finite, or says why it is not."""
+"""Parameter vectors of the whole box and its boundary: rollouts are finite, or say why not."""
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from pipeline import bench as yardstick
+from pipeline.identify.space import Space
 from pipeline.sling import THETA, Sling, interact, launch
 from pipeline.verify.agreement import random_thetas
 from pipeline.verify.check import Bench, Check, Section
 from pipeline.verify.experiment import band_of
 
-COUNT, LAUNCHES, BATCH, SEED = 10_000, 2_000, 500, 1
+COUNT, LAUNCHES, FACES, BATCH, SEED = 10_000, 2_000, 500, 500, 1
 HELD_FAST = 1e5  # N: at this force of the pads no band slips out
 UNCONVERGED = "the simulation did not converge"
 ALLOWED = 10  # of 10,000 that did not converge, each marked so
+
+
+def corners(bench: Bench) -> np.ndarray:
+    """Thetas (32, 5) at a bound of the box each."""
+    unit = np.array(list(product((0.0, 1.0), repeat=len(THETA))))
+    return Space.of(bench.params.parameters).to_physical(unit)
+
+
+def on_faces(bench: Bench, count: int) -> np.ndarray:
+    """Random thetas (count, 5) of the box, one parameter of each at a bound, every one in turn."""
+    unit = np.random.default_rng(SEED).random((count, len(THETA)))
+    turn = np.arange(count)
+    unit[turn, turn % len(THETA)] = turn // len(THETA) % 2
+    return Space.of(bench.params.parameters).to_physical(unit)
+
+
+def ranges(thetas: list[dict[str, float]]) -> str:
+    """Between what bounds the parameters of thetas lie; one that all share is named as such."""
+
+    def told(name: str) -> str:
+        low, high = (f"{f([one[name] for one in thetas]):.3g}" for f in (min, max))
+        return f"{name} {low}" if low == high else f"{name} {low}–{high}"
+
+    return ", ".join(told(name) for name in THETA)
 
 
 def survey(bench: Bench, sling: Sling, thetas: np.ndarray, progress=print) -> dict:
@@ -63,22 +89,47 @@ def survey_launches(bench: Bench, sling: Sling, thetas: np.ndarray) -> dict:
     }
 
 
-def section(bench: Bench, count: int = COUNT, launches: int = LAUNCHES, progress=print) -> Section:
+def section(
+    bench: Bench,
+    count: int = COUNT,
+    launches: int = LAUNCHES,
+    faces: int = FACES,
+    progress=print,
+) -> Section:
     sling, thetas = band_of(bench), random_thetas(bench, count, SEED)
-    held = survey(bench, replace(sling, grip_force=HELD_FAST), thetas, progress)
+    fast = replace(sling, grip_force=HELD_FAST)
+    held = survey(bench, fast, thetas, progress)
+    edges = {
+        "corners": survey(bench, fast, corners(bench), progress),
+        "faces": survey(bench, fast, on_faces(bench, faces), progress),
+    }
     gripped = survey(bench, sling, thetas[:launches], progress)
     launched = survey_launches(bench, sling, thetas[:launches])
-    surveys = {"held_fast": held, "default_grip": gripped, "launches": launched}
-    slipped = sum(gripped["reasons"].values()) - len(gripped["unconverged"])
+    surveys = {"held_fast": held, "default_grip": gripped, "launches": launched} | edges
     allowed = ALLOWED * count / COUNT
 
     def told(reasons: dict) -> str:
         return "; ".join(f"{number} “{reason}”" for reason, number in reasons.items()) or "none"
 
+    boundary = [
+        Check(
+            f"unconverged, and marked so, of {one['rollouts']} rollouts {where}, held fast",
+            "—",
+            float(len(one["unconverged"])),
+            "θ",
+            None,
+            ranges(one["unconverged"]) if one["unconverged"] else "",
+        )
+        for where, one in (
+            ("at the corners of the box", edges["corners"]),
+            ("on its faces, one parameter at a bound", edges["faces"]),
+        )
+    ]
     checks = [
         Check(
-            f"not finite, though not marked failed, of {count} rollouts, {launches} with the"
-            f" default grip and {launches} launches",
+            f"not finite, though not marked failed, of {count} rollouts, {len(corners(bench))} at"
+            f" corners and {faces} on faces of the box, {launches} with the default grip and"
+            f" {launches} launches",
             "0",
             float(sum(one["not_finite"] for one in surveys.values())),
             "θ",
@@ -86,20 +137,21 @@ def section(bench: Bench, count: int = COUNT, launches: int = LAUNCHES, progress
             f"farthest node {held['farthest_node_m']:.2f} m from the fork",
         ),
         Check(
-            f"unconverged, and marked so, of {count} rollouts held fast",
+            f"unconverged, and marked so, of {count} rollouts within the box, held fast",
             "0, or marked failed with a reason",
             float(len(held["unconverged"])),
             "θ",
             allowed,
             told(held["reasons"]),
         ),
+        *boundary,
         Check(
             f"failed of {launches} with the default grip",
             "—",
             float(sum(gripped["reasons"].values())),
             "θ",
             None,
-            f"{slipped} of them slip out of the fingers; {told(gripped['reasons'])}",
+            told(gripped["reasons"]),
         ),
         Check(
             f"failed of {launches} launches from random draws",
@@ -113,7 +165,8 @@ def section(bench: Bench, count: int = COUNT, launches: int = LAUNCHES, progress
     return Section(
         "Random parameters",
         checks,
-        "θ from the whole box of `params.yaml`, on the pull-and-release of `sling bench`; a rollout"
-        " that fails carries its reason and counts for nothing.",
+        "θ from the box of `params.yaml`, on the pull-and-release of `sling bench`; a rollout that"
+        " fails carries its reason and counts for nothing. Random θ lie within the box; what lies"
+        " on its boundary is harder and counted apart.",
         details={"seed": SEED, "surveys": surveys},
     )

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from importlib.metadata import version
 
 import numpy as np
 from scipy.stats import qmc
 
-from pipeline.bench import DRAWN, available, pull_and_release, yardstick
+from pipeline.bench import DRAWN, available, pull_and_release, timed, yardstick
 from pipeline.errors import UserError
 from pipeline.identify.space import Space
 from pipeline.peers import mujoco_flex
@@ -57,7 +56,7 @@ def _ours(sling: Sling, episode, space: Space, device: str) -> dict:
     kind = device.partition(":")[0]
     count = ENVIRONMENTS[kind][0]
     thetas = space.to_physical(qmc.LatinHypercube(5, rng=1).random(count))
-    cpu, wall = _seconds(lambda: interact(sling, episode, thetas, device=device))
+    _, cpu, wall = timed(lambda: interact(sling, episode, thetas, device=device))
     return _entry(
         "sling", f"warp {version('warp-lang')}", device, (cpu if kind == "cpu" else wall) / count,
         f"{count} random thetas at once, {sling.edges} edges, {len(held.times)} steps",
@@ -67,10 +66,7 @@ def _ours(sling: Sling, episode, space: Space, device: str) -> dict:
 
 def _mujoco(sling: Sling, episode, ours: dict) -> dict:
     try:
-        result = []
-        cpu, _ = _seconds(
-            lambda: result.append(mujoco_flex.interact(sling, episode, THETA, PEER_STEP))
-        )
+        result, cpu, _ = timed(lambda: mujoco_flex.interact(sling, episode, THETA, PEER_STEP))
     except UserError as error:
         return {"name": "mujoco", "device": "cpu", "note": str(error)}
     whole = episode.time[-1] - episode.grasp_time
@@ -79,7 +75,7 @@ def _mujoco(sling: Sling, episode, ours: dict) -> dict:
         "mujoco", version("mujoco"), "cpu", cpu * whole / held,
         f"3D flex of 900 tetrahedra, stable neo-Hookean, discrete, {PEER_STEP:g} s; timed from the"
         f" grasp to the release, {held / whole:.0%} of it",
-        _force_error(sling, episode, result[0].force[-1]),
+        _force_error(sling, episode, result.force[-1]),
         ours,
     )  # fmt: skip
 
@@ -96,12 +92,12 @@ def _newton(sling: Sling, episode, ours: dict, device: str) -> dict:
     try:
         one = Bands(tube, THETA, 1, path, **options)
         one.run(4)  # compiles
-        cpu, wall = _seconds(lambda: one.run(drawn - 4))
+        _, cpu, wall = timed(lambda: one.run(drawn - 4))
         per_step, timed = cpu / (drawn - 4), drawn - 4
         if kind == "cuda":
             many = Bands(tube, THETA, count, path, **options)
             many.run(4)
-            _, wall = _seconds(lambda: many.run(TIMED_STEPS))
+            _, _, wall = timed(lambda: many.run(TIMED_STEPS))
             per_step, timed = wall / TIMED_STEPS / count, TIMED_STEPS
     except UserError as error:
         return {"name": "newton", "device": device, "note": str(error)}
@@ -158,10 +154,3 @@ def _force_error(sling: Sling, episode, force: np.ndarray) -> float:
     lengths = np.linalg.norm(legs, axis=1, keepdims=True)
     pull = String.of(sling, THETA).force(2 * lengths / sling.rest_length)
     return float(np.linalg.norm(force) / np.linalg.norm((pull * legs / lengths).sum(axis=0)) - 1)
-
-
-def _seconds(work) -> tuple[float, float]:
-    """CPU and wall seconds of a call."""
-    cpu, wall = time.process_time(), time.perf_counter()
-    work()
-    return time.process_time() - cpu, time.perf_counter() - wall

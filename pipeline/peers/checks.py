@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.bench import ease, unseen
 from pipeline.episode import Episode
 from pipeline.peers import mujoco_flex
 from pipeline.sling.interaction import interact
@@ -84,26 +85,10 @@ def episode_of(sling: Sling) -> Episode:
     """Lift, pull to (-DRAW, -DROP) and hold; a camera at 30 Hz."""
     t = np.arange(0.0, RELEASE + 0.5, 0.01)
     hang = np.sqrt(sling.rest_length**2 / 4 - sling.half_width**2)
-
-    def ease(first: float, last: float) -> np.ndarray:
-        return 0.5 - 0.5 * np.cos(np.pi * np.clip((t - first) / (last - first), 0, 1))
-
-    lift, pull = ease(GRASP, LIFTED), ease(LIFTED - 0.1, DRAWN)
+    lift, pull = ease(t, GRASP, LIFTED), ease(t, LIFTED - 0.1, DRAWN)
     position = np.stack([0 * t, -DRAW * pull, hang * (lift - 1) - DROP * pull], axis=1)
     stamps = np.arange(np.ceil(30 * GRASP), 30 * t[-1]) / 30
-    return Episode(
-        band="peers",
-        time=t,
-        position=position,
-        velocity=np.gradient(position, t, axis=0),
-        force=np.zeros_like(position),
-        opening=np.full(len(t), np.nan),
-        cloud_time=stamps,
-        clouds=[np.zeros((0, 3), np.float32)] * len(stamps),
-        grasp_time=GRASP,
-        release_time=RELEASE,
-        camera=np.zeros(3),
-    )
+    return unseen("peers", t, position, stamps, GRASP, RELEASE)
 
 
 def pull(bench: Bench, theta, step: float = 5e-4, **mesh) -> Pull:

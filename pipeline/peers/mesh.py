@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pipeline.sling.cylinder import cylinder, volumes
 from pipeline.sling.interaction import GRASP_BLEND
-from pipeline.sling.model import Sling, fixed_frames
+from pipeline.sling.model import ROD, Sling, fixed_frames
 
 CLAMPED = 0.015  # m of band in each clamp
 EDGES, GRADING = 48, 6.0  # 50 intervals with those in the clamps: 900 tetrahedra
@@ -47,7 +47,8 @@ class Tube:
             grading: How much shorter they are at the clamps and in the hand than midway.
             rings: Of vertices in the section.
         """
-        arc = graded(sling.rest_length, edges, grading)
+        steps = sling.steps.model_copy(update={"grading": grading})
+        arc = replace(sling, edges=edges, mesh=ROD, steps=steps).arc
         whole = np.concatenate([[-CLAMPED], arc, [sling.rest_length + CLAMPED]])
         rest, tetrahedra = cylinder(whole, 2 * sling.radius, rings)
         share = np.repeat(volumes(rest, tetrahedra) / 4, 4)
@@ -71,7 +72,8 @@ class Tube:
     def elastic_force(self, positions: np.ndarray, theta) -> np.ndarray:
         """Force of the stretched band on each vertex [N], for positions (layers, V, 3), that shape.
 
-        The law of rod.h: nominal stress P = mu F + (lam (J - 1) - mu) cof F in each tetrahedron.
+        The law of material.h: nominal stress P = mu F + (lam (J - 1) - mu) cof F in each
+        tetrahedron.
         """
         young, poisson = theta[:2]
         mu = young / (2 * (1 + poisson))
@@ -90,14 +92,6 @@ class Tube:
         force = np.zeros((len(self.mass), 3))
         np.add.at(force, self.tetrahedra, pull)
         return force.reshape(self.rest.shape)
-
-
-def graded(length: float, edges: int, grading: float) -> np.ndarray:
-    """Places of layers that are denser at both ends and in the middle, shape (edges + 1,)."""
-    place = (np.arange(edges // 2) + 0.5) / (edges // 2)
-    half = 1 + (grading - 1) * np.sin(np.pi * place) ** 2
-    arc = np.concatenate([[0.0], np.cumsum(np.concatenate([half, half]))])
-    return arc * length / arc[-1]
 
 
 def hand_path(episode, times: np.ndarray, grasp: np.ndarray) -> np.ndarray:

@@ -7,33 +7,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.ticker import LogFormatter
 
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
-import pandas as pd  # noqa: E402
-from matplotlib.ticker import LogFormatter  # noqa: E402
-
-from pipeline.episode import Episode  # noqa: E402
-from pipeline.files import replacing  # noqa: E402
-from pipeline.policy.landing_map import LandingMap  # noqa: E402
-from pipeline.policy.trials import stretch_of  # noqa: E402
-from pipeline.report.replay import Replay  # noqa: E402
-from pipeline.report.results import Result  # noqa: E402
-
-COLORS = ("#d1495b", "#00798c", "#edae49", "#66a182", "#8d6a9f", "#2e4057", "#f17300", "#5b8e7d")
-MEASURED = "#222222"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.alpha": 0.25,
-    "legend.frameon": False,
-    "figure.constrained_layout.use": True,
-}
+from pipeline.episode import Episode
+from pipeline.files import replacing
+from pipeline.policy.landing_map import LandingMap
+from pipeline.policy.trials import stretch_of
+from pipeline.report.replay import Replay
+from pipeline.report.results import Result
+from pipeline.style import COLORS, INK, STYLE
 
 
 def color(number: int) -> str:
@@ -46,9 +31,7 @@ def force(path: Path, episode: Episode, replays: dict[str, Replay]) -> None:
         figure, axes = plt.subplots(2, 2, figsize=(9, 4.6), width_ratios=(2.4, 1), sharex="col")
         for axis, row in ((1, axes[0]), (2, axes[1])):
             for ax in row:
-                ax.plot(
-                    episode.time, episode.force[:, axis], color=MEASURED, lw=2, label="measured"
-                )
+                ax.plot(episode.time, episode.force[:, axis], color=INK, lw=2, label="measured")
                 for number, (method, replay) in enumerate(replays.items()):
                     style = {"color": color(number), "lw": 1.2, "ls": ("-", "--", ":")[number % 3]}
                     ax.plot(episode.time, replay.force[:, axis], label=method, **style)
@@ -98,7 +81,7 @@ def clouds(path: Path, episode: Episode, replays: dict[str, Replay], diameter: f
             axes[0, column].set_title(f"{name}\n{since:+.3f} s from the release", fontsize=9)
             points = episode.clouds[frame]
             for ax, (_, across, up) in zip(axes[:, column], views, strict=True):
-                ax.plot(points[:, across], points[:, up], ".", ms=1.2, color=MEASURED, zorder=2.5)
+                ax.plot(points[:, across], points[:, up], ".", ms=1.2, color=INK, zorder=2.5)
                 for number, replay in enumerate(replays.values()):
                     line = replay.center_line[frame][:, [across, up]].T
                     ax.plot(*line, color=color(number), lw=0.9, zorder=3)
@@ -110,7 +93,7 @@ def clouds(path: Path, episode: Episode, replays: dict[str, Replay], diameter: f
             row[0].set_ylabel(f"{'xyz'[up]} [m]\n{view}")
             for ax in row:
                 ax.set_xlabel(f"{'xyz'[across]} [m]", labelpad=0)
-        dots = [plt.Line2D([], [], ls="", marker=".", color=MEASURED)]
+        dots = [plt.Line2D([], [], ls="", marker=".", color=INK)]
         lines = [plt.Line2D([], [], color=color(number)) for number in range(len(replays))]
         names = ["measured points", *replays]
         figure.legend(dots + lines, names, loc="outside lower center", ncols=4)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.bench import pull_and_release
+from pipeline.bench import pull_and_release, timed
 from pipeline.sling import Launches, Rollouts, Sling, interact, launch
 from pipeline.sling.interaction import schedule_of
 from pipeline.sling.model import GRAVITY, ROD, TETRAHEDRA, layers_of, material
@@ -133,8 +131,8 @@ def measure(bench: Bench, sling: Sling, count: int = COUNT) -> Figures:
     thetas, draws = random_launches(count)
     firm = replace(sling, grip_force=1e6)  # no theta slips out of it
     interact(firm, episode, thetas[:1])  # compiles
-    rollouts, rollout_seconds = _timed(lambda: interact(firm, episode, thetas))
-    launches, launch_seconds = _timed(lambda: launch(sling, thetas, draws))
+    rollouts, rollout_seconds, _ = timed(lambda: interact(firm, episode, thetas))
+    launches, launch_seconds, _ = timed(lambda: launch(sling, thetas, draws))
     frames = len(episode.cloud_time)
     return Figures(
         sling=sling,
@@ -146,13 +144,6 @@ def measure(bench: Bench, sling: Sling, count: int = COUNT) -> Figures:
         launch_seconds=launch_seconds / count,
         memory=memory(sling, schedule_of(sling, episode), frames),
     )
-
-
-def _timed(work: Callable) -> tuple:
-    """What `work` returns, and its CPU time [s]."""
-    start = time.process_time()
-    result = work()
-    return result, time.process_time() - start
 
 
 def compare(figures: Figures, rod: Figures) -> dict[str, float]:

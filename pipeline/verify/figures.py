@@ -4,24 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
 
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
-
-COLORS = ("#d1495b", "#00798c", "#edae49", "#66a182", "#8d6a9f", "#2e4057")
-CLOSED = "#222222"
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.alpha": 0.25,
-    "legend.frameon": False,
-    "figure.constrained_layout.use": True,
-}
+from pipeline.style import COLORS, INK, STYLE
 
 
 def _save(figure, path: Path) -> None:
@@ -38,12 +24,12 @@ def pull(path: Path, stretch: np.ndarray, curves: dict[str, tuple[np.ndarray, np
     with plt.rc_context(STYLE):
         figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.2))
         for number, (name, (measured, closed)) in enumerate(curves.items()):
-            left.plot(stretch, closed, color=CLOSED, lw=1, zorder=1)
+            left.plot(stretch, closed, color=INK, lw=1, zorder=1)
             left.plot(stretch, measured, "o", ms=4, color=COLORS[number], label=name)
             right.plot(
                 stretch, 100 * (measured / closed - 1), "o-", ms=3, lw=1, color=COLORS[number]
             )
-        left.plot([], [], color=CLOSED, lw=1, label="closed form")
+        left.plot([], [], color=INK, lw=1, label="closed form")
         left.set(xlabel="stretch", ylabel="pull / (E A)")
         left.legend()
         right.axhspan(-0.5, 0.5, color="0.92", zorder=0)
@@ -65,7 +51,7 @@ def oscillation(path: Path, cases: dict[str, tuple[np.ndarray, np.ndarray, np.nd
             zip(np.atleast_1d(axes), cases.items(), strict=True)
         ):
             shown = slice(None, None, max(len(time) // 60, 1))
-            ax.plot(time, 1e3 * closed, color=CLOSED, lw=1, label="oscillator, closed form")
+            ax.plot(time, 1e3 * closed, color=INK, lw=1, label="oscillator, closed form")
             ax.plot(
                 time[shown],
                 1e3 * place[shown],
@@ -94,7 +80,7 @@ def balance(path: Path, done) -> None:
                 ax.plot(
                     time, parts[number], color=COLORS[number], lw=1.2, label=names.get(name, name)
                 )
-            ax.plot(time, work, color=CLOSED, lw=2, alpha=0.5, label="work of the hand")
+            ax.plot(time, work, color=INK, lw=2, alpha=0.5, label="work of the hand")
             ax.plot(time, parts.sum(0), color="k", ls=":", lw=1, label="sum of the others")
         axes[0].set(xlabel="time [s]", ylabel="energy since the band hung [J]")
         axes[1].set(xlabel="time after the release [ms]", xlim=(-10, 100))

@@ -111,6 +111,10 @@ def section(
     def told(reasons: dict) -> str:
         return "; ".join(f"{number} “{reason}”" for reason, number in reasons.items()) or "none"
 
+    def failed(name: str, one: dict) -> Check:
+        total = float(sum(one["reasons"].values()))
+        return Check(name, "—", total, "θ", None, told(one["reasons"]))
+
     boundary = [
         Check(
             f"unconverged, and marked so, of {one['rollouts']} rollouts {where}, held fast",
@@ -145,22 +149,8 @@ def section(
             told(held["reasons"]),
         ),
         *boundary,
-        Check(
-            f"failed of {launches} with the default grip",
-            "—",
-            float(sum(gripped["reasons"].values())),
-            "θ",
-            None,
-            told(gripped["reasons"]),
-        ),
-        Check(
-            f"failed of {launches} launches from random draws",
-            "—",
-            float(sum(launched["reasons"].values())),
-            "θ",
-            None,
-            told(launched["reasons"]),
-        ),
+        failed(f"failed of {launches} with the default grip", gripped),
+        failed(f"failed of {launches} launches from random draws", launched),
     ]
     return Section(
         "Random parameters",

@@ -13,11 +13,9 @@ import pytest
 
 from pipeline.bench import environment
 from pipeline.files import write_json
-from pipeline.identify.checkpoint import fingerprint
 from pipeline.params import load
 
 ROOT = Path(__file__).parents[2]
-SIMULATOR = fingerprint(ROOT / "pipeline/sling")[:12]  # before a campaign, as it is imported then
 
 
 @pytest.fixture(scope="session")
@@ -44,10 +42,8 @@ def record(request) -> Callable[..., None]:
     """
 
     def write(name: str, *, asked: str, met: bool, settings: dict, figures: dict) -> None:
-        about = environment("cpu") | {
-            "command": "make validate",
+        about = environment("cpu", "make validate") | {
             "alone": f"python -m pytest -m validation tests/validation/{request.path.name}",
-            "simulator": SIMULATOR,
         }
         content = {"asked": asked, "met": met, "settings": settings, "figures": figures, **about}
         write_json(ROOT / "reports/validation" / f"{name}.json", _plain(content))

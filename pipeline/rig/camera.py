@@ -23,15 +23,22 @@ RATE = 30.0  # Hz
 FIRST_FRAME = 0.004  # s
 LIGHT = np.array([0.45, 0.35, 0.82]) / np.linalg.norm([0.45, 0.35, 0.82])
 AMBIENT = 0.45
+NEAR = 0.05  # m
 EDGE = 0.03  # m between neighbours, from which on pixels are unsure
 
 
 @dataclass(frozen=True)
 class Picture:
-    """RGB from 0 to 1 (H, W, 3), and depth along the optical axis (H, W) [m], inf for nothing."""
+    """RGB from 0 to 1 (H, W, 3), and depth along the optical axis (H, W) [m], inf for nothing.
+
+    Where something moved during the exposure, `depth` is what was seen for longest, `nearest` and
+    `furthest` (H, W) the extremes.
+    """
 
     color: np.ndarray
     depth: np.ndarray
+    nearest: np.ndarray
+    furthest: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -90,24 +97,50 @@ class Camera:
 
         scene = o3d.t.geometry.RaycastingScene()
         scene.add_triangles(mesh.vertices.astype(np.float32), mesh.triangles.astype(np.uint32))
-        hits = scene.cast_rays(o3d.core.Tensor(self.rays))
-        depth = hits["t_hit"].numpy()
-        seen = np.isfinite(depth)
+        window = self.window(mesh.vertices)
+        rays = np.ascontiguousarray(self.rays[window])
+        hits = scene.cast_rays(o3d.core.Tensor(rays))
+        reached = hits["t_hit"].numpy()
+        seen = np.isfinite(reached)
         normals = hits["primitive_normals"].numpy()[seen]
-        facing = -np.sign(np.sum(normals * self.rays[seen, 3:], axis=-1))
+        facing = -np.sign(np.sum(normals * rays[seen, 3:], axis=-1))
         bright = np.maximum(facing * (normals @ LIGHT.astype(np.float32)), 0)
         albedo = mesh.colors.astype(np.float32)[hits["primitive_ids"].numpy()[seen]]
+        depth = np.full(self.size[::-1], np.inf, np.float32)
         color = np.zeros((*depth.shape, 3), np.float32)
-        color[seen] = albedo * (AMBIENT + (1 - AMBIENT) * bright)[:, None]
-        return Picture(color, depth)
+        depth[window] = reached
+        color[window][seen] = albedo * (AMBIENT + (1 - AMBIENT) * bright)[:, None]
+        return Picture(color, depth, depth, depth)
+
+    def window(self, points: np.ndarray) -> tuple[slice, slice]:
+        """Rows and columns that can see what lies between points (V, 3); all if some are behind."""
+        local = self.rotation.apply(points - self.position, inverse=True)
+        if local[:, 2].min() < NEAR:
+            return slice(None), slice(None)
+        pixels = self.focal * local[:, :2] / local[:, 2:] + self.center
+        low, high = np.floor(pixels.min(axis=0)), np.ceil(pixels.max(axis=0)) + 1
+        (left, top), (right, bottom) = np.clip([low, high], 0, self.size).astype(int)
+        return slice(top, bottom), slice(left, right)
 
 
 def nearer(first: Picture, second: Picture) -> Picture:
     """Both pictures of one camera as one."""
     hidden = second.depth < first.depth
+    depth = np.where(hidden, second.depth, first.depth)
+    color = np.where(hidden[..., None], second.color, first.color)
+    return Picture(color, depth, depth, depth)
+
+
+def blurred(instants: list[Picture]) -> Picture:
+    """Pictures of equally long parts of one exposure as one."""
+    if len(instants) == 1:
+        return instants[0]
+    depths = np.stack([one.depth for one in instants])
     return Picture(
-        np.where(hidden[..., None], second.color, first.color),
-        np.where(hidden, second.depth, first.depth),
+        np.mean([one.color for one in instants], axis=0),
+        np.sort(depths, axis=0)[len(depths) // 2],
+        depths.min(axis=0),
+        depths.max(axis=0),
     )
 
 
@@ -117,15 +150,18 @@ def exposed(color: np.ndarray, settings: RigCamera, rng: np.random.Generator) ->
     return np.clip(255 * color + noise, 0, 255).astype(np.uint8)
 
 
-def measured_depth(depth: np.ndarray, settings: RigCamera, rng: np.random.Generator) -> np.ndarray:
+def measured_depth(picture: Picture, settings: RigCamera, rng: np.random.Generator) -> np.ndarray:
     """Millimetres as a time-of-flight camera gives them, 0: none; uint16 (H, W).
 
-    Noise grows with the square of the distance; at edges some pixels are lost and some fly between
-    the two surfaces.
+    Noise grows with the square of the distance; where two surfaces share a pixel, at an edge or
+    because one moves through it, some pixels are lost and some fly between the two.
     """
-    depth = np.where(depth < settings.range, depth, 0).astype(np.float32)
-    around = np.stack([depth, np.roll(depth, 1, axis=0), np.roll(depth, 1, axis=1)])
-    far, near = around.max(axis=0), around.min(axis=0)
+    depth, near, far = (
+        np.where(one < settings.range, one, 0).astype(np.float32)
+        for one in (picture.depth, picture.nearest, picture.furthest)
+    )
+    near = np.stack([near, np.roll(near, 1, axis=0), np.roll(near, 1, axis=1)]).min(axis=0)
+    far = np.stack([far, np.roll(far, 1, axis=0), np.roll(far, 1, axis=1)]).max(axis=0)
     chance = rng.random(depth.shape, np.float32)
     mixing = rng.random(depth.shape, np.float32)
     noisy = depth + settings.depth_noise * depth**2 * rng.standard_normal(depth.shape, np.float32)

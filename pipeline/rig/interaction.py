@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.errors import UserError
 from pipeline.rig.motion import END, GRASP, OPEN, Motion
+from pipeline.rig.servo import Servo
 from pipeline.rig.string import ElasticString
 from pipeline.rig.world import bent_at
 
@@ -25,11 +26,17 @@ class Interaction:
 
     Attributes:
         force: Of the band on the gripper at the sensor's times [N], shape (T, 3).
-        lines: Nodes of the band at the camera's times [m], shape (K, nodes, 3).
+        hand: Of the tool centre point at the sensor's times [m], shape (T, 3).
+        acceleration: Of the hand at the sensor's times [m/s2], shape (T, 3).
+        seen: The camera's times [s], shape (K,).
+        lines: Nodes of the band at those times [m], shape (K, nodes, 3).
         slip_time: When the band leaves the fingers [s].
     """
 
     force: np.ndarray
+    hand: np.ndarray
+    acceleration: np.ndarray
+    seen: np.ndarray
     lines: np.ndarray
     slip_time: float
 
@@ -61,21 +68,19 @@ def pull_and_release(
     """
     rig = params.rig
     holding = 2 * rig.pad_friction * params.setup.grip_force  # two pads
-
-    def pull(time: float) -> np.ndarray:
-        return motion.position(time, 2)
+    follow = Servo.of(rig.arm).following(motion)
 
     def margin(time: float, y: np.ndarray) -> float:
         grip = holding * float(motion.grip(time))
-        return grip - float(np.linalg.norm(string.on_hand(y, pull(time))))
+        return grip - float(np.linalg.norm(string.at_middle(y)))
 
     y = string.state(hanging)
-    y[string.middle, 3:6] = motion.position(GRASP, 1)
+    y[string.middle, :6] = np.concatenate([motion.position(GRASP), motion.position(GRASP, 1)])
     last = OPEN + motion.opening_time
     wanted = np.union1d(sensor_times, camera_times)
-    wanted = wanted[(wanted > GRASP) & (wanted < last)]
+    during = wanted[(wanted > GRASP) & (wanted < last)]
     held_times, held = string.integrate(
-        y, np.concatenate([[GRASP], wanted, [last]]), rig.tolerance, pull=pull, event=margin
+        y, np.concatenate([[GRASP], during, [last]]), rig.tolerance, hand=follow, event=margin
     )
     held_times, held = held_times[1:], held[1:]  # the first shows the jolt of the grasp alone
     slip = float(held_times[-1])
@@ -86,19 +91,30 @@ def pull_and_release(
         )
     progress(f"held from {GRASP:.2f} s, slipped free at {slip:.4f} s")
 
-    force = np.zeros((len(sensor_times), 3))
-    sensed = np.isin(held_times, sensor_times)
-    load = np.concatenate(
-        [
-            string.on_hand(held[i : i + CHUNK], pull(held_times[i : i + CHUNK]))
-            for i in range(0, len(held), CHUNK)
-        ]
-    )
-    force[np.isin(sensor_times, held_times)] = load[sensed]
-
-    after = camera_times[camera_times > slip]
+    after = wanted[wanted > slip]
     free = string.integrate(held[-1], np.concatenate([[slip], after, [END]]), rig.tolerance)[1]
+    hand = follow.alone(held[-1, string.middle, :6], np.concatenate([[slip], after]), rig.tolerance)
+    hand = hand[1:]  # (x, v) after the slip
+
+    force, place = np.zeros((len(sensor_times), 3)), motion.position(sensor_times)
+    speed = motion.position(sensor_times, 1)
+    while_held, sensed = np.isin(sensor_times, held_times), np.isin(held_times, sensor_times)
+    force[while_held] = np.concatenate(
+        [string.at_middle(held[i : i + CHUNK]) for i in range(0, len(held), CHUNK)]
+    )[sensed]
+    place[while_held] = held[sensed, string.middle, :3]
+    speed[while_held] = held[sensed, string.middle, 3:6]
+    then = np.isin(after, sensor_times)
+    place[sensor_times > slip], speed[sensor_times > slip] = hand[then, :3], hand[then, 3:]
+
     lines = np.repeat(hanging[None], len(camera_times), axis=0)
     lines[np.isin(camera_times, held_times)] = held[np.isin(held_times, camera_times), :, :3]
-    lines[camera_times > slip] = free[1:-1, :, :3]
-    return Interaction(force=force, lines=lines, slip_time=slip)
+    lines[camera_times > slip] = free[1:-1][np.isin(after, camera_times), :, :3]
+    return Interaction(
+        force=force,
+        hand=place,
+        acceleration=follow(sensor_times, place.T, speed.T, force.T).T,
+        seen=camera_times,
+        lines=lines,
+        slip_time=slip,
+    )

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from pipeline.params import TARGET_AREA
+from pipeline.rig.scene import ROD
 from pipeline.rig.string import GRAVITY, ElasticString
 from pipeline.rig.world import bent_at, pulled, string_of
 
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
 PATIENCE = 0.5  # s within which the projectile leaves the pouch, if it ever does
 FLIGHT = 20.0  # s, more than any flight takes
+FOOT = ROD  # m: height of the bar that joins the fork's rods on the floor
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,7 @@ class Trial:
     """One launch, SI units, frame O; NaN where there is nothing to tell.
 
     Attributes:
-        landing_y: Where the projectile meets the floor.
+        landing_y: Where the projectile meets the floor, also beyond the area.
         failure: None, or why there is no landing.
         hold_force: Of the drawn band on the hand.
         speed, angle: Of the projectile as it leaves the pouch [m/s, rad above the horizon].
@@ -43,30 +46,35 @@ def launch(
 
     Args:
         trial_seed: Of the actuation error (`trials.actuation_error`, normal in y and z); equal
-            seeds give every method the same error. None: no error.
+            seeds give every method the same error. So does the kick of the opening fingers
+            (`rig.release_jitter`). None: neither.
     """
-    aim = np.array([0.0, *draw])
+    aim, kick = np.array([0.0, *draw]), np.zeros(3)
     if trial_seed is not None:
         rng = np.random.default_rng([params.rig.seed, trial_seed])
         aim[1:] += rng.normal(0, params.trials.actuation_error, 2)
-    return launch_from(string_of(params, band_name), params, aim)
+        kick[1:] = rng.normal(0, params.rig.release_jitter, 2)
+    return launch_from(string_of(params, band_name), params, aim, kick)
 
 
-def launch_from(string: ElasticString, params: Params, aim: np.ndarray) -> Trial:
-    """Launch from exactly the draw `aim` (3,)."""
+def launch_from(
+    string: ElasticString, params: Params, aim: np.ndarray, kick: np.ndarray | None = None
+) -> Trial:
+    """Launch from exactly the draw `aim` (3,), let go with the velocity `kick` (3,)."""
     tolerance, mass = params.rig.tolerance, params.setup.projectile_mass
     taut = string.length / 2
     if np.linalg.norm(aim - string.clamps[0]) <= taut:
         return Trial(float("nan"), "too short: the drawn band is slack", 0.0)
     _, stress, memory = pulled(string, aim)
     y = string.at_rest(bent_at(string, aim), tolerance, held=True, memory=memory[-1] / stress[-1])
-    hold_force = float(np.linalg.norm(string.on_hand(y, np.zeros(3))))
+    hold_force = float(np.linalg.norm(string.at_middle(y)))
     limit = params.setup.max_force
     if hold_force > limit:
         reason = f"holding takes {hold_force:.1f} N, more than {limit:g} N"
         return Trial(float("nan"), reason, hold_force)
 
     loaded = replace(string, payload=mass)
+    y[string.middle, 3:6] = 0.0 if kick is None else kick
     heading = -aim / np.linalg.norm(aim)
 
     def push(time: float, y: np.ndarray) -> float:
@@ -79,11 +87,20 @@ def launch_from(string: ElasticString, params: Params, aim: np.ndarray) -> Trial
         return Trial(float("nan"), "the projectile never left the pouch", hold_force)
     position, velocity = states[-1, loaded.middle, 1:3], states[-1, loaded.middle, 4:6]
     floor = -params.setup.fork_height
-    landing = fly(position, velocity, floor, params.rig.projectile_drag / mass)
+    drag = params.rig.projectile_drag / mass
+    landing = fly(position, velocity, floor, drag)
     speed, angle = float(np.hypot(*velocity)), float(np.arctan2(velocity[1], velocity[0]))
     if not landing > 0:
         reason = "too short: the projectile fell before the fork"
         return Trial(float("nan"), reason, hold_force, speed, angle)
+    if fly(position, velocity, floor + FOOT, drag) < 0:
+        reason = "hits the fork: too low where it passes"
+        return Trial(float("nan"), reason, hold_force, speed, angle)
+    low, high = TARGET_AREA
+    if not low <= landing <= high:
+        where = "too short" if landing < low else "beyond the area"
+        reason = f"{where}: lands at {landing:.3f} m, not within {low:g} to {high:g} m"
+        return Trial(landing, reason, hold_force, speed, angle)
     return Trial(landing, None, hold_force, speed, angle)
 
 

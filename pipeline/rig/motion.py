@@ -1,7 +1,7 @@
 """What the robot does: a path through waypoints, tracking errors, fingers that close and open.
 
 Positions are of the tool centre point between the finger tips, in frame O. Each leg is a cubic
-with rest at both ends; smooth wander is added to what is commanded, and the pose reports the sum.
+with rest at both ends; smooth wander is added to what is commanded. An arm with some give follows.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 # Seconds from the start of the recording.
-REACHED, GRASP = 0.8, 1.0  # the hand is there and its fingers close; they hold the band
+START = 0.4  # the hand leaves its place
+REACHED, GRASP = 0.8, 1.0  # it is there and its fingers close; they hold the band
 PULL, PULLED = 2.0, 6.0  # the middle is at the tips' height; it is drawn
 OPEN = 8.0  # the fingers begin to open
 RETREAT, RETREATED, END = 8.3, 9.3, 10.0
@@ -58,8 +59,8 @@ class Motion:
         drawn = PULL_LENGTH * back
         start = hanging + APPROACH_LENGTH * back
         end = drawn + RETREAT_LENGTH * back
-        times = [0.0, REACHED, GRASP, PULL, PULLED, RETREAT, RETREATED, END]
-        points = np.array([start, hanging, hanging, 0 * back, drawn, drawn, end, end])
+        times = [0.0, START, REACHED, GRASP, PULL, PULLED, RETREAT, RETREATED, END]
+        points = np.array([start, start, hanging, hanging, 0 * back, drawn, drawn, end, end])
         amplitude = rng.normal(size=(WANDER_TONES, 3))
         amplitude *= tracking_error * np.sqrt(2 / np.sum(amplitude**2, axis=0))
         return cls(

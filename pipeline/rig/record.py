@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
 from pipeline.files import replacing
@@ -22,18 +23,17 @@ from pipeline.rig.string import ElasticString
 from pipeline.rig.world import string_of
 
 if TYPE_CHECKING:
-    from pipeline.params import Params
+    from pipeline.params import Params, RigClock
 
 EPOCH = 1_760_000_000_000_000_000  # ns, when the recording starts
 SENSOR_RATE, GRIPPER_RATE = 1000, 50  # Hz
 FINGERS = ["panda_finger_joint1", "panda_finger_joint2"]
 COLOR, DEPTH = "/camera/color", "/camera/depth"
 OPTICAL = "camera_color_optical_frame"
-DELAYS = {"gripper": 200_000, "pose": 300_000, "wrench": 400_000, "color": 12_000_000}  # ns
-JITTER = {"wrench": 120_000, "color": 1_700_000}  # ns, mean of an exponential
-DEPTH_DELAY = 3_000_000  # ns after colour
 JPEG_QUALITY = 90
 REPORT_EVERY = 60  # frames
+INSTANTS = 5  # of each exposure at which the band is computed
+PIXELS_APART, MOST_INSTANTS = 2.0, 16  # of the instants that are seen
 
 
 def record(
@@ -50,7 +50,8 @@ def record(
         picture_scale: Of the pictures' 640 x 480 pixels.
     """
     rig, setup = params.rig, params.setup
-    motion_rng, sensor_rng, clock_rng, camera_rng = np.random.default_rng(rig.seed).spawn(4)
+    rng = np.random.default_rng([rig.seed, *band_name.encode()])
+    motion_rng, sensor_rng, clock_rng, camera_rng = rng.spawn(4)
     robot = Robot.of(rig)
     string = string_of(params, band_name)
     progress(f"{band_name}: modulus {string.rubber.scale / 1e6:.3f} of Treloar's rubber")
@@ -61,33 +62,57 @@ def record(
     times = np.arange(round(END * SENSOR_RATE)) / SENSOR_RATE
     frames = eye.FIRST_FRAME + np.arange(int((END - eye.FIRST_FRAME) * eye.RATE)) / eye.RATE
     frames = frames[camera_rng.random(len(frames)) >= rig.camera.drop_rate]
-    happened = pull_and_release(string, hanging, motion, times, frames, params, progress)
+    shutter = rig.camera.exposure * np.linspace(-0.5, 0.5, INSTANTS)
+    seen = np.unique(frames[:, None] + shutter)
+    happened = pull_and_release(string, hanging, motion, times, seen, params, progress)
 
     bag = BagWriter()
-    clock = Clock(clock_rng)
     look = np.array(rig.camera.position), np.array(rig.camera.target)
     camera = Camera.looking(*look, rig.camera.focal, picture_scale)
     add_frames(bag, robot, camera.misplaced(rig.camera, camera_rng))
-    add_gripper(bag, clock, motion)
-    add_pose(bag, clock, robot, times, motion.position(times))
-    add_wrench(bag, clock, times, wrench(happened.force, robot, rig.wrench, sensor_rng))
+    clocks = clock_rng.spawn(4)
+    add_gripper(bag, Clock(rig.clock, clocks[0]), motion)
+    late = interp1d(times, happened.hand, axis=0, fill_value="extrapolate")
+    add_pose(bag, Clock(rig.clock, clocks[1]), robot, times, late(times - rig.pose_latency))
+    felt = wrench(happened, robot, rig.wrench, sensor_rng)
+    add_wrench(bag, Clock(rig.clock, clocks[2]), times, felt)
+
+    clock = Clock(rig.camera.clock, clocks[3])
     still = camera.see(room(setup.fork_width, setup.fork_height, robot))
-    for i, (time, line) in enumerate(zip(frames, happened.lines, strict=True)):
+    color, hand = rig.bands[band_name].color, interp1d(times, happened.hand, axis=0)
+    for i, time in enumerate(frames):
         if i % REPORT_EVERY == 0:
             progress(f"picture {i} of {len(frames)}")
-        color = rig.bands[band_name].color
-        moving = joined(
-            [
-                tube(line, radius(string, line), color),
-                arm(robot, motion.position(time), float(motion.finger(time))),
-            ]
-        )
-        picture = eye.nearer(still, camera.see(moving))
+        lines = happened.lines[np.searchsorted(seen, time + shutter)]
+        others = arm(robot, hand(time), float(motion.finger(time)))
+        instants = [
+            camera.see(joined([tube(line, radius(string, line), color), others]))
+            for line in instants_of(lines, camera)
+        ]
+        picture = eye.blurred([eye.nearer(still, one) for one in instants])
         add_picture(bag, clock, camera, time, picture, params, camera_rng)
     with replacing(path) as temporary:
         bag.write(temporary)
     progress(f"{path}: {path.stat().st_size / 1e6:.0f} MB")
     return happened
+
+
+def instants_of(lines: np.ndarray, camera: Camera) -> np.ndarray:
+    """As many instants of one exposure as it takes that the band moves by two pixels between them.
+
+    Args:
+        lines: Nodes at INSTANTS equal times of the exposure, shape (INSTANTS, nodes, 3).
+
+    Returns:
+        Shape (N, nodes, 3); the middle alone where nothing moves.
+    """
+    distance = np.linalg.norm(lines.mean(axis=(0, 1)) - camera.position)
+    way = np.linalg.norm(np.diff(lines, axis=0), axis=-1).sum(axis=0).max()
+    count = min(int(np.ceil(way * camera.focal / distance / PIXELS_APART)), MOST_INSTANTS)
+    if count <= 1:
+        return lines[INSTANTS // 2][None]
+    at = (np.arange(count) + 0.5) / count * (INSTANTS - 1)
+    return interp1d(np.arange(INSTANTS), lines, axis=0)(at)
 
 
 def radius(string: ElasticString, line: np.ndarray) -> np.ndarray:
@@ -99,19 +124,19 @@ def radius(string: ElasticString, line: np.ndarray) -> np.ndarray:
 
 
 class Clock:
-    """When messages are received: late and jittering, each source's in their order."""
+    """Stamps of one source, which jitter, and when its messages are received: later, in order."""
 
-    def __init__(self, rng: np.random.Generator) -> None:
-        self.rng = rng
-        self.last: dict[str, int] = {}
+    def __init__(self, settings: RigClock, rng: np.random.Generator) -> None:
+        self.settings, self.rng = settings, rng
+        self.stamped = self.received = 0
 
-    def __call__(self, time: float, source: str) -> tuple[int, int]:
+    def __call__(self, time: float) -> tuple[int, int]:
         """Stamp and time of receipt [ns] of a message of `time` [s]."""
-        stamp = EPOCH + round(time * 1e9)
-        jitter = self.rng.exponential(JITTER[source]) if source in JITTER else 0
-        received = stamp + DELAYS[source] + round(jitter)
-        self.last[source] = max(received, self.last.get(source, 0))
-        return stamp, self.last[source]
+        stamp = time + self.rng.normal(0, self.settings.stamp_jitter)
+        received = time + self.settings.delay + self.rng.exponential(self.settings.delay_jitter)
+        self.stamped = max(EPOCH + round(stamp * 1e9), self.stamped + 1)
+        self.received = max(EPOCH + round(received * 1e9), self.received)
+        return self.stamped, self.received
 
 
 def add_frames(bag: BagWriter, robot: Robot, believed: Camera) -> None:
@@ -147,7 +172,7 @@ def add_frames(bag: BagWriter, robot: Robot, believed: Camera) -> None:
 def add_gripper(bag: BagWriter, clock: Clock, motion: Motion) -> None:
     for i in range(round(END * GRIPPER_RATE)):
         time = i / GRIPPER_RATE
-        stamp, received = clock(time, "gripper")
+        stamp, received = clock(time)
         message = bag.types["sensor_msgs/msg/JointState"](
             header=bag.header(stamp, ""),
             name=FINGERS,
@@ -165,7 +190,7 @@ def add_pose(
     quaternion = (robot.base.inv() * robot.tool).as_quat(canonical=True)
     orientation = kinds["geometry_msgs/msg/Quaternion"](*map(float, quaternion))
     for time, position in zip(times, robot.in_base(positions), strict=True):
-        stamp, received = clock(time, "pose")
+        stamp, received = clock(time)
         message = kinds["geometry_msgs/msg/PoseStamped"](
             header=bag.header(stamp, "panda_link0"),
             pose=kinds["geometry_msgs/msg/Pose"](
@@ -179,7 +204,7 @@ def add_pose(
 def add_wrench(bag: BagWriter, clock: Clock, times: np.ndarray, wrenches: np.ndarray) -> None:
     vector = bag.types["geometry_msgs/msg/Vector3"]
     for time, row in zip(times, wrenches.tolist(), strict=True):
-        stamp, received = clock(time, "wrench")
+        stamp, received = clock(time)
         message = bag.types["geometry_msgs/msg/WrenchStamped"](
             header=bag.header(stamp, "ft_sensor"),
             wrench=bag.types["geometry_msgs/msg/Wrench"](
@@ -202,11 +227,11 @@ def add_picture(
     import cv2
 
     settings = params.rig.camera
-    stamp, received = clock(time, "color")
+    stamp, received = clock(time)
     header = bag.header(stamp, OPTICAL)
     info = camera_info(bag, header, camera)
     color = eye.exposed(picture.color, settings, rng)[..., ::-1]
-    depth = eye.measured_depth(picture.depth, settings, rng)
+    depth = eye.measured_depth(picture, settings, rng)
     jpeg = cv2.imencode(".jpg", color, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
     huffman = [cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY]
     png = cv2.imencode(".png", depth, huffman)[1]  # noise holds nothing that a search could find
@@ -217,8 +242,7 @@ def add_picture(
     bag.add(f"{DEPTH}/camera_info", info, stamp, received)
     framed = np.concatenate([np.zeros(12, np.uint8), png])  # header: format and quantisation
     depth_topic = f"{DEPTH}/image_raw/compressedDepth"
-    late = received + DEPTH_DELAY
-    bag.add(depth_topic, image(header, "16UC1; compressedDepth png", framed), stamp, late)
+    bag.add(depth_topic, image(header, "16UC1; compressedDepth png", framed), stamp, received)
 
 
 def camera_info(bag: BagWriter, header: Any, camera: Camera) -> Any:

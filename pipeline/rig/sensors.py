@@ -11,20 +11,24 @@ from pipeline.rig.string import GRAVITY
 
 if TYPE_CHECKING:
     from pipeline.params import RigWrench
+    from pipeline.rig.interaction import Interaction
+
+TOOL_CENTER = 0.4  # of the way from the sensor to the tool centre point
 
 
 def wrench(
-    band_force: np.ndarray, robot: Robot, settings: RigWrench, rng: np.random.Generator
+    happened: Interaction, robot: Robot, settings: RigWrench, rng: np.random.Generator
 ) -> np.ndarray:
     """Forces [N] and torques [N m] in the sensor's frame, shape (T, 6).
 
-    Args:
-        band_force: Of the band on the gripper, frame O, shape (T, 3).
+    The sensor carries the tool: its weight, and its inertia as the hand speeds up or swings back.
     """
-    count = len(band_force)
+    count = len(happened.force)
     lever = SENSOR_LEVER * robot.tool_axes[:, 2]
-    force = robot.sensor.apply(band_force + settings.tool_mass * GRAVITY, inverse=True)
-    torque = robot.sensor.apply(np.cross(lever, band_force), inverse=True)
+    tool = settings.tool_mass * (GRAVITY - happened.acceleration)
+    force = robot.sensor.apply(happened.force + tool, inverse=True)
+    torque = np.cross(lever, happened.force) + np.cross(TOOL_CENTER * lever, tool)
+    torque = robot.sensor.apply(torque, inverse=True)
     bias, drift = settings.bias * direction(rng), settings.drift * direction(rng)
     force += bias + np.linspace(0, 1, count)[:, None] * drift
     force += rng.normal(0, settings.noise, force.shape)

@@ -24,6 +24,16 @@ CYLINDER_DRAG = 1.1  # coefficient of a cylinder across the wind
 NUDGE = 1e-7  # of the difference quotients, in m, m/s and MPa
 SETTLING_TIME = 4.0
 FOREVER = 1e9  # s
+
+Hand = Callable[[float, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""Acceleration (3, ...) of the hand by time, and its place, velocity and the band's force on it."""
+
+
+def still(time: float, x: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """A hand that does not move, whatever pulls."""
+    return np.zeros_like(x)
+
+
 GRADING = 0.75  # edges are 1 - GRADING to 1 + GRADING of their mean
 
 
@@ -137,26 +147,25 @@ class ElasticString:
         force += masses * (GRAVITY.reshape(3, *ones) - self.damping * v)
         return force, owed / rubber.times.reshape(-1, *ones)
 
-    def rates(self, y: np.ndarray, pull: np.ndarray | None = None) -> np.ndarray:
-        """dY/dt; `pull` is the acceleration of a held middle node, shape (3,)."""
+    def rates(self, y: np.ndarray, time: float = 0.0, hand: Hand | None = None) -> np.ndarray:
+        """dY/dt of states (nodes, 6 + K, ...); `hand` holds the middle node."""
         force, forgetting = self.forces(y)
         rates = np.zeros_like(y)
         rates[1:-1, :3] = y[1:-1, 3:6]
         rates[1:-1, 3:6] = force[1:-1] / self.masses[1:-1].reshape(-1, 1, *(1,) * (y.ndim - 2))
         rates[:-1, 6:] = forgetting
-        if pull is not None:
-            rates[self.middle, 3:6] = pull.reshape(3, *(1,) * (y.ndim - 2))
+        if hand is not None:
+            place, velocity = y[self.middle, :3], y[self.middle, 3:6]
+            rates[self.middle, 3:6] = hand(time, place, velocity, force[self.middle])
         return rates
 
-    def on_hand(self, y: np.ndarray, pull: np.ndarray) -> np.ndarray:
-        """Force of the band on the hand that holds its middle, shape (..., 3) [N].
+    def at_middle(self, y: np.ndarray) -> np.ndarray:
+        """Force of the band on what holds its middle, shape (..., 3) [N].
 
-        Args:
-            y: States (..., nodes, 6 + K).
-            pull: Acceleration of the hand, shape (..., 3).
+        The middle node's inertia is not in it: it moves with the hand. States (..., nodes, 6 + K).
         """
         force = np.moveaxis(self.forces(np.moveaxis(y, (-2, -1), (0, 1)))[0], (0, 1), (-2, -1))
-        return force[..., self.middle, :] - self.masses[self.middle] * pull
+        return force[..., self.middle, :]
 
     def integrate(
         self,
@@ -164,7 +173,7 @@ class ElasticString:
         times: np.ndarray,
         tolerance: float,
         *,
-        pull: Callable[[float], np.ndarray] | None = None,
+        hand: Hand | None = None,
         event: Callable[[float, np.ndarray], float] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Follow the state y (nodes, 6 + K) from times[0], where it holds.
@@ -172,25 +181,24 @@ class ElasticString:
         Args:
             times: To report at, ascending, shape (S,).
             tolerance: Relative; a hundredth of it in m, m/s and MPa.
-            pull: Acceleration of a held middle node by time.
+            hand: What holds the middle node, if anything.
             event: Ends the integration where it falls through zero.
 
         Returns:
             Times (R,) and states (R, nodes, 6 + K): those asked for, up to the event and with it.
         """
         shape = y.shape
-        at = pull if pull is not None else lambda t: None
         reach = 2 * shape[1] + 5  # two nodes on, from the first of x to the last of v
         colours = np.arange(y.size) % (2 * reach + 1)
         tint = np.equal.outer(colours, np.arange(2 * reach + 1))
 
         def rates(t: float, flat: np.ndarray) -> np.ndarray:
-            return self.rates(flat.reshape(shape), at(t)).ravel()
+            return self.rates(flat.reshape(shape), t, hand).ravel()
 
         def jacobian(t: float, flat: np.ndarray) -> np.ndarray:
             """Banded, by differences: columns of one colour share no row."""
             moved = (flat[:, None] + NUDGE * tint).reshape(*shape, -1)
-            change = self.rates(moved, at(t)).reshape(y.size, -1) - rates(t, flat)[:, None]
+            change = self.rates(moved, t, hand).reshape(y.size, -1) - rates(t, flat)[:, None]
             rows = np.arange(y.size) + np.arange(-reach, reach + 1)[:, None]  # (band, column)
             inside = (rows >= 0) & (rows < y.size)
             return np.where(inside, change[rows.clip(0, y.size - 1), colours], 0.0) / NUDGE
@@ -237,9 +245,8 @@ class ElasticString:
         excess = 0.0 if memory is None else float(rubber.weights @ (1 - memory))
         frozen = replace(rubber, relaxation=np.array([[excess, FOREVER]]))
         sticky = replace(self, rubber=frozen, damping=2 * np.sqrt(-GRAVITY[2] / (self.length / 2)))
-        still = (lambda t: np.zeros(3)) if held else None
-        start = sticky.state(x, np.zeros(1))
-        end = sticky.integrate(start, np.array([0.0, SETTLING_TIME]), tolerance, pull=still)[1][-1]
+        start, hand = sticky.state(x, np.zeros(1)), still if held else None
+        end = sticky.integrate(start, np.array([0.0, SETTLING_TIME]), tolerance, hand=hand)[1][-1]
         return self.state(end[:, :3], memory)
 
     def energy(self, y: np.ndarray) -> float:

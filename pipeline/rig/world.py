@@ -60,7 +60,7 @@ def _string_of(
     guess = with_scale(hidden.peak_force / (2 * tension))
     drawn = bent_at(guess, path[peak])
     y = guess.at_rest(drawn, tolerance, held=True, memory=memory[peak] / stress[peak])
-    force = guess.on_hand(y, np.zeros(3))[1]
+    force = guess.at_middle(y)[1]
     return with_scale(guess.rubber.scale * hidden.peak_force / force)
 
 

@@ -5,8 +5,11 @@ from pathlib import Path
 import pytest
 
 from pipeline.params import Params, load
+from pipeline.rig.interaction import Interaction
+from pipeline.rig.record import record
 
 ROOT = Path(__file__).parents[2]
+SCALE = 0.4  # of the pictures
 
 
 @pytest.fixture(scope="session")
@@ -27,3 +30,10 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip("needs ../shared, which is not part of the project")
     return folder
+
+
+@pytest.fixture(scope="session")
+def recorded(coarse: Params, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Interaction]:
+    """One recording of the quick world, and what truly happened."""
+    path = tmp_path_factory.mktemp("raw") / "band1.mcap"
+    return path, record(coarse, "band1", path, picture_scale=SCALE)

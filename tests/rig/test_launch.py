@@ -6,7 +6,7 @@ import numpy as np
 from scipy.integrate import simpson
 
 from pipeline.params import Params
-from pipeline.rig.launch import fly, launch, launch_from
+from pipeline.rig.launch import FOOT, fly, launch, launch_from
 from pipeline.rig.world import bent_at, string_of
 
 DRAW = (-0.30, -0.15)
@@ -47,7 +47,7 @@ def test_pouch_pushes_until_the_band_slackens(coarse: Params) -> None:
     for part in distances:
         at = bent_at(string, part * np.array([0.0, *DRAW]))
         held = string.at_rest(at, coarse.rig.tolerance, held=True)
-        force.append(np.linalg.norm(string.on_hand(held, np.zeros(3))))
+        force.append(np.linalg.norm(string.at_middle(held)))
     stored = -simpson(force, x=distances * np.hypot(*DRAW))
     energy = coarse.setup.projectile_mass * trial.speed**2 / 2
     assert 0.5 * stored < energy < stored
@@ -62,6 +62,27 @@ def test_failures_say_why(coarse: Params) -> None:
     assert strong.failure.startswith("holding takes")
     assert strong.hold_force > 5 and np.isnan(strong.landing_y)
     assert "slack" in launch("band1", coarse, (-0.15, -0.1), None).failure
+    assert "too short: lands" in launch("band1", coarse, (-0.24, -0.02), None).failure
+    far = launch("band1", coarse, (-0.44, -0.28), None)
+    assert far.failure.startswith("beyond the area") and far.landing_y > 2.425
+
+
+def test_a_low_flight_hits_the_forks_foot(coarse: Params) -> None:
+    """It would reach the floor just behind the fork, and meets the bar between the rods."""
+    floor = -0.52
+    low = np.array([-0.2, floor + 0.03]), np.array([3.0, 0.0])
+    assert fly(*low, floor, 0.0) > 0 > fly(*low, floor + FOOT, 0.0)
+
+
+def test_a_kick_moves_the_landing(coarse: Params) -> None:
+    """Along the launch it adds to the speed; equal seeds give every method the same kick."""
+    string, aim = string_of(coarse, "band1"), np.array([0.0, *DRAW])
+    heading = -aim / np.linalg.norm(aim)
+    plain, kicked = (launch_from(string, coarse, aim, k * heading) for k in (0.0, 0.2))
+    assert kicked.speed > plain.speed
+    calm = coarse.rig.model_copy(update={"release_jitter": 0.0})
+    calm = coarse.model_copy(update={"rig": calm})
+    assert launch("band1", coarse, DRAW, 3).landing_y != launch("band1", calm, DRAW, 3).landing_y
 
 
 def test_landing_is_converged(params: Params) -> None:

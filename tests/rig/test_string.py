@@ -36,7 +36,7 @@ def test_held_force_is_the_laws(string: ElasticString) -> None:
     half = np.hypot(0.1375, 0.4)
     stress = 2e5 * nominal_stress(np.array([half / 0.26]))[0][0]
     expected = 2 * np.pi / 4 * thin.diameter**2 * stress * 0.4 / half
-    assert np.isclose(thin.on_hand(y, np.zeros(3))[1], expected, rtol=3e-3)
+    assert np.isclose(thin.at_middle(y)[1], expected, rtol=3e-3)
 
 
 def test_forces_are_the_energys_gradient(string: ElasticString) -> None:
@@ -86,8 +86,8 @@ def test_relaxation_under_a_constant_hold(string: ElasticString) -> None:
     slow = replace(string, rubber=replace(ELASTIC, relaxation=np.array([[0.3, 0.5]])))
     y = slow.at_rest(bent_at(slow, DRAWN), 1e-6, held=True, memory=np.zeros(1))
     times = np.array([0.0, 0.25, 0.5, 1.0, 5.0])
-    states = slow.integrate(y, times, 1e-6, pull=lambda t: np.zeros(3))[1]
-    force = slow.on_hand(states, np.zeros(3))[:, 1]
+    states = slow.integrate(y, times, 1e-6, hand=string_module.still)[1]
+    force = slow.at_middle(states)[:, 1]
     expected = (1 + 0.3 * np.exp(-times / 0.5)) / 1.3
     np.testing.assert_allclose(force / force[0], expected, rtol=8e-3)
 
@@ -108,5 +108,5 @@ def test_finer_edges_change_little(params: Params) -> None:
     for edges in (60, 120):
         mesh = replace(string, edges=edges)
         y = mesh.at_rest(bent_at(mesh, DRAWN), 1e-6, held=True)
-        forces.append(mesh.on_hand(y, np.zeros(3))[1])
+        forces.append(mesh.at_middle(y)[1])
     assert np.isclose(*forces, rtol=2e-3)

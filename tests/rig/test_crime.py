@@ -1,0 +1,70 @@
+"""Not the inverse crime: the rig's rubber is not the simulator's, and the loss shows it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.identify.evaluate import Evaluator
+from pipeline.identify.explore import explore
+from pipeline.identify.history import History
+from pipeline.identify.loss import EpisodeLoss
+from pipeline.identify.refine import refine
+from pipeline.identify.regions import find_regions
+from pipeline.identify.space import Space
+from pipeline.recording.build import build_episode
+from pipeline.rig.record import EPOCH
+from pipeline.rig.world import string_of
+from pipeline.signal import cutoff_hz
+from pipeline.sling.model import THETA, Sling
+from tests.identify.own_law import own_law_episode, visible
+
+METHOD = "sling2sim2real"
+TRUTH = np.array([2.5e5, 0.45, 4e-3, 0.7, 0.6])
+
+
+def best_loss(params, sling, episode) -> tuple[float, np.ndarray]:
+    """Least total that a small budget finds, and its theta."""
+    loss = EpisodeLoss.of(params, METHOD, episode, sling)
+    evaluate = Evaluator(episode, sling, loss, Space.of(params.parameters))
+    history, search = History(METHOD, THETA), params.optimizer
+    explore(evaluate, search, history)
+    regions = find_regions(
+        history.unit, history.total, k_top=search.k_top, k_nn=search.k_nn, delta=search.delta
+    )
+    refine(evaluate, regions, search, history)
+    best = history.best()
+    return best["total"], np.array([best[name] for name in THETA])
+
+
+@pytest.fixture(scope="module")
+def quick(coarse):
+    budget = {"generations": 7, "population": 20, "k_top": 2, "cma_rollouts": 160}
+    optimizer = coarse.optimizer.model_copy(update=budget)
+    return coarse.model_copy(update={"optimizer": optimizer})
+
+
+def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorded) -> None:
+    """The same motion, noise, search and budget; clouds of the true band, without a camera's flaws.
+
+    So what is left is the law: Ogden's with relaxation against neo-Hookean with damping.
+    """
+    path, happened = recorded
+    sling = Sling.of(quick.bands["band1"], quick.setup, quick.sling)
+    string, rng = string_of(quick, "band1"), np.random.default_rng(0)
+    episode = build_episode(path, "band1", quick)
+    start = 1e-9 * (episode.metadata["input"]["start_ns"] - EPOCH)
+    nearest = np.abs(happened.seen[:, None] - start - episode.cloud_time).argmin(axis=0)
+    about = string.sizes, string.diameter / 2, episode.camera, quick.rig.camera.depth_noise
+    clouds = [visible(happened.lines[at], *about, rng) for at in nearest]
+    rig = replace(episode, clouds=clouds)
+
+    cutoff = cutoff_hz(quick.force.cutoff, quick.force.cutoff_unit)
+    noise = quick.rig.wrench.noise
+    own = own_law_episode(sling, rig, TRUTH, cutoff=cutoff, force_noise=noise)
+    own_loss, theta = best_loss(quick, sling, own)
+    rig_loss, _ = best_loss(quick, sling, rig)
+    assert np.isclose(theta[0], TRUTH[0], rtol=0.03)
+    assert rig_loss > 1.5 * own_loss

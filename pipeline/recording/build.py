@@ -2,41 +2,59 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from pipeline.episode import Episode
 from pipeline.errors import UserError
 from pipeline.recording.cloud import Clouds, clouds_of
+from pipeline.recording.delays import Delays, delays_of
 from pipeline.recording.geometry import Geometry, geometry_of
-from pipeline.recording.reader import Recording, read_recording
+from pipeline.recording.input.reader import Recording, explained, read_recording
 from pipeline.recording.signals import Signals, signals_of
 from pipeline.recording.view import Scene, View
 
 
 @dataclass(frozen=True)
 class Processed:
-    """Every step's result, for those who report on a recording."""
+    """Every step's result, for those who report on a recording.
+
+    Attributes:
+        recording: With the stamps corrected by `delays`.
+    """
 
     recording: Recording
     geometry: Geometry
     signals: Signals
     scene: Scene
     clouds: Clouds
+    delays: Delays
+    view: View
 
 
 def process(path: Path, band: object, params: object) -> Processed:
-    """Read, resolve frames, find events, mask. `band` is one of params.bands. Raises UserError."""
-    return process_recording(read_recording(path, params.setup), band, params)
+    """Read, resolve frames, set stamps right, find events, mask. Raises UserError.
+
+    Args:
+        band: One of params.bands.
+    """
+    recording = read_recording(path, params.setup)
+    try:
+        return process_recording(recording, band, params)
+    except UserError as error:
+        raise explained(error, recording.path, recording.losses) from None
 
 
 def process_recording(recording: Recording, band: object, params: object) -> Processed:
     """As `process`, from a recording that was read already."""
-    geometry = geometry_of(recording, params.setup)
-    signals = signals_of(recording, geometry, params.episode, params.force)
-    scene = Scene.of(band, params.setup, signals)
+    geometry, setup = geometry_of(recording, params.setup), params.setup
+    delays = delays_of(recording, geometry, params)
+    recording = delays.corrected(recording)
+    signals = signals_of(recording, geometry, params.episode, params.force, setup.tool, delays.felt)
+    scene = Scene.of(band, setup, signals)
     view = View(recording, geometry, scene, params.episode.duration)
-    return Processed(recording, geometry, signals, scene, clouds_of(view, params.cloud))
+    clouds = clouds_of(view, params.cloud)
+    return Processed(recording, geometry, signals, scene, clouds, delays, view)
 
 
 def build_episode(path: Path, band_name: str, params: object) -> Episode:
@@ -65,14 +83,17 @@ def episode_of(done: Processed, band_name: str, params: object) -> Episode:
             "sha256": recording.sha256,
             "start_ns": signals.origin,
             "topics": {role: stream.topic for role, stream in recording.streams.items()},
+            "choices": recording.choices,
             "frames": done.geometry.sources,
             "delays": {role: stream.delay for role, stream in recording.streams.items()},
             "lost": {role: stream.lost for role, stream in recording.streams.items()},
             "missing": {role: stream.missing for role, stream in recording.streams.items()},
             "losses": recording.losses,
+            "notes": recording.notes,
         },
         "preprocessing": {
             **signals.facts,
+            "delays": asdict(done.delays),
             "cutoff": params.force.cutoff,
             "cutoff_unit": params.force.cutoff_unit,
             "mask": params.cloud.mask,

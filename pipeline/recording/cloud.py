@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.errors import UserError
-from pipeline.recording.mask import masker
-from pipeline.recording.view import View
+from pipeline.recording.masks import masker
+from pipeline.recording.view import Frame, View
 
+ALONE = 0.2  # share of the points a band has within a radius: what has fewer is no band
 MOST_EMPTY = 0.5  # share of frames without any band
 
 
@@ -47,18 +48,18 @@ def clouds_of(view: View, cloud: object) -> Clouds:
     path = view.recording.path
     if not len(view):
         raise UserError(f"{path}: no camera frames between the window's start and end")
-    mask = masker(cloud.mask, view)
+    mask = masker(cloud.mask, view, cloud.sam3)
     times, points, pixels = [], [], []
     for _, frame in view.frames():
         found = mask.mask(frame)
         times.append(frame.time)
         pixels.append(int(found.sum()))
-        points.append(sample(frame.points[found], cloud))
+        points.append(cloud_of(view, frame, found, cloud))
     clouds = Clouds(
         np.array(times),
         points,
         np.array(pixels),
-        getattr(mask, "likeness", None) is not None,
+        getattr(mask, "colors", None) is not None,
         len(view.damaged),
         view.unpaired,
     )
@@ -70,9 +71,28 @@ def clouds_of(view: View, cloud: object) -> Clouds:
     return clouds
 
 
-def sample(points: np.ndarray, cloud: object) -> np.ndarray:
-    """Statistical and radius outlier removal, then at most cloud.points of them, (P, 3) float32."""
+def cloud_of(view: View, frame: Frame, found: np.ndarray, cloud: object) -> np.ndarray:
+    """Points of the pixels `found` (H, W), without outliers and sampled, (P, 3) float32."""
+    if not found.any():
+        return np.zeros((0, 3), np.float32)
+    matrix = view.recording.depth_camera.matrix
+    per_square = matrix[0, 0] * matrix[1, 1] / float(np.median(frame.depth[found])) ** 2
+    return sample(frame.points[found], cloud, view.scene.diameter * per_square)
+
+
+def sample(points: np.ndarray, cloud: object, density: float = np.inf) -> np.ndarray:
+    """Statistical and radius outlier removal, then at most cloud.points of them, (P, 3) float32.
+
+    Args:
+        points: Shape (S, 3).
+        cloud: That section of params.
+        density: Points that a metre of the band may have; of a thin or far band no more neighbours
+            are asked for than it can have.
+    """
     import open3d
+
+    expected = ALONE * density * 2 * cloud.radius
+    neighbors = int(np.clip(expected, 1, cloud.radius_neighbors))
 
     if len(points) <= cloud.statistical_neighbors:
         return np.zeros((0, 3), np.float32)
@@ -80,7 +100,7 @@ def sample(points: np.ndarray, cloud: object) -> np.ndarray:
     dense, _ = dense.remove_statistical_outlier(
         cloud.statistical_neighbors, cloud.statistical_ratio
     )
-    dense, _ = dense.remove_radius_outlier(cloud.radius_neighbors, cloud.radius)
+    dense, _ = dense.remove_radius_outlier(neighbors, cloud.radius)
     if len(dense.points) > cloud.points:
         dense = dense.farthest_point_down_sample(cloud.points)
     return np.asarray(dense.points, np.float32).reshape(-1, 3)

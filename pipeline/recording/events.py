@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from pipeline.errors import UserError
+from pipeline.recording.input.reader import Recording
+from pipeline.recording.motion import Motion
 
+MARGIN = 0.05  # s kept clear of the grasp and of the release when means are taken
+SETTLE = 0.4  # s after the release until the hand is free and at rest
 SIGMAS = 6.0
 LEAST_PULL = 0.5  # N: below it nothing was drawn
 GAP = 3.5  # periods of the force around the release
 SUDDEN = 0.5  # share of the drop that a release takes within a few hundredths of a second
+SLIP = 0.2  # share of the largest drop from which a sudden drop is worth a word
+FREE = 0.3  # share of the held force that a free hand may still feel
 LEAST_STROKE = 0.002  # m: fingers that move less than this did not move
 OPENS = 0.5  # s by which the gripper's topic may come late
 LEAD_IN = 0.2  # s at least
+LIFT = 0.005  # m
+AT_REST = 0.02  # m/s
+SLOWEST_FALL = 0.03  # s
+RINGS = 0.15  # share of the drop: past half of the fall the sensor may ring by this
 
 
 @dataclass(frozen=True)
@@ -23,54 +34,67 @@ class Release:
 
     Attributes:
         time: The force begins to drop [s].
+        error: Standard deviation of `time` [s], by the samples' spacing and noise.
         resolution: Time between force samples around it [s].
         hold: Mean force while held, sensor frame, bias included [N], shape (3,).
         noise: Standard deviation of one force sample along the pull [N].
         drop: How much the force fell [N].
+        slips: Other sudden drops of the force [s].
     """
 
     time: float
+    error: float
     resolution: float
     hold: np.ndarray
     noise: float
     drop: float
+    slips: list[float] = field(default_factory=list)
 
 
-def find_release(t: np.ndarray, force: np.ndarray) -> Release:
+def events_of(recording: Recording, motion: Motion) -> tuple[float, Release]:
+    """Time of the grasp [s] and the release, since the first force. Raises UserError."""
+    origin = int(recording.wrench.stamp[0])
+    gripper = opening_of(recording, origin)
+    release = find_release(recording.wrench.seconds(origin), recording.wrench.values, gripper)
+    return find_grasp(gripper, (motion.time, motion.path), release.time), release
+
+
+def opening_of(recording: Recording, origin: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """Times [s] since `origin` [ns] and opening [m] of the gripper; None where not recorded."""
+    if recording.gripper is None:
+        return None
+    return recording.gripper.seconds(origin), recording.gripper.values[:, 0]
+
+
+def find_release(
+    t: np.ndarray, force: np.ndarray, gripper: tuple[np.ndarray, np.ndarray] | None = None
+) -> Release:
     """Find the release in a raw force, whose bias need not be known.
 
-    The steepest drop is found first, by the difference of short means before and after; then the
-    first sample below the held level by more than the noise. Where the fall takes several samples,
-    the line through its first third is followed back to the held level.
+    Sudden drops that last are found first, by differences of short and of long means before and
+    after: a knock does not last. The release is the one that leaves the hand free, or else the
+    largest, and with a gripper one at which the fingers open. Around it, the moment at which the
+    fall begins is the mean over all straight falls, weighed by how well they go with the samples.
 
     Args:
         t: Times [s], shape (S,).
         force: Any constant frame [N], shape (S, 3).
+        gripper: Times (G,) [s] and opening (G,) [m], or None where it was not recorded.
 
     Raises:
-        UserError: if the force never drops as it does when a drawn band is let go.
+        UserError: if the force never drops as it does when a drawn band is let go, or does so
+            more than once.
     """
     period = float(np.median(np.diff(t)))
     near, far = max(1, round(0.005 / period)), max(3, round(0.05 / period))
     if len(t) < 4 * far:
         raise UserError("the force is too short to find a release in it")
-    # Difference of the means over [-far, -near] and [near, far] around each sample.
-    sums = np.concatenate([np.zeros((1, 3)), np.cumsum(force, axis=0)])
-    center = np.arange(far, len(t) - far)
-    before = (sums[center - near + 1] - sums[center - far]) / (far - near + 1)
-    after = (sums[center + far + 1] - sums[center + near]) / (far - near + 1)
-    jump = np.linalg.norm(before - after, axis=1)
-    steepest = int(np.argmax(jump))
-    coarse = center[steepest]
+    center, others = _steepest(t, force, near, far, gripper)
 
-    quiet = slice(max(0, coarse - 6 * far), coarse - far)
-    settled = slice(min(coarse + far, len(t) - 1), min(coarse + 6 * far, len(t)))
+    quiet = slice(max(0, center - 6 * far), center - far)
+    settled = slice(min(center + far, len(t) - 1), min(center + 6 * far, len(t)))
     hold, free = force[quiet].mean(axis=0), force[settled].mean(axis=0)
     drop = float(np.linalg.norm(hold - free))
-    if drop < LEAST_PULL or jump[steepest] < SUDDEN * drop:
-        raise UserError(
-            f"the force never drops by {LEAST_PULL} N at once: no release of a drawn band is in it"
-        )
     along = force @ ((hold - free) / drop)
     level, spread = along[quiet].mean(), np.diff(along[quiet])
     noise = float(1.4826 * np.median(np.abs(spread - np.median(spread))) / np.sqrt(2))
@@ -87,23 +111,81 @@ def find_release(t: np.ndarray, force: np.ndarray) -> Release:
             f" {t[first]:.3f} s: its time cannot be told, record again"
         )
     fall = (level - along) / drop
-    return Release(_onset(t, fall, first, threshold / drop), resolution, hold, noise, drop)
+    time, error = _onset(t, fall, first, max(noise / drop, 0.003), period)
+    return Release(time, error, resolution, hold, noise, drop, [float(t[i]) for i in others])
 
 
-def _onset(t: np.ndarray, fall: np.ndarray, first: int, threshold: float) -> float:
-    """Follow the first third of the fall (0 held, 1 gone) back to where it began."""
+def _steepest(
+    t: np.ndarray, force: np.ndarray, near: int, far: int, gripper: tuple | None
+) -> tuple[int, list[int]]:
+    """Sample at which the band is let go, and those of sudden drops before it."""
+    sudden = np.linalg.norm(np.subtract(*_means(force, near, far)), axis=1)
+    before, after = _means(force, far, 6 * far)
+    lasting = np.linalg.norm(before - after, axis=1)
+    size = np.where(sudden >= SUDDEN * lasting, np.minimum(sudden, lasting), 0)
+    size[: far + 1] = size[-far:] = 0
+    largest = size.max()
+    least = max(LEAST_PULL, SLIP * largest)
+    drops, _ = find_peaks(size, height=least, distance=far)
+    drops = np.array([i for i in drops if _median_step(force, i, far) > least], int)
+    if not len(drops):
+        raise UserError(
+            f"the force never drops by {LEAST_PULL} N at once: no release of a drawn band is in it"
+        )
+    rest = force[t < t[0] + LEAD_IN].mean(axis=0)
+    held, left = (np.linalg.norm(x[drops] - rest, axis=1) for x in (before, after))
+    ends = list(drops[(left < FREE * held) & (size[drops] >= SUDDEN * largest)])
+    if gripper is not None:
+        ends = [i for i in ends if _opens(*gripper, t[i])] or ends
+    if len(ends) > 1:
+        times = " and ".join(f"{t[i]:.1f}" for i in ends)
+        raise UserError(f"a band is let go at {times} s: record one pull at a time")
+    release = int(ends[0] if ends else drops[np.argmax(size[drops])])
+    return release, [int(i) for i in drops if i < release]
+
+
+def _means(x: np.ndarray, near: int, far: int) -> tuple[np.ndarray, np.ndarray]:
+    """Means over [-far, -near] and over [near, far] samples around each sample, two (S, 3)."""
+    sums = np.concatenate([np.zeros((1, 3)), np.cumsum(x, axis=0)])
+    middle, last = np.arange(len(x)), len(x)
+
+    def mean(first: int, end: int) -> np.ndarray:
+        a, b = np.clip(middle + first, 0, last), np.clip(middle + end + 1, 0, last)
+        return (sums[b] - sums[a]) / np.maximum(b - a, 1)[:, None]
+
+    return mean(-far, -near), mean(near, far)
+
+
+def _median_step(force: np.ndarray, i: int, far: int) -> float:
+    """As the difference of long means, but blind to a knock."""
+    before, after = force[max(0, i - 6 * far) : i - far], force[i + far : i + 6 * far]
+    return float(np.linalg.norm(np.median(before, axis=0) - np.median(after, axis=0)))
+
+
+def _onset(
+    t: np.ndarray, fall: np.ndarray, first: int, noise: float, period: float
+) -> tuple[float, float]:
+    """Mean and standard deviation of when the fall (0 held, 1 gone) began.
+
+    Over all straight falls that begin at r and last D, of any D alike on a logarithmic scale, with
+    Gaussian noise. What comes after half of the fall is not looked at: a sensor may ring there. A
+    fall that is over between two samples is thus found between them, not at the second one.
+    """
     last = first
-    while last + 1 < len(t) and fall[last] < 1 / 3:
+    while last + 1 < len(t) and fall[last] < 0.5:
         last += 1
-    if last == first and fall[first + 1] - fall[first] > 1 / 4:
-        last += 1  # still falling: two samples tell how fast
-    if last == first:
-        return float(t[first])  # all at once: the first sample that has fallen
-    slope, offset = np.polyfit(t[first : last + 1] - t[first], fall[first : last + 1], 1)
-    if slope <= 0:
-        return float(t[first])
-    earliest = t[first - 1] - threshold / slope  # the sample before had hardly fallen
-    return float(np.clip(t[first] - offset / slope, earliest, t[first]))
+    earliest = max(0, first - max(6, round(0.006 / period)))
+    begin = np.arange(t[earliest], t[last], period / 100)[:, None]
+    lasts = np.geomspace(period / 20, SLOWEST_FALL, 150)
+    misfit = np.zeros((len(begin), len(lasts)))
+    for time, seen in zip(t[earliest : last + 1], fall[earliest : last + 1], strict=True):
+        expected = np.minimum((time - begin).clip(0) / lasts, 0.5)
+        spread = noise if seen < 0.5 else max(noise, RINGS)
+        misfit += ((expected - min(seen, 0.5)) / spread) ** 2
+    weight = np.exp((misfit.min() - misfit) / 2).sum(axis=1)
+    weight /= weight.sum()
+    mean = weight @ begin[:, 0]
+    return float(mean), float(np.sqrt(weight @ (begin[:, 0] - mean) ** 2))
 
 
 def find_grasp(
@@ -113,41 +195,45 @@ def find_grasp(
 ) -> float:
     """The first moment from which the fingers stay closed, or else that the hand lifts.
 
+    The hand rests while it grasps: where it moves when the fingers are said to have closed, the
+    gripper's topic is late, and the end of the rest just before counts.
+
     Args:
         gripper: Times (G,) [s] and opening (G,) [m], or None where it was not recorded.
-        pose: Times (S,) [s] and height (S,) [m] of the hand.
+        pose: Times (S,) [s] and path (S, 3) [m] of the hand, z up.
         release: Time of the release [s].
 
     Raises:
-        UserError: if the band was in the hand from the start.
+        UserError: if the band was in the hand from the start, or never let go by the fingers.
     """
     if gripper is not None:
-        _let_go(*gripper, release)
+        if _opens(*gripper, release) is False:
+            raise UserError(
+                f"the force drops at {release:.3f} s but the gripper stays closed: the band slipped"
+                " out or tore, record again with a firmer grip"
+            )
         grasp = _closed(*gripper, release)
         if grasp is not None:
-            return grasp
-    t, height = pose
-    lifted = np.flatnonzero(height - height[0] > 0.005)
-    rising = lifted[t[lifted] < release]
-    if not len(rising):
+            return _rested(*pose, grasp)
+    t, height = pose[0], pose[1][:, 2]
+    before = t < release
+    low = np.flatnonzero(before & (height < height[before].min(initial=np.inf) + LIFT))
+    lifted = before & (t > t[low[-1]]) if len(low) else np.zeros(0)
+    if not lifted.any():
         raise UserError(
             "no grasp: the gripper does not close (or was not recorded) and the hand does not lift;"
             " record from before the grasp on"
         )
-    return float(t[rising[0]])
+    return float(t[np.argmax(lifted)])
 
 
-def _let_go(t: np.ndarray, opening: np.ndarray, release: float) -> None:
-    """The fingers must open when the force drops. Raises UserError where they stay closed."""
+def _opens(t: np.ndarray, opening: np.ndarray, release: float) -> bool | None:
+    """Whether the fingers open when the force drops; None where they were not seen to move."""
     after = (t > release) & (t < release + OPENS)
     held = (t < release) & (t > release - 1.0)
     if after.sum() < 3 or not held.any() or np.ptp(opening) < LEAST_STROKE:
-        return
-    if opening[after].max() < np.median(opening[held]) + 0.2 * np.ptp(opening):
-        raise UserError(
-            f"the force drops at {release:.3f} s but the gripper stays closed: the band slipped out"
-            " or tore, record again with a firmer grip"
-        )
+        return None
+    return bool(opening[after].max() > np.median(opening[held]) + 0.2 * np.ptp(opening))
 
 
 def _closed(t: np.ndarray, opening: np.ndarray, release: float) -> float | None:
@@ -162,3 +248,14 @@ def _closed(t: np.ndarray, opening: np.ndarray, release: float) -> float | None:
         return None
     wide = np.flatnonzero(opening[before] > closed + stroke / 10)
     return float(t[wide[-1] + 1]) if wide[-1] + 1 < before.sum() else None
+
+
+def _rested(t: np.ndarray, path: np.ndarray, grasp: float) -> float:
+    """`grasp`, or the end of the last rest before it if the hand moves then."""
+    times = np.arange(grasp - OPENS, grasp + 0.03, 0.02)
+    at = np.stack([np.interp(times, t, axis) for axis in path.T], axis=1)
+    resting = np.linalg.norm(np.diff(at, axis=0), axis=1) < AT_REST * 0.02
+    inside = (times[:-1] >= t[0]) & resting
+    if inside[-2:].any() or not inside.any():
+        return grasp
+    return float(times[np.flatnonzero(inside)[-1] + 1])

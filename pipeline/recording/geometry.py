@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.errors import UserError
-from pipeline.recording.frames import Transform, TransformTree
-from pipeline.recording.reader import Recording
+from pipeline.recording.input.frames import Transform, TransformTree
+from pipeline.recording.input.reader import Recording
 
 FORK = "fork"
 TOOLS = ("tcp", "ee", "end_effector")  # words in the name of the frame that a pose is given for
@@ -23,7 +22,7 @@ class Geometry:
         base: Frame of the pose topic to frame O.
         camera: Depth camera to frame O.
         color: Depth camera to colour camera.
-        sensor: Force sensor to end effector, or to frame O where `sensor_is_fixed`.
+        sensor: The wrench's frame to the end effector, or to frame O where `sensor_is_fixed`.
         sensor_is_fixed: The wrench is given in a frame that does not move with the hand.
         sources: Where each came from, in words.
     """
@@ -31,7 +30,7 @@ class Geometry:
     base: Transform
     camera: Transform
     color: Transform
-    sensor: Rotation
+    sensor: Transform
     sensor_is_fixed: bool
     sources: dict[str, str]
 
@@ -61,13 +60,13 @@ def geometry_of(recording: Recording, setup: object) -> Geometry:
     color_to_fork = to_fork("camera_to_fork", color_frame, setup.camera_to_fork)
     color = _between_cameras(recording, color_frame, depth_frame)
 
-    fixed = tree.between(pose_frame, wrench_frame)
+    fixed = tree.between(pose_frame, wrench_frame) if wrench_frame else None
     if fixed is not None:
-        sensor = base.rotation * fixed.rotation
+        sensor = base @ fixed
         sources["wrench"] = f"fixed frame {wrench_frame}"
     else:
-        tool = _tool_frame(tree, wrench_frame)
-        sensor = tree.between(tool, wrench_frame).rotation
+        tool = _tool_frame(tree, wrench_frame, setup.tip_link)
+        sensor = tree.between(tool, wrench_frame)
         sources["wrench"] = f"{wrench_frame} on {tool}, which the pose topic is taken to move"
     return Geometry(base, color_to_fork @ color, color, sensor, fixed is not None, sources)
 
@@ -85,16 +84,17 @@ def _between_cameras(recording: Recording, color_frame: str, depth_frame: str) -
     return found
 
 
-def _tool_frame(tree: TransformTree, wrench_frame: str) -> str:
-    """PoseStamped does not say which frame moves: one named like a tool, else the root."""
+def _tool_frame(tree: TransformTree, wrench_frame: str, tip_link: str | None) -> str:
+    """PoseStamped does not say which frame moves: the tip, one named like a tool, else the root."""
     rigid = [frame for frame in tree.frames if tree.between(frame, wrench_frame) is not None]
+    if tip_link in rigid:
+        return tip_link
     named = [frame for frame in rigid if set(frame.lower().split("_")) & set(TOOLS)]
     roots = [frame for frame in rigid if tree.is_root(frame)]
     return (named or roots or [wrench_frame])[0]
 
 
-def turned(pose: np.ndarray) -> tuple[Rotation, float]:
-    """Mean orientation of poses (S, 7), and the largest angle from it [rad]."""
-    rotations = Rotation.from_quat(pose[:, 3:])
+def turned(rotations: Rotation) -> tuple[Rotation, float]:
+    """Mean of some rotations, and the largest angle from it [rad]."""
     mean = rotations.mean()
     return mean, float((mean.inv() * rotations).magnitude().max())

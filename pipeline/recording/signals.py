@@ -5,20 +5,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from pipeline import signal
 from pipeline.errors import UserError
-from pipeline.recording.events import LEAD_IN, find_grasp, find_release
+from pipeline.recording.events import (
+    LEAD_IN,
+    MARGIN,
+    SETTLE,
+    Release,
+    events_of,
+    opening_of,
+)
+from pipeline.recording.felt import Felt
 from pipeline.recording.geometry import Geometry, turned
-from pipeline.recording.reader import Recording
+from pipeline.recording.input.reader import Recording
+from pipeline.recording.motion import VELOCITY_WINDOW, Motion, expect_dense
+from pipeline.recording.tool import Wrench
 
-MARGIN = 0.05  # s kept clear of the grasp and of the release when means are taken
-MOST_TURN = np.deg2rad(5.0)  # of the hand; beyond it the tool's weight would have to be known
+MOST_TURN = np.deg2rad(5.0)  # of the hand; beyond it the tool's weight has to be known
 MOST_ASKEW = np.deg2rad(30.0)  # between the held force and the way to the fork
 MOST_DRIFT = 0.05  # of the held force: more is no drift of the sensor
-SETTLE = 0.4  # s after the release until the hand is free and at rest
-SMOOTHING = 0.05  # s window of the derivative of the pose
+MOST_GAP = 0.3  # s over which force and pose may be interpolated
 
 
 @dataclass(frozen=True)
@@ -59,77 +66,117 @@ class Signals:
         return float(np.nan_to_num(np.interp(time, self.time, self.opening)))
 
 
-def signals_of(recording: Recording, geometry: Geometry, episode: object, force: object) -> Signals:
-    """Turn raw streams into samples. `episode` and `force` are those sections of params.
+def signals_of(
+    recording: Recording,
+    geometry: Geometry,
+    episode: object,
+    force: object,
+    tool: object | None = None,
+    felt: Felt | None = None,
+) -> Signals:
+    """Turn raw streams into samples.
+
+    Args:
+        episode, force: Those sections of params.
+        tool: setup.tool, which has mass and center, or None.
+        felt: The tool as its inertia shows, where setup.tool does not know it.
 
     Raises:
         UserError: if the recording cannot be used, in one line that begins with its path.
     """
     try:
-        return _signals(recording, geometry, episode, force)
+        return _signals(recording, geometry, episode, force, tool, felt)
     except UserError as error:
         raise UserError(f"{recording.path}: {error}") from None
 
 
-def _signals(recording: Recording, geometry: Geometry, episode: object, filter: object) -> Signals:
+def _signals(
+    recording: Recording,
+    geometry: Geometry,
+    episode: object,
+    filter: object,
+    tool: object | None,
+    felt: Felt | None,
+) -> Signals:
+    expect_dense(recording.wrench)
     origin = int(recording.wrench.stamp[0])
     t = recording.wrench.seconds(origin)
-    pose_t = recording.pose.seconds(origin)
-    raw = recording.wrench.values
-    path = geometry.base.apply(recording.pose.values[:, :3])
+    motion = Motion.of(recording.pose, geometry, origin)
+    gripper = opening_of(recording, origin)
+    grasp, release = events_of(recording, motion)
 
-    release = find_release(t, raw)
-    gripper = recording.gripper and (
-        recording.gripper.seconds(origin),
-        recording.gripper.values[:, 0],
-    )
-    grasp = find_grasp(gripper, (pose_t, path[:, 2]), release.time)
-
-    used = (pose_t >= 0) & (pose_t <= release.time)
+    used = (motion.time >= 0) & (motion.time <= release.time)
     if used.sum() < 10:
         raise UserError(f"{recording.pose.topic} stops before the release at {release.time:.3f} s")
-    orientation, turn = turned(recording.pose.values[used])
-    if turn > MOST_TURN:
+    orientation, turn = turned(motion.turn[used])
+    if turn > MOST_TURN and tool is None:
         raise UserError(
-            f"the hand turns by {np.degrees(turn):.1f} degrees before the release: keep its"
-            " orientation, or the weight of the tool leaks into the force"
+            f"the hand turns by {np.degrees(turn):.1f} degrees before the release, and the weight"
+            " of the tool leaks into the force: give its mass and centre of mass as setup.tool in"
+            " params.yaml (mass 0 for a force without it), or keep the hand's orientation"
         )
-    rotation = geometry.sensor
-    if not geometry.sensor_is_fixed:
-        rotation = geometry.base.rotation * orientation * rotation
-
-    force, tare = _tared(t, raw, grasp, release)
-    force = rotation.apply(force)
+    tool = felt if tool is None else tool
+    raw = recording.wrench.values
+    wrench = Wrench.of(t, raw, motion, orientation, geometry, tool, release.time)
     held = (t > release.time - 0.5) & (t < release.time - MARGIN / 5)
     if not held.any():
         raise UserError(f"no force in the half second before the release at {release.time:.3f} s")
-    hold = force[held].mean(axis=0)
-    hand = np.array([np.interp(release.time, pose_t, axis) for axis in path.T])
-    sign = _sign(hold, hand)
+    hand = motion.position(release.time)
 
-    start = _window(recording, t, pose_t, grasp, release.time, episode)
+    force, tare = _tared(wrench, 1.0, grasp, release)
+    sign = _sign(force[held].mean(axis=0), hand)
+    if sign < 0 and tool is not None:  # the sensor feels its tool with the other sign, too
+        force, tare = _tared(wrench, sign, grasp, release)
+        if _sign(force[held].mean(axis=0), hand) > 0:
+            raise UserError(
+                f"a tool of {tool.mass:.3g} kg hides which sign the force has: check setup.tool and"
+                " the wrench's frame"
+            )
+    force = sign * force
+    hold = force[held].mean(axis=0)
+
+    start = _window(recording, t, motion.time, grasp, release.time, episode)
     period = episode.duration / episode.samples
+    gaps = {
+        stream.topic: _longest_gap(times, start, start + episode.duration)
+        for stream, times in ((recording.wrench, t), (recording.pose, motion.time))
+    }
+    for topic, gap in gaps.items():
+        if gap > MOST_GAP:
+            raise UserError(
+                f"{topic} is missing for {gap:.2f} s between the lead-in and the end: more than"
+                f" {MOST_GAP:g} s cannot be filled in, record again"
+            )
     rate = 1 / recording.wrench.period
     cutoff = signal.cutoff_hz(filter.cutoff, filter.cutoff_unit)
-    grid, even = signal.uniform(t, sign * force, rate)
+    grid, even = signal.uniform(t, force, rate)
     smooth = signal.lowpass(even, rate, cutoff)
-    pose_grid, position, velocity = _motion(pose_t, path, 1 / recording.pose.period)
+    pose_grid, position, velocity = motion.velocity()
 
     def sampled(times: np.ndarray, values: np.ndarray) -> np.ndarray:
         return signal.average(times, values, start, period, episode.samples)
 
     facts = {
-        "bias": rotation.apply(tare["bias"]).tolist(),
-        "drift": rotation.apply(tare["drift"]).tolist(),
+        **tare,
         "noise": release.noise,
-        "hold_force": (sign * hold).tolist(),
+        "hold_force": hold.tolist(),
         "peak_force": float(np.linalg.norm(smooth[grid < release.time - MARGIN], axis=1).max()),
         "flipped": bool(sign < 0),
         "turn": turn,
+        "tool": tool
+        and {
+            "mass": tool.mass,
+            "center": list(tool.center),
+            "source": "its inertia" if tool is felt else "setup.tool",
+        },
         "rate": rate,
+        "longest_gap": gaps,
         "cutoff_hz": cutoff,
+        "release_error": release.error,
         "release_resolution": release.resolution,
-        "velocity_window": SMOOTHING,
+        "slips": [time - start for time in release.slips],
+        "velocity_window": VELOCITY_WINDOW,
+        "twist_difference": _twist_difference(recording, origin, pose_grid, velocity),
     }
     return Signals(
         origin=origin + round(start * 1e9),
@@ -141,29 +188,36 @@ def _signals(recording: Recording, geometry: Geometry, episode: object, filter: 
         grasp_time=grasp - start,
         release_time=release.time - start,
         facts=facts,
-        path_time=pose_t - start,
-        path=path,
-        tool_axis=(geometry.base.rotation * orientation).apply([0, 0, 1]),
+        path_time=motion.time - start,
+        path=motion.path,
+        tool_axis=orientation.apply([0, 0, 1]),
     )
 
 
-def _tared(t: np.ndarray, raw: np.ndarray, grasp: float, release) -> tuple[np.ndarray, dict]:
-    """Take the lead-in's mean away, and the sensor's drift until the free hand at the end."""
+def _tared(wrench: Wrench, sign: float, grasp: float, release: Release) -> tuple[np.ndarray, dict]:
+    """The band's force in frame O (S, 3), with the sensor's sign, and what was taken away.
+
+    Taken away are the tool's load, then, in the sensor's frame, the lead-in's mean and the drift
+    until the free hand at the end.
+    """
+    t, rest = wrench.time, wrench.raw - sign * wrench.load
     lead_in = t < grasp - MARGIN
     if lead_in.sum() < 20 or grasp - MARGIN - t[0] < LEAD_IN:
         raise UserError(
             f"the band is grasped {grasp - t[0]:.2f} s after the start: record at least"
             f" {LEAD_IN + MARGIN:.2f} s of the empty hand before, to tare the force"
         )
-    bias = raw[lead_in].mean(axis=0)
+    bias = rest[lead_in].mean(axis=0)
     end = t > release.time + SETTLE
     drift = np.zeros(3)
     if end.sum() >= 20:
-        late = raw[end].mean(axis=0) - bias
+        late = rest[end].mean(axis=0) - bias
         if np.linalg.norm(late) < MOST_DRIFT * release.drop:
             drift = late / (t[end].mean() - t[lead_in].mean())
-    force = raw - bias - drift * (t - t[lead_in].mean())[:, None]
-    return force, {"bias": bias, "drift": drift}
+    force = rest - bias - drift * (t - t[lead_in].mean())[:, None]
+    turn = wrench.turn if wrench.turn.single else wrench.turn[lead_in].mean()
+    tare = {"bias": turn.apply(bias).tolist(), "drift": turn.apply(drift).tolist()}
+    return wrench.turn.apply(force), tare
 
 
 def _sign(hold: np.ndarray, hand: np.ndarray) -> float:
@@ -213,10 +267,22 @@ def _window(
     return start
 
 
-def _motion(t: np.ndarray, path: np.ndarray, rate: float) -> tuple[np.ndarray, ...]:
-    """Even times, position and velocity by a local cubic fit (Savitzky-Golay)."""
-    grid, even = signal.uniform(t, path, rate)
-    window = max(5, 2 * round(SMOOTHING * rate / 2) + 1)
-    if len(grid) <= window:
-        raise UserError("the pose is too short to differentiate")
-    return grid, even, savgol_filter(even, window, 3, deriv=1, delta=1 / rate, axis=0)
+def _longest_gap(times: np.ndarray, start: float, end: float) -> float:
+    """Between samples of a window [s]; values are interpolated over it."""
+    inside = times[(times > start) & (times < end)]
+    return float(np.diff(inside).max()) if len(inside) > 1 else end - start
+
+
+def _twist_difference(
+    recording: Recording, origin: int, times: np.ndarray, velocity: np.ndarray
+) -> float | None:
+    """Median difference of speed to a recorded twist [m/s], in whatever frame that is given.
+
+    The derivative of the pose is used all the same: a robot filters its twist, nobody says how.
+    """
+    twist = recording.twist
+    if twist is None or twist.topic == recording.pose.topic:
+        return None
+    said = np.linalg.norm(twist.values[:, :3], axis=1)
+    speed = np.interp(twist.seconds(origin), times, np.linalg.norm(velocity, axis=1))
+    return float(np.median(np.abs(said - speed)))

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from pipeline.recording import images
 from pipeline.recording.geometry import Geometry
-from pipeline.recording.reader import Recording
+from pipeline.recording.input import images
+from pipeline.recording.input.reader import Recording
 from pipeline.recording.signals import Signals
 
 PAIRING = 0.5  # of a frame's period: colour and depth further apart are not one picture
 SPARE = 0.05  # of the length, for the accuracy of what was measured
 TAUT = 1.05  # stretch from which the held band is two straight lines
 UNKNOWN = 1000.0  # m, where the depth is not known
-RECOIL = 0.5  # s after the release in which the band may be longer than when it hangs
+CLOSEST = 0.05  # m before the colour camera
+HIDDEN = 0.02  # m behind what the colour camera sees, from which on a point is hidden
+RECOIL = 0.25  # s after the release in which the band may be longer than when it hangs
 
 
 def length(vectors: np.ndarray) -> np.ndarray:
@@ -25,23 +27,35 @@ def length(vectors: np.ndarray) -> np.ndarray:
     return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
 
 
+def onto_depth(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """What a colour picture shows at `pixels` (H, W, 2), 0 where they are -1."""
+    return cv2.remap(
+        picture, pixels, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0
+    )
+
+
 @dataclass(frozen=True)
 class Frame:
     """One picture, cropped; H x W pixels of the depth image.
 
     Attributes:
+        number: Of the pictures of the view.
         time: Its stamp, seconds since the window's start.
-        color: BGR, shape (H, W, 3), uint8.
+        color: BGR, shape (H, W, 3), uint8; black where the colour camera does not see the point.
         depth: Metres, shape (H, W), 0 where unknown.
         points: Frame O, shape (H, W, 3); far away where the depth is unknown.
         near: Pixels that the band can reach, shape (H, W).
+        pixels: Where in the colour picture each is seen, shape (H, W, 2), -1 where it is not; None
+            where the depth is registered to colour.
     """
 
+    number: int
     time: float
     color: np.ndarray
     depth: np.ndarray
     points: np.ndarray
     near: np.ndarray
+    pixels: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -87,6 +101,10 @@ class Scene:
             length = self.stretch(self.signals.release_time)
         return (1 + SPARE) * self.rest_length * max(length, 1.1) + 2 * self.diameter
 
+    def reach_of_half(self, time: float) -> float:
+        """No point of the held band is further from its tip and the hand together than this [m]."""
+        return self.rest_length * (max(self.stretch(time), 1.0) / 2 + SPARE) + 2 * self.diameter
+
     def furthest_reach(self) -> float:
         return max(self.reach(t) for t in (0.0, *self.signals.time))
 
@@ -108,50 +126,100 @@ class View:
         self.times = np.array([times[k] for k, _ in self.index])
         self.damaged: set[int] = set()
         self.window = self._window()
-        self.rays = recording.depth_camera.rays()[self.window].astype(np.float32)  # (H, W, 3)
+        self.rays = recording.depth_camera.rays().astype(np.float32)  # (H, W, 3)
 
     def __len__(self) -> int:
         return len(self.index)
 
-    def frames(self, every: int = 1) -> Iterator[tuple[int, Frame]]:
-        """Yield (number, frame) of every so many frames; damaged ones are left out and counted."""
-        for number in range(0, len(self.index), every):
-            frame = self._frame(number)
+    def frames(
+        self, numbers: Iterable[int] | None = None, *, whole: bool = False
+    ) -> Iterator[tuple[int, Frame]]:
+        """Yield (number, frame) of these or all frames; damaged ones are left out and counted.
+
+        `whole` pictures are not cropped to what sees where the band can be.
+        """
+        window = (slice(None), slice(None)) if whole else self.window
+        for number in range(len(self.index)) if numbers is None else numbers:
+            frame = self._frame(number, window)
             if frame is not None:
                 yield number, frame
 
-    def _frame(self, number: int) -> Frame | None:
-        k, c = self.index[number]
+    def depth(self, number: int) -> np.ndarray | None:
+        """A depth picture [m], 0 where unknown, of the camera's size; None where it is damaged."""
         camera = self.recording.depth_camera
         try:
-            depth = images.depth(self.recording.depth.values[k])
-            color = images.color(self.recording.color.values[c])
+            depth = images.depth(self.recording.depth.values[self.index[number][0]])
         except images.Undecodable:
+            return None
+        return depth if depth.shape == (camera.height, camera.width) else None
+
+    def color(self, number: int) -> np.ndarray | None:
+        """A colour picture as it was recorded, BGR; None where it is damaged."""
+        try:
+            return images.color(self.recording.color.values[self.index[number][1]])
+        except images.Undecodable:
+            return None
+
+    def _frame(self, number: int, window: tuple[slice, slice]) -> Frame | None:
+        depth, color = self.depth(number), self.color(number)
+        if depth is None or color is None:
             self.damaged.add(number)
             return None
-        if depth.shape != (camera.height, camera.width):
-            self.damaged.add(number)
-            return None
-        depth = depth[self.window]
-        seen = self.rays * np.where(depth > 0, depth, np.float32(UNKNOWN))[..., None]
+        return self.frame_of(number, depth, color, window)
+
+    def frame_of(
+        self,
+        number: int,
+        depth: np.ndarray,
+        color: np.ndarray,
+        window: tuple[slice, slice] | None = None,
+    ) -> Frame:
+        """The frame of two decoded pictures."""
+        window = window or self.window
+        depth = depth[window]
+        seen = self.rays[window] * np.where(depth > 0, depth, np.float32(UNKNOWN))[..., None]
         points = self.geometry.camera.apply(seen.reshape(-1, 3)).reshape(seen.shape)
         time = float(self.times[number])
-        return Frame(time, self._colors(color, seen), depth, points, self._near(points, time))
+        pixels = None if self._registered(color) else self._pixels(color, seen)
+        color = color[window] if pixels is None else onto_depth(color, pixels)
+        return Frame(number, time, color, depth, points, self._near(points, time), pixels)
 
     def _near(self, points: np.ndarray, time: float) -> np.ndarray:
-        left, right = self.scene.tips.astype(np.float32)
-        way = length(points - left) + length(points - right)
-        above = points[..., 2] > self.scene.floor + 2 * self.scene.diameter
-        return (way < self.scene.reach(time)) & above
+        """Pixels of points (H, W, 3) above the floor that the band's length allows."""
+        scene, squared = self.scene, np.einsum("...i,...i->...", points, points)
 
-    def _colors(self, color: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """Colour of each depth pixel; through the colour camera where the depth is its own."""
-        if self._registered(color):
-            return color[self.window]
+        def away(place: np.ndarray) -> np.ndarray:
+            """Distance from a place (3,); with the square at hand no differences are needed."""
+            off = points @ (-2 * place).astype(np.float32)
+            off += squared
+            off += np.float32(place @ place)
+            return np.sqrt(np.maximum(off, 0, out=off), out=off)
+
+        left, right = away(scene.tips[0]), away(scene.tips[1])
+        near = left + right < scene.reach(time)
+        if scene.holds(time):
+            half = np.minimum(left, right) + away(scene.signals.hand(time))
+            near &= half < scene.reach_of_half(time)
+        return near & (points[..., 2] > scene.floor + 2 * scene.diameter)
+
+    def _pixels(self, color: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """Where the colour camera sees each point (H, W, 3) of the depth camera's frame."""
         in_color = self.geometry.color.apply(seen.reshape(-1, 3))
-        pixels = self.recording.color_camera.project(in_color).astype(np.float32)
-        pixels = np.where(in_color[:, 2:] > 0, pixels, -1).reshape(*seen.shape[:2], 2)
-        return cv2.remap(color, pixels, None, cv2.INTER_LINEAR)
+        ahead = in_color[:, 2] > CLOSEST
+        pixels = np.full((len(in_color), 2), -1, np.float32)
+        pixels[ahead] = self.recording.color_camera.project(in_color[ahead])
+        height, width = color.shape[:2]
+        cells = np.round(pixels).astype(np.int64)
+        inside = ((cells >= 0) & (cells < (width, height))).all(axis=1)
+        places = cells[inside, 1] * width + cells[inside, 0]
+        depths = in_color[inside, 2]
+        nearest = np.full(height * width, np.float32(UNKNOWN))
+        np.minimum.at(nearest, places, depths)
+        # Depth pixels may lie some colour pixels apart, so a surface hides what is between them.
+        nearest = cv2.erode(nearest.reshape(height, width), np.ones((3, 3))).ravel()
+        inside[inside] = depths < nearest[places] + HIDDEN
+        pixels[~inside] = -1
+        return pixels.reshape(*seen.shape[:2], 2)
 
     def _registered(self, color: np.ndarray) -> bool:
         a, b = self.recording.color_camera, self.recording.depth_camera

@@ -30,7 +30,6 @@ TYPES = {
 START = 1_700_000_000 * 10**9
 TIPS = np.array([[-0.1375, 0, 0], [0.1375, 0, 0]])
 FLOOR, REST, RADIUS = -0.52, 0.52, 0.005
-SIZE, FOCAL, FPS = (320, 240), 250.0, 15
 CAMERA = Rotation.from_matrix(  # optical frame: z forward, y down, looking at the fork from a side
     np.stack([[-0.5, 0.866, 0], [0.4, 0.231, -0.887], [-0.768, -0.4434, -0.4619]]).T
 )
@@ -38,6 +37,18 @@ EYE = np.array([0.75, 0.28, 0.42])
 BASE = (Rotation.from_euler("z", 90, degrees=True), np.array([0.0, -0.72, -0.4]))
 SENSOR = Rotation.from_euler("z", 30, degrees=True)
 HAND = Rotation.from_matrix(np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0.0]]))  # z towards the fork
+
+
+@dataclass(frozen=True)
+class Lens:
+    """The camera: pixels, focal length [pixels], pictures a second."""
+
+    size: tuple[int, int] = (320, 240)
+    focal: float = 250.0
+    fps: int = 15
+
+
+LENS = Lens()
 
 
 @dataclass(frozen=True)
@@ -57,6 +68,7 @@ class Truth:
     band: tuple[int, int, int] = (30, 140, 240)  # BGR
     floor: int = 90
     arm: int = 230
+    radius: float = RADIUS
 
     def hand(self, t: float) -> np.ndarray:
         low, lift = -0.195, _ease((t - self.grasp - 0.1) / (self.lifted - self.grasp - 0.1))
@@ -108,11 +120,23 @@ def write_bag(
     change: Callable[[str, int, object], object] = lambda kind, t, message: message,
     cameras: bool = True,
     rate: int = 1000,
+    pose_rate: int = 200,
+    lens: Lens = LENS,
+    receive: Callable[[str, float, float], float] = lambda kind, t, delay: t + delay,
     **options: object,
 ) -> Truth:
-    """Write a recording; `without` leaves out topics by kind, `change` may spoil messages.
+    """Write a recording.
 
-    Without `cameras` the pictures are there but black, which is faster.
+    Args:
+        path: The file.
+        truth: What is played.
+        without: Kinds of topics to leave out.
+        change: (kind, stamp, message) to the message as it is written, None to drop it.
+        cameras: Without them the pictures are there but black, which is faster.
+        rate, pose_rate: Messages a second.
+        lens: The camera.
+        receive: (kind, time, usual delay) to log_time [s].
+        options: For the MCAP writer.
     """
     truth, random = truth or Truth(), np.random.default_rng(1)
     definitions = get_typestore(Stores.ROS2_HUMBLE)
@@ -133,14 +157,14 @@ def write_bag(
                 message = Message(header=_header(stamp, frame), **body)
             message = change(kind, stamp, message)
             if message is not None:
-                late = stamp + round(delay * 1e9)
+                late = START + round(receive(kind, t, delay) * 1e9)
                 writer.write_message(topic, schemas[TYPES[kind]], message, late, late)
 
         write("tf", "/tf_static", 0.0, 0.0, {"transforms": _transforms()}, "")
         events = [(k / rate, "wrench") for k in range(int(truth.end * rate))]
-        events += [(k / 200, "pose") for k in range(int(truth.end * 200))]
+        events += [(k / pose_rate, "pose") for k in range(int(truth.end * pose_rate))]
         events += [(k / 50, "gripper") for k in range(int(truth.end * 50))]
-        events += [(0.004 + k / FPS, "frame") for k in range(int(truth.end * FPS))]
+        events += [(0.004 + k / lens.fps, "frame") for k in range(int(truth.end * lens.fps))]
         for t, kind in sorted(events):
             if kind == "wrench":
                 force = (HAND * SENSOR).inv().apply(truth.sign * truth.force(t)) + truth.bias
@@ -162,10 +186,10 @@ def write_bag(
                 }
                 write(kind, "/gripper/joint_states", t, 0.0002, joints, "")
             else:
-                color, depth = render(truth, t) if cameras else _black()
+                color, depth = render(truth, t, lens) if cameras else _black(lens)
                 _, jpeg = cv2.imencode(".jpg", color, [cv2.IMWRITE_JPEG_QUALITY, 92])
                 _, png = cv2.imencode(".png", depth)
-                info = _info()
+                info = _info(lens)
                 write("info", "/camera/color/camera_info", t, 0.012, info, "optical")
                 write("info", "/camera/depth/camera_info", t, 0.012, info, "optical")
                 body = {"format": "bgr8; jpeg compressed bgr8", "data": jpeg.tobytes()}
@@ -176,11 +200,11 @@ def write_bag(
     return truth
 
 
-def render(truth: Truth, t: float) -> tuple[np.ndarray, np.ndarray]:
+def render(truth: Truth, t: float, lens: Lens = LENS) -> tuple[np.ndarray, np.ndarray]:
     """Colour (BGR) and depth (mm) of floor, fork, arm and band."""
-    width, height = SIZE
+    width, height = lens.size
     u, v = np.meshgrid(np.arange(width), np.arange(height))
-    rays = np.stack([(u - width / 2) / FOCAL, (v - height / 2) / FOCAL, np.ones(u.shape)], -1)
+    rays = np.stack([u - width / 2, v - height / 2, np.full(u.shape, lens.focal)], -1) / lens.focal
     downwards = (rays @ CAMERA.as_matrix().T)[..., 2]
     with np.errstate(divide="ignore"):
         depth = np.where(downwards < -1e-3, (FLOOR - EYE[2]) / downwards, 3.0).clip(0, 3.0)
@@ -197,22 +221,23 @@ def render(truth: Truth, t: float) -> tuple[np.ndarray, np.ndarray]:
         (posts.reshape(-1, 3), 0.012, (150, 150, 155)),
         (palm, 0.05, (truth.arm,) * 3),
         (fingers, 0.010, (truth.arm,) * 3),
-        (truth.center_line(t), RADIUS, truth.band),
+        (truth.center_line(t), truth.radius, truth.band),
     ):
-        _splat(color, depth, points, radius, paint)
+        _splat(color, depth, points, radius, paint, lens.focal)
     noise = np.random.default_rng(round(t * 1e4)).normal(0, 0.0008, depth.shape)
     millimetres = np.round(1000 * (depth + noise * depth**2)).astype(np.uint16)
     return color, np.where(depth > 2.5, 0, millimetres).astype(np.uint16)
 
 
-def _splat(color, depth, points: np.ndarray, radius: float, paint: tuple[int, int, int]) -> None:
+def _splat(color, depth, points: np.ndarray, radius: float, paint: tuple, focal: float) -> None:
     """Spheres: nearest surface for each pixel, shaded from the middle to the rim."""
+    height, width = depth.shape
     seen = (points - EYE) @ CAMERA.as_matrix()
     for x, y, z in seen[seen[:, 2] > 0.1]:
-        size = FOCAL * radius / z
-        cu, cv = FOCAL * x / z + SIZE[0] / 2, FOCAL * y / z + SIZE[1] / 2
-        rows = slice(max(0, int(cv - size)), min(SIZE[1], max(0, int(cv + size) + 2)))
-        columns = slice(max(0, int(cu - size)), min(SIZE[0], max(0, int(cu + size) + 2)))
+        size = focal * radius / z
+        cu, cv = focal * x / z + width / 2, focal * y / z + height / 2
+        rows = slice(max(0, int(cv - size)), min(height, max(0, int(cv + size) + 2)))
+        columns = slice(max(0, int(cu - size)), min(width, max(0, int(cu + size) + 2)))
         if rows.start >= rows.stop or columns.start >= columns.stop:
             continue
         v, u = np.mgrid[rows, columns]
@@ -224,8 +249,8 @@ def _splat(color, depth, points: np.ndarray, radius: float, paint: tuple[int, in
         color[rows, columns][hit] = (shade * paint).astype(np.uint8)
 
 
-def _black() -> tuple[np.ndarray, np.ndarray]:
-    return np.zeros((*SIZE[::-1], 3), np.uint8), np.zeros(SIZE[::-1], np.uint16)
+def _black(lens: Lens) -> tuple[np.ndarray, np.ndarray]:
+    return np.zeros((*lens.size[::-1], 3), np.uint8), np.zeros(lens.size[::-1], np.uint16)
 
 
 def _header(stamp: int, frame: str) -> Message:
@@ -254,11 +279,12 @@ def _transform(parent: str, child: str, rotation: Rotation, place: np.ndarray) -
     )
 
 
-def _info() -> dict[str, object]:
-    matrix = [FOCAL, 0.0, SIZE[0] / 2, 0.0, FOCAL, SIZE[1] / 2, 0.0, 0.0, 1.0]
+def _info(lens: Lens) -> dict[str, object]:
+    (width, height), focal = lens.size, lens.focal
+    matrix = [focal, 0.0, width / 2, 0.0, focal, height / 2, 0.0, 0.0, 1.0]
     return {
-        "width": SIZE[0],
-        "height": SIZE[1],
+        "width": width,
+        "height": height,
         "distortion_model": "plumb_bob",
         "d": [0.0] * 5,
         "k": matrix,
@@ -270,4 +296,4 @@ def _info() -> dict[str, object]:
     }
 
 
-__all__ = ["Truth", "render", "replace", "write_bag"]
+__all__ = ["Lens", "Truth", "render", "replace", "write_bag"]

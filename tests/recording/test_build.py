@@ -9,10 +9,10 @@ import pytest
 
 from pipeline.episode import Episode
 from pipeline.errors import UserError
-from pipeline.recording.build import build_episode
-from pipeline.recording.check import check_recording
+from pipeline.recording.build import build_episode, episode_of, process_recording
+from pipeline.recording.delays import delays_of
 from pipeline.recording.geometry import geometry_of
-from pipeline.recording.reader import read_recording
+from pipeline.recording.input.reader import read_recording
 from pipeline.recording.signals import signals_of
 from tests.recording.bag import EYE, RADIUS, Truth, write_bag
 
@@ -144,7 +144,7 @@ def test_a_hand_that_turns_is_refused(tmp_path, params) -> None:
 
     path = tmp_path / "turning.mcap"
     write_bag(path, cameras=False, rate=500, change=turn)
-    with pytest.raises(UserError, match="turns by"):
+    with pytest.raises(UserError, match="turns by .* setup.tool"):
         signals(path, params)
 
 
@@ -178,25 +178,30 @@ def test_an_unknown_mask_is_refused_by_name(seen, params) -> None:
         build_episode(seen[0], "band1", params.model_copy(update={"cloud": cloud}))
 
 
-def test_the_report_of_a_good_recording(seen, params) -> None:
-    path, truth = seen
-    report = check_recording(path, params)
-    assert report.usable
-    content = json.loads(report.to_json())
-    assert content["signals"]["release_s"] == pytest.approx(truth.release, abs=1e-3)
-    peak = np.linalg.norm(truth.force(truth.release - 0.01))
-    assert content["signals"]["peak_force_n"] == pytest.approx(peak, rel=0.02)
-    assert content["cloud"]["taut_coverage"] > 0.9
-    assert content["cloud"]["taut_offset_m"] == pytest.approx(RADIUS, abs=0.002)
-    text = report.to_text()
-    assert "/ft/wrench" in text and text.endswith("can be used")
+def test_a_late_camera_is_put_right_and_it_is_said(episode, seen, params) -> None:
+    recording = read_recording(seen[0], params.setup).shifted(camera=-0.015)
+    done = process_recording(recording, params.bands["band1"], params)
+    late = episode_of(done, "band1", params).metadata["preprocessing"]["delays"]
+    assert late["camera"]["applied"] and late["camera"]["source"] == "estimated"
+    assert late["camera"]["value"] == pytest.approx(0.015, abs=1e-3)
+    assert late["pose"] == {"value": 0.0, "error": None, "source": "not seen", "applied": False}
+    np.testing.assert_allclose(done.clouds.time, episode.cloud_time, atol=1e-3)
 
 
-def test_the_report_of_a_bad_recording(tmp_path, params) -> None:
-    path = tmp_path / "bad.mcap"
-    write_bag(path, cameras=False, rate=500, without=("wrench",))
-    report = check_recording(path, params)
-    assert not report.usable
-    assert "no force" in json.loads(report.to_json())["problem"]
-    assert "cannot be used: no force" in report.to_text()
-    assert "/arm/current_pose" in report.to_text()
+def test_a_given_delay_of_the_pose_moves_the_hand(blind, params) -> None:
+    """By its speed: the hand is where it was 0.02 s earlier, and the force stays."""
+    delays = params.episode.delays.model_copy(update={"pose": 0.02, "camera": 0.0})
+    given = params.model_copy(
+        update={"episode": params.episode.model_copy(update={"delays": delays})}
+    )
+    recording = read_recording(blind[0], params.setup)
+    found = delays_of(recording, geometry_of(recording, params.setup), given)
+    geometry = geometry_of(recording, params.setup)
+    moved = signals_of(found.corrected(recording), geometry, params.episode, params.force)
+    usual = signals_of(recording, geometry, params.episode, params.force)
+    late = (usual.origin - moved.origin) * 1e-9
+    t = np.linspace(1.2, 2.2, 50)
+    np.testing.assert_allclose(moved.hand(t + late), usual.hand(t + 0.02), atol=1e-6)
+    assert moved.release_time + moved.origin * 1e-9 == pytest.approx(
+        usual.release_time + usual.origin * 1e-9, abs=1e-6
+    )

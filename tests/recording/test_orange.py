@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.intake.check import coverage
 from pipeline.params import Band, load
 from pipeline.recording.build import episode_of, process
-from pipeline.recording.check import coverage
 
 RECORDING = Path(__file__).parents[3] / "shared/recordings/orange.mcap"
 

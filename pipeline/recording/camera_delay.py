@@ -1,0 +1,189 @@
+"""The camera's delay against the pose, by where the hand is seen.
+
+A late picture shows the hand where it was. Its points, laid over those of pictures in which the
+hand rests, are off by the velocity times the delay; what they are off by place is a matter of the
+extrinsics and is fitted beside it. No model of the hand is needed, but it must be rigid and turn as
+the pose says.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.recording.events import events_of
+from pipeline.recording.felt import LONGEST
+from pipeline.recording.geometry import Geometry
+from pipeline.recording.input import images
+from pipeline.recording.input.reader import Recording
+from pipeline.recording.motion import Motion
+
+BLOCKS = 8  # of time, for errors by leaving one out
+FRAMES = 48  # pictures looked at
+REST = 4  # pictures with the slowest hand, at each end of the way
+PALM, REACH = 0.08, 0.13  # m: what is looked at around a point so far behind the tool centre point
+FINGERTIPS = 0.015  # m behind the tool centre point that are left to the band
+POINTS = 500  # of the hand in a picture
+FEWEST = 100
+NEIGHBOURS = 12
+FLAT = 0.1  # of the variances of neighbours across and along a surface
+NEAREST = (0.02, 0.01, 0.004, 0.004, 0.004)  # m between points that are laid on each other
+SCATTER = 0.0003  # m from picture to picture, against which the next is weighed
+ASKEW = 0.02  # m that wrong extrinsics may displace a metre of way
+WORST = 0.001  # m from picture to picture that is left: else it is no rigid hand
+SEEN = 0.8  # share of the pictures in which the hand must be found
+ROUNDS, CLOSE = 4, 3e-4  # s
+
+
+def camera_delay(recording: Recording, geometry: Geometry) -> tuple[float, float] | None:
+    """Delay and its standard error [s]; None where the hand is not seen well enough."""
+    origin = int(recording.wrench.stamp[0])
+    motion = Motion.of(recording.pose, geometry, origin)
+    grasp, release = events_of(recording, motion)
+    release = release.time
+    stamps = recording.depth.seconds(origin)
+    used = np.flatnonzero((stamps > grasp + LONGEST) & (stamps < release - LONGEST))
+    if len(used) < 2 * BLOCKS:
+        return None
+    used = used[np.linspace(0, len(used) - 1, min(FRAMES, len(used))).round().astype(int)]
+    look = _Look(recording, geometry, motion)
+    pictures = [(stamps[k], look.hand(k, stamps[k])) for k in used]
+    pictures = [(time, points) for time, points in pictures if len(points) >= FEWEST]
+    if len(pictures) < 2 * BLOCKS:
+        return None
+    times = np.array([time for time, _ in pictures])
+    grid, _, velocity = motion.velocity()
+    delay = 0.0
+    for _ in range(ROUNDS):
+        at = times - delay
+        turns, hands = motion.orientation(at), motion.position(at)
+        speed = np.stack([np.interp(at, grid, axis) for axis in velocity.T], axis=-1)
+        points = [
+            _behind(turn.inv().apply(seen - hand))
+            for turn, hand, (_, seen) in zip(turns, hands, pictures, strict=True)
+        ]
+        first = np.arange(len(at)) < len(at) / 2
+        found = [_step(points, turns, hands, speed, part) for part in (first, ~first)]
+        if None in found:
+            return None
+        steps, errors = np.array(found).T
+        delay += float(steps.mean())
+        if abs(delay) > LONGEST:
+            return None
+        if abs(steps.mean()) < CLOSE:
+            break
+    return delay, float(np.hypot(errors.max(), np.ptp(steps) / 2))
+
+
+class _Look:
+    """Points around the hand in single pictures."""
+
+    def __init__(self, recording: Recording, geometry: Geometry, motion: Motion):
+        self.recording, self.geometry, self.motion = recording, geometry, motion
+        self.rays = recording.depth_camera.rays().astype(np.float32)
+        self.random = np.random.default_rng(0)
+
+    def hand(self, k: int, time: float) -> np.ndarray:
+        """Of picture k in frame O, shape (P, 3); none where it does not show the hand."""
+        camera, nothing = self.recording.depth_camera, np.zeros((0, 3))
+        palm = self.motion.position(time)
+        palm = palm + self.motion.orientation(time).apply([0, 0, -PALM])
+        middle = self.geometry.camera.inverse().apply(palm)
+        if middle[2] < 2 * REACH:
+            return nothing
+        size = np.array([camera.width, camera.height])
+        half = 1.3 * REACH * np.diag(camera.matrix)[:2] / middle[2]
+        pixel = camera.project(middle[None])[0]
+        low, high = (np.clip(pixel + side * half, 0, size).astype(int) for side in (-1, 1))
+        window = slice(low[1], high[1]), slice(low[0], high[0])
+        try:
+            depth = images.depth(self.recording.depth.values[k])
+        except images.Undecodable:
+            return nothing
+        if depth.shape != (camera.height, camera.width):
+            return nothing
+        depth = depth[window]
+        seen = (self.rays[window] * depth[..., None])[depth > 0]
+        if not len(seen):
+            return nothing
+        points = self.geometry.camera.apply(seen)
+        near = np.linalg.norm(points - palm, axis=1) < 1.3 * REACH
+        return self.random.permutation(points[near].astype(float))
+
+
+def _behind(points: np.ndarray) -> np.ndarray:
+    """Those of the hand without its fingertips and the band, in the hand's frame."""
+    away = np.linalg.norm(points + [0, 0, PALM], axis=1)
+    return points[(away < REACH) & (points[:, 2] < -FINGERTIPS)]
+
+
+def _step(points, turns, hands, speed, part) -> tuple[float, float] | None:
+    """Delay and error that are left, against the slowest pictures of one part of the way."""
+    slowest = np.flatnonzero(part)[np.argsort(np.linalg.norm(speed[part], axis=1))[:REST]]
+    surface = _Surface(np.vstack([points[i] for i in slowest]))
+    rows, wanted = [], []
+    for i in range(len(points)):
+        if i in slowest or surface.empty:
+            continue
+        laid = surface.lay(points[i][:POINTS])
+        if laid is None:
+            continue
+        offset, root = laid
+        turn = turns[i].as_matrix()
+        root = root @ turn.T / SCATTER  # frame O
+        place = hands[i] - hands[slowest].mean(axis=0)
+        away = np.kron(np.eye(3), place)  # (3, 9): displacement by the extrinsics
+        rows.append(root @ np.hstack([np.eye(3), away, speed[i][:, None]]))
+        wanted.append(root @ turn @ offset)
+    if len(rows) < SEEN * (len(points) - REST):
+        return None
+    rows, wanted = np.array(rows), np.array(wanted)  # (K, 3, 13), (K, 3)
+    prior = np.zeros((9, 13))
+    prior[:, 3:12] = np.eye(9) / ASKEW
+
+    def solve(used: np.ndarray) -> np.ndarray:
+        matrix = np.vstack([rows[used].reshape(-1, 13), prior])
+        right = np.concatenate([wanted[used].ravel(), np.zeros(9)])
+        return np.linalg.lstsq(matrix, right, rcond=None)[0]
+
+    everything = np.arange(len(rows))
+    best = solve(everything)
+    left = (rows @ best - wanted) * SCATTER
+    if np.sqrt(np.mean(np.sum(left**2, axis=1))) > WORST:
+        return None
+    blocks = np.array_split(everything, BLOCKS)
+    parts = np.array([-solve(np.setdiff1d(everything, block))[-1] for block in blocks])
+    error = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((parts - parts.mean()) ** 2))  # jackknife
+    return -best[-1], float(error)
+
+
+class _Surface:
+    """Points of the resting hand with their normals."""
+
+    def __init__(self, points: np.ndarray):
+        self.empty = len(points) < FEWEST
+        if self.empty:
+            return
+        points = np.random.default_rng(0).permutation(points)[: 8 * POINTS]
+        _, index = cKDTree(points).query(points, k=NEIGHBOURS)
+        around = points[index] - points[index].mean(axis=1, keepdims=True)
+        spread, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))
+        flat = spread[:, 0] < FLAT * spread[:, 1]
+        self.points, self.normals = points[flat], axes[flat, :, 0]
+        self.empty = len(self.points) < FEWEST
+        self.tree = cKDTree(self.points) if not self.empty else None
+
+    def lay(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """By how much points (P, 3) are displaced, and the root of how surely, (3,) and (3, 3)."""
+        offset = np.zeros(3)
+        for most in NEAREST:
+            distance, index = self.tree.query(points - offset, distance_upper_bound=most)
+            near = np.isfinite(distance)
+            if near.sum() < FEWEST:
+                return None
+            normals = self.normals[index[near]]
+            across = points[near] - offset - self.points[index[near]]
+            sure = normals.T @ normals / len(normals)
+            gap = np.einsum("ij,ij->i", normals, across)
+            offset = offset + np.linalg.lstsq(sure, normals.T @ gap / len(gap), rcond=0.02)[0]
+        return offset, np.linalg.cholesky(sure + 1e-6 * np.eye(3)).T

@@ -1,0 +1,81 @@
+"""How late the stamps of pose and camera are against the force's, seen in the recording itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pipeline.errors import UserError
+from pipeline.recording.camera_delay import camera_delay
+from pipeline.recording.felt import Felt, felt_tool
+from pipeline.recording.geometry import Geometry
+from pipeline.recording.input.reader import Recording
+
+SIGMAS = 3.0  # what is less sure than this is not corrected
+MOST_ERROR = 0.003  # s: what is not known better counts as not seen
+LEAST_ERROR = 0.0005  # s: what no scatter shows
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """By how much a topic's stamps are late.
+
+    Attributes:
+        value: Against the force's [s].
+        error: Standard deviation [s]; 0 where it was given, None where nothing was seen.
+        source: "setup", "estimated" or "not seen".
+        applied: Whether the stamps are corrected by it.
+    """
+
+    value: float = 0.0
+    error: float | None = None
+    source: str = "not seen"
+    applied: bool = False
+
+
+@dataclass(frozen=True)
+class Delays:
+    """Of pose (and twist) and of the camera's two topics; and the tool that told the pose's."""
+
+    pose: Estimate
+    camera: Estimate
+    felt: Felt | None = None
+
+    def corrected(self, recording: Recording) -> Recording:
+        """The recording with the stamps that it should have had."""
+        both = {"pose": self.pose, "camera": self.camera}
+        late = {role: one.value for role, one in both.items() if one.applied}
+        return recording.shifted(**late) if late else recording
+
+
+def delays_of(recording: Recording, geometry: Geometry, params: object) -> Delays:
+    """Given delays as they are, others as far as the recording shows them.
+
+    The camera's is estimated against the pose, after that was corrected. An estimate is applied
+    where it is more than three standard deviations: a wrong correction is worse than none.
+    """
+    given = params.episode.delays
+    try:
+        felt = felt_tool(recording, geometry, params.setup.tool)
+    except UserError:  # the recording is refused for it later, in its own words
+        felt = None
+    pose = _judged(given.pose, lambda: felt and (felt.delay, felt.delay_error))
+    if pose.applied:
+        recording = recording.shifted(pose=pose.value)
+    camera = _judged(given.camera, lambda: camera_delay(recording, geometry))
+    return Delays(pose, camera, felt)
+
+
+def _judged(given: float | None, estimate: Callable[[], tuple[float, float] | None]) -> Estimate:
+    if given is not None:
+        return Estimate(given, 0.0, "setup", given != 0)
+    try:
+        found = estimate()
+    except UserError:
+        return Estimate()
+    if found is None:
+        return Estimate()
+    value, error = found[0], max(found[1], LEAST_ERROR)
+    if error > MOST_ERROR:
+        return Estimate()
+    return Estimate(value, error, "estimated", abs(value) > SIGMAS * error)

@@ -1,0 +1,180 @@
+"""Header stamps against log_time: what is a clock's fault, and when that can be mended.
+
+A message has two times: its header's stamp, when it was measured, and log_time, when the recorder
+received it, which is later by a delay that jitters and at times piles up. Only the least delays of
+a while are worth comparing. The rule, for each break in a topic:
+
+| delay | stamps | it is |
+|---|---|---|
+| as before | leap ahead | a gap: kept, and said |
+| changes for good | go on evenly | a step of log_time, or a slower network: nothing to mend |
+| changes for good | leap by the same | a step of the stamps' clock: taken out |
+| as before | go back, and log_time too | a step of the machine's clock: taken out |
+
+A step is taken out by continuity: the message after it comes a whole number of periods after the
+one before, that number being told by log_time. So a topic needs an even rate; the step of another
+topic is refused, as log_time alone is not good to a millisecond. Where several topics step at once,
+the fastest one tells by how much. A lone stamp far from both of its neighbours is damage.
+
+A whole topic on another clock than the wrench's can be tied to it by log_time only as well as the
+two transports' least delays agree: about a millisecond for what a controller publishes (pose,
+twist, gripper), which is put right, but tens of milliseconds for pictures, where a millisecond
+costs 25 % of the damping: they are refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+LEAST = 0.010  # s: smaller steps cannot be told from delays
+WINDOW = 1.0  # s of log_time around a break in which the least delay is looked for
+LEAST_AROUND = 3  # messages on each side of a step
+EVEN = 0.2  # of the period, by which intervals of an even rate differ in the median
+PILED = 0.2  # of the period, within which messages come that had to wait
+AGREE = 0.003  # s between a step by continuity and by log_time
+FAR = 1.0  # s between a stamp and those around it
+INTERLEAVED = 6  # how often stamps of two runs alternate that cover the same time
+TOLERANCE = 0.5  # s between the clocks of two topics
+
+
+@dataclass(frozen=True)
+class Step:
+    """A clock's step.
+
+    Attributes:
+        index: The first message after it, in the order of the arrays that were given.
+        log: log_time there [ns].
+        size: How far the stamps leapt, beside the time that passed [ns].
+        period: Of the topic [ns].
+        exact: Whether the rate is even enough to tell the size by continuity.
+    """
+
+    index: int
+    log: int
+    size: int
+    period: int
+    exact: bool
+
+
+def outliers(stamp: np.ndarray) -> np.ndarray:
+    """Which stamps [ns], in the order of arrival, are far from all around them; shape (S,)."""
+    if len(stamp) < 5:
+        return np.zeros(len(stamp), bool)
+    middle = np.median(stamp.astype(float))
+    usual = median_filter(stamp - middle, 5, mode="nearest") + middle
+    limit = max(FAR * 1e9, 10 * _period(stamp))
+    return np.abs(stamp - usual) > limit
+
+
+def arrival(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
+    """The order in which messages came, shape (S,): the file's, or log_time's.
+
+    The latter where chunks are in disorder: both times go back, and no clock was set (`rewinds`).
+    Where log_time alone goes back, the recorder's clock was set.
+    """
+    disorder = len(_back(stamp, log)) > 0
+    return np.argsort(log, kind="stable") if disorder else np.arange(len(stamp))
+
+
+def steps(stamp: np.ndarray, log: np.ndarray) -> list[Step]:
+    """Steps of the stamps' clock alone, in a topic [ns], in the order of arrival."""
+    if len(stamp) < 2 * LEAST_AROUND:
+        return []
+    period, spread = _period(stamp), _spread(stamp)
+    exact = spread < EVEN * period
+    arrived = np.maximum.accumulate(log)
+    least = max(LEAST * 1e9, 0.6 * period, 6 * spread)
+    delay = log - stamp
+    # Messages that had piled up come all at once; their delays say nothing of a clock.
+    alone = np.diff(log, prepend=log[0] - period) > PILED * period
+    found: list[Step] = []
+    for i in np.flatnonzero(np.abs(np.diff(delay)) > least) + 1:
+        low = max(
+            np.searchsorted(arrived, arrived[i] - WINDOW * 1e9), found[-1].index if found else 0
+        )
+        high = np.searchsorted(arrived, arrived[i] + WINDOW * 1e9, side="right")
+        before, after = (delay[a:b][alone[a:b]] for a, b in ((low, i), (i, high)))
+        if min(len(before), len(after)) < LEAST_AROUND:
+            continue
+        size = int(before.min() - after.min())
+        way = int(stamp[i] - stamp[i - 1])
+        leap = way - max(1, round((way - size) / period)) * period
+        if min(abs(size), abs(way - period), abs(leap)) < least or (size > 0) != (way > period):
+            continue  # delays, a gap, or log_time's own step
+        agrees = abs(leap - size) < max(AGREE * 1e9, period / 4)
+        found.append(
+            Step(int(i), int(log[i]), round(leap if agrees else size), period, exact and agrees)
+        )
+    return found
+
+
+def rewinds(stamp: np.ndarray, log: np.ndarray) -> list[Step]:
+    """Steps back of both clocks, in a topic [ns], in the order of the file.
+
+    Chunks in another order go back too, but do not cover the same time twice.
+    """
+    found = []
+    for i in _back(stamp, log):
+        before = stamp[:i][stamp[:i] >= stamp[i]]
+        after = stamp[i:][stamp[i:] <= stamp[i - 1]]
+        run = np.repeat([0, 1], [len(before), len(after)])
+        order = np.argsort(np.concatenate([before, after]), kind="stable")
+        if np.count_nonzero(np.diff(run[order])) >= INTERLEAVED:
+            period = _period(stamp)
+            size = int(stamp[i] - stamp[i - 1]) - period
+            exact = _spread(stamp) < EVEN * period
+            found.append(Step(int(i), int(log[i]), size, period, exact))
+    return found
+
+
+def without(stamp: np.ndarray, found: list[Step], base: int = 0) -> np.ndarray:
+    """Stamps on the clock that segment `base` (0: before the first step) has."""
+    segment = segments(len(stamp), found)
+    leaps = np.concatenate([[0], np.cumsum([step.size for step in found], dtype=np.int64)])
+    return stamp - (leaps - leaps[base])[segment].astype(np.int64)
+
+
+def segments(count: int, found: list[Step]) -> np.ndarray:
+    """Number of steps before each message, shape (count,)."""
+    return np.searchsorted([step.index for step in found], np.arange(count), side="right")
+
+
+def offset(
+    stamp: np.ndarray, log: np.ndarray, other_stamp: np.ndarray, other_log: np.ndarray
+) -> float:
+    """By how much [s] the least delays of a topic exceed another's, where both have messages."""
+    start = min(log.min(), other_log.min())
+    mine, others = _least(stamp, log, start), _least(other_stamp, other_log, start)
+    common = sorted({*mine} & {*others})
+    if not common:
+        return float((log - stamp).min() - (other_log - other_stamp).min()) * 1e-9
+    return float(np.median([mine[one] - others[one] for one in common])) * 1e-9
+
+
+def _back(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
+    """Messages at which both times go back, by about as much."""
+    way, way_by_log = np.diff(stamp), np.diff(log)
+    both = np.maximum(way, way_by_log) < -LEAST * 1e9
+    return np.flatnonzero(both & (np.abs(way - way_by_log) < -way_by_log / 2)) + 1
+
+
+def _least(stamp: np.ndarray, log: np.ndarray, start: int) -> dict[int, int]:
+    """Least delay in each second of log_time."""
+    second, delay = (log - start) // 10**9, log - stamp
+    order = np.lexsort([delay, second])
+    keys, first = np.unique(second[order], return_index=True)
+    return dict(zip(keys.tolist(), delay[order][first].tolist(), strict=True))
+
+
+def _period(stamp: np.ndarray) -> int:
+    ways = np.diff(stamp)
+    ways = ways[ways > 0]
+    return max(1, int(np.median(ways))) if len(ways) else 1
+
+
+def _spread(stamp: np.ndarray) -> float:
+    """Median by which intervals differ from the period [ns]."""
+    return float(np.median(np.abs(np.diff(stamp) - _period(stamp))))

@@ -1,0 +1,316 @@
+"""What the records of a file amount to: channels with their messages, and what was lost on the way.
+
+The rules are in `container`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from mcap import records as kinds
+from mcap.opcode import Opcode
+
+from pipeline.errors import UserError
+from pipeline.recording.input.records import (
+    HEAD,
+    MESSAGE,
+    PRIVATE,
+    Damaged,
+    Record,
+    crc,
+    inside,
+    parse,
+    unpack,
+    walk,
+)
+
+MOST = 2**30  # bytes of messages that are held at once
+OVERHEAD = 256  # bytes that a message costs beside its payload
+BULKY = re.compile("PointCloud|LaserScan|OccupancyGrid|CompressedVideo")  # counted, not kept
+KEPT = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+LONGEST = 86_400 * 10**9  # ns that a recording lasts
+NAMED = 5  # places or topics named in one line
+
+
+@dataclass
+class Channel:
+    """One topic with its raw messages, in the order of the file.
+
+    The payloads of types that no topic needs and that are large (BULKY) are left empty.
+    """
+
+    topic: str
+    schema: kinds.Schema
+    encoding: str
+    log_times: list[int] = field(default_factory=list)  # ns
+    payloads: list[bytes] = field(default_factory=list)
+
+
+class Collector:
+    """Takes one record after the other; then says what it has.
+
+    Attributes:
+        channels: Messages by the number of their channel, not yet named.
+        aside: What may not be believed, until it is known whether the file has checksums.
+    """
+
+    def __init__(self, path: Path, file: BinaryIO):
+        self.path, self.file, self.size = path, file, path.stat().st_size
+        self.schemas: dict[int, kinds.Schema] = {}
+        self.definitions: dict[int, kinds.Channel] = {}
+        self.channels: dict[int, Channel] = {}
+        self.ambiguous: Counter[int] = Counter()  # messages dropped by channel id
+        self.held = 0
+        self.checked = 0  # chunks that have a checksum
+        self.aside: list[Record] = []
+        self.disbelieved = 0
+        self.gaps: list[Record] = []
+        self.private = 0
+        self.dropped: list[tuple[int, int]] = []  # first and last log time of damaged chunks
+        self.data_end: Record | None = None
+        self.footer: Record | None = None
+        self.summary: list[kinds.McapRecord] = []
+
+    def collect(self) -> tuple[list[Channel], list[str], list[str]]:
+        """Channels that have messages, losses and notes."""
+        for record in walk(self.file, self.size):
+            self._take(record)
+        for record in self.aside:
+            self._settle(record)
+        trusted = self._summary_holds()
+        for one in self.summary if trusted else ():
+            if isinstance(one, kinds.Schema):
+                self.schemas.setdefault(one.id, one)
+            elif isinstance(one, kinds.Channel):
+                self.definitions.setdefault(one.id, one)
+        channels, orphans = self._joined()
+        return channels, [*self._losses(trusted), *orphans], self._notes(trusted)
+
+    # Records
+
+    def _take(self, record: Record) -> None:
+        """One record outside of chunks."""
+        opcode, content = record.opcode, record.content
+        if not opcode:
+            self.gaps.append(record)
+        elif opcode == Opcode.CHUNK and content.uncompressed_crc:
+            self.checked += 1
+            self._open(content)
+        elif opcode == Opcode.DATA_END:
+            self.data_end = record
+        elif opcode == Opcode.FOOTER:
+            self.footer = record
+        elif self.data_end and opcode not in (Opcode.CHUNK, Opcode.MESSAGE):
+            self.summary.append(content)
+        elif opcode == Opcode.CHUNK or (self.gaps and opcode in KEPT):
+            self.aside.append(record._replace(content=None))
+        elif opcode == Opcode.MESSAGE:
+            self._message(content, 0, len(content))
+        elif opcode in KEPT:
+            self._define(content)
+        elif opcode >= PRIVATE:
+            self.private += 1
+
+    def _settle(self, record: Record) -> None:
+        """A record that was put aside: believed only where nothing has a checksum."""
+        self.file.seek(record.at + HEAD.size)
+        content = self.file.read(record.end - record.at - HEAD.size)
+        if record.opcode == Opcode.CHUNK:
+            chunk = parse(record.opcode, content)
+            if self.checked:
+                self.dropped.append(_span(chunk))
+            else:
+                self._open(chunk)
+        elif self.checked:
+            self.disbelieved += 1
+        elif record.opcode == Opcode.MESSAGE:
+            self._message(content, 0, len(content))
+        else:
+            self._define(parse(record.opcode, content))
+
+    def _open(self, chunk: kinds.Chunk) -> None:
+        try:
+            data = unpack(chunk)
+            for opcode, start, end in inside(data):
+                if opcode == Opcode.MESSAGE:
+                    self._message(data, start, end)
+                elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                    self._define(parse(opcode, data[start:end]))
+                else:
+                    self._hold(OVERHEAD)  # no end of tiny records either
+        except Damaged:
+            self.dropped.append(_span(chunk))
+
+    def _define(self, record: kinds.McapRecord) -> None:
+        if isinstance(record, kinds.Schema):
+            self.schemas.setdefault(record.id, record)
+        elif isinstance(record, kinds.Channel):
+            known = self.definitions.setdefault(record.id, record)
+            if _meaning(known) != _meaning(record):
+                self.ambiguous.setdefault(record.id, 0)
+
+    def _message(self, data: bytes, start: int, end: int) -> None:
+        if end - start < MESSAGE.size:
+            raise Damaged("a message that is too short")
+        number, _, log_time, _ = MESSAGE.unpack_from(data, start)
+        if number in self.ambiguous:
+            self.ambiguous[number] += 1
+            return
+        channel = self.channels.get(number)
+        if channel is None:
+            channel = self.channels[number] = Channel("", None, "")
+        bulky = self._is_bulky(number)
+        payload = b"" if bulky else data[start + MESSAGE.size : end]
+        self._hold(len(payload) + OVERHEAD)
+        channel.log_times.append(log_time)
+        channel.payloads.append(payload)
+
+    def _is_bulky(self, number: int) -> bool:
+        known = self.definitions.get(number)
+        schema = self.schemas.get(known.schema_id) if known else None
+        return bool(schema and BULKY.search(schema.name))
+
+    def _hold(self, size: int) -> None:
+        self.held += size
+        if self.held > MOST:
+            raise UserError(
+                f"{self.path}: holds more than {MOST / 2**30:.0f} GiB of messages: record only the"
+                " topics that are needed, for the time of the pull, pictures compressed"
+            )
+
+    # Joining
+
+    def _joined(self) -> tuple[list[Channel], list[str]]:
+        """Channels by topic, and in words what could not be joined."""
+        found: dict[tuple, Channel] = {}
+        losses = []
+        for number, channel in self.channels.items():
+            known, count = self.definitions.get(number), _messages(len(channel.payloads))
+            if known is None:
+                losses.append(f"{count} of channel {number} dropped: no record says what it is")
+                continue
+            schema = self.schemas.get(known.schema_id)
+            if schema is None and known.schema_id:
+                losses.append(f"{count} of {known.topic} dropped: its schema is missing")
+                continue
+            schema = schema or kinds.Schema(id=0, data=b"", encoding="", name="")
+            key = (known.topic, schema.name, schema.encoding, schema.data, known.message_encoding)
+            one = found.setdefault(key, Channel(known.topic, schema, known.message_encoding))
+            one.log_times += channel.log_times
+            one.payloads += channel.payloads
+        for number, count in self.ambiguous.items():
+            topic = self.definitions[number].topic
+            losses.append(
+                f"channel {number} is {topic} and then another: {_messages(count)} dropped since"
+            )
+        return list(found.values()), losses
+
+    def _summary_holds(self) -> bool:
+        """Whether the summary can be believed."""
+        if self.data_end is None or self.footer is None:
+            return False
+        start, wanted = self.data_end.end, self.footer.content.summary_crc
+        if not wanted:
+            return not any(gap.at >= start for gap in self.gaps)
+        return crc(self.file, start, self.footer.end - 4) == wanted
+
+    # Words
+
+    def _losses(self, trusted: bool) -> list[str]:
+        losses = []
+        data_end = self.data_end.at if self.data_end else self.size
+        if self.data_end is None:
+            losses.append(f"the file has no end: cut off after {self._seconds(self._last())} s")
+        if self.dropped:
+            count = len(self.dropped)
+            where = [f"{self._seconds(a)} to {self._seconds(b)} s" for a, b in self.dropped]
+            losses.append(f"{count} damaged chunk{'s' * (count > 1)} dropped: {_few(where)}")
+        # What a file that was cut off ends with is no loss of its own.
+        lost = [gap for gap in self.gaps if gap.at < data_end and gap.end < self.size]
+        if lost:
+            where = [f"{gap.end - gap.at} at {gap.at}" for gap in lost]
+            losses.append(f"unreadable bytes of {self.size} in the file: {_few(where)}")
+        if self.disbelieved:
+            losses.append(f"{self.disbelieved} record(s) behind them dropped: without a checksum")
+        if self.private:  # a damaged chunk may look like one
+            losses.append(f"{self.private} record(s) of kinds that are not MCAP's own passed over")
+        if self.data_end and not self.dropped and not lost and not self._data_crc_holds():
+            losses.append(
+                "the checksum of all messages together does not hold: what is damaged is not known"
+            )
+        return [*losses, *(self._compared() if trusted else ())]
+
+    def _notes(self, trusted: bool) -> list[str]:
+        notes = []
+        crcs = self.checked or (self.data_end and self.data_end.content.data_section_crc)
+        if not crcs:
+            notes.append("no checksums in the file: damage to its messages would not be noticed")
+        if self.data_end and not trusted:
+            notes.append("the summary at the file's end is damaged: its counts were not compared")
+        elif self.data_end and any(gap.at >= self.data_end.end for gap in self.gaps):
+            notes.append("unreadable bytes behind the last message")
+        return notes
+
+    def _data_crc_holds(self) -> bool:
+        wanted = self.data_end.content.data_section_crc
+        return not wanted or crc(self.file, 0, self.data_end.at) == wanted
+
+    def _compared(self) -> list[str]:
+        """Where the file's own end speaks of another length or of other numbers than were read."""
+        off = self.footer.content.summary_start
+        off = off and off - self.data_end.end
+        if off:
+            what = "missing from" if off > 0 else "too many in"
+            return [f"{abs(off)} bytes are {what} the file", *self._counted()]
+        return self._counted()
+
+    def _counted(self) -> list[str]:
+        found = [one for one in self.summary if isinstance(one, kinds.Statistics)]
+        if not found:
+            return []
+        wanted = found[-1].channel_message_counts
+        read = {number: len(channel.payloads) for number, channel in self.channels.items()}
+        off = []
+        for number in sorted({*wanted, *read}) if wanted else ():
+            a, b = wanted.get(number, 0), read.get(number, 0)
+            known = self.definitions.get(number)
+            if a != b:
+                off.append(f"{b} of {a} of {known.topic if known else f'channel {number}'}")
+        total = sum(read.values())
+        if not off and total != found[-1].message_count:
+            off.append(f"{total} of {found[-1].message_count}")
+        return [f"messages read of those that the file counts: {_few(off)}"] if off else []
+
+    def _times(self) -> np.ndarray:
+        """log_times [ns] without those that are damage."""
+        times = np.array([t for one in self.channels.values() for t in one.log_times], float)
+        return times[np.abs(times - np.median(times)) < LONGEST] if len(times) else times
+
+    def _last(self) -> float:
+        return max(self._times(), default=0.0)
+
+    def _seconds(self, log_time: float) -> str:
+        """Since the first message."""
+        return f"{(log_time - min(self._times(), default=log_time)) * 1e-9:.2f}"
+
+
+def _span(chunk: kinds.Chunk) -> tuple[int, int]:
+    return chunk.message_start_time, chunk.message_end_time
+
+
+def _meaning(channel: kinds.Channel) -> tuple:
+    return channel.topic, channel.message_encoding, channel.schema_id
+
+
+def _few(words: list[str]) -> str:
+    more = len(words) - NAMED
+    return ", ".join(words[:NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _messages(count: int) -> str:
+    return f"{count} message{'s' * (count != 1)}"

@@ -1,0 +1,122 @@
+"""MCAP file to `Recording`: which topic is which, their signals on header stamps, checked.
+
+Everything comes sorted by header.stamp; log_time is when a message was received, which is late and
+jitters, and serves only to notice what is wrong with a stamp's clock (`clocks`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Protocol
+
+from pipeline.errors import UserError
+from pipeline.recording.input.camera import Camera
+from pipeline.recording.input.container import Container, read_container, sha256
+from pipeline.recording.input.frames import TransformTree
+from pipeline.recording.input.stream import Stream
+from pipeline.recording.input.streams import streams_of
+from pipeline.recording.input.topics import Choice, camera_of, choose
+from pipeline.recording.input.transforms import transforms_of
+
+SHOWN = 3  # losses in an error
+ROLES = ("wrench", "pose", "twist", "gripper", "color", "depth")
+
+__all__ = ["Recording", "Stream", "explained", "read_recording", "recording_of"]
+
+
+class Setup(Protocol):
+    """What reading needs of params.setup."""
+
+    topics: object
+    urdf: str | None
+    tip_link: str | None
+    start_pose: tuple[float, ...] | None
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What was read of one file.
+
+    Attributes:
+        wrench: Force [N] in `wrench.frame`, values (S, 3).
+        pose: Position [m] and quaternion xyzw in `pose.frame`, values (S, 7).
+        twist: Velocity [m/s] and angular velocity [rad/s], values (S, 6); None where not recorded.
+        gripper: Sum of the finger positions [m], values (S, 1); None where not recorded.
+        color, depth: `Picture`s, decoded by `pipeline.recording.input.images`.
+        color_camera, depth_camera: Their intrinsics.
+        transforms: The static tree.
+        losses: What was lost of the file or mended in it, in words.
+        notes: What else to know of it, which cost nothing.
+        choices: Why each role has its topic.
+        sha256: Hash of the file.
+    """
+
+    path: Path
+    wrench: Stream
+    pose: Stream
+    gripper: Stream | None
+    color: Stream
+    depth: Stream
+    color_camera: Camera
+    depth_camera: Camera
+    transforms: TransformTree
+    losses: list[str] = field(default_factory=list)
+    sha256: str = ""
+    twist: Stream | None = None
+    notes: list[str] = field(default_factory=list)
+    choices: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def streams(self) -> dict[str, Stream]:
+        found = {role: getattr(self, role) for role in ROLES}
+        return {role: stream for role, stream in found.items() if stream}
+
+    def shifted(self, pose: float = 0.0, camera: float = 0.0) -> Recording:
+        """With stamps that are late by so many seconds put right: pose and twist; pictures."""
+        return replace(
+            self,
+            pose=self.pose.shifted(pose),
+            twist=self.twist and self.twist.shifted(pose),
+            color=self.color.shifted(camera),
+            depth=self.depth.shifted(camera),
+        )
+
+
+def read_recording(path: Path, setup: Setup) -> Recording:
+    """Read and check a recording. Raises UserError with one line about what is missing or wrong."""
+    return recording_of(read_container(Path(path)), setup)
+
+
+def recording_of(container: Container, setup: Setup) -> Recording:
+    """As `read_recording`, from a file that was read already."""
+    try:
+        chosen = choose(container, setup)
+        cameras = {role: camera_of(container, chosen, role) for role in ("color", "depth")}
+        found = {role: chosen[role] for role in ROLES if role in chosen}
+        streams, remarks = streams_of(container.path, found)
+    except UserError as error:
+        raise explained(error, container.path, container.losses) from None
+    lost = [f"{stream.topic}: {note}" for stream in streams.values() for note in stream.notes]
+    return Recording(
+        path=container.path,
+        **{role: streams.get(role) for role in ROLES},
+        color_camera=cameras["color"],
+        depth_camera=cameras["depth"],
+        transforms=transforms_of(container),
+        losses=[*container.losses, *lost],
+        notes=[*container.notes, *remarks],
+        choices=_reasons(chosen),
+        sha256=sha256(container.path),
+    )
+
+
+def _reasons(chosen: dict[str, Choice]) -> dict[str, str]:
+    return {role: choice.why for role, choice in chosen.items()}
+
+
+def explained(error: UserError, path: Path, losses: list[str]) -> UserError:
+    """The error with the file's name and with what was lost, which may be its cause."""
+    text = str(error) if str(path) in str(error) else f"{path}: {error}"
+    shown = losses[:SHOWN] + ["and more"] * (len(losses) > SHOWN)
+    return UserError(f"{text} ({'; '.join(shown)})" if losses else text)

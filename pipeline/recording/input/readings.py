@@ -1,0 +1,223 @@
+"""What the pipeline takes from a message: one reader for each kind of schema.
+
+ROS 2, ROS 1, Foxglove and Franka schemas differ in the names of fields and in where the stamp is;
+here they become `Reading`s. Messages have attributes, whatever they were encoded as (`decode`).
+
+Sources: ros2/common_interfaces, docs.foxglove.dev/docs/sdk/schemas, frankarobotics/franka_ros2
+(FrankaRobotState) and frankarobotics/franka_ros (FrankaState).
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+MISSING = object()
+LATEST = 2**62  # ns; a stamp beyond it is damage
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What all image messages have in common.
+
+    Attributes:
+        encoding: Of raw pixels (rgb8, 16UC1, ...), "" where `data` is packed.
+        format: Of packed data ("jpeg", "16UC1; compressedDepth png", ...), "" where it is raw.
+        data: uint8, shape (bytes,).
+        height, width: Pixels; 0 where packed, as are `step` and `is_bigendian`.
+        step: Bytes a row, with its padding.
+    """
+
+    encoding: str
+    format: str
+    data: np.ndarray
+    height: int = 0
+    width: int = 0
+    step: int = 0
+    is_bigendian: bool = False
+
+    @property
+    def kind(self) -> tuple:
+        """What all pictures of a topic have in common."""
+        return self.encoding, self.format, self.height, self.width, self.step
+
+
+class Reading(NamedTuple):
+    """One message.
+
+    Attributes:
+        stamp: Of its header [ns]; None where the type has none.
+        frame: frame_id, "" where there is none.
+        value: wrench fx fy fz [N]; pose x y z [m] qx qy qz qw; twist vx vy vz [m/s] wx wy wz
+            [rad/s]; gripper: opening [m]; joints: positions [rad, m]; or the picture.
+    """
+
+    stamp: int | None
+    frame: str
+    value: tuple[float, ...] | Picture
+
+
+def kind_of(schema: str) -> str:
+    """The schema's own name: geometry_msgs/msg/PoseStamped, a.b.PoseStamped -> PoseStamped."""
+    kind = re.split(r"[/.:]+", schema)[-1]
+    return "WrenchStamped" if kind.endswith("WrenchStamped") else kind
+
+
+def first_of(message: object, *names: str) -> object:
+    """The first of these fields that the message has. Raises AttributeError."""
+    for name in names:
+        value = getattr(message, name, MISSING)
+        if value is not MISSING:
+            return value
+    raise AttributeError(f"none of the fields {', '.join(names)}")
+
+
+def stamp_of(message: object) -> int | None:
+    """header.stamp (ROS) or timestamp (Foxglove) [ns]; None where there is neither."""
+    header = getattr(message, "header", None)
+    time = getattr(message, "timestamp", None) if header is None else header.stamp
+    if time is None:
+        return None
+    if isinstance(time, str):  # RFC 3339, as protobuf's JSON has it
+        stamp = int(np.datetime64(time.rstrip("Z"), "ns").astype(np.int64))
+    else:
+        seconds = first_of(time, "sec", "secs", "seconds")
+        stamp = int(seconds) * 10**9 + int(first_of(time, "nanosec", "nsec", "nsecs", "nanos"))
+    if not 0 <= stamp < LATEST:
+        raise ValueError("a stamp outside of all time")
+    return stamp
+
+
+def frame_of(message: object) -> str:
+    header = getattr(message, "header", message)
+    return str(getattr(header, "frame_id", "")).lstrip("/")
+
+
+def read_wrench(message: object) -> Reading:
+    wrench = getattr(message, "wrench", message)
+    return _reading(message, _vector(wrench.force))
+
+
+def read_pose(message: object) -> Reading:
+    pose = message.pose
+    pose = getattr(pose, "pose", pose)  # PoseWithCovariance
+    return _reading(message, pose_of(pose))
+
+
+def read_twist(message: object) -> Reading:
+    twist = message.twist
+    twist = getattr(twist, "twist", twist)  # TwistWithCovariance
+    return _reading(message, (*_vector(twist.linear), *_vector(twist.angular)))
+
+
+def read_state_pose(message: object) -> Reading:
+    """O_T_EE: a PoseStamped in FrankaRobotState, a column-major 4 x 4 in FrankaState."""
+    pose = first_of(message, "o_t_ee", "O_T_EE")
+    if hasattr(pose, "pose"):
+        return Reading(stamp_of(message), frame_of(pose) or frame_of(message), pose_of(pose.pose))
+    matrix = np.array(pose, float).reshape(4, 4).T
+    if not np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-3):
+        raise ValueError("O_T_EE has no rotation")
+    turn = Rotation.from_matrix(matrix[:3, :3]).as_quat()
+    return _reading(message, (*map(float, matrix[:3, 3]), *map(float, turn)))
+
+
+def read_state_wrench(message: object) -> Reading:
+    """O_F_ext_hat_K, the external force that the arm estimates, in the frame of O_T_EE."""
+    wrench = first_of(message, "o_f_ext_hat_k", "O_F_ext_hat_K")
+    if not hasattr(wrench, "wrench"):
+        return _reading(message, tuple(float(wrench[i]) for i in range(3)))
+    frame = frame_of(wrench) or read_state_pose(message).frame
+    return Reading(stamp_of(message), frame, _vector(wrench.wrench.force))
+
+
+def opening_reader(names: tuple[str, ...]) -> Callable[[object], Reading]:
+    """Sum of these joints: two fingers that each move half the opening, or one value."""
+    read = joints_reader(names, "")
+
+    def read_opening(message: object) -> Reading:
+        stamp, _, positions = read(message)
+        return Reading(stamp, frame_of(message), (sum(positions),))
+
+    return read_opening
+
+
+def joints_reader(names: tuple[str, ...], frame: str) -> Callable[[object], Reading]:
+    """Positions of these joints, in this order, of a robot whose root is `frame`.
+
+    The reader raises ValueError for a message in which one is missing.
+    """
+
+    def read(message: object) -> Reading:
+        joints = joints_of(message)
+        missing = [name for name in names if name not in joints]
+        if missing:
+            raise ValueError(f"joint {missing[0]} is missing")
+        return Reading(stamp_of(message), frame, tuple(joints[name] for name in names))
+
+    return read
+
+
+def read_image(message: object) -> Reading:
+    """Image and foxglove.RawImage, CompressedImage and foxglove.CompressedImage."""
+    data = _bytes(message.data)
+    if hasattr(message, "format"):
+        return _reading(message, Picture("", str(message.format) or "unnamed", data))
+    size = (int(message.height), int(message.width), int(message.step))
+    swapped = bool(getattr(message, "is_bigendian", False))
+    return _reading(message, Picture(str(message.encoding), "", data, *size, swapped))
+
+
+def joints_of(message: object) -> dict[str, float]:
+    """Position of each joint, of JointState, foxglove.JointStates or a Franka state."""
+    message = getattr(message, "measured_joint_state", message)
+    if hasattr(message, "joints"):
+        return {str(one.name): float(one.position) for one in message.joints}
+    return dict(zip(map(str, message.name), map(float, message.position), strict=True))
+
+
+def pose_of(pose: object) -> tuple[float, ...]:
+    """x y z qx qy qz qw of a Pose. Raises ValueError for a quaternion without length."""
+    place, turn = pose.position, pose.orientation
+    return (*_vector(place), *quaternion_of(turn))
+
+
+def quaternion_of(turn: object) -> tuple[float, ...]:
+    quaternion = tuple(float(getattr(turn, axis)) for axis in "xyzw")
+    if not sum(x * x for x in quaternion) > 1e-12:
+        raise ValueError("the quaternion has no length")
+    return quaternion
+
+
+def _reading(message: object, value: tuple[float, ...] | Picture) -> Reading:
+    return Reading(stamp_of(message), frame_of(message), value)
+
+
+def _vector(vector: object) -> tuple[float, float, float]:
+    return float(vector.x), float(vector.y), float(vector.z)
+
+
+def _bytes(data: object) -> np.ndarray:
+    """Bytes, base64 as JSON has it, or a list of numbers, to uint8."""
+    if isinstance(data, str):
+        data = base64.b64decode(data, validate=True)
+    if isinstance(data, bytes | bytearray | memoryview):
+        return np.frombuffer(data, np.uint8)
+    return np.asarray(data, np.uint8)
+
+
+POSE = dict.fromkeys(("PoseStamped", "PoseInFrame", "PoseWithCovarianceStamped"), read_pose)
+STATES = ("FrankaRobotState", "FrankaState")
+JOINTS = ("JointState", "JointStates")
+IMAGES = dict.fromkeys(("Image", "RawImage", "CompressedImage"), read_image)
+TWIST = dict.fromkeys(("TwistStamped", "TwistWithCovarianceStamped"), read_twist)
+INFOS = ("CameraInfo", "CameraCalibration")
+WRENCH = {"WrenchStamped": read_wrench}
+STATE_POSE = dict.fromkeys(STATES, read_state_pose)
+STATE_WRENCH = dict.fromkeys(STATES, read_state_wrench)

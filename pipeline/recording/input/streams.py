@@ -1,0 +1,243 @@
+"""One topic's messages to a `Stream`: read, put on one clock, sorted, and what was lost said.
+
+The rules of the clocks are in `clocks`. A message is lost where it cannot be read, is not finite or
+absurdly large, has no stamp or one far from its neighbours', names another frame than the rest, or
+has the stamp of another.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.errors import UserError
+from pipeline.recording.input import clocks
+from pipeline.recording.input.readings import Picture
+from pipeline.recording.input.roles import OPTIONAL
+from pipeline.recording.input.stream import Stream, frozen, gaps
+from pipeline.recording.input.topics import Choice
+
+ABSURD = 1e6  # N, m, m/s, rad: nothing here is as large
+TIMED = ("gripper",)  # roles for which log_time will do where there are no stamps
+CORRECTABLE = ("pose", "twist", "gripper")  # by log_time, if they have a clock of their own
+
+
+@dataclass
+class Raw:
+    """One topic as it was read, in the order of the file."""
+
+    role: str
+    choice: Choice
+    frame: str
+    stamp: np.ndarray
+    log: np.ndarray
+    values: list
+    lost: Counter[str]
+    notes: list[str] = field(default_factory=list)
+    late: int = 0  # how often the stamps go back
+
+    @property
+    def topic(self) -> str:
+        return self.choice.channel.topic
+
+    def keep(self, which: np.ndarray) -> None:
+        """Only these messages: a mask or an order."""
+        self.stamp, self.log = self.stamp[which], self.log[which]
+        places = np.flatnonzero(which) if which.dtype == bool else which
+        self.values = [self.values[i] for i in places]
+
+    def drop(self, which: np.ndarray, why: str) -> None:
+        if which.any():
+            self.lost[why] += int(which.sum())
+            self.keep(~which)
+
+
+def streams_of(path: Path, chosen: dict[str, Choice]) -> tuple[dict[str, Stream], list[str]]:
+    """All topics on the wrench's clock, and remarks on what costs nothing.
+
+    Args:
+        path: The recording, for messages.
+        chosen: Choices of wrench, pose, color, depth, and of twist and gripper if there are.
+
+    Raises:
+        UserError: for a topic that cannot be used, in one line.
+    """
+    raw, notes = {}, []
+    for role, choice in chosen.items():
+        try:
+            raw[role] = _read(path, role, choice)
+        except UserError as error:
+            if role not in OPTIONAL:
+                raise
+            notes.append(f"{str(error).removeprefix(f'{path}: ')}: done without it")
+    _take_rewinds_out(path, raw)
+    for one in raw.values():
+        one.late = int(np.count_nonzero(np.diff(one.stamp) < 0))
+        one.keep(clocks.arrival(one.stamp, one.log))
+        one.drop(clocks.outliers(one.stamp), "far off in time")
+    _take_steps_out(path, raw)
+    _on_one_clock(path, raw)
+    streams = {role: _sorted(path, one) for role, one in raw.items()}
+    origin = int(streams["wrench"].stamp[0])
+    first = min(stream.stamp[0] for stream in streams.values())
+    last = max(stream.stamp[-1] for stream in streams.values())
+    for stream in streams.values():
+        stream.notes.extend(gaps(stream, origin, first, last))
+    return streams, notes + frozen(streams, origin)
+
+
+def _read(path: Path, role: str, choice: Choice) -> Raw:
+    stamps, logs, values, frames, lost = [], [], [], [], Counter()
+    seen, bare = set(), 0
+    channel = choice.channel
+    for log_time, payload in zip(channel.log_times, channel.payloads, strict=True):
+        try:
+            stamp, frame, value = choice.read(payload)
+            finite = isinstance(value, Picture) or all(abs(x) < ABSURD for x in value)
+        except Exception:  # whatever damaged bytes do to the decoder
+            lost["damaged"] += 1
+            continue
+        if (log_time, payload) in seen:
+            lost["doubled"] += 1
+            continue
+        seen.add((log_time, payload))
+        if not finite:
+            lost["not finite"] += 1
+            continue
+        if not stamp:
+            bare += 1
+            stamp = 0
+        stamps.append(stamp)
+        logs.append(log_time)
+        values.append(value)
+        frames.append(frame)
+    frame = Counter(frames).most_common(1)[0][0] if frames else ""
+    stamp, log = np.array(stamps, np.int64), np.array(logs, np.uint64).astype(np.int64)
+    raw = Raw(role, choice, frame, stamp, log, values, lost)
+    if bare == len(stamps) > 0:
+        if role not in TIMED:
+            raise UserError(
+                f"{path}: topic {raw.topic} has no header stamps, record with time stamps"
+            )
+        raw.stamp = log.copy()
+        raw.notes.append("no header stamps: log_time is used")
+    raw.drop(np.array([one != frame for one in frames], bool), "in another frame")
+    raw.drop(raw.stamp == 0, "without a stamp")
+    if len(raw.stamp) < 2:
+        reasons = f" ({_words(raw.lost)})" if raw.lost else ""
+        raise UserError(f"{path}: topic {raw.topic} has fewer than two readable messages{reasons}")
+    return raw
+
+
+def _take_rewinds_out(path: Path, raw: dict[str, Raw]) -> None:
+    """Steps back of the machine's clock, stamps and log_time alike."""
+    for one, found in _agreed(path, raw, clocks.rewinds).items():
+        role = raw[one]
+        role.stamp = clocks.without(role.stamp, found)
+        role.log = clocks.without(role.log, found)
+        role.notes += [_step_note(step, role.log[0], "of its machine's clock ") for step in found]
+
+
+def _take_steps_out(path: Path, raw: dict[str, Raw]) -> None:
+    """Steps of the stamps' clock alone; the segment that fits the other topics is right."""
+    found = _agreed(path, raw, clocks.steps)
+    start = min(one.log.min() for one in raw.values())
+    usual = {}
+    for role, one in raw.items():
+        segment = clocks.segments(len(one.stamp), found.get(role, []))
+        longest = np.argmax(np.bincount(segment))
+        usual[role] = (one.log - one.stamp)[segment == longest].min()
+    for role, jumps in found.items():
+        one = raw[role]
+        segment = clocks.segments(len(one.stamp), jumps)
+        least = [(one.log - one.stamp)[segment == k].min() for k in range(len(jumps) + 1)]
+        others = np.median([usual[other] for other in raw if other not in found] or [usual[role]])
+        base = int(np.argmin(np.abs(np.array(least, float) - others)))
+        one.stamp = clocks.without(one.stamp, jumps, base)
+        one.notes += [_step_note(step, start) for step in jumps]
+        one.late -= sum(step.size < 0 for step in jumps)
+
+
+def _agreed(path: Path, raw: dict[str, Raw], find) -> dict[str, list[clocks.Step]]:
+    """Steps of each role; those at one time have the size that the fastest topic tells."""
+    found = {role: find(one.stamp, one.log) for role, one in raw.items()}
+    found = {role: steps for role, steps in found.items() if steps}
+    for role, steps in found.items():
+        for k, step in enumerate(steps):
+            twins = [
+                other
+                for others in found.values()
+                for other in others
+                if abs(other.size - step.size) < max(other.period, step.period, 5_000_000)
+                and abs(other.log - step.log) < 0.5e9
+            ]
+            best = min(twins, key=lambda one: (not one.exact, one.period))
+            if not best.exact and role not in CORRECTABLE:
+                raise UserError(
+                    f"{path}: the clock of {raw[role].topic} steps by {step.size * 1e-9:+.3f} s,"
+                    " and its rate is too uneven to tell by how much exactly: record again without"
+                    " setting clocks"
+                )
+            steps[k] = replace(step, size=best.size)
+    return found
+
+
+def _step_note(step: clocks.Step, start: int, whose: str = "") -> str:
+    at = (step.log - start) * 1e-9
+    return f"clock step {whose}of {step.size * 1e-9:+.4f} s at {at:.2f} s taken out"
+
+
+def _on_one_clock(path: Path, raw: dict[str, Raw]) -> None:
+    wrench = raw["wrench"]
+    offsets = {
+        role: clocks.offset(one.stamp, one.log, wrench.stamp, wrench.log)
+        for role, one in raw.items()
+    }
+    middle = float(np.median(list(offsets.values())))
+    needed = [role for role in offsets if role not in CORRECTABLE]
+    if (
+        max(offsets[role] for role in needed) - min(offsets[role] for role in needed)
+        > clocks.TOLERANCE
+    ):
+        worst = max(needed, key=lambda role: abs(offsets[role] - middle))
+        raise UserError(
+            f"{path}: the stamps of {raw[worst].topic} are {middle - offsets[worst]:+.3f} s off the"
+            " other topics' clock, record all topics with one clock"
+        )
+    for role in CORRECTABLE:
+        if role in raw and abs(offsets[role]) > clocks.TOLERANCE:
+            raw[role].stamp = raw[role].stamp + round(offsets[role] * 1e9)
+            raw[role].notes.append(
+                f"on another clock: {offsets[role]:+.3f} s added to its stamps by log_time, good to"
+                " about a millisecond"
+            )
+
+
+def _sorted(path: Path, raw: Raw) -> Stream:
+    if raw.late > 0:
+        raw.notes.append(f"{_count(raw.late)} out of order, sorted by stamp")
+    raw.keep(np.argsort(raw.stamp, kind="stable"))
+    raw.drop(np.diff(raw.stamp, prepend=raw.stamp[0] - 1) == 0, "with the stamp of another")
+    if len(raw.stamp) < 2:
+        raise UserError(f"{path}: topic {raw.topic} has fewer than two readable messages")
+    values = raw.values
+    if not isinstance(values[0], Picture):
+        values = np.array(values, float)
+        if raw.choice.convert is not None:
+            values = raw.choice.convert(raw.stamp, values)
+    if raw.lost:
+        raw.notes.append(f"lost {_words(raw.lost)}")
+    delay = float(np.median(raw.log - raw.stamp)) * 1e-9
+    lost = sum(raw.lost.values())
+    return Stream(raw.topic, raw.frame, raw.stamp, values, delay, lost, raw.notes)
+
+
+def _count(messages: int) -> str:
+    return f"{messages} message{'s' * (messages != 1)}"
+
+
+def _words(lost: Counter[str]) -> str:
+    return ", ".join(f"{count} {why}" for why, count in sorted(lost.items()))

@@ -1,0 +1,214 @@
+"""Which topic plays which role: by params, else by type, rate, and words in the name."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+from pipeline.errors import UserError
+from pipeline.recording.input import images
+from pipeline.recording.input import readings as of
+from pipeline.recording.input.camera import Camera, camera_from
+from pipeline.recording.input.container import Channel, Container
+from pipeline.recording.input.decode import Decoder, decoder
+from pipeline.recording.input.readings import Picture
+from pipeline.recording.input.roles import OPTIONAL, ROLES, TRIES, Candidate, Choice
+from pipeline.recording.input.sources import NotIt, source_of
+
+SHOWN = 12  # topics named in a message
+
+__all__ = ["Choice", "camera_of", "choose"]
+
+
+def choose(container: Container, setup: object) -> dict[str, Choice]:
+    """Role to channel, for every role of ROLES that the file has.
+
+    Args:
+        container: What was read.
+        setup: params.setup: topics (a topic's name for a role, or None), urdf, tip_link,
+            start_pose.
+
+    Raises:
+        UserError: for a role that nothing can play, with what the file has and how to mend it.
+    """
+    chooser = _Chooser(container, setup)
+    chosen: dict[str, Choice] = {}
+    for role in ROLES:
+        choice = chooser.choice(role, chosen)
+        if choice is not None:
+            chosen[role] = choice
+        elif role not in OPTIONAL:
+            raise chooser.lacking(role)
+    return chosen
+
+
+def camera_of(container: Container, chosen: dict[str, Choice], role: str) -> Camera:
+    """The camera of the images of `role`, color or depth. Raises UserError."""
+    info, image = chosen[f"{role}_info"], chosen[role]
+    calibration, topic = info.typical(key=repr).value, image.channel.topic
+    return camera_from(container.path, info.channel.topic, calibration, topic, _size(image))
+
+
+class _Chooser:
+    """Goes through the channels of one file, role by role."""
+
+    def __init__(self, container: Container, setup: object) -> None:
+        self.container, self.setup = container, setup
+        self.problems: list[str] = []  # why channels of the right type could not be used
+        self.decoders: dict[int, Decoder] = {}
+
+    def choice(self, role: str, chosen: dict[str, Choice]) -> Choice | None:
+        self.problems = []
+        name = getattr(self.setup.topics, role)
+        if name is not None:
+            return self._named(role, name)
+        found = [self._candidate(role, channel) for channel in self.container.channels]
+        found = [one for one in found if one is not None and self._suits(role, one)]
+        if role.endswith("_info"):
+            return self._info(found, role.removesuffix("_info"), chosen)
+        if role == "twist":  # a command is not a measurement
+            found = [one for one in found if not one.doubts]
+        if not found:
+            return None
+        best = max(found, key=Candidate.merit)
+        return replace(best.choice, why=_why(best, found))
+
+    def lacking(self, role: str) -> UserError:
+        what, path = ROLES[role].what, self.container.path
+        if self.problems:
+            return UserError(f"{path}: no {what}; {'; or '.join(self.problems[:2])}")
+        has = sorted({f"{c.topic} ({of.kind_of(_type(c))})" for c in self.container.channels})
+        more = f" and {len(has) - SHOWN} more" if len(has) > SHOWN else ""
+        return UserError(
+            f"{path}: no {what}; the file has {', '.join(has[:SHOWN]) or 'no topics at all'}"
+            f"{more}: record it, or name its topic in setup.topics.{role}"
+        )
+
+    def _named(self, role: str, name: str) -> Choice:
+        channels = [c for c in self.container.channels if c.topic == name]
+        where = f"{self.container.path}: setup.topics.{role}"
+        if not channels:
+            has = ", ".join(sorted({c.topic for c in self.container.channels})[:SHOWN])
+            raise UserError(f"{where}: no topic {name}, the file has {has or 'none'}")
+        readers = ROLES[role].readers
+        fitting = [c for c in channels if of.kind_of(c.schema.name) in readers]
+        if not fitting:
+            types = " or ".join(readers)
+            raise UserError(f"{where}: {name} is a {_type(channels[0])}, not {types}")
+        found = self._candidate(role, max(fitting, key=lambda c: len(c.payloads)), named=True)
+        if found is None:
+            problem = (self.problems or [f"{name} has no messages, or fingers only"])[0]
+            raise UserError(f"{where}: {problem}")
+        if role in ("color", "depth"):
+            problem = _unsupported(role, found.typical.value)
+            if problem:
+                raise UserError(f"{where}: {name}: {problem}")
+        return replace(found.choice, why=f"setup.topics.{role}")
+
+    def _candidate(self, role: str, channel: Channel, named: bool = False) -> Candidate | None:
+        """None, with a word in `problems`, for a channel of the right type that is of no use."""
+        if of.kind_of(channel.schema.name) not in ROLES[role].readers or not channel.payloads:
+            return None
+        try:
+            if id(channel) not in self.decoders:
+                self.decoders[id(channel)] = decoder(channel)
+            decode = self.decoders[id(channel)]
+            read, convert = source_of(role, channel, decode, self.setup, named)
+            choice = Choice(channel, lambda payload: read(decode(payload)), "", convert)
+            return Candidate(ROLES[role], choice, choice.typical())
+        except NotIt:
+            return None
+        except UserError as error:
+            self.problems.append(str(error))
+            return None
+
+    def _suits(self, role: str, candidate: Candidate) -> bool:
+        """Pictures: whether they are colour or depth, and of a kind that can be decoded."""
+        if role not in ("color", "depth"):
+            return True
+        picture = candidate.typical.value
+        deep = images.is_depth(picture)
+        deep |= picture.encoding == "mono16" and "depth" in candidate.topic.lower()
+        if deep != (role == "depth"):
+            return False
+        problem = _unsupported(role, picture)
+        if problem:
+            self.problems.append(f"{candidate.topic}: {problem}")
+        return problem is None
+
+    def _info(
+        self, found: Sequence[Candidate], role: str, chosen: dict[str, Choice]
+    ) -> Choice | None:
+        """A camera info belongs to the images in whose folder it is, or with their frame and size.
+
+        Depth may take the colour camera's where it is registered to colour: in its frame and size.
+        """
+        image, color = chosen[role], chosen["color"]
+        topic, frame, size = image.channel.topic, image.typical().frame, _size(image)
+        ranked = []
+        for one in found:
+            camera = one.typical.value.camera
+            beside, of_color = _beside(one.topic, topic), _beside(one.topic, color.channel.topic)
+            own = beside and (role == "color" or not of_color)
+            known = camera.frame or (color.typical().frame if of_color else "")
+            fits = size is None or size == (camera.width, camera.height)
+            if own or (known == frame and (fits or beside)):
+                why = f"beside {topic}" if beside else f"of the frame and size of {topic}"
+                merit = (own, known == frame, fits, beside, len(one.choice.channel.payloads))
+                ranked.append((merit, [-ord(c) for c in one.topic], why, one.choice))
+            else:
+                pixels = f", {size[0]} x {size[1]}" if size else ""
+                self.problems.append(
+                    f"{one.topic} is of frame {known!r}, {camera.width} x {camera.height} pixels,"
+                    f" {topic} of {frame!r}{pixels}: record the camera info of those images, or"
+                    f" name it in setup.topics.{role}_info"
+                )
+        if not ranked:
+            return None
+        *_, why, choice = max(ranked, key=lambda one: one[:2])
+        return replace(choice, why=why)
+
+
+def _type(channel: Channel) -> str:
+    return channel.schema.name or f"{channel.encoding} topic without a schema"
+
+
+def _size(image: Choice) -> tuple[int, int] | None:
+    """Width and height that most of the first pictures tell."""
+    sizes = []
+    for payload in image.channel.payloads:
+        try:
+            sizes.append(images.size_of(image.read(payload).value))
+        except Exception:  # whatever damaged bytes do to the decoder
+            continue
+        if len(sizes) == TRIES:
+            break
+    known = Counter(size for size in sizes if size is not None)
+    return known.most_common(1)[0][0] if known else None
+
+
+def _unsupported(role: str, picture: Picture) -> str | None:
+    """Why pictures like this cannot be decoded; None where they can, or this one is damaged."""
+    try:
+        getattr(images, role)(picture)
+    except images.Unsupported as error:
+        return str(error)
+    except images.Undecodable:
+        pass
+    return None
+
+
+def _beside(info: str, image: str) -> bool:
+    """Whether the two are in one folder, the name of the image's transport left out."""
+    folder, parts = info.split("/")[:-1], image.split("/")
+    return any(folder) and folder in (parts[:-1], parts[:-2])
+
+
+def _why(best: Candidate, found: list[Candidate]) -> str:
+    if len(found) == 1:
+        return f"the only {best.kind} for {best.role.what.partition(' (')[0]}"
+    named = f"named {' '.join(best.hints)}, " if best.hints else ""
+    others = sorted({one.topic for one in found} - {best.topic})[:2]
+    rest = f"; not {', '.join(others)}" if others else ""
+    return f"of {len(found)} topics: {named}{best.rate:.0f} Hz{rest}"

@@ -1,0 +1,34 @@
+"""Which pixels show the band: backends behind one seam.
+
+A backend is made for one view, learns once from its frames, and then masks each frame.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from pipeline.errors import UserError
+from pipeline.recording.masks.ridge import RidgeMask
+from pipeline.recording.view import Frame, View
+
+
+class Masker(Protocol):
+    def mask(self, frame: Frame) -> np.ndarray:
+        """Pixels of the band, shape (H, W), bool."""
+
+
+def masker(name: str, view: View, sam3: object | None = None) -> Masker:
+    """The backend of params.cloud.mask; `sam3` is params.cloud.sam3.
+
+    Raises:
+        UserError: There is no such backend, or it lacks something.
+    """
+    if name == "opencv":
+        return RidgeMask(view)
+    if name == "sam3" and sam3 is not None:
+        from pipeline.recording.masks.sam3 import Sam3Mask
+
+        return Sam3Mask(view, sam3)
+    raise UserError(f"cloud.mask: backend {name!r} is not available, use opencv")

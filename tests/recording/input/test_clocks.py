@@ -1,0 +1,333 @@
+"""Clocks: steps and offsets that were put in come out to the period's jitter; good ones are left.
+
+The truth is the stamp before a clock was set: a mended topic must have it again, up to one constant
+that all topics share.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipeline.errors import UserError
+from pipeline.recording.input import clocks
+from pipeline.recording.input.reader import Recording, read_recording
+from tests.recording.bag import START, write_bag
+
+MS = 1_000_000
+
+
+def topic(
+    rate: float, seconds: float = 6.0, *, seed: int = 0, jitter: float = 0.02, delay: float = 3e-4
+) -> tuple[np.ndarray, np.ndarray]:
+    """Stamps and log_times [ns]: an even rate, exponential delays."""
+    random = np.random.default_rng(seed)
+    k = np.arange(int(seconds * rate))
+    stamp = START + np.round(1e9 * (k + jitter * random.normal(size=len(k))) / rate).astype(int)
+    late = delay + random.exponential(delay, len(k))
+    # The recorder writes as it receives.
+    return stamp, np.maximum.accumulate(stamp + np.round(1e9 * late).astype(int))
+
+
+def stall(log: np.ndarray, at: float, seconds: float) -> np.ndarray:
+    """The recorder writes nothing for a while, and then all at once."""
+    begin = log.min() + int(at * 1e9)
+    end = begin + int(seconds * 1e9)
+    held = (log >= begin) & (log < end)
+    late = log.copy()
+    late[held] = end + np.arange(held.sum()) * 20_000
+    return np.maximum.accumulate(late)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(
+    rate=st.sampled_from([15.0, 30.0, 50.0, 200.0, 1000.0]),
+    seed=st.integers(0, 999),
+    jitter=st.sampled_from([0.0, 0.01, 0.1, 0.4]),
+    stalls=st.lists(st.tuples(st.floats(0, 5.5), st.floats(0.01, 0.8)), max_size=3),
+    lost=st.lists(st.tuples(st.floats(0, 1), st.floats(0, 0.3)), max_size=3),
+    log_step=st.sampled_from([0.0, -1.5, 0.2, 5.0]),
+    slower=st.sampled_from([0.0, 0.004, 0.05]),
+)
+def test_a_good_file_is_never_mended(rate, seed, jitter, stalls, lost, log_step, slower) -> None:
+    """Stalled recorders, lost messages, a log clock that steps and a network that gets slower."""
+    stamp, log = topic(rate, seed=seed, jitter=jitter)
+    for at, seconds in stalls:
+        log = stall(log, at, seconds)
+    half = len(log) // 2
+    log[half:] += round(1e9 * (log_step + slower))
+    kept = np.ones(len(stamp), bool)
+    for share, part in lost:
+        first = int(share * len(stamp))
+        kept[first : first + int(part * len(stamp))] = False
+    if log_step:  # a gap just there, as long as that step, would be a step of the stamps
+        kept[half - int(2 * rate) : half + int(2 * rate)] = True
+    stamp, log = stamp[kept], log[kept]
+    if len(stamp) < 20:
+        return
+    order = clocks.arrival(stamp, log)
+    assert clocks.steps(stamp[order], log[order]) == []
+    assert clocks.rewinds(stamp, log) == []
+    assert not clocks.outliers(stamp[order]).any()
+
+
+@pytest.mark.parametrize("rate", [15.0, 30.0, 200.0, 1000.0])
+@pytest.mark.parametrize("size", [-3.7, -0.12, 0.12, 1.2, 3600.0])
+def test_a_step_of_the_stamps_is_taken_out(rate, size) -> None:
+    true, log = topic(rate, seed=3)
+    half = len(true) // 2
+    stamp = true.copy()
+    stamp[half:] += round(size * 1e9)
+    (step,) = clocks.steps(stamp, log)
+    assert step.index == half and step.exact
+    jitter = 0.02 * 1e9 / rate
+    assert abs(step.size - size * 1e9) < 5 * jitter
+    mended = clocks.without(stamp, [step])
+    assert np.abs(mended - true).max() < 5 * jitter
+    np.testing.assert_array_equal(mended[:half], true[:half])
+    np.testing.assert_array_equal(clocks.without(stamp, [step], 1)[half:], stamp[half:])
+
+
+def test_a_step_where_messages_were_lost_and_the_recorder_stalled() -> None:
+    true, log = topic(1000.0, seed=4)
+    log = stall(log, 2.99, 0.2)
+    stamp = true.copy()
+    stamp[3000:] += 700 * MS
+    kept = np.ones(len(true), bool)
+    kept[2995:3005] = False
+    (step,) = clocks.steps(stamp[kept], log[kept])
+    mended = clocks.without(stamp[kept], [step])
+    assert np.abs(mended - true[kept]).max() < 3 * MS  # the stall hides how many were lost
+
+
+def test_two_steps() -> None:
+    true, log = topic(200.0, seed=5)
+    stamp = true.copy()
+    stamp[400:] += 900 * MS
+    stamp[800:] -= 300 * MS
+    found = clocks.steps(stamp, log)
+    assert [step.index for step in found] == [400, 800]
+    assert np.abs(clocks.without(stamp, found) - true).max() < 1 * MS
+
+
+def test_the_machine_clock_steps_back() -> None:
+    true, log = topic(1000.0, seed=6)
+    stamp, logged = true.copy(), log.copy()
+    stamp[2500:] -= 400 * MS
+    logged[2500:] -= 400 * MS
+    (step,) = clocks.rewinds(stamp, logged)
+    assert step.index == 2500 and abs(step.size + 400 * MS) < 0.2 * MS
+    assert np.abs(clocks.without(stamp, [step]) - true).max() < 0.2 * MS
+
+
+def test_chunks_in_another_order_are_no_step() -> None:
+    stamp, log = topic(1000.0, seed=7)
+    order = np.r_[0:1000, 3000:4000, 2000:3000, 1000:2000, 4000:6000]
+    assert clocks.rewinds(stamp[order], log[order]) == []
+    found = order[clocks.arrival(stamp[order], log[order])]
+    assert np.abs(found - np.arange(6000)).max() < 5  # as their delays have it
+
+
+def test_stamps_far_from_all_others() -> None:
+    stamp, log = topic(200.0, seed=8)
+    stamp[[100, 500, 501]] += np.array([10**15, -(10**18), 5 * 10**9])
+    np.testing.assert_array_equal(np.flatnonzero(clocks.outliers(stamp)), [100, 500, 501])
+
+
+def read(path, params, **options) -> Recording:
+    write_bag(path, cameras=False, rate=500, **options)
+    return read_recording(path, params.setup)
+
+
+def shift(*kinds: str, by: float, since: float = -1.0, until: float = 1e9):
+    """A `change` for write_bag: these topics' stamps, between two times, by so many seconds."""
+
+    def change(kind: str, stamp: int, message):
+        if kind in kinds and since <= (stamp - START) * 1e-9 < until:
+            moved = stamp + round(by * 1e9)
+            time = SimpleNamespace(sec=moved // 10**9, nanosec=moved % 10**9)
+            message.header = SimpleNamespace(stamp=time, frame_id=message.header.frame_id)
+        return message
+
+    return change
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory, params) -> Recording:
+    return read(tmp_path_factory.mktemp("clock") / "good.mcap", params)
+
+
+def test_nothing_is_said_of_a_good_file(good) -> None:
+    assert good.losses == []
+    assert all(stream.notes == [] for stream in good.streams.values())
+
+
+@pytest.mark.parametrize("kind", ["pose", "gripper"])
+def test_another_clock_of_pose_or_gripper_is_put_right(tmp_path, params, good, kind) -> None:
+    found = read(tmp_path / "clock.mcap", params, change=shift(kind, by=-3600.0))
+    mended, true = getattr(found, kind), getattr(good, kind)
+    assert np.abs(mended.stamp - true.stamp).max() < 1 * MS
+    np.testing.assert_array_equal(mended.values, true.values)
+    assert len(found.losses) == 1 and "on another clock: +3600.000 s added" in found.losses[0]
+
+
+@pytest.mark.parametrize(
+    ("kinds", "named"),
+    [
+        (("color",), "/camera/color/compressed are -40.0"),
+        (("color", "depth", "info"), "/camera/"),
+        (("wrench",), "/ft/wrench are -39.9"),
+    ],
+)
+def test_another_clock_of_force_or_camera_is_refused(tmp_path, params, kinds, named) -> None:
+    with pytest.raises(UserError, match=named) as caught:
+        read(tmp_path / "clock.mcap", params, change=shift(*kinds, by=-40.0))
+    assert "record all topics with one clock" in str(caught.value)
+
+
+def test_log_time_on_a_clock_of_its_own_does_no_harm(tmp_path, params, good) -> None:
+    found = read(tmp_path / "clock.mcap", params, receive=lambda kind, t, delay: t + delay - 1e6)
+    np.testing.assert_array_equal(found.wrench.stamp, good.wrench.stamp)
+    assert found.losses == []
+
+
+def test_a_step_of_log_time_does_no_harm(tmp_path, params, good) -> None:
+    for step in (0.9, -0.9):
+        found = read(
+            tmp_path / "clock.mcap",
+            params,
+            receive=lambda kind, t, delay, step=step: t + delay + step * (t > 2.0),
+        )
+        for role, stream in found.streams.items():
+            np.testing.assert_array_equal(stream.stamp, good.streams[role].stamp)
+        assert found.losses == []
+
+
+def test_messages_out_of_order_are_sorted_and_said(tmp_path, params, good) -> None:
+    found = read(
+        tmp_path / "clock.mcap", params, change=shift("pose", by=-0.012, since=2, until=2.005)
+    )
+    assert found.losses == ["/arm/current_pose: 1 message out of order, sorted by stamp"]
+    assert np.all(np.diff(found.pose.stamp) > 0)
+    assert len(found.pose.stamp) == len(good.pose.stamp)
+
+
+@pytest.mark.parametrize("kind", ["wrench", "pose", "gripper", "depth"])
+def test_a_step_in_one_topic(tmp_path, params, good, kind) -> None:
+    found = read(tmp_path / "clock.mcap", params, change=shift(kind, by=1.2, since=2.0))
+    assert np.abs(getattr(found, kind).stamp - getattr(good, kind).stamp).max() < 0.1 * MS
+    assert len(found.losses) == 1
+    assert "clock step of +1.2000 s at 2.0" in found.losses[0]
+    # Whatever part is longer, the part on the others' clock is right.
+    found = read(tmp_path / "clock.mcap", params, change=shift(kind, by=1.2, until=3.0))
+    assert np.abs(getattr(found, kind).stamp - getattr(good, kind).stamp).max() < 0.1 * MS
+
+
+def test_a_step_in_all_topics_keeps_them_together(tmp_path, params, good) -> None:
+    kinds = ("wrench", "pose", "gripper", "color", "depth", "info")
+    found = read(tmp_path / "clock.mcap", params, change=shift(*kinds, by=0.8, since=2.0))
+    for role, stream in found.streams.items():
+        off = stream.stamp - good.streams[role].stamp
+        assert np.ptp(off) < 0.1 * MS and abs(np.median(off) - 800 * MS) < 0.1 * MS, role
+    assert sum("clock step" in loss for loss in found.losses) == 5
+
+
+def test_the_machine_clock_steps_back_in_all_topics(tmp_path, params, good) -> None:
+    kinds = ("wrench", "pose", "gripper", "color", "depth", "info")
+    found = read(
+        tmp_path / "clock.mcap",
+        params,
+        change=shift(*kinds, by=-0.80037, since=2.0),
+        receive=lambda kind, t, delay: t + delay - 0.80037 * (t >= 2.0),
+    )
+    for role, stream in found.streams.items():
+        assert np.abs(stream.stamp - good.streams[role].stamp).max() < 0.1 * MS, role
+    assert any("clock step of its machine's clock of -0.8004 s" in one for one in found.losses)
+
+
+def test_an_uneven_topic_with_a_step_is_refused(tmp_path, params) -> None:
+    def change(kind: str, stamp: int, message):
+        if kind == "wrench":
+            uneven = np.random.default_rng(stamp % 2**31).uniform(0, 0.0019)
+            moved = stamp + round(1e9 * (uneven + 0.7 * (stamp > START + 2 * 10**9)))
+            time = SimpleNamespace(sec=moved // 10**9, nanosec=moved % 10**9)
+            message.header = SimpleNamespace(stamp=time, frame_id="ft_sensor")
+        return message
+
+    with pytest.raises(UserError, match="rate is too uneven to tell by how much exactly"):
+        read(tmp_path / "clock.mcap", params, change=change)
+
+
+def test_an_uneven_gripper_with_a_step_is_put_right(tmp_path, params, good) -> None:
+    """To the millisecond that log_time is good to, which is enough for it."""
+
+    def change(kind: str, stamp: int, message):
+        if kind == "gripper":
+            uneven = np.random.default_rng(stamp % 2**31).uniform(0, 0.001)
+            message.header.stamp.nanosec += round(1e9 * uneven)
+            message.header.stamp.sec += 7 * (stamp > START + 2 * 10**9)
+        # Every third one is missing.
+        return None if kind == "gripper" and stamp // (20 * MS) % 3 == 0 else message
+
+    found = read(tmp_path / "clock.mcap", params, change=change)
+    (loss,) = found.losses
+    assert "/gripper/joint_states: clock step of +6.99" in loss
+    near = np.searchsorted(good.gripper.stamp, found.gripper.stamp - 5 * MS)
+    off = found.gripper.stamp - good.gripper.stamp[near]
+    assert np.abs(off).max() < 3 * MS
+
+
+def test_gaps_and_ends_are_said(tmp_path, params) -> None:
+    def change(kind: str, stamp: int, message):
+        t = (stamp - START) * 1e-9
+        if kind == "wrench" and 0.8 <= t < 0.9:
+            message.wrench.force.x = float("nan")
+        gone = (kind == "pose" and t > 3.5) or (kind == "color" and 1.0 < t < 1.6)
+        return None if gone or (kind == "gripper" and t < 0.6) else message
+
+    found = read(tmp_path / "gaps.mcap", params, change=change)
+    words = "\n".join(found.losses)
+    assert "/ft/wrench: lost 50 not finite" in words
+    assert "/ft/wrench: gap of 0.102 s at 0.80 s" in words
+    assert "/arm/current_pose: stops 0.70 s before the others" in words
+    assert "/gripper/joint_states: starts 0.60 s after the others" in words
+    assert "/camera/color/compressed: gap of 0.667 s at 0.94 s" in words
+    assert found.wrench.lost == 50 and np.isfinite(found.wrench.values).all()
+
+
+def test_stamps_that_are_missing(tmp_path, params, good) -> None:
+    def zero(kind: str, stamp: int, message, part: int):
+        if kind == "wrench" and stamp % 10**9 % part == 0:
+            message.header = SimpleNamespace(
+                stamp=SimpleNamespace(sec=0, nanosec=0), frame_id="ft_sensor"
+            )
+        return message
+
+    some = read(tmp_path / "zero.mcap", params, change=lambda *a: zero(*a, part=100 * MS))
+    assert any("without a stamp" in loss for loss in some.losses)
+    assert len(some.wrench.stamp) + some.wrench.lost == len(good.wrench.stamp)
+    with pytest.raises(UserError, match="/ft/wrench has no header stamps"):
+        read(tmp_path / "zero.mcap", params, change=lambda *a: zero(*a, part=1))
+
+
+def test_a_frozen_sensor_is_remarked_on(tmp_path, params) -> None:
+    held = {}
+
+    def change(kind: str, stamp: int, message):
+        if kind == "wrench" and 2 * 10**9 <= stamp - START < 2.5e9:
+            message.wrench = held.setdefault("wrench", message.wrench)
+        return message
+
+    found = read(tmp_path / "frozen.mcap", params, change=change)
+    assert any("/ft/wrench: the same value 250 times from 2.00 s" in one for one in found.notes)
+
+
+def test_shifted_puts_late_stamps_right(good) -> None:
+    found = good.shifted(pose=0.004, camera=-0.010)
+    for role, by in (("pose", 4), ("color", -10), ("depth", -10), ("wrench", 0), ("gripper", 0)):
+        off = good.streams[role].stamp - found.streams[role].stamp
+        np.testing.assert_array_equal(off, by * MS)

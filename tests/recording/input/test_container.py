@@ -1,0 +1,325 @@
+"""The container: intact messages come back, what is lost is said, and no size field is believed."""
+
+from __future__ import annotations
+
+import struct
+import subprocess
+import sys
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import lz4.frame
+import pytest
+import zstandard
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap import records as kinds
+from mcap.data_stream import RecordBuilder
+from mcap.writer import CompressionType, IndexType, Writer
+
+from pipeline.errors import UserError
+from pipeline.recording.input.container import read_container
+from pipeline.recording.input.records import MAGIC
+
+ROOT = Path(__file__).parents[3]
+START = 10**18
+SCHEMA = kinds.Schema(id=1, data=b"float64 x", encoding="ros2msg", name="pkg/msg/X")
+ANY = settings(
+    max_examples=150,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+
+
+def channel(number: int = 1, topic: str = "/x", schema: int = 1) -> kinds.Channel:
+    return kinds.Channel(number, topic, "cdr", {}, schema)
+
+
+def message(k: int, number: int = 1, data: bytes = b"12345678") -> kinds.Message:
+    time = START + k * 10**9
+    return kinds.Message(channel_id=number, log_time=time, data=data, publish_time=time, sequence=k)
+
+
+def packed(records) -> bytes:
+    """Records as the library writes them; bytes are taken as they are."""
+    parts = []
+    for record in records:
+        if isinstance(record, bytes):
+            parts.append(record)
+            continue
+        builder = RecordBuilder()
+        record.write(builder)
+        parts.append(builder.end())
+    return b"".join(parts)
+
+
+def chunk(records, *, compression: str = "", crc: int | None = None, size: int | None = None):
+    data = records if isinstance(records, bytes) else packed(records)
+    body = {"": bytes, "zstd": zstandard.compress, "lz4": lz4.frame.compress}[compression](data)
+    return kinds.Chunk(
+        compression=compression,
+        data=body,
+        message_start_time=START + 3 * 10**9,
+        message_end_time=START + 4 * 10**9,
+        uncompressed_crc=zlib.crc32(data) if crc is None else crc,
+        uncompressed_size=len(data) if size is None else size,
+    )
+
+
+END = (kinds.DataEnd(0), kinds.Footer(0, 0, 0))
+
+
+def read(folder: Path, *records, end=END, magic: bytes = MAGIC):
+    path = folder / "file.mcap"
+    path.write_bytes(MAGIC + packed([kinds.Header("ros2", "test"), *records, *end]) + magic)
+    return read_container(path)
+
+
+def times(container, topic: str = "/x") -> list[int]:
+    found = [one for one in container.channels if one.topic == topic]
+    return [(t - START) // 10**9 for one in found for t in one.log_times]
+
+
+def test_a_plain_file(tmp_path) -> None:
+    found = read(tmp_path, chunk([SCHEMA, channel(), message(0), message(1)]))
+    assert times(found) == [0, 1] and (found.losses, found.notes) == ([], [])
+    assert found.channels[0].payloads == [b"12345678"] * 2
+
+
+def test_damaged_chunks_are_dropped_with_their_time(tmp_path) -> None:
+    first = chunk([SCHEMA, channel(), message(0)])
+    for bad in (
+        chunk([message(3)], crc=1),
+        chunk([message(3)], size=7),
+        chunk([message(3)], size=2**62),
+        chunk(packed([message(3)]) + b"\x05\xff"),  # ends within a record
+        chunk(packed([message(3)]) + bytes(9)),  # opcode 0
+        chunk([message(3)], compression="zstd", size=2**30 + 1),
+        kinds.Chunk("zstd", b"no frame", START + 3 * 10**9, START + 4 * 10**9, 1, 100),
+        kinds.Chunk("lz4", b"no frame", START + 3 * 10**9, START + 4 * 10**9, 1, 100),
+    ):
+        bad.message_start_time, bad.message_end_time = START + 3 * 10**9, START + 4 * 10**9
+        found = read(tmp_path, first, bad, chunk([message(5)]))
+        assert times(found)[0] == 0 and times(found)[-1] == 5
+        assert found.losses == ["1 damaged chunk dropped: 3.00 to 4.00 s"]
+
+
+def test_a_wrong_length_costs_what_is_near_it(tmp_path) -> None:
+    whole = [chunk([SCHEMA, channel(), message(0)]), *(chunk([message(k)]) for k in (1, 2, 3))]
+    parts = [bytearray(packed([one])) for one in whole]
+    for value in (0, 5, 10**6, 2**64 - 1):
+        parts[1][1:9] = struct.pack("<Q", value)
+        found = read(tmp_path, *map(bytes, parts))
+        assert times(found) == [0, 2, 3]
+        assert "unreadable bytes" in found.losses[0]
+    bare = [SCHEMA, channel(), *map(message, range(6))]
+    parts = [bytearray(packed([one])) for one in bare]
+    parts[4][1:9] = struct.pack("<Q", 2**40)
+    found = read(tmp_path, *map(bytes, parts))
+    assert times(found) == [0, 1, 3, 4, 5] and "unreadable bytes" in found.losses[0]
+
+
+def test_a_chunk_without_the_checksum_that_others_have_is_not_believed(tmp_path) -> None:
+    found = read(tmp_path, chunk([SCHEMA, channel(), message(0)]), chunk([message(3)], crc=0))
+    assert times(found) == [0] and found.losses == ["1 damaged chunk dropped: 3.00 to 4.00 s"]
+    bare = [chunk([SCHEMA, channel(), message(0)], crc=0), chunk([message(3)], crc=0)]
+    found = read(tmp_path, *bare)
+    assert times(found) == [0, 3] and found.losses == []
+    assert found.notes == ["no checksums in the file: damage to its messages would not be noticed"]
+
+
+def test_the_checksum_of_an_unchunked_file(tmp_path) -> None:
+    path = tmp_path / "file.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, use_chunking=False, enable_data_crcs=True)
+        writer.start()
+        schema = writer.register_schema("pkg/msg/X", "ros2msg", b"float64 x")
+        number = writer.register_channel("/x", "cdr", schema)
+        for k in range(5):
+            writer.add_message(number, START + k * 10**9, b"12345678", START)
+        writer.finish()
+    found = read_container(path)
+    assert times(found) == [0, 1, 2, 3, 4] and (found.losses, found.notes) == ([], [])
+    path.write_bytes(path.read_bytes().replace(b"12345678", b"12345679", 1))
+    assert read_container(path).losses == [
+        "the checksum of all messages together does not hold: what is damaged is not known"
+    ]
+
+
+def test_the_order_of_records_does_not_matter(tmp_path) -> None:
+    found = read(tmp_path, chunk([message(1)]), chunk([channel(), message(2)]), chunk([SCHEMA]))
+    assert times(found) == [1, 2] and found.losses == []
+
+
+def test_one_topic_in_two_channels_is_one(tmp_path) -> None:
+    records = [SCHEMA, channel(1), channel(2), message(0, 1), message(1, 2)]
+    found = read(tmp_path, chunk(records))
+    assert len(found.channels) == 1 and times(found) == [0, 1]
+
+
+def test_what_cannot_be_joined_is_said(tmp_path) -> None:
+    found = read(tmp_path, chunk([SCHEMA, channel(), message(0), message(1, 7)]))
+    assert found.losses == ["1 message of channel 7 dropped: no record says what it is"]
+    found = read(tmp_path, chunk([channel(), message(0)]))
+    assert found.losses == ["1 message of /x dropped: its schema is missing"]
+    twice = [SCHEMA, channel(), message(0), channel(1, "/y"), message(1), message(2)]
+    found = read(tmp_path, chunk(twice))
+    assert times(found) == [0]
+    assert found.losses == ["channel 1 is /x and then another: 2 messages dropped since"]
+    found = read(tmp_path, chunk([channel(schema=0), message(0)]))
+    assert times(found) == [0] and found.channels[0].schema.name == "" and found.losses == []
+
+
+@pytest.mark.parametrize("summary", [True, False])
+def test_counts_of_the_file_are_compared(tmp_path, summary) -> None:
+    path = tmp_path / "file.mcap"
+    with path.open("wb") as file:
+        index = IndexType.ALL if summary else IndexType.NONE
+        writer = Writer(file, chunk_size=60, compression=CompressionType.NONE, index_types=index)
+        writer.start()
+        schema = writer.register_schema("pkg/msg/X", "ros2msg", b"float64 x")
+        number = writer.register_channel("/x", "cdr", schema)
+        for k in range(9):
+            writer.add_message(number, START + k * 10**9, b"1234567" + bytes([k]), START)
+        writer.finish()
+    assert (read_container(path).losses, read_container(path).notes) == ([], [])
+    content = path.read_bytes()
+    # A chunk that is gone without a trace, but for the counts and the place of the summary.
+    at = content.index(b"1234567\x05")
+    start = content.rindex(b"\x06", 0, at - 40)
+    (length,) = struct.unpack_from("<Q", content, start + 1)
+    path.write_bytes(content[:start] + content[start + 9 + length :])
+    losses = " ".join(read_container(path).losses)
+    assert "bytes are missing from the file" in losses and "of 9 of /x" in losses
+
+
+def test_a_damaged_end_costs_nothing(tmp_path) -> None:
+    data = [chunk([SCHEMA, channel(), message(0)])]
+    found = read(tmp_path, *data, end=[kinds.DataEnd(0), b"\x0b\xff\xff"])
+    assert times(found) == [0] and found.losses == []
+    assert "summary at the file's end is damaged" in found.notes[0]
+    found = read(tmp_path, *data, end=[])
+    assert times(found) == [0]
+    assert found.losses[0] == "the file has no end: cut off after 0.00 s"
+
+
+def test_records_of_applications_are_said(tmp_path) -> None:
+    found = read(
+        tmp_path, b"\x90" + struct.pack("<Q", 3) + b"abc", chunk([SCHEMA, channel(), message(0)])
+    )
+    assert times(found) == [0]
+    assert found.losses == ["1 record(s) of kinds that are not MCAP's own passed over"]
+
+
+def test_large_types_that_no_role_has_are_counted_only(tmp_path) -> None:
+    cloud = kinds.Schema(id=1, data=b"", encoding="ros2msg", name="sensor_msgs/msg/PointCloud2")
+    found = read(tmp_path, chunk([cloud, channel(), message(0)]))
+    assert found.channels[0].payloads == [b""] and times(found) == [0]
+
+
+BOMBS = """
+import resource, sys
+from pathlib import Path
+from pipeline.errors import UserError
+from pipeline.recording.input.container import read_container
+for path in sorted(Path(sys.argv[1]).glob("*.mcap")):
+    try:
+        found = read_container(path)
+        print(path.stem, sum(len(c.payloads) for c in found.channels), *found.losses)
+    except UserError as error:
+        print(path.stem, "refused", error)
+print("peak", 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def test_no_size_field_gets_more_than_two_gigabytes(tmp_path) -> None:
+    first = chunk([SCHEMA, channel(), message(0)])
+    large = packed([message(3, data=bytes(2**29 - 100))])
+    honest = chunk(large, compression="zstd")
+    tiny = struct.pack("<BQ", 0x99, 0) * 5_000_000
+    files = {
+        "a-claims-little": [first, replace(honest, uncompressed_size=1000)],
+        "b-claims-little": [first, chunk(large, compression="lz4", size=1000)],
+        "c-claims-much": [first, chunk([message(3)], compression="zstd", size=2**29)],
+        "d-too-large": [first, replace(honest, uncompressed_size=2**29 + 1)],
+        "e-many": [first, honest, honest, honest],
+        "f-tiny": [first, chunk(tiny, compression="zstd")],
+        "g-frame": [first, _frame_that_claims(2**50)],
+    }
+    for name, records in files.items():
+        data = packed([kinds.Header("", ""), *records, *END])
+        (tmp_path / f"{name}.mcap").write_bytes(MAGIC + data + MAGIC)
+    command = [sys.executable, "-c", BOMBS, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True)
+    *lines, peak = done.stdout.splitlines()
+    for line in lines:
+        name, _, rest = line.partition(" ")
+        if name in ("e-many", "f-tiny"):
+            assert rest.startswith("refused") and "holds more than 1 GiB of messages" in rest
+        else:
+            assert rest == "1 1 damaged chunk dropped: 3.00 to 4.00 s", name
+    assert len(lines) == len(files)
+    assert int(peak.split()[1]) < 2 * 2**30
+
+
+def _frame_that_claims(size: int) -> kinds.Chunk:
+    """A zstd frame whose header announces `size` bytes of content (RFC 8878, 3.1.1.1)."""
+    head = struct.pack("<IBQ", 0xFD2FB528, 0b11100000, size)  # one segment, 8 bytes of size
+    last_raw_block = struct.pack("<I", 1 | 3 << 3)[:3] + b"abc"
+    bomb = chunk(b"abc")
+    bomb.compression, bomb.data = "zstd", head + last_raw_block
+    bomb.uncompressed_size, bomb.uncompressed_crc = 2**29, 1
+    return bomb
+
+
+@ANY
+@given(st.binary(max_size=400))
+def test_any_bytes_behind_the_magic(tmp_path, data) -> None:
+    path = tmp_path / "any.mcap"
+    path.write_bytes(MAGIC + data)
+    try:
+        found = read_container(path)
+    except UserError as error:
+        assert "\n" not in str(error)
+    else:
+        assert found.losses or data.endswith(MAGIC)
+
+
+records = st.one_of(
+    st.builds(chunk, st.lists(st.builds(message, st.integers(0, 9)), max_size=3)),
+    st.builds(message, st.integers(0, 9), st.integers(0, 3), st.binary(max_size=30)),
+    st.builds(channel, st.integers(0, 3), st.sampled_from(["/x", "/y"]), st.integers(0, 2)),
+    st.just(SCHEMA),
+    st.builds(kinds.DataEnd, st.integers(0, 2)),
+    st.builds(kinds.Footer, st.integers(0, 2**64 - 1), st.just(0), st.integers(0, 1)),
+    st.builds(
+        lambda opcode, length, content: struct.pack("<BQ", opcode, length) + content,
+        st.integers(0, 255),
+        st.one_of(st.integers(0, 60), st.integers(0, 2**64 - 1)),
+        st.binary(max_size=60),
+    ),
+)
+
+
+@ANY
+@given(st.lists(records, max_size=12))
+def test_any_stream_of_records(tmp_path, stream) -> None:
+    try:
+        found = read(tmp_path, *stream)
+    except UserError as error:
+        assert "\n" not in str(error)
+        return
+    for one in found.channels:
+        assert len(one.log_times) == len(one.payloads) > 0
+
+
+@ANY
+@given(
+    st.permutations([SCHEMA, channel(1), channel(2, "/y"), *map(message, range(4)), message(4, 2)])
+)
+def test_any_order_of_intact_records(tmp_path, stream) -> None:
+    found = read(tmp_path, *(chunk([one]) for one in stream))
+    assert found.losses == []
+    assert sorted(times(found)) == [0, 1, 2, 3] and times(found, "/y") == [4]

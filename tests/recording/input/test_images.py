@@ -1,0 +1,256 @@
+"""Pictures of every supported encoding, written by formulas, OpenCV, Pillow and RVL's own coder."""
+
+from __future__ import annotations
+
+import io
+import struct
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from pipeline.recording.input.images import (
+    Undecodable,
+    Unsupported,
+    color,
+    depth,
+    is_depth,
+    rvl,
+    size_of,
+)
+from pipeline.recording.input.readings import Picture
+
+RANDOM = np.random.default_rng(0)
+BGR = RANDOM.integers(0, 256, (6, 5, 3)).astype(np.uint8)
+DEPTH = RANDOM.uniform(0.3, 2.5, (6, 5)).astype(np.float32)
+MILLIMETRES = np.round(DEPTH * 1000).astype(np.uint16)
+QUICK = settings(max_examples=60, deadline=None, derandomize=True)
+
+
+def raw(encoding: str, pixels: np.ndarray, padding: int = 0, swapped: bool = False) -> Picture:
+    kind = pixels.dtype.newbyteorder(">" if swapped else "<")
+    rows = [row.astype(kind).tobytes() + b"\xaa" * padding for row in pixels]
+    data = np.frombuffer(b"".join(rows), np.uint8)
+    return Picture(encoding, "", data, *pixels.shape[:2], len(rows[0]), swapped)
+
+
+def packed(format: str, data: bytes) -> Picture:
+    return Picture("", format, np.frombuffer(data, np.uint8))
+
+
+def png(image: np.ndarray) -> bytes:
+    return cv2.imencode(".png", image)[1].tobytes()
+
+
+@st.composite
+def arrays(draw, kind, channels: int = 1):
+    height, width = draw(st.integers(1, 9)), draw(st.integers(1, 9))
+    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    shape = (height, width, channels) if channels > 1 else (height, width)
+    if np.issubdtype(kind, np.floating):
+        return random.uniform(0.1, 5, shape).astype(kind)
+    return random.integers(0, np.iinfo(kind).max + 1, shape).astype(kind)
+
+
+@QUICK
+@given(arrays(np.uint8, 3), st.integers(0, 7))
+def test_raw_colors(bgr, padding) -> None:
+    alpha = np.full_like(bgr[..., :1], 7)
+    np.testing.assert_array_equal(color(raw("bgr8", bgr, padding)), bgr)
+    np.testing.assert_array_equal(color(raw("8UC3", bgr, padding)), bgr)
+    np.testing.assert_array_equal(color(raw("rgb8", bgr[..., ::-1], padding)), bgr)
+    bgra = np.concatenate([bgr, alpha], axis=-1)
+    np.testing.assert_array_equal(color(raw("bgra8", bgra, padding)), bgr)
+    rgba = np.concatenate([bgr[..., ::-1], alpha], axis=-1)
+    np.testing.assert_array_equal(color(raw("rgba8", rgba, padding)), bgr)
+    gray = np.repeat(bgr[..., :1], 3, axis=2)
+    np.testing.assert_array_equal(color(raw("mono8", bgr[..., 0], padding)), gray)
+
+
+@QUICK
+@given(arrays(np.uint16), st.integers(0, 7), st.booleans())
+def test_raw_sixteen_bits(pixels, padding, swapped) -> None:
+    metres = (pixels / 1000).astype(np.float32)
+    np.testing.assert_allclose(depth(raw("16UC1", pixels, padding, swapped)), metres, rtol=1e-6)
+    gray = np.repeat((pixels // 256).astype(np.uint8)[..., None], 3, axis=2)
+    np.testing.assert_array_equal(color(raw("mono16", pixels, padding, swapped)), gray)
+
+
+@QUICK
+@given(arrays(np.float32), st.integers(0, 7), st.booleans())
+def test_raw_metres(pixels, padding, swapped) -> None:
+    np.testing.assert_array_equal(depth(raw("32FC1", pixels, padding, swapped)), pixels)
+
+
+def test_unknown_depth_is_zero() -> None:
+    unknown = DEPTH.copy()
+    unknown[0] = [np.nan, np.inf, -np.inf, -1, 0]
+    found = depth(raw("32FC1", unknown))
+    assert not found[0].any()
+    np.testing.assert_array_equal(found[1:], DEPTH[1:])
+
+
+def test_packed_colors_of_another_library() -> None:
+    rgb = Image.fromarray(np.ascontiguousarray(BGR[..., ::-1]))
+    for format in ("bgr8; png compressed bgr8", "png", "unnamed"):
+        with io.BytesIO() as file:
+            rgb.save(file, "PNG")
+            np.testing.assert_array_equal(color(packed(format, file.getvalue())), BGR)
+    smooth = np.full((32, 48, 3), (200, 120, 40), np.uint8)
+    with io.BytesIO() as file:
+        Image.fromarray(smooth).save(file, "JPEG", quality=95)
+        picture = packed("rgb8; jpeg compressed bgr8", file.getvalue())
+    np.testing.assert_allclose(color(picture), smooth[..., ::-1], atol=3)
+    assert size_of(picture) == (48, 32)
+
+
+def test_packed_depths() -> None:
+    metres = (MILLIMETRES / 1000).astype(np.float32)
+    for picture in (
+        packed("16UC1; compressedDepth png", bytes(12) + png(MILLIMETRES)),
+        packed("16UC1; compressedDepth", bytes(12) + png(MILLIMETRES)),
+        packed("16UC1; png compressed", png(MILLIMETRES)),
+        packed("png", png(MILLIMETRES)),
+    ):
+        assert is_depth(picture) and size_of(picture) == (5, 6)
+        np.testing.assert_allclose(depth(picture), metres, rtol=1e-6)
+
+
+def quantised(metres: np.ndarray) -> tuple[bytes, np.ndarray]:
+    """Header and inverse depth with depth_max 10 m, depth_quantization 100 (image_transport)."""
+    a = 100 * 101.0
+    b = 1 - a / 10
+    return struct.pack("<iff", 0, a, b), np.where(metres > 0, np.round(a / metres + b), 0)
+
+
+@pytest.mark.parametrize("coder", ["png", "rvl"])
+def test_quantised_depth_as_image_transport_writes_it(coder) -> None:
+    metres = DEPTH.copy()
+    metres[2, 3] = 0
+    header, inverse = quantised(np.where(metres > 0, metres, np.inf))
+    inverse[2, 3] = 0
+    inverse = inverse.astype(np.uint16)
+    body = png(inverse) if coder == "png" else run_length(inverse)
+    found = depth(packed(f"32FC1; compressedDepth {coder}", header + body))
+    np.testing.assert_allclose(found, metres, rtol=2e-4)
+
+
+def run_length(pixels: np.ndarray) -> bytes:
+    """Columns, rows, and what the coder of the package `rvl` makes of them."""
+    coder = pytest.importorskip("rvl")
+    body = coder.compress(np.ascontiguousarray(pixels).tobytes())[4:]  # its own header is the size
+    return struct.pack("<II", pixels.shape[1], pixels.shape[0]) + bytes(body)
+
+
+@QUICK
+@given(arrays(np.uint16), st.integers(0, 3), st.integers(0, 2**32 - 1))
+def test_rvl_of_another_coder(pixels, holes, seed) -> None:
+    """Noise, large steps, and runs of unknown depth."""
+    mask = np.random.default_rng(seed).random(pixels.shape) * 3 < holes
+    pixels = np.where(mask, 0, pixels).astype(np.uint16)
+    data = np.frombuffer(run_length(pixels), np.uint8)
+    np.testing.assert_array_equal(rvl(data), pixels)
+
+
+def test_rvl_of_a_whole_frame() -> None:
+    v, u = np.mgrid[:480, :640]
+    frame = (800 + 0.5 * u + 100 * np.sin(v / 30)).astype(np.uint16)
+    frame[np.hypot(u - 300, v - 200) < 80] = 0
+    picture = packed("16UC1; compressedDepth rvl", bytes(12) + run_length(frame))
+    assert is_depth(picture) and size_of(picture) == (640, 480)
+    np.testing.assert_allclose(depth(picture), frame / 1000, rtol=1e-6)
+
+
+@QUICK
+@given(st.binary(max_size=200))
+@example(bytes(8))
+@example(struct.pack("<II", 2**31, 2**31) + bytes(64))
+@example(struct.pack("<II", 64, 64) + b"\xff" * 4000)
+@example(struct.pack("<II", 4, 4) + bytes(400))
+@example(struct.pack("<II", 1, 1) + b"\xff\xff\xff\x0f" * 2)
+def test_damaged_rvl_is_refused(data) -> None:
+    try:
+        found = rvl(np.frombuffer(data, np.uint8))
+    except Undecodable:
+        return
+    assert found.dtype == np.uint16 and found.shape[::-1] == struct.unpack_from("<II", data)
+
+
+@QUICK
+@given(st.integers(0, 2**32 - 1))
+def test_mutated_pictures_are_pictures_or_undecodable(seed) -> None:
+    random = np.random.default_rng(seed)
+    frame = np.full((24, 32), 900, np.uint16)
+    jpeg = cv2.imencode(".jpg", np.full((24, 32, 3), 90, np.uint8))[1].tobytes()
+    for read, format, content in (
+        (depth, "16UC1; compressedDepth rvl", bytes(12) + run_length(frame)),
+        (depth, "16UC1; compressedDepth png", bytes(12) + png(frame)),
+        (depth, "32FC1; compressedDepth png", bytes(12) + png(frame)),
+        (color, "jpeg", jpeg),
+    ):
+        data = np.frombuffer(content, np.uint8).copy()
+        data[random.integers(len(data), size=2)] = random.integers(256, size=2)
+        data = data[: random.integers(len(data) + 1)] if seed % 2 else data
+        try:
+            found = read(Picture("", format, data))
+        except Undecodable as error:
+            assert "\n" not in str(error)
+        else:
+            assert found.ndim in (2, 3)
+
+
+def test_what_a_whole_topic_cannot_be_is_told_from_damage() -> None:
+    for read, picture in (
+        (color, raw("bayer_rggb8", BGR[..., 0])),
+        (color, packed("16UC1; compressedDepth png", bytes(12) + png(MILLIMETRES))),
+        (depth, raw("rgb8", BGR)),
+        (depth, packed("32FC1; png compressed", png(MILLIMETRES))),
+        (depth, packed("16UC1; compressedDepth png", bytes(12) + png(BGR[..., 0]))),
+    ):
+        with pytest.raises(Unsupported):
+            read(picture)
+    jpeg = cv2.imencode(".jpg", np.full((64, 64, 3), 90, np.uint8))[1].tobytes()
+    tiff = cv2.imencode(".tiff", BGR)[1].tobytes()
+    whole = raw("rgb8", BGR)
+    for read, picture in (
+        (color, packed("jpeg", b"")),
+        (color, packed("jpeg", jpeg[: len(jpeg) // 2])),
+        (color, packed("tiff", tiff)),
+        (depth, packed("16UC1; compressedDepth png", b"short")),
+        (color, Picture("rgb8", "", whole.data[:-1], 6, 5, 15)),
+        (color, Picture("rgb8", "", whole.data, 6, 5, 14)),
+        (color, Picture("rgb8", "", whole.data, 2**31, 2**31, 2**33)),
+        (color, Picture("rgb8", "", whole.data, 0, 5, 15)),
+    ):
+        with pytest.raises(Undecodable) as caught:
+            read(picture)
+        assert not isinstance(caught.value, Unsupported)
+
+
+def test_an_image_bomb_is_not_unpacked() -> None:
+    """A JPEG header of 65500 x 65500 pixels, which would be 12 GB."""
+    jpeg = bytearray(cv2.imencode(".jpg", np.zeros((64, 64, 3), np.uint8))[1].tobytes())
+    place = jpeg.index(b"\xff\xc0") + 5
+    jpeg[place : place + 4] = struct.pack(">HH", 65500, 65500)
+    with pytest.raises(Undecodable):
+        color(packed("jpeg", bytes(jpeg)))
+
+
+def test_a_png_chunk_that_says_to_be_longer_than_the_file_is_not_believed() -> None:
+    """OpenCV would take 2 GB for it."""
+    data = bytearray(png(MILLIMETRES))
+    data[data.index(b"IDAT") - 4] = 0x7F
+    for format, content in (("png", data), ("16UC1; compressedDepth png", bytes(12) + data)):
+        with pytest.raises(Undecodable, match="damaged PNG"):
+            depth(packed(format, bytes(content)))
+
+
+def test_depth_is_told_from_color() -> None:
+    assert is_depth(raw("16UC1", MILLIMETRES)) and is_depth(raw("32FC1", DEPTH))
+    assert not is_depth(raw("rgb8", BGR)) and not is_depth(raw("mono16", MILLIMETRES))
+    assert is_depth(packed("16UC1; compressedDepth", b""))
+    assert not is_depth(packed("rgb8; jpeg compressed bgr8", b""))
+    assert not is_depth(packed("png", png(BGR[..., 0])))

@@ -1,0 +1,248 @@
+"""The hand's pose, and the force, from whatever a lab records of them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from mcap.records import Schema
+from mcap_ros2._dynamic import serialize_dynamic
+from scipy.spatial.transform import Rotation
+
+from pipeline.errors import UserError
+from pipeline.recording.input import kinematics
+from pipeline.recording.input.container import Channel
+from tests.recording.input.messages import (
+    COUNT,
+    FORCE,
+    PLACES,
+    POSES,
+    TIMES,
+    TURNS,
+    assert_poses,
+    channel,
+    chosen,
+    head,
+    joints,
+    played,
+    pose,
+    pose_fields,
+    twist,
+    wrench,
+)
+
+
+def test_a_pose_with_covariance(params) -> None:
+    messages = [
+        {**head(k), "pose": {"pose": pose_fields(POSES[k]), "covariance": []}} for k in range(COUNT)
+    ]
+    kind = "geometry_msgs/msg/PoseWithCovarianceStamped"
+    choice = chosen(params, wrench("/ft"), channel("/ee", kind, messages))["pose"]
+    frame, found = played(choice)
+    assert (
+        frame == "base" and choice.why == "the only PoseWithCovarianceStamped for end-effector pose"
+    )
+    assert_poses(found)
+
+
+ROBOT_STATE = """std_msgs/Header header
+sensor_msgs/JointState measured_joint_state
+geometry_msgs/WrenchStamped o_f_ext_hat_k
+geometry_msgs/PoseStamped o_t_ee
+uint8 robot_mode
+===
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+===
+MSG: sensor_msgs/JointState
+std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+===
+MSG: geometry_msgs/WrenchStamped
+std_msgs/Header header
+geometry_msgs/Wrench wrench
+===
+MSG: geometry_msgs/Wrench
+geometry_msgs/Vector3 force
+geometry_msgs/Vector3 torque
+===
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+===
+MSG: geometry_msgs/PoseStamped
+std_msgs/Header header
+geometry_msgs/Pose pose
+===
+MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+===
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+===
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+===
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+""".replace("===", "=" * 80)
+
+
+def robot_state(topic: str = "/franka_robot_state_broadcaster/robot_state") -> Channel:
+    """FrankaRobotState in CDR by mcap-ros2-support; some of its fields."""
+    name = "franka_msgs/msg/FrankaRobotState"
+    encode = serialize_dynamic(name, ROBOT_STATE)[name]
+    payloads = []
+    for k in range(COUNT):
+        message = {
+            **head(k, "link0"),
+            "measured_joint_state": {**head(k), "name": [], "position": []},
+            "o_f_ext_hat_k": {**head(k, "link0"), "wrench": {"force": FORCE, "torque": FORCE}},
+            "o_t_ee": {**head(0, "link0"), "pose": pose_fields(POSES[k])},
+            "robot_mode": 2,
+        }
+        message["measured_joint_state"].update(velocity=[], effort=[])
+        payloads.append(encode(_named(message)))
+    times = [5_000_000_000 + round(1e9 * t) for t in TIMES]
+    return Channel(topic, Schema(1, ROBOT_STATE.encode(), "ros2msg", name), "cdr", times, payloads)
+
+
+def _named(value: object) -> object:
+    if not isinstance(value, dict):
+        return value
+    return SimpleNamespace(**{name: _named(one) for name, one in value.items()})
+
+
+def test_a_franka_robot_state_is_pose_and_for_lack_of_a_sensor_force(params) -> None:
+    roles = chosen(params, robot_state())
+    frame, found = played(roles["pose"])
+    assert frame == "link0"
+    assert_poses(found)
+    frame, found = played(roles["wrench"])
+    assert frame == "link0"
+    np.testing.assert_array_equal(found, [[1, 2, 3]] * COUNT)
+    assert roles["wrench"].why == "the only FrankaRobotState for force"
+
+    with_sensor = chosen(params, robot_state(), wrench("/external_wrench"))
+    assert with_sensor["wrench"].channel.topic == "/external_wrench"
+    name = "/franka_robot_state_broadcaster/robot_state"
+    named = chosen(params, robot_state(), wrench("/ft"), topics={"wrench": name})
+    assert named["wrench"].channel.topic == name
+    assert named["wrench"].why == "setup.topics.wrench"
+
+
+@pytest.mark.parametrize("names", [("O_T_EE", "O_F_ext_hat_K"), ("o_t_ee", "o_f_ext_hat_k")])
+def test_a_franka_state_has_column_major_matrices(params, names) -> None:
+    messages = []
+    for k in range(COUNT):
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = TURNS[k].as_matrix(), PLACES[k]
+        messages.append(
+            {**head(k, "link0"), names[0]: list(matrix.T.ravel()), names[1]: [1, 2, 3] * 2}
+        )
+    roles = chosen(params, channel("/state", "franka_msgs/FrankaState", messages))
+    assert_poses(played(roles["pose"])[1])
+    assert played(roles["wrench"])[0] == "link0"
+    np.testing.assert_array_equal(played(roles["wrench"])[1], [[1, 2, 3]] * COUNT)
+
+
+GANTRY = [("x", "prismatic", "1 0 0"), ("y", "prismatic", "0 1 0"), ("z", "prismatic", "0 0 1")]
+GANTRY += [(f"r{name}", "revolute", axis) for name, _, axis in reversed(GANTRY)]
+
+
+GANTRY_URDF = {"urdf": "gantry.urdf"}
+
+
+@pytest.fixture
+def gantry(tmp_path, monkeypatch):
+    """Three slides, then turns about z, y and x: its positions are the pose."""
+    links = ["bench", "a", "b", "c", "d", "e", "my_tcp"]
+    joints = "".join(
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<axis xyz="{axis}"/></joint>'
+        for (name, kind, axis), parent, child in zip(GANTRY, links[:-1], links[1:], strict=True)
+    )
+    (tmp_path / "gantry.urdf").write_text(f'<robot name="gantry">{joints}</robot>')
+    monkeypatch.setattr(kinematics, "FOLDER", tmp_path)
+    return np.hstack([PLACES, TURNS.as_euler("ZYX")])
+
+
+def test_joint_states_through_a_urdf(params, gantry) -> None:
+    """In another order, among others, and beside the gripper's."""
+    names = ["finger_joint1", *(name for name, *_ in reversed(GANTRY))]
+    positions = np.hstack([np.full((COUNT, 1), 0.02), gantry[:, ::-1]])
+    arm = joints("/joint_states", names, positions)
+    gripper = joints("/gripper/joint_states", ["finger_joint1"], gantry[:, :1])
+    roles = chosen(params, wrench("/ft"), gripper, arm, urdf="gantry.urdf")
+    frame, found = played(roles["pose"])
+    assert frame == "bench" and roles["pose"].channel.topic == "/joint_states"
+    assert_poses(found)
+    assert roles["gripper"].channel.topic == "/gripper/joint_states"
+
+    alone = chosen(params, wrench("/ft"), arm, urdf="gantry.urdf")
+    np.testing.assert_array_equal(played(alone["gripper"])[1], [[0.02]] * COUNT)
+    measured = chosen(params, wrench("/ft"), arm, pose(), urdf="gantry.urdf")
+    assert measured["pose"].channel.topic == "/arm/current_pose"
+
+
+def test_arm_and_gripper_that_share_a_topic(params, gantry) -> None:
+    """Each is read from its own messages; the other's raise, for the caller to leave out."""
+    arm = joints("/joint_states", [name for name, *_ in GANTRY], gantry)
+    fingers = joints("/joint_states", ["left_finger", "right_finger"], gantry[:, :2])
+    both = [one for pair in zip(fingers.payloads, arm.payloads, strict=True) for one in pair]
+    shared = Channel("/joint_states", arm.schema, "json", sorted(arm.log_times * 2), both)
+    roles = chosen(params, wrench("/ft"), shared, urdf="gantry.urdf")
+    assert len(roles["pose"].read(both[1]).value) == 6
+    assert roles["gripper"].read(both[0]).value == (gantry[0, 0] + gantry[0, 1],)
+    for role, payload in (("pose", both[0]), ("gripper", both[1])):
+        with pytest.raises(ValueError, match="is missing"):
+            roles[role].read(payload)
+
+
+def test_a_twist_alone_from_a_start_pose(params) -> None:
+    start = (*PLACES[0], 0, 0, 0, 1)
+    roles = chosen(params, wrench("/ft"), twist("/ee_twist"), start_pose=start)
+    frame, found = played(roles["pose"])
+    assert frame == "base"
+    np.testing.assert_allclose(found[:, :3], PLACES, atol=1e-5)
+    turned = Rotation.from_rotvec(np.outer(TIMES, [1, 2, 3]))
+    assert (turned.inv() * Rotation.from_quat(found[:, 3:])).magnitude().max() < 1e-9
+    assert roles["twist"].channel.topic == "/ee_twist"
+
+
+def test_a_twist_beside_a_pose_is_a_role_of_its_own(params) -> None:
+    roles = chosen(params, wrench("/ft"), pose(), twist("/ee_twist"))
+    assert roles["pose"].channel.topic == "/arm/current_pose"
+    np.testing.assert_array_equal(played(roles["twist"])[1][:, 3:], [[1, 2, 3]] * COUNT)
+    assert "twist" not in chosen(params, wrench("/ft"), pose(), twist("/cmd/twist"))
+
+
+@pytest.mark.parametrize(
+    ("channel", "setup", "words"),
+    [
+        (joints("/js", ["j1", "j2"], PLACES[:, :2]), {}, "joints j1, j2: put the robot's URDF"),
+        (joints("/js", ["x", "y"], PLACES[:, :2]), GANTRY_URDF, "/js lacks joint z, rz, ry, rx of"),
+        (joints("/js", ["finger"], PLACES[:, :1]), {}, "the file has .*/js .JointState"),
+        (joints("/js", ["x"], PLACES[:, :1]), {"urdf": "no.urdf"}, "no.urdf: cannot be read"),
+        (twist("/tw"), {}, "/tw has a twist: give the hand's pose .* in setup.start_pose"),
+        (twist("/tw", "hand_tcp"), {"start_pose": (0,) * 6 + (1,)}, "along the axes of the hand"),
+    ],
+)
+def test_a_missing_pose_says_what_would_do(params, gantry, channel, setup, words) -> None:
+    with pytest.raises(UserError, match=words) as caught:
+        chosen(params, wrench("/ft"), channel, **setup)
+    text = str(caught.value)
+    assert text.startswith("f.mcap: no end-effector pose") and "\n" not in text

@@ -1,0 +1,192 @@
+"""Choosing among topics, and saying what lacks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from mcap.records import Schema
+
+from pipeline.errors import UserError
+from pipeline.recording.input.container import Channel, Container
+from pipeline.recording.input.topics import camera_of
+from tests.recording.input.messages import (
+    CAMERA,
+    PLACES,
+    chosen,
+    info,
+    joints,
+    picture,
+    pose,
+    wrench,
+)
+
+
+def test_the_measured_one_of_several(params) -> None:
+    roles = chosen(
+        params,
+        wrench("/command/wrench"),
+        wrench("/arm/external_wrench"),
+        wrench("/ft_sensor/wrench"),
+        wrench("/battery/ft_force", rate=1.0, count=190),
+        pose("/arm/target_pose"),
+        pose("/camera/ee_pose"),
+        pose("/arm/ee_pose"),
+        pose("/object"),
+    )
+    assert roles["wrench"].channel.topic == "/ft_sensor/wrench"
+    assert roles["wrench"].why == (
+        "of 4 topics: named ft wrench, 1000 Hz; not /arm/external_wrench, /battery/ft_force"
+    )
+    assert roles["pose"].channel.topic == "/arm/ee_pose"
+    assert roles["color"].why == "the only Image for colour images"
+    assert list(roles) == ["wrench", "pose", "color", "depth", "color_info", "depth_info"]
+
+
+def test_sixteen_grey_bits_are_depth_where_the_name_says_so(params) -> None:
+    camera = [*CAMERA[:2], picture("/cam/depth/image", "mono16", "depth"), CAMERA[3]]
+    assert chosen(params, wrench("/ft"), pose(), camera=camera)["depth"]
+    camera[2] = picture("/cam/infra", "mono16", "depth")
+    with pytest.raises(UserError, match="no depth images"):
+        chosen(params, wrench("/ft"), pose(), camera=camera)
+
+
+def test_the_topics_of_a_realsense(params) -> None:
+    """Registered depth before the camera's own, colour before infrared."""
+    frames = {"color": "color", "aligned_depth_to_color": "color", "depth": "d", "infra1": "d"}
+    encodings = {"color": "rgb8", "infra1": "mono16"}
+    camera = [
+        one
+        for name, frame in frames.items()
+        for one in (
+            picture(f"/cam/{name}/image_raw", encodings.get(name, "16UC1"), frame),
+            info(f"/cam/{name}/camera_info", frame),
+        )
+    ]
+    roles = chosen(params, wrench("/ft300/wrench"), pose(), camera=camera)
+    assert {role: choice.channel.topic for role, choice in roles.items()} == {
+        "wrench": "/ft300/wrench",
+        "pose": "/arm/current_pose",
+        "color": "/cam/color/image_raw",
+        "depth": "/cam/aligned_depth_to_color/image_raw",
+        "color_info": "/cam/color/camera_info",
+        "depth_info": "/cam/aligned_depth_to_color/camera_info",
+    }
+
+
+# Camera infos
+
+
+def cameras(params, *channels: Channel, **topics: str):
+    file = Container(Path("f.mcap"), list(channels), [])
+    roles = chosen(params, wrench("/ft"), pose(), camera=channels, topics=topics)
+    focals = [camera_of(file, roles, role).matrix[0, 0] for role in ("color", "depth")]
+    return roles, focals
+
+
+def test_each_camera_has_its_own_info(params) -> None:
+    color, color_info, depth, depth_info = CAMERA
+    assert cameras(params, *CAMERA)[1] == [50, 40]
+    assert cameras(params, *reversed(CAMERA))[1] == [50, 40]
+    away = info("/calibration/depth", "depth", 30.0)  # elsewhere, but of that frame and size
+    roles, focals = cameras(params, color, color_info, depth, away)
+    assert focals == [50, 30]
+    assert roles["depth_info"].why == "of the frame and size of /cam/depth/image"
+    assert roles["color_info"].why == "beside /cam/color/image"
+    flat = [picture("/cam/color", "rgb8", "color"), picture("/cam/depth", "16UC1", "depth")]
+    flat += [info("/cam/color_info", "color"), info("/cam/depth_info", "depth", 40.0)]
+    assert cameras(params, *flat)[1] == [50, 40]
+
+
+def test_a_damaged_first_message_does_not_decide(params) -> None:
+    color, color_info, depth, depth_info = CAMERA
+    bad_info, bad_depth = (replace(one, payloads=list(one.payloads)) for one in (depth_info, depth))
+    bad_info.payloads = [depth_info.payloads[0].replace(b"40.0", b"-4.0"), *depth_info.payloads * 2]
+    bad_depth.payloads[0] = depth.payloads[0].replace(b"16UC1", b"16QC1")
+    bad_info.log_times = [0] * len(bad_info.payloads)
+    assert cameras(params, color, color_info, bad_depth, bad_info)[1] == [50, 40]
+
+
+def test_registered_depth_may_use_the_colour_cameras(params) -> None:
+    color, color_info, *_ = CAMERA
+    depth = picture("/cam/aligned/image", "16UC1", "color")
+    roles, focals = cameras(params, color, color_info, depth)
+    assert focals == [50, 50]
+    assert roles["depth_info"].why == "of the frame and size of /cam/aligned/image"
+
+
+@pytest.mark.parametrize(
+    ("depth", "about"),
+    [
+        (picture("/cam/depth/image", "16UC1", "depth"), "info"),
+        (picture("/cam/depth/image", "16UC1", "color", 8, 4), "8 x 4"),
+    ],
+)
+def test_unregistered_depth_must_not_use_the_colour_cameras(params, depth, about) -> None:
+    color, color_info, *_ = CAMERA
+    with pytest.raises(UserError, match=f"no camera info of the depth.*{about}"):
+        cameras(params, color, color_info, depth)
+    one_folder = [picture("/cam/color", "rgb8", "color"), picture("/cam/depth", "16UC1", "depth")]
+    with pytest.raises(UserError, match="no camera info of the depth"):
+        cameras(params, *one_folder, info("/cam/camera_info", "color"))
+    for nameless in (
+        [color, info("/cam/color/camera_info", ""), depth],
+        [color, color_info, picture("/cam/depth/image", "16UC1", "")],
+    ):
+        with pytest.raises(UserError, match="no camera info of the depth"):
+            cameras(params, *nameless)
+    roles, _ = cameras(params, *CAMERA[:3], depth_info="/cam/color/camera_info")
+    assert roles["depth_info"].why == "setup.topics.depth_info"  # who says so is believed
+
+
+# What lacks
+
+
+def test_a_missing_force_says_what_there_is(params) -> None:
+    with pytest.raises(UserError, match="no force.*the file has /arm/current_pose .PoseStamped"):
+        chosen(params, pose())
+
+
+def test_pictures_that_cannot_be_decoded_are_refused_beforehand(params) -> None:
+    bayer = picture("/cam/color/bayer", "bayer_rggb8", "color")
+    with pytest.raises(UserError, match="no colour images.*/cam/color/bayer.*'bayer_rggb8'"):
+        chosen(params, wrench("/ft"), pose(), camera=[bayer, *CAMERA[1:]])
+    assert chosen(params, wrench("/ft"), pose(), camera=[bayer, *CAMERA])
+    with pytest.raises(UserError, match="setup.topics.color: /cam/color/bayer: .*'bayer_rggb8'"):
+        topics = {"color": "/cam/color/bayer"}
+        chosen(params, wrench("/ft"), pose(), camera=[bayer, *CAMERA], topics=topics)
+
+
+@pytest.mark.parametrize(
+    ("topics", "words"),
+    [
+        ({"wrench": "/none"}, "setup.topics.wrench: no topic /none, the file has /arm/current"),
+        ({"pose": "/ft"}, "setup.topics.pose: /ft is a geometry_msgs/WrenchStamped, not PoseSt"),
+        ({"pose": "/js"}, "setup.topics.pose: /js has the joints j1, j2, j3: put the robot's URDF"),
+        ({"depth": "/cam/color/image"}, "setup.topics.depth: /cam/color/image: .*'rgb8'"),
+        ({"color_info": "/ft"}, "not CameraInfo or CameraCalibration"),
+    ],
+)
+def test_named_topics_that_will_not_do(params, topics, words) -> None:
+    arm = joints("/js", ["j1", "j2", "j3"], PLACES)
+    with pytest.raises(UserError, match=words) as caught:
+        chosen(params, wrench("/ft"), pose(), arm, topics=topics)
+    assert "\n" not in str(caught.value)
+
+
+def test_json_without_a_schema_is_called_so(params) -> None:
+    bare = Channel("/ft", Schema(0, b"", "", ""), "json", [1], [b"{}"])
+    with pytest.raises(UserError, match="the file has .*/ft .json topic without a schema"):
+        chosen(params, bare, pose())
+    with pytest.raises(UserError, match="/ft is a json topic without a schema, not WrenchSt"):
+        chosen(params, bare, pose(), topics={"wrench": "/ft"})
+
+
+def test_a_topic_in_an_unknown_encoding_is_named_if_nothing_else_will_do(params) -> None:
+    other = Channel(
+        "/ft", Schema(1, b"", "flatbuffer", "lab.WrenchStamped"), "flatbuffer", [1], [b""]
+    )
+    with pytest.raises(UserError, match="no force.*topic /ft: schema 'flatbuffer'"):
+        chosen(params, other, pose())
+    assert chosen(params, other, wrench("/ft2"), pose())["wrench"].channel.topic == "/ft2"

@@ -1,0 +1,106 @@
+"""The band is found in every look, and nothing else is taken for it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.params import load
+from pipeline.recording.cloud import clouds_of
+from pipeline.recording.masks.colors import Colors
+from pipeline.recording.masks.hand import Shape
+from pipeline.recording.masks.ridge import RidgeMask
+from tests.recording import looks
+from tests.recording.looks import LOOKS
+from tests.recording.scores import PHASES, figures
+
+FRAMES = 24
+# Depth alone decides in looks that differ in colour alone: these differ in what matters.
+QUICK = (
+    "orange on grey, white arm",
+    "near white beside a white arm",
+    "dark in shadow, dark floor and arm",
+    "the wall's and the fork's colour",
+    "4 mm thin, white, white arm",
+    "orange, colour camera apart",
+)
+
+
+@pytest.fixture(scope="module")
+def cloud():
+    return load("params.yaml").cloud
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_clouds_lie_on_the_band_and_cover_it(name, cloud) -> None:
+    view, truths = looks.view_of(LOOKS[name], looks.times(FRAMES))
+    found = figures(view, truths, clouds_of(view, cloud))
+    assert set(found) == {*PHASES, "all"}
+    assert found["all"]["median_off_m"] <= 0.003
+    assert found["all"]["covered"] >= 0.9
+    assert found["all"]["further_than_1cm"] <= 0.01
+    for phase in PHASES:
+        assert found[phase]["median_off_m"] <= 0.003
+        assert found[phase]["covered"] >= 0.8
+        assert found[phase]["further_than_1cm"] <= 0.05
+
+
+def test_a_hand_that_is_not_seen_alone_is_left_out_with_more_room(cloud) -> None:
+    """It turns, so what is learned of it in one picture does not fit the next."""
+    view, truths = looks.view_of(LOOKS["near white beside a white arm"], looks.times(FRAMES))
+    view.scene.signals.facts["turn"] = 0.5
+    found = figures(view, truths, clouds_of(view, cloud))
+    assert found["all"]["median_off_m"] <= 0.003
+    assert found["all"]["covered"] >= 0.85
+    assert found["all"]["further_than_1cm"] <= 0.01
+
+
+def test_shadows_are_not_the_band() -> None:
+    """The dark line of the band's shadow on the floor, and the floor beside the band."""
+    view, truths = looks.view_of(LOOKS["dark in shadow, dark floor and arm"], looks.times(FRAMES))
+    mask = RidgeMask(view)
+    for number, frame in view.frames(range(FRAMES - 4, FRAMES)):
+        truth = truths[number]
+        still = truth.part[view.window] < looks.WALL
+        still &= np.abs(frame.depth - truth.depth[view.window]) < 0.005  # no flying pixel
+        assert still.sum() > 10_000
+        assert not (mask.mask(frame) & still).any()
+
+
+def test_colors_count_only_where_they_tell_apart() -> None:
+    random = np.random.default_rng(0)
+
+    def seen(color, shades):
+        bright = random.uniform(*shades, (2000, 1))
+        return np.clip(bright * color + random.normal(0, 2, (2000, 3)), 0, 255).astype(np.uint8)
+
+    orange, white = (30, 120, 235), (230, 230, 230)
+    colors = Colors.learn(seen(orange, (0.4, 1)), seen(white, (0.4, 1)))
+    assert colors.against(seen(white, (0.5, 1))).mean() > 0.9
+    assert colors.against(seen(orange, (0.2, 1))).mean() < 0.02  # nor in shadow
+    assert not colors.against(np.full((1, 3), 4, np.uint8)).any()  # the dark tells nothing
+    assert Colors.learn(seen(white, (0.9, 1)), seen(white, (0.3, 0.6))) is None  # lit differently
+    assert Colors.learn(seen(orange, (0.4, 1))[:50], seen(white, (0.4, 1))) is None
+
+
+def test_the_hand_is_what_moves_with_it() -> None:
+    random = np.random.default_rng(0)
+    finger = random.uniform([-0.01, -0.05, -0.01], [0.01, 0.01, 0.01], (3000, 3))
+    flying = [random.uniform(-0.2, 0.2, (50, 3)) for _ in range(6)]
+    shape = Shape.learn(np.concatenate([finger, noise]) for noise in flying)
+    assert shape.holds(finger).all()
+    assert not shape.holds(finger + [0.05, 0, 0]).any()
+    assert shape.holds(flying[0]).mean() < 0.05
+    assert not shape.holds(np.array([[0.0, 5.0, 0.0]])).any()  # beyond what was looked at
+    assert Shape.learn([finger] * 3) is None  # too few pictures
+    other = Shape.learn([finger + [0.05, 0, 0]] * 6)
+    assert Shape.swept(shape, other).holds(finger + [0.025, 0, 0]).mean() > 0.9
+
+
+def test_the_same_pictures_give_the_same_mask(cloud) -> None:
+    first, second = (
+        clouds_of(looks.view_of(LOOKS["orange on grey, white arm"], looks.times(8))[0], cloud)
+        for _ in range(2)
+    )
+    for one, other in zip(first.points, second.points, strict=True):
+        np.testing.assert_array_equal(one, other)

@@ -1,0 +1,99 @@
+"""Clouds out of masked pictures, and which colour belongs to which depth pixel."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.errors import UserError
+from pipeline.params import load
+from pipeline.recording import bench, cloud
+from pipeline.recording.masks import masker
+from tests.recording import looks
+from tests.recording.looks import BAND, LOOKS
+
+SETTINGS = load("params.yaml").cloud
+
+
+def tube(count: int, random: np.random.Generator) -> np.ndarray:
+    """Points on half a band of 10 mm, (count, 3)."""
+    angle = random.uniform(0, np.pi, count)
+    across = 0.005 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.column_stack([random.uniform(0, 0.4, count), across])
+
+
+def test_strays_are_removed_and_the_band_is_covered() -> None:
+    random = np.random.default_rng(0)
+    strays = random.uniform([0, 0.05, 0.05], [0.4, 0.3, 0.3], (40, 3))
+    points = cloud.sample(np.concatenate([tube(4000, random), strays]), SETTINGS)
+    assert points.shape == (SETTINGS.points, 3) and points.dtype == np.float32
+    assert np.hypot(points[:, 1], points[:, 2]).max() < 0.0051
+    gaps = np.diff(np.sort(points[:, 0]))  # the farthest points first: no gap is left
+    assert gaps.max() < 0.01
+    assert np.ptp(points[:, 0]) > 0.39
+
+
+def test_few_points_are_no_cloud() -> None:
+    assert cloud.sample(np.zeros((0, 3)), SETTINGS).shape == (0, 3)
+    few = tube(SETTINGS.statistical_neighbors, np.random.default_rng(0))
+    assert cloud.sample(few, SETTINGS).shape == (0, 3)
+
+
+def test_of_a_thin_band_no_more_neighbours_are_asked_for_than_it_has() -> None:
+    """One pixel every 3 mm: within 1 cm there are six others, less those without depth."""
+    line = np.column_stack([np.arange(0, 0.4, 0.003), *np.zeros((2, 134))])
+    line = line[np.random.default_rng(0).random(134) > 0.4]
+    strict = cloud.sample(line, SETTINGS)
+    kept = cloud.sample(line, SETTINGS, density=1 / 0.003)
+    assert len(kept) > 0.9 * len(line) > 2 * len(strict)
+
+
+def test_a_recording_in_which_no_band_is_seen_is_refused(monkeypatch) -> None:
+    view, _ = looks.view_of(LOOKS["orange on grey, white arm"], looks.times(4))
+    nothing = SimpleNamespace(mask=lambda frame: np.zeros_like(frame.near))
+    monkeypatch.setattr(cloud, "masker", lambda *given: nothing)
+    with pytest.raises(UserError, match="not found in 4 of 4 frames"):
+        cloud.clouds_of(view, SETTINGS)
+
+
+def test_a_backend_that_is_not_there() -> None:
+    view, _ = looks.view_of(LOOKS["orange on grey, white arm"], looks.times(4))
+    with pytest.raises(UserError, match="'other' is not available"):
+        masker("other", view, SETTINGS.sam3)
+
+
+def test_colours_of_a_camera_apart_belong_to_their_points() -> None:
+    """What the colour camera does not see is black; it never takes the colour of what hides it."""
+    look = LOOKS["orange, colour camera apart"]
+    view, truths = looks.view_of(look, looks.times(6))
+    orange, hidden, there = [], 0, 0
+    for number, frame in view.frames():
+        part = truths[number].part[view.window]
+        right = np.abs(frame.depth - truths[number].depth[view.window]) < 0.003
+        ratio = frame.color[..., 2].astype(float) - frame.color[..., 0]
+        black = ~frame.color.any(axis=-1)
+        band = right & (part == BAND)
+        orange.append(np.mean(ratio[band & ~black] > 40))
+        behind = right & np.isin(part, (looks.FLOOR_ID, looks.TILE, looks.WALL))
+        there += behind.sum()
+        hidden += (behind & black).sum()
+        assert np.mean(ratio[behind] > 40) < 0.002  # orange on the floor
+        assert (frame.pixels[black & (frame.depth > 0)] == -1).mean() > 0.9
+    assert np.mean(orange) > 0.9
+    assert 0 < hidden < 0.2 * there
+
+
+def test_the_steps_are_timed(tmp_path, params) -> None:
+    from tests.recording.bag import write_bag
+
+    path = tmp_path / "seen.mcap"
+    write_bag(path, rate=500)
+    result = bench.bench_recording(path, params)
+    assert result["frames"] == 54 and result["points"] > 100
+    assert set(result["per_frame_ms"]) == set(bench.STEPS)
+    assert all(value > 0 for value in result["per_frame_ms"].values())
+    rest = sum(value for step, value in result["per_frame_ms"].items() if step != "decode")
+    assert result["frames_per_s_after_decoding"] == pytest.approx(1000 / rest)
+    assert "after decoding" in bench.table(result)

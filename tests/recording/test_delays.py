@@ -1,0 +1,122 @@
+"""Delays that were put in are found; none is made up where there is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.recording.camera_delay import camera_delay
+from pipeline.recording.delays import Estimate, delays_of
+from pipeline.recording.felt import felt_tool
+from pipeline.recording.geometry import geometry_of
+from pipeline.recording.input.reader import read_recording
+from tests.recording.bag import Truth
+from tests.recording.played import Played
+
+SLOW = Truth(grasp=0.9, lifted=1.4, drawn=2.8, release=3.4, end=4.6)
+INJECTED = (-0.02, 0.0, 0.005, 0.015)  # s
+
+
+def late(recording, role: str, seconds: float):
+    """With the stamps of one topic late."""
+    stream = getattr(recording, role)
+    return replaced(recording, **{role: replace(stream, stamp=stream.stamp + round(seconds * 1e9))})
+
+
+def replaced(recording, **streams):
+    if isinstance(recording, SimpleNamespace):
+        return SimpleNamespace(**{**vars(recording), **streams})
+    return replace(recording, **streams)
+
+
+@pytest.fixture(scope="module")
+def felt():
+    """A recording in which the hand comes and goes, and the sensor feels it."""
+    played = Played(mass=0.7, truth=replace(SLOW, noise=0.0))
+    return played.recording(), played.geometry()
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.1])
+def test_the_poses_delay_is_found_by_the_tools_inertia(felt, noise) -> None:
+    """With an error that is true: 20 recordings of other noise."""
+    recording, geometry = felt
+    off, errors = [], []
+    for seed in range(20):
+        wrench = recording.wrench
+        shaken = np.random.default_rng(seed).normal(0, noise, wrench.values.shape)
+        one = replaced(recording, wrench=replace(wrench, values=wrench.values + shaken))
+        seconds = INJECTED[seed % 4]
+        found = felt_tool(late(one, "pose", seconds), geometry, None)
+        off.append(found.delay - seconds)
+        errors.append(found.delay_error)
+        assert found.mass == pytest.approx(0.7, abs=5 * found.mass_error)
+    assert np.abs(off).max() <= 0.05 * noise  # s for each newton
+    assert 0.5 < np.sqrt(np.mean((np.array(off) / errors) ** 2)) < 1.5
+
+
+def test_a_force_that_does_not_feel_the_tool_says_nothing_of_the_pose() -> None:
+    played = Played(mass=0.0, truth=SLOW)
+    for seconds in INJECTED:
+        recording = late(played.recording(), "pose", seconds)
+        assert felt_tool(recording, played.geometry(), None) is None
+
+
+@pytest.fixture(scope="module")
+def looked_at(seen, params):
+    recording = read_recording(seen[0], params.setup)
+    return recording, geometry_of(recording, params.setup)
+
+
+@pytest.mark.parametrize("seconds", INJECTED)
+def test_the_cameras_delay_is_found_by_the_hand_in_its_pictures(looked_at, seconds) -> None:
+    recording, geometry = looked_at
+    value, error = camera_delay(late(recording, "depth", seconds), geometry)
+    assert error < 0.002
+    assert abs(value - seconds) <= 0.001
+
+
+def test_wrong_extrinsics_are_no_delay(looked_at) -> None:
+    """A camera that is 3 mm and half a degree elsewhere."""
+    from scipy.spatial.transform import Rotation
+
+    from pipeline.recording.input.frames import Transform
+
+    recording, geometry = looked_at
+    off = Transform(Rotation.from_rotvec([0.006, -0.004, 0.005]), np.array([0.002, 0.002, -0.001]))
+    value, _ = camera_delay(recording, replace(geometry, camera=off @ geometry.camera))
+    assert abs(value) <= 0.0015
+
+
+def test_black_pictures_say_nothing(blind, params) -> None:
+    recording = read_recording(blind[0], params.setup)
+    assert camera_delay(recording, geometry_of(recording, params.setup)) is None
+
+
+def test_what_is_applied(looked_at, params) -> None:
+    recording, geometry = looked_at
+    found = delays_of(recording, geometry, params)
+    assert found.pose == Estimate(0.0, None, "not seen", False)
+    assert found.camera.source == "estimated" and not found.camera.applied
+    assert found.corrected(recording) is recording
+
+    found = delays_of(late(recording, "depth", 0.015), geometry, params)
+    assert found.camera.applied and found.camera.value == pytest.approx(0.015, abs=0.001)
+    right = found.corrected(late(recording, "depth", 0.015))
+    np.testing.assert_allclose((right.depth.stamp - recording.depth.stamp) * 1e-9, 0, atol=1e-3)
+
+
+def test_given_delays_are_used_as_they_are(looked_at, params) -> None:
+    recording, geometry = looked_at
+    delays = params.episode.delays.model_copy(update={"pose": -0.004, "camera": 0.0})
+    given = params.model_copy(
+        update={"episode": params.episode.model_copy(update={"delays": delays})}
+    )
+    found = delays_of(recording, geometry, given)
+    assert found.pose == Estimate(-0.004, 0.0, "setup", True)
+    assert found.camera == Estimate(0.0, 0.0, "setup", False)
+    moved = found.corrected(recording)
+    assert np.all(moved.pose.stamp - recording.pose.stamp == 4_000_000)
+    assert np.all(moved.depth.stamp == recording.depth.stamp)

@@ -1,0 +1,172 @@
+"""Force and motion of formulas: a tool that is felt, a hand that turns, gaps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.errors import UserError
+from pipeline.recording.felt import felt_tool
+from pipeline.recording.signals import signals_of
+from tests.recording.bag import START, Truth
+from tests.recording.played import Played, stream
+
+MASS = 0.73
+
+
+def tool(mass: float = MASS, center=(0.01, -0.02, 0.05)) -> SimpleNamespace:
+    return SimpleNamespace(mass=mass, center=center)
+
+
+def signals(played: Played, params, tool=None, recording=None, felt=None):
+    recording = recording or played.recording()
+    return signals_of(recording, played.geometry(), params.episode, params.force, tool, felt)
+
+
+def off(played: Played, found) -> np.ndarray:
+    """Error of the force [N], (T,), where no kink of the truth is smeared by the low pass."""
+    truth = played.truth
+    t = found.time + (found.origin - START) * 1e-9
+    kinks = [0.4, truth.grasp, 0.6, truth.lifted, truth.release]  # of the acceleration, too
+    calm = np.all([np.abs(t - kink) > 0.06 for kink in kinks], axis=0)
+    wanted = np.array([truth.force(x) for x in t])
+    return np.linalg.norm(found.force - wanted, axis=1)[calm]
+
+
+@pytest.fixture(scope="module")
+def turning() -> Played:
+    return Played(turn=0.6, mass=MASS)
+
+
+def test_a_turning_hand_asks_for_the_tool(turning, params) -> None:
+    with pytest.raises(UserError, match=r"turns by \d\d\.\d degrees .* setup.tool"):
+        signals(turning, params)
+
+
+def test_a_turning_hand_with_its_tool_gives_the_bands_force(turning, params) -> None:
+    found = signals(turning, params, tool())
+    assert off(turning, found).max() < 0.15  # of 20 N; a kink where the band goes taut
+    assert np.median(off(turning, found)) < 0.02
+    assert found.facts["tool"]["mass"] == MASS and np.degrees(found.facts["turn"]) > 10
+
+
+@pytest.mark.parametrize("wrong", [tool(mass=1.5 * MASS), tool(mass=0.0)])
+def test_a_wrong_mass_gives_a_wrong_force(turning, params, wrong) -> None:
+    """In the hold, by the share of the weight that turned."""
+    found = signals(turning, params, wrong)
+    hold = np.array(found.facts["hold_force"]) - turning.truth.force(turning.truth.release - 0.1)
+    a, b = turning.orientation(np.array([0.0, 2.9])).inv().apply([0, 0, 9.81])
+    leaks = abs(wrong.mass - MASS) * np.linalg.norm(a - b)
+    assert leaks > 0.5
+    assert np.linalg.norm(hold) == pytest.approx(leaks, abs=0.05)
+
+
+def test_a_wrong_centre_of_mass_is_felt_where_the_hand_turns_fast(params) -> None:
+    played = Played(turn=1.5, mass=MASS, truth=Truth(noise=0.002))
+    right = off(played, signals(played, params, tool()))
+    wrong = off(played, signals(played, params, tool(center=(0.01, -0.02, 0.25))))
+    assert wrong.max() > right.max() + 0.3
+
+
+def test_the_inertia_of_a_hand_that_does_not_turn(params) -> None:
+    """Without the tool's mass it stays in the force, with it is gone."""
+    played = Played(mass=MASS, truth=Truth(noise=0.005))
+    left, gone = off(played, signals(played, params)), off(played, signals(played, params, tool()))
+    assert left.max() > 2.0  # the hand is lifted with several m/s^2
+    assert gone.max() < 0.15 and np.median(gone) < 0.01
+
+
+def test_a_tool_that_nobody_told_of_is_felt(params) -> None:
+    """Its inertia in free motion shows its mass, with which it is gone from the pull, too."""
+    played = Played(mass=MASS, truth=Truth(noise=0.005))
+    felt = felt_tool(played.recording(), played.geometry(), None)
+    assert felt.mass == pytest.approx(MASS, rel=0.03)
+    found = signals(played, params, felt=felt)
+    assert off(played, found).max() < 0.25 and np.median(off(played, found)) < 0.02
+    assert found.facts["tool"]["source"] == "its inertia"
+    told = signals(played, params, tool(mass=0.0), felt=felt)
+    assert told.facts["tool"] == {
+        "mass": 0.0,
+        "center": [0.01, -0.02, 0.05],
+        "source": "setup.tool",
+    }
+
+
+def test_a_sensor_of_the_other_sign_feels_its_tool_so_too(params) -> None:
+    played = Played(turn=0.6, mass=MASS, truth=Truth(sign=-1.0))
+    found = signals(played, params, tool())
+    assert found.facts["flipped"] and off(played, found).max() < 0.15
+
+
+def test_a_wrench_in_the_base_of_a_hand_that_turns(params) -> None:
+    played = Played(turn=0.6, mass=MASS, fixed=True)
+    found = signals(played, params, tool(center=tuple(played.center_in_hand)))
+    assert off(played, found).max() < 0.15
+
+
+def test_a_force_without_its_tool_may_turn_with_mass_zero(params) -> None:
+    played = Played(turn=0.6, mass=0.0)
+    assert off(played, signals(played, params, tool(mass=0.0))).max() < 0.15
+
+
+def test_gaps_are_said_and_long_ones_refused(params) -> None:
+    played = Played()
+    for length, topic in ((0.2, "wrench"), (0.2, "pose"), (0.4, "wrench"), (0.4, "pose")):
+        recording = played.recording()
+        whole = getattr(recording, topic)
+        t = whole.seconds(int(whole.stamp[0]))
+        keep = (t < 1.5) | (t > 1.5 + length)
+        cut = replace(whole, stamp=whole.stamp[keep], values=whole.values[keep])
+        setattr(recording, topic, cut)
+        if length > 0.3:
+            with pytest.raises(UserError, match=f"{whole.topic} is missing for 0.40 s"):
+                signals(played, params, recording=recording)
+        else:
+            found = signals(played, params, recording=recording)
+            assert found.facts["longest_gap"][whole.topic] == pytest.approx(length, abs=0.005)
+            hand = played.hand(found.time + (found.origin - START) * 1e-9)
+            assert np.abs(found.position - hand).max() < 0.012  # a T^2 / 8, a = 2.4 m/s^2
+
+
+def test_irregular_stamps_give_the_same_velocity(params) -> None:
+    played = Played()
+    recording = played.recording()
+    even = signals(played, params, recording=recording)
+    random = np.random.default_rng(3)
+    u = np.sort(random.uniform(0, played.truth.end, 2000))
+    u[0] = 0.0
+    base = played.geometry().base.inverse()
+    values = np.hstack(
+        [base.apply(played.hand(u)), np.tile(recording.pose.values[0, 3:], (len(u), 1))]
+    )
+    recording.pose = stream("/arm/pose", u, values)
+    jittered = signals(played, params, recording=recording)
+    np.testing.assert_allclose(jittered.velocity, even.velocity, atol=0.03)
+
+
+def test_a_recorded_twist_is_compared(params) -> None:
+    played = Played()
+    recording = played.recording()
+    assert signals(played, params, recording=recording).facts["twist_difference"] is None
+    t = np.arange(0, played.truth.end, 0.01)
+    speed = (played.hand(t + 1e-4) - played.hand(t - 1e-4)) / 2e-4
+    for factor, size in ((1.0, 0.002), (1.5, None)):
+        twist = np.hstack([factor * speed, np.zeros((len(t), 3))])
+        recording.twist = stream("/arm/twist", t, twist)
+        said = signals(played, params, recording=recording).facts["twist_difference"]
+        assert said < size if size else said > 0.02
+
+
+@pytest.mark.parametrize("topic", ["wrench", "pose"])
+def test_a_stamp_of_another_century_is_refused(topic, params) -> None:
+    """And not filled in at 1 kHz."""
+    recording = Played().recording()
+    whole = getattr(recording, topic)
+    stamp = whole.stamp.copy()
+    stamp[-1] += 3 * 10**18
+    setattr(recording, topic, replace(whole, stamp=stamp))
+    with pytest.raises(UserError, match=f"{whole.topic} has .* missing nearly all the time"):
+        signals(Played(), params, recording=recording)

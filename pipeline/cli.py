@@ -68,6 +68,24 @@ def parser() -> argparse.ArgumentParser:
 
     sub = command(run_check, "say what is in a recording, what is missing, whether it can be used")
     sub.add_argument("recording", type=Path, metavar="FILE.mcap")
+    sub.add_argument("--band", metavar="NAME", help="of params.yaml: its diameter and rest length")
+    sub.add_argument("--diameter", type=positive, metavar="M", help="else 0.010 is assumed")
+    sub.add_argument(
+        "--rest-length", type=positive, metavar="M", help="between the clamps; else 0.52 is assumed"
+    )
+    sub.add_argument("--sheet", type=Path, metavar="OUT.png", help="six moments, force, coverage")
+    sub.add_argument("--rrd", type=Path, metavar="OUT.rrd", help="one timeline for Rerun's viewer")
+    sub.add_argument("--json", action="store_true")
+
+    sub = command(run_plan, "plan the pull that a robot is to record, and check it against limits")
+    sub.add_argument("--band", required=True)
+    sub.add_argument("--draw", type=draw, metavar="Y,Z", help="frame O [m]; default plan.draw")
+    sub.add_argument("--theta", type=Path, metavar="FILE", help="says the force to hold the draw")
+    sub.add_argument(
+        "--recording", type=Path, metavar="FILE.mcap", help="earlier one: robot's base, and force"
+    )
+    sub.add_argument("--out", type=Path, metavar="FOLDER", help="default data/plans/<band>")
+    sub.add_argument("--rate", type=positive, default=100.0, metavar="HZ", help="of the CSV, 100")
     sub.add_argument("--json", action="store_true")
 
     sub = command(run_launch, "simulate one launch with identified or hand-written parameters")
@@ -90,6 +108,9 @@ def parser() -> argparse.ArgumentParser:
     sub = command(run_bench, "measure rollouts and launches a second")
     sub.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
     sub.add_argument("--peers", action="store_true", help="MuJoCo and Newton beside ours")
+    sub.add_argument(
+        "--recording", type=Path, metavar="FILE.mcap", help="time the way from a recording to clouds"
+    )
     sub.add_argument("--json", action="store_true")
     return top
 
@@ -148,7 +169,7 @@ def readable(value: object) -> str:
 
 
 def run_add_band(arguments: argparse.Namespace) -> tuple[str, int]:
-    from pipeline.recording.add_band import add_band
+    from pipeline.intake.add_band import add_band
 
     done = add_band(
         arguments.name,
@@ -161,11 +182,34 @@ def run_add_band(arguments: argparse.Namespace) -> tuple[str, int]:
 
 
 def run_check(arguments: argparse.Namespace) -> tuple[str, int]:
+    from pipeline.intake.command import check
     from pipeline.params import load
-    from pipeline.recording.check import check_recording
 
-    report = check_recording(arguments.recording, load())
-    return report.to_json() if arguments.json else report.to_text(), int(not report.usable)
+    return check(
+        arguments.recording,
+        load(),
+        band=arguments.band,
+        diameter=arguments.diameter,
+        rest_length=arguments.rest_length,
+        as_json=arguments.json,
+        sheet=arguments.sheet,
+        rrd=arguments.rrd,
+    )
+
+
+def run_plan(arguments: argparse.Namespace) -> tuple[str, int]:
+    from pipeline.params import load
+    from pipeline.plan.plan import plan_recording
+
+    plan = plan_recording(
+        load(),
+        arguments.band,
+        draw=arguments.draw,
+        theta=arguments.theta,
+        recording=arguments.recording,
+    )
+    files = plan.write(arguments.out or Path("data", "plans", arguments.band), arguments.rate)
+    return plan.to_json(files) if arguments.json else plan.to_text(files), 0
 
 
 def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
@@ -222,6 +266,13 @@ def run_bench(arguments: argparse.Namespace) -> tuple[str, int]:
     from pipeline.bench import bench, environment, table
     from pipeline.params import load
 
+    if arguments.recording:
+        from pipeline.recording import bench as recording
+
+        result = recording.bench_recording(arguments.recording, load())
+        if arguments.json:
+            return json.dumps(environment("cpu", "sling bench --recording --json") | result), 0
+        return recording.table(result), 0
     if arguments.peers:
         from pipeline.peers import bench as peers
 

@@ -19,10 +19,13 @@ from pipeline.schema import (
     FILLED,
     LIST,
     UNIQUE,
+    UNIT,
+    Component,
     Direction,
     Metres,
     Name,
     Names,
+    Pattern,
     Pose,
     Range,
     Section,
@@ -36,6 +39,15 @@ Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound")
 # y of the paper's fixed target of 1 m by 1 m: a landing outside is a failure, so trials aim inside.
 TARGET_AREA = (1.425, 2.425)
+
+
+def _lies_beside(name: str) -> str:
+    if name != Path(name).name or name.startswith("."):
+        raise refusal(f"must be the name of a file in robots/, got {name!r}")
+    return name
+
+
+FileName = Annotated[str, FILLED, AfterValidator(_lies_beside)]
 
 
 def _is_free(name: str) -> str:
@@ -63,11 +75,19 @@ class Band(Section):
 class Topics(Section):
     wrench: str | None
     pose: str | None
+    twist: str | None
     gripper: str | None
     color: str | None
     depth: str | None
     color_info: str | None
     depth_info: str | None
+
+
+class Tool(Section):
+    """What the force sensor carries: hand, fingers, flange."""
+
+    mass: Annotated[float, Range(0, 20)]
+    center: Annotated[tuple[Metres, Metres, Metres], LIST]
 
 
 DrawY = Annotated[float, Range(-2, -0.05)]
@@ -86,18 +106,74 @@ class Setup(Section):
     draw_z: Annotated[tuple[DrawZ, DrawZ], LIST, ASCENDING]
     base_to_fork: Pose | None
     camera_to_fork: Pose | None
+    urdf: FileName | None
+    tip_link: str | None
+    start_pose: Pose | None
+    tool: Tool | None
     topics: Topics
+
+
+Delay = Annotated[float, Range(-0.5, 0.5)]
+
+
+class Delays(Section):
+    pose: Delay | None
+    camera: Delay | None
 
 
 class Episode(Section):
     samples: Annotated[int, Range(30, 10_000)]
     duration: Annotated[float, Range(1, 120)]
     tail: Annotated[float, Range(0.1, 60)]
+    delays: Delays
 
     @model_validator(mode="after")
     def _tail_within(self) -> Episode:
         if self.tail >= self.duration:
             raise refusal("tail must be less than duration")
+        return self
+
+
+Speed = Annotated[float, Range(0.005, 3)]
+Way = Annotated[float, Range(0, 0.5)]
+Opening = Annotated[float, Range(0, 0.5)]
+Quaternion = Annotated[tuple[Component, Component, Component, Component], LIST, UNIT]
+
+
+class Gripper(Section):
+    open: Opening
+    closed: Opening
+
+    @model_validator(mode="after")
+    def _closed_is_narrower(self) -> Gripper:
+        if self.closed >= self.open:
+            raise refusal("closed must be less than open")
+        return self
+
+
+class Plan(Section):
+    """What it asks of the episode is checked by `sling plan`, which alone reads it."""
+
+    draw: Annotated[tuple[DrawY, DrawZ], LIST]
+    max_speed: Speed
+    pull_speed: Speed
+    max_acceleration: Annotated[float, Range(0.05, 30)]
+    lead_in: Annotated[float, Range(0.5, 60)]
+    finger_time: Annotated[float, Range(0.05, 10)]
+    pause: Annotated[float, Range(0.5, 60)]  # the held force is the mean of the last 0.5 s
+    wait: Annotated[float, Range(0, 60)]
+    approach: Way
+    retreat: Way
+    floor_clearance: Way
+    hanging: Annotated[float, Range(0, 3)] | None
+    gripper: Gripper
+    orientation: Quaternion | None
+    frame: Annotated[str, FILLED]
+
+    @model_validator(mode="after")
+    def _pulls_slower(self) -> Plan:
+        if self.pull_speed > self.max_speed:
+            raise refusal("pull_speed must be at most max_speed")
         return self
 
 
@@ -112,9 +188,16 @@ class Force(Section):
         return self
 
 
+class Sam3(Section):
+    weights: Annotated[str, FILLED]
+    prompt: Annotated[str, FILLED]
+    device: Annotated[str, Pattern("cuda(:[0-9]+)?|cpu")]
+
+
 class Cloud(Section):
     points: Annotated[int, Range(10, 100_000)]
-    mask: Literal["opencv"]
+    mask: Literal["opencv", "sam3"]
+    sam3: Sam3
     statistical_neighbors: Annotated[int, Range(1, 1000)]
     statistical_ratio: Annotated[float, Range(0.1, 100)]
     radius: Annotated[float, Range(1e-4, 1)]
@@ -276,11 +359,27 @@ class RigWrench(Section):
     drift: Annotated[float, Range(0, 10)]  # over the recording
 
 
+class RigArm(Section):
+    mass: Annotated[float, Range(0.1, 100)]
+    stiffness: Annotated[float, Range(100, 1e6)]
+    damping_ratio: Annotated[float, Range(0.05, 5)]
+
+
+class RigClock(Section):
+    """Of one source's messages; the delay is from the stamp to the receipt."""
+
+    stamp_jitter: Annotated[float, Range(0, 0.01)]
+    delay: Annotated[float, Range(0, 1)]
+    delay_jitter: Annotated[float, Range(0, 1)]
+
+
 class RigCamera(Section):
     position: Point
     target: Point
     focal: Annotated[float, Range(50, 5000)]
     range: Annotated[float, Range(0.1, 100)]
+    exposure: Annotated[float, Range(0, 0.02)]
+    clock: RigClock
     drop_rate: Share
     color_noise: Annotated[float, Range(0, 100)]
     depth_noise: Annotated[float, Range(0, 0.1)]
@@ -297,9 +396,13 @@ class Rig(Section):
     tolerance: Annotated[float, Range(1e-10, 1e-3)]
     pad_friction: Annotated[float, Range(0.05, 10)]
     tracking_error: Annotated[float, Range(0, 0.01)]
+    pose_latency: Annotated[float, Range(0, 0.1)]
+    release_jitter: Annotated[float, Range(0, 1)]
     projectile_drag: Annotated[float, Range(0, 0.01)]
     base: Pose
     tool_pitch: Annotated[float, Range(-1.5, 1.5)]
+    arm: RigArm
+    clock: RigClock
     wrench: RigWrench
     camera: RigCamera
     bands: dict[Name, RigBand]
@@ -315,6 +418,7 @@ class Params(Section):
     run: Run
     bands: Annotated[dict[BandName, Band], FILLED]
     setup: Setup
+    plan: Plan
     episode: Episode
     force: Force
     cloud: Cloud

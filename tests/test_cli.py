@@ -56,6 +56,10 @@ def test_the_documented_commands_are_understood() -> None:
     assert (band.name, band.recording, band.mass) == ("orange", Path("o.mcap"), 0.0408)
     assert (band.diameter, band.rest_length) == (0.010, 0.52)
     assert parse("check o.mcap --json".split()).json
+    planned = parse("plan --band band1 --recording o.mcap --draw=-0.30,-0.17 --rate 50".split())
+    assert (planned.draw, planned.rate, planned.out) == ((-0.30, -0.17), 50.0, None)
+    looked = parse("check o.mcap --band band1 --sheet o.png --rrd o.rrd".split())
+    assert (looked.band, looked.sheet, looked.rrd) == ("band1", Path("o.png"), Path("o.rrd"))
     launched = parse("launch --theta t.json --band band1 --draw=-0.30,-0.17".split())
     assert (launched.theta, launched.draw) == (Path("t.json"), (-0.30, -0.17))
     aimed = parse("aim --band band1 --target 1.925".split())
@@ -105,6 +109,12 @@ def test_a_command_line_that_makes_no_sense(arguments: str, expected: str) -> No
         ("aim --band band9 --target 1.925", "band band9: not in params.yaml"),
         ("aim --band band1 --method best --target 1.925", "method best: not in params.yaml"),
         ("check none.mcap", "none.mcap"),
+        ("check none.mcap --band band9", "band9"),
+        ("check none.mcap --sheet none/out.png", "none"),
+        ("plan --band band1", "setup.base_to_fork is null"),
+        ("plan --band band9", "band band9: not in params.yaml"),
+        ("plan --band band1 --recording none.mcap", "none.mcap: no such file"),
+        ("bench --recording none.mcap", "none.mcap: no such file"),
         ("add-band new --recording none.mcap --mass 0.04", "none.mcap"),
     ],
 )

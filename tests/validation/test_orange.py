@@ -16,7 +16,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from pipeline.recording.add_band import add_band
+from pipeline.intake.add_band import add_band
 from pipeline.report.tables import prediction_error
 from tests.project import ROOT, copy_project
 

@@ -1,0 +1,103 @@
+"""How well the clouds cover the band, picture by picture."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.recording.build import Processed
+from pipeline.recording.masks.ridge import HAND, distance_to_lines
+from pipeline.recording.view import Scene
+
+COVERED = 1.5  # diameters from a point of the cloud to the part of the band that it stands for
+FINGERS = 0.05  # m of a slack band that the open or closed hand may hide
+RECOIL = 0.15  # s after the release
+PHASES = ("hanging", "held", "drawn", "recoil", "swing")
+
+
+def coverage(done: Processed) -> tuple[float | None, float | None]:
+    """How well the clouds see the drawn band, whose place is known: two lines, tip to hand.
+
+    Returns:
+        Share of the lines (without the fingers' part) that has points beside it, and the median
+        distance of points from the lines [m], which is the band's radius where the calibration is
+        right; None where the band was never taut.
+    """
+    scene, clouds = done.scene, done.clouds
+    taut = [
+        (time, points)
+        for time, points in zip(clouds.time, clouds.points, strict=True)
+        if scene.taut(time) and len(points)
+    ]
+    if not taut:
+        return None, None
+    shares = [share_covered(scene, time, points) for time, points in taut]
+    offsets = [distance_to_lines(points, scene, time) for time, points in taut]
+    return float(np.mean(shares)), float(np.median(np.concatenate(offsets)))
+
+
+def share_covered(scene: Scene, time: float, points: np.ndarray) -> float:
+    """Share of the band that has points beside it.
+
+    Where it is drawn: of the two straight lines. Where it is slack its place is not known, but it
+    runs from tip to tip: of the places x between the tips, less what the hand hides.
+    """
+    if not len(points):
+        return 0.0
+    if scene.taut(time):
+        found = []
+        for tip in scene.tips:
+            way = scene.signals.hand(time) - tip
+            length = np.linalg.norm(way)
+            parts = np.arange(0.0, length - HAND, scene.diameter)[:, None] / length
+            nearest = np.linalg.norm((tip + parts * way)[:, None] - points[None], axis=-1)
+            found.append(nearest.min(axis=1) < COVERED * scene.diameter)
+        return float(np.mean(np.concatenate(found)))
+    places = np.arange(scene.tips[0, 0] + scene.diameter, scene.tips[1, 0], scene.diameter)
+    if scene.holds(time):
+        places = places[np.abs(places - scene.signals.hand(time)[0]) > FINGERS]
+    gaps = np.abs(places[:, None] - points[:, 0]).min(axis=1)
+    return float(np.mean(gaps < COVERED * scene.diameter))
+
+
+def phase(scene: Scene, time: float) -> str:
+    """One of PHASES."""
+    signals = scene.signals
+    if time < signals.grasp_time:
+        return "hanging"
+    if time < signals.release_time:
+        return "drawn" if scene.taut(time) else "held"
+    return "recoil" if time < signals.release_time + RECOIL else "swing"
+
+
+def over_time(done: Processed, start: float) -> list[dict]:
+    """A row a picture; times count from `start` seconds before the window."""
+    return [
+        {
+            "time": round(start + float(time), 6),
+            "phase": phase(done.scene, time),
+            "points": len(points),
+            "coverage": round(share_covered(done.scene, time, points), 4),
+        }
+        for time, points in zip(done.clouds.time, done.clouds.points, strict=True)
+    ]
+
+
+def by_phase(rows: list[dict]) -> list[dict]:
+    """The rows of `over_time` gathered, phases without a picture left out."""
+    table = []
+    for name in PHASES:
+        part = [row for row in rows if row["phase"] == name]
+        if part:
+            points = [row["points"] for row in part]
+            table.append(
+                {
+                    "phase": name,
+                    "start": part[0]["time"],
+                    "end": part[-1]["time"],
+                    "pictures": len(part),
+                    "empty": points.count(0),
+                    "points": int(np.median(points)),
+                    "coverage": round(float(np.mean([row["coverage"] for row in part])), 4),
+                }
+            )
+    return table

@@ -1,0 +1,184 @@
+"""What `sling check` says of a recording: the same content as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+
+
+@dataclass
+class Topic:
+    """One line of the table; times in seconds, None where the topic plays no role.
+
+    Attributes:
+        why: How it was chosen for its role.
+        delay: Median of log_time - header.stamp.
+        clock_offset: Its stamps against those of the other topics' clock, by their delays.
+        missing: Messages that a constant rate would have had in the gaps.
+        lost: Damaged, not finite or doubled messages.
+        notes: What was repaired or lost, in words.
+    """
+
+    topic: str
+    type: str
+    messages: int
+    role: str | None = None
+    why: str | None = None
+    rate: float | None = None
+    longest_gap: float | None = None
+    missing: int | None = None
+    lost: int | None = None
+    delay: float | None = None
+    clock_offset: float | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Caution:
+    """Something that costs accuracy: `about` names it for programs, `cure` says what to do."""
+
+    about: str
+    what: str
+    cure: str
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.cure}"
+
+
+@dataclass
+class Report:
+    """Everything `sling check` says; `problem` is None where the recording can be used.
+
+    Attributes:
+        losses: What was lost of the file and its topics or mended in them, in words.
+        notes: What else to know of it, which cost nothing.
+        band: Diameter and rest length [m] that it was read with, and where they come from.
+        frames: Where each transform comes from.
+        signals: Events [s since the first force], force [N], frame O.
+        delays: Of pose and camera: seconds that their stamps are late, with standard error.
+        cloud: How well the band is seen, over the whole recording.
+        phases: The same for each phase.
+        coverage: The same for each picture: time [s], phase, points, coverage.
+        extrinsics: How far the fork tips are off in the clouds; empty where it cannot be told.
+        cautions: What costs accuracy, and what to do.
+        written: Files that were drawn of it, in words.
+    """
+
+    path: str
+    sha256: str
+    problem: str | None
+    losses: list[str]
+    topics: list[Topic]
+    notes: list[str] = field(default_factory=list)
+    band: dict[str, object] = field(default_factory=dict)
+    frames: dict[str, str] = field(default_factory=dict)
+    signals: dict[str, object] = field(default_factory=dict)
+    delays: dict[str, dict] = field(default_factory=dict)
+    cloud: dict[str, object] = field(default_factory=dict)
+    phases: list[dict] = field(default_factory=list)
+    coverage: list[dict] = field(default_factory=list)
+    extrinsics: dict[str, object] = field(default_factory=dict)
+    cautions: list[Caution] = field(default_factory=list)
+    written: list[str] = field(default_factory=list)
+
+    @property
+    def usable(self) -> bool:
+        return self.problem is None
+
+    @property
+    def verdict(self) -> str:
+        if not self.usable:
+            return f"cannot be used: {self.problem}"
+        return "can be used, but:" if self.cautions else "can be used"
+
+    def to_json(self) -> str:
+        content = {**asdict(self), "usable": self.usable, "verdict": self.verdict}
+        return json.dumps(content, indent=2, allow_nan=False)
+
+    def to_text(self) -> str:
+        lines = [f"{self.path}  sha256 {self.sha256[:16]}", "", *_topics(self.topics)]
+        for title in ("band", "frames", "signals", "cloud"):
+            facts = getattr(self, title)
+            if facts:
+                lines += ["", title, *(f"  {k:<22}{_shown(v)}" for k, v in facts.items())]
+        lines += _phases(self.phases) + _delays(self.delays) + _extrinsics(self.extrinsics)
+        lines += ["", *(f"lost or mended: {loss}" for loss in self.losses)]
+        lines += [*(f"note: {note}" for note in self.notes), self.verdict]
+        lines += [f"  - {caution}" for caution in self.cautions]
+        lines += ["", *self.written] if self.written else []
+        return "\n".join(lines)
+
+
+def _topics(topics: list[Topic]) -> list[str]:
+    width = max([len(row.topic) for row in topics], default=5)
+    head = ("messages", "rate", "longest gap", "missing", "lost", "delay", "clock")
+    rows = [f"{'topic':<{width}}  {'role':<11}" + "".join(f"{name:>13}" for name in head)]
+    for row in topics:
+        cells = [str(row.messages)]
+        if row.rate is not None:
+            cells += [f"{row.rate:.1f} Hz", f"{1e3 * row.longest_gap:.1f} ms", str(row.missing)]
+            cells += [str(row.lost), f"{1e3 * row.delay:+.1f} ms"]
+            cells += [f"{1e3 * row.clock_offset:+.1f} ms"]
+        line = f"{row.topic:<{width}}  {row.role or '-':<11}"
+        rows.append((line + "".join(f"{cell:>13}" for cell in cells)).rstrip())
+    chosen = [row for row in topics if row.why]
+    if chosen:
+        rows += ["", "chosen", *(f"  {r.role:<12}{r.topic}  ({r.type}): {r.why}" for r in chosen)]
+    return rows
+
+
+def _phases(phases: list[dict]) -> list[str]:
+    if not phases:
+        return []
+    rows = [
+        "",
+        f"mask       {'seconds':>15}{'pictures':>10}{'empty':>7}{'points':>8}{'covered':>9}",
+    ]
+    for row in phases:
+        seconds = f"{row['start']:.2f} - {row['end']:.2f}"
+        rows.append(
+            f"  {row['phase']:<9}{seconds:>15}{row['pictures']:>10}{row['empty']:>7}"
+            f"{row['points']:>8}{100 * row['coverage']:>7.0f} %"
+        )
+    return rows
+
+
+def _delays(delays: dict[str, dict]) -> list[str]:
+    if not delays:
+        return []
+    rows = ["", "delays against the force's stamps"]
+    for role, delay in delays.items():
+        value, error = delay["value_s"], delay["error_s"]
+        shown = "-" if value is None else f"{round(1e3 * value, 1) + 0.0:+.1f} ms"
+        shown += "" if error is None else f" ± {1e3 * error:.1f} ms"
+        done = "taken out" if delay["applied"] else "left as it is"
+        rows.append(f"  {role:<10}{shown}  ({delay['source']}, {done})")
+    return rows
+
+
+def _extrinsics(facts: dict[str, object]) -> list[str]:
+    if not facts:
+        return []
+
+    def pair(values: list[float], errors: list[float], unit: float, digits: int = 1) -> str:
+        return "  ".join(
+            f"{axis} {unit * v:+.{digits}f} ± {unit * e:.{digits}f}"
+            for axis, v, e in zip("xyz", values, errors, strict=True)
+        )
+
+    rows = [
+        "",
+        f"extrinsics, by the drawn band in {facts['pictures']} pictures (frame O)",
+        f"  left tip off   {pair(facts['left_tip_m'], facts['left_tip_error_m'], 1e3)} mm",
+        f"  right tip off  {pair(facts['right_tip_m'], facts['right_tip_error_m'], 1e3)} mm",
+        f"  camera turned  {pair(facts['turn_deg'], facts['turn_error_deg'], 1, 2)} degrees",
+        f"  hand off       {pair(facts['hand_m'], facts['hand_error_m'], 1e3)} mm",
+        f"  what is left   {1e3 * facts['residual_m']:.1f} mm",
+    ]
+    return rows
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, list):
+        return " ".join(f"{number:.4f}" for number in value)
+    return f"{value:.4f}" if isinstance(value, float) else str(value)

@@ -109,7 +109,7 @@ def parser() -> argparse.ArgumentParser:
     sub.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
     sub.add_argument("--peers", action="store_true", help="MuJoCo and Newton beside ours")
     sub.add_argument(
-        "--recording", type=Path, metavar="FILE.mcap", help="time the way from a recording to clouds"
+        "--recording", type=Path, metavar="FILE.mcap", help="time how it becomes clouds"
     )
     sub.add_argument("--json", action="store_true")
     return top

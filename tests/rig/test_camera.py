@@ -37,7 +37,7 @@ def test_a_window_sees_what_all_rays_see(camera: Camera) -> None:
 
 
 def test_a_fast_band_is_smeared_and_loses_depth(camera: Camera, params: Params) -> None:
-    """A recoil at 8 m/s, seen for 4 ms: 32 mm of band 10 mm thick, so that no pixel shows it longer than not."""
+    """32 mm of way in one exposure, of a band 10 mm thick: no pixel shows it longer than not."""
     ways = np.linspace(-0.016, 0.016, 9)
     seen = [
         nearer(wall(camera, 2.0), camera.see(tube(LINE + [0, 0, way], RADIUS, (1.0, 0, 0))))

@@ -180,7 +180,7 @@ def _unpacked(data: np.ndarray, flags: int, kind: str) -> np.ndarray:
 
 
 def _chunks_fit(data: np.ndarray) -> bool:
-    """Whether a PNG's chunks are whole: OpenCV checks no CRC, and takes whatever length one says."""
+    """Whether a PNG's chunks are whole: OpenCV checks no CRC and believes every length."""
     at = 8
     while at + PNG_CHUNK.size <= len(data):
         length, kind = PNG_CHUNK.unpack_from(data, at)

@@ -29,6 +29,7 @@ def built_once(build: Callable[..., wp.Kernel]) -> Callable[..., wp.Kernel]:
 
     def built(*key) -> wp.Kernel:
         with _one_at_a_time:
+            wp.init()  # two threads that start Warp at once would undo each other's modules
             return build(*key)
 
     return built

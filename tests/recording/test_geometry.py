@@ -12,7 +12,7 @@ from pipeline.errors import UserError
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.frames import Transform, TransformTree
 
-SETUP = SimpleNamespace(base_to_fork=None, camera_to_fork=None)
+SETUP = SimpleNamespace(base_to_fork=None, camera_to_fork=None, tip_link=None)
 TURN = Rotation.from_euler("z", 30, degrees=True)
 JOINED = {("fork", "base"): [0, -1, 0], ("base", "optical"): [1, 0, 0]}
 ON_HAND = {("hand_tcp", "ft"): [0, 0, -0.1], ("flange", "hand_tcp"): [0, 0, 0.2]}
@@ -42,6 +42,15 @@ def test_a_sensor_on_the_hand() -> None:
     np.testing.assert_allclose(found.camera.translation, [np.cos(np.pi / 6), -0.5, 0], atol=1e-12)
 
 
+def test_the_tip_link_is_the_frame_that_moves() -> None:
+    """Where params name it, and the sensor sits on it, whatever else sounds like a tool."""
+    joins = {**JOINED, **ON_HAND, ("ft", "pointed"): [0, 0, 0.2]}
+    setup = SimpleNamespace(base_to_fork=None, camera_to_fork=None, tip_link="pointed")
+    assert "ft on pointed" in geometry_of(recording(joins), setup).sources["wrench"]
+    elsewhere = SimpleNamespace(base_to_fork=None, camera_to_fork=None, tip_link="optical")
+    assert "ft on hand_tcp" in geometry_of(recording(joins), elsewhere).sources["wrench"]
+
+
 def test_a_wrench_in_the_base() -> None:
     found = geometry_of(recording(JOINED, wrench="base"), SETUP)
     assert found.sensor_is_fixed
@@ -49,7 +58,9 @@ def test_a_wrench_in_the_base() -> None:
 
 
 def test_a_wrench_and_a_pose_without_frames_are_the_hands_and_the_bases() -> None:
-    setup = SimpleNamespace(base_to_fork=(0, 1, 0, 0, 0, 0, 1), camera_to_fork=None)
+    setup = SimpleNamespace(
+        base_to_fork=(0, 1, 0, 0, 0, 0, 1), camera_to_fork=None, tip_link=None
+    )
     found = geometry_of(recording({("fork", "optical"): [1, 0, 0]}, wrench="", pose=""), setup)
     assert not found.sensor_is_fixed
     assert found.sources["base_to_fork"] == "setup.base_to_fork"

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from pipeline.errors import UserError
 from pipeline.params import load
 from pipeline.recording.cloud import clouds_of
+from pipeline.recording.input.frames import Transform
 from pipeline.recording.masks.colors import Colors
 from pipeline.recording.masks.hand import Shape
 from pipeline.recording.masks.ridge import RidgeMask
-from tests.recording import looks
+from pipeline.recording.view import View
+from tests.recording import looks, strand
 from tests.recording.looks import LOOKS
 from tests.recording.scores import PHASES, figures
 
@@ -95,6 +101,34 @@ def test_the_hand_is_what_moves_with_it() -> None:
     assert Shape.learn([finger] * 3) is None  # too few pictures
     other = Shape.learn([finger + [0.05, 0, 0]] * 6)
     assert Shape.swept(shape, other).holds(finger + [0.025, 0, 0]).mean() > 0.9
+
+
+def test_without_a_taut_frame_no_colour_counts(cloud) -> None:
+    """Where the band is longer than the hand goes, nothing is surely the band."""
+    view, _ = looks.view_of(LOOKS["orange on grey, white arm"], looks.times(8))
+    long = replace(view.scene, rest_length=2.0)
+    slack = View(view.recording, view.geometry, long, strand.END)
+    assert not clouds_of(slack, cloud).color_counts
+
+
+def test_a_camera_that_looks_elsewhere_is_told_so() -> None:
+    view, _ = looks.view_of(LOOKS["orange on grey, white arm"], looks.times(8))
+    for turn in ([0, 2.0, 0], [1.0, 0, 0]):
+        aside = Transform(Rotation.from_rotvec(turn), np.zeros(3))
+        geometry = replace(view.geometry, camera=view.geometry.camera @ aside)
+        with pytest.raises(UserError, match="looks past where the band can be"):
+            View(view.recording, geometry, view.scene, strand.END)
+
+
+def test_what_is_said_to_touch_the_lens_is_nowhere(cloud) -> None:
+    """A camera so near that the band could reach it, with pixels of a few millimetres."""
+    view, _ = looks.view_of(LOOKS["orange on grey, white arm"], looks.times(8))
+    there = Transform(view.geometry.camera.rotation, np.array([0.0, 0.05, 0.0]))
+    close = View(view.recording, replace(view.geometry, camera=there), view.scene, strand.END)
+    depth = np.full((480, 640), 0.2, np.float32)
+    depth[::40, ::40] = 0.003
+    frame = close.frame_of(0, depth, view.color(0))
+    assert not frame.near[frame.depth < 0.1].any() and frame.near.any()
 
 
 def test_the_same_pictures_give_the_same_mask(cloud) -> None:

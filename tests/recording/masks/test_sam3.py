@@ -16,74 +16,15 @@ from pipeline.errors import UserError
 from pipeline.recording.masks import masker
 from tests.recording import looks
 from tests.recording.looks import LOOKS
+from tests.recording.masks.tiny_sam3 import save_tiny_sam3
 
 pytest.importorskip("transformers", reason="sam3 is an extra")
-WIDTH, IMAGE = 128, 112
 
 
 @pytest.fixture(scope="module")
 def weights(tmp_path_factory):
-    """A folder as a user would have it, of a model that finds something by any prompt."""
-    import torch
-    from transformers import CLIPTokenizer, Sam3VideoConfig, Sam3VideoModel
-
     folder = tmp_path_factory.mktemp("sam3")
-    heads = {"num_attention_heads": 2, "intermediate_size": 64}
-    vision = {
-        "backbone_config": {
-            **heads,
-            "model_type": "sam3_vit_model",
-            "hidden_size": 32,
-            "num_hidden_layers": 2,
-            "image_size": IMAGE,
-            "pretrain_image_size": IMAGE,
-            "patch_size": 14,
-            "window_size": 4,
-            "global_attn_indexes": [1],
-        },
-        "fpn_hidden_size": WIDTH,
-        "backbone_feature_sizes": [[32, 32], [16, 16], [8, 8]],
-    }
-    detector = {
-        "vision_config": vision,
-        "text_config": {**heads, "hidden_size": 32, "num_hidden_layers": 1, "projection_dim": 32},
-        "geometry_encoder_config": {**heads, "hidden_size": WIDTH, "num_layers": 1},
-        "detr_encoder_config": {**heads, "hidden_size": WIDTH, "num_layers": 1},
-        "detr_decoder_config": {**heads, "hidden_size": WIDTH, "num_layers": 1, "num_queries": 8},
-        "mask_decoder_config": {"hidden_size": WIDTH, "num_attention_heads": 2},
-    }
-    tracker = {
-        "vision_config": vision,
-        "prompt_encoder_config": {"hidden_size": WIDTH, "image_size": IMAGE, "patch_size": 14},
-        "mask_decoder_config": {
-            "hidden_size": WIDTH,
-            "mlp_dim": 64,
-            "num_attention_heads": 2,
-            "iou_head_hidden_dim": 32,
-        },
-        "memory_attention_hidden_size": WIDTH,
-        "memory_attention_num_layers": 1,
-        "memory_attention_feed_forward_hidden_size": 64,
-        "memory_attention_rope_feat_sizes": [8, 8],
-        "memory_encoder_hidden_size": WIDTH,
-        "memory_encoder_output_channels": 64,
-        "mask_downsampler_embed_dim": WIDTH,
-        "memory_fuser_embed_dim": WIDTH,
-        "memory_fuser_intermediate_dim": 64,
-        "image_size": IMAGE,
-    }
-    torch.manual_seed(0)
-    config = Sam3VideoConfig(
-        detector_config=detector,
-        tracker_config=tracker,
-        low_res_mask_size=32,
-        score_threshold_detection=0.0,
-        new_det_thresh=0.0,
-    )
-    Sam3VideoModel(config).save_pretrained(folder)
-    words = ("<|startoftext|>", "<|endoftext|>", "rubber</w>", "band</w>")
-    vocabulary = {word: number for number, word in enumerate(words)}
-    CLIPTokenizer(vocab=vocabulary, merges=[]).save_pretrained(folder)
+    save_tiny_sam3(folder)
     return folder
 
 

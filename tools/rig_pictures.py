@@ -25,6 +25,7 @@ from pipeline.style import COLORS, INK, STYLE
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "docs" / "rig"
 TRELOAR = ROOT.parent / "shared/data/treloar_1944.csv"
+SMOOTHED = 0.1  # s before the release, where the filtered force falls already
 
 
 def main() -> None:
@@ -71,7 +72,8 @@ def pulls(done: dict) -> None:
     figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.2))
     for color, (band, one) in zip(COLORS, done.items(), strict=False):
         signals = one.signals
-        held = (signals.time > signals.grasp_time) & (signals.time < signals.release_time)
+        end = signals.release_time - SMOOTHED
+        held = (signals.time > signals.grasp_time) & (signals.time < end)
         force = np.linalg.norm(signals.force, axis=1)
         draw = -signals.position[:, 1]
         left.plot(100 * draw[held], force[held], color=color, label=band)

@@ -105,11 +105,13 @@ def launch_from(
 
 
 def fly(position: np.ndarray, velocity: np.ndarray, floor: float, drag: float) -> float:
-    """Where a projectile from `position` (y, z) with `velocity` meets z = floor.
+    """Where a projectile from `position` (y, z) with `velocity` meets z = floor: there, if below.
 
     Args:
         drag: Deceleration per squared speed [1/m].
     """
+    if position[1] <= floor:
+        return float(position[0])
 
     def rates(time: float, state: np.ndarray) -> np.ndarray:
         speed = np.hypot(state[2], state[3])

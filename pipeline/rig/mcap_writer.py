@@ -8,8 +8,6 @@ from typing import Any
 from mcap.writer import CompressionType, Writer
 from rosbags.typesys import Stores, get_typestore
 
-NANOSECOND = 1e-9
-
 
 class BagWriter:
     """Collects messages and writes them in the order in which they would have been received.

@@ -41,7 +41,7 @@ def best_loss(params, sling, episode) -> tuple[float, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def quick(coarse):
-    budget = {"generations": 7, "population": 20, "k_top": 2, "cma_rollouts": 160}
+    budget = {"generations": 12, "population": 20, "k_top": 2, "cma_rollouts": 320}
     optimizer = coarse.optimizer.model_copy(update=budget)
     return coarse.model_copy(update={"optimizer": optimizer})
 
@@ -67,4 +67,4 @@ def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorde
     own_loss, theta = best_loss(quick, sling, own)
     rig_loss, _ = best_loss(quick, sling, rig)
     assert np.isclose(theta[0], TRUTH[0], rtol=0.03)
-    assert rig_loss > 1.5 * own_loss
+    assert rig_loss > 3 * own_loss

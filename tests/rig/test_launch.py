@@ -72,6 +72,12 @@ def test_a_low_flight_hits_the_forks_foot(coarse: Params) -> None:
     floor = -0.52
     low = np.array([-0.2, floor + 0.03]), np.array([3.0, 0.0])
     assert fly(*low, floor, 0.0) > 0 > fly(*low, floor + FOOT, 0.0)
+    table = coarse.setup.model_copy(update={"fork_height": 0.1})
+    table = coarse.model_copy(update={"setup": table})
+    trial = launch("band1", table, (-0.27, 0.0), None)
+    assert trial.failure.startswith("hits the fork") and np.isnan(trial.landing_y)
+    short = launch("band1", table, (-0.24, 0.0), None)
+    assert "fell before the fork" in short.failure and np.isnan(short.landing_y)
 
 
 def test_a_kick_moves_the_landing(coarse: Params) -> None:

@@ -32,6 +32,14 @@ def test_it_swings_back_like_an_oscillator(motion: Motion) -> None:
     np.testing.assert_allclose(found[:, :3] - place, shape * offset, atol=1e-8)
 
 
+def test_without_a_load_it_stays_on_a_path_that_moves(motion: Motion) -> None:
+    follow, times = Servo(MASS, STIFFNESS, DAMPING).following(motion), np.linspace(2.5, 5.5, 40)
+    start = np.concatenate([motion.position(2.5), motion.position(2.5, 1)])
+    found = follow.alone(start, times, 1e-9)
+    np.testing.assert_allclose(found[:, :3], motion.position(times), atol=1e-7)
+    np.testing.assert_allclose(found[:, 3:], motion.position(times, 1), atol=1e-6)
+
+
 def test_a_steady_load_pushes_it_aside_by_its_stiffness(motion: Motion) -> None:
     follow = Servo(MASS, STIFFNESS, DAMPING).following(motion)
     load = np.array([0.0, 12.0, -1.0])

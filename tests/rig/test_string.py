@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from pipeline.params import Params
 from pipeline.rig import string as string_module
@@ -92,6 +93,40 @@ def test_relaxation_under_a_constant_hold(string: ElasticString) -> None:
     np.testing.assert_allclose(force / force[0], expected, rtol=8e-3)
 
 
+def test_out_and_back_is_the_laws_loop(string: ElasticString) -> None:
+    """A thin band drawn on and let back: F by the law alone, whose memory SciPy follows."""
+    weight, tau, omega = 0.4, 0.1, 2 * np.pi / 0.5
+    lossy = replace(ELASTIC, relaxation=np.array([[weight, tau]]), viscosity=0.02)
+    thin = replace(string, edges=20, diameter=0.0005, mass=6e-5, rubber=lossy)
+
+    def draw(time: np.ndarray) -> np.ndarray:
+        return 0.3 + 0.05 * (1 - np.cos(omega * time))
+
+    def hand(time: float, x: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+        y = np.zeros_like(x)
+        y[1] = -0.05 * omega**2 * np.cos(omega * time)
+        return y
+
+    y = thin.at_rest(bent_at(thin, np.array([0.0, -0.3, 0.0])), 1e-6, held=True)
+    times = np.linspace(0, 0.5, 51)
+    force = thin.at_middle(thin.integrate(y, times, 1e-5, hand=hand)[1])[:, 1]
+
+    def stress(time: np.ndarray) -> np.ndarray:
+        return nominal_stress(np.hypot(0.1375, draw(time)) / 0.26)[0]
+
+    def forget(time: float, w: np.ndarray) -> np.ndarray:
+        return (stress(time) - w) / tau
+
+    memory = solve_ivp(forget, (0, 0.5), [stress(0.0)], t_eval=times, rtol=1e-9, atol=1e-9).y[0]
+    rate = (stress(times + 1e-5) - stress(times - 1e-5)) / 2e-5
+    total = (1 + weight) * stress(times) - weight * memory + lossy.viscosity * rate
+    area = np.pi / 4 * thin.diameter**2
+    expected = 2 * lossy.scale * area * total * draw(times) / np.hypot(0.1375, draw(times))
+    np.testing.assert_allclose(force, expected, rtol=1.5e-2)  # it swings a little
+    there, back = force[13], force[-14]  # a quarter of the way, at equal draws
+    assert back < 0.9 * there
+
+
 def test_hanging_band(string: ElasticString) -> None:
     """It is at rest and symmetric, and hangs nearly as deep as two straight halves would."""
     nodes = hang(string, 1e-6)
@@ -110,3 +145,17 @@ def test_finer_edges_change_little(params: Params) -> None:
         y = mesh.at_rest(bent_at(mesh, DRAWN), 1e-6, held=True)
         forces.append(mesh.at_middle(y)[1])
     assert np.isclose(*forces, rtol=2e-3)
+
+
+@pytest.mark.parametrize("stretch", [1.0, 2.0])
+def test_drag_is_a_cylinders(string: ElasticString, stretch: float) -> None:
+    """rho C d L V^2 / 2 of a straight band that moves across itself, none along itself."""
+    straight = replace(string, length=0.275 / stretch, clamp_direction=np.array([1.0, 0.0, 0.0]))
+    x = (stretch * np.append(0, np.cumsum(straight.sizes)) - 0.1375)[:, None] * [1.0, 0.0, 0.0]
+    still, moving, along = (straight.state(x) for _ in range(3))
+    moving[:, 4], along[:, 3] = 7.0, 7.0
+    at_rest = straight.forces(still)[0]
+    expected = -0.5 * 1.2 * 1.1 * 0.01 / np.sqrt(stretch) * 0.275 * 7**2
+    drag = (straight.forces(moving)[0] - at_rest).sum(axis=0)
+    np.testing.assert_allclose(drag, [0, expected, 0], atol=1e-9)
+    np.testing.assert_allclose(straight.forces(along)[0], at_rest, atol=1e-9)

@@ -1,0 +1,59 @@
+"""Nothing of the rig reaches the identification but the recording, `setup:` and `bands:`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from ruamel.yaml import YAML
+
+from pipeline.identify.loss import EpisodeLoss
+from pipeline.params import Params
+from pipeline.recording.build import build_episode
+from pipeline.rig.interaction import Interaction
+from pipeline.sling.model import Sling
+from tests.rig.conftest import ROOT
+
+STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
+WORLD = {"record", "trials"}
+
+
+class Hidden:
+    def __getattribute__(self, name: str):
+        raise AssertionError(f"rig.{name} was read")
+
+
+def test_an_episode_and_its_loss_are_made_without_the_world(
+    coarse: Params, recorded: tuple[Path, Interaction]
+) -> None:
+    """What knows nothing of `rig:` gives the same numbers."""
+    blind = coarse.model_copy(update={"rig": Hidden()})
+    with pytest.raises(AssertionError, match=r"rig\.seed was read"):
+        blind.rig.seed  # noqa: B018
+    band = blind.bands["band1"]
+    episode = build_episode(recorded[0], "band1", blind)
+    sling = Sling.of(band, blind.setup, blind.sling)
+    EpisodeLoss.of(blind, "sling2sim2real", episode, sling)
+
+
+def test_stages_depend_on_the_world_where_they_may() -> None:
+    for name, stage in STAGES.items():
+        hidden = [key for key in stage.get("params", []) if key.split(".")[0] == "rig"]
+        assert bool(hidden) == (name in WORLD), f"{name}: {hidden}"
+
+
+def test_no_launch_reaches_what_is_identified() -> None:
+    """Landings go to the report alone, and a stage reads raw recordings, not the truth."""
+    for name, stage in STAGES.items():
+        data = [dep for dep in stage["deps"] if dep.startswith("data/")]
+        assert name == "report" or not any(dep.startswith("data/trials/$") for dep in data)
+        assert name != "record" or not data
+
+
+def test_a_recording_holds_no_truth(recorded: tuple[Path, Interaction]) -> None:
+    """Topics of a lab (test_record.py) are all of it: nothing is attached, no topic has notes."""
+    with open(recorded[0], "rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary.statistics.attachment_count == summary.statistics.metadata_count == 0
+    assert not any(channel.metadata for channel in summary.channels.values())

@@ -1,0 +1,158 @@
+"""Each number under `rig:` changes the recording, and just those topics that it should."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+
+from pipeline.params import Params, Section
+from pipeline.rig import camera, interaction, motion, record
+from pipeline.rig.launch import launch
+
+TF, GRIPPER = "/tf_static", "/franka_gripper/joint_states"
+POSE, WRENCH = "/franka_robot_state_broadcaster/current_pose", "/ft_sensor/wrench"
+COLOR, COLOR_INFO = "/camera/color/image_raw/compressed", "/camera/color/camera_info"
+DEPTH, DEPTH_INFO = "/camera/depth/image_raw/compressedDepth", "/camera/depth/camera_info"
+PICTURE = {COLOR, DEPTH}
+CAMERA = PICTURE | {COLOR_INFO, DEPTH_INFO}
+FELT = {POSE, WRENCH}  # what moves the hand; whether a pixel changes too is left open
+EVERYTHING = CAMERA | {TF, GRIPPER, POSE, WRENCH}
+LANDING = {"landing"}
+
+HASTE = {"PULL": 1.2, "PULLED": 2, "OPEN": 2.4, "RETREAT": 2.5, "RETREATED": 2.6, "END": 2.7}
+CHANGES = {  # the longest prefix of a number's name counts
+    "seed": EVERYTHING | LANDING,
+    "edges": FELT | LANDING,
+    "tolerance": FELT | LANDING,
+    "pad_friction": FELT,
+    "tracking_error": FELT,
+    "pose_latency": {POSE},
+    "release_jitter": LANDING,
+    "projectile_drag": LANDING,
+    "base": PICTURE | {TF, POSE},
+    **{f"base.{i}": {TF, POSE} for i in range(3, 7)},  # turns what is reported, moves nothing
+    "tool_pitch": FELT,
+    "arm": FELT,
+    "clock": {GRIPPER, POSE, WRENCH},
+    "wrench": {WRENCH},
+    "wrench.yaw": {TF, WRENCH},
+    "camera.position": PICTURE | {TF},
+    "camera.target": PICTURE | {TF},
+    "camera.focal": CAMERA,
+    "camera.range": {DEPTH},
+    "camera.exposure": PICTURE,
+    "camera.clock": CAMERA,
+    "camera.drop_rate": CAMERA,
+    "camera.color_noise": {COLOR},
+    "camera.depth_noise": {DEPTH},
+    "camera.dropout": {DEPTH},
+    "camera.edge_loss": {DEPTH},
+    "camera.edge_fly": {DEPTH},
+    "camera.translation_error": {TF},
+    "camera.rotation_error": {TF},
+    "bands.band1": FELT | LANDING,
+    "bands.band1.color": {COLOR},
+}
+
+
+def numbers(value: Any, name: str = "") -> Iterator[str]:
+    if isinstance(value, Section):
+        value = dict(value)
+    if isinstance(value, tuple):
+        value = {str(i): one for i, one in enumerate(value)}
+    if not isinstance(value, dict):
+        yield name
+        return
+    for key, one in value.items():
+        yield from numbers(one, f"{name}.{key}".lstrip("."))
+
+
+def changed(value: Any, name: str) -> Any:
+    """`value` with another number at `name`, which may be its own."""
+    if not name:
+        return value + 4 if isinstance(value, int) else value * 1.5 + 0.01 * (value == 0)
+    key, _, rest = name.partition(".")
+    if isinstance(value, tuple):
+        at = int(key)
+        return (*value[:at], changed(value[at], rest), *value[at + 1 :])
+    if isinstance(value, dict):
+        return {**value, key: changed(value[key], rest)}
+    return value.model_copy(update={key: changed(getattr(value, key), rest)})
+
+
+def expected(name: str) -> set[str]:
+    fits = [one for one in CHANGES if f"{name}.".startswith(f"{one}.")]
+    assert fits, f"rig.{name}: say here what it changes"
+    return CHANGES[max(fits, key=len)]
+
+
+class Laboratory:
+    """Recordings of a rough band, quickly pulled, by a small camera: messages by topic."""
+
+    def __init__(self, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.path, self.done = path, {}
+        self.pull_and_release = record.pull_and_release
+        monkeypatch.setattr(record, "SENSOR_RATE", 100)
+        monkeypatch.setattr(record, "PIXELS_APART", 0.1)
+        monkeypatch.setattr(camera, "RATE", 5.0)
+        monkeypatch.setattr(camera, "FIRST_FRAME", 0.02)  # so that one sees the recoil, at 2.42 s
+        for module in (motion, interaction, record):
+            for name in HASTE.keys() & vars(module).keys():
+                monkeypatch.setattr(module, name, HASTE[name])
+        monkeypatch.setattr(record, "pull_and_release", self.remembered)
+
+    def remembered(self, string, hanging, motion, sensor_times, camera_times, params, progress):
+        """Integrate anew only where something that goes in is new."""
+        world = {name: getattr(params.rig, name) for name in ("pad_friction", "arm", "tolerance")}
+        arrays = hanging, motion.amplitude, motion.frequency, motion.phase, camera_times
+        key = id(string), repr(world), *(array.tobytes() for array in arrays)
+        if key not in self.done:
+            seen = SimpleNamespace(rig=SimpleNamespace(**world), setup=params.setup)
+            arguments = string, hanging, motion, sensor_times, camera_times, seen
+            done = self.pull_and_release(*arguments)
+            rounded = {name: getattr(done, name).round(9) for name in ("force", "acceleration")}
+            self.done[key] = replace(done, **rounded)  # the last bits hang on the frames
+        return self.done[key]
+
+    def __call__(self, params: Params) -> dict[str, Any]:
+        record.record(params, "band1", self.path, picture_scale=0.1)
+        topics: dict[str, Any] = {}
+        with open(self.path, "rb") as stream:
+            for _, channel, message in make_reader(stream).iter_messages():
+                content = message.data, message.log_time, message.publish_time
+                topics.setdefault(channel.topic, []).append(content)
+        return topics
+
+
+def test_each_number_changes_what_it_should(
+    params: Params, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rough = {"edges": 8, "tolerance": 1e-2}
+    eyes = {"drop_rate": 0.3, "dropout": 0.01}  # few frames, few pixels: let chance have its way
+    rough["camera"] = params.rig.camera.model_copy(update=eyes)
+    rough["bands"] = {"band1": params.rig.bands["band1"]}
+    rig = params.rig.model_copy(update=rough)
+    laboratory = Laboratory(tmp_path / "band1.mcap", monkeypatch)
+
+    def everything(rig: Section, fly: bool) -> dict[str, Any]:
+        world = params.model_copy(update={"rig": rig})
+        landing = {"landing": launch("band1", world, (-0.30, -0.15), 0)} if fly else {}
+        return laboratory(world) | landing
+
+    before = everything(rig, True)
+    assert set(before) == EVERYTHING | LANDING
+    wrong = {}
+    for name in numbers(rig):
+        now = everything(changed(rig, name), "landing" in expected(name))
+        found = {topic for topic in now if now[topic] != before[topic]}
+        if FELT <= expected(name) and TF not in expected(name):
+            found -= PICTURE
+        if found != expected(name):
+            wrong[name] = found ^ expected(name)
+    assert not wrong, "changed, or should have"

@@ -146,14 +146,13 @@ def _topics(container: Container) -> list[Topic]:
 
 def _add_roles(topics: list[Topic], recording: Recording) -> None:
     by_name = {row.topic: row for row in topics}
-    middle = float(np.median([stream.delay for stream in recording.streams.values()]))
     for role, stream in recording.streams.items():
         row = by_name[stream.topic]
         row.role = f"{row.role}, {role}" if row.role else role
         row.why = recording.choices[role]
         row.rate, row.longest_gap = 1 / stream.period, stream.longest_gap
         row.missing, row.lost = stream.missing, stream.lost
-        row.delay, row.clock_offset = stream.delay, stream.delay - middle
+        row.delay, row.clock_offset = stream.delay, recording.wrench.delay - stream.delay
         row.notes = list(stream.notes)
 
 

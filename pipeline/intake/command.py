@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.intake.check import band_of, look_at
-from pipeline.intake.output import expect_writable
+from pipeline.intake.output import expect_writable, written
 
 
 def check(
@@ -43,10 +43,12 @@ def check(
     if sheet:
         from pipeline.intake.sheet import draw_sheet
 
-        look.report.written.append(draw_sheet(look, params, sheet))
+        with written(sheet):
+            look.report.written.append(draw_sheet(look, params, sheet))
     if rrd:
         from pipeline.intake.timeline import write_timeline
 
-        look.report.written.append(write_timeline(look, params, rrd))
+        with written(rrd):
+            look.report.written.append(write_timeline(look, params, rrd))
     report = look.report
     return report.to_json() if as_json else report.to_text(), int(not report.usable)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from pipeline.errors import UserError
@@ -19,3 +21,12 @@ def expect_writable(path: Path, suffix: str) -> None:
         raise UserError(f"{path}: there is no folder {folder}, make it first")
     if not os.access(folder, os.W_OK) or (path.exists() and not os.access(path, os.W_OK)):
         raise UserError(f"{path}: may not be written here, choose another folder")
+
+
+@contextmanager
+def written(path: Path) -> Iterator[None]:
+    """Raises UserError where writing `path` fails: a full disk, a strange file system."""
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror or error})") from error

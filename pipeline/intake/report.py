@@ -13,7 +13,7 @@ class Topic:
     Attributes:
         why: How it was chosen for its role.
         delay: Median of log_time - header.stamp.
-        clock_offset: Its stamps against those of the other topics' clock, by their delays.
+        clock_offset: By how much its stamps are ahead of the force's, by the times of receipt.
         missing: Messages that a constant rate would have had in the gaps.
         lost: Damaged, not finite or doubled messages.
         notes: What was repaired or lost, in words.
@@ -122,8 +122,10 @@ def _topics(topics: list[Topic]) -> list[str]:
         line = f"{row.topic:<{width}}  {row.role or '-':<11}"
         rows.append((line + "".join(f"{cell:>13}" for cell in cells)).rstrip())
     chosen = [row for row in topics if row.why]
+    wide = max([len(row.role) for row in chosen], default=0) + 2
     if chosen:
-        rows += ["", "chosen", *(f"  {r.role:<12}{r.topic}  ({r.type}): {r.why}" for r in chosen)]
+        rows += ["", "chosen"]
+        rows += [f"  {r.role:<{wide}}{r.topic}  ({r.type}): {r.why}" for r in chosen]
     return rows
 
 

@@ -15,10 +15,12 @@ MISSING = 0.05  # share of the messages
 FORCE_RATE, PICTURE_RATE = 900.0, 20.0  # Hz
 COVERAGE = {"hanging": 0.7, "drawn": 0.9, "recoil": 0.6, "swing": 0.7}
 EMPTY = 0.05  # share of the pictures
-TIPS_OFF, HAND_OFF = 0.003, 0.006  # m
-SURE = 2.0  # standard errors from which something is more than noise
+TIPS_OFF, HAND_OFF = 0.004, 0.006  # m
+SURE = 3.0  # standard errors from which something is more than noise
 NOISE = DRIFT = SETTLED = 0.02  # of the held force; drift from grasp to release
-DELAY, CLOCK = 0.002, 0.1  # s
+DELAY = 0.002  # s
+AHEAD = 0.01  # s of stamps before the force's, by the times of receipt
+BEHIND, SLOW = 0.02, {"color": 0.1, "depth": 0.1, "gripper": 0.1}  # s after; pictures take a while
 LEAD_IN, PAUSE = 0.5, 1.0  # s
 STILL = 0.005  # m/s
 TURN = 2.0  # degrees
@@ -41,6 +43,7 @@ def cautions_of(report: Report, done: Processed, setup: object) -> list[Caution]
         *_of_force(report, setup),
         *_of_motion(report, done.signals, setup),
         *_of_pictures(report),
+        *_of_sensor(done),
         *_of_frames(report),
     ]
 
@@ -85,12 +88,14 @@ def _of_rate(row: Topic, roles: list[str]) -> Iterator[Caution]:
 
 def _of_clocks(report: Report) -> Iterator[Caution]:
     for row in report.topics:
-        if row.role and abs(row.clock_offset) > CLOCK:
+        most = max(SLOW.get(role, BEHIND) for role in (row.role or "").split(", "))
+        if row.role and not -most <= row.clock_offset <= AHEAD:
             yield Caution(
                 "clock",
-                f"the stamps of {row.topic} are {row.clock_offset:+.3f} s off the other topics' by"
-                " the times of receipt",
-                "stamp all topics by one clock (chrony or PTP between computers)",
+                f"the stamps of {row.topic} are {row.clock_offset:+.3f} s off the force's by the"
+                " times of receipt",
+                "stamp all topics by one clock (chrony or PTP between computers), when it is"
+                " measured",
             )
     for role, delay in report.delays.items():
         value, error = delay["value_s"] or 0.0, delay["error_s"] or 0.0
@@ -135,17 +140,15 @@ def _of_force(report: Report, setup: object) -> Iterator[Caution]:
 
 def _of_motion(report: Report, signals: Signals, setup: object) -> Iterator[Caution]:
     facts = report.signals
-    if facts["grasp_s"] < LEAD_IN:
+    if round(facts["grasp_s"], 2) < LEAD_IN:
         what = f"only {facts['grasp_s']:.2f} s of the empty hand come before the grasp"
         yield Caution("lead_in", what, f"record {LEAD_IN} s or more, the force is tared there")
     still, change = pause(signals)
     if still < PAUSE or change > SETTLED:
-        yield Caution(
-            "pause",
-            f"the hand rests for {still:.1f} s before the release, and in the last half second the"
-            f" force changes by {100 * change:.1f} %",
-            "pause for 1 to 2 s, until the force has settled",
-        )
+        what = f"the hand rests for {still:.1f} s before the release"
+        if change > SETTLED:
+            what += f", and in its last half second the force changes by {100 * change:.1f} %"
+        yield Caution("pause", what, "pause for 1 to 2 s, until the force has settled")
     if facts["turn_deg"] > TURN and setup.tool is None:
         what = f"the hand turns by {facts['turn_deg']:.1f} degrees, and its weight with it"
         yield Caution("turn", what, "keep its orientation, or give setup.tool in params.yaml")
@@ -177,14 +180,30 @@ def _of_pictures(report: Report) -> Iterator[Caution]:
                 f" {SEEN_AS[row['phase']]} ({row['start']:.2f} - {row['end']:.2f} s)",
                 look,
             )
+    shown = {row["phase"] for row in report.phases}
+    for phase in (phase for phase in SEEN_AS if phase not in shown):
+        what = f"no picture shows how the band {SEEN_AS[phase]}"
+        yield Caution("unseen", what, "record the camera from before the grasp until it has swung")
     facts = report.cloud
     if facts["empty"] > EMPTY * facts["frames"]:
         what = f"{facts['empty']} of {facts['frames']} pictures show no band"
         yield Caution("empty", what, look)
-    for name, what in (("damaged", "cannot be decoded"), ("unpaired", "have no colour picture")):
+    for name, what, cure in (
+        ("damaged", "cannot be decoded", "see whether the camera's driver sends empty ones"),
+        ("unpaired", "have no colour picture", "record both at one rate, with reliable QoS"),
+    ):
         if facts[name] > EMPTY * facts["frames"]:
-            cure = "record colour and depth at one rate, with reliable QoS"
             yield Caution(name, f"{facts[name]} depth pictures {what}", cure)
+
+
+def _of_sensor(done: Processed) -> Iterator[Caution]:
+    frame, known = done.recording.wrench.frame, done.recording.transforms.frames
+    if frame not in known and not done.geometry.sensor_is_fixed:
+        yield Caution(
+            "sensor",
+            f"/tf_static does not know the force's frame {frame!r}, it is taken for the hand's",
+            "publish how the sensor is turned against the tool centre point",
+        )
 
 
 def _of_frames(report: Report) -> Iterator[Caution]:

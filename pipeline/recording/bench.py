@@ -15,13 +15,11 @@ from pathlib import Path
 import cv2
 
 from pipeline.bench import timed
+from pipeline.recording.build import view_of
 from pipeline.recording.cloud import cloud_of
-from pipeline.recording.delays import delays_of
-from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.masks import masker
-from pipeline.recording.signals import signals_of
-from pipeline.recording.view import Scene, View
+from pipeline.recording.view import View
 
 STEPS = ("decode", "points", "learn", "mask", "cloud")
 
@@ -42,7 +40,7 @@ def bench_recording(path: Path, params: object) -> dict:
     band = next(iter(params.bands.values()))
     with on_one_core() as how:
         recording, read, _ = timed(partial(read_recording, Path(path), params.setup))
-        view, signals, _ = timed(partial(_view, recording, band, params))
+        (view, _), signals, _ = timed(partial(view_of, recording, band, params))
         spent, sizes = _steps(view, params.cloud)
     count = max(1, len(sizes))
     after = sum(spent.values()) - spent["decode"]
@@ -73,14 +71,6 @@ def on_one_core() -> Iterator[str]:
     finally:
         os.sched_setaffinity(0, allowed)
         cv2.setNumThreads(threads)
-
-
-def _view(recording: object, band: object, params: object) -> View:
-    geometry = geometry_of(recording, params.setup)
-    recording = delays_of(recording, geometry, params).corrected(recording)
-    episode, force, tool = params.episode, params.force, params.setup.tool
-    signals = signals_of(recording, geometry, episode, force, tool)
-    return View(recording, geometry, Scene.of(band, params.setup, signals), episode.duration)
 
 
 def _steps(view: View, cloud: object) -> tuple[dict[str, float], list[int]]:

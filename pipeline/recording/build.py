@@ -47,14 +47,19 @@ def process(path: Path, band: object, params: object) -> Processed:
 
 def process_recording(recording: Recording, band: object, params: object) -> Processed:
     """As `process`, from a recording that was read already."""
+    view, delays = view_of(recording, band, params)
+    clouds, scene = clouds_of(view, params.cloud), view.scene
+    return Processed(view.recording, view.geometry, scene.signals, scene, clouds, delays, view)
+
+
+def view_of(recording: Recording, band: object, params: object) -> tuple[View, Delays]:
+    """What the camera sees, with everything known that the mask needs. Raises UserError."""
     geometry, setup = geometry_of(recording, params.setup), params.setup
     delays = delays_of(recording, geometry, params)
     recording = delays.corrected(recording)
     signals = signals_of(recording, geometry, params.episode, params.force, setup.tool, delays.felt)
     scene = Scene.of(band, setup, signals)
-    view = View(recording, geometry, scene, params.episode.duration)
-    clouds = clouds_of(view, params.cloud)
-    return Processed(recording, geometry, signals, scene, clouds, delays, view)
+    return View(recording, geometry, scene, params.episode.duration), delays
 
 
 def build_episode(path: Path, band_name: str, params: object) -> Episode:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pipeline.errors import UserError
 from pipeline.recording.camera_delay import camera_delay
@@ -35,7 +35,11 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Delays:
-    """Of pose (and twist) and of the camera's two topics; and the tool that told the pose's."""
+    """Of pose (and twist) and of the camera's two topics; and the tool that told the pose's.
+
+    Attributes:
+        felt: Its `delay` is what `pose` leaves of it, 0 where that is no more than its error.
+    """
 
     pose: Estimate
     camera: Estimate
@@ -62,6 +66,10 @@ def delays_of(recording: Recording, geometry: Geometry, params: object) -> Delay
     pose = _judged(given.pose, lambda: felt and (felt.delay, felt.delay_error))
     if pose.applied:
         recording = recording.shifted(pose=pose.value)
+    if felt is not None:
+        left = felt.delay - (pose.value if pose.applied else 0.0)
+        sure = abs(left) > SIGMAS * max(felt.delay_error, LEAST_ERROR)
+        felt = replace(felt, delay=left if sure else 0.0)
     camera = _judged(given.camera, lambda: camera_delay(recording, geometry))
     return Delays(pose, camera, felt)
 

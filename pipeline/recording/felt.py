@@ -2,7 +2,8 @@
 
 In free motion the sensor feels its own tool's weight and inertia, which the pose tells but for the
 tool's mass. The band's force is not used: that it leads the path is what damping does, and a delay
-that was taken from it would take the damping away.
+that was taken from it would take the damping away. What of its tool a sensor takes off by itself
+is not felt, and so not taken off again.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ from scipy.signal import savgol_filter
 from pipeline.recording.events import MARGIN, SETTLE, events_of
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.input.reader import Recording
-from pipeline.recording.motion import ACCELERATION_WINDOW, Motion
+from pipeline.recording.motion import Motion
 from pipeline.recording.tool import load_per_mass
 
 LONGEST = 0.1  # s of either sign
 BLOCK = 0.2  # s in which errors of the smoothed force go together
 LEAST_LOAD = 8.0  # standard deviations by which the tool's mass must be felt
+WINDOW = 0.15  # s of the fits by which the load changes
 STEP = 0.002  # s of the grid on which the load is tabulated
 ROUNDS = 8
 
@@ -30,8 +32,10 @@ class Felt:
     """What the force sensor carries, as it feels it.
 
     Attributes:
-        mass, mass_error: Of the tool, and its standard deviation [kg].
+        mass, mass_error: Of the tool, and its standard deviation [kg]; negative where the sensor
+            has the other sign, or takes off more than there is.
         delay, delay_error: By which the pose's stamps are late, and its standard deviation [s].
+        center: Of mass [m], as in setup.tool.
     """
 
     mass: float
@@ -39,6 +43,20 @@ class Felt:
     delay: float
     delay_error: float
     center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def inertia(
+        self, motion: Motion, geometry: Geometry, times: np.ndarray, release: float
+    ) -> np.ndarray:
+        """Part of the raw force at times (T,) [s] that is the tool's inertia, shape (T, 3) [N].
+
+        Not the weight: a sensor may know that, and the hand does not turn. The hand may start back
+        at `release` [s].
+        """
+        at, jump = times + self.delay, release + self.delay
+        center = np.array(self.center)
+        return self.mass * load_per_mass(
+            motion, geometry, at, center, gravity=np.zeros(3), jump=jump
+        )
 
 
 def felt_tool(recording: Recording, geometry: Geometry, tool: object | None) -> Felt | None:
@@ -52,18 +70,15 @@ def felt_tool(recording: Recording, geometry: Geometry, tool: object | None) -> 
     motion = Motion.of(recording.pose, geometry, origin)
     grasp, release = events_of(recording, motion)
     release = release.time
-    size = 2 * round(ACCELERATION_WINDOW / recording.wrench.period / 2) + 1
-    sure = MARGIN + ACCELERATION_WINDOW / 2
+    sure = MARGIN + WINDOW / 2
     inside = (t > max(t[0], motion.time[0]) + sure) & (t < min(t[-1], motion.time[-1]) - sure)
     free = np.flatnonzero(inside & ((t < grasp - sure) | (t > release + SETTLE + sure)))
-    if len(free) < size or len(t) <= size:
+    if len(free) * recording.wrench.period < WINDOW:
         return None
     center = np.zeros(3) if tool is None else np.array(tool.center)
     grid = np.arange(motion.time[0], motion.time[-1], STEP)
     load = load_per_mass(motion, geometry, grid, center)
-    width = 2 * round(ACCELERATION_WINDOW / STEP / 2) + 1
-    if len(grid) <= width:
-        return None
+    width = 2 * round(WINDOW / STEP / 2) + 1
     change = savgol_filter(load, width, 3, deriv=1, delta=STEP, axis=0)
     table = np.hstack([load, change])
     t, force, late = t[free], raw[free], t[free] > release
@@ -87,7 +102,8 @@ def felt_tool(recording: Recording, geometry: Geometry, tool: object | None) -> 
         delay = float(np.clip(delay + product / mass, -LONGEST, LONGEST))
     if abs(delay) >= LONGEST or abs(mass) < LEAST_LOAD * errors[0]:
         return None
-    return Felt(abs(mass), float(errors[0]), delay, float(errors[1] / abs(mass)), tuple(center))
+    mass, delay_error = float(mass), float(errors[1] / abs(mass))
+    return Felt(mass, float(errors[0]), delay, delay_error, tuple(center.tolist()))
 
 
 def _noise(left: np.ndarray, blocks: np.ndarray, fitted: int) -> float:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import make_lsq_spline
 from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation, Slerp
 
@@ -16,7 +18,8 @@ from pipeline.recording.input.reader import Stream
 
 VELOCITY_WINDOW = 0.05  # s of the local cubic fits that are differentiated once
 SPARSE = 20  # times longer than its messages at their usual rate would take
-ACCELERATION_WINDOW = 0.15  # s of the quintic ones that are differentiated twice
+DEGREE = 5  # of the splines that are differentiated twice
+KNOTS_APART, LEAST_BETWEEN, PHASES = 0.05, 2, 3  # s, in samples at least, and splines
 
 
 def expect_dense(stream: Stream) -> None:
@@ -67,37 +70,48 @@ class Motion:
         return Slerp(self.time, self.turn)
 
     def velocity(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Even times (M,), position and velocity there, each (M, 3).
+        """Even times (M,), position and velocity there, each (M, 3). Raises UserError.
 
         Local cubic fits (Savitzky-Golay) on an even grid, onto which the samples are interpolated.
         """
-        return self._derived(self.path, VELOCITY_WINDOW, 3, 1)
+        grid, even = signal.uniform(self.time, self.path, 1 / self.period)
+        size = max(5, 2 * round(VELOCITY_WINDOW / self.period / 2) + 1)
+        if len(grid) <= size:
+            raise UserError("the pose is too short to differentiate")
+        return grid, even, savgol_filter(even, size, 3, deriv=1, delta=self.period, axis=0)
 
     def acceleration(
         self, times: np.ndarray, point: np.ndarray, jump: float | None = None
     ) -> np.ndarray:
         """Of a point (3,) that is fixed in the hand's frame, at times (T,); shape (T, 3).
 
-        Nothing is smoothed over the time `jump` [s], at which a hand that is let go starts back.
+        The mean of quintic splines, fitted to the samples with knots at several phases. At the time
+        `jump` [s], at which a hand that is let go starts back, the acceleration may jump, position
+        and velocity may not. Beyond the samples the hand rests.
         """
         path = self.path + self.turn.apply(point)
-        jump = np.inf if jump is None else jump
-        found = np.empty((len(times), 3))
-        for samples, wanted in (
-            (self.time < jump, times < jump),
-            (self.time >= jump, times >= jump),
-        ):
-            if wanted.any():
-                grid, _, second = self._derived(path, ACCELERATION_WINDOW, 5, 2, samples)
-                at = [np.interp(times[wanted], grid, axis) for axis in second.T]
-                found[wanted] = np.stack(at, axis=-1)
+        splines = [
+            make_lsq_spline(self.time, path, knots, DEGREE).derivative(2)(times)
+            for knots in _knots(self.time, self.period, jump)
+        ]
+        found = np.mean(splines, axis=0)
+        found[(times < self.time[0]) | (times > self.time[-1])] = 0.0
         return found
 
-    def _derived(
-        self, path: np.ndarray, window: float, degree: int, order: int, part=slice(None)
-    ) -> tuple[np.ndarray, ...]:
-        grid, even = signal.uniform(self.time[part], path[part], 1 / self.period)
-        size = max(degree + 2, 2 * round(window / self.period / 2) + 1)
-        if len(grid) <= size:
-            raise UserError("the pose is too short to differentiate")
-        return grid, even, savgol_filter(even, size, degree, deriv=order, delta=self.period, axis=0)
+
+def _knots(t: np.ndarray, period: float, jump: float | None) -> Iterator[np.ndarray]:
+    """Of each spline. Knots lie on samples, so that none is without samples around it in a gap."""
+    step = max(round(KNOTS_APART / period), LEAST_BETWEEN)
+    if len(t) <= 4 * step + DEGREE:
+        raise UserError("the pose is too short to differentiate")
+    ends = np.ones(DEGREE + 1)
+    first, last = t[2 * step], t[-1 - 2 * step]  # further apart where there is but one side
+    for phase in range(0, step, -(-step // PHASES)):
+        inner = t[phase::step]
+        if jump is not None and first < jump < last:
+            at = int(np.searchsorted(t, jump))
+            before = t[at - 2 * step + phase :: -step][::-1]
+            after = t[at + 2 * step - phase :: step]
+            inner = np.concatenate([before, [jump] * (DEGREE - 1), after])
+        inner = inner[(inner > first) & (inner < last)]
+        yield np.concatenate([t[0] * ends, inner, t[-1] * ends])

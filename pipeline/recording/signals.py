@@ -25,6 +25,7 @@ from pipeline.recording.tool import Wrench
 MOST_TURN = np.deg2rad(5.0)  # of the hand; beyond it the tool's weight has to be known
 MOST_ASKEW = np.deg2rad(30.0)  # between the held force and the way to the fork
 MOST_DRIFT = 0.05  # of the held force: more is no drift of the sensor
+STRAIGHT = np.deg2rad(1.0)  # of a hand whose weight, if unknown, may be compared with the lead-in's
 MOST_GAP = 0.3  # s over which force and pose may be interpolated
 
 
@@ -79,7 +80,7 @@ def signals_of(
     Args:
         episode, force: Those sections of params.
         tool: setup.tool, which has mass and center, or None.
-        felt: The tool as its inertia shows, where setup.tool does not know it.
+        felt: The tool as its inertia shows; that is taken off where `tool` is None.
 
     Raises:
         UserError: if the recording cannot be used, in one line that begins with its path.
@@ -115,9 +116,11 @@ def _signals(
             " of the tool leaks into the force: give its mass and centre of mass as setup.tool in"
             " params.yaml (mass 0 for a force without it), or keep the hand's orientation"
         )
-    tool = felt if tool is None else tool
     raw = recording.wrench.values
-    wrench = Wrench.of(t, raw, motion, orientation, geometry, tool, release.time)
+    felt = felt if tool is None else None
+    if felt is not None:
+        raw = raw - felt.inertia(motion, geometry, t, release.time)
+    wrench = Wrench.of(t, raw, motion, geometry, tool, release.time)
     held = (t > release.time - 0.5) & (t < release.time - MARGIN / 5)
     if not held.any():
         raise UserError(f"no force in the half second before the release at {release.time:.3f} s")
@@ -163,12 +166,7 @@ def _signals(
         "peak_force": float(np.linalg.norm(smooth[grid < release.time - MARGIN], axis=1).max()),
         "flipped": bool(sign < 0),
         "turn": turn,
-        "tool": tool
-        and {
-            "mass": tool.mass,
-            "center": list(tool.center),
-            "source": "its inertia" if tool is felt else "setup.tool",
-        },
+        "tool": _told(tool, "setup.tool") or _told(felt, "its inertia"),
         "rate": rate,
         "longest_gap": gaps,
         "cutoff_hz": cutoff,
@@ -208,16 +206,21 @@ def _tared(wrench: Wrench, sign: float, grasp: float, release: Release) -> tuple
             f" {LEAD_IN + MARGIN:.2f} s of the empty hand before, to tare the force"
         )
     bias = rest[lead_in].mean(axis=0)
-    end = t > release.time + SETTLE
+    turn, end = wrench.turn[lead_in].mean(), t > release.time + SETTLE
+    if not wrench.load.any():
+        end &= (turn.inv() * wrench.turn).magnitude() < STRAIGHT
     drift = np.zeros(3)
     if end.sum() >= 20:
         late = rest[end].mean(axis=0) - bias
         if np.linalg.norm(late) < MOST_DRIFT * release.drop:
             drift = late / (t[end].mean() - t[lead_in].mean())
     force = rest - bias - drift * (t - t[lead_in].mean())[:, None]
-    turn = wrench.turn if wrench.turn.single else wrench.turn[lead_in].mean()
     tare = {"bias": turn.apply(bias).tolist(), "drift": turn.apply(drift).tolist()}
     return wrench.turn.apply(force), tare
+
+
+def _told(tool: object | None, source: str) -> dict | None:
+    return tool and {"mass": tool.mass, "center": list(tool.center), "source": source}
 
 
 def _sign(hold: np.ndarray, hand: np.ndarray) -> float:

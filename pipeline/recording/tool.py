@@ -21,7 +21,7 @@ class Wrench:
         time: Shape (S,) [s].
         raw: The wrench's frame, shape (S, 3) [N].
         load: Of the tool on the sensor, in the same frame, shape (S, 3); 0 where it is not known.
-        turn: The wrench's frame into frame O: one rotation, or S of them where the tool is known.
+        turn: The wrench's frame into frame O, S rotations.
     """
 
     time: np.ndarray
@@ -35,18 +35,16 @@ class Wrench:
         t: np.ndarray,
         raw: np.ndarray,
         motion: Motion,
-        orientation: Rotation,
         geometry: Geometry,
         tool: object | None,
         release: float,
     ) -> Wrench:
-        """`orientation` is the hand's where it does not turn; at `release` it may start back."""
+        """At `release` [s] the hand may start back."""
+        load = np.zeros_like(raw)
         if tool is not None:
             center = np.array(tool.center)
-            load = tool.mass * load_per_mass(motion, geometry, t, center, release)
-            return cls(t, raw, load, sensor_turns(motion, geometry, t))
-        turn = geometry.sensor.rotation
-        return cls(t, raw, 0 * raw, turn if geometry.sensor_is_fixed else orientation * turn)
+            load = tool.mass * load_per_mass(motion, geometry, t, center, jump=release)
+        return cls(t, raw, load, sensor_turns(motion, geometry, t))
 
 
 def sensor_turns(motion: Motion, geometry: Geometry, times: np.ndarray) -> Rotation:
@@ -61,6 +59,8 @@ def load_per_mass(
     geometry: Geometry,
     times: np.ndarray,
     center: np.ndarray,
+    *,
+    gravity: np.ndarray = GRAVITY,
     jump: float | None = None,
 ) -> np.ndarray:
     """Force on the sensor of each kilogram of tool, gravity less acceleration [N/kg].
@@ -69,11 +69,12 @@ def load_per_mass(
         times: Shape (T,) [s].
         center: Of mass, in the wrench's frame [m], shape (3,); in the hand's frame where the
             wrench is given in one that does not move with the hand.
+        gravity: Frame O [m/s^2]; 0 leaves the inertia alone.
         jump: When the acceleration may jump [s].
 
     Returns:
         Shape (T, 3), in the wrench's frame.
     """
     point = np.asarray(center) if geometry.sensor_is_fixed else geometry.sensor.apply(center)
-    felt = GRAVITY - motion.acceleration(times, point, jump)
+    felt = gravity - motion.acceleration(times, point, jump)
     return sensor_turns(motion, geometry, times).inv().apply(felt)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from pipeline.errors import UserError
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording
@@ -18,6 +19,7 @@ SPARE = 0.05  # of the length, for the accuracy of what was measured
 TAUT = 1.05  # stretch from which the held band is two straight lines
 UNKNOWN = 1000.0  # m, where the depth is not known
 CLOSEST = 0.05  # m before the colour camera
+BLIND = 0.15  # m before the depth camera that it cannot measure: what is said to be there is not
 HIDDEN = 0.02  # m behind what the colour camera sees, from which on a point is hidden
 RECOIL = 0.25  # s after the release in which the band may be longer than when it hangs
 
@@ -110,7 +112,11 @@ class Scene:
 
 
 class View:
-    """Decodes the frames of a recording within the window, one at a time."""
+    """Decodes the frames of a recording within the window, one at a time.
+
+    Raises:
+        UserError: The camera looks elsewhere.
+    """
 
     def __init__(self, recording: Recording, geometry: Geometry, scene: Scene, duration: float):
         self.recording, self.geometry, self.scene = recording, geometry, scene
@@ -126,6 +132,11 @@ class View:
         self.times = np.array([times[k] for k, _ in self.index])
         self.damaged: set[int] = set()
         self.window = self._window()
+        if any(side.start >= side.stop for side in self.window):
+            raise UserError(
+                f"{recording.path}: the camera looks past where the band can be: check its pose in"
+                " /tf_static or setup.camera_to_fork"
+            )
         self.rays = recording.depth_camera.rays().astype(np.float32)  # (H, W, 3)
 
     def __len__(self) -> int:
@@ -182,7 +193,8 @@ class View:
         time = float(self.times[number])
         pixels = None if self._registered(color) else self._pixels(color, seen)
         color = color[window] if pixels is None else onto_depth(color, pixels)
-        return Frame(number, time, color, depth, points, self._near(points, time), pixels)
+        near = self._near(points, time) & (depth > BLIND)
+        return Frame(number, time, color, depth, points, near, pixels)
 
     def _near(self, points: np.ndarray, time: float) -> np.ndarray:
         """Pixels of points (H, W, 3) above the floor that the band's length allows."""

@@ -115,6 +115,82 @@ def test_cautions_come_from_the_report_alone(looked, params) -> None:
     assert "extrinsics" in {caution.about for caution in none}
 
 
+@pytest.mark.parametrize(
+    ("role", "offset", "said"),
+    [
+        ("pose", 0.3, True),
+        ("pose", -0.05, True),
+        ("pose", -0.01, False),
+        ("color", 0.045, True),  # received before it was taken
+        ("color", -0.06, False),  # a slow driver
+        ("color", -0.2, True),
+    ],
+)
+def test_times_of_receipt_tell_of_another_clock(looked, params, role, offset, said) -> None:
+    topics = [
+        replace(row, clock_offset=offset) if row.role == role else row
+        for row in looked.report.topics
+    ]
+    found = cautions_of(replace(looked.report, topics=topics), looked.done, params.setup)
+    words = [caution.what for caution in found if caution.about == "clock"]
+    assert len(words) == said and all(f"{offset:+.3f} s" in what for what in words)
+
+
+def test_a_clock_ahead_is_shown_with_its_sign(tmp_path, params) -> None:
+    """Stamps of the pose that are 0.2 s too large."""
+
+    def ahead(kind: str, stamp: int, message):
+        if kind == "pose":
+            whole = stamp + 200_000_000
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(whole, 10**9)
+        return message
+
+    path = tmp_path / "ahead.mcap"
+    write_bag(path, cameras=False, rate=500, change=ahead)
+    rows = {row.role: row for row in check_recording(path, params).topics}
+    assert rows["pose"].clock_offset == pytest.approx(0.2, abs=0.001)
+    assert rows["wrench"].clock_offset == 0
+    assert rows["depth"].clock_offset == pytest.approx(-0.0155, abs=0.001)  # it takes a while
+
+
+def test_a_camera_that_stops_before_the_release_is_said(looked, params) -> None:
+    phases = [row for row in looked.report.phases if row["phase"] in ("hanging", "held", "drawn")]
+    found = cautions_of(replace(looked.report, phases=phases), looked.done, params.setup)
+    said = [caution.what for caution in found if caution.about == "unseen"]
+    assert said == [f"no picture shows how the band {how}" for how in ("recoils", "swings")]
+
+
+def test_a_sensor_that_tf_static_does_not_know_is_said(looked, params) -> None:
+    assert "sensor" not in abouts(looked.report)
+    recording = looked.done.recording
+    loose = replace(recording, wrench=replace(recording.wrench, frame="elsewhere"))
+    found = cautions_of(looked.report, replace(looked.done, recording=loose), params.setup)
+    assert any(c.about == "sensor" and "'elsewhere'" in c.what for c in found)
+
+
+def test_tips_are_off_from_three_standard_errors(looked, params) -> None:
+    for off, error, said in ((0.0039, 0.0001, 0), (0.0045, 0.0016, 0), (0.0045, 0.0014, 1)):
+        facts = {**looked.report.extrinsics, "off_m": off, "off_error_m": error}
+        found = cautions_of(replace(looked.report, extrinsics=facts), looked.done, params.setup)
+        assert sum(caution.about == "extrinsics" for caution in found) == said
+
+
+def test_each_chosen_topic_stands_apart_from_its_role(looked) -> None:
+    """Also where one topic plays two roles."""
+    topics = [replace(row, role=row.role and "wrench, pose") for row in looked.report.topics]
+    assert "  wrench, pose  /ft/wrench  (" in replace(looked.report, topics=topics).to_text()
+
+
+def test_a_disk_that_is_full_is_one_line(seen, params, tmp_path, monkeypatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: full())
+    with pytest.raises(UserError, match="out.png: cannot be written .No space left"):
+        check(seen[0], params, sheet=tmp_path / "out.png")
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_pause_before_the_release(looked, seen) -> None:
     still, change = pause(looked.done.signals)
     truth = seen[1]

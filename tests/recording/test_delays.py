@@ -57,6 +57,25 @@ def test_the_poses_delay_is_found_by_the_tools_inertia(felt, noise) -> None:
     assert 0.5 < np.sqrt(np.mean((np.array(off) / errors) ** 2)) < 1.5
 
 
+@pytest.mark.parametrize("share", [0.0, 0.2])
+def test_a_slow_pose_that_loses_messages_makes_no_delay_up(felt, share) -> None:
+    """At 33 Hz, or with every fifth message missing: what is found is true within its error."""
+    recording, geometry = felt
+    for seed in range(6):
+        random = np.random.default_rng(seed)
+        pose = recording.pose
+        keep = np.arange(seed, len(pose.stamp), 15)
+        keep = keep[random.random(len(keep)) >= share]
+        one = replaced(
+            recording, pose=replace(pose, stamp=pose.stamp[keep], values=pose.values[keep])
+        )
+        found = felt_tool(late(one, "pose", INJECTED[seed % 4]), geometry, None)
+        if found is None:
+            continue
+        off = found.delay - INJECTED[seed % 4]
+        assert abs(off) < 0.002 or abs(off) < 3 * found.delay_error
+
+
 def test_a_force_that_does_not_feel_the_tool_says_nothing_of_the_pose() -> None:
     played = Played(mass=0.0, truth=SLOW)
     for seconds in INJECTED:

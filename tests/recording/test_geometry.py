@@ -58,9 +58,7 @@ def test_a_wrench_in_the_base() -> None:
 
 
 def test_a_wrench_and_a_pose_without_frames_are_the_hands_and_the_bases() -> None:
-    setup = SimpleNamespace(
-        base_to_fork=(0, 1, 0, 0, 0, 0, 1), camera_to_fork=None, tip_link=None
-    )
+    setup = SimpleNamespace(base_to_fork=(0, 1, 0, 0, 0, 0, 1), camera_to_fork=None, tip_link=None)
     found = geometry_of(recording({("fork", "optical"): [1, 0, 0]}, wrench="", pose=""), setup)
     assert not found.sensor_is_fixed
     assert found.sources["base_to_fork"] == "setup.base_to_fork"

@@ -7,17 +7,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pipeline.errors import UserError
 from pipeline.recording.felt import felt_tool
 from pipeline.recording.signals import signals_of
-from tests.recording.bag import START, Truth
-from tests.recording.played import Played, stream
+from tests.recording.bag import HAND, SENSOR, START, Truth
+from tests.recording.played import GRAVITY, Played, stream
 
 MASS = 0.73
+TOOL = (0.01, -0.02, 0.05)  # its centre of mass
 
 
-def tool(mass: float = MASS, center=(0.01, -0.02, 0.05)) -> SimpleNamespace:
+def tool(mass: float = MASS, center=TOOL) -> SimpleNamespace:
     return SimpleNamespace(mass=mass, center=center)
 
 
@@ -90,9 +92,61 @@ def test_a_tool_that_nobody_told_of_is_felt(params) -> None:
     told = signals(played, params, tool(mass=0.0), felt=felt)
     assert told.facts["tool"] == {
         "mass": 0.0,
-        "center": [0.01, -0.02, 0.05],
+        "center": list(TOOL),
         "source": "setup.tool",
     }
+
+
+def test_a_sensor_that_takes_off_too_much_or_has_the_other_sign(params) -> None:
+    """What is felt is taken off as it is felt, whatever its sign."""
+    for played in (
+        Played(mass=-0.3, truth=Truth(noise=0.005)),
+        Played(mass=MASS, truth=Truth(noise=0.005, sign=-1.0)),
+    ):
+        felt = felt_tool(played.recording(), played.geometry(), None)
+        assert felt.mass == pytest.approx(played.truth.sign * played.mass, rel=0.03)
+        found = signals(played, params, felt=felt)
+        assert off(played, found).max() < 0.25 and np.median(off(played, found)) < 0.02
+
+
+def test_a_sensor_that_knows_the_weight_but_not_the_inertia(params) -> None:
+    """The weight is not taken off a second time while the hand turns by a few degrees."""
+    played = Played(turn=0.07, mass=MASS, truth=Truth(noise=0.005))
+    recording = played.recording()
+    t = recording.wrench.seconds(START)
+    weight = (played.orientation(t) * SENSOR).inv().apply(MASS * GRAVITY)
+    recording.wrench = replace(recording.wrench, values=recording.wrench.values - weight)
+    felt = felt_tool(recording, played.geometry(), None)
+    assert felt.mass == pytest.approx(MASS, rel=0.05)
+    found = signals(played, params, recording=recording, felt=replace(felt, center=TOOL))
+    assert off(played, found).max() < 0.25 and np.median(off(played, found)) < 0.02
+
+
+def test_a_delay_that_is_left_does_not_displace_the_inertia(params) -> None:
+    """Of 20 ms, which the pose's stamps may keep by episode.delays.pose."""
+    played = Played(mass=MASS, truth=Truth(noise=0.005))
+    recording = played.recording()
+    pose = recording.pose
+    recording.pose = replace(pose, stamp=pose.stamp + 20_000_000)
+    felt = felt_tool(recording, played.geometry(), None)
+    assert felt.delay == pytest.approx(0.02, abs=0.002)
+    found = signals(played, params, recording=recording, felt=felt)
+    assert off(played, found).max() < 0.25 and np.median(off(played, found)) < 0.02
+
+
+class Leaving(Played):
+    def orientation(self, t: np.ndarray) -> Rotation:
+        """Turned by 4 degrees after the release."""
+        angle = 0.07 * np.clip((t - self.truth.release - 0.05) / 0.3, 0, 1)
+        return HAND * Rotation.from_rotvec(angle[:, None] * [1.0, 0.0, 0.0])
+
+
+def test_the_weight_of_a_hand_that_turns_away_is_no_drift(params) -> None:
+    played = Leaving(mass=MASS)
+    found = signals(played, params)
+    assert found.facts["drift"] == [0, 0, 0]
+    hold = np.array(found.facts["hold_force"]) - played.truth.force(played.truth.release - 0.1)
+    assert np.linalg.norm(hold) < 0.05
 
 
 def test_a_sensor_of_the_other_sign_feels_its_tool_so_too(params) -> None:

@@ -124,7 +124,9 @@ def camera_from(
     camera, model = calibration.camera, calibration.model.lower()
     numbers = (*camera.matrix.flat, *camera.distortion, *calibration.rectified.flat)
     if min(camera.matrix[0, 0], camera.matrix[1, 1]) <= 0 or not np.isfinite(numbers).all():
-        raise UserError(f"{path}: {topic} is not calibrated (focal length 0), calibrate the camera")
+        raise UserError(
+            f"{path}: {topic} is not calibrated (focal length 0, or no numbers), calibrate it"
+        )
     if not 0 < camera.width * camera.height <= LARGEST:
         raise UserError(f"{path}: {topic} is of {camera.width} x {camera.height} pixels")
     if RECTIFIED.search(image) and calibration.rectified[0, 0] > 0:

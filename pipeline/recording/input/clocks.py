@@ -36,6 +36,7 @@ EVEN = 0.2  # of the period, by which intervals of an even rate differ in the me
 PILED = 0.2  # of the period, within which messages come that had to wait
 AGREE = 0.003  # s between a step by continuity and by log_time
 FAR = 1.0  # s between a stamp and those around it
+DISORDER = 10  # messages that go back, from which no clock was set, but the file has no order
 INTERLEAVED = 6  # how often stamps of two runs alternate that cover the same time
 TOLERANCE = 0.5  # s between the clocks of two topics
 
@@ -114,10 +115,11 @@ def steps(stamp: np.ndarray, log: np.ndarray) -> list[Step]:
 def rewinds(stamp: np.ndarray, log: np.ndarray) -> list[Step]:
     """Steps back of both clocks, in a topic [ns], in the order of the file.
 
-    Chunks in another order go back too, but do not cover the same time twice.
+    Chunks in another order go back too, but do not cover the same time twice. Nobody sets a clock
+    as often as a file without any order goes back.
     """
-    found = []
-    for i in _back(stamp, log):
+    found, back = [], _back(stamp, log)
+    for i in back if len(back) < DISORDER else ():
         before = stamp[:i][stamp[:i] >= stamp[i]]
         after = stamp[i:][stamp[i:] <= stamp[i - 1]]
         run = np.repeat([0, 1], [len(before), len(after)])

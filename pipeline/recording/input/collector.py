@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
-import numpy as np
 from mcap import records as kinds
 from mcap.opcode import Opcode
 
 from pipeline.errors import UserError
+from pipeline.recording.input.account import losses_of, notes_of
 from pipeline.recording.input.records import (
     HEAD,
     MESSAGE,
@@ -33,8 +33,6 @@ MOST = 2**30  # bytes of messages that are held at once
 OVERHEAD = 256  # bytes that a message costs beside its payload
 BULKY = re.compile("PointCloud|LaserScan|OccupancyGrid|CompressedVideo")  # counted, not kept
 KEPT = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
-LONGEST = 86_400 * 10**9  # ns that a recording lasts
-NAMED = 5  # places or topics named in one line
 
 
 @dataclass
@@ -89,7 +87,7 @@ class Collector:
             elif isinstance(one, kinds.Channel):
                 self.definitions.setdefault(one.id, one)
         channels, orphans = self._joined()
-        return channels, [*self._losses(trusted), *orphans], self._notes(trusted)
+        return channels, [*losses_of(self, trusted), *orphans], notes_of(self, trusted)
 
     # Records
 
@@ -219,85 +217,6 @@ class Collector:
             return not any(gap.at >= start for gap in self.gaps)
         return crc(self.file, start, self.footer.end - 4) == wanted
 
-    # Words
-
-    def _losses(self, trusted: bool) -> list[str]:
-        losses = []
-        data_end = self.data_end.at if self.data_end else self.size
-        if self.data_end is None:
-            losses.append(f"the file has no end: cut off after {self._seconds(self._last())} s")
-        if self.dropped:
-            count = len(self.dropped)
-            where = [f"{self._seconds(a)} to {self._seconds(b)} s" for a, b in self.dropped]
-            losses.append(f"{count} damaged chunk{'s' * (count > 1)} dropped: {_few(where)}")
-        # What a file that was cut off ends with is no loss of its own.
-        lost = [gap for gap in self.gaps if gap.at < data_end and gap.end < self.size]
-        if lost:
-            where = [f"{gap.end - gap.at} at {gap.at}" for gap in lost]
-            losses.append(f"unreadable bytes of {self.size} in the file: {_few(where)}")
-        if self.disbelieved:
-            losses.append(f"{self.disbelieved} record(s) behind them dropped: without a checksum")
-        if self.private:  # a damaged chunk may look like one
-            losses.append(f"{self.private} record(s) of kinds that are not MCAP's own passed over")
-        if self.data_end and not self.dropped and not lost and not self._data_crc_holds():
-            losses.append(
-                "the checksum of all messages together does not hold: what is damaged is not known"
-            )
-        return [*losses, *(self._compared() if trusted else ())]
-
-    def _notes(self, trusted: bool) -> list[str]:
-        notes = []
-        crcs = self.checked or (self.data_end and self.data_end.content.data_section_crc)
-        if not crcs:
-            notes.append("no checksums in the file: damage to its messages would not be noticed")
-        if self.data_end and not trusted:
-            notes.append("the summary at the file's end is damaged: its counts were not compared")
-        elif self.data_end and any(gap.at >= self.data_end.end for gap in self.gaps):
-            notes.append("unreadable bytes behind the last message")
-        return notes
-
-    def _data_crc_holds(self) -> bool:
-        wanted = self.data_end.content.data_section_crc
-        return not wanted or crc(self.file, 0, self.data_end.at) == wanted
-
-    def _compared(self) -> list[str]:
-        """Where the file's own end speaks of another length or of other numbers than were read."""
-        off = self.footer.content.summary_start
-        off = off and off - self.data_end.end
-        if off:
-            what = "missing from" if off > 0 else "too many in"
-            return [f"{abs(off)} bytes are {what} the file", *self._counted()]
-        return self._counted()
-
-    def _counted(self) -> list[str]:
-        found = [one for one in self.summary if isinstance(one, kinds.Statistics)]
-        if not found:
-            return []
-        wanted = found[-1].channel_message_counts
-        read = {number: len(channel.payloads) for number, channel in self.channels.items()}
-        off = []
-        for number in sorted({*wanted, *read}) if wanted else ():
-            a, b = wanted.get(number, 0), read.get(number, 0)
-            known = self.definitions.get(number)
-            if a != b:
-                off.append(f"{b} of {a} of {known.topic if known else f'channel {number}'}")
-        total = sum(read.values())
-        if not off and total != found[-1].message_count:
-            off.append(f"{total} of {found[-1].message_count}")
-        return [f"messages read of those that the file counts: {_few(off)}"] if off else []
-
-    def _times(self) -> np.ndarray:
-        """log_times [ns] without those that are damage."""
-        times = np.array([t for one in self.channels.values() for t in one.log_times], float)
-        return times[np.abs(times - np.median(times)) < LONGEST] if len(times) else times
-
-    def _last(self) -> float:
-        return max(self._times(), default=0.0)
-
-    def _seconds(self, log_time: float) -> str:
-        """Since the first message."""
-        return f"{(log_time - min(self._times(), default=log_time)) * 1e-9:.2f}"
-
 
 def _span(chunk: kinds.Chunk) -> tuple[int, int]:
     return chunk.message_start_time, chunk.message_end_time
@@ -305,11 +224,6 @@ def _span(chunk: kinds.Chunk) -> tuple[int, int]:
 
 def _meaning(channel: kinds.Channel) -> tuple:
     return channel.topic, channel.message_encoding, channel.schema_id
-
-
-def _few(words: list[str]) -> str:
-    more = len(words) - NAMED
-    return ", ".join(words[:NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _messages(count: int) -> str:

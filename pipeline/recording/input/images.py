@@ -213,7 +213,7 @@ def _rows(picture: Picture, kind: type, channels: int) -> np.ndarray:
 def _metres(depth: np.ndarray) -> np.ndarray:
     """uint16 holds millimetres, floats hold metres."""
     if depth.ndim != 2:
-        raise Undecodable("depth image with more than one channel")
+        raise Unsupported("a picture in colour is no depth image")
     if depth.dtype == np.uint16:
         return depth.astype(np.float32) / 1000
     if depth.dtype != np.float32:

@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 
 MISSING = object()
 LATEST = 2**62  # ns; a stamp beyond it is damage
+FRANKA_BASE = "franka_base"  # frame of Franka states whose header names none, as franka_ros writes
 
 
 @dataclass(frozen=True)
@@ -120,19 +121,22 @@ def read_state_pose(message: object) -> Reading:
     """O_T_EE: a PoseStamped in FrankaRobotState, a column-major 4 x 4 in FrankaState."""
     pose = first_of(message, "o_t_ee", "O_T_EE")
     if hasattr(pose, "pose"):
-        return Reading(stamp_of(message), frame_of(pose) or frame_of(message), pose_of(pose.pose))
+        frame = frame_of(pose) or frame_of(message) or FRANKA_BASE
+        return Reading(stamp_of(message), frame, pose_of(pose.pose))
     matrix = np.array(pose, float).reshape(4, 4).T
     if not np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-3):
         raise ValueError("O_T_EE has no rotation")
     turn = Rotation.from_matrix(matrix[:3, :3]).as_quat()
-    return _reading(message, (*map(float, matrix[:3, 3]), *map(float, turn)))
+    value = (*map(float, matrix[:3, 3]), *map(float, turn))
+    return Reading(stamp_of(message), frame_of(message) or FRANKA_BASE, value)
 
 
 def read_state_wrench(message: object) -> Reading:
     """O_F_ext_hat_K, the external force that the arm estimates, in the frame of O_T_EE."""
     wrench = first_of(message, "o_f_ext_hat_k", "O_F_ext_hat_K")
     if not hasattr(wrench, "wrench"):
-        return _reading(message, tuple(float(wrench[i]) for i in range(3)))
+        force = tuple(float(wrench[i]) for i in range(3))
+        return Reading(stamp_of(message), frame_of(message) or FRANKA_BASE, force)
     frame = frame_of(wrench) or read_state_pose(message).frame
     return Reading(stamp_of(message), frame, _vector(wrench.wrench.force))
 

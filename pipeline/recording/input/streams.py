@@ -1,8 +1,8 @@
 """One topic's messages to a `Stream`: read, put on one clock, sorted, and what was lost said.
 
 The rules of the clocks are in `clocks`. A message is lost where it cannot be read, is not finite or
-absurdly large, has no stamp or one far from its neighbours', names another frame than the rest, or
-has the stamp of another.
+absurdly large, has no stamp or one far from its neighbours', names another frame than the rest, has
+the stamp of another, or, of force and pose, is alone far off those around it.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from pipeline.errors import UserError
 from pipeline.recording.input import clocks
@@ -21,6 +22,9 @@ from pipeline.recording.input.stream import Stream, frozen, gaps
 from pipeline.recording.input.topics import Choice
 
 ABSURD = 1e6  # N, m, m/s, rad: nothing here is as large
+# What a lone message may be off the four around it: a knock or a fall lasts for more than one.
+LONE = {"wrench": 30.0, "pose": 0.05}  # N, m
+FASTEST = 2.0  # m/s of the hand
 TIMED = ("gripper",)  # roles for which log_time will do where there are no stamps
 CORRECTABLE = ("pose", "twist", "gripper")  # by log_time, if they have a clock of their own
 
@@ -138,7 +142,13 @@ def _take_rewinds_out(path: Path, raw: dict[str, Raw]) -> None:
         role = raw[one]
         role.stamp = clocks.without(role.stamp, found)
         role.log = clocks.without(role.log, found)
-        role.notes += [_step_note(step, role.log[0], "of its machine's clock ") for step in found]
+        start = int(role.log[0])
+        for step in found:
+            at = (int(role.log[step.index]) - start) * 1e-9
+            size = step.size * 1e-9
+            role.notes.append(
+                f"step of its machine's clock of {size:+.4f} s at {at:.2f} s taken out"
+            )
 
 
 def _take_steps_out(path: Path, raw: dict[str, Raw]) -> None:
@@ -157,7 +167,9 @@ def _take_steps_out(path: Path, raw: dict[str, Raw]) -> None:
         others = np.median([usual[other] for other in raw if other not in found] or [usual[role]])
         base = int(np.argmin(np.abs(np.array(least, float) - others)))
         one.stamp = clocks.without(one.stamp, jumps, base)
-        one.notes += [_step_note(step, start) for step in jumps]
+        for step in jumps:
+            at, size = (step.log - start) * 1e-9, step.size * 1e-9
+            one.notes.append(f"clock step of {size:+.4f} s at {at:.2f} s taken out")
         one.late -= sum(step.size < 0 for step in jumps)
 
 
@@ -183,11 +195,6 @@ def _agreed(path: Path, raw: dict[str, Raw], find) -> dict[str, list[clocks.Step
                 )
             steps[k] = replace(step, size=best.size)
     return found
-
-
-def _step_note(step: clocks.Step, start: int, whose: str = "") -> str:
-    at = (step.log - start) * 1e-9
-    return f"clock step {whose}of {step.size * 1e-9:+.4f} s at {at:.2f} s taken out"
 
 
 def _on_one_clock(path: Path, raw: dict[str, Raw]) -> None:
@@ -226,6 +233,8 @@ def _sorted(path: Path, raw: Raw) -> Stream:
     values = raw.values
     if not isinstance(values[0], Picture):
         values = np.array(values, float)
+        if raw.role in LONE and raw.choice.convert is None:
+            values = _without_lone(raw, values)
         if raw.choice.convert is not None:
             values = raw.choice.convert(raw.stamp, values)
     if raw.lost:
@@ -233,6 +242,19 @@ def _sorted(path: Path, raw: Raw) -> Stream:
     delay = float(np.median(raw.log - raw.stamp)) * 1e-9
     lost = sum(raw.lost.values())
     return Stream(raw.topic, raw.frame, raw.stamp, values, delay, lost, raw.notes)
+
+
+def _without_lone(raw: Raw, values: np.ndarray) -> np.ndarray:
+    """Without single values of force or place far from those around them, shape (S, C)."""
+    around = median_filter(values[:, :3], (5, 1), mode="nearest")
+    limit = LONE[raw.role]
+    if raw.role == "pose":
+        limit = max(limit, FASTEST * 1e-9 * float(np.median(np.diff(raw.stamp))))
+    lone = np.abs(values[:, :3] - around).max(axis=1) > limit
+    if len(values) - lone.sum() < 2:
+        return values
+    raw.drop(lone, "far off those around")
+    return values[~lone]
 
 
 def _count(messages: int) -> str:

@@ -78,10 +78,12 @@ class _Chooser:
         what, path = ROLES[role].what, self.container.path
         if self.problems:
             return UserError(f"{path}: no {what}; {'; or '.join(self.problems[:2])}")
+        if not self.container.channels:
+            return UserError(f"{path}: no {what}; the file has no messages at all: record it again")
         has = sorted({f"{c.topic} ({of.kind_of(_type(c))})" for c in self.container.channels})
         more = f" and {len(has) - SHOWN} more" if len(has) > SHOWN else ""
         return UserError(
-            f"{path}: no {what}; the file has {', '.join(has[:SHOWN]) or 'no topics at all'}"
+            f"{path}: no {what}; the file has {', '.join(has[:SHOWN])}"
             f"{more}: record it, or name its topic in setup.topics.{role}"
         )
 

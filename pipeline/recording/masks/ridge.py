@@ -69,16 +69,17 @@ class RidgeMask:
             often=MOSTLY,
         )
         band = [self._surely(frame) for _, frame in view.frames(taut)]
-        self.colors = band and Colors.learn(
-            np.concatenate(band), np.concatenate([pixels for _, pixels in hand])
-        )
+        self.colors = None
+        if band:
+            others = np.concatenate([pixels for _, pixels in hand])
+            self.colors = Colors.learn(np.concatenate(band), others)
 
     def mask(self, frame: Frame) -> np.ndarray:
         found = self._candidates(frame)
         rows, columns = np.nonzero(found)
         points = frame.points[rows, columns]
         keep = ~self._in_hand(points, frame.time)
-        if self.colors:
+        if self.colors is not None:
             keep &= ~self.colors.against(frame.color[rows, columns])
         if self.scene.taut(frame.time):
             keep &= self._off_lines(points, frame.time) < 0
@@ -154,7 +155,7 @@ class RidgeMask:
         for shape in shapes:
             if shape is not None:
                 found |= shape.holds(away)
-        if self._hangs(time) and self.hanging:
+        if self._hangs(time) and self.hanging is not None:
             found |= (length(away) < REACH) & ~self.hanging.holds(self._from_middle(points))
         return found
 

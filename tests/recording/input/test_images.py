@@ -254,3 +254,9 @@ def test_depth_is_told_from_color() -> None:
     assert is_depth(packed("16UC1; compressedDepth", b""))
     assert not is_depth(packed("rgb8; jpeg compressed bgr8", b""))
     assert not is_depth(packed("png", png(BGR[..., 0])))
+
+
+def test_a_colour_picture_is_no_depth() -> None:
+    """Unsupported, not damaged: params may have named the wrong topic."""
+    with pytest.raises(Unsupported, match="in colour"):
+        depth(packed("png", png(np.zeros((4, 5, 3), np.uint8))))

@@ -50,6 +50,28 @@ def test_what_another_library_decodes_is_what_we_read(blind, params) -> None:
     assert recording.gripper.values[0, 0] == pytest.approx(0.08)
 
 
+def test_a_lone_wild_value_is_lost_and_a_knock_is_kept(tmp_path, params) -> None:
+    """A glitch is one message; what the hand feels lasts for several."""
+    stamps = {name: START + round(t * 1e9) for name, t in (("wild", 1.5), ("knock", 1.7))}
+
+    def spoil(kind: str, stamp: int, message):
+        if kind == "wrench" and stamp == stamps["wild"]:
+            message.wrench.force.x = 5000.0
+        if kind == "wrench" and 0 <= stamp - stamps["knock"] < 8_000_000:
+            message.wrench.force.x += 60.0
+        if kind == "pose" and stamp == stamps["wild"]:
+            message.pose.position.x = message.pose.position.y = message.pose.position.z = 0.0
+        return message
+
+    path = tmp_path / "wild.mcap"
+    write_bag(path, cameras=False, rate=500, change=spoil)
+    recording = read(path, params)
+    for stream in (recording.wrench, recording.pose):
+        assert stream.lost == 1 and stream.notes == ["lost 1 far off those around"]
+        assert stamps["wild"] not in stream.stamp
+    assert np.count_nonzero(recording.wrench.values[:, 0] > 40) == 4
+
+
 @pytest.mark.parametrize(
     "options",
     [
@@ -229,7 +251,7 @@ def test_files_that_are_no_recordings(tmp_path, params) -> None:
         (tmp_path, "is a folder"),
         (empty, "is empty"),
         (text, "not an MCAP"),
-        (bare, "no topics"),
+        (bare, "no messages at all"),
     ):
         with pytest.raises(UserError, match=words):
             read(path, params)

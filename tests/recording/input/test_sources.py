@@ -159,6 +159,17 @@ def test_a_franka_state_has_column_major_matrices(params, names) -> None:
     np.testing.assert_array_equal(played(roles["wrench"])[1], [[1, 2, 3]] * COUNT)
 
 
+def test_a_franka_state_without_a_frame_is_in_the_base(params) -> None:
+    """As franka_ros publishes it: pose and force are both given there."""
+    matrix = list(np.eye(4).ravel())
+    messages = [
+        {**head(k, ""), "O_T_EE": matrix, "O_F_ext_hat_K": [1, 2, 3] * 2} for k in range(COUNT)
+    ]
+    roles = chosen(params, channel("/state", "franka_msgs/FrankaState", messages))
+    frames = {played(roles[role])[0] for role in ("pose", "wrench")}
+    assert len(frames) == 1 and "" not in frames
+
+
 GANTRY = [("x", "prismatic", "1 0 0"), ("y", "prismatic", "0 1 0"), ("z", "prismatic", "0 0 1")]
 GANTRY += [(f"r{name}", "revolute", axis) for name, _, axis in reversed(GANTRY)]
 

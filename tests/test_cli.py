@@ -122,6 +122,14 @@ def test_a_users_mistake(arguments: str, expected: str) -> None:
     assert expected in refused(sling(*arguments.split()), 1)
 
 
+def test_a_reader_that_has_seen_enough() -> None:
+    """`sling ... | head` is no mistake of anybody."""
+    endless = "from pipeline.errors import run; run(lambda: print('a line\\n' * 1_000_000))"
+    command = ["bash", "-c", f'"{sys.executable}" -c "{endless}" | head -n 1']
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+    assert (done.stdout, done.stderr) == ("a line\n", "")
+
+
 def test_a_folder_without_params(tmp_path: Path) -> None:
     done = sling("aim", "--band", "band1", "--target", "1.9", folder=tmp_path)
     assert "params.yaml: cannot be read" in refused(done, 1)

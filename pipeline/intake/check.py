@@ -165,7 +165,7 @@ def _add_signals(report: Report, recording: Recording, band: object, params: obj
         report.delays = _delays(delays)
         recording = delays.corrected(recording)
         sections = params.episode, params.force, params.setup.tool
-        signals = signals_of(recording, geometry, *sections)
+        signals = signals_of(recording, geometry, *sections, delays.felt)
     except UserError:  # it is the problem that was reported
         return
     scene = Scene.of(band, params.setup, signals)

@@ -49,6 +49,11 @@ def geometry_of(recording: Recording, setup: object) -> Geometry:
         found = tree.between(FORK, frame)
         if found is None:
             has = ", ".join(tree.frames) or "nothing"
+            if not frame:
+                raise UserError(
+                    f"{recording.path}: messages name no frame that /tf_static could join to"
+                    f" {FORK!r}: set their frame_id, or setup.{name} in params.yaml"
+                )
             raise UserError(
                 f"{recording.path}: /tf_static does not join {frame!r} to {FORK!r} (it has {has}):"
                 f" publish it, or set setup.{name} in params.yaml"

@@ -248,15 +248,16 @@ def _window(
     episode: object,
 ) -> float:
     """Start of the window [s]: as much lead-in as the tail after the release leaves room for."""
-    streams = [(t[0], t[-1]), (pose_t[0], pose_t[-1])]
-    first, last = max(a for a, _ in streams), min(b for _, b in streams)
+    first, last = max(t[0], pose_t[0]), min(t[-1], pose_t[-1])
+    ends = recording.wrench.topic if t[-1] < pose_t[-1] else recording.pose.topic
     start = max(first, release + episode.tail - episode.duration)
     slack = 1.5 * max(recording.wrench.period, recording.pose.period)
     if start + episode.duration > last + slack:
         if last < release + episode.tail:
+            side = "after" if last >= release else "before"
             raise UserError(
-                f"it ends {last - release:.2f} s after the release, episode.tail asks for"
-                f" {episode.tail} s: record on for longer"
+                f"{ends} ends {abs(last - release):.2f} s {side} the release, episode.tail asks"
+                f" for {episode.tail} s after it: record on for longer"
             )
         raise UserError(
             f"it is {last - first:.2f} s long, episode.duration asks for {episode.duration} s:"

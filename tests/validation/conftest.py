@@ -43,7 +43,7 @@ def record(request) -> Callable[..., None]:
 
     def write(name: str, *, asked: str, met: bool, settings: dict, figures: dict) -> None:
         about = environment("cpu", "make validate") | {
-            "alone": f"python -m pytest -m validation tests/validation/{request.path.name}",
+            "alone": f"python -m pytest -m validation -n 0 tests/validation/{request.path.name}",
         }
         content = {"asked": asked, "met": met, "settings": settings, "figures": figures, **about}
         write_json(ROOT / "reports/validation" / f"{name}.json", _plain(content))

@@ -93,7 +93,7 @@ def test_twenty_thousand_mutations(tmp_path) -> None:
     failed = failures(results)
     libraries = ("mcap", "mcap-ros2-support", "rosbags", "numpy", "opencv-python-headless")
     report = {
-        "command": "python -m pytest -m validation tests/recording/input/test_mutations.py",
+        "command": "python -m pytest -m validation -n 0 tests/recording/input/test_mutations.py",
         "mutations": len(results),
         "seeds": [0, each - 1],
         "outcomes": counts(results),

@@ -189,7 +189,9 @@ class View:
         window = window or self.window
         depth = depth[window]
         seen = self.rays[window] * np.where(depth > 0, depth, np.float32(UNKNOWN))[..., None]
-        points = self.geometry.camera.apply(seen.reshape(-1, 3)).reshape(seen.shape)
+        camera = self.geometry.camera
+        affine = np.column_stack([camera.rotation.as_matrix(), camera.translation])
+        points = cv2.transform(seen, affine.astype(np.float32))
         time = float(self.times[number])
         pixels = None if self._registered(color) else self._pixels(color, seen)
         color = color[window] if pixels is None else onto_depth(color, pixels)
@@ -198,20 +200,17 @@ class View:
 
     def _near(self, points: np.ndarray, time: float) -> np.ndarray:
         """Pixels of points (H, W, 3) above the floor that the band's length allows."""
-        scene, squared = self.scene, np.einsum("...i,...i->...", points, points)
-
-        def away(place: np.ndarray) -> np.ndarray:
-            """Distance from a place (3,); with the square at hand no differences are needed."""
-            off = points @ (-2 * place).astype(np.float32)
-            off += squared
-            off += np.float32(place @ place)
-            return np.sqrt(np.maximum(off, 0, out=off), out=off)
-
-        left, right = away(scene.tips[0]), away(scene.tips[1])
+        scene, holds = self.scene, self.scene.holds(time)
+        places = np.array([*scene.tips, scene.signals.hand(time)])[: 3 if holds else 2]
+        # |x - p|^2 = x.x - 2 p.x + p.p: one affine map of all pixels, which OpenCV does fastest.
+        affine = np.column_stack([-2 * places, np.einsum("ij,ij->i", places, places)])
+        away = cv2.transform(points, affine.astype(np.float32))
+        away += np.einsum("...i,...i->...", points, points)[..., None]
+        away = cv2.sqrt(np.maximum(away, 0, out=away))
+        left, right = away[..., 0], away[..., 1]
         near = left + right < scene.reach(time)
-        if scene.holds(time):
-            half = np.minimum(left, right) + away(scene.signals.hand(time))
-            near &= half < scene.reach_of_half(time)
+        if holds:
+            near &= np.minimum(left, right) + away[..., 2] < scene.reach_of_half(time)
         return near & (points[..., 2] > scene.floor + 2 * scene.diameter)
 
     def _pixels(self, color: np.ndarray, seen: np.ndarray) -> np.ndarray:

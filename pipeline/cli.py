@@ -213,15 +213,13 @@ def run_plan(arguments: argparse.Namespace) -> tuple[str, int]:
 
 
 def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
-    from pipeline.params import load
+    from pipeline.params import expect_known, load
     from pipeline.sling.launch import launch
     from pipeline.sling.model import load_sling
     from pipeline.theta import load_theta, vector
 
     params = load()
-    if arguments.band not in params.bands:
-        known = ", ".join(params.bands)
-        raise UserError(f"band {arguments.band}: not in params.yaml, which has {known}")
+    expect_known(params, "band", arguments.band)
     floor = -params.setup.fork_height
     if arguments.draw[1] < floor:
         raise UserError(

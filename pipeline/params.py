@@ -475,6 +475,15 @@ class Params(Section):
         return self
 
 
+def expect_known(params: Params, kind: str, name: str, called: str | None = None) -> None:
+    """Raises UserError where there is no such `kind`, band or method; `called` names it."""
+    known = getattr(params, f"{kind}s")
+    if name not in known:
+        raise UserError(
+            f"{called or kind} {name}: not in params.yaml, which has {', '.join(known)}"
+        )
+
+
 def load(path: str | Path = "params.yaml") -> Params:
     """Read and check params.yaml. Raises UserError."""
     try:

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from pipeline.errors import UserError
-from pipeline.params import Params, load
+from pipeline.params import Params, expect_known, load
 
 
 def arguments(*names: str) -> list[str]:
@@ -24,9 +24,7 @@ def started(*names: str) -> tuple[Params, *tuple[str, ...]]:
     given = arguments(*names)
     params = load()
     for name, value in zip(names, given, strict=True):
-        known = getattr(params, f"{name}s")
-        if value not in known:
-            raise UserError(f"{name} {value}: not in params.yaml, which has {', '.join(known)}")
+        expect_known(params, name, value)
     return params, *given
 
 

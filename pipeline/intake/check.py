@@ -13,6 +13,7 @@ from pipeline.intake.coverage import by_phase, coverage, over_time
 from pipeline.intake.report import Report, Topic
 from pipeline.intake.tips import Tips, along, measure_tips
 from pipeline.intake.verdict import cautions_of
+from pipeline.params import expect_known
 from pipeline.recording.build import Processed, process_recording
 from pipeline.recording.delays import Delays, delays_of
 from pipeline.recording.geometry import geometry_of
@@ -94,9 +95,7 @@ def band_of(
     if name is not None and (diameter or rest_length):
         raise UserError("--band brings its diameter and rest length: leave the other two out")
     if name is not None:
-        if name not in params.bands:
-            known = ", ".join(params.bands)
-            raise UserError(f"--band {name}: not in params.yaml, which has {known}")
+        expect_known(params, "band", name, called="--band")
         return params.bands[name], f"bands.{name} of params.yaml"
     if diameter is None and rest_length is None:
         return None, ASSUMED

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.errors import UserError
 from pipeline.files import replacing, write_json, write_text
+from pipeline.params import expect_known
 from pipeline.plan import limits, messages
 from pipeline.plan.force import Held, Prediction, predict, read_earlier
 from pipeline.plan.pull import hanging_middle, trajectory_of
@@ -177,8 +178,7 @@ def plan_recording(
     Raises:
         UserError: in one line, where a limit is broken or something is not known.
     """
-    if band not in params.bands:
-        raise UserError(f"band {band}: not in params.yaml, which has {', '.join(params.bands)}")
+    expect_known(params, "band", band)
     setup, about = params.setup, params.bands[band]
     settings = params.plan if draw is None else params.plan.model_copy(update={"draw": draw})
     earlier = None if recording is None else read_earlier(recording, params)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import UserError
+from pipeline.params import expect_known
 from pipeline.theta import load_theta, vector
 
 NORMAL_95 = 1.6448536269514722  # 90 % of a normal distribution lies within this many deviations
@@ -57,12 +58,8 @@ def aim(
     Raises:
         UserError: Unknown band or method, or a file that is missing.
     """
-    if band not in params.bands:
-        raise UserError(f"band {band}: not in params.yaml, which has {', '.join(params.bands)}")
-    if method not in params.methods:
-        raise UserError(
-            f"method {method}: not in params.yaml, which has {', '.join(params.methods)}"
-        )
+    expect_known(params, "band", band)
+    expect_known(params, "method", method)
     root = Path(root)
     theta = load_theta(root / "data" / "theta" / band / f"{method}.json", band)
     draw = policy_draws(root / "data" / "policies" / band / method, np.array([target]))[0]

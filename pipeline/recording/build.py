@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pipeline.episode import Episode
 from pipeline.errors import UserError
+from pipeline.params import expect_known
 from pipeline.recording.cloud import Clouds, clouds_of
 from pipeline.recording.delays import Delays, delays_of
 from pipeline.recording.geometry import Geometry, geometry_of
@@ -64,9 +65,7 @@ def view_of(recording: Recording, band: object, params: object) -> tuple[View, D
 
 def build_episode(path: Path, band_name: str, params: object) -> Episode:
     """The episode of a recording. Raises UserError with one line where it cannot be used."""
-    if band_name not in params.bands:
-        known = ", ".join(params.bands)
-        raise UserError(f"band {band_name}: not in params.yaml, which has {known}")
+    expect_known(params, "band", band_name)
     return episode_of(process(path, params.bands[band_name], params), band_name, params)
 
 

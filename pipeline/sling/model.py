@@ -41,6 +41,8 @@ class Sling:
         steps: The step sizes and the mesh's grading, as in params.yaml `sling`.
         clamped: Whether the first and the last end are held; experiments on a free band let go.
         clamp_twist: Of the last clamp about the band, against the first [rad].
+        air_drag: Of the moving band: force for its mass and speed [1/s], one or one a theta. It is
+            the drag of a cylinder across the wind, linear about the speeds of a recoil.
         mesh: ROD, or TETRAHEDRA: a solid cylinder, whose edges are equally long. What of the band
             is inside the clamps does not deform there, so that the mesh ends at them.
     """
@@ -60,6 +62,7 @@ class Sling:
     clamped: tuple[bool, bool] = (True, True)
     clamp_twist: float = 0.0
     mesh: str = ROD
+    air_drag: float | np.ndarray = 0.0
 
     @classmethod
     def of(
@@ -163,7 +166,7 @@ def load_sling(params, band: str, root: str | Path = ".") -> Sling:
 
 
 def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
-    """What state.h takes for physical thetas (N, 5): mu, lam, d, s, 2 friction, cb; (N, 6).
+    """What state.h takes for physical thetas (N, 5): mu, lam, d, s, 2 friction, cb, drag; (N, 7).
 
     mu is the shear modulus and lam the volume modulus of the stable neo-Hookean law without its
     logarithm (Smith, de Goes, Kim 2018): first Lame parameter plus mu, so that E and nu are the
@@ -176,7 +179,8 @@ def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
         bending = (1 + poisson) * sling.radius**2 / 2
     else:
         bending = sling.flexural_rigidity / (mu * sling.area)
-    return np.stack([mu, lam, damping, scale, 2 * friction, bending], axis=1)
+    drag = np.broadcast_to(sling.air_drag, young.shape)
+    return np.stack([mu, lam, damping, scale, 2 * friction, bending, drag], axis=1)
 
 
 def _transport(normal: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -47,9 +47,12 @@ auto mass_of = [&](int i, int m) -> real {
   const SC length = m < 3 ? (SC)0.5 * (before + after) : (i < L - 1 ? after : before) * radius2 / 4;
   return zero + line_mass * length + (i == MID && m < 3 ? payload : zero);
 };
+// drag of the air on the moving band, which the projectile does not feel
+auto wind_of = [&](int i, int m) -> real { return m < 3 ? air * (mass_of(i, m) - (i == MID ? payload : zero)) : zero; };
+auto wind_on = [&](int i, int m) -> real { return wind_of(i, m) * (X(m, i) - Y(m, i)); };
 // of the hand on the node that it leads, after Newton's change times `scale`, to first order
 auto hand_force = [&](int c, real scale) -> real {
-  real force = mass_of(MID, c) * ibh2 * (X(c, MID) - XH(c, MID));
+  real force = mass_of(MID, c) * ibh2 * (X(c, MID) - XH(c, MID)) + wind_on(MID, c);
   UNROLL for (int side = 0; side < 2; ++side) {
     const int e = MID - 1 + side;
     real after = zero;
@@ -68,8 +71,8 @@ auto stage_layer = [&](int i) {
   // ---- inertia and gravity of the node and the directors
   UNROLL for (int m = 0; m < N; ++m) {
     const real mass = mass_of(i, m);
-    f[m] = mass * ibh2 * (X(m, i) - XH(m, i));
-    own[LOWER(m, m)] = mass * ibh2 + shift * (m < 3 ? zero + node_shift : mu * (area * mean_edge));
+    f[m] = mass * ibh2 * (X(m, i) - XH(m, i)) + wind_on(i, m);
+    own[LOWER(m, m)] = mass * ibh2 + wind_of(i, m) + shift * (m < 3 ? zero + node_shift : mu * (area * mean_edge));
   }
   if (i < L - 1) {
     // ---- edge i: k = 0, 1, 2 are g, a, b; x now, xp predicted, xt rates

@@ -150,7 +150,7 @@ def run(
     """Step N slings through a schedule.
 
     Args:
-        parameters: As `model.material` gives them, shape (N, 6).
+        parameters: As `model.material` gives them, shape (N, 7).
         state: Initial layers, shape (N, layers, unknowns) or (layers, unknowns).
         lane_state: As documented in state.h, shape (N, LANE_STATE).
         frame_steps, frame_weights: Step in which each frame falls and its place in it, shape (K,).

@@ -12,8 +12,8 @@ const int max_iterations = (int)geometry.data[7];
 const bool first_clamped = geometry.data[8] > 0, last_clamped = geometry.data[9] > 0;
 
 const SC node_shift = node_mass * (SC)2.5e5;  // the inertia of a 2 ms step
-auto PAR = ROW(parameter, 6);
-const real mu = PAR[0], lam = PAR[1], bulk = lam - mu / (SC)3, d = PAR[2], s = PAR[3], friction = PAR[4];
+auto PAR = ROW(parameter, 7);
+const real mu = PAR[0], lam = PAR[1], bulk = lam - mu / (SC)3, d = PAR[2], s = PAR[3], friction = PAR[4], drag = PAR[6];
 
 // unknown k of layer i: now, predicted, the y and xh of step.h, Newton's change, and of the two steps before
 auto INITIAL = ROW(state, N * L);
@@ -63,4 +63,5 @@ bool attached = false, gripped = false;    // the hand leads the middle layer's 
 bool opening = false;                      // its fingers open
 real capacity = zero;                      // what the pads can hold [N]
 real cb = zero, dh = zero, dsh = zero;     // bending, d / (beta h), that times s
+real air = zero;                           // drag / (beta h)
 real shift = zero, inexact = zero;         // of the Hessian: what is added to its diagonal, whether it is not exact

@@ -1,8 +1,9 @@
 // Steps slings through a schedule. A step solves, for all layers at once,
 //
-//   M (x - xh)/(beta h)^2 + dW/dx + dD/dx' = 0,   x' = (x - y)/(beta h),
+//   M (x - xh)/(beta h)^2 + c M x' + dW/dx + dD/dx' = 0,   x' = (x - y)/(beta h),
 //   y = c1 x_n - c2 x_n-1,   xh = y + beta h (c1 v_n - c2 v_n-1) + (beta h)^2 gravity
 //
+// with the air's drag c on the nodes (not on directors or the projectile)
 // (backward Euler: beta = c1 = 1, c2 = 0; variable-step BDF2 otherwise) by Newton's method with the exact Hessian;
 // where that is indefinite, its diagonal is shifted.
 
@@ -33,7 +34,7 @@ for (int step = 0; step < steps; ++step) {
   const SC normal_force = row[9], blend = row[10], time = row[11];
   ibh = (SC)1 / bh; ibh2 = ibh * ibh;
   cb = PAR[5] * row[12]; ct = radius2 / 4 * row[12];  // guesses relax with less of them first
-  dh = d * ibh; dsh = dh * s;
+  dh = d * ibh; dsh = dh * s; air = relax ? zero : drag * ibh;
 
   // ---- the hand takes hold of the band where it is, and leads it to its own path
   const bool was_attached = attached;

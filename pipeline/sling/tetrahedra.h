@@ -41,9 +41,12 @@ real own[N][N], following[N][N], across[N][N], force_here[N], force_there[N];
 // of the slabs on both sides of the hand: force on the held layer, and what it has of the other layer's unknowns
 real felt[2][3], felt_of[2][3][N];
 
+// drag of the air on the moving band, which the projectile does not feel
+auto wind_of = [&](int i, int m) -> real { return air * (mass_of(i, m) - (i == MID ? share(m) * payload : zero)); };
+auto wind_on = [&](int i, int m) -> real { return wind_of(i, m) * (X(m, i) - Y(m, i)); };
 auto hand_force = [&](int c, real scale) -> real {  // on the held layer, after Newton's change times `scale`, to first order
   real force = felt[0][c] + felt[1][c];
-  for (int m = c; m < N; m += 3) force += mass_of(MID, m) * ibh2 * (X(m, MID) - XH(m, MID));
+  for (int m = c; m < N; m += 3) force += mass_of(MID, m) * ibh2 * (X(m, MID) - XH(m, MID)) + wind_on(MID, m);
   for (int m = 0; m < N; ++m)
     force -= scale * (felt_of[0][c][m] * DX(m, MID - 1) + felt_of[1][c][m] * DX(m, MID + 1));
   return force;
@@ -112,8 +115,8 @@ auto stage_layer = [&](int i) {
   if (i < L - 1) stage_slab(i);
   for (int m = 0; m < N; ++m) {
     const real mass = mass_of(i, m);
-    force_here[m] += mass * ibh2 * (X(m, i) - XH(m, i));
-    own[m][m] += mass * ibh2 + shift * (node_shift * share(m));
+    force_here[m] += mass * ibh2 * (X(m, i) - XH(m, i)) + wind_on(i, m);
+    own[m][m] += mass * ibh2 + wind_of(i, m) + shift * (node_shift * share(m));
   }
 };
 

@@ -17,7 +17,7 @@ from typing import NoReturn
 from pipeline import errors
 from pipeline.errors import UserError
 
-DEFAULT_METHOD = "sling2sim2real"
+DEFAULT_METHOD = "sling2sim2real_taut"
 FURTHEST_TARGET, FURTHEST_DRAW = 100.0, 2.0  # m
 
 
@@ -111,6 +111,8 @@ def parser() -> argparse.ArgumentParser:
     sub.add_argument(
         "--recording", type=Path, metavar="FILE.mcap", help="time how it becomes clouds"
     )
+    sub.add_argument("--methods", action="store_true", help="time a whole search by each method")
+    sub.add_argument("--budget", choices=("laptop", "paper"), default="laptop", help="of --methods")
     sub.add_argument("--json", action="store_true")
     return top
 
@@ -215,8 +217,7 @@ def run_plan(arguments: argparse.Namespace) -> tuple[str, int]:
 def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
     from pipeline.params import expect_known, load
     from pipeline.sling.launch import launch
-    from pipeline.sling.model import load_sling
-    from pipeline.theta import load_theta, vector
+    from pipeline.theta import calibrated, load_theta, vector
 
     params = load()
     expect_known(params, "band", arguments.band)
@@ -228,9 +229,9 @@ def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
         )
     if math.hypot(*arguments.draw) > FURTHEST_DRAW:
         raise UserError(f"--draw: must be at most {FURTHEST_DRAW:g} m from the fork")
-    theta = vector(load_theta(arguments.theta, arguments.band))
-    sling = load_sling(params, arguments.band)
-    result = launch(sling, theta, arguments.draw, max_force=params.setup.max_force)
+    content = load_theta(arguments.theta, arguments.band)
+    sling = calibrated(params, arguments.band, content)
+    result = launch(sling, vector(content), arguments.draw, max_force=params.setup.max_force)
     return shown(
         {
             "landing_y_m": finite(result.landing_y[0]),
@@ -271,6 +272,15 @@ def run_bench(arguments: argparse.Namespace) -> tuple[str, int]:
         if arguments.json:
             return json.dumps(environment("cpu", "sling bench --recording --json") | result), 0
         return recording.table(result), 0
+    if arguments.methods:
+        from pipeline import bench_methods as methods
+
+        result = methods.bench_methods(load(), arguments.device, arguments.budget)
+        if arguments.json:
+            command = f"sling bench --methods --budget {arguments.budget}"
+            command += f" --device {arguments.device} --json"
+            return json.dumps(environment(arguments.device, command) | result), 0
+        return methods.table(result), 0
     if arguments.peers:
         from pipeline.peers import bench as peers
 

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from pipeline.errors import UserError
 from pipeline.params import Parameters
 from pipeline.schema import Range
-from pipeline.sling.model import THETA
+from pipeline.sling.model import THETA, Sling, load_sling
 
 
 def _limits(name: str) -> Range:
@@ -51,6 +52,12 @@ def load_theta(path: Path, band: str) -> dict:
                 f" got {repr(value)[:60]}"
             )
     return content
+
+
+def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Sling:
+    """The sling of a band in the air that a θ file's content has identified beside θ."""
+    drag = content.get("nuisances", {}).get("air_drag", 0.0)
+    return replace(load_sling(params, band, root), air_drag=drag)
 
 
 def vector(content: dict) -> np.ndarray:

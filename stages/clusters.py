@@ -2,7 +2,8 @@
 
     python -m stages.clusters band1 sling2sim2real
 
-Reads data/history/<band>/<method>.parquet; writes data/clusters/<band>/<method>.json.
+Reads data/history/<band>/<method>.parquet; writes data/clusters/<band>/<method>.json, which holds
+no region where the method's search has one phase.
 """
 
 from __future__ import annotations
@@ -12,24 +13,33 @@ from pathlib import Path
 from pipeline import errors
 from pipeline.identify.history import History
 from pipeline.identify.regions import find_regions, save_regions
-from pipeline.sling.model import THETA
+from pipeline.identify.search import Free
+from pipeline.identify.space import Space
 from pipeline.stage import expect, started
 
 
 def main() -> None:
     params, band, method = started("band", "method")
-    optimizer = params.optimizer
+    about, optimizer = params.methods[method], params.optimizer
+    free = Free.of(Space.of_method(params, method), about.fixed)
     source = expect(Path("data/history", band, f"{method}.parquet"), f"history@{band}-{method}")
-    history = History.load(method, THETA, source)
+    history = History.load(method, free.names, source)
+    target = Path("data/clusters", band, f"{method}.json")
+    if about.search != "multistart":
+        save_regions(target, free.names, [], 0)
+        print(f"{band} {method}: {about.search} has no second phase")
+        return
+    k_top = about.k_top or optimizer.k_top
     regions = find_regions(
         history.unit,
         history.total,
-        k_top=optimizer.k_top,
+        k_top=k_top,
         k_nn=optimizer.k_nn,
         delta=optimizer.delta,
+        covariance=about.covariance,
     )
-    save_regions(Path("data/clusters", band, f"{method}.json"), THETA, regions, optimizer.k_top)
-    fewer = f" (k_top asks for {optimizer.k_top})" if len(regions) < optimizer.k_top else ""
+    save_regions(target, free.names, regions, k_top)
+    fewer = f" (k_top asks for {k_top})" if len(regions) < k_top else ""
     print(f"{band} {method}: {len(regions)} regions{fewer}, best loss {regions[0].loss:.5g}")
 
 

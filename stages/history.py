@@ -1,9 +1,11 @@
-"""Search the whole box of parameters by differential evolution; keep everything evaluated.
+"""Search the whole box of parameters; keep everything evaluated.
 
     python -m stages.history band1 sling2sim2real
 
-Reads data/episodes/<band>/; writes data/history/<band>/<method>.parquet. Killed, it resumes from
-.checkpoints/. SLING_DEVICE and SLING_WORKERS say where it runs.
+The search is that of the method; of a multistart it is differential evolution, which the regions
+and their refinement follow. Reads data/episodes/<band>/; writes
+data/history/<band>/<method>.parquet. Killed, it resumes from .checkpoints/. SLING_DEVICE and
+SLING_WORKERS say where it runs.
 """
 
 from __future__ import annotations
@@ -11,19 +13,29 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline import errors
-from pipeline.identify.explore import explore
 from pipeline.identify.history import History
-from pipeline.identify.session import session
-from pipeline.sling.model import THETA
+from pipeline.identify.optimizers import explorer
+from pipeline.identify.search import Free, budget, search
+from pipeline.identify.session import service
+from pipeline.identify.space import Space
 from pipeline.stage import started
 
 
 def main() -> None:
     params, band, method = started("band", "method")
-    history = History(method, THETA)
-    with session("history", band, method, params, params.optimizer.generations + 1) as evaluate:
-        explore(evaluate, params.optimizer, history)
-        history.save(Path("data/history", band, f"{method}.parquet"))
+    about = params.methods[method]
+    space = Space.of_method(params, method)
+    free = Free.of(space, about.fixed)
+    rollouts, _ = budget(params.optimizer, about.search)
+    history = History(method, space.names)
+    search(
+        explorer(about, params.optimizer, len(free.axes), rollouts),
+        service("history", band, method, params, rollouts),
+        history,
+        rollouts=rollouts,
+        free=free,
+    )
+    history.save(Path("data/history", band, f"{method}.parquet"))
 
 
 if __name__ == "__main__":

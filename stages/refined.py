@@ -3,8 +3,8 @@
     python -m stages.refined band1 sling2sim2real
 
 Reads data/episodes/<band>/ and data/clusters/<band>/<method>.json; writes
-data/refined/<band>/<method>.parquet. Killed, it resumes from .checkpoints/. SLING_DEVICE and
-SLING_WORKERS say where it runs.
+data/refined/<band>/<method>.parquet, which has no row where the method's search has one phase.
+Killed, it resumes from .checkpoints/. SLING_DEVICE and SLING_WORKERS say where it runs.
 """
 
 from __future__ import annotations
@@ -13,22 +13,30 @@ from pathlib import Path
 
 from pipeline import errors
 from pipeline.identify.history import History
-from pipeline.identify.refine import iterations, refine
+from pipeline.identify.optimizers.multistart import Multistart
 from pipeline.identify.regions import load_regions
-from pipeline.identify.session import session
-from pipeline.sling.model import THETA
+from pipeline.identify.search import Free, search
+from pipeline.identify.session import service
+from pipeline.identify.space import Space
 from pipeline.stage import expect, started
 
 
 def main() -> None:
     params, band, method = started("band", "method")
+    about, optimizer = params.methods[method], params.optimizer
+    space = Space.of_method(params, method)
     source = expect(Path("data/clusters", band, f"{method}.json"), f"clusters@{band}-{method}")
     regions = load_regions(source)
-    batches = iterations(params.optimizer, len(regions))
-    history = History(method, THETA)
-    with session("refined", band, method, params, batches) as evaluate:
-        refine(evaluate, regions, params.optimizer, history)
-        history.save(Path("data/refined", band, f"{method}.parquet"))
+    history = History(method, space.names)
+    if regions:
+        search(
+            Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed),
+            service("refined", band, method, params, optimizer.cma_rollouts),
+            history,
+            rollouts=optimizer.cma_rollouts,
+            free=Free.of(space, about.fixed),
+        )
+    history.save(Path("data/refined", band, f"{method}.parquet"))
 
 
 if __name__ == "__main__":

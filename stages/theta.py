@@ -1,9 +1,10 @@
-"""Choose θ*: the best of everything that exploration and refinement evaluated.
+"""Choose θ*, the best of everything that was evaluated, and say how sure it is.
 
     python -m stages.theta band1 sling2sim2real
 
-Reads data/history/ and data/refined/<band>/<method>.parquet; writes
-data/theta/<band>/<method>.json.
+Reads data/history/ and data/refined/<band>/<method>.parquet, data/episodes/<band>/ and
+data/mounting/<band>.json; writes data/theta/<band>/<method>.json, and samples of the posterior
+with profile curves to data/confidence/<band>/<method>.json. SLING_WORKERS says on how many threads.
 """
 
 from __future__ import annotations
@@ -11,22 +12,33 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline import errors
+from pipeline.confidence.summary import confidence
 from pipeline.files import write_json
 from pipeline.identify.history import History, theta_content
-from pipeline.sling.model import THETA
+from pipeline.identify.session import load_episode, workers
+from pipeline.sling.model import THETA, load_sling
 from pipeline.stage import expect, started
+from pipeline.theta import vector
 
 
 def main() -> None:
-    _, band, method = started("band", "method")
+    params, band, method = started("band", "method")
     sources = [
         expect(Path("data", phase, band, f"{method}.parquet"), f"{phase}@{band}-{method}")
         for phase in ("history", "refined")
     ]
     content = theta_content(History.load(method, THETA, *sources), band)
+    episode, sling = load_episode(band), load_sling(params, band)
+    known, kept = confidence(params, method, episode, sling, vector(content), workers=workers())
+    content["confidence"] = known
+    write_json(Path("data/confidence", band, f"{method}.json"), kept | {"band": band})
     write_json(Path("data/theta", band, f"{method}.json"), content)
-    values = ", ".join(f"{name} {value:.4g}" for name, value in content["theta"].items())
-    print(f"{band} {method}: {values}; loss {content['loss']['total']:.5g}")
+    print(f"{band} {method}: loss {content['loss']['total']:.5g}")
+    for name, value in content["theta"].items():
+        about = known["parameters"][name]
+        what = "fixed" if about.get("fixed") else f"{about['low']:.4g} to {about['high']:.4g}"
+        word = "" if about["identifiable"] or about.get("fixed") else ", not identifiable"
+        print(f"  {name} {value:.4g} ({what}{word})")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
     python -m stages.trials band1 sling2sim2real
 
-Reads data/policies/, data/theta/ and data/episodes/, and for a recorded band
+Reads data/policies/, data/theta/, data/confidence/ and data/episodes/, and for a recorded band
 data/trials/measured/<band>.csv where it is there; writes data/trials/<band>/<method>.parquet.
 A rig band is launched on the virtual rig, with the same actuation errors for every method. For a
 recorded band the calibrated simulator predicts the measured launches, or else the policy's own.
@@ -22,6 +22,7 @@ from pipeline.episode import Episode
 from pipeline.params import load
 from pipeline.policy import trials
 from pipeline.policy.aim import policy_draws, simulator
+from pipeline.policy.spread import landing_intervals, load_samples
 from pipeline.stage import expect_episode, started
 from pipeline.theta import load_theta, vector
 
@@ -49,6 +50,9 @@ def main() -> None:
         kind, landing, failure = "predicted", [None] * len(draws), [None] * len(draws)
 
     predicted = simulator(params, band, vector(theta), params.setup.max_force)(draws)
+    samples = load_samples(Path("data/confidence", band, f"{method}.json"), band, method)
+    launcher = simulator(params, band, vector(theta))
+    intervals = landing_intervals(launcher, draws, samples, params.trials.actuation_error)
     hold_force = predicted.hold_force
     if about.source == "rig":
         seeds = [1_000_000 * params.trials.seed + number for number in range(len(draws))]
@@ -65,6 +69,7 @@ def main() -> None:
         draws=draws,
         targets=targets,
         predicted=predicted,
+        intervals=intervals,
         landing=landing,
         failure=failure,
         hold_force=hold_force,

@@ -63,7 +63,7 @@ def test_the_documented_commands_are_understood() -> None:
     launched = parse("launch --theta t.json --band band1 --draw=-0.30,-0.17".split())
     assert (launched.theta, launched.draw) == (Path("t.json"), (-0.30, -0.17))
     aimed = parse("aim --band band1 --target 1.925".split())
-    assert (aimed.method, aimed.target, aimed.json) == ("sling2sim2real", 1.925, False)
+    assert (aimed.method, aimed.target, aimed.json) == ("sling2sim2real_taut", 1.925, False)
     assert parse("aim --band band1 --method m --target 1.925".split()).method == "m"
     assert parse("bench --device cuda:0 --json".split()).device == "cuda:0"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.episode import Episode
 from pipeline.identify.loss import TERMS, EpisodeLoss
 from pipeline.identify.space import Space
-from pipeline.sling.interaction import interact
+from pipeline.sling.interaction import Rollouts, interact
 
 SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
 
@@ -25,7 +25,7 @@ class Evaluation:
     """N evaluated parameter vectors of dimension D.
 
     Attributes:
-        unit, theta: In the unit cube and physical, shape (N, D).
+        unit, theta: In the unit cube and physical, shape (N, D); nuisances are the last columns.
         terms: Each loss term, shape (N,); NaN where the rollout failed.
         total: Weighted sum of the terms, shape (N,); +inf where the rollout failed.
         failure: None or the reason, length N.
@@ -58,12 +58,16 @@ class Evaluator:
 
         Args:
             workers: Threads on the CPU (the kernels release the interpreter); None: all cores.
-            simulate: Called as `simulate(sling, episode, thetas, device=device)`.
+            simulate: Called as `simulate(sling, episode=, thetas=, device=)`.
         """
         self.space, self.loss = space, loss
-        self._simulate = partial(simulate, sling, episode, device=device)
+        more = len(loss.stamps) / len(episode.cloud_time)  # frames than the camera's
+        if more > 1:
+            episode = replace(episode, cloud_time=loss.stamps)
+        self._sling = sling
+        self._simulate = partial(simulate, episode=episode, device=device)
         on_gpu = device.startswith("cuda")
-        self._slice = SLICE["cuda" if on_gpu else "cpu"]
+        self._slice = int(SLICE["cuda"] / more) if on_gpu else SLICE["cpu"]
         self._pool = ThreadPoolExecutor(1 if on_gpu else workers or os.cpu_count())
 
     def __call__(self, unit: np.ndarray) -> Evaluation:
@@ -85,10 +89,19 @@ class Evaluator:
             seconds=time.perf_counter() - start,
         )
 
+    def rollouts(self, theta: np.ndarray) -> tuple[Rollouts, dict[str, np.ndarray]]:
+        """Simulate physical points (N, D); the rollouts and their nuisances, as the loss asks."""
+        first = self.space.dimension - len(self.space.nuisances)
+        nuisances = dict(zip(self.space.nuisances, theta[:, first:].T, strict=True))
+        sling = self._sling
+        if "air_drag" in nuisances:
+            sling = replace(sling, air_drag=nuisances["air_drag"])
+        return self._simulate(sling, thetas=theta[:, :first]), nuisances
+
     def _evaluate(self, theta: np.ndarray) -> tuple[dict[str, np.ndarray], list[str | None]]:
-        rollouts = self._simulate(theta)
+        rollouts, nuisances = self.rollouts(theta)
         with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
-            terms = self.loss.terms(rollouts)
+            terms = self.loss.terms(rollouts, nuisances)
             finite = np.isfinite(self.loss.total(terms))
         failure = [
             reason or (None if good else "the loss is not finite")

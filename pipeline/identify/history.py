@@ -1,7 +1,7 @@
 """Everything that a search evaluated, one row a parameter vector, and the best of it.
 
-Columns: method, phase (de, cma), generation, solver (null unless several run side by side),
-unit_<name> and <name> (physical) of each parameter, geom, force, work, taut, total, failure. A
+Columns: method, phase (de, cma, bo, ...), generation, solver (null unless several run side by
+side), unit_<name> and <name> (physical) of each axis, geom, force, work, taut, total, failure. A
 failed row has total = +inf, NaN terms and the reason.
 """
 
@@ -37,6 +37,11 @@ class History:
         solver: np.ndarray | None = None,
     ) -> None:
         """Append a batch; `solver` says who asked for each point, shape (N,)."""
+        self._parts.append(self._rows(evaluation, phase, generation, solver))
+
+    def _rows(
+        self, evaluation: Evaluation, phase: str, generation: int, solver: np.ndarray | None
+    ) -> pa.Table:
         count = len(evaluation.total)
         columns = {
             "method": pa.array([self.method] * count, pa.string()),
@@ -51,11 +56,16 @@ class History:
             columns[name] = pa.array(evaluation.terms[name], pa.float64())
         columns["total"] = pa.array(evaluation.total, pa.float64())
         columns["failure"] = pa.array(evaluation.failure, pa.string())
-        self._parts.append(pa.table(columns))
+        return pa.table(columns)
 
     @property
     def table(self) -> pa.Table:
-        return pa.concat_tables(self._parts).combine_chunks()
+        return pa.concat_tables(self._parts or [self._no_rows()]).combine_chunks()
+
+    def _no_rows(self) -> pa.Table:
+        points, values = np.zeros((0, len(self.names))), np.zeros(0)
+        nothing = Evaluation(points, points, dict.fromkeys(TERMS, values), values, [])
+        return self._rows(nothing, "", 0, None)
 
     @property
     def unit(self) -> np.ndarray:
@@ -89,13 +99,18 @@ class History:
 
 
 def theta_content(history: History, band: str) -> dict:
-    """What a theta file holds: the best parameters of everything that was evaluated."""
+    """What a theta file holds: the best of everything that was evaluated.
+
+    Its nuisances are the searched axes that are none of `history.names`.
+    """
     best = history.best()
+    nuisances = [name for name in best if f"unit_{name}" in best and name not in history.names]
     terms = {name: best[name] for name in (*TERMS, "total") if np.isfinite(best[name])}
     return {
         "band": band,
         "method": history.method,
         "theta": {name: best[name] for name in history.names},
+        "nuisances": {name: best[name] for name in nuisances},
         "loss": terms,
         "rollouts": len(history.total),
         "failed": int(np.isinf(history.total).sum()),

@@ -17,25 +17,19 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.episode import Episode
 from pipeline.errors import UserError
+from pipeline.identify.phases import taut_time
 from pipeline.sling.interaction import interact
 from pipeline.sling.model import Sling
 
 ANGLE = (-30.0, 60.0)  # of the clamps, towards the middle of the fork [deg]
 RIGIDITY = (0.1, 20.0)  # relative to a solid round band
-TAUT = 0.05  # of the peak force, above the band's weight: below it the band is slack
 UNITS = {"geom": 0.1, "force": 0.1}  # 1 mm of shape weighs as much as 0.1 N
 POISSON = 0.45  # while the band is slack, any will do
 
 
 def slack_part(episode: Episode) -> Episode:
     """The episode until the band is taut. Raises UserError where it never hangs slack."""
-    size = np.linalg.norm(episode.force, axis=1)
-    held = (episode.time > episode.grasp_time) & (episode.time < episode.release_time)
-    peak, weight = size[held].max(), np.median(size[held][:30])
-    taut = held & (size > TAUT * peak + min(1.5 * weight, 0.2 * peak))
-    if not taut.any():
-        raise UserError(f"episode of {episode.band}: the hand's force never rises")
-    end = episode.time[np.argmax(taut)]
+    end = taut_time(episode)
     count, frames = int(np.sum(episode.time < end)), int(np.sum(episode.cloud_time < end))
     if end - episode.grasp_time < 0.3 or frames < 10:
         raise UserError(

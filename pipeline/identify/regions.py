@@ -36,9 +36,17 @@ class Region:
 
 
 def find_regions(
-    unit: np.ndarray, total: np.ndarray, *, k_top: int, k_nn: int, delta: float
+    unit: np.ndarray,
+    total: np.ndarray,
+    *,
+    k_top: int,
+    k_nn: int,
+    delta: float,
+    covariance: bool = True,
 ) -> list[Region]:
     """The k_top best regions of evaluated points (N, D) with losses (N,); fewer if there are fewer.
+
+    Without `covariance` each Sigma is a multiple of the identity, of the same determinant.
 
     Raises UserError if not even two points have a finite loss.
     """
@@ -52,10 +60,11 @@ def find_regions(
     for centre in suppress(unit[good], total[good], delta, k_top):
         distance = np.linalg.norm(unit[good] - unit[good][centre], axis=1)
         members = good[np.argsort(distance, kind="stable")[:k_nn]]
+        sigma = regularised(np.cov(unit[members], rowvar=False))
         regions.append(
             Region(
                 mu=unit[good[centre]],
-                sigma=regularised(np.cov(unit[members], rowvar=False)),
+                sigma=sigma if covariance else isotropic(sigma),
                 loss=float(total[good[centre]]),
                 members=members.tolist(),
             )
@@ -80,6 +89,13 @@ def regularised(covariance: np.ndarray) -> np.ndarray:
     dimension = len(covariance)
     ridge = max(RIDGE * np.trace(covariance) / dimension, LEAST_VARIANCE)
     return covariance + ridge * np.eye(dimension)
+
+
+def isotropic(covariance: np.ndarray) -> np.ndarray:
+    """The ball whose volume is that of the ellipsoid of a positive definite covariance (D, D)."""
+    dimension = len(covariance)
+    _, log_determinant = np.linalg.slogdet(covariance)
+    return np.exp(log_determinant / dimension) * np.eye(dimension)
 
 
 def save_regions(path: Path, names: tuple[str, ...], regions: list[Region], asked: int) -> None:

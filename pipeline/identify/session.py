@@ -1,4 +1,4 @@
-"""What the searching stages share: an evaluator that reports, and resumes after a kill.
+"""What the searching stages share: an evaluator that reports, and remembers what it simulated.
 
 Where it runs is said by the environment, because results do not depend on it beyond rounding:
 SLING_DEVICE (cpu or cuda:0; default cpu) and SLING_WORKERS (threads on the CPU; default all cores).
@@ -7,67 +7,45 @@ SLING_DEVICE (cpu or cuda:0; default cpu) and SLING_WORKERS (threads on the CPU;
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
-import numpy as np
-
-from pipeline import episode as episode_module
-from pipeline import signal as signal_module
 from pipeline.episode import Episode
 from pipeline.errors import UserError
-from pipeline.identify.checkpoint import Recorded, fingerprint
-from pipeline.identify.evaluate import Evaluation, Evaluator
+from pipeline.identify.evaluate import Evaluator
 from pipeline.identify.loss import EpisodeLoss
+from pipeline.identify.memo import Memo, fingerprint
 from pipeline.identify.progress import Progress
 from pipeline.identify.space import Space
-from pipeline.sling import model as sling_module
 from pipeline.sling.model import load_sling, mounting_path
 from pipeline.stage import expect_episode
 
-SOURCES = (
-    Path(__file__).parent,
-    Path(sling_module.__file__).parent,
-    Path(episode_module.__file__),
-    Path(signal_module.__file__),
+PIPELINE = Path(__file__).parents[1]
+LOSS = ("chamfer.h", "chamfer.py", "evaluate.py", "kernel.py", "loss.py", "nuisance.py")
+SOURCES = (  # the code that a term of the loss hangs on
+    *(PIPELINE / "identify" / name for name in (*LOSS, "phases.py", "space.py")),
+    *(PIPELINE / name for name in ("episode.py", "native.py", "signal.py", "sling")),
 )
 
 
-@contextmanager
-def session(
-    stage: str, band: str, method: str, params, batches: int
-) -> Iterator[Callable[[np.ndarray], Evaluation]]:
-    """Give the evaluator of a stage; its checkpoint is removed when the block ends well."""
-    folder = Path("data/episodes", band)
+def service(stage: str, band: str, method: str, params, rollouts: int) -> Progress:
+    """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
     evaluate = evaluator(params, band, method)
-    recorded = Recorded(
+    sections = (params.bands[band], params.setup, params.sling, params.force, params.loss)
+    memo = Memo(
         evaluate,
-        Path(".checkpoints", stage, f"{band}-{method}"),
+        Path(".checkpoints", band),
         fingerprint(
             *SOURCES,
-            *(folder / name for name in ("signals.parquet", "clouds.parquet")),
+            *(Path("data/episodes", band, f"{name}.parquet") for name in ("signals", "clouds")),
             mounting_path(band),
-            *(
-                section.model_dump_json()
-                for section in (
-                    params.bands[band],
-                    params.setup,
-                    params.sling,
-                    params.force,
-                    params.parameters,
-                    params.loss,
-                    params.methods[method],
-                )
-            ),
+            *(section.model_dump_json() for section in sections),
             *(f"{package} {version(package)}" for package in ("warp-lang", "numpy", "scipy")),
             device(),
         ),
     )
     name = f"{stage}-{band}-{method}"
-    yield Progress(recorded, name, batches, Path("logs", f"{name}.log"))
-    recorded.clear()
+    return Progress(memo, name, rollouts, Path("logs", f"{name}.log"))
 
 
 def evaluator(params, band: str, method: str) -> Evaluator:
@@ -81,7 +59,7 @@ def evaluator(params, band: str, method: str) -> Evaluator:
         episode,
         sling,
         EpisodeLoss.of(params, method, episode, sling, device=device()),
-        Space.of(params.parameters),
+        Space.of_method(params, method),
         device=device(),
         workers=workers(),
     )

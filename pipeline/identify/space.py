@@ -1,4 +1,4 @@
-"""The box of the search: physical parameters to the unit cube and back."""
+"""The box of the search: physical parameters, and nuisances, to the unit cube and back."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.params.identification import NUISANCES
 from pipeline.sling.model import THETA
 
 
@@ -25,19 +26,44 @@ class Space:
     log: np.ndarray
 
     @classmethod
-    def of(cls, parameters) -> Space:
-        """Make it from params.yaml's `parameters`, in the simulator's order."""
+    def of(
+        cls,
+        parameters,
+        nuisances: dict[str, tuple[float, float]] | None = None,
+        bounds: dict[str, tuple[float, float]] | None = None,
+    ) -> Space:
+        """Make it from params.yaml's `parameters`, in the simulator's order.
+
+        Of a method's `nuisances`, bounds by name, each adds a linear axis, in NUISANCES' order. Its
+        `bounds` take the place of a parameter's own.
+        """
         boxes = [getattr(parameters, name) for name in THETA]
+        bounds = bounds or {}
+        known = [
+            bounds.get(name, (box.low, box.high)) for name, box in zip(THETA, boxes, strict=True)
+        ]
+        others = {name: nuisances[name] for name in NUISANCES if name in (nuisances or {})}
         return cls(
-            names=THETA,
-            low=np.array([box.low for box in boxes], float),
-            high=np.array([box.high for box in boxes], float),
-            log=np.array([box.scale == "log" for box in boxes]),
+            names=(*THETA, *others),
+            low=np.array([low for low, _ in (*known, *others.values())], float),
+            high=np.array([high for _, high in (*known, *others.values())], float),
+            log=np.array([*(box.scale == "log" for box in boxes), *(False for _ in others)]),
         )
+
+    @classmethod
+    def of_method(cls, params, method: str) -> Space:
+        """The box that a method of params.yaml searches: within its bounds, with its nuisances."""
+        about = params.methods[method]
+        return cls.of(params.parameters, about.nuisances, about.bounds)
 
     @property
     def dimension(self) -> int:
         return len(self.names)
+
+    @property
+    def nuisances(self) -> tuple[str, ...]:
+        """The last axes: those that are no parameters of the simulator."""
+        return tuple(name for name in self.names if name in NUISANCES)
 
     def to_physical(self, unit: np.ndarray) -> np.ndarray:
         """Physical values, shape (..., D), of points in the unit cube, shape (..., D)."""

@@ -8,9 +8,8 @@ import numpy as np
 
 from pipeline.errors import UserError
 from pipeline.params import expect_known
+from pipeline.policy.spread import landing_intervals, load_samples
 from pipeline.theta import load_theta, vector
-
-NORMAL_95 = 1.6448536269514722  # 90 % of a normal distribution lies within this many deviations
 
 
 def policy_draws(folder: Path, targets: np.ndarray) -> np.ndarray:
@@ -47,13 +46,14 @@ def aim(
 
     Args:
         params: The whole of params.yaml.
-        launcher: Simulates draws, shape (N, 2) [m]; the calibrated simulator by default.
+        launcher: Simulates draws, shape (N, 2) [m], and with a second argument those of other θ,
+            shape (N, 5); the calibrated simulator by default.
 
     Returns:
         draw_y_m, draw_z_m, predicted_landing_m, interval_90_m, hold_force_n, warnings. The
-        interval covers 90 % of the landings that an error of `trials.actuation_error` in the drawn
-        position spreads around the prediction, by the launch's own gradient; that θ is not known
-        exactly is not in it. Landing and interval are None where the launch fails.
+        interval holds 90 % of the landings that samples of θ (data/confidence) and an error of
+        `trials.actuation_error` in the drawn position give. Landing and interval are None where
+        the launch fails.
 
     Raises:
         UserError: Unknown band or method, or a file that is missing.
@@ -64,9 +64,7 @@ def aim(
     theta = load_theta(root / "data" / "theta" / band / f"{method}.json", band)
     draw = policy_draws(root / "data" / "policies" / band / method, np.array([target]))[0]
     launcher = launcher or simulator(params, band, vector(theta))
-    step = 1e-3  # m, small against the box and large against the simulator's rounding
-    around = draw + step * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
-    launched = launcher(around)
+    launched = launcher(draw[None])
     warnings = []
     low, high = params.policy.targets
     if not low <= target <= high:
@@ -78,11 +76,12 @@ def aim(
         landing = float(launched.landing_y[0])
         if abs(landing - target) > 0.05:
             warnings.append(f"the simulated landing is {landing - target:+.2f} m off the target")
-        if not any(launched.failure):
-            ahead, behind = launched.landing_y[1::2], launched.landing_y[2::2]
-            gradient = (ahead - behind) / (2 * step)
-            half = float(NORMAL_95 * params.trials.actuation_error * np.hypot(*gradient))
-            interval = [landing - half, landing + half]
+        samples = load_samples(root / "data" / "confidence" / band / f"{method}.json", band, method)
+        if samples is None:
+            warnings.append("the interval leaves out how well the parameters are known")
+        found = landing_intervals(launcher, draw, samples, params.trials.actuation_error)[0]
+        if np.isfinite(found).all():
+            interval = found.tolist()
     force = float(launched.hold_force[0])
     if force > params.setup.max_force:
         warnings.append(
@@ -102,7 +101,10 @@ def aim(
 def simulator(
     params, band: str, theta: np.ndarray, max_force: float = np.inf, root: str | Path = "."
 ):
-    """Function that launches draws, shape (N, 2) [m], in the simulator calibrated with `theta`."""
+    """Function that launches draws, shape (N, 2) [m], in the simulator calibrated with `theta`.
+
+    A second argument, shape (N, 5), gives each launch a θ of its own.
+    """
     import os
 
     from pipeline.sling.launch import launch
@@ -111,7 +113,8 @@ def simulator(
     sling = load_sling(params, band, root)
     workers = os.cpu_count() or 1
 
-    def launcher(draws: np.ndarray):
-        return launch(sling, theta[None], draws, max_force=max_force, workers=workers)
+    def launcher(draws: np.ndarray, thetas: np.ndarray | None = None):
+        thetas = theta[None] if thetas is None else thetas
+        return launch(sling, thetas, draws, max_force=max_force, workers=workers)
 
     return launcher

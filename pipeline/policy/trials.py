@@ -28,6 +28,8 @@ SCHEMA = pa.schema(
         ("draw_y", pa.float64()),  # m, as commanded
         ("draw_z", pa.float64()),
         ("predicted_y", pa.float64()),  # m, by the calibrated simulator; null where it fails
+        ("predicted_low", pa.float64()),  # m, central 90 % by what is known of theta and the draw
+        ("predicted_high", pa.float64()),
         ("predicted_failure", pa.string()),
         ("landing_y", pa.float64()),  # m; null where failed, and for predictions
         ("hold_force", pa.float64()),  # N, of the rig where kind is virtual, else as predicted
@@ -115,6 +117,7 @@ def table(
     draws: np.ndarray,
     targets: list[float | None],
     predicted,
+    intervals: np.ndarray,
     landing: list[float | None],
     failure: list[str | None],
     hold_force: np.ndarray,
@@ -126,6 +129,7 @@ def table(
     Args:
         draws: Commanded draws (y, z) [m], shape (N, 2).
         predicted: The calibrated simulator's launches of those draws.
+        intervals: Where 90 % of them would land [m], shape (N, 2); NaN where that is not known.
         landing: Where they landed [m], None where nowhere or unknown.
         recorded: Largest stretch of the recording.
     """
@@ -144,6 +148,8 @@ def table(
         "draw_y": draws[:, 0],
         "draw_z": draws[:, 1],
         "predicted_y": pa.array(predicted.landing_y, pa.float64(), from_pandas=True),
+        "predicted_low": pa.array(intervals[:, 0], pa.float64(), from_pandas=True),
+        "predicted_high": pa.array(intervals[:, 1], pa.float64(), from_pandas=True),
         "predicted_failure": predicted.failure,
         "landing_y": landing,
         "hold_force": pa.array(hold_force, pa.float64(), from_pandas=True),

@@ -32,11 +32,28 @@ LANDING = {
 }
 TARGETS = (1.725, 1.925, 2.125)
 BANDS = {"band1": "Band 1", "band2": "Band 2", "band3": "Band 3"}  # ours that imitate them
-METHODS = {"sling2sim2real": "Sling2Sim2Real"}  # ours that are theirs
+METHODS = {  # ours that are theirs
+    "sling2sim2real": "Sling2Sim2Real",
+    "package_si": "Package SI",
+    "real2sim2real": "Real2Sim2Real",
+    "de": "DE",
+    "bo": "BO",
+    "adam": "Adam",
+    "no_covariance": "without covariance",
+    "no_multistart": "without multi-start",
+    "no_covariance_no_multistart": "without covariance and multi-start",
+    "no_work": "without the work term",
+}
 
-# Identified E [Pa], nu, damping [s], friction, damping scale, and the loss, of its own method.
+# Identified E [Pa], nu, damping [s], friction, damping scale, and the loss.
 THETA = {
-    "Band 1": (9.29e5, 0.46, 1.11e-2, 0.80, 0.79, 1.9785),
-    "Band 2": (5.01e6, 0.38, 1.01e-2, 0.28, 0.77, 2.1749),
-    "Band 3": (3.33e6, 0.40, 7.89e-3, 0.40, 0.71, 0.9416),
+    ("Band 1", "Sling2Sim2Real"): (9.29e5, 0.46, 1.11e-2, 0.80, 0.79, 1.9785),
+    ("Band 1", "Package SI"): (7.06e5, 0.45, 1.30e-2, 0.25, 1.00, 2.4718),
+    ("Band 1", "Real2Sim2Real"): (8.52e6, 0.45, 5.12e-3, 0.94, 1.00, 4.1798),
+    ("Band 2", "Sling2Sim2Real"): (5.01e6, 0.38, 1.01e-2, 0.28, 0.77, 2.1749),
+    ("Band 2", "Package SI"): (2.23e6, 0.45, 9.38e-3, 0.25, 1.00, 2.3267),
+    ("Band 2", "Real2Sim2Real"): (1.63e5, 0.45, 5.13e-3, 0.61, 1.00, 4.2244),
+    ("Band 3", "Sling2Sim2Real"): (3.33e6, 0.40, 7.89e-3, 0.40, 0.71, 0.9416),
+    ("Band 3", "Package SI"): (9.56e5, 0.45, 2.43e-2, 0.25, 1.00, 3.4290),
+    ("Band 3", "Real2Sim2Real"): (1.27e5, 0.45, 5.13e-3, 0.98, 1.00, 3.7900),
 }

@@ -2,51 +2,74 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.episode import Episode
 from pipeline.errors import UserError
-from pipeline.signal import average, cutoff_hz, lowpass
+from pipeline.identify.loss import EpisodeLoss
+from pipeline.identify.nuisance import along_axes
+from pipeline.theta import calibrated, vector
 
-RATE = 1000.0  # of the simulated force on its way through the filter [Hz]
+SEEN_BY_CAMERA = ("camera_delay", "cloud_shift_x", "cloud_shift_y", "cloud_shift_z")
 
 
 @dataclass(frozen=True)
 class Replay:
-    """One simulated interaction.
+    """One simulated interaction; nuisances of the θ file act on it as in the loss.
 
     Attributes:
         force: On the gripper at the episode's samples, filtered as the measured one, shape (T, 3).
         center_line: Nodes of the band at the camera's stamps [m], shape (K, L, 3).
+        distance: Of each frame's cloud from the simulated band [m], shape (K,); NaN without points.
+        measured_work, work: Of the band on the hand since the start [J], shape (T,); forces and
+            velocity through the loss's median filter, so that they end apart by its work term.
+        residuals: "force" [N] and "cloud" [cm] during the pull, each "fitted" and "held_out".
     """
 
     force: np.ndarray
     center_line: np.ndarray
+    distance: np.ndarray
+    measured_work: np.ndarray
+    work: np.ndarray
+    residuals: dict[str, dict[str, float]]
 
 
-def replay(params, band: str, episode: Episode, theta: np.ndarray) -> Replay:
-    """Simulate the episode's interaction with physical θ, shape (5,).
+def replay(params, band: str, method: str, episode: Episode, theta: dict) -> Replay:
+    """Simulate the episode's interaction with a θ file's content.
 
     Raises:
         UserError: θ fails in simulation.
     """
     from pipeline.sling.interaction import interact
-    from pipeline.sling.model import load_sling
 
-    sling = load_sling(params, band)
-    rollouts = interact(sling, episode, theta[None])
+    sling = calibrated(params, band, theta)
+    loss = EpisodeLoss.of(params, method, episode, sling)
+    nuisances = {name: np.array([value]) for name, value in theta.get("nuisances", {}).items()}
+    delay, shift = nuisances.get("camera_delay", 0.0), along_axes(nuisances, "cloud_shift")
+    late = replace(episode, cloud_time=episode.cloud_time - delay)
+    rollouts = interact(sling, late, vector(theta)[None])
     if rollouts.failure[0]:
         raise UserError(f"theta of {band}: {rollouts.failure[0]}; `dvc repro theta` makes it anew")
-    start = episode.time[0] - episode.sample_period / 2
-    samples = len(episode.time)
-    grid = start + np.arange(int(samples * episode.sample_period * RATE) + 1) / RATE
-    # Until the grasp nothing pulls at the hand.
-    force = [np.interp(grid, rollouts.times, axis, left=0.0) for axis in rollouts.force[0].T]
-    cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
-    smooth = lowpass(np.stack(force, axis=1), RATE, cutoff)
+    if shift is not None:
+        rollouts = replace(rollouts, center_line=rollouts.center_line + shift[:, None, None])
+    nuisances = {name: one for name, one in nuisances.items() if name not in SEEN_BY_CAMERA}
+    force = loss.filtered(rollouts, nuisances)
     return Replay(
-        force=average(grid, smooth, start, episode.sample_period, samples),
+        force=force[0],
         center_line=rollouts.center_line[0],
+        distance=loss.frames(rollouts, nuisances)[0],
+        measured_work=work(loss.force, loss.velocity, episode.sample_period),
+        work=work(loss.smooth(force)[0], loss.velocity, episode.sample_period),
+        residuals={
+            kind: {part: float(value[0]) for part, value in parts.items()}
+            for kind, parts in loss.residuals(rollouts, nuisances).items()
+        },
     )
+
+
+def work(force: np.ndarray, velocity: np.ndarray, period: float) -> np.ndarray:
+    """Work since the first sample by trapezoids [J], shape (T,), of (T, 3) at equal times."""
+    power = np.einsum("tc,tc->t", force, velocity)
+    return np.append(0.0, np.cumsum(power[1:] + power[:-1]) / 2 * period)

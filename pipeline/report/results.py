@@ -9,6 +9,8 @@ from pathlib import Path
 import pandas as pd
 
 from pipeline.episode import Episode
+from pipeline.identify.regions import Region, load_regions
+from pipeline.params import pairs
 from pipeline.policy.landing_map import LandingMap
 from pipeline.stage import expect
 from pipeline.theta import load_theta
@@ -19,8 +21,11 @@ class Result:
     """What one method made of one band.
 
     Attributes:
-        theta: The θ file: "theta", "loss", "rollouts", ...
+        theta: The θ file: "theta", "loss", "rollouts", "confidence", ...
         history: Every evaluated θ, the exploration's rows before the refinement's.
+        regions: Where the refinement began; none for a search of one phase.
+        axes: Names of the regions' axes in the unit cube.
+        posterior: "names", "samples", "profiles", "mean"; None where θ has no confidence.
         card: The policy's card.
         training: One row an iteration of the policy's training.
         landing_map: Simulated launches over the box of draws.
@@ -31,10 +36,18 @@ class Result:
     method: str
     theta: dict
     history: pd.DataFrame
+    regions: list[Region]
+    axes: list[str]
+    posterior: dict | None
     card: dict
     training: pd.DataFrame
     landing_map: LandingMap
     trials: pd.DataFrame
+
+    @property
+    def confidence(self) -> dict:
+        """Intervals of the θ file by kind; empty where it has none."""
+        return self.theta.get("confidence") or {}
 
 
 @dataclass(frozen=True)
@@ -46,36 +59,48 @@ class Results:
 
     @property
     def trials(self) -> pd.DataFrame:
-        return pd.concat(
-            [one.trials for by_method in self.methods.values() for one in by_method.values()],
-            ignore_index=True,
-        )
+        return pd.concat([one.trials for one in self], ignore_index=True)
+
+    def __iter__(self):
+        """Every result, band by band."""
+        for methods in self.methods.values():
+            yield from methods.values()
 
 
 def gather(params, root: str | Path = ".") -> Results:
     """Read the outputs of every band and method of params.run. Raises UserError."""
     data = Path(root) / "data"
-    episodes, methods = {}, {}
-    for band in params.run.bands:
+    episodes, methods = {}, {band: {} for band in params.run.bands}
+    for band in methods:
         expect(data / "episodes" / band / "signals.parquet", f"episode@{band}")
         episodes[band] = Episode.load(data / "episodes" / band)
-        methods[band] = {name: _result(data, band, name) for name in params.run.methods}
+    for band, method in pairs(params.run):
+        prefix = "" if method in params.run.methods else "ablation_"
+        methods[band][method] = _result(data, band, method, prefix)
     return Results(episodes, methods)
 
 
-def _result(data: Path, band: str, method: str) -> Result:
+def _result(data: Path, band: str, method: str, prefix: str) -> Result:
     def path(step: str, name: str, stage: str) -> Path:
-        return expect(data / step / band / name, f"{stage}@{band}-{method}")
+        return expect(data / step / band / name, f"{prefix}{stage}@{band}-{method}")
 
     policy = f"{method}/"
     history = [
         pd.read_parquet(path(step, f"{method}.parquet", step)) for step in ("history", "refined")
     ]
+    clusters = path("clusters", f"{method}.json", "clusters")
+    theta = load_theta(path("theta", f"{method}.json", "theta"), band)
+    posterior = None
+    if theta.get("confidence"):
+        posterior = json.loads(path("confidence", f"{method}.json", "theta").read_text("utf-8"))
     return Result(
         band=band,
         method=method,
-        theta=load_theta(path("theta", f"{method}.json", "theta"), band),
-        history=pd.concat(history, ignore_index=True),
+        theta=theta,
+        history=pd.concat([part for part in history if len(part)], ignore_index=True),
+        regions=load_regions(clusters),
+        axes=json.loads(clusters.read_text("utf-8"))["names"],
+        posterior=posterior,
         card=json.loads(path("policies", policy + "card.json", "policy").read_text("utf-8")),
         training=pd.read_parquet(path("policies", policy + "training.parquet", "policy")),
         landing_map=LandingMap.load(path("policies", policy + "map.parquet", "policy")),

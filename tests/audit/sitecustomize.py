@@ -23,7 +23,7 @@ class Section:
         self._section, self._path = section, path
 
     def __getattr__(self, name: str) -> object:
-        if name == "model_dump_json":  # a checkpoint's fingerprint: no result depends on it
+        if name == "model_dump_json":  # a memory's fingerprint: no result depends on it
             return self._section.model_dump_json
         if name not in type(self._section).model_fields:  # another method may read everything
             read.add(self._path)
@@ -52,6 +52,8 @@ class Entries(Mapping):
 
 def noted(value: object, path: str) -> object:
     if isinstance(value, dict):
+        if not value:
+            read.add(path)
         return Entries(value, path)
     if hasattr(type(value), "model_fields"):
         return Section(value, path)

@@ -1,6 +1,6 @@
-"""A search that kills itself in the middle of its batch number `argv[3]`; see test_checkpoint.py.
+"""A search that kills itself in the middle of its batch number `argv[4]`; see test_memo.py.
 
-python -m tests.identify.killed CHECKPOINTS OUTPUT BATCH
+python -m tests.identify.killed OPTIMISER MEMORY OUTPUT BATCH
 """
 
 from __future__ import annotations
@@ -12,26 +12,33 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.identify.checkpoint import Recorded
-from tests.identify.toy import CENTRE, chain, correlated, quadratic
+from pipeline.identify.history import History
+from pipeline.identify.memo import Memo
+from tests.identify.functions import CENTRE, Evaluate, alone, chain, correlated, quadratic
+
+ROLLOUTS = 250
+VALLEY = quadratic(CENTRE, correlated()).function
+
+
+def searched(name: str, evaluate) -> list[History]:
+    """All histories of a search by that name."""
+    if name == "multistart":
+        return list(chain(evaluate)[:2])
+    return [alone(name, evaluate, ROLLOUTS)]
 
 
 def main() -> None:
-    folder, output, fatal = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
-    inner = quadratic(CENTRE, correlated())
-    evaluated = 0
+    name, folder, output, fatal = sys.argv[1], *map(Path, sys.argv[2:4]), int(sys.argv[4])
 
-    def evaluate(unit: np.ndarray):
-        nonlocal evaluated
-        if evaluated == fatal:
+    def dies(unit: np.ndarray) -> np.ndarray:
+        if evaluate.count > fatal:
             os.kill(os.getpid(), signal.SIGKILL)
-        evaluated += 1
-        return inner(unit)
+        return VALLEY(unit)
 
-    recorded = Recorded(evaluate, folder, "inputs")
-    for name, history in zip(("a", "b"), chain(recorded)[:2], strict=True):
-        history.save(output / f"{name}.parquet")
-    print(evaluated)
+    evaluate = Evaluate(dies)
+    for number, history in enumerate(searched(name, Memo(evaluate, folder, "inputs"))):
+        history.save(output / f"{number}.parquet")
+    print(evaluate.count)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UserError
-from pipeline.identify.loss import TERMS, EpisodeLoss, taut_frames
+from pipeline.identify.loss import TERMS, EpisodeLoss
+from pipeline.identify.phases import taut_frames
 from pipeline.signal import average, lowpass
 from tests.identify import toy
 
@@ -108,16 +109,6 @@ def test_taut_counts_only_the_frames_of_the_recoil() -> None:
     assert loss.total(terms)[0] == 2 * terms["taut"][0]
 
 
-def test_recoil_with_frames_that_do_not_show_the_middle() -> None:
-    """An empty frame decides nothing and counts for nothing; late frames never count."""
-    content = recoil([-0.4, -0.3, -0.2, -0.1, -0.05])
-    content["clouds"][1] = np.zeros((0, 3))
-    content["cloud_time"][4] = 2.0
-    episode = toy.episode(**content)
-    np.testing.assert_array_equal(taut_frames(episode), [0, 1, 1, 1, 0])
-    np.testing.assert_array_equal(loss_of(episode).taut, [0, 0, 1, 1, 0])
-
-
 def test_an_episode_without_taut_frames() -> None:
     """It serves methods that do not weigh them, and is refused by name for those that do."""
     episode = toy.episode(**recoil([-0.4, 0.1]))
@@ -154,3 +145,60 @@ def test_a_broken_rollout_breaks_no_other() -> None:
     total = loss.total(terms)
     assert np.isfinite(total[0])
     assert not np.isfinite(total[1])
+
+
+BLOCKS = np.array([[0.45, 0.75]])  # of the toy's pull, from 0.3 to 1.2 s
+
+
+def test_a_held_out_block_counts_in_its_own_terms_alone() -> None:
+    """What differs within the block and its guard moves no fitted term, and the other way round."""
+    episode = toy.episode(samples=200, release_time=5.9)
+    loss = loss_of(episode, held_out=np.array([[2.0, 3.0]]), median_window=1)
+    off, late = toy.rollouts(episode), toy.rollouts(episode)
+    inside = (off.times > 2.1) & (off.times < 2.9)
+    pictures = (off.cloud_time > 2.1) & (off.cloud_time < 2.9)
+    off.force[0, inside, 1], off.center_line[0, pictures, :, 2] = 4, -0.01
+    late.force[0, off.times > 3.5, 1] = 4
+    late.center_line[0, off.cloud_time > 3.5, :, 2] -= 0.01
+    clean = loss.terms(toy.rollouts(episode))
+    for name in ("geom", "force", "work"):
+        assert loss.terms(off)[name][0] == pytest.approx(clean[name][0], abs=1e-3)
+        assert loss.terms(late)[name][0] > clean[name][0] + 0.1
+    held = loss.held_out_terms(off)
+    assert held["force"][0] == pytest.approx(4 * 0.8, rel=0.05)
+    assert held["geom"][0] == pytest.approx(pictures.sum() / loss.held_frames.sum(), rel=0.01)
+    assert loss.held_out_terms(late)["force"][0] < 1e-6
+    residuals = loss.residuals(off)
+    assert residuals["force"]["fitted"][0] < 1e-3
+    assert residuals["cloud"]["fitted"][0] < 0.01
+    assert residuals["force"]["held_out"][0] == held["force"][0]
+    assert residuals["cloud"]["held_out"][0] == held["geom"][0]
+
+
+def test_samples_and_frames_are_fitted_or_held_out_or_guards() -> None:
+    loss = loss_of(toy.episode(), held_out=BLOCKS, median_window=1)
+    for time, fitted, held in (
+        (loss.time, loss.fitted_samples, loss.held_samples),
+        (toy.episode().cloud_time, loss.fitted_frames, loss.held_frames),
+    ):
+        assert not (fitted & held).any()
+        np.testing.assert_array_equal(held, (time > 0.45) & (time < 0.75))
+        guard = ~(fitted | held)
+        assert guard.any()
+        assert np.abs(np.abs(time[guard] - 0.6) - 0.15).max() < 0.1
+
+
+def test_without_blocks_nothing_is_held_out() -> None:
+    episode = toy.episode()
+    lines = toy.rollouts(episode, shift=(0.001, 0, -0.01), force=(0.1, 1, 0))
+    plain, none = loss_of(episode), loss_of(episode, held_out=np.zeros((0, 2)))
+    for name, value in plain.terms(lines).items():
+        np.testing.assert_array_equal(none.terms(lines)[name], value)
+    assert all(np.isnan(value).all() for value in plain.held_out_terms(lines).values())
+
+
+def test_the_recoil_cannot_be_held_out_of_a_method_that_weighs_it() -> None:
+    episode = toy.episode(**recoil([-0.4, -0.3, -0.1, 0.02, *50 * [0.1]]))
+    loss_of(episode, weights=ONES)
+    with pytest.raises(UserError, match="toy.*taut"):
+        loss_of(episode, weights=ONES, held_out=np.array([[0.9, 1.2]]))

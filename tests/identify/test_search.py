@@ -1,32 +1,37 @@
-"""The chain of differential evolution, regions and CMA-ES on functions with known minima."""
+"""The loop around optimisers, and the whole chain, on functions with known minima."""
 
 from __future__ import annotations
 
-from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pipeline.errors import UserError
-from pipeline.identify.explore import explore
 from pipeline.identify.history import History, theta_content
-from pipeline.identify.refine import Solver, iterations
-from pipeline.identify.regions import (
-    Region,
-    find_regions,
-    load_regions,
-    regularised,
-    save_regions,
-    suppress,
+from pipeline.identify.optimizers import build
+from pipeline.identify.search import Free, budget, latin_hypercube, search
+from pipeline.identify.space import Space
+from pipeline.params import load
+from tests.identify.functions import (
+    CENTRE,
+    NAMES,
+    Evaluate,
+    alone,
+    chain,
+    changed,
+    correlated,
+    quadratic,
 )
-from tests.identify.toy import BUDGET, CENTRE, NAMES, budget, chain, correlated, quadratic
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_minimum_of_a_correlated_quadratic_is_found(seed: int) -> None:
     """Through a tenth of the box that fails; the refinement improves on the exploration."""
     evaluate = quadratic(CENTRE, correlated(), fails=lambda unit: unit[:, 4] > 0.9)
-    explored, refined, _ = chain(evaluate, budget(seed=seed, cma_rollouts=1600))
+    explored, refined, _ = chain(evaluate, changed(seed=seed, cma_rollouts=1600))
     assert len(explored.total) == 24 * 13
     assert len(refined.total) == 1600
     assert np.isinf(explored.total).any()
@@ -50,29 +55,108 @@ def test_everything_evaluated_is_recorded_inside_the_box() -> None:
     assert rows.max() <= 1
     table = refined.table
     assert set(table["phase"].to_pylist()) == {"cma"}
-    count = iterations(BUDGET, len(regions))
-    assert table["generation"].to_pylist() == [g for g in range(count) for _ in range(40)]
+    assert len(regions) == 5
+    assert table["generation"].to_pylist() == [g for g in range(8) for _ in range(40)]
     assert table["solver"].to_pylist()[:40] == [k for k in range(5) for _ in range(8)]
 
 
-def test_exploration_starts_from_a_latin_hypercube_and_spends_its_budget() -> None:
-    """Each of 24 strata of each parameter holds one agent; equal losses do not stop it early."""
-    history = History("toy", NAMES)
-    explore(quadratic(CENTRE, np.zeros((5, 5))), BUDGET, history)
-    strata = np.sort(np.floor(history.unit[:24] * 24).astype(int), axis=0)
-    np.testing.assert_array_equal(strata, np.tile(np.arange(24)[:, None], 5))
-    generation = history.table["generation"].to_numpy()
-    np.testing.assert_array_equal(generation, np.repeat(np.arange(13), 24))
-
-
-def test_exploration_survives_a_box_that_fails_everywhere() -> None:
-    history = History("toy", NAMES)
-    explore(quadratic(CENTRE, np.eye(5), fails=lambda unit: unit[:, 0] >= 0), BUDGET, history)
+def test_a_box_that_fails_everywhere_is_searched_to_the_end() -> None:
+    """An optimiser is told finite losses even so; only then the failure is said."""
+    evaluate = quadratic(CENTRE, np.eye(5), fails=lambda unit: unit[:, 0] >= 0)
+    history = alone("de", evaluate, 312)
     assert np.isinf(history.total).all()
     with pytest.raises(UserError, match="each of 312 simulations failed"):
         history.best()
-    with pytest.raises(UserError, match="only 0 of 312"):
-        find_regions(history.unit, history.total, k_top=5, k_nn=15, delta=0.1)
+
+
+class Recorder:
+    """Asks for batches of sizes that were given, and keeps what it is told."""
+
+    phase = "recorder"
+
+    def __init__(self, *sizes: int) -> None:
+        self._sizes, self.told = iter(sizes), []
+
+    def ask(self) -> np.ndarray:
+        return np.full((next(self._sizes), 5), 0.5)
+
+    def tell(self, losses: np.ndarray) -> None:
+        self.told.append(losses)
+
+
+@given(sizes=st.lists(st.integers(1, 9), min_size=1, max_size=9), data=st.data())
+def test_exactly_the_budget_is_spent(sizes: list[int], data: st.DataObject) -> None:
+    """Whatever sizes are asked for; the batch that is cut is not told."""
+    rollouts = data.draw(st.integers(1, sum(sizes)))
+    one, history = Recorder(*sizes), History("toy", NAMES)
+    search(one, quadratic(CENTRE, np.eye(5)), history, rollouts=rollouts)
+    assert len(history.total) == rollouts
+    whole = [size for size, end in zip(sizes, np.cumsum(sizes), strict=True) if end <= rollouts]
+    assert [len(losses) for losses in one.told] == whole
+    generation = np.repeat(np.arange(len(sizes)), sizes)[:rollouts]
+    assert history.table["generation"].to_pylist() == generation.tolist()
+
+
+def test_failed_points_are_told_as_twice_the_worst_so_far() -> None:
+    values = iter([np.array([1.0, np.inf, 3.0]), np.array([2.0, np.inf]), np.array([4.0, np.inf])])
+    evaluate = Evaluate(lambda unit: next(values), fails=lambda unit: np.arange(len(unit)) == 1)
+    one = Recorder(3, 2, 2)
+    search(one, evaluate, History("toy", NAMES), rollouts=7)
+    assert [losses.tolist() for losses in one.told] == [[1.0, 6.0, 3.0], [2.0, 6.0], [4.0, 8.0]]
+
+
+def test_fixed_axes_keep_their_physical_values() -> None:
+    """The optimiser searches the other axes; the history has all of them."""
+    parameters = load("params.yaml").parameters
+    space = Space.of(parameters)
+    free = Free.of(space, {"poissons_ratio": 0.45, "elasticity_damping": 5e-3})
+    assert free.names == ("youngs_modulus", "dynamic_friction", "damping_scale")
+    evaluate = quadratic(CENTRE, np.eye(5))
+    evaluate.space = space
+    history = History("toy", space.names)
+    one = build("de", 3, rollouts=600, seed=1, population=20)
+    search(one, evaluate, history, rollouts=600, free=free)
+    np.testing.assert_allclose(history.table["poissons_ratio"], 0.45, rtol=1e-12)
+    np.testing.assert_allclose(history.table["elasticity_damping"], 5e-3, rtol=1e-12)
+    best = [history.best()[f"unit_{name}"] for name in free.names]
+    np.testing.assert_allclose(best, CENTRE[[0, 3, 4]], atol=1e-3)
+
+
+def test_every_search_has_the_same_budget() -> None:
+    optimizer = load("params.yaml").optimizer
+    explore, refine = budget(optimizer, "multistart")
+    assert explore == optimizer.population * (optimizer.generations + 1)
+    assert budget(optimizer, "bo") == (explore + refine, 0)
+    assert explore + refine == 600
+
+
+@pytest.mark.parametrize("name", ["de", "bo", "adam", "tests.identify.own:RandomSearch"])
+def test_an_optimiser_is_deterministic_and_spends_its_budget(name: str) -> None:
+    """And starts, if it is ours, from the common Latin hypercube."""
+    runs = []
+    for number, seed in enumerate((1, 1, 2)):
+        np.random.seed(number)
+        optimizer = changed(seed=seed, population=8)
+        runs.append(alone(name, quadratic(CENTRE, correlated()), 29, optimizer))
+    for history in runs:
+        assert len(history.total) == 29
+        assert history.unit.min() >= 0
+        assert history.unit.max() <= 1
+    assert runs[0].table.equals(runs[1].table)
+    assert not runs[0].table.equals(runs[2].table)
+    if ":" not in name:
+        assert set(runs[0].table["phase"].to_pylist()) == {name}
+        np.testing.assert_array_equal(runs[0].unit[:8], latin_hypercube(5, 8, 1))
+
+
+def test_a_history_without_rows_can_be_kept(tmp_path: Path) -> None:
+    """What a search of one phase leaves for the second one: the same columns."""
+    empty, full = History("toy", NAMES), alone("de", quadratic(CENTRE, np.eye(5)), 30)
+    empty.save(tmp_path / "empty.parquet")
+    full.save(tmp_path / "full.parquet")
+    loaded = History.load("toy", NAMES, tmp_path / "full.parquet", tmp_path / "empty.parquet")
+    assert loaded.table.equals(full.table)
+    assert len(History.load("toy", NAMES, tmp_path / "empty.parquet").total) == 0
 
 
 def test_the_same_seed_gives_the_same_bytes(tmp_path) -> None:
@@ -81,87 +165,13 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path) -> None:
     for number, seed in enumerate((1, 1, 2)):
         np.random.seed(number)
         for phase, history in zip(
-            "ab", chain(quadratic(CENTRE, correlated()), budget(seed=seed))[:2], strict=True
+            "ab", chain(quadratic(CENTRE, correlated()), changed(seed=seed))[:2], strict=True
         ):
             history.save(tmp_path / f"{number}{phase}.parquet")
         files.append([(tmp_path / f"{number}{phase}.parquet").read_bytes() for phase in "ab"])
     assert files[0] == files[1]
     assert files[0][0] != files[2][0]
     assert files[0][1] != files[2][1]
-
-
-def test_suppression_equals_its_definition() -> None:
-    """Kept: the best row, and then every row further than delta from all kept better ones."""
-    rng = np.random.default_rng(1)
-    for _ in range(50):
-        unit, total = rng.random((60, 3)), rng.random(60)
-        left, expected = set(range(60)), []
-        while left:
-            best = min(left, key=lambda row: total[row])
-            expected.append(best)
-            left = {row for row in left if np.linalg.norm(unit[row] - unit[best]) > 0.4}
-        assert suppress(unit, total, 0.4, 100) == expected
-        assert suppress(unit, total, 0.4, 2) == expected[:2]
-        assert all(np.linalg.norm(unit[i] - unit[j]) > 0.4 for i, j in combinations(expected, 2))
-
-
-def test_covariance_is_that_of_the_nearest_successes() -> None:
-    """Two clouds of known covariance; failed rows at the centres have no say."""
-    rng = np.random.default_rng(1)
-    factors = [
-        np.diag([0.02, 0.01, 0.005]),
-        np.array([[0.02, 0, 0], [0.015, 0.01, 0], [0, 0, 0.01]]),
-    ]
-    centres = np.array([[0.25, 0.25, 0.5], [0.75, 0.75, 0.5]])
-    count = 4000
-    clouds = [c + rng.normal(size=(count, 3)) @ f.T for c, f in zip(centres, factors, strict=True)]
-    unit = np.concatenate([centres, *clouds, centres])
-    near = np.linalg.norm(unit[:, None] - centres, axis=2).min(axis=1)
-    total = near + np.where(unit[:, 0] > 0.5, 0.001, 0)
-    total[-2:] = np.inf
-    regions = find_regions(unit, total, k_top=3, k_nn=count + 1, delta=0.3)
-    assert len(regions) == 2  # three were asked for, and there are no more
-    for number, region in enumerate(regions):
-        np.testing.assert_array_equal(region.mu, centres[number])
-        assert region.members[0] == number
-        assert region.loss == total[number]
-        assert not set(region.members) & {len(unit) - 1, len(unit) - 2}
-        expected = factors[number] @ factors[number].T
-        np.testing.assert_allclose(region.sigma, expected, atol=0.06 * expected.max())
-
-
-def test_covariance_is_positive_definite_whatever_the_neighbours() -> None:
-    """One point many times over, a line, two points."""
-    line = np.outer(np.linspace(0, 1, 9), np.ones(5))
-    for points in (np.full((9, 5), 0.5), line, line[:2]):
-        sigma = regularised(np.cov(points, rowvar=False))
-        np.testing.assert_allclose(sigma, sigma.T)
-        assert np.linalg.eigvalsh(sigma).min() > 0
-        np.linalg.cholesky(sigma)
-
-
-def test_regions_survive_the_file(tmp_path) -> None:
-    region = Region(np.full(5, 0.1), np.eye(5) / 3, 1.25, [3, 1])
-    save_regions(tmp_path / "a.json", NAMES, [region], 5)
-    (loaded,) = load_regions(tmp_path / "a.json")
-    np.testing.assert_array_equal(loaded.mu, region.mu)
-    np.testing.assert_array_equal(loaded.sigma, region.sigma)
-    assert (loaded.loss, loaded.members) == (1.25, [3, 1])
-
-
-def test_first_candidates_follow_the_region() -> None:
-    """They are mu + L z with z from N(0, I): mean mu, covariance Sigma."""
-    factor = np.array([[0.04, 0, 0], [0.03, 0.02, 0], [0, -0.01, 0.03]])
-    sigma = factor @ factor.T
-    mu = np.array([0.4, 0.5, 0.6])
-    asked = Solver(Region(mu, sigma, 1.0, []), population=4000, seed=3).ask()
-    np.testing.assert_allclose(asked.mean(axis=0), mu, atol=0.003)
-    np.testing.assert_allclose(np.cov(asked, rowvar=False), sigma, atol=1.5e-4)
-
-
-def test_iterations_share_the_budget() -> None:
-    assert iterations(BUDGET, 5) == 8
-    assert iterations(BUDGET, 2) == 20
 
 
 def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
@@ -178,3 +188,12 @@ def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
         assert (content["band"], content["method"]) == ("band1", "toy")
         assert content["found"]["phase"] == phase
         assert content["confidence"] is None
+
+
+def test_nuisances_stand_beside_theta(tmp_path: Path) -> None:
+    explored = alone("de", quadratic(CENTRE, np.eye(5)), 60)
+    explored.save(tmp_path / "a.parquet")
+    content = theta_content(History.load("toy", NAMES[:3], tmp_path / "a.parquet"), "band1")
+    assert list(content["theta"]) == ["a", "b", "c"]
+    assert list(content["nuisances"]) == ["d", "e"]
+    assert content["nuisances"]["d"] == explored.best()["d"]

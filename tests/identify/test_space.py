@@ -33,6 +33,20 @@ def test_scales() -> None:
     assert middle["poissons_ratio"] == pytest.approx((0.30 + 0.49) / 2)
 
 
+def test_nuisances_are_the_last_axes() -> None:
+    """In one order, whatever that of the params; linear, between their bounds."""
+    bounds = {"force_bias_x": (-1.0, 1.0), "camera_delay": (-0.003, 0.001)}
+    space = Space.of(load().parameters, bounds)
+    assert space.names == (*THETA, "camera_delay", "force_bias_x")
+    assert space.nuisances == ("camera_delay", "force_bias_x")
+    assert space.dimension == 7
+    theta = space.to_physical(np.full(7, 0.5))
+    np.testing.assert_array_equal(theta[:5], SPACE.to_physical(np.full(5, 0.5)))
+    np.testing.assert_allclose(theta[5:], [-0.001, 0.0], atol=1e-15)
+    np.testing.assert_allclose(space.to_unit(theta), np.full(7, 0.5))
+    assert SPACE.nuisances == ()
+
+
 @given(arrays(float, (3, 5), elements=st.floats(-1e6, 1e6)))
 def test_reflection_lands_inside_and_is_idempotent(unit: np.ndarray) -> None:
     inside = reflect(unit)

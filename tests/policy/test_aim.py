@@ -23,6 +23,9 @@ PARAMS = SimpleNamespace(
 )
 
 
+LEFT_OUT = "the interval leaves out how well the parameters are known"
+
+
 @pytest.fixture(scope="module")
 def root(trained, tmp_path_factory):
     root = tmp_path_factory.mktemp("root")
@@ -46,7 +49,7 @@ def test_the_draw_lands_on_the_target(root) -> None:
     assert truth.landing_y[0] == pytest.approx(1.925, abs=0.02)
     assert answer["predicted_landing_m"] == pytest.approx(truth.landing_y[0], abs=1e-6)
     assert answer["hold_force_n"] == pytest.approx(truth.hold_force[0], abs=1e-6)
-    assert answer["warnings"] == []
+    assert answer["warnings"] == [LEFT_OUT]
     np.testing.assert_allclose(policy_draws(root / "data/policies/toy/none", [1.925]), draw)
 
 
@@ -57,6 +60,29 @@ def test_nine_landings_of_ten_lie_in_the_interval(root) -> None:
     low, high = answer["interval_90_m"]
     landing = toy.launch(spread).landing_y
     assert 0.88 < ((landing > low) & (landing < high)).mean() < 0.92
+
+
+def test_what_is_known_of_theta_widens_the_interval(root) -> None:
+    """Samples whose landings spread by a tenth: nine of ten of those lie inside."""
+
+    def launcher(draws, thetas=None):
+        launched = toy.launch(draws)
+        if thetas is not None:
+            launched.landing_y = launched.landing_y * thetas[:, 0]
+        return launched
+
+    narrow = shoot(root, 1.925)["interval_90_m"]
+    spread = np.linspace(0.9, 1.1, 201)
+    file = root / "data/confidence/toy/none.json"
+    file.parent.mkdir(parents=True)
+    samples = np.tile(spread[:, None], (1, len(THETA))).tolist()
+    file.write_text(json.dumps({"names": list(THETA), "samples": samples}))
+    answer = shoot(root, 1.925, launcher=launcher)
+    file.unlink()
+    landing = answer["predicted_landing_m"]
+    assert answer["warnings"] == []
+    np.testing.assert_allclose(answer["interval_90_m"], [0.91 * landing, 1.09 * landing], rtol=0.01)
+    assert np.ptp(narrow) < 0.5 * np.ptp(answer["interval_90_m"])
 
 
 def test_warns_outside_the_trained_range_and_above_the_force(root) -> None:

@@ -89,6 +89,7 @@ def test_a_table_counts_trials_by_target_and_keeps_what_failed_empty() -> None:
         draws=np.array([[-0.3, -0.17]] * 3),
         targets=[1.9, 1.9, 2.1],
         predicted=predicted,
+        intervals=np.array([[1.8, 2.0], [np.nan, np.nan], [1.9, 2.1]]),
         landing=[1.95, None, None],
         failure=[None, "too far", "too strong"],
         hold_force=predicted.hold_force,
@@ -98,5 +99,7 @@ def test_a_table_counts_trials_by_target_and_keeps_what_failed_empty() -> None:
     assert made.schema.equals(SCHEMA)
     assert made["trial"].to_pylist() == [1, 2, 1]
     assert made["predicted_y"].to_pylist() == [1.9, None, 2.0]
+    assert made["predicted_low"].to_pylist() == [1.8, None, 1.9]
+    assert made["predicted_high"].to_pylist() == [2.0, None, 2.1]
     assert made["hold_force"].to_pylist() == [9.0, None, 31.0]
     assert made["landing_y"].null_count == 2

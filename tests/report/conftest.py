@@ -13,11 +13,12 @@ from ruamel.yaml import YAML
 from torch import nn
 
 from pipeline.episode import Episode
+from pipeline.identify.regions import Region, save_regions
 from pipeline.params import load
 from pipeline.policy.export import write_onnx
 from pipeline.policy.landing_map import LandingMap
 from pipeline.policy.train import Policy
-from pipeline.policy.trials import SCHEMA
+from pipeline.sling.model import THETA as NAMES
 from tests.policy import toy
 
 BAND, METHOD = "toy", "sling2sim2real"
@@ -42,6 +43,25 @@ def episode() -> Episode:
     )  # fmt: skip
 
 
+def history(phase: str, totals: list[float], solver: int | None = None) -> pd.DataFrame:
+    """Rows on the diagonal of the unit cube, one generation each; its box is params.yaml's."""
+    boxes = load(Path("params.yaml")).parameters
+    place = (np.arange(len(totals)) + 0.5) / len(totals)
+    rows = pd.DataFrame({"method": METHOD, "phase": phase, "total": totals})
+    rows["generation"], rows["solver"] = np.arange(len(totals)), solver
+    rows["solver"] = rows.solver.astype("Int32")
+    for name in NAMES:
+        box = getattr(boxes, name)
+        low, high = np.log([box.low, box.high]) if box.scale == "log" else (box.low, box.high)
+        value = low + place * (high - low)
+        rows[f"unit_{name}"], rows[name] = place, np.exp(value) if box.scale == "log" else value
+    finite = np.where(np.isfinite(totals), totals, np.nan)
+    for name, share in (("geom", 0.5), ("force", 0.25), ("work", 0.25), ("taut", 0.1)):
+        rows[name] = share * finite
+    rows["failure"] = np.where(np.isfinite(totals), None, "slipped")
+    return rows
+
+
 def launches() -> pd.DataFrame:
     rows = [(1.725, 1.745), (1.725, 1.695), (1.925, 1.965), (2.125, None)]
     return pd.DataFrame(
@@ -55,6 +75,8 @@ def launches() -> pd.DataFrame:
             "draw_z": -0.2,
             "predicted_y": [1.725, 1.725, 1.925, 2.125],
             "predicted_failure": None,
+            "predicted_low": [1.7, 1.7, 1.9, 2.1],
+            "predicted_high": [1.75, 1.75, 1.95, 2.15],
             "landing_y": [landing for _, landing in rows],
             "hold_force": 9.0,
             "failure": [None, None, None, "did not land"],
@@ -62,6 +84,50 @@ def launches() -> pd.DataFrame:
             "recorded_stretch": 1.63,
         }
     )
+
+
+def confidence(fixed: str | None = None) -> dict:
+    """What a θ file says of its confidence; friction cannot be identified."""
+    parameters = {
+        name: {"low": 0.9 * value, "high": 1.1 * value, "identifiable": name != "dynamic_friction"}
+        for name, value in THETA.items()
+    }
+    if fixed:
+        parameters[fixed] = {"low": THETA[fixed], "high": THETA[fixed], "identifiable": False}
+        parameters[fixed]["fixed"] = True
+    matrix = np.eye(5)
+    matrix[0, 1] = matrix[1, 0] = -0.9
+    return {
+        "level": 0.9,
+        "parameters": parameters,
+        "derived": {
+            "damping_product": {"value": 2.1e-3, "low": 1.9e-3, "high": 2.3e-3, "unit": "s"},
+            "hold_force": {"value": 12.0, "low": 11.96, "high": 12.04, "unit": "N"},
+        },
+        "correlation": {"names": list(NAMES), "matrix": matrix.tolist()},
+        "phases": {
+            phase: {"force_rms": 0.1 * number, "cloud_rms": 0.002 * number}
+            for number, phase in enumerate(("slack", "taut", "recoil", "swing"), start=1)
+        },
+    }
+
+
+def posterior() -> dict:
+    """Samples within ± 10 % of θ, and parabolas as profiles."""
+    spread = np.linspace(0.9, 1.1, 41)
+    theta = np.array(list(THETA.values()))
+    return {
+        "names": list(NAMES),
+        "samples": (theta * spread[:, None]).tolist(),
+        "profiles": {
+            name: {
+                "value": (value * spread).tolist(),
+                "misfit": (2.71 * ((spread - 1) / 0.1) ** 2).tolist(),
+            }
+            for name, value in THETA.items()
+        },
+        "mean": theta.tolist(),
+    }
 
 
 @pytest.fixture
@@ -78,15 +144,21 @@ def root(tmp_path: Path) -> Path:
     }
     yaml.dump(content, tmp_path / "params.yaml")
     data = tmp_path / "data"
-    for name in ("history", "refined", "theta", "trials"):
+    for name in ("history", "clusters", "refined", "theta", "confidence", "trials"):
         (data / name / BAND).mkdir(parents=True)
     episode().save(data / "episodes" / BAND)
-    for phase, total in (("history", [3.0, np.inf, 2.0]), ("refined", [2.5, 1.25])):
-        rows = pd.DataFrame({"method": METHOD, "phase": phase, "total": total})
-        rows.to_parquet(data / phase / BAND / f"{METHOD}.parquet")
+    for step, rows in (
+        ("history", history("de", [3.0, np.inf, 2.0])),
+        ("refined", history("cma", [2.5, 1.25], solver=0)),
+    ):
+        rows.to_parquet(data / step / BAND / f"{METHOD}.parquet")
+    region = Region(np.full(5, 0.4), 0.01 * np.eye(5), 2.0, [2, 0])
+    save_regions(data / "clusters" / BAND / f"{METHOD}.json", NAMES, [region], 5)
     loss = {"geom": 0.5, "force": 0.25, "work": 0.5, "taut": 0.1, "total": 1.25}
     theta = {"band": BAND, "method": METHOD, "theta": THETA, "loss": loss, "rollouts": 5}
+    theta["confidence"] = confidence()
     (data / "theta" / BAND / f"{METHOD}.json").write_text(json.dumps(theta))
+    (data / "confidence" / BAND / f"{METHOD}.json").write_text(json.dumps(posterior()))
 
     folder = data / "policies" / BAND / METHOD
     chart = LandingMap.simulate(
@@ -104,8 +176,7 @@ def root(tmp_path: Path) -> Path:
     torch.manual_seed(0)
     network = nn.Sequential(nn.Linear(1, 8), nn.ELU(), nn.Linear(8, 2))
     write_onnx(Policy(network, (1.425, 2.425), chart), folder / "policy.onnx")
-    frame = launches()
-    frame.to_parquet(data / "trials" / BAND / f"{METHOD}.parquet", schema=SCHEMA)
+    launches().to_parquet(data / "trials" / BAND / f"{METHOD}.parquet")
     return tmp_path
 
 

@@ -2,33 +2,65 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
 from pipeline.episode import Episode
+from pipeline.identify.loss import EpisodeLoss
 from pipeline.params import load
-from pipeline.report.replay import replay
+from pipeline.report.replay import replay, work
 from pipeline.sling.interaction import interact
+from pipeline.sling.model import THETA as NAMES
 from pipeline.sling.model import Sling
 
-THETA = np.array([3e5, 0.46, 4e-3, 0.5, 0.6])
+METHOD = "sling2sim2real"
+THETA = dict(zip(NAMES, (3e5, 0.46, 4e-3, 0.5, 0.6), strict=True))
+SHIFT = np.array([0, 0.05, 0])  # of the clouds from where the band is
 
 
 @pytest.fixture(scope="module")
-def played():
+def params():
+    return load()
+
+
+@pytest.fixture(scope="module")
+def sling(params):
+    return Sling.of(params.bands["band1"], params.setup, params.sling)
+
+
+@pytest.fixture(scope="module")
+def recorded(sling):
     """A hand that takes the hanging band at 1 s, draws it 0.3 m by 3 s and lets go at 4 s."""
-    params = load()
     time = (np.arange(160) + 0.5) * 0.03
     knots = np.array([[0, 0, -0.2], [0, 0, -0.2], [0, 0, 0], [0, -0.3, 0], [0, -0.3, 0]])
-    path = PchipInterpolator([0, 1, 2, 3, 5], knots)(time)
+    path = PchipInterpolator([0, 1, 2, 3, 5], knots)
     nothing, stamps = np.zeros((160, 3)), np.arange(20) * 0.24
     episode = Episode(
-        "band1", time, path, nothing, nothing, 0 * time, stamps, [], 1.0, 4.0, np.ones(3)
-    )
-    band = params.bands["band1"]
-    rollouts = interact(Sling.of(band, params.setup, params.sling), episode, THETA[None])
-    return episode, rollouts, replay(params, "band1", episode, THETA)
+        "band1", time, path(time), path(time, 1), nothing + [0, 2, 0], 0 * time, stamps, [],
+        1.0, 4.0, np.array([1.5, 0, 0]),
+    )  # fmt: skip
+    rollouts = interact(sling, episode, np.array([list(THETA.values())]))
+    clouds = [(line + SHIFT).astype(np.float32) for line in rollouts.center_line[0]]
+    return replace(episode, clouds=clouds), rollouts
+
+
+def play(params, episode: Episode, **nuisances: float):
+    """Replay with nuisances, in a method that searches them."""
+    about = {name: (min(value, 0.0), max(value, 1.0)) for name, value in nuisances.items()}
+    if "camera_delay" in about:
+        about["camera_delay"] = (-0.02, 0.02)
+    method = params.methods[METHOD].model_copy(update={"nuisances": about})
+    params = params.model_copy(update={"methods": {METHOD: method}})
+    return replay(params, "band1", METHOD, episode, {"theta": THETA, "nuisances": nuisances})
+
+
+@pytest.fixture(scope="module")
+def played(params, recorded):
+    episode, rollouts = recorded
+    return episode, rollouts, play(params, episode)
 
 
 def test_the_pause_keeps_the_force_and_nothing_pulls_before_or_after(played) -> None:
@@ -54,3 +86,36 @@ def test_the_bands_ends_stay_at_the_tips(played) -> None:
     assert played.center_line.shape == rollouts.center_line.shape[1:]
     ends = played.center_line[:, [0, -1]]
     np.testing.assert_allclose(np.abs(ends), np.broadcast_to([0.1375, 0, 0], ends.shape), atol=2e-3)
+
+
+def test_it_ends_where_the_loss_says(params, sling, played) -> None:
+    episode, rollouts, played = played
+    terms = EpisodeLoss.of(params, METHOD, episode, sling).terms(rollouts)
+    apart = abs(played.measured_work[-1] - played.work[-1])
+    assert apart == pytest.approx(terms["work"][0], rel=1e-9) and apart > 0.1
+    assert 100 * played.distance.mean() == pytest.approx(terms["geom"][0], rel=1e-6)
+
+
+def test_nuisances_act_as_in_the_loss(params, recorded, played) -> None:
+    episode, rollouts = recorded
+    shifted = play(params, episode, cloud_shift_y=0.05)
+    np.testing.assert_allclose(shifted.center_line, rollouts.center_line[0] + SHIFT, atol=1e-6)
+    thick = params.bands["band1"].diameter  # the clouds are the middle line, not the surface
+    assert shifted.distance.max() < thick < 2 * thick < played[2].distance.min()
+    np.testing.assert_array_equal(shifted.force, played[2].force)
+    stronger = play(params, episode, force_gain=1.1)
+    np.testing.assert_allclose(stronger.force, 1.1 * played[2].force, rtol=1e-12)
+    late = play(params, episode, camera_delay=0.012)
+    at_four = np.argmin(np.abs(episode.cloud_time - 4.08))  # it moves by metres a second
+    early = play(params, replace(episode, cloud_time=episode.cloud_time - 0.012))
+    np.testing.assert_allclose(late.center_line, early.center_line)
+    assert np.abs(late.center_line - played[2].center_line)[at_four].max() > 0.005
+
+
+def test_work_of_a_constant_force_and_of_a_spring() -> None:
+    time = np.linspace(0, 2, 2001)
+    velocity = np.stack([0 * time, np.cos(time), 0 * time], 1)
+    constant = work(np.tile([5.0, 2.0, 0.0], (2001, 1)), velocity, 1e-3)
+    np.testing.assert_allclose(constant, 2 * np.sin(time), atol=1e-6)
+    spring = np.stack([0 * time, -3 * np.sin(time), 0 * time], 1)
+    np.testing.assert_allclose(work(spring, velocity, 1e-3), -1.5 * np.sin(time) ** 2, atol=1e-6)

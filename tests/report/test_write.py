@@ -6,31 +6,32 @@ import json
 import re
 import shutil
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from pipeline.errors import UserError
-from pipeline.policy.trials import SCHEMA
 from pipeline.report import write as writing
-from pipeline.report.replay import Replay
 from tests.report.conftest import BAND, METHOD
+from tests.report.toy_replay import toy_replay
+
+THETA_FILE = f"data/theta/{BAND}/{METHOD}.json"
 
 
 @pytest.fixture(autouse=True)
 def no_simulation(monkeypatch) -> None:
-    def replay(params, band, episode, theta) -> Replay:
-        return Replay(0.9 * episode.force, np.stack([cloud + 0.01 for cloud in episode.clouds]))
+    monkeypatch.setattr(writing, "replay", toy_replay)
 
-    monkeypatch.setattr(writing, "replay", replay)
+
+def written(root, params) -> str:
+    writing.write(params, root)
+    return (root / "reports" / "README.md").read_text()
 
 
 def test_the_report_is_complete_and_equal_twice(root, params) -> None:
-    writing.write(params, root)
+    text = written(root, params)
     first = {f: f.read_bytes() for f in (root / "reports").rglob("*") if f.is_file()}
-    text = (root / "reports" / "README.md").read_text()
     pictures = re.findall(r"\]\((figures/[^)]+)\)", text)
-    assert len(pictures) == len(set(pictures)) == 6
+    assert len(pictures) == len(set(pictures)) == 10
     assert {root / "reports" / name for name in pictures} == {
         file for file in first if file.suffix == ".png"
     }
@@ -41,28 +42,54 @@ def test_the_report_is_complete_and_equal_twice(root, params) -> None:
     assert {f: f.read_bytes() for f in (root / "reports").rglob("*") if f.is_file()} == first
 
 
+def test_intervals_stand_beside_what_was_identified(root, params) -> None:
+    text = written(root, params)
+    assert "3.00e5 (2.70e5 – 3.30e5)" in text and "0.5, not identifiable" in text
+    assert "2.10 (1.90 – 2.30)" in text  # s·d in ms
+    # 1.745 lies in 1.70 - 1.75, 1.695 does not; the third lies beyond the recorded stretch
+    assert "1 of 2 measured landings inside the recorded stretch lie in their 90 % interval" in text
+
+
+def test_a_posterior_that_has_not_settled_is_named(root, params) -> None:
+    assert "not settled" not in written(root, params)
+    theta = json.loads((root / THETA_FILE).read_text())
+    theta["confidence"]["moved"] = 4.37
+    (root / THETA_FILE).write_text(json.dumps(theta))
+    text = written(root, params)
+    assert f"posterior of {BAND}, Sling2Sim2Real had **not settled**" in text and "4.4" in text
+
+
+def test_a_theta_by_hand_needs_no_confidence(root, params) -> None:
+    theta = json.loads((root / THETA_FILE).read_text())
+    (root / THETA_FILE).write_text(json.dumps({"band": BAND, "theta": theta["theta"]}))
+    (root / f"data/confidence/{BAND}/{METHOD}.json").unlink()
+    text = written(root, params)
+    assert "No θ of this run comes with a confidence" in text and "3.00e5 | 0.45" in text
+    assert "profiles.png" not in text
+    assert not (root / f"reports/figures/{BAND}-profiles.png").exists()
+
+
 def test_a_failed_prediction_is_named(root, params) -> None:
     file = root / "data" / "trials" / BAND / f"{METHOD}.parquet"
     good = pd.read_parquet(file)
-    writing.write(params, root)
-    text = (root / "reports" / "README.md").read_text()
+    text = written(root, params)
     assert "could not be predicted" not in text and "stretch, is met" in text
     bad = good.assign(
         predicted_y=[1.725, None, 1.925, 2.125],
         predicted_failure=[None, "the simulation did not converge", None, None],
+        predicted_low=[1.7, None, 1.9, 2.1],
+        predicted_high=[1.75, None, 1.95, 2.15],
         hold_force=[9.0, None, 9.0, 9.0],
     )
-    bad.to_parquet(file, schema=SCHEMA)
-    writing.write(params, root)
-    text = (root / "reports" / "README.md").read_text()
+    bad.to_parquet(file)
+    text = written(root, params)
     assert "1 of 4 launches could not be predicted" in text
     assert "**not** met: 1 launches there are not predicted" in text
     assert "| 1 of 4 |" in text and "hold force, predicted [N]" in text
     assert "| 1.40 | – | the simulation did not converge |" in text
     far = good.assign(predicted_y=2 * good.predicted_y)
-    far.to_parquet(file, schema=SCHEMA)
-    writing.write(params, root)
-    assert "stretch, is **not** met" in (root / "reports" / "README.md").read_text()
+    far.to_parquet(file)
+    assert "stretch, is **not** met" in written(root, params)
 
 
 def test_metrics_are_the_numbers_of_the_tables(root, params) -> None:
@@ -73,6 +100,7 @@ def test_metrics_are_the_numbers_of_the_tables(root, params) -> None:
     assert metrics["measured_failed"] == 1
     inside = (abs(1.725 / 1.745 - 1) + abs(1.725 / 1.695 - 1)) / 2
     assert metrics["prediction_error_inside_percent"] == pytest.approx(100 * inside, abs=1e-3)
+    assert metrics["measured_in_interval_inside"] == 0.5
 
 
 @pytest.mark.parametrize(
@@ -80,8 +108,10 @@ def test_metrics_are_the_numbers_of_the_tables(root, params) -> None:
     [
         (f"data/episodes/{BAND}/signals.parquet", f"episode@{BAND}"),
         (f"data/history/{BAND}/{METHOD}.parquet", f"history@{BAND}-{METHOD}"),
+        (f"data/clusters/{BAND}/{METHOD}.json", f"clusters@{BAND}-{METHOD}"),
         (f"data/refined/{BAND}/{METHOD}.parquet", f"refined@{BAND}-{METHOD}"),
-        (f"data/theta/{BAND}/{METHOD}.json", f"theta@{BAND}-{METHOD}"),
+        (THETA_FILE, f"theta@{BAND}-{METHOD}"),
+        (f"data/confidence/{BAND}/{METHOD}.json", f"theta@{BAND}-{METHOD}"),
         (f"data/policies/{BAND}/{METHOD}/card.json", f"policy@{BAND}-{METHOD}"),
         (f"data/policies/{BAND}/{METHOD}/map.parquet", f"policy@{BAND}-{METHOD}"),
         (f"data/trials/{BAND}/{METHOD}.parquet", f"trials@{BAND}-{METHOD}"),

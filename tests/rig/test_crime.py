@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from pipeline.identify.evaluate import Evaluator
-from pipeline.identify.explore import explore
 from pipeline.identify.history import History
 from pipeline.identify.loss import EpisodeLoss
-from pipeline.identify.refine import refine
+from pipeline.identify.optimizers import explorer
+from pipeline.identify.optimizers.multistart import Multistart
 from pipeline.identify.regions import find_regions
+from pipeline.identify.search import budget, search
 from pipeline.identify.space import Space
 from pipeline.recording.build import build_episode
 from pipeline.rig.record import EPOCH
@@ -26,22 +27,23 @@ TRUTH = np.array([2.5e5, 0.45, 4e-3, 0.7, 0.6])
 
 
 def best_loss(params, sling, episode) -> tuple[float, np.ndarray]:
-    """Least total that a small budget finds, and its theta."""
+    """Least total that a budget finds which follows the ridge of E and nu, and its theta."""
     loss = EpisodeLoss.of(params, METHOD, episode, sling)
     evaluate = Evaluator(episode, sling, loss, Space.of(params.parameters))
-    history, search = History(METHOD, THETA), params.optimizer
-    explore(evaluate, search, history)
-    regions = find_regions(
-        history.unit, history.total, k_top=search.k_top, k_nn=search.k_nn, delta=search.delta
-    )
-    refine(evaluate, regions, search, history)
+    history, optimizer, about = History(METHOD, THETA), params.optimizer, params.methods[METHOD]
+    explore, refine = budget(optimizer, about.search)
+    search(explorer(about, optimizer, len(THETA), explore), evaluate, history, rollouts=explore)
+    settings = {name: getattr(optimizer, name) for name in ("k_top", "k_nn", "delta")}
+    regions = find_regions(history.unit, history.total, **settings)
+    solvers = Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed)
+    search(solvers, evaluate, history, rollouts=refine)
     best = history.best()
     return best["total"], np.array([best[name] for name in THETA])
 
 
 @pytest.fixture(scope="module")
 def quick(coarse):
-    budget = {"generations": 12, "population": 20, "k_top": 2, "cma_rollouts": 320}
+    budget = {"generations": 12, "population": 20, "k_top": 2, "cma_rollouts": 960}
     optimizer = coarse.optimizer.model_copy(update=budget)
     return coarse.model_copy(update={"optimizer": optimizer})
 

@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 from pipeline.intake.add_band import add_band
-from pipeline.report.tables import prediction_error
+from pipeline.report.tables.landings import prediction_error
 from tests.project import ROOT, copy_project
 
 pytestmark = pytest.mark.validation

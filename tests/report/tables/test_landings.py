@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
 from pipeline.report import paper
-from pipeline.report.tables import (
-    at_edge,
+from pipeline.report.tables.cells import markdown
+from pipeline.report.tables.landings import (
+    intervals,
     landing_errors,
-    markdown,
     prediction_error,
     predictions,
 )
@@ -80,11 +79,25 @@ def test_prediction_error_inside_and_beyond() -> None:
     assert "+5.0%" in text and "-10.0%" in text and text.count("(beyond)") == 2
 
 
-def test_edge_of_the_box_on_both_scales() -> None:
-    log = SimpleNamespace(low=1e-4, high=1e-2, scale="log")
-    line = SimpleNamespace(low=0.0, high=1.0, scale="linear")
-    assert at_edge(1.01e-4, log) and not at_edge(1.2e-4, log) and at_edge(1e-2, log)
-    assert at_edge(0.995, line) and not at_edge(0.98, line)
+def test_coverage_of_the_predicted_intervals() -> None:
+    launched = trials(
+        [
+            (math.nan, 2.0, None, 2.1, 1.4),
+            (math.nan, 2.0, None, 2.1, 1.5),
+            (math.nan, math.nan, "fell", 2.1, 1.5),  # nothing to cover
+            (math.nan, 4.0, None, 3.6, 1.7),  # beyond
+        ]
+    )
+    assert intervals(launched) is None
+    ranged = launched.assign(
+        predicted_low=[1.95, 2.05, 1.0, 3.0], predicted_high=[2.25, 2.15, 3.0, 4.0]
+    )
+    parts = intervals(ranged)
+    assert (parts["inside"]["covered"], parts["inside"]["launches"]) == (1, 2)
+    assert parts["inside"]["width"] == pytest.approx((0.15 + 0.05) / 2)
+    assert parts["beyond"] == {"launches": 1, "covered": 1, "width": 0.25}
+    assert "| 1.950 – 2.250 |" in markdown(predictions(ranged))
+    assert intervals(launched.assign(predicted_low=math.nan, predicted_high=math.nan)) is None
 
 
 def test_markdown_has_one_line_a_row() -> None:

@@ -1,4 +1,4 @@
-"""One CMA-ES in each region, all regions' candidates evaluated as one batch.
+"""One CMA-ES in each region, all regions' candidates asked for as one batch.
 
 The solver of a region searches z from N(0, I), and θ = mu + L z with L L' = Sigma, so that its
 first samples follow the region's covariance. Points outside the box are reflected into it: the
@@ -7,15 +7,34 @@ evaluated point is what the history records.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import cma
 import numpy as np
 
-from pipeline.identify.evaluate import Evaluation, Penalty
-from pipeline.identify.history import History
 from pipeline.identify.regions import Region
 from pipeline.identify.space import reflect
+
+
+class Multistart:
+    """CMA-ES in every region side by side."""
+
+    phase = "cma"
+
+    def __init__(self, regions: list[Region], *, population: int, seed: int) -> None:
+        """Start a solver in each region, with `population` candidates an iteration each."""
+        seeds = np.random.SeedSequence(seed).generate_state(len(regions))
+        self._solvers = [
+            Solver(region, population, int(own)) for region, own in zip(regions, seeds, strict=True)
+        ]
+        self.owner = np.repeat(np.arange(len(regions)), population)
+
+    def ask(self) -> np.ndarray:
+        """Candidates of all solvers, shape (regions * population, D); `owner` says whose."""
+        return np.concatenate([solver.ask() for solver in self._solvers])
+
+    def tell(self, losses: np.ndarray) -> None:
+        """Their finite losses, shape (regions * population,)."""
+        for number, solver in enumerate(self._solvers):
+            solver.tell(losses[self.owner == number])
 
 
 class Solver:
@@ -46,35 +65,3 @@ class Solver:
     def tell(self, losses: np.ndarray) -> None:
         """Finite losses of the candidates that were asked for last, shape (population,)."""
         self._cma.tell(self._asked, losses.tolist())
-
-
-def iterations(optimizer, solvers: int) -> int:
-    """How often `solvers` can ask within the budget of rollouts."""
-    return max(optimizer.cma_rollouts // (solvers * optimizer.cma_population), 1)
-
-
-def refine(
-    evaluate: Callable[[np.ndarray], Evaluation],
-    regions: list[Region],
-    optimizer,
-    history: History,
-) -> None:
-    """Run a CMA-ES in every region side by side; all rows go to `history`.
-
-    Args:
-        evaluate: Losses of points of the unit cube, shape (N, D).
-        optimizer: params.yaml's `optimizer`: seed, cma_population, cma_rollouts.
-    """
-    seeds = np.random.SeedSequence(optimizer.seed).generate_state(len(regions))
-    solvers = [
-        Solver(region, optimizer.cma_population, int(seed))
-        for region, seed in zip(regions, seeds, strict=True)
-    ]
-    owner = np.repeat(np.arange(len(solvers)), optimizer.cma_population)
-    penalty = Penalty()
-    for iteration in range(iterations(optimizer, len(solvers))):
-        evaluation = evaluate(np.concatenate([solver.ask() for solver in solvers]))
-        history.add(evaluation, phase="cma", generation=iteration, solver=owner)
-        losses = penalty(evaluation.total)
-        for number, solver in enumerate(solvers):
-            solver.tell(losses[owner == number])

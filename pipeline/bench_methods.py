@@ -1,0 +1,168 @@
+"""How long a whole search takes, method by method, on the yardstick of `sling bench`.
+
+A search is all that the stages history, clusters and refined do, with nothing remembered. Its time
+is what evaluations take (simulation, loss, keeping them) and what is left: the optimiser's own.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.bench import available, recorded_yardstick, seconds, timed
+from pipeline.episode import Episode
+from pipeline.errors import UserError
+from pipeline.identify.evaluate import Evaluator, simulated
+from pipeline.identify.history import History
+from pipeline.identify.loss import EpisodeLoss
+from pipeline.identify.memo import Memo
+from pipeline.identify.optimizers import explorer
+from pipeline.identify.optimizers.multistart import Multistart
+from pipeline.identify.regions import find_regions
+from pipeline.identify.search import Free, budget, latin_hypercube, search
+from pipeline.identify.space import Space
+from pipeline.sling.model import Sling
+
+PAPER = {"population": 64, "generations": 39, "cma_population": 16, "cma_rollouts": 3200}
+BUDGETS = {"laptop": {}, "paper": PAPER}  # laptop: as params.yaml has it
+
+
+class Clocked:
+    """A callable that sums up what its calls took [s]."""
+
+    def __init__(self, function) -> None:
+        self.function, self.seconds = function, 0.0
+
+    def __call__(self, *arguments):
+        result, _, wall = timed(partial(self.function, *arguments))
+        self.seconds += wall
+        return result
+
+
+def bench_methods(params, device: str = "cpu", size: str = "laptop") -> dict:
+    """Time a search with each of params.yaml's methods.
+
+    Args:
+        size: Of the budget, laptop (params.yaml's) or paper.
+
+    Returns:
+        `budget`: its name and settings; `batch`: seconds of one generation, simulated alone and
+        with the loss; `methods`, by name: rollouts, failures, seconds of the whole, CPU seconds of
+        all threads, seconds of evaluations and of the optimiser, rollouts/s, best loss.
+
+    Raises:
+        UserError: There is no such device.
+    """
+    if device.partition(":")[0] not in ("cpu", "cuda") or not available(device):
+        raise UserError(f"device {device}: not there; cpu is, and cuda:0 where there is a GPU")
+    optimizer = params.optimizer.model_copy(update=BUDGETS[size])
+    sling, episode = recorded_yardstick(params)
+    first = next(iter(params.methods))
+    _import_and_compile(params, sling, episode, first, device)
+    return {
+        "budget": {"name": size} | {name: getattr(optimizer, name) for name in ("k_top", *PAPER)},
+        "batch": _generation(params, sling, episode, first, device, optimizer.population),
+        "methods": {
+            method: time_search(params, method, optimizer, sling, episode, device)
+            for method in params.methods
+        },
+    }
+
+
+def time_search(
+    params, method: str, optimizer, sling: Sling, episode: Episode, device: str
+) -> dict:
+    """One search from nothing, all its rollouts counted."""
+    with tempfile.TemporaryDirectory() as folder:
+        memo = Memo(_evaluator(params, method, sling, episode, device), Path(folder), "bench")
+        evaluate = Clocked(memo)
+        history, cpu, wall = timed(partial(complete, params, method, optimizer, evaluate))
+    count = len(history.total)
+    return {
+        "rollouts": count,
+        "failed": int(np.isinf(history.total).sum()),
+        "seconds": wall,
+        "cpu_seconds": cpu,
+        "evaluation_s": evaluate.seconds,
+        "optimizer_s": wall - evaluate.seconds,
+        "rollouts_per_s": count / wall,
+        "best_loss": history.best()["total"],
+    }
+
+
+def complete(params, method: str, optimizer, evaluate) -> History:
+    """Everything that the stages history, clusters and refined evaluate for a method."""
+    about = params.methods[method]
+    space = Space.of_method(params, method)
+    free = Free.of(space, about.fixed)
+    explore, refine = budget(optimizer, about.search)
+    history = History(method, space.names)
+    first = explorer(about, optimizer, len(free.axes), explore)
+    search(first, evaluate, history, rollouts=explore, free=free)
+    if refine:
+        explored = History(method, free.names, [history.table])
+        regions = find_regions(
+            explored.unit,
+            explored.total,
+            k_top=about.k_top or optimizer.k_top,
+            k_nn=optimizer.k_nn,
+            delta=optimizer.delta,
+            covariance=about.covariance,
+        )
+        solvers = Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed)
+        search(solvers, evaluate, history, rollouts=refine, free=free)
+    return history
+
+
+def _generation(params, sling: Sling, episode: Episode, method: str, device: str, count: int):
+    """Seconds of one generation: simulated on one thread, and with the loss, on all cores."""
+    unit = latin_hypercube(5, count, params.optimizer.seed)
+    thetas = Space.of(params.parameters).to_physical(unit)
+    evaluate = _evaluator(params, method, sling, episode, device, nuisances=False)
+    simulate = partial(simulated, sling, episode, thetas, device=device, workers=os.cpu_count())
+    simulation, whole = seconds(simulate), seconds(partial(evaluate, unit))
+    return {"rollouts": count, "simulation_s": simulation, "with_loss_s": whole}
+
+
+def _evaluator(
+    params, method: str, sling: Sling, episode: Episode, device: str, nuisances: bool = True
+) -> Evaluator:
+    loss = EpisodeLoss.of(params, method, episode, sling, device=device)
+    names = params.methods[method].nuisances if nuisances else None
+    return Evaluator(episode, sling, loss, Space.of(params.parameters, names), device=device)
+
+
+def _import_and_compile(params, sling: Sling, episode: Episode, method: str, device: str) -> None:
+    """What a machine does once, and a method should not pay for."""
+    import botorch  # noqa: F401
+
+    evaluate = _evaluator(params, method, sling, episode, device)
+    evaluate(np.full((1, evaluate.space.dimension), 0.5))
+
+
+def table(result: dict) -> str:
+    """What `bench_methods` found, as lines for people."""
+    batch, methods = result["batch"], result["methods"]
+    width = max(map(len, methods))
+    heads = ("rollouts", "seconds", "evaluation", "optimizer", "rollouts/s", "best loss")
+    lines = ["  ".join([" " * width, *heads])]
+    for name, row in methods.items():
+        values = (
+            f"{row['rollouts']}",
+            f"{row['seconds']:.1f}",
+            f"{row['evaluation_s']:.1f}",
+            f"{row['optimizer_s']:.1f}",
+            f"{row['rollouts_per_s']:.0f}",
+            f"{row['best_loss']:.4f}",
+        )
+        cells = [f"{value:>{len(head)}}" for value, head in zip(values, heads, strict=True)]
+        lines.append("  ".join([f"{name:{width}}", *cells]))
+    lines.append(
+        f"a generation of {batch['rollouts']}: {batch['simulation_s']:.3f} s simulated,"
+        f" {batch['with_loss_s']:.3f} s with the loss"
+    )
+    return "\n".join(lines)

@@ -1,0 +1,160 @@
+"""Typed view of params.yaml: `load()` refuses unknown keys, wrong types and impossible values.
+
+Attribute names are the keys of the file. Ranges say what makes physical or numerical sense, wide
+enough for any lab. Every violation is a UserError of one line that names the key's path.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import ValidationError, model_validator
+from ruamel.yaml import YAML, YAMLError
+
+from pipeline.errors import UserError
+from pipeline.params.identification import (
+    Loss,
+    Method,
+    Optimizer,
+    Parameters,
+    Sling,
+    check_method,
+)
+from pipeline.params.lab import Band, BandName, Plan, Run, Setup
+from pipeline.params.launches import TARGET_AREA, Policy, Trials
+from pipeline.params.recording import Cloud, Episode, Force
+from pipeline.params.virtual_rig import Rig, RigArm, RigBand, RigCamera, RigClock, RigWrench
+from pipeline.schema import FILLED, Name, Section, one_line, refusal
+
+__all__ = [
+    "TARGET_AREA",
+    "Band",
+    "Parameters",
+    "Params",
+    "Plan",
+    "Rig",
+    "RigArm",
+    "RigBand",
+    "RigCamera",
+    "RigClock",
+    "RigWrench",
+    "expect_known",
+    "load",
+    "pairs",
+    "parse",
+]
+
+
+class Params(Section):
+    run: Run
+    bands: Annotated[dict[BandName, Band], FILLED]
+    setup: Setup
+    plan: Plan
+    episode: Episode
+    force: Force
+    cloud: Cloud
+    sling: Sling
+    parameters: Parameters
+    loss: Loss
+    optimizer: Optimizer
+    methods: Annotated[dict[Name, Method], FILLED]
+    policy: Policy
+    trials: Trials
+    rig: Rig
+
+    @model_validator(mode="after")
+    def _names_agree(self) -> Params:
+        for key, names, known in (
+            ("bands", self.run.bands, self.bands),
+            ("methods", self.run.methods, self.methods),
+            ("ablations.methods", self.run.ablations.methods, self.methods),
+        ):
+            for name in names:
+                if name not in known:
+                    raise refusal(f"run.{key}: {name} is not one of {', '.join(known)}")
+        rig = [name for name in self.run.bands if self.bands[name].source == "rig"]
+        if list(self.run.rig) != rig:
+            raise refusal(
+                "run.rig: must list those of run.bands that have source: rig, in the same order:"
+                f" [{', '.join(rig)}]"
+            )
+        for name in rig:
+            if name not in self.rig.bands:
+                raise refusal(f"rig.bands: lacks {name}, which the rig is to record")
+        return self
+
+    @model_validator(mode="after")
+    def _methods_fit(self) -> Params:
+        for name, method in self.methods.items():
+            check_method(method, f"methods.{name}.", self.parameters, self.optimizer)
+        return self
+
+    @model_validator(mode="after")
+    def _bands_reach_across(self) -> Params:
+        for name, band in self.bands.items():
+            if band.rest_length <= self.setup.fork_width:
+                raise refusal(
+                    f"bands.{name}.rest_length: {band.rest_length:g} must be longer than"
+                    f" setup.fork_width, {self.setup.fork_width:g}"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _trials_are_trained(self) -> Params:
+        low, high = self.policy.targets
+        for target in self.trials.targets:
+            if not low <= target <= high:
+                raise refusal(
+                    f"trials.targets: {target} lies outside policy.targets [{low}, {high}]"
+                )
+            if not TARGET_AREA[0] <= target <= TARGET_AREA[1]:
+                raise refusal(
+                    f"trials.targets: {target} lies outside the target on the floor,"
+                    f" {list(TARGET_AREA)}, where every landing counts as failed"
+                )
+        return self
+
+
+def pairs(run: Run) -> list[tuple[str, str]]:
+    """Every band with every method that runs on it, band by band."""
+    ablated = {band: run.ablations.methods for band in run.ablations.bands}
+    return [
+        (band, method) for band in run.bands for method in (*run.methods, *ablated.get(band, ()))
+    ]
+
+
+def expect_known(params: Params, kind: str, name: str, called: str | None = None) -> None:
+    """Raises UserError where there is no such `kind`, band or method; `called` names it."""
+    known = getattr(params, f"{kind}s")
+    if name not in known:
+        raise UserError(
+            f"{called or kind} {name}: not in params.yaml, which has {', '.join(known)}"
+        )
+
+
+def load(path: str | Path = "params.yaml") -> Params:
+    """Read and check params.yaml. Raises UserError."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not UTF-8 text"
+        raise UserError(f"{path}: cannot be read ({reason})") from error
+    return parse(text, str(path))
+
+
+def parse(text: str, name: str = "params.yaml") -> Params:
+    """Check the text of a params.yaml; `name` stands in error messages. Raises UserError."""
+    try:
+        content = YAML(typ="safe").load(text)  # the parser that DVC uses
+    except (YAMLError, ValueError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f", line {mark.line + 1}" if mark else ""
+        what = getattr(error, "problem", None) or str(error).partition("\n")[0]
+        raise UserError(f"{name}{where}: not valid YAML ({what})") from error
+    if not isinstance(content, dict):
+        raise UserError(f"{name}: must hold a mapping of sections such as `run:` and `bands:`")
+    try:
+        return Params.model_validate(content)
+    except ValidationError as error:
+        raise UserError(f"{name}: {one_line(error, Params)}") from error

@@ -1,0 +1,218 @@
+"""What params.yaml says of the simulator, the loss and the search."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Generic, Literal, TypeVar
+
+from pydantic import AfterValidator, model_validator
+
+from pipeline.schema import ASCENDING, LIST, Range, Section, Seed, refusal
+
+Step = Annotated[float, Range(1e-5, 0.05)]
+Bound = TypeVar("Bound")
+KTop = Annotated[int, Range(1, 50)]
+SEARCHES = ("multistart", "de", "bo", "adam")
+NUISANCES = {  # how far the box of each may reach: 1/s, s, 1, N, m
+    "air_drag": (0.0, 50.0),
+    "camera_delay": (-0.02, 0.02),
+    "force_delay": (-0.02, 0.02),
+    "force_gain": (0.5, 2.0),
+    **dict.fromkeys(("force_bias_x", "force_bias_y", "force_bias_z"), (-5.0, 5.0)),
+    **dict.fromkeys(("cloud_shift_x", "cloud_shift_y", "cloud_shift_z"), (-0.05, 0.05)),
+}
+
+
+class Sling(Section):
+    mesh: Literal["rod", "tetrahedra"]
+    edges: Annotated[int, Range(4, 400)]
+    grading: Annotated[float, Range(1, 20)]
+    tet_edges: Annotated[int, Range(4, 400)]
+    grip_step: Step
+    recoil_step: Step
+    recoil_time: Annotated[float, Range(1e-3, 10)]
+    swing_step: Step
+    launch_step: Step
+    launch_time: Annotated[float, Range(0.01, 10)]
+
+    @model_validator(mode="after")
+    def _middle_is_a_layer(self) -> Sling:
+        for name in ("edges", "tet_edges"):
+            if getattr(self, name) % 2:
+                raise refusal(f"{name} must be even: the hand holds the middle")
+        return self
+
+
+class Box(Section, Generic[Bound]):
+    """One axis of the search; `Bound` says how far the box may reach."""
+
+    low: Bound
+    high: Bound
+    scale: Literal["log", "linear"]
+
+    @model_validator(mode="after")
+    def _low_below_high(self) -> Box:
+        if not self.low < self.high:
+            raise refusal("low must be less than high")
+        if self.scale == "log" and self.low <= 0:
+            raise refusal("low must be above 0 on a log scale")
+        return self
+
+
+class Parameters(Section):
+    youngs_modulus: Box[Annotated[float, Range(1e3, 1e9)]]
+    poissons_ratio: Box[Annotated[float, Range(0, 0.495)]]
+    elasticity_damping: Box[Annotated[float, Range(1e-6, 1)]]
+    dynamic_friction: Box[Annotated[float, Range(0, 5)]]
+    damping_scale: Box[Annotated[float, Range(0, 1)]]
+
+
+class HeldOut(Section):
+    """Blocks of the recording that are kept out of the fit, to check it."""
+
+    blocks: Annotated[int, Range(0, 20)]
+    length: Annotated[float, Range(0.5, 5)]  # s
+
+
+class Loss(Section):
+    chamfer: Literal["symmetric", "measured"]
+    median_window: Annotated[int, Range(1, 101)]
+    held_out: HeldOut
+
+    @model_validator(mode="after")
+    def _window_has_a_middle(self) -> Loss:
+        if self.median_window % 2 == 0:
+            raise refusal("median_window must be odd")
+        return self
+
+
+Factor = Annotated[float, Range(0, 2)]
+
+
+class Optimizer(Section):
+    seed: Seed
+    population: Annotated[int, Range(5, 100_000)]
+    generations: Annotated[int, Range(1, 100_000)]
+    mutation: Annotated[tuple[Factor, Factor], LIST, ASCENDING]
+    recombination: Annotated[float, Range(0, 1)]
+    k_top: KTop
+    k_nn: Annotated[int, Range(6, 10_000)]  # a covariance of five parameters needs six points
+    delta: Annotated[float, Range(1e-3, 2)]
+    cma_population: Annotated[int, Range(4, 10_000)]
+    cma_rollouts: Annotated[int, Range(4, 10_000_000)]
+
+    @model_validator(mode="after")
+    def _budgets_suffice(self) -> Optimizer:
+        history = self.population * (self.generations + 1)
+        if self.k_nn > history:
+            raise refusal(f"k_nn must be at most population x (generations + 1) = {history}")
+        iteration = self.k_top * self.cma_population
+        if self.cma_rollouts < iteration:
+            raise refusal(f"cma_rollouts must be at least k_top x cma_population = {iteration}")
+        return self
+
+
+Weight = Annotated[float, Range(0, 1e6)]
+
+
+class Weights(Section):
+    geom: Weight
+    force: Weight
+    work: Weight
+    taut: Weight
+
+    @model_validator(mode="after")
+    def _something_counts(self) -> Weights:
+        if not any((self.geom, self.force, self.work, self.taut)):
+            raise refusal("at least one weight must be above 0")
+        return self
+
+
+def _is_search(text: str) -> str:
+    own = all(part.isidentifier() for part in re.split("[.:]", text)) and text.count(":") == 1
+    if text not in SEARCHES and not own:
+        raise refusal(f"must be {', '.join(SEARCHES)} or package.module:Class, got {text!r}")
+    return text
+
+
+def _is_setting(value: object) -> object:
+    if not isinstance(value, bool | int | float | str):
+        raise refusal(f"must be a number, true, false or a text, got {repr(value)[:60]}")
+    return value
+
+
+def _reaches(bounds: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    for name, (low, high) in bounds.items():
+        if name not in NUISANCES:
+            raise refusal(f"{name} is not one of {', '.join(NUISANCES)}")
+        least, most = NUISANCES[name]
+        neutral = 1.0 if name == "force_gain" else 0.0
+        if not (least <= low <= neutral <= high <= most and low < high):
+            raise refusal(
+                f"{name}: must be [low, high] between {least:g} and {most:g} with {neutral:g}"
+                f" in it, got {[low, high]}"
+            )
+    return bounds
+
+
+Value = Annotated[float, Range(-1e9, 1e9)]
+Setting = Annotated[object, AfterValidator(_is_setting)]
+Bounds = Annotated[tuple[Value, Value], LIST]
+
+
+class Method(Section):
+    """What is weighed, what is searched, and how; keys that have a default may be left out."""
+
+    weights: Weights
+    search: Annotated[str, AfterValidator(_is_search)] = "multistart"
+    settings: dict[str, Setting] = {}  # of the optimiser's class, by name
+    fixed: dict[str, Value] = {}  # axes that are not searched
+    bounds: dict[str, Bounds] = {}  # narrower ones than the box: what is known before
+    nuisances: Annotated[dict[str, Bounds], AfterValidator(_reaches)] = {}  # searched besides
+    k_top: KTop | None = None  # None: optimizer.k_top
+    covariance: bool = True  # else isotropic starts of the same determinant
+
+    @model_validator(mode="after")
+    def _keys_belong_to_the_search(self) -> Method:
+        if self.search == "multistart" and self.settings:
+            raise refusal("settings are for another search than multistart, which has none")
+        if self.search != "multistart" and not (self.k_top is None and self.covariance):
+            raise refusal(f"k_top and covariance are for search: multistart, not {self.search}")
+        return self
+
+    @model_validator(mode="after")
+    def _gain_is_no_modulus(self) -> Method:
+        if "force_gain" in self.nuisances and not {"force_gain", "youngs_modulus"} & {*self.fixed}:
+            raise refusal("force_gain and youngs_modulus cannot both be free: fix one in `fixed`")
+        return self
+
+
+def check_method(method: Method, path: str, parameters: Parameters, optimizer: Optimizer) -> None:
+    """Refuse what a method, whose key ends with `path`, asks for outside the box or the budget."""
+    boxes = {name: (box.low, box.high) for name, box in parameters}
+    for name, (low, high) in method.bounds.items():
+        if name not in boxes:
+            raise refusal(f"{path}bounds: {name} is not one of {', '.join(boxes)}")
+        least, most = boxes[name]
+        if not least <= low < high <= most:
+            raise refusal(
+                f"{path}bounds.{name}: must be [low, high] within parameters.{name},"
+                f" {least:g} to {most:g}, got {[low, high]}"
+            )
+    boxes |= method.bounds | method.nuisances
+    for name, value in method.fixed.items():
+        if name not in boxes:
+            raise refusal(f"{path}fixed: {name} is not one of {', '.join(boxes)}")
+        low, high = boxes[name]
+        if not low <= value <= high:
+            raise refusal(
+                f"{path}fixed.{name}: must be between {low:g} and {high:g}, got {value:g}"
+            )
+    if len(method.fixed) == len(boxes):
+        raise refusal(f"{path}fixed: names every parameter, so nothing is left to search")
+    iteration = (method.k_top or 1) * optimizer.cma_population
+    if optimizer.cma_rollouts < iteration:
+        raise refusal(
+            f"{path}k_top: k_top x optimizer.cma_population = {iteration} is more than"
+            f" optimizer.cma_rollouts, {optimizer.cma_rollouts}"
+        )

@@ -1,0 +1,157 @@
+"""What params.yaml says of a lab: what to run, bands, set-up and recorded pull."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, model_validator
+
+from pipeline.schema import (
+    ASCENDING,
+    FILLED,
+    LIST,
+    UNIT,
+    Component,
+    Direction,
+    Metres,
+    Name,
+    Names,
+    Pose,
+    Range,
+    Section,
+    refusal,
+)
+
+
+def _lies_beside(name: str) -> str:
+    if name != Path(name).name or name.startswith("."):
+        raise refusal(f"must be the name of a file in robots/, got {name!r}")
+    return name
+
+
+FileName = Annotated[str, FILLED, AfterValidator(_lies_beside)]
+
+
+def _is_free(name: str) -> str:
+    if name.lower() == "measured":
+        raise refusal("data/trials/measured holds measured landings, choose another name")
+    return name
+
+
+BandName = Annotated[Name, AfterValidator(_is_free)]
+
+
+class Ablations(Section):
+    """Methods that run on some bands only."""
+
+    bands: Names
+    methods: Names
+
+
+class Run(Section):
+    bands: Annotated[Names, FILLED]
+    rig: Names
+    methods: Annotated[Names, FILLED]
+    ablations: Ablations
+
+    @model_validator(mode="after")
+    def _nothing_runs_twice(self) -> Run:
+        for band in self.ablations.bands:
+            if band not in self.bands:
+                raise refusal(f"ablations.bands: {band} is not one of run.bands")
+        for method in self.ablations.methods:
+            if method in self.methods:
+                raise refusal(f"ablations.methods: {method} is one of run.methods already")
+        return self
+
+
+class Band(Section):
+    source: Literal["recording", "rig"]
+    mass: Annotated[float, Range(1e-4, 1)]
+    diameter: Annotated[float, Range(5e-4, 0.05)]
+    rest_length: Annotated[float, Range(0.05, 3)]
+
+
+class Topics(Section):
+    wrench: str | None
+    pose: str | None
+    twist: str | None
+    gripper: str | None
+    color: str | None
+    depth: str | None
+    color_info: str | None
+    depth_info: str | None
+
+
+class Tool(Section):
+    """What the force sensor carries: hand, fingers, flange."""
+
+    mass: Annotated[float, Range(0, 20)]
+    center: Annotated[tuple[Metres, Metres, Metres], LIST]
+
+
+DrawY = Annotated[float, Range(-2, -0.05)]
+DrawZ = Annotated[float, Range(-2, 1)]
+
+
+class Setup(Section):
+    fork_width: Annotated[float, Range(0.02, 2)]
+    fork_height: Annotated[float, Range(0.05, 3)]
+    clamp_direction: Direction
+    projectile_mass: Annotated[float, Range(1e-3, 1)]
+    grip_force: Annotated[float, Range(0.1, 500)]
+    finger_opening_time: Annotated[float, Range(1e-3, 1)]
+    max_force: Annotated[float, Range(0.1, 1000)]
+    draw_y: Annotated[tuple[DrawY, DrawY], LIST, ASCENDING]
+    draw_z: Annotated[tuple[DrawZ, DrawZ], LIST, ASCENDING]
+    base_to_fork: Pose | None
+    camera_to_fork: Pose | None
+    urdf: FileName | None
+    tip_link: str | None
+    start_pose: Pose | None
+    tool: Tool | None
+    topics: Topics
+
+
+Speed = Annotated[float, Range(0.005, 3)]
+Way = Annotated[float, Range(0, 0.5)]
+Opening = Annotated[float, Range(0, 0.5)]
+Quaternion = Annotated[tuple[Component, Component, Component, Component], LIST, UNIT]
+
+
+class Gripper(Section):
+    open: Opening
+    closed: Opening
+
+    @model_validator(mode="after")
+    def _closed_is_narrower(self) -> Gripper:
+        if self.closed >= self.open:
+            raise refusal("closed must be less than open")
+        return self
+
+
+class Plan(Section):
+    """What it asks of the episode is checked by `sling plan`, which alone reads it."""
+
+    draw: Annotated[tuple[DrawY, DrawZ], LIST]
+    max_speed: Speed
+    pull_speed: Speed
+    max_acceleration: Annotated[float, Range(0.05, 30)]
+    lead_in: Annotated[float, Range(0.5, 60)]
+    finger_time: Annotated[float, Range(0.05, 10)]
+    pause: Annotated[float, Range(0.5, 60)]  # the held force is the mean of the last 0.5 s
+    wait: Annotated[float, Range(0, 60)]
+    approach: Way
+    retreat: Way
+    floor_clearance: Way
+    hanging: Annotated[float, Range(0, 3)] | None
+    gripper: Gripper
+    orientation: Quaternion | None
+    frame: Annotated[str, FILLED]
+
+    @model_validator(mode="after")
+    def _pulls_slower(self) -> Plan:
+        if self.pull_speed > self.max_speed:
+            raise refusal("pull_speed must be at most max_speed")
+        return self

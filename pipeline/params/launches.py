@@ -1,0 +1,42 @@
+"""What params.yaml says of the policy and of the launches that try it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pipeline.schema import ASCENDING, FILLED, LIST, UNIQUE, Range, Section, Seed
+
+# y of the paper's fixed target of 1 m by 1 m: a landing outside is a failure, so trials aim inside.
+TARGET_AREA = (1.425, 2.425)
+Distance = Annotated[float, Range(0.1, 20)]  # along the floor, m
+
+
+class Reward(Section):
+    height: Annotated[float, Range(1e-3, 1e3)]
+    scale: Annotated[float, Range(1e-3, 10)]
+    penalty: Annotated[float, Range(0, 1e3)]
+
+
+Nodes = Annotated[int, Range(4, 1000)]  # a cubic spline needs four
+Width = Annotated[int, Range(1, 4096)]
+
+
+class Policy(Section):
+    seed: Seed
+    targets: Annotated[tuple[Distance, Distance], LIST, ASCENDING]
+    map_size: Annotated[tuple[Nodes, Nodes], LIST]
+    envs: Annotated[int, Range(2, 1_000_000)]
+    steps: Annotated[int, Range(2, 10_000)]  # with 2 envs: one sample a mini-batch
+    iterations: Annotated[int, Range(1, 100_000)]
+    hidden: Annotated[tuple[Width, ...], LIST, FILLED]
+    learning_rate: Annotated[float, Range(1e-7, 1)]
+    init_std: Annotated[float, Range(1e-3, 10)]
+    final_std: Annotated[float, Range(1e-4, 10)]
+    reward: Reward
+
+
+class Trials(Section):
+    seed: Seed
+    targets: Annotated[tuple[Distance, ...], LIST, FILLED, UNIQUE]
+    repeats: Annotated[int, Range(1, 10_000)]
+    actuation_error: Annotated[float, Range(0, 0.1)]

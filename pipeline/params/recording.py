@@ -1,0 +1,57 @@
+"""What params.yaml says of the way from a recording to an episode."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import model_validator
+
+from pipeline.schema import FILLED, Pattern, Range, Section, refusal
+
+Delay = Annotated[float, Range(-0.5, 0.5)]
+
+
+class Delays(Section):
+    pose: Delay | None
+    camera: Delay | None
+
+
+class Episode(Section):
+    samples: Annotated[int, Range(30, 10_000)]
+    duration: Annotated[float, Range(1, 120)]
+    tail: Annotated[float, Range(0.1, 60)]
+    delays: Delays
+
+    @model_validator(mode="after")
+    def _tail_within(self) -> Episode:
+        if self.tail >= self.duration:
+            raise refusal("tail must be less than duration")
+        return self
+
+
+class Force(Section):
+    cutoff: Annotated[float, Range(1e-4, 1e4)]
+    cutoff_unit: Literal["rad/sample", "rad/s", "Hz"]
+
+    @model_validator(mode="after")
+    def _below_nyquist(self) -> Force:
+        if self.cutoff_unit == "rad/sample" and self.cutoff >= math.pi:
+            raise refusal("cutoff must be below pi rad/sample")
+        return self
+
+
+class Sam3(Section):
+    weights: Annotated[str, FILLED]
+    prompt: Annotated[str, FILLED]
+    device: Annotated[str, Pattern("cuda(:[0-9]+)?|cpu")]
+
+
+class Cloud(Section):
+    points: Annotated[int, Range(10, 100_000)]
+    mask: Literal["opencv", "sam3"]
+    sam3: Sam3
+    statistical_neighbors: Annotated[int, Range(1, 1000)]
+    statistical_ratio: Annotated[float, Range(0.1, 100)]
+    radius: Annotated[float, Range(1e-4, 1)]
+    radius_neighbors: Annotated[int, Range(1, 1000)]

@@ -1,0 +1,77 @@
+"""Where launches may land: θ is not known exactly, and no draw is exactly made."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import norm
+
+from pipeline.errors import UserError
+from pipeline.sling.model import THETA
+
+LEVEL = 0.9
+MOST = 60  # samples of θ that are launched
+STEP = 1e-3  # m, small against the box of draws and large against the simulator's rounding
+CROSS = STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
+ERRORS = norm.ppf((np.arange(41) + 0.5) / 41)  # equally likely
+
+
+def load_samples(path: Path, band: str, method: str) -> np.ndarray | None:
+    """Samples of θ (M, 5) that the theta stage kept; None where there are none.
+
+    Raises UserError where the file is damaged.
+    """
+    if not path.is_file():
+        return None
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        samples = np.array(content["samples"], float)
+        if content["names"] != list(THETA) or samples.ndim != 2 or samples.shape[1] != len(THETA):
+            raise ValueError
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise UserError(
+            f"{path}: damaged; `dvc repro --force theta@{band}-{method}` makes it anew"
+        ) from error
+    return samples
+
+
+def landing_intervals(
+    launcher: Callable, draws: np.ndarray, samples: np.ndarray | None, error: float
+) -> np.ndarray:
+    """Central 90 % of the landings of each draw [m], shape (N, 2); NaN where launches fail.
+
+    Landings of samples of θ, spread by the error of the draw through the launch's own gradient.
+    More than a tenth of failures among the samples is a failure.
+
+    Args:
+        launcher: `launcher(draws)` launches with the best θ; `launcher(draws, thetas)` with others.
+        draws: (y, z) [m], shape (N, 2).
+        samples: Of θ, shape (M, 5); None leaves out that θ is not known exactly.
+        error: Standard deviation of the drawn position along each axis [m].
+    """
+    draws = np.atleast_2d(np.asarray(draws, float))
+    count = len(draws)
+    around = launcher((draws[:, None] + CROSS).reshape(-1, 2))
+    landing = _landing(around).reshape(count, len(CROSS))
+    gradient = (landing[:, 1::2] - landing[:, 2::2]) / (2 * STEP)  # (N, 2)
+    spread = error * np.linalg.norm(gradient, axis=1)
+    centres = landing[:, :1]
+    if samples is not None:
+        some = samples[np.linspace(0, len(samples) - 1, min(MOST, len(samples))).astype(int)]
+        launched = launcher(np.repeat(draws, len(some), axis=0), np.tile(some, (count, 1)))
+        centres = _landing(launched).reshape(count, len(some))
+    result = np.full((count, 2), np.nan)
+    for row, (centre, width) in enumerate(zip(centres, spread, strict=True)):
+        good = centre[np.isfinite(centre)]
+        if len(good) >= 0.9 * len(centre) and np.isfinite(width):
+            all_of_them = (good[:, None] + width * ERRORS).ravel()
+            result[row] = np.quantile(all_of_them, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return result
+
+
+def _landing(launched) -> np.ndarray:
+    good = np.array([failure is None for failure in launched.failure])
+    return np.where(good, np.asarray(launched.landing_y, float), np.nan)

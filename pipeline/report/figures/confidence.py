@@ -1,0 +1,146 @@
+"""How far θ* is to be trusted: profile curves with marginals, and correlations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.stats import chi2
+
+from pipeline.report.figures.canvas import PARAMETERS, few_ticks, save
+from pipeline.report.looks import Look
+from pipeline.report.results import Result
+from pipeline.sling.model import THETA
+from pipeline.style import INK, STYLE
+
+BINS = 14  # of a marginal, over the span that is shown
+TOP = 3.0  # of the misfit axis, in units of the misfit at the interval's ends
+
+
+def profiles(path: Path, results: dict[str, Result], looks: dict[str, Look], boxes) -> None:
+    """Least misfit with one parameter held at each value, and the posterior's marginals.
+
+    Args:
+        results: Methods whose θ has a confidence.
+        boxes: params.yaml's `parameters`.
+    """
+    level = next(iter(results.values())).confidence["level"]
+    reach = float(chi2.ppf(level, 1))
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(2, 3, figsize=(9.6, 5.6), sharey=True)
+        for ax, name in zip(axes.flat, THETA, strict=False):
+            label, unit = PARAMETERS[name]
+            box, marks = getattr(boxes, name), []
+            if box.scale == "log":
+                ax.set_xscale("log")
+            for number, (method, result) in enumerate(results.items()):
+                about = result.confidence["parameters"][name]
+                color, best = looks[method].color, unit * result.theta["theta"][name]
+                if about.get("fixed"):
+                    ax.axvline(best, color=color, lw=1.2, ls=":")
+                    marks.append(f"{looks[method].name}: held fixed")
+                    continue
+                samples = unit * _column(result, name)
+                _marginal(ax, samples, color, reach, log=box.scale == "log")
+                curve = result.posterior["profiles"][name]
+                value = unit * np.array(curve["value"])
+                ax.plot(value, curve["misfit"], "o-", ms=2.5, color=color, lw=1.5)
+                _interval(ax, unit * about["low"], unit * about["high"], best, color, number, reach)
+                if not about["identifiable"]:
+                    marks.append(f"{looks[method].name}: not identifiable")
+            if box.scale == "log":
+                few_ticks(ax.xaxis)
+            else:  # the whole box, so that an interval that fills it is seen to
+                margin = 0.03 * (box.high - box.low)
+                ax.set_xlim(unit * (box.low - margin), unit * (box.high + margin))
+            ax.axhline(reach, color="0.5", lw=0.8, ls="--")
+            ax.set_xlabel(label)
+            words = {"va": "top", "fontsize": 7.5, "zorder": 6}
+            ax.text(0.03, 0.98, "\n".join(marks), transform=ax.transAxes, **words)
+        _product(axes[1, 2], results, looks, reach)
+        axes[0, 0].set_ylim(0, TOP * reach)
+        for ax in axes[:, 0]:
+            ax.set_ylabel("misfit above its least")
+        handles = [plt.Line2D([], [], color=looks[method].color) for method in results]
+        names = [looks[method].name for method in results]
+        handles += [
+            plt.Line2D([], [], color="0.5", ls="--", lw=0.8),
+            plt.Line2D([], [], color="0.4", lw=3),
+            plt.Rectangle((0, 0), 1, 1, color="0.8"),
+        ]
+        names += [f"{100 * level:g} % of a likelihood ratio", f"{100 * level:g} % interval and θ*"]
+        names += ["posterior's marginal"]
+        figure.legend(handles, names, loc="outside lower center", ncols=len(names))
+        save(figure, path)
+
+
+def _product(ax: plt.Axes, results: dict[str, Result], looks, reach: float) -> None:
+    """Marginal of s·d, the damping that a recording can see."""
+    for number, (method, result) in enumerate(results.items()):
+        about = result.confidence["derived"].get("damping_product")
+        if about is None:
+            continue
+        samples = 1e3 * _column(result, "damping_scale") * _column(result, "elasticity_damping")
+        color = looks[method].color
+        _marginal(ax, samples, color, reach, log=False)
+        theta = result.theta["theta"]
+        low, high = 1e3 * about["low"], 1e3 * about["high"]
+        best = 1e3 * theta["damping_scale"] * theta["elasticity_damping"]
+        _interval(ax, low, high, best, color, number, reach)
+    ax.set_xlabel("s·d [ms] (marginal alone)")
+
+
+def _column(result: Result, name: str) -> np.ndarray:
+    """Samples of a parameter, SI units, shape (S,)."""
+    samples = np.array(result.posterior["samples"], float)
+    return samples[:, result.posterior["names"].index(name)]
+
+
+def _marginal(ax: plt.Axes, samples: np.ndarray, color: str, reach: float, *, log: bool) -> None:
+    """Histogram whose highest bin reaches two thirds of the panel."""
+    scaled = np.log(samples) if log else samples
+    edges = np.histogram_bin_edges(scaled, BINS)
+    counts, edges = np.histogram(scaled, edges)
+    edges = np.exp(edges) if log else edges
+    ax.stairs(counts / counts.max() * TOP * reach * 2 / 3, edges, fill=True, color=color, alpha=0.2)
+
+
+def _interval(ax, low: float, high: float, best: float, color: str, number: int, reach) -> None:
+    """A bar near the top of the panel, one line a method, with a dot at θ*."""
+    height = (0.80 - 0.06 * number) * TOP * reach
+    ax.plot([low, high], [height, height], color=color, lw=3, solid_capstyle="butt")
+    ax.plot(best, height, "o", ms=6, color=color, mec="w", mew=1)
+
+
+def correlation(path: Path, results: dict[str, Result], looks: dict[str, Look]) -> None:
+    """Correlations of the posterior, a matrix a method."""
+    cells = max(len(one.confidence["correlation"]["names"]) for one in results.values())
+    inches = max(3.4, 0.47 * cells)
+    with plt.rc_context({**STYLE, "axes.grid": False}):
+        size = (len(results) * (inches + 0.9) + 0.7, inches + 0.8)
+        figure, axes = plt.subplots(1, len(results), figsize=size, squeeze=False)
+        for ax, (method, result) in zip(axes.flat, results.items(), strict=True):
+            about = result.confidence["correlation"]
+            matrix = np.array(about["matrix"], float)
+            names = [quantity(name) for name in about["names"]]
+            image = ax.imshow(matrix, cmap="RdBu_r", vmin=-1, vmax=1)
+            for (row, column), value in np.ndenumerate(matrix):
+                small = "1" if row == column else "0"
+                shown = abs(value) >= 0.005 and row != column
+                text = f"{value:+.2f}".replace("-", "−") if shown else small
+                ink = {"color": "w" if abs(value) > 0.6 else INK, "fontsize": 7}
+                ax.text(column, row, text, ha="center", va="center", **ink)
+            ax.set_xticks(range(len(names)), names, rotation=40, ha="right", rotation_mode="anchor")
+            ax.set_yticks(range(len(names)), names)
+            ax.set_title(looks[method].name, fontsize=9, color=looks[method].color)
+            ax.tick_params(length=0)
+            ax.spines[:].set_visible(False)
+        figure.colorbar(image, ax=axes, label="correlation", shrink=0.8)
+        save(figure, path)
+
+
+def quantity(name: str) -> str:
+    """A parameter or a derived quantity, without its unit."""
+    known = PARAMETERS.get(name, ("s·d" if name == "damping_product" else name, 1.0))[0]
+    return known.split(" [")[0].replace("_", " ")

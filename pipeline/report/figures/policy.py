@@ -1,0 +1,147 @@
+"""The policies: training, where each draw lands, and landings beside their predictions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+
+from pipeline.policy.landing_map import LandingMap
+from pipeline.policy.trials import stretch_of
+from pipeline.report.figures.canvas import log_y, save
+from pipeline.report.looks import Look
+from pipeline.report.results import Result
+from pipeline.style import COLORS, STYLE
+
+FAIR = 0.05  # of the distance, shaded
+ERRORS = (-80, -50, -20, -10, -5, 0, 5, 10, 20, 50, 100, 200)  # % at the axis
+LEVEL = 90  # % that the predicted intervals are of
+
+
+def landings(path: Path, trials: pd.DataFrame, looks: dict[str, Look], near: list[str]) -> None:
+    """Landings against predictions of two methods, and the error of every method.
+
+    Args:
+        looks: Of every method, in the order of the rows.
+        near: Methods of the left panel.
+    """
+    trials = trials[trials.landing_y.notna() & trials.predicted_y.notna()]
+    inside = trials.stretch <= trials.recorded_stretch
+    with plt.rc_context(STYLE):
+        tall = max(4.0, 1.6 + 0.3 * len(looks))
+        figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, tall), width_ratios=(1, 1.15))
+        shown = trials[trials.method.isin(near)]
+        both = shown[["landing_y", "predicted_y"]].to_numpy()
+        low, high = (0, 1) if both.size == 0 else (0.95 * both.min(), 1.05 * both.max())
+        line = np.array([low, high])
+        left.fill_between(line, (1 - FAIR) * line, (1 + FAIR) * line, color="0.9", lw=0)
+        left.plot(line, line, color="0.6", lw=1)
+        for method in near:
+            for chosen, face in ((inside, looks[method].color), (~inside, "none")):
+                mine = trials[(trials.method == method) & chosen]
+                _with_intervals(left, mine, looks[method].color, face)
+        kinds = " and ".join(sorted(set(trials.kind))) or "no"
+        left.set(xlabel=f"{kinds} landing [m]", ylabel="predicted landing [m]")
+        left.set(xlim=(low, high), ylim=(low, high), aspect="equal")
+        right.axvspan(-100 * FAIR, 100 * FAIR, color="0.9", lw=0)
+        right.axvline(0, color="0.6", lw=1)
+        for row, (method, look) in enumerate(looks.items()):
+            for chosen, face in ((inside, look.color), (~inside, "none")):
+                mine = trials[(trials.method == method) & chosen]
+                error = 100 * (mine.predicted_y / mine.landing_y - 1)
+                place = np.full(len(mine), row)
+                right.scatter(error, place, s=20, facecolors=face, edgecolors=look.color, alpha=0.7)
+        right.set_yticks(range(len(looks)), [look.name for look in looks.values()])
+        right.set_ylim(len(looks) - 0.5, -0.5)
+        right.set_xscale("symlog", linthresh=10)
+        right.xaxis.set_major_locator(plt.FixedLocator(ERRORS))
+        right.xaxis.set_major_formatter("{x:g}")
+        right.set_xlabel("predicted / landed − 1 [%], logarithmic beyond ± 10")
+        style = {"ls": "", "marker": "o", "ms": 5, "color": "0.4"}
+        marks = [plt.Line2D([], [], ls="", marker="o", color=looks[m].color) for m in near]
+        marks += [plt.Line2D([], [], **style), plt.Line2D([], [], mfc="none", **style)]
+        marks += [plt.Rectangle((0, 0), 1, 1, color="0.9")]
+        names = [*(looks[m].name for m in near), "inside the recorded stretch", "beyond it"]
+        names += [f"± {100 * FAIR:g} %"]
+        if "predicted_low" in trials and trials.predicted_low.notna().any():
+            marks.append(plt.Line2D([], [], color="0.4", lw=1))
+            names.append(f"{LEVEL} % interval")
+        figure.legend(marks, names, loc="outside lower center", ncols=4)
+        save(figure, path)
+
+
+def _with_intervals(ax: plt.Axes, trials: pd.DataFrame, color: str, face: str) -> None:
+    if "predicted_low" in trials:
+        for one in trials[trials.predicted_low.notna()].itertuples():
+            ends = [one.predicted_low, one.predicted_high]
+            ax.plot([one.landing_y] * 2, ends, color=color, lw=1, alpha=0.5)
+    ax.scatter(
+        trials.landing_y, trials.predicted_y, s=20, facecolors=face, edgecolors=color, alpha=0.8
+    )
+
+
+def training(path: Path, results: dict[str, Result], looks: dict[str, Look]) -> None:
+    """Landing error of the deterministic policy by iteration of PPO, in its own simulator."""
+    with plt.rc_context(STYLE):
+        figure, ax = plt.subplots(figsize=(7.2, 3.4))
+        for method, result in results.items():
+            curve, look = result.training, looks[method]
+            ax.plot(curve.iteration, 100 * curve.mean_error, color=look.color, label=look.name)
+        ax.axhline(1, color="0.6", lw=1)
+        ax.set(
+            xlabel="PPO iteration (line: the aim of 1 cm)",
+            ylabel="mean |landing − target| [cm]",
+        )
+        log_y(ax)
+        figure.legend(loc="outside right upper")
+        save(figure, path)
+
+
+def landing_map(
+    path: Path,
+    result: Result,
+    draws: np.ndarray,
+    targets: np.ndarray,
+    recorded: float,
+    fork_width: float,
+    rest_length: float,
+) -> None:
+    """Landing against draw, with the policy's path over its targets.
+
+    Args:
+        draws: The policy's draws [m] for `targets` [m], shape (N, 2).
+        recorded: Largest stretch of the recording; what lies beyond is extrapolated.
+    """
+    chart: LandingMap = result.landing_map
+    fine_y = np.linspace(chart.draw_y[0], chart.draw_y[-1], 161)
+    fine_z = np.linspace(chart.draw_z[0], chart.draw_z[-1], 161)
+    y, z = np.meshgrid(fine_y, fine_z, indexing="ij")
+    points = np.stack([y.ravel(), z.ravel()], 1)
+    landed = chart(points)
+    stretch = stretch_of(np.insert(points, 0, 0, axis=1), fork_width, rest_length).reshape(y.shape)
+    with plt.rc_context(STYLE):
+        figure, ax = plt.subplots(figsize=(6, 4.6))
+        landing = landed.landing_y.reshape(y.shape)
+        ax.set_facecolor("0.8")
+        ax.grid(False)
+        if np.isfinite(landing).any():
+            filled = ax.contourf(y, z, landing, levels=_round(landing), cmap="viridis")
+            figure.colorbar(filled, label="simulated landing [m] (grey: the launch fails)")
+            lines = ax.contour(y, z, landing, levels=np.unique(targets), colors="w", linewidths=0.8)
+            ax.clabel(lines, fmt="%g m", fontsize=7)
+        if stretch.min() < recorded < stretch.max():
+            ax.contour(y, z, stretch, levels=[recorded], colors="k", linestyles=":")
+            ax.plot([], [], "k:", label=f"recorded stretch {recorded:.2f}: beyond is extrapolated")
+        ax.plot(*draws.T, color=COLORS[0], lw=2.5, label="the policy's draws, near to far target")
+        ax.plot(*draws[0], "o", color=COLORS[0])
+        ax.set(xlabel="draw y [m]", ylabel="draw z [m]")
+        ax.set(xlim=(fine_y[0], fine_y[-1]), ylim=(fine_z[0], fine_z[-1]))
+        figure.legend(loc="outside lower center", ncols=2, fontsize=8)
+        save(figure, path)
+
+
+def _round(values: np.ndarray) -> np.ndarray:
+    """Some twenty round levels over finite values."""
+    return plt.MaxNLocator(20).tick_values(np.nanmin(values), np.nanmax(values))

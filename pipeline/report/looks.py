@@ -1,0 +1,56 @@
+"""How a method is named and coloured, in every table and every picture alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+# Red is ours, teal the paper's, blue to violet its ablations, yellow to brown other optimisers,
+# green the geometry-only baselines. Names are the paper's where the methods are.
+KNOWN = {
+    "sling2sim2real_taut": ("ours (taut)", "#d1495b"),
+    "sling2sim2real": ("Sling2Sim2Real", "#00798c"),
+    "no_covariance": ("−c", "#3a5ba0"),
+    "no_multistart": ("−m", "#6f9bd8"),
+    "no_covariance_no_multistart": ("−c, −m", "#8d6a9f"),
+    "no_work": ("−L_work", "#c08bbd"),
+    "de": ("DE_L", "#edae49"),
+    "bo": ("BO_L", "#f17300"),
+    "adam": ("Adam_L", "#8a5a2b"),
+    "real2sim2real": ("Real2Sim2Real", "#7fb069"),
+    "package_si": ("Package SI", "#33673b"),
+}
+SPARE = ("#2e4057", "#8c8c8c", "#c2187b", "#00b5a0", "#5e35b1", "#9e9d24")  # of a user's methods
+DRAWN = ("sling2sim2real_taut", "sling2sim2real")  # rather than others where curves would crowd
+COUNT = 2  # of methods in such pictures
+
+
+@dataclass(frozen=True)
+class Look:
+    """A method's name for readers, and its colour."""
+
+    name: str
+    color: str
+
+
+def looks(methods: Iterable[str]) -> dict[str, Look]:
+    """A look for each method; one that the paper and we do not have keeps its own name."""
+    methods = list(methods)
+    others = [method for method in methods if method not in KNOWN]
+    return {
+        method: Look(*KNOWN[method])
+        if method in KNOWN
+        else Look(method, SPARE[others.index(method) % len(SPARE)])
+        for method in methods
+    }
+
+
+def drawn(methods: Iterable[str]) -> list[str]:
+    """Which methods stand in pictures that can hold only two: ours and the paper's before others.
+
+    In the order of `methods`.
+    """
+    methods = list(methods)
+    first = [method for method in DRAWN if method in methods]
+    chosen = (first + [method for method in methods if method not in first])[:COUNT]
+    return [method for method in methods if method in chosen]

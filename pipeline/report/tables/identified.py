@@ -1,0 +1,216 @@
+"""What the searches found: parameters with intervals, derived quantities, losses, residuals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pipeline.report import paper
+from pipeline.report.looks import Look
+from pipeline.report.losses import PRINTED
+from pipeline.report.replay import Replay
+from pipeline.report.results import Result, Results
+from pipeline.report.tables.cells import NONE, Table, number, percent
+from pipeline.sling.model import THETA
+
+NAMES = {
+    "youngs_modulus": "E [Pa]",
+    "poissons_ratio": "ν",
+    "elasticity_damping": "d [ms]",
+    "dynamic_friction": "friction",
+    "damping_scale": "s",
+}
+DERIVED = {  # heading and factor from SI; others keep their name and unit
+    "damping_product": ("s·d [ms]", 1e3),
+    "hold_force": ("held force [N]", 1.0),
+    "release_time": ("release [s]", 1.0),
+    "camera_delay": ("camera delay [ms]", 1e3),
+}
+PARTS = ("fitted", "held out", "ratio")
+PHASES = ("slack", "taut", "recoil", "swing")
+SEARCHES = {
+    "de": "differential evolution",
+    "bo": "Bayesian optimisation",
+    "adam": "Adam on finite differences",
+}
+TERMS = {"geom": "geom [cm]", "force": "force [N]", "work": "work [J]", "taut": "taut [cm]"}
+
+
+def methods(params, looks: dict[str, Look]) -> Table:
+    """What each method searches, what it minimises, and what it holds fixed."""
+    rows = []
+    for method, look in looks.items():
+        about = params.methods[method]
+        terms = [
+            term if weight == 1 else f"{weight:g} {term}"
+            for term, weight in dict(about.weights).items()
+            if weight
+        ]
+        search = SEARCHES.get(about.search, f"`{about.search}`")
+        if about.search == "multistart":
+            regions = about.k_top or params.optimizer.k_top
+            search = f"DE, then CMA-ES in {'1 region' if regions == 1 else f'{regions} regions'}"
+            search += "" if about.covariance else ", isotropic starts"
+        fixed = [_held(name, value) for name, value in about.fixed.items()]
+        more = ", ".join(about.nuisances) or NONE
+        shown = [look.name, f"`{method}`", search, " + ".join(terms), ", ".join(fixed) or NONE]
+        rows.append([*shown, more])
+    heads = ["method", "in params.yaml", "search", "minimises", "held fixed", "nuisances besides"]
+    return heads, rows
+
+
+def _held(name: str, value: float) -> str:
+    """As in "d 5 ms"."""
+    symbol, _, unit = NAMES.get(name, name).partition(" [")
+    return f"{symbol} {physical(name, value)} {unit.rstrip(']')}".rstrip()
+
+
+def parameters(results: Results, params, looks: dict[str, Look]) -> Table:
+    """Identified θ by band and method, with intervals, the box of the search, the paper's own."""
+    box = {name: getattr(params.parameters, name) for name in THETA}
+    heads = ["band", "method", *(NAMES[name] for name in THETA)]
+    bounds = [f"{physical(n, box[n].low)} – {physical(n, box[n].high)}" for n in THETA]
+    rows = [["*box*", f"*{'/'.join(sorted({b.scale for b in box.values()}))} scale*", *bounds]]
+    for band, of_band in results.methods.items():
+        for method, result in of_band.items():
+            fixed = params.methods[method].fixed
+            cells = [_parameter(result, name, box[name], name in fixed) for name in THETA]
+            rows.append([band, looks[method].name, *cells])
+        for method in of_band:
+            key = paper.BANDS.get(band), paper.METHODS.get(method)
+            if key in paper.THETA:
+                theirs = paper.THETA[key]
+                cells = [physical(name, value) for name, value in zip(THETA, theirs, strict=False)]
+                rows.append([f"*{key[0]}*", f"*paper: {looks[method].name}*", *cells])
+    return heads, rows
+
+
+def _parameter(result: Result, name: str, box, fixed: bool) -> str:
+    value = result.theta["theta"][name]
+    if fixed:
+        return f"{physical(name, value)}, fixed"
+    text = physical(name, value) + (" ⚠" if at_edge(value, box) else "")
+    about = result.confidence.get("parameters", {}).get(name)
+    if about is None:
+        return text
+    if not about["identifiable"]:
+        return f"{text}, not identifiable"
+    outside = "" if about["low"] <= value <= about["high"] else " †"
+    return f"{text}{outside} ({_between(name, about['low'], about['high'])})"
+
+
+def _between(name: str, low: float, high: float) -> str:
+    """An interval with three digits, or as many more as tell its ends apart."""
+    for digits in (3, 4, 5, 6):
+        ends = physical(name, low, digits), physical(name, high, digits)
+        if ends[0] != ends[1]:
+            break
+    return " – ".join(ends)
+
+
+def at_edge(value: float, box) -> bool:
+    """Whether the search ended within 1 % of a side of its box: the optimum may lie outside."""
+    low, high = box.low, box.high
+    if box.scale == "log":
+        value, low, high = math.log(value), math.log(low), math.log(high)
+    return not 0.01 <= (value - low) / (high - low) <= 0.99
+
+
+def derived(results: Results, looks: dict[str, Look]) -> Table | None:
+    """Quantities that data can see, with intervals; None where no θ has a confidence."""
+    shown = [result for result in results if result.confidence]
+    if not shown:
+        return None
+    found = {name for one in shown for name in one.confidence["derived"]}
+    names = [*(name for name in DERIVED if name in found), *sorted(found - DERIVED.keys())]
+    units = {n: one["unit"] for r in shown for n, one in r.confidence["derived"].items()}
+    titles = {n: DERIVED.get(n, (f"{n.replace('_', ' ')} [{units[n]}]", 1.0)) for n in names}
+    rows = []
+    for result in shown:
+        cells = []
+        for name in names:
+            about, factor = result.confidence["derived"].get(name), titles[name][1]
+            cells.append(NONE if about is None else _range(about, factor))
+        rows.append([result.band, looks[result.method].name, *cells])
+    return ["band", "method", *(title for title, _ in titles.values())], rows
+
+
+def _range(about: dict, factor: float) -> str:
+    """A value and its interval, with as many digits as the interval's width deserves."""
+    value, low, high = (factor * about[key] for key in ("value", "low", "high"))
+    width = high - low
+    if width <= 0:
+        return f"{value:.3g}, fixed"
+    digits = max(1 - math.floor(math.log10(width)), 0)
+    return f"{value:.{digits}f} ({low:.{digits}f} – {high:.{digits}f})"
+
+
+def phases(results: Results, looks: dict[str, Look]) -> Table | None:
+    """Root mean square residuals by part of the episode; None without a confidence."""
+    shown = [result for result in results if result.confidence.get("phases")]
+    if not shown:
+        return None
+    parts = [part for part in PHASES if part in shown[0].confidence["phases"]]
+    rows = []
+    for result in shown:
+        about = result.confidence["phases"]
+        force = [number(about[part].get("force_rms"), ".3f") for part in parts]
+        cloud = [number(_centimetres(about[part].get("cloud_rms")), ".2f") for part in parts]
+        rows.append([result.band, looks[result.method].name, *force, *cloud])
+    heads = [f"force, {part} [N]" for part in parts] + [f"cloud, {part} [cm]" for part in parts]
+    return ["band", "method", *heads], rows
+
+
+def _centimetres(metres: float | None) -> float | None:
+    return None if metres is None else 100 * metres
+
+
+def losses(results: Results, params, looks: dict[str, Look]) -> Table:
+    """Terms of the loss at θ, the share that each weighs, the printed total, and the budget."""
+    found = {term for one in results for term in one.theta.get("loss", {}) if term != "total"}
+    terms = TERMS | {term: term for term in sorted(found - TERMS.keys())}
+    heads = ["band", "method", *terms.values(), "total of its own loss", "printed loss", "rollouts"]
+    rows = []
+    for result in results:
+        loss, weights = result.theta.get("loss", {}), dict(params.methods[result.method].weights)
+        total = loss.get("total", math.nan)
+        cells = []
+        for term in terms:
+            weight, value = weights.get(term, 0.0), loss.get(term, math.nan)
+            share = f" ({percent(weight * value / total)})" if weight else " (unused)"
+            cells.append(number(value, ".3g") + (share if np.isfinite(value) else ""))
+        common = sum(loss.get(term, math.nan) for term in PRINTED)
+        cells += [number(total, ".4g"), number(common, ".4g"), str(len(result.history))]
+        rows.append([result.band, looks[result.method].name, *cells])
+    for band, of_band in results.methods.items():
+        for method in of_band:
+            key = paper.BANDS.get(band), paper.METHODS.get(method)
+            if key in paper.THETA:
+                cells = [NONE] * len(terms) + [NONE, f"{paper.THETA[key][5]:.4f}", NONE]
+                rows.append([f"*{key[0]}*", f"*paper: {looks[method].name}*", *cells])
+    return heads, rows
+
+
+def held_out(replays: dict[str, Replay], looks: dict[str, Look]) -> Table | None:
+    """Residuals of fitted and of held-out data of a band's pull; None where nothing is held out."""
+    rows = []
+    for method, replay in replays.items():
+        cells = []
+        for kind, form in (("force", ".3f"), ("cloud", ".2f")):
+            fitted, held = (replay.residuals[kind][part] for part in ("fitted", "held_out"))
+            if not np.isfinite(held):
+                return None
+            cells += [number(fitted, form), number(held, form), number(held / fitted, ".2f")]
+        rows.append([looks[method].name, *cells])
+    heads = [f"{what}, {part}" for what in ("force [N]", "cloud [cm]") for part in PARTS]
+    return ["method", *heads], rows
+
+
+def physical(name: str, value: float, digits: int = 3) -> str:
+    """A parameter as the tables print it."""
+    if name == "youngs_modulus":
+        return f"{value:.{digits - 1}e}".replace("e+0", "e")
+    if name == "elasticity_damping":
+        return f"{1e3 * value:.{digits}g}"
+    return f"{value:.{digits}g}"

@@ -1,0 +1,213 @@
+"""Where launches landed: beside their targets, beside their predictions, beside the paper's."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from pipeline.params import TARGET_AREA
+from pipeline.report import paper
+from pipeline.report.looks import Look
+from pipeline.report.results import Results
+from pipeline.report.tables.cells import Table, number, percent
+
+AIM = 0.05  # mean error of predicted landings inside the recorded stretch, share of the distance
+
+
+def landing_errors(trials: pd.DataFrame) -> dict:
+    """Statistics of launches that had targets: by target, and under "all" over every target.
+
+    A launch fails that has a failure or lands outside the fixed target area. Returns for each key
+    launches, failed, and over the rest mean and std of |y - g|, and bias, the mean of y - g [m].
+    "all" has two deviations, because the paper's mixes them: `pooled_std` (within targets) and
+    `std` (over all launches). Deviations are those of a sample, NaN for fewer than two.
+    """
+    trials = trials[trials.target.notna()]
+    inside = trials.landing_y.between(*TARGET_AREA)
+    good = trials.failure.isna() & trials.landing_y.notna() & inside
+
+    def statistics(chosen: pd.Series) -> dict:
+        rows = trials[chosen & good]
+        miss = rows.landing_y - rows.target
+        return {
+            "launches": int(chosen.sum()),
+            "failed": int((chosen & ~good).sum()),
+            "mean": float(miss.abs().mean()),
+            "std": float(miss.abs().std(ddof=1)),
+            "bias": float(miss.mean()),
+        }
+
+    result = {target: statistics(trials.target == target) for target in sorted(set(trials.target))}
+    variances = [one["std"] ** 2 for one in result.values() if np.isfinite(one["std"])]
+    everything = statistics(pd.Series(True, index=trials.index))
+    everything["pooled_std"] = math.sqrt(np.mean(variances)) if variances else math.nan
+    return {**result, "all": everything}
+
+
+def landings(results: Results, band: str, kind: str, looks: dict[str, Look]) -> Table | None:
+    """Landing error by method and target [cm] with the paper's beside it; None without launches."""
+    rows = []
+    targets: list[float] = []
+    for method, result in results.methods[band].items():
+        trials = result.trials[(result.trials.kind == kind) & result.trials.target.notna()]
+        if trials.empty:
+            continue
+        errors = landing_errors(trials)
+        targets = [key for key in errors if key != "all"]
+        total = errors["all"]
+        rows.append(
+            [
+                looks[method].name,
+                kind,
+                *(_spread(errors[target], "std") for target in targets),
+                _spread(total, "pooled_std"),
+                number(100 * total["std"], ".2f"),
+                number(100 * total["bias"], "+.2f"),
+                f"{total['failed']} of {total['launches']}",
+            ]
+        )
+    if not rows:
+        return None
+    if tuple(targets) == paper.TARGETS:
+        for method in results.methods[band]:
+            key = paper.BANDS.get(band), paper.METHODS.get(method)
+            if key in paper.LANDING:
+                shown = [f"{c[0]:.2f} ± {c[1]:.2f}" if c else "N/A" for c in paper.LANDING[key]]
+                rows.append(
+                    [f"*paper: {looks[method].name}*", "*paper, real robot*", *shown, "", "", ""]
+                )
+    heads = [
+        "method",
+        "launches",
+        *(f"g = {target:g} m" for target in targets),
+        "all targets (± within targets)",
+        "± over all",
+        "bias",
+        "failed",
+    ]
+    return heads, rows
+
+
+def predictions(trials: pd.DataFrame) -> Table:
+    """Predicted beside measured landing, launch by launch, with the error in % of distance."""
+    measured = bool(trials.landing_y.notna().any() or trials.failure.notna().any())
+    ranged = intervals(trials) is not None
+    heads = ["draw y, z [m]", "stretch", "hold force, predicted [N]", "predicted [m]"]
+    heads += ["90 % interval"] if ranged else []
+    heads += ["measured [m]", "error"] if measured else ["target [m]"]
+    rows = []
+    for trial in trials.itertuples():
+        beyond = "" if trial.stretch <= trial.recorded_stretch else " (beyond)"
+        row = [
+            f"{trial.draw_y:.3f}, {trial.draw_z:.3f}",
+            f"{trial.stretch:.2f}{beyond}",
+            number(trial.hold_force, ".1f"),
+            number(trial.predicted_y, ".3f", trial.predicted_failure),
+        ]
+        if ranged:
+            low, high = number(trial.predicted_low, ".3f"), number(trial.predicted_high, ".3f")
+            row.append(f"{low} – {high}")
+        if measured:
+            error = trial.predicted_y / trial.landing_y - 1
+            row += [number(trial.landing_y, ".3f", trial.failure), number(error, "+.1%")]
+        else:
+            row += [number(trial.target, ".3f", "")]
+        rows.append(row)
+    return heads, rows
+
+
+def prediction_error(trials: pd.DataFrame) -> dict[str, dict]:
+    """Errors predicted / measured - 1 inside and beyond the recorded stretch.
+
+    Keys "inside", "beyond", "all", each with `launches` (those compared), `unpredicted` (their
+    simulation failed) of `tried`, and over those compared the mean and max of the error's size and
+    its signed mean, `bias` (fractions, NaN if none).
+    """
+    signed = trials.predicted_y / trials.landing_y - 1
+    error = signed.abs()
+    inside = trials.stretch <= trials.recorded_stretch
+    parts = {"inside": inside, "beyond": ~inside, "all": pd.Series(True, index=trials.index)}
+    return {
+        name: {
+            "launches": int((chosen & error.notna()).sum()),
+            "mean": float(error[chosen].mean()),
+            "max": float(error[chosen].max()),
+            "bias": float(signed[chosen].mean()),
+            "tried": int(chosen.sum()),
+            "unpredicted": int((chosen & trials.predicted_y.isna()).sum()),
+        }
+        for name, chosen in parts.items()
+    }
+
+
+def intervals(trials: pd.DataFrame) -> dict[str, dict] | None:
+    """How often landings lie in their predicted 90 % intervals, inside and beyond the recording.
+
+    Keys "inside", "beyond", each with `launches` (those that have both), how many are `covered`,
+    and the median `width` of the intervals as a share of the landing. None where no launch has an
+    interval.
+    """
+    if not {"predicted_low", "predicted_high"} <= set(trials) or trials.predicted_low.isna().all():
+        return None
+    both = trials.predicted_low.notna() & trials.landing_y.notna()
+    covered = trials.landing_y.between(trials.predicted_low, trials.predicted_high)
+    width = (trials.predicted_high - trials.predicted_low) / trials.landing_y
+    inside = trials.stretch <= trials.recorded_stretch
+    return {
+        name: {
+            "launches": int((chosen & both).sum()),
+            "covered": int((chosen & both & covered).sum()),
+            "width": float(width[chosen & both].median()),
+        }
+        for name, chosen in (("inside", inside), ("beyond", ~inside))
+    }
+
+
+def prediction_summary(
+    results: Results, band: str, kind: str, looks: dict[str, Look]
+) -> Table | None:
+    """Prediction error of each method on launches of a kind, and what its intervals cover."""
+    rows = []
+    for method, result in results.methods[band].items():
+        trials = result.trials[result.trials.kind == kind]
+        if trials.empty:
+            continue
+        parts, ranges = prediction_error(trials), intervals(trials) or {}
+        rows.append(
+            [
+                looks[method].name,
+                *(_share(parts[name]) for name in ("inside", "beyond", "all")),
+                number(100 * parts["all"]["bias"], "+.1f"),
+                f"{parts['all']['unpredicted']} of {parts['all']['tried']}",
+                *(_coverage(ranges.get(name)) for name in ("inside", "beyond")),
+            ]
+        )
+    heads = ["method", "inside the recorded stretch", "beyond it", "all launches", "bias [%]"]
+    heads += ["not predicted", "in the 90 % interval, inside", "beyond"]
+    return (heads, rows) if rows else None
+
+
+def _spread(one: dict, deviation: str) -> str:
+    """Mean ± deviation in cm, N/A where every launch failed; partial failures are counted."""
+    if one["failed"] == one["launches"]:
+        return "N/A"
+    failed = f" ({one['failed']} failed)" if one["failed"] else ""
+    if not np.isfinite(one[deviation]):
+        return f"{100 * one['mean']:.2f}{failed}"
+    return f"{100 * one['mean']:.2f} ± {100 * one[deviation]:.2f}{failed}"
+
+
+def _share(part: dict) -> str:
+    if not part["launches"]:
+        return "no launches"
+    return f"{percent(part['mean'], '.1f')} (max {percent(part['max'], '.1f')},\
+ {part['launches']} launches)"
+
+
+def _coverage(part: dict | None) -> str:
+    if not part or not part["launches"]:
+        return "–"
+    width = percent(part["width"], ".0f")
+    return f"{part['covered']} of {part['launches']} (median width {width})"

@@ -1,0 +1,106 @@
+"""Posterior and profiles of a linear toy, whose Gaussian is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.confidence.axes import Axes
+from pipeline.confidence.intervals import identifiable, interval
+from pipeline.confidence.profile import profiles
+from pipeline.errors import UserError
+from tests.confidence.toy import SCALE, SPACE, TRUTH, Toy, fitted
+from tests.identify.toy import episode
+
+
+def test_posterior_of_a_linear_model(monkeypatch) -> None:
+    """Mean and deviations of least squares, from a start that is many deviations off."""
+    toy = Toy(seed=1)
+    start = TRUTH * [1.03, 0.98, 1.2, 1.05, 0.95]
+    posterior = fitted(monkeypatch, toy, episode(), start=start)
+    even = toy.axes.even(posterior.samples)
+    np.testing.assert_array_less(np.abs(even.mean(axis=0) - toy.optimum), 0.25 * SCALE)
+    np.testing.assert_allclose(even.std(axis=0), SCALE, rtol=0.25)
+    others = np.corrcoef(even.T) - np.eye(5)
+    assert np.abs(others).max() < 0.25
+    assert posterior.moved < 0.7
+
+
+def test_profiles_of_a_linear_model(monkeypatch) -> None:
+    """Parabolas, 2.71 at 1.645 deviations; in the damping's case of its product with s."""
+    toy = Toy(seed=2)
+    posterior = fitted(monkeypatch, toy, episode())
+    curves = profiles(posterior, workers=1)
+    for name, column in (("youngs_modulus", 0), ("poissons_ratio", 1), ("damping_scale", 4)):
+        curve = curves[name]
+        scale = SCALE[column] * (TRUTH[0] if column == 0 else 1.0)
+        centre = np.exp(toy.optimum[0]) if column == 0 else toy.optimum[column]
+        ends = [curve["low"], curve["high"]]
+        np.testing.assert_allclose(
+            ends, centre + 1.645 * scale * np.array([-1, 1]), atol=0.4 * scale
+        )
+        low, high = interval(posterior.samples[:, column])
+        assert np.ptp(ends) == pytest.approx(high - low, rel=0.15)
+        column = posterior.samples[:, column]
+        parabola = ((curve["value"] - column.mean()) / column.std()) ** 2
+        np.testing.assert_allclose(curve["misfit"], parabola, atol=0.12 * parabola.max())
+
+
+def test_an_axis_without_effect_is_not_identifiable(monkeypatch) -> None:
+    """Friction does nothing: its interval fills what the box leaves, the others stay."""
+    scale = np.where(np.arange(5) == 3, np.inf, SCALE)
+    toy = Toy(seed=3, scale=scale)
+    posterior = fitted(monkeypatch, toy, episode())
+    words = {
+        name: identifiable(name, *interval(posterior.samples[:, column]), toy.axes)
+        for column, name in enumerate(SPACE.names)
+    }
+    assert not words["dynamic_friction"]
+    assert words["youngs_modulus"] and words["poissons_ratio"] and words["damping_scale"]
+    even = toy.axes.even(posterior.samples)
+    assert even[:, 0].std() == pytest.approx(SCALE[0], rel=0.25)
+
+
+def test_the_box_cuts_the_posterior(monkeypatch) -> None:
+    """The data want a Poisson's ratio beyond the box: samples pile up at its face."""
+    toy = Toy(seed=4)
+    beyond = (SPACE.high[1] + 0.01 - toy.truth[1]) * toy.columns[:, 1]
+    toy.noise = toy.noise + beyond
+    posterior = fitted(monkeypatch, toy, episode(), start=np.where(TRUTH == 0.4, 0.47, TRUTH))
+    poisson = posterior.samples[:, 1]
+    assert poisson.max() <= SPACE.high[1] * (1 + 1e-9)
+    assert interval(poisson)[1] > SPACE.high[1] - 0.001
+    assert interval(poisson)[0] > SPACE.high[1] - 0.02
+
+
+def test_fixed_parameters_stay_and_priors_count(monkeypatch) -> None:
+    """A prior as narrow as the data's halves the variance and draws the mean half way."""
+    toy = Toy(seed=5)
+    prior = {"poissons_ratio": (toy.optimum[1] + 0.01, SCALE[1])}
+    posterior = fitted(monkeypatch, toy, episode(), priors=prior)
+    poisson = posterior.samples[:, 1]
+    assert poisson.mean() == pytest.approx(toy.optimum[1] + 0.005, abs=0.0015)
+    assert poisson.std() == pytest.approx(SCALE[1] / np.sqrt(2), rel=0.25)
+
+    axes = Axes(SPACE, TRUTH, {"dynamic_friction", "damping_scale"})
+    posterior = fitted(monkeypatch, toy, episode(), axes=axes)
+    np.testing.assert_array_equal(np.unique(posterior.samples[:, 3:], axis=0), [TRUTH[3:]])
+
+
+def test_the_same_seed_gives_the_same_samples(monkeypatch) -> None:
+    twice = [fitted(monkeypatch, Toy(seed=6), episode(), seed=3).samples for _ in range(2)]
+    np.testing.assert_array_equal(*twice)
+
+
+def test_failures_everywhere_are_one_line(monkeypatch) -> None:
+    toy = Toy(seed=7)
+    works = toy.interact
+
+    def fails(*arguments):
+        rollouts = works(*arguments)
+        rollouts.failure = ["it broke"] * len(rollouts.failure)
+        return rollouts
+
+    toy.interact = fails
+    with pytest.raises(UserError, match="64 of 64 simulations near the best"):
+        fitted(monkeypatch, toy, episode())

@@ -1,0 +1,78 @@
+"""Optimisers by their names: the built-in ones, a user's own, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.errors import UserError
+from pipeline.identify.optimizers import build, explorer
+from pipeline.identify.optimizers.evolution import Evolution
+from pipeline.identify.search import latin_hypercube
+from pipeline.params import parse
+from tests.identify.functions import Evaluate, alone, rosenbrock
+
+TEXT = Path("params.yaml").read_text(encoding="utf-8")
+OWN = "tests.identify.own:RandomSearch"
+
+
+def method(**more):
+    """params.yaml's optimiser, and its method sling2sim2real with other keys."""
+    params = parse(TEXT)
+    about = params.methods["sling2sim2real"].model_copy(update=more)
+    return about, params.optimizer
+
+
+def test_a_multistart_explores_as_differential_evolution_does() -> None:
+    for search in ("multistart", "de"):
+        one = explorer(*method(search=search), 4, 60)
+        assert isinstance(one, Evolution)
+        np.testing.assert_array_equal(one.ask(), latin_hypercube(4, 20, 1))
+
+
+def test_the_explorer_moves_as_params_say() -> None:
+    about, optimizer = method()
+    still = optimizer.model_copy(update={"recombination": 0.0, "mutation": (0.0, 0.1)})
+    second = []
+    for settings in (optimizer, still):
+        one = explorer(about, settings, 4, 60)
+        one.tell(rosenbrock(one.ask()))
+        second.append(one.ask())
+    assert not np.array_equal(*second)
+
+
+def test_a_class_of_ones_own_spends_its_budget() -> None:
+    history = alone(OWN, Evaluate(rosenbrock), 50)
+    assert len(history.total) == 50
+    assert set(history.table["phase"].to_pylist()) == {"random"}
+    assert explorer(*method(search=OWN, settings={"batch": 3}), 4, 60).ask().shape == (3, 4)
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "expected"),
+    [
+        ("nowhere.at_all:Class", {}, "cannot be imported (No module named 'nowhere')"),
+        ("tests.identify.own:Absent", {}, "cannot be imported (module 'tests.identify.own' has no"),
+        ("tests.identify.own:Deaf", {}, "is no optimiser, it lacks tell"),
+        ("math:hypot", {}, "cannot be called as Class(dimension, rollouts, seed, population)"),
+        (OWN, {"rate": 1.0}, "got an unexpected keyword argument 'rate'"),
+        ("de", {"rate": 1.0}, "got an unexpected keyword argument 'rate'"),
+    ],
+)
+def test_what_is_no_optimiser_is_refused_in_one_line(
+    name: str, settings: dict, expected: str
+) -> None:
+    with pytest.raises(UserError) as error:
+        build(name, 4, rollouts=60, seed=1, population=20, **settings)
+    assert expected in str(error.value)
+    assert "`search` under `methods` in params.yaml" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_points_outside_the_cube_are_refused() -> None:
+    with pytest.raises(UserError, match="Outside: ask.. must give points of the unit cube"):
+        alone("tests.identify.own:Outside", Evaluate(rosenbrock), 50)
+    with pytest.raises(UserError, match=r"shape \(N, 4\), and gave shape \(1, 5\)"):
+        alone("tests.identify.own:Flat", Evaluate(rosenbrock), 50, names=tuple("abcd"))

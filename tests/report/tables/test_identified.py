@@ -1,0 +1,117 @@
+"""Tables of what was identified, against values by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from pipeline.report.looks import looks
+from pipeline.report.results import gather
+from pipeline.report.tables.identified import (
+    at_edge,
+    derived,
+    held_out,
+    losses,
+    methods,
+    parameters,
+    phases,
+)
+from tests.report.conftest import BAND, METHOD, confidence, episode
+from tests.report.toy_replay import toy_replay
+
+
+@pytest.fixture
+def results(root, params):
+    return gather(params, root)
+
+
+@pytest.fixture
+def named(params):
+    return looks(params.run.methods)
+
+
+def column(table, heading: str) -> list[str]:
+    heads, rows = table
+    return [row[heads.index(heading)] for row in rows]
+
+
+def test_edge_of_the_box_on_both_scales() -> None:
+    log = SimpleNamespace(low=1e-4, high=1e-2, scale="log")
+    line = SimpleNamespace(low=0.0, high=1.0, scale="linear")
+    assert at_edge(1.01e-4, log) and not at_edge(1.2e-4, log) and at_edge(1e-2, log)
+    assert at_edge(0.995, line) and not at_edge(0.98, line)
+
+
+def test_intervals_and_what_cannot_be_identified(results, params, named) -> None:
+    table = parameters(results, params, named)
+    assert column(table, "d [ms]") == ["0.1 – 50", "3 (2.7 – 3.3)"]
+    assert column(table, "friction")[1] == "0.5, not identifiable"
+    assert column(table, "method") == ["*linear/log scale*", "Sling2Sim2Real"]
+
+
+def test_a_theta_outside_its_interval_is_marked(results, params, named) -> None:
+    about = results.methods[BAND][METHOD].theta["confidence"]["parameters"]
+    about["poissons_ratio"] |= {"low": 0.4891, "high": 0.4899}
+    about["youngs_modulus"] |= {"low": 3.001e5, "high": 3.003e5}
+    table = parameters(results, params, named)
+    assert column(table, "ν")[1] == "0.45 † (0.489 – 0.49)"
+    assert column(table, "E [Pa]")[1] == "3.00e5 † (3.001e5 – 3.003e5)"
+
+
+def test_a_parameter_that_is_not_searched_is_called_fixed(results, params, named) -> None:
+    method = params.methods[METHOD].model_copy(
+        update={"fixed": {"poissons_ratio": 0.45, "elasticity_damping": 5e-3}}
+    )
+    params = params.model_copy(update={"methods": {METHOD: method}})
+    results.methods[BAND][METHOD].theta["confidence"] = confidence(fixed="poissons_ratio")
+    assert column(parameters(results, params, named), "ν")[1] == "0.45, fixed"
+    assert column(methods(params, named), "held fixed") == ["ν 0.45, d 5 ms"]
+
+
+def test_what_a_method_minimises_and_by_what_search(params) -> None:
+    table = methods(params, looks(params.methods))
+    minimises = dict(zip(column(table, "method"), column(table, "minimises"), strict=True))
+    search = dict(zip(column(table, "method"), column(table, "search"), strict=True))
+    assert minimises["Sling2Sim2Real"] == "geom + force + work"
+    assert minimises["−L_work"] == "geom + force" and minimises["Package SI"] == "geom"
+    assert search["−c, −m"] == "DE, then CMA-ES in 1 region, isotropic starts"
+    assert search["DE_L"] == "differential evolution"
+
+
+def test_derived_quantities_keep_the_digits_that_their_width_deserves(results, named) -> None:
+    table = derived(results, named)
+    assert column(table, "s·d [ms]") == ["2.10 (1.90 – 2.30)"]
+    assert column(table, "held force [N]") == ["12.000 (11.960 – 12.040)"]
+    results.methods[BAND][METHOD].theta["confidence"] = None
+    assert derived(results, named) is None and phases(results, named) is None
+
+
+def test_residuals_by_phase_in_newtons_and_centimetres(results, named) -> None:
+    table = phases(results, named)
+    assert column(table, "force, taut [N]") == ["0.200"]
+    assert column(table, "cloud, swing [cm]") == ["0.80"]
+
+
+def test_losses_say_what_each_term_weighs(results, params, named) -> None:
+    table = losses(results, params, named)
+    assert column(table, "geom [cm]") == column(table, "work [J]") == ["0.5 (40 %)"]
+    assert column(table, "taut [cm]") == ["0.1 (unused)"]
+    assert column(table, "printed loss") == ["1.25"] and column(table, "rollouts") == ["5"]
+
+
+def test_a_term_of_another_name_has_a_column_too(results, params, named) -> None:
+    results.methods[BAND][METHOD].theta["loss"]["glow"] = 0.7
+    assert column(losses(results, params, named), "glow") == ["0.7 (unused)"]
+
+
+def test_held_out_residuals_stand_beside_the_fitted(params, named) -> None:
+    inputs = params, BAND, METHOD, episode(), {}
+    assert held_out({METHOD: toy_replay(*inputs)}, named) is None
+    residuals = {
+        "force": {"fitted": 0.2, "held_out": 0.3},
+        "cloud": {"fitted": 0.5, "held_out": 0.25},
+    }
+    heads, rows = held_out({METHOD: toy_replay(*inputs, residuals=residuals)}, named)
+    assert rows == [["Sling2Sim2Real", "0.200", "0.300", "1.50", "0.50", "0.25", "0.50"]]
+    assert heads[1:4] == ["force [N], fitted", "force [N], held out", "force [N], ratio"]

@@ -25,7 +25,8 @@ from pipeline.identify.optimizers.multistart import Multistart
 from pipeline.identify.regions import find_regions
 from pipeline.identify.search import Free, budget, latin_hypercube, search
 from pipeline.identify.space import Space
-from pipeline.sling.model import Sling
+from pipeline.params import expect_known
+from pipeline.sling.model import THETA, Sling
 
 PAPER = {"population": 64, "generations": 39, "cma_population": 16, "cma_rollouts": 3200}
 BUDGETS = {"laptop": {}, "paper": PAPER}  # laptop: as params.yaml has it
@@ -43,11 +44,14 @@ class Clocked:
         return result
 
 
-def bench_methods(params, device: str = "cpu", size: str = "laptop") -> dict:
+def bench_methods(
+    params, device: str = "cpu", size: str = "laptop", methods: list[str] | None = None
+) -> dict:
     """Time a search with each of params.yaml's methods.
 
     Args:
         size: Of the budget, laptop (params.yaml's) or paper.
+        methods: These alone; none or an empty list means all.
 
     Returns:
         `budget`: its name and settings; `batch`: seconds of one generation, simulated alone and
@@ -55,8 +59,10 @@ def bench_methods(params, device: str = "cpu", size: str = "laptop") -> dict:
         all threads, seconds of evaluations and of the optimiser, rollouts/s, best loss.
 
     Raises:
-        UserError: There is no such device.
+        UserError: There is no such device or method.
     """
+    for method in methods or ():
+        expect_known(params, "method", method)
     if device.partition(":")[0] not in ("cpu", "cuda") or not available(device):
         raise UserError(f"device {device}: not there; cpu is, and cuda:0 where there is a GPU")
     optimizer = params.optimizer.model_copy(update=BUDGETS[size])
@@ -68,7 +74,7 @@ def bench_methods(params, device: str = "cpu", size: str = "laptop") -> dict:
         "batch": _generation(params, sling, episode, first, device, optimizer.population),
         "methods": {
             method: time_search(params, method, optimizer, sling, episode, device)
-            for method in params.methods
+            for method in methods or params.methods
         },
     }
 
@@ -120,20 +126,17 @@ def complete(params, method: str, optimizer, evaluate) -> History:
 
 def _generation(params, sling: Sling, episode: Episode, method: str, device: str, count: int):
     """Seconds of one generation: simulated on one thread, and with the loss, on all cores."""
-    unit = latin_hypercube(5, count, params.optimizer.seed)
-    thetas = Space.of(params.parameters).to_physical(unit)
-    evaluate = _evaluator(params, method, sling, episode, device, nuisances=False)
+    evaluate = _evaluator(params, method, sling, episode, device)
+    unit = latin_hypercube(evaluate.space.dimension, count, params.optimizer.seed)
+    thetas = evaluate.space.to_physical(unit)[:, : len(THETA)]
     simulate = partial(simulated, sling, episode, thetas, device=device, workers=os.cpu_count())
     simulation, whole = seconds(simulate), seconds(partial(evaluate, unit))
     return {"rollouts": count, "simulation_s": simulation, "with_loss_s": whole}
 
 
-def _evaluator(
-    params, method: str, sling: Sling, episode: Episode, device: str, nuisances: bool = True
-) -> Evaluator:
+def _evaluator(params, method: str, sling: Sling, episode: Episode, device: str) -> Evaluator:
     loss = EpisodeLoss.of(params, method, episode, sling, device=device)
-    names = params.methods[method].nuisances if nuisances else None
-    return Evaluator(episode, sling, loss, Space.of(params.parameters, names), device=device)
+    return Evaluator(episode, sling, loss, Space.of_method(params, method), device=device)
 
 
 def _import_and_compile(params, sling: Sling, episode: Episode, method: str, device: str) -> None:

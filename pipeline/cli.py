@@ -111,7 +111,12 @@ def parser() -> argparse.ArgumentParser:
     sub.add_argument(
         "--recording", type=Path, metavar="FILE.mcap", help="time how it becomes clouds"
     )
-    sub.add_argument("--methods", action="store_true", help="time a whole search by each method")
+    sub.add_argument(
+        "--methods",
+        nargs="*",
+        metavar="METHOD",
+        help="time searches, all or of these methods",
+    )
     sub.add_argument("--budget", choices=("laptop", "paper"), default="laptop", help="of --methods")
     sub.add_argument("--json", action="store_true")
     return top
@@ -272,13 +277,15 @@ def run_bench(arguments: argparse.Namespace) -> tuple[str, int]:
         if arguments.json:
             return json.dumps(environment("cpu", "sling bench --recording --json") | result), 0
         return recording.table(result), 0
-    if arguments.methods:
+    if arguments.methods is not None:
         from pipeline import bench_methods as methods
 
-        result = methods.bench_methods(load(), arguments.device, arguments.budget)
+        result = methods.bench_methods(
+            load(), arguments.device, arguments.budget, arguments.methods
+        )
         if arguments.json:
-            command = f"sling bench --methods --budget {arguments.budget}"
-            command += f" --device {arguments.device} --json"
+            command = " ".join(["sling bench --methods", *arguments.methods])
+            command += f" --budget {arguments.budget} --device {arguments.device} --json"
             return json.dumps(environment(arguments.device, command) | result), 0
         return methods.table(result), 0
     if arguments.peers:

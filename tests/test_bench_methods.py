@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline import bench_methods as bench
 from pipeline.bench import THETA, recorded_yardstick
 from pipeline.errors import UserError
-from pipeline import bench_methods as bench
 from pipeline.identify.evaluate import Evaluator
 from pipeline.identify.loss import EpisodeLoss
 from pipeline.identify.space import Space
 from pipeline.params import load
 
-PARAMS = load(Path(__file__).parents[2] / "params.yaml")
+PARAMS = load(Path(__file__).parents[1] / "params.yaml")
 SMALL = {"population": 6, "generations": 2, "cma_population": 4, "cma_rollouts": 16, "k_top": 2}
 
 
@@ -47,6 +47,17 @@ def test_every_search_spends_its_budget_and_says_what_it_took(monkeypatch) -> No
     assert 0 < result["batch"]["simulation_s"] < 2 * result["batch"]["with_loss_s"]
     text = bench.table(result)
     assert all(name in text for name in names)
+
+
+def test_a_search_is_timed_in_the_box_of_its_method() -> None:
+    """Bounds and nuisances of the method included."""
+    sling, episode = recorded_yardstick(PARAMS)
+    for method in ("sling2sim2real", "sling2sim2real_taut"):
+        evaluate = bench._evaluator(PARAMS, method, sling, episode, "cpu")
+        expected = Space.of_method(PARAMS, method)
+        assert evaluate.space.names == expected.names
+        np.testing.assert_array_equal(evaluate.space.low, expected.low)
+        np.testing.assert_array_equal(evaluate.space.high, expected.high)
 
 
 def test_the_papers_budget_is_the_papers() -> None:

@@ -152,6 +152,33 @@ def test_exact_lines() -> None:
         ("methods.de.search", "my.module:", "or package.module:Class, got 'my.module:'"),
         ("methods.de.search", "my module:Class", "methods.de.search: must be multistart"),
         ("methods.no_work.settings", {"rate": 1}, "methods.no_work: settings are for another"),
+        ("methods.de.settings", {"seed": 3}, "methods.de: settings: seed stands under `optimizer`"),
+        ("optimizer.mutation", [0.5, 2.0], "optimizer.mutation.1: must be between 0 and 1.99"),
+        (
+            "methods.sling2sim2real_taut.fixed",
+            {"poissons_ratio": 0.4},  # in the box, not in the method's bounds
+            "methods.sling2sim2real_taut.fixed.poissons_ratio: must be between 0.45 and 0.49",
+        ),
+        (
+            "methods.sling2sim2real_taut.fixed",
+            {"air_drag": 9.0},
+            "methods.sling2sim2real_taut.fixed.air_drag: must be between 0 and 8, got 9",
+        ),
+        (
+            "methods.de.fixed",
+            {"air_drag": 1.0},  # no nuisance of this method
+            "methods.de.fixed: air_drag is not one of youngs_modulus",
+        ),
+        (
+            "methods.de.bounds",
+            {"air_drag": [0.0, 1.0]},
+            "methods.de.bounds: air_drag is not one of youngs_modulus",
+        ),
+        (
+            "methods.de.bounds",
+            {"poissons_ratio": [0.2, 0.4]},
+            "methods.de.bounds.poissons_ratio: must be [low, high] within parameters.poissons",
+        ),
         ("methods.de.settings", {"rate": [1]}, "methods.de.settings.rate: must be a number, true"),
         ("methods.de.k_top", 3, "methods.de: k_top and covariance are for search: multistart"),
         ("methods.de.covariance", False, "methods.de: k_top and covariance are for search"),
@@ -172,7 +199,7 @@ def test_exact_lines() -> None:
         (
             "methods.de.nuisances",
             {"delay": [0, 1]},
-            "methods.de.nuisances: delay is not one of camera_delay",
+            "methods.de.nuisances: delay is not one of air_drag, camera_delay",
         ),
         (
             "methods.de.nuisances",

@@ -1,7 +1,8 @@
 """θ files: the identified parameters of a band as JSON, or the same written by hand.
 
 {"band": "...", "theta": {"youngs_modulus": ..., ... all five}}  and, where a stage wrote it,
-"method", "loss": {"geom", "force", "work", "total"}, "rollouts", "confidence"
+"method", "nuisances": {"air_drag": ...}, "loss": {"geom", "force", "work", "total"}, "rollouts",
+"confidence"
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from pipeline.errors import UserError
 from pipeline.params import Parameters
+from pipeline.params.identification import NUISANCES
 from pipeline.schema import Range
 from pipeline.sling.model import THETA, Sling, load_sling
 
@@ -40,24 +42,37 @@ def load_theta(path: Path, band: str) -> dict:
         raise UserError(f"{path}: cannot be read as JSON ({error})") from error
     if not isinstance(content, dict) or content.get("band") != band:
         raise UserError(f'{path}: must hold an object with "band": "{band}"')
-    theta = content.get("theta")
+    theta, nuisances = content.get("theta"), content.get("nuisances", {})
     if not isinstance(theta, dict) or set(theta) != set(THETA):
         raise UserError(f'{path}: "theta" must hold exactly {", ".join(THETA)}')
     for name, value in theta.items():
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        low, high = LIMITS[name].low, LIMITS[name].high
-        if not number or not low <= value <= high:
-            raise UserError(
-                f"{path}: theta.{name} must be a number between {low:g} and {high:g},"
-                f" got {repr(value)[:60]}"
-            )
+        _expect_number(path, f"theta.{name}", value, LIMITS[name].low, LIMITS[name].high)
+    if not isinstance(nuisances, dict) or not set(nuisances) <= set(NUISANCES):
+        raise UserError(f'{path}: "nuisances" may hold {", ".join(NUISANCES)}, and nothing else')
+    for name, value in nuisances.items():
+        _expect_number(path, f"nuisances.{name}", value, *NUISANCES[name])
     return content
+
+
+def _expect_number(path: Path, key: str, value: object, low: float, high: float) -> None:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not number or not low <= value <= high:
+        raise UserError(
+            f"{path}: {key} must be a number between {low:g} and {high:g}, got {repr(value)[:60]}"
+        )
 
 
 def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Sling:
     """The sling of a band in the air that a θ file's content has identified beside θ."""
     drag = content.get("nuisances", {}).get("air_drag", 0.0)
     return replace(load_sling(params, band, root), air_drag=drag)
+
+
+def in_air(sling: Sling, points: np.ndarray) -> tuple[Sling, np.ndarray]:
+    """A sling and θ (N, 5) of points (N, 5) or (N, 6), whose last column is the air's drag."""
+    if points.shape[-1] == len(THETA):
+        return sling, points
+    return replace(sling, air_drag=points[:, -1]), points[:, :-1]
 
 
 def vector(content: dict) -> np.ndarray:

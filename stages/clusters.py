@@ -29,6 +29,7 @@ def main() -> None:
         save_regions(target, free.names, [], 0)
         print(f"{band} {method}: {about.search} has no second phase")
         return
+    history.best()  # says why, where all failed
     k_top = about.k_top or optimizer.k_top
     regions = find_regions(
         history.unit,

@@ -20,7 +20,7 @@ from pipeline.policy.export import card, write_onnx, write_torchscript
 from pipeline.policy.landing_map import LandingMap
 from pipeline.policy.train import train
 from pipeline.stage import started
-from pipeline.theta import load_theta, vector
+from pipeline.theta import load_theta
 
 
 def main() -> None:
@@ -29,7 +29,7 @@ def main() -> None:
     folder = Path("data/policies", band, method)
 
     landing_map = LandingMap.simulate(
-        simulator(params, band, vector(theta)),
+        simulator(params, band, theta),
         draw_y=params.setup.draw_y,
         draw_z=params.setup.draw_z,
         size=params.policy.map_size,

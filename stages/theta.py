@@ -18,7 +18,6 @@ from pipeline.identify.history import History, theta_content
 from pipeline.identify.session import load_episode, workers
 from pipeline.sling.model import THETA, load_sling
 from pipeline.stage import expect, started
-from pipeline.theta import vector
 
 
 def main() -> None:
@@ -29,7 +28,7 @@ def main() -> None:
     ]
     content = theta_content(History.load(method, THETA, *sources), band)
     episode, sling = load_episode(band), load_sling(params, band)
-    known, kept = confidence(params, method, episode, sling, vector(content), workers=workers())
+    known, kept = confidence(params, method, episode, sling, content, workers=workers())
     content["confidence"] = known
     write_json(Path("data/confidence", band, f"{method}.json"), kept | {"band": band})
     write_json(Path("data/theta", band, f"{method}.json"), content)

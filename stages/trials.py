@@ -22,9 +22,9 @@ from pipeline.episode import Episode
 from pipeline.params import load
 from pipeline.policy import trials
 from pipeline.policy.aim import policy_draws, simulator
-from pipeline.policy.spread import landing_intervals, load_samples
+from pipeline.policy.spread import landing_intervals, law_discrepancy, load_samples
 from pipeline.stage import expect_episode, started
-from pipeline.theta import load_theta, vector
+from pipeline.theta import load_theta
 
 
 def main() -> None:
@@ -49,10 +49,11 @@ def main() -> None:
         draws = policy_draws(Path("data/policies", band, method), np.array(targets))
         kind, landing, failure = "predicted", [None] * len(draws), [None] * len(draws)
 
-    predicted = simulator(params, band, vector(theta), params.setup.max_force)(draws)
+    predicted = simulator(params, band, theta, params.setup.max_force)(draws)
     samples = load_samples(Path("data/confidence", band, f"{method}.json"), band, method)
-    launcher = simulator(params, band, vector(theta))
-    intervals = landing_intervals(launcher, draws, samples, params.trials.actuation_error)
+    error, discrepancy = params.trials.actuation_error, law_discrepancy(theta)
+    launcher = simulator(params, band, theta)
+    intervals = landing_intervals(launcher, draws, samples, error, discrepancy)
     hold_force = predicted.hold_force
     if about.source == "rig":
         seeds = [1_000_000 * params.trials.seed + number for number in range(len(draws))]

@@ -109,7 +109,7 @@ def test_exact_lines() -> None:
     ("path", "value", "expected"),
     [
         ("run.rig", [], "run.rig: must list"),
-        ("run.bands", ["other"], "run.bands: other is not one of band1"),
+        ("run.bands", ["band1", "other"], "run.bands: other is not one of band1"),
         ("run.bands", ["band1", "band1"], "run.bands: lists an entry twice"),
         ("run.bands", [], "run.bands: must not be empty"),
         ("run.methods", ["best"], "run.methods: best is not one of"),

@@ -7,7 +7,14 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from pipeline.identify.evaluate import Evaluation
+from pipeline.identify.history import History
+from pipeline.identify.loss import TERMS
+from pipeline.identify.space import Space
+from pipeline.params import load
 
 ROOT = Path(__file__).parents[1]
 OF_A_BAND = ("record", "episode", "mounting")
@@ -45,6 +52,23 @@ def test_unknown_names(stage) -> None:
     assert status == 1 and line.startswith("error: band band9: not in params.yaml, which has band1")
     status, line = stage("theta", "band1", "best")
     assert status == 1 and line.startswith("error: method best: not in params.yaml, which has")
+
+
+def test_a_history_that_failed_says_why(stage) -> None:
+    space = Space.of(load(ROOT / "params.yaml").parameters)
+    unit = np.random.default_rng(1).random((30, 5))
+    nothing = {term: np.full(30, np.nan) for term in TERMS}
+    theta, reasons = space.to_physical(unit), ["the band slipped"] * 30
+    history = History("sling2sim2real", space.names)
+    history.add(
+        Evaluation(unit, theta, nothing, np.full(30, np.inf), reasons), phase="de", generation=0
+    )
+    history.save(Path("data/history/band1/sling2sim2real.parquet"))
+    status, line = stage("clusters", "band1", "sling2sim2real")
+    assert status == 1
+    assert line.startswith(
+        "error: sling2sim2real: each of 30 simulations failed (the band slipped)"
+    )
 
 
 @pytest.mark.parametrize("name", [*OF_A_BAND[1:], *OF_A_METHOD, "report"])

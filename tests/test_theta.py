@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipeline.errors import UserError
 from pipeline.sling.model import THETA
-from pipeline.theta import load_theta, vector
+from pipeline.theta import in_air, load_theta, vector
 
 SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 
@@ -52,3 +54,37 @@ def test_values_out_of_range_are_named(tmp_path: Path, name: str, value: object)
 @pytest.mark.parametrize("text", ["[" * 200_000, "", "{", "1" * 5000])
 def test_what_is_no_json_object(tmp_path: Path, text: str) -> None:
     assert "cannot be read as JSON" in refusal(tmp_path / "theta.json", text)
+
+
+def test_nuisances_come_back_and_the_sling_gets_their_drag(tmp_path: Path) -> None:
+    file = tmp_path / "theta.json"
+    said = {"air_drag": 2.5, "force_bias_x": -0.1}
+    file.write_text(json.dumps({"band": "red", "theta": SOFT, "nuisances": said}))
+    assert load_theta(file, "red")["nuisances"] == said
+    sling, theta = in_air(Windless(), np.array([[1.0, 2, 3, 4, 5, 0.7], [1.0, 2, 3, 4, 5, 0.9]]))
+    assert theta.tolist() == [[1, 2, 3, 4, 5]] * 2
+    np.testing.assert_array_equal(sling.air_drag, [0.7, 0.9])
+    assert in_air(Windless(), theta)[0].air_drag == 0.0
+
+
+@dataclass(frozen=True)
+class Windless:
+    air_drag: float = 0.0
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ({"wind": 1.0}, '"nuisances" may hold air_drag, camera_delay, '),
+        ([1.0], '"nuisances" may hold air_drag'),
+        (None, '"nuisances" may hold air_drag'),
+        ({"air_drag": -1}, "nuisances.air_drag must be a number between 0 and 50, got -1"),
+        ({"air_drag": float("nan")}, "nuisances.air_drag must be a number"),
+        ({"air_drag": float("inf")}, "nuisances.air_drag must be a number"),
+        ({"camera_delay": True}, "nuisances.camera_delay must be a number between -0.02"),
+        ({"force_gain": "1"}, "nuisances.force_gain must be a number between 0.5 and 2"),
+    ],
+)
+def test_bad_nuisances_are_one_line(tmp_path: Path, said: object, message: str) -> None:
+    text = json.dumps({"band": "red", "theta": SOFT, "nuisances": said})
+    assert message in refusal(tmp_path / "theta.json", text)

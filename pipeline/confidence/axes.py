@@ -1,8 +1,9 @@
-"""Coordinates in which a rollout changes nearly evenly: log E, ν, log s d, 1/friction, s.
+"""Coordinates in which a rollout changes nearly evenly: log E, ν, log s d, 1/friction, s, drag.
 
 Damping acts through the product s d while the band is taut, and friction through the time that the
 opening fingers need to let go, which goes with 1/friction. The prior stays that of the search's
-box: uniform on its axes.
+box: uniform on its axes. The air's drag is one of them where the method searches it, because
+launches feel it and a recoil hardly tells it from damping.
 """
 
 from __future__ import annotations
@@ -10,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.identify.space import Space
-from pipeline.sling.model import THETA
+from pipeline.theta import vector
 
-YOUNG, POISSON, DAMPING, FRICTION, SCALE = range(5)
+YOUNG, POISSON, DAMPING, FRICTION, SCALE, DRAG = range(6)
 LEAST_SCALE = 1e-3  # of damping: below it nothing is damped, and the product has no logarithm
 LEAST_FRICTION = 1e-3
 
@@ -28,31 +29,43 @@ class Axes:
         least_friction: float = 0.0,
     ) -> None:
         """Args:
-        space: Box of the five parameters.
-        theta: Values of the fixed ones are taken from here, shape (5,).
+        space: Box of the five parameters, and of air_drag where it is searched: P axes.
+        theta: Values of the fixed ones are taken from here, shape (P,).
         least_friction: Below it the band slips out of the closed fingers.
         """
-        self.space, self._theta = space, np.array(theta, float)
-        self.free = np.array([i for i, name in enumerate(THETA) if name not in fixed])
-        self.names = tuple(THETA[i] for i in self.free)
-        self.low, self.high = space.low[:5].copy(), space.high[:5].copy()
+        self.space, self.theta = space, np.array(theta, float)
+        self.free = np.array([i for i, name in enumerate(space.names) if name not in fixed])
+        self.names = tuple(space.names[i] for i in self.free)
+        self.low, self.high = space.low.copy(), space.high.copy()
         self.low[SCALE] = max(self.low[SCALE], min(LEAST_SCALE, self.high[SCALE]))
         room = self.high[FRICTION] - self.low[FRICTION]
         least = min(least_friction, self.high[FRICTION] - 0.02 * room)
         self.low[FRICTION] = max(self.low[FRICTION], least, LEAST_FRICTION)
 
+    @classmethod
+    def of_method(cls, params, method: str, content: dict, least_friction: float) -> Axes:
+        """What a method of params.yaml searches and launches feel, at a θ file's content.
+
+        Within the method's bounds; what instruments add besides is not among the axes.
+        """
+        about = params.methods[method]
+        drag = {name: ends for name, ends in about.nuisances.items() if name == "air_drag"}
+        space = Space.of(params.parameters, drag, about.bounds)
+        theta = [*vector(content), *(content["nuisances"][name] for name in drag)]
+        return cls(space, np.array(theta), set(about.fixed), least_friction)
+
     def even(self, theta: np.ndarray) -> np.ndarray:
-        """Coordinates (N, D) of physical parameters (N, 5)."""
-        young, poisson, damping, friction, scale = np.asarray(theta, float).T
+        """Coordinates (N, D) of physical parameters (N, P)."""
+        young, poisson, damping, friction, scale, *drag = np.asarray(theta, float).T
         product = damping * np.maximum(scale, LEAST_SCALE)
-        columns = [np.log(young), poisson, np.log(product), 1 / friction, scale]
+        columns = [np.log(young), poisson, np.log(product), 1 / friction, scale, *drag]
         return np.stack(columns, axis=1)[:, self.free]
 
     def physical(self, even: np.ndarray) -> np.ndarray:
-        """Physical parameters (N, 5) of coordinates (N, D)."""
-        theta = np.tile(self._theta, (len(even), 1))
+        """Physical parameters (N, P) of coordinates (N, D)."""
+        theta = np.tile(self.theta, (len(even), 1))
         columns = dict(zip(self.free.tolist(), np.asarray(even, float).T, strict=True))
-        for i in (POISSON, SCALE):
+        for i in (POISSON, SCALE, DRAG):
             if i in columns:
                 theta[:, i] = columns[i]
         if YOUNG in columns:
@@ -70,7 +83,7 @@ class Axes:
         return self.even(theta)
 
     def inside(self, theta: np.ndarray) -> np.ndarray:
-        """Which physical parameters (N, 5) lie in the box on every free axis, (N,)."""
+        """Which physical parameters (N, P) lie in the box on every free axis, (N,)."""
         good = (theta >= self.low * (1 - 1e-9)) & (theta <= self.high * (1 + 1e-9))
         return good[:, self.free].all(axis=1)
 

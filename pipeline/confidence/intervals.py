@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.confidence.axes import Axes
-from pipeline.sling.model import THETA
 
 LEVEL = 0.9
 FILLS = 2 / 3  # of the prior's own interval: from here on a parameter is not identifiable
@@ -23,7 +22,7 @@ def identifiable(name: str, low: float, high: float, axes: Axes, prior=None) -> 
     Args:
         prior: Mean and standard deviation, where more is known than the box.
     """
-    column = THETA.index(name)
+    column = axes.space.names.index(name)
     edges = np.tile(axes.low, (2, 1))
     edges[1] = axes.high
     box = axes.space.to_unit(edges)[:, column]

@@ -18,18 +18,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm, qmc
 
-from pipeline.confidence.axes import Axes
+from pipeline.confidence.axes import DAMPING, DRAG, SCALE, Axes
 from pipeline.confidence.ensemble import sample
 from pipeline.confidence.rounds import LANES, Place, Round, Rounds, Tolerances
 from pipeline.episode import Episode
 
-START = np.array([0.04, 0.03, 0.4, 0.4, 0.25])  # spread of the first design, even coordinates
+START = np.array([0.04, 0.03, 0.4, 0.4, 0.25, 1.0])  # spread of the first design, even coordinates
 SPREAD = 1.25  # of a design against the posterior
 SHRINK, GROW = 0.3, 2.0  # of a design's spread against the one before
 HEAT = (100.0, 30.0, 9.0, 2.7)  # of the first rounds
 ROUNDS = 11  # at most
 STILL = 0.7  # standard deviations that the mean may move before the last round
-BATCHES, LAST = 4, 8  # of a round and of the last one
+BATCHES, LAST = 5, 10  # of a round and of the last one
 SHORT, LONG = 180, 900  # steps of the sampler in a round and in the last one
 DRAWS = 4000  # that intervals are quantiles of
 
@@ -39,13 +39,13 @@ class Posterior:
     """What is known of θ.
 
     Attributes:
-        samples: Physical, shape (M, 5).
-        mean: Of the even coordinates, as physical parameters, shape (5,).
+        samples: Physical, shape (M, P): the axes of the method's box.
+        mean: Of the even coordinates, as physical parameters, shape (P,).
         derived: Samples of what data see better than θ, shape (M,) each: damping_product [s],
-            hold_force [N], release_time [s], camera_delay [s].
+            hold_force [N], release_time [s], camera_delay [s], and air_drag [1/s] where it is free.
         rounds, last: What the rounds needed, and the last one, on whose surrogate all this rests.
         moved: How far the mean moved in it, in standard deviations.
-        course: Physical mean after each round, shape (rounds, 5).
+        course: Physical mean after each round, shape (rounds, P).
     """
 
     samples: np.ndarray
@@ -69,11 +69,11 @@ def fit(
     seed: int = 1,
     workers: int | None = None,
 ) -> Posterior:
-    """Posterior of an episode's θ.
+    """Posterior of an episode's θ, and of the air's drag where it is one of the axes.
 
     Args:
         cutoff: Of the low-pass that the recorded force went through [Hz].
-        theta: Where to begin, shape (5,): the best that a search found.
+        theta: Where to begin, shape (P,): the best that a search found.
         tolerances: Of the instruments; by default what the episode's metadata say.
         priors: Mean and standard deviation of parameters that more is known of than their box.
         workers: Threads; they change no result.
@@ -155,9 +155,11 @@ def _derived(
     mean, covariance = found.surrogate.nuisances(drawn)
     noise = rng.multivariate_normal(np.zeros(2), covariance[:2, :2], len(drawn))
     shifts = found.place.times + (mean[:, :2] + noise) * found.place.steps
+    drag = {"air_drag": theta[:, DRAG]} if theta.shape[1] > DRAG else {}
     return {
-        "damping_product": theta[:, 2] * theta[:, 4],
+        "damping_product": theta[:, DAMPING] * theta[:, SCALE],
         "hold_force": found.hold_force(drawn),
         "release_time": episode.release_time + shifts[:, 0],
         "camera_delay": -shifts[:, 1],
+        **drag,
     }

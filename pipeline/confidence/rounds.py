@@ -15,6 +15,7 @@ from pipeline.confidence.whitening import weights
 from pipeline.episode import Episode
 from pipeline.errors import UserError
 from pipeline.sling.interaction import Rollouts, interact
+from pipeline.theta import in_air
 
 LANES = 16  # rollouts that cost as much as one
 REACH = 3.0  # of the surrogate, in spreads of its design
@@ -134,7 +135,7 @@ class Rounds:
         self._held = np.flatnonzero((until > 0.05) & (until < 0.5))
 
     def simulate(self, theta: np.ndarray, times: np.ndarray) -> list[Rollouts]:
-        """Batches of LANES physical theta (N, 5); each has its times (N / LANES, 2)."""
+        """Batches of LANES physical theta (N, P); each has its times (N / LANES, 2)."""
 
         def batch(theta: np.ndarray, shift: np.ndarray) -> Rollouts:
             shifted = replace(
@@ -142,13 +143,14 @@ class Rounds:
                 release_time=self.episode.release_time + shift[0],
                 cloud_time=self.episode.cloud_time + shift[1],
             )
-            return interact(self.sling, shifted, theta)
+            sling, theta = in_air(self.sling, theta)
+            return interact(sling, shifted, theta)
 
         self.rollouts += len(theta)
-        return list(self.pool.map(batch, theta.reshape(len(times), -1, 5), times))
+        return list(self.pool.map(batch, np.split(theta, len(times)), times))
 
     def known(self, theta: np.ndarray) -> np.ndarray:
-        """-2 log of the priors of physical parameters (N, 5), the box's left out, (N,)."""
+        """-2 log of the priors of physical parameters (N, P), the box's left out, (N,)."""
         names = self.axes.space.names
         gaps = [
             (theta[:, names.index(name)] - mean) / deviation

@@ -2,47 +2,79 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pipeline.confidence.axes import Axes
+from pipeline.confidence.discrepancy import discrepancy
 from pipeline.confidence.intervals import LEVEL, correlation, identifiable, interval
 from pipeline.confidence.posterior import Posterior, fit
 from pipeline.confidence.profile import profiles
 from pipeline.confidence.residuals import PHASES
 from pipeline.episode import Episode
-from pipeline.identify.space import Space
 from pipeline.signal import cutoff_hz
 from pipeline.sling.model import THETA
 
 SAMPLES = 200  # that are kept
-UNITS = {"damping_product": "s", "hold_force": "N", "release_time": "s", "camera_delay": "s"}
+UNITS = {
+    "damping_product": "s",
+    "hold_force": "N",
+    "release_time": "s",
+    "camera_delay": "s",
+    "air_drag": "1/s",
+}
 SLIP = 1.01  # times the least friction that holds the measured force
 
 
 def confidence(
-    params, method: str, episode: Episode, sling, theta: np.ndarray, *, workers: int | None = None
+    params, method: str, episode: Episode, sling, content: dict, *, workers: int | None = None
 ) -> tuple[dict, dict]:
     """What a θ file says under `confidence`, and what data/confidence keeps.
 
+    The box is the method's own. A searched drag of the air is an axis beside θ; what instruments
+    add, which a method may have searched too, is taken off the recording, and what is left of it
+    is marginalised.
+
     Args:
-        theta: θ* of the method, physical, shape (5,).
+        content: Of the θ file: "theta" and "nuisances".
 
     Raises:
         UserError: Too many simulations around θ* fail.
     """
-    fixed = set(params.methods[method].fixed)
+    episode = corrected(episode, content["nuisances"])
     peak = np.linalg.norm(episode.force, axis=1).max()
-    axes = Axes(Space.of(params.parameters), theta, fixed, SLIP * peak / sling.grip_force)
+    axes = Axes.of_method(params, method, content, SLIP * peak / sling.grip_force)
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
-    posterior = fit(episode, sling, cutoff, axes, theta, workers=workers)
+    posterior = fit(episode, sling, cutoff, axes, axes.theta, workers=workers)
     curves = profiles(posterior, workers=workers)
-    return summary(posterior, curves), kept(posterior, curves)
+    known = summary(posterior, curves)
+    known["discrepancy"] = discrepancy(episode, sling, cutoff, axes.theta)
+    return known, kept(posterior, curves)
+
+
+def corrected(episode: Episode, nuisances: dict[str, float]) -> Episode:
+    """The episode without what its instruments add, as a θ file's nuisances say it."""
+
+    def vector(name: str) -> np.ndarray:
+        return np.array([nuisances.get(f"{name}_{axis}", 0.0) for axis in "xyz"])
+
+    force = (episode.force - vector("force_bias")) / nuisances.get("force_gain", 1.0)
+    late, shift = nuisances.get("force_delay", 0.0), vector("cloud_shift").astype(np.float32)
+    sooner = [np.interp(episode.time + late, episode.time, axis) for axis in force.T]
+    return replace(
+        episode,
+        force=np.stack(sooner, axis=1),
+        cloud_time=episode.cloud_time - nuisances.get("camera_delay", 0.0),
+        clouds=[cloud - shift for cloud in episode.clouds],
+    )
 
 
 def summary(posterior: Posterior, curves: dict) -> dict:
     """Intervals, correlations and residuals, ready for JSON."""
     axes, parameters = posterior.rounds.axes, {}
-    for column, name in enumerate(THETA):
+    for name in THETA:
+        column = axes.space.names.index(name)
         low, high = interval(posterior.samples[:, column])
         entry = {"low": low, "high": high}
         if name in curves:
@@ -57,7 +89,7 @@ def summary(posterior: Posterior, curves: dict) -> dict:
         low, high = interval(samples)
         value = float(np.median(samples))
         derived[name] = {"value": value, "low": low, "high": high, "unit": UNITS[name]}
-    names = {THETA[i]: posterior.samples[:, i] for i in axes.free}
+    names = {axes.space.names[i]: posterior.samples[:, i] for i in axes.free}
     return {
         "level": LEVEL,
         "parameters": parameters,
@@ -77,7 +109,7 @@ def kept(posterior: Posterior, curves: dict) -> dict:
         good = np.isfinite(curve["misfit"])
         shown[name] = {key: curve[key][good].tolist() for key in ("value", "misfit", "surrogate")}
     return {
-        "names": list(THETA),
+        "names": list(posterior.rounds.axes.space.names),
         "samples": posterior.samples[rows].tolist(),
         "mean": posterior.mean.tolist(),
         "profiles": shown,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-import zipfile
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +46,8 @@ class Memo:
         evaluation = self._recalled(path, unit, theta)
         if evaluation is None:
             evaluation = self.evaluate(unit)
-            self._keep(path, evaluation)
+            with suppress(FileNotFoundError):  # another run has just thrown the folder away
+                self._keep(path, evaluation)
         return evaluation
 
     def _key(self, theta: np.ndarray) -> str:
@@ -76,8 +77,8 @@ class Memo:
                 terms = {name: arrays[f"term_{name}"] for name in TERMS}
                 failure = [str(reason) or None for reason in arrays["failure"]]
                 weighed = arrays["weighed"].tolist()
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-            return None  # not there, or damaged
+        except Exception:
+            return None  # not there, or damaged: a zip file can be in many ways
         if NOT_FINITE in failure and weighed != self._weighed:
             return None
         total = self.evaluate.loss.total(terms)

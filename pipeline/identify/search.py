@@ -118,6 +118,11 @@ def search(
         rollouts -= len(unit)
         evaluation = evaluate(unit if free is None else free.fill(unit))
         owner = getattr(optimizer, "owner", None)
+        if owner is not None and np.shape(owner) != (len(asked),):
+            raise UserError(
+                f"{type(optimizer).__name__}: owner must say for each of {len(asked)} points who"
+                f" asked, and has shape {np.shape(owner)}"
+            )
         history.add(
             evaluation,
             phase=optimizer.phase,
@@ -130,10 +135,17 @@ def search(
 
 
 def _checked(optimizer: Optimizer, dimension: int) -> np.ndarray:
-    unit = np.array(optimizer.ask(), float)
-    points = unit.ndim == 2 and len(unit) > 0 and unit.shape[1] == dimension
-    if not (points and (unit >= 0).all() and (unit <= 1).all()):
-        what = f"shape {unit.shape}" if not points else "coordinates outside 0 to 1"
+    asked, what = optimizer.ask(), ""
+    try:
+        unit = np.array(asked, float)
+    except (TypeError, ValueError):
+        what = "no array of numbers"
+    else:
+        if unit.ndim != 2 or len(unit) == 0 or unit.shape[1] != dimension:
+            what = f"shape {unit.shape}"
+        elif not ((unit >= 0) & (unit <= 1)).all():
+            what = "coordinates outside 0 to 1"
+    if what:
         raise UserError(
             f"{type(optimizer).__name__}: ask() must give points of the unit cube, shape"
             f" (N, {dimension}), and gave {what}"

@@ -86,7 +86,7 @@ class Loss(Section):
         return self
 
 
-Factor = Annotated[float, Range(0, 2)]
+Factor = Annotated[float, Range(0, 1.99)]  # SciPy's differential evolution wants less than 2
 
 
 class Optimizer(Section):
@@ -174,6 +174,9 @@ class Method(Section):
 
     @model_validator(mode="after")
     def _keys_belong_to_the_search(self) -> Method:
+        given = {"rollouts", "seed", "population"} & {*self.settings}
+        if given:
+            raise refusal(f"settings: {min(given)} stands under `optimizer`, for all methods")
         if self.search == "multistart" and self.settings:
             raise refusal("settings are for another search than multistart, which has none")
         if self.search != "multistart" and not (self.k_top is None and self.covariance):

@@ -8,8 +8,8 @@ import numpy as np
 
 from pipeline.errors import UserError
 from pipeline.params import expect_known
-from pipeline.policy.spread import landing_intervals, load_samples
-from pipeline.theta import load_theta, vector
+from pipeline.policy.spread import landing_intervals, law_discrepancy, load_samples
+from pipeline.theta import calibrated, in_air, load_theta, vector
 
 
 def policy_draws(folder: Path, targets: np.ndarray) -> np.ndarray:
@@ -47,13 +47,13 @@ def aim(
     Args:
         params: The whole of params.yaml.
         launcher: Simulates draws, shape (N, 2) [m], and with a second argument those of other θ,
-            shape (N, 5); the calibrated simulator by default.
+            as `simulator` does; the calibrated simulator by default.
 
     Returns:
         draw_y_m, draw_z_m, predicted_landing_m, interval_90_m, hold_force_n, warnings. The
-        interval holds 90 % of the landings that samples of θ (data/confidence) and an error of
-        `trials.actuation_error` in the drawn position give. Landing and interval are None where
-        the launch fails.
+        interval holds 90 % of the landings that samples of θ (data/confidence), the law's own error
+        as the recording shows it, and an error of `trials.actuation_error` in the drawn position
+        give. Landing and interval are None where the launch fails.
 
     Raises:
         UserError: Unknown band or method, or a file that is missing.
@@ -61,9 +61,9 @@ def aim(
     expect_known(params, "band", band)
     expect_known(params, "method", method)
     root = Path(root)
-    theta = load_theta(root / "data" / "theta" / band / f"{method}.json", band)
+    content = load_theta(root / "data" / "theta" / band / f"{method}.json", band)
     draw = policy_draws(root / "data" / "policies" / band / method, np.array([target]))[0]
-    launcher = launcher or simulator(params, band, vector(theta))
+    launcher = launcher or simulator(params, band, content, root=root)
     launched = launcher(draw[None])
     warnings = []
     low, high = params.policy.targets
@@ -79,7 +79,8 @@ def aim(
         samples = load_samples(root / "data" / "confidence" / band / f"{method}.json", band, method)
         if samples is None:
             warnings.append("the interval leaves out how well the parameters are known")
-        found = landing_intervals(launcher, draw, samples, params.trials.actuation_error)[0]
+        error, discrepancy = params.trials.actuation_error, law_discrepancy(content)
+        found = landing_intervals(launcher, draw, samples, error, discrepancy)[0]
         if np.isfinite(found).all():
             interval = found.tolist()
     force = float(launched.hold_force[0])
@@ -98,23 +99,21 @@ def aim(
     }
 
 
-def simulator(
-    params, band: str, theta: np.ndarray, max_force: float = np.inf, root: str | Path = "."
-):
-    """Function that launches draws, shape (N, 2) [m], in the simulator calibrated with `theta`.
+def simulator(params, band: str, content: dict, max_force: float = np.inf, root: str | Path = "."):
+    """Function that launches draws, shape (N, 2) [m], in the simulator calibrated by a θ file.
 
-    A second argument, shape (N, 5), gives each launch a θ of its own.
+    A second argument gives each launch a θ of its own, shape (N, 5), or with a sixth column a drag
+    of the air as well.
     """
     import os
 
     from pipeline.sling.launch import launch
-    from pipeline.sling.model import load_sling
 
-    sling = load_sling(params, band, root)
+    sling, best = calibrated(params, band, content, root), vector(content)[None]
     workers = os.cpu_count() or 1
 
     def launcher(draws: np.ndarray, thetas: np.ndarray | None = None):
-        thetas = theta[None] if thetas is None else thetas
-        return launch(sling, thetas, draws, max_force=max_force, workers=workers)
+        moving, thetas = in_air(sling, best if thetas is None else thetas)
+        return launch(moving, thetas, draws, max_force=max_force, workers=workers)
 
     return launcher

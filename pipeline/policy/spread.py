@@ -1,4 +1,4 @@
-"""Where launches may land: θ is not known exactly, and no draw is exactly made."""
+"""Where launches may land: neither θ nor its law is exactly the rubber's, and no draw is exact."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ LEVEL = 0.9
 MOST = 60  # samples of θ that are launched
 STEP = 1e-3  # m, small against the box of draws and large against the simulator's rounding
 CROSS = STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
-ERRORS = norm.ppf((np.arange(41) + 0.5) / 41)  # equally likely
+ERRORS = norm.ppf((np.arange(401) + 0.5) / 401)  # equally likely; 41 end 6 % too soon
 
 
 def load_samples(path: Path, band: str, method: str) -> np.ndarray | None:
-    """Samples of θ (M, 5) that the theta stage kept; None where there are none.
+    """Samples of θ, and of the air's drag if searched, (M, 5) or (M, 6); None where there are none.
 
     Raises UserError where the file is damaged.
     """
@@ -29,7 +29,8 @@ def load_samples(path: Path, band: str, method: str) -> np.ndarray | None:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         samples = np.array(content["samples"], float)
-        if content["names"] != list(THETA) or samples.ndim != 2 or samples.shape[1] != len(THETA):
+        known = content["names"] in (list(THETA), [*THETA, "air_drag"])
+        if not known or samples.ndim != 2 or samples.shape[1] != len(content["names"]):
             raise ValueError
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise UserError(
@@ -38,26 +39,39 @@ def load_samples(path: Path, band: str, method: str) -> np.ndarray | None:
     return samples
 
 
+def law_discrepancy(content: dict) -> float:
+    """Share of a landing by which the law errs, as a θ file says it; 0 where it says nothing."""
+    known = content.get("confidence") or {}
+    return float(known.get("discrepancy", {}).get("landing", 0.0))
+
+
 def landing_intervals(
-    launcher: Callable, draws: np.ndarray, samples: np.ndarray | None, error: float
+    launcher: Callable,
+    draws: np.ndarray,
+    samples: np.ndarray | None,
+    error: float,
+    discrepancy: float = 0.0,
 ) -> np.ndarray:
     """Central 90 % of the landings of each draw [m], shape (N, 2); NaN where launches fail.
 
-    Landings of samples of θ, spread by the error of the draw through the launch's own gradient.
-    More than a tenth of failures among the samples is a failure.
+    Landings of samples of θ, spread by the error of the draw through the launch's own gradient, and
+    by what the recording shows of the law's error (pipeline/confidence/discrepancy.py). Both are
+    normal and independent, so they add in quadrature. More than a tenth of failures among the
+    samples is a failure.
 
     Args:
         launcher: `launcher(draws)` launches with the best θ; `launcher(draws, thetas)` with others.
         draws: (y, z) [m], shape (N, 2).
-        samples: Of θ, shape (M, 5); None leaves out that θ is not known exactly.
+        samples: Of θ, shape (M, P); None leaves out that θ is not known exactly.
         error: Standard deviation of the drawn position along each axis [m].
+        discrepancy: Of the landing, as a share of it.
     """
     draws = np.atleast_2d(np.asarray(draws, float))
     count = len(draws)
     around = launcher((draws[:, None] + CROSS).reshape(-1, 2))
     landing = _landing(around).reshape(count, len(CROSS))
     gradient = (landing[:, 1::2] - landing[:, 2::2]) / (2 * STEP)  # (N, 2)
-    spread = error * np.linalg.norm(gradient, axis=1)
+    spread = np.hypot(error * np.linalg.norm(gradient, axis=1), discrepancy * landing[:, 0])
     centres = landing[:, :1]
     if samples is not None:
         some = samples[np.linspace(0, len(samples) - 1, min(MOST, len(samples))).astype(int)]

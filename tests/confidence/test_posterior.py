@@ -102,5 +102,5 @@ def test_failures_everywhere_are_one_line(monkeypatch) -> None:
         return rollouts
 
     toy.interact = fails
-    with pytest.raises(UserError, match="64 of 64 simulations near the best"):
+    with pytest.raises(UserError, match="80 of 80 simulations near the best"):
         fitted(monkeypatch, toy, episode())

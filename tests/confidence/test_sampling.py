@@ -9,7 +9,9 @@ from pipeline.confidence.axes import Axes
 from pipeline.confidence.ensemble import sample
 from pipeline.confidence.intervals import correlation, identifiable, interval
 from pipeline.confidence.surrogate import Surrogate, monomials
+from pipeline.params import load
 from tests.confidence.toy import SPACE, TRUTH
+from tests.project import ROOT
 
 
 def walkers(log_density, start, seed: int = 1) -> np.ndarray:
@@ -152,3 +154,28 @@ def test_the_prior_is_that_of_the_box() -> None:
         np.testing.assert_allclose(
             np.quantile(column, [0.05, 0.5, 0.95]), [0.05, 0.5, 0.95], atol=0.05
         )
+
+
+def test_a_searched_drag_is_an_axis_and_other_nuisances_are_none() -> None:
+    """Its values are the coordinate itself; the method's bounds are the box."""
+    params = load(ROOT / "params.yaml")
+    about = params.methods["sling2sim2real_taut"]
+    nuisances = {"air_drag": (0.0, 8.0), "force_bias_x": (-1.0, 1.0)}
+    about = about.model_copy(
+        update={"nuisances": nuisances, "bounds": {"poissons_ratio": (0.4, 0.45)}}
+    )
+    params = params.model_copy(update={"methods": {"own": about}})
+    content = {
+        "theta": dict(zip(SPACE.names, TRUTH, strict=True)),
+        "nuisances": {"air_drag": 3.0, "force_bias_x": 0.2},
+    }
+    axes = Axes.of_method(params, "own", content, 0.0)
+    assert axes.names == (*SPACE.names, "air_drag")
+    np.testing.assert_array_equal(axes.theta, [*TRUTH, 3.0])
+    assert (axes.low[1], axes.high[1], axes.low[5], axes.high[5]) == (0.4, 0.45, 0.0, 8.0)
+    points = np.array([[*TRUTH, drag] for drag in (0.0, 2.0, 7.5)])
+    even = axes.even(points)
+    np.testing.assert_array_equal(even[:, 5], [0.0, 2.0, 7.5])
+    np.testing.assert_allclose(axes.physical(even), points)
+    assert axes.inside(points).all() and not axes.inside(points + [0, 0, 0, 0, 0, 9.0]).any()
+    assert identifiable("air_drag", 1.0, 2.0, axes) and not identifiable("air_drag", 0.5, 7.5, axes)

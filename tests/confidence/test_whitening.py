@@ -7,7 +7,13 @@ import pytest
 from scipy.signal import lfilter
 
 from pipeline.confidence.residuals import Group
-from pipeline.confidence.whitening import autocorrelation_time, dense, independent, weights
+from pipeline.confidence.whitening import (
+    autocorrelation_time,
+    dense,
+    discrepant,
+    noise_variance,
+    weights,
+)
 
 
 def ar1(rng: np.random.Generator, phi: float, shape: tuple[int, ...]) -> np.ndarray:
@@ -16,10 +22,22 @@ def ar1(rng: np.random.Generator, phi: float, shape: tuple[int, ...]) -> np.ndar
     return lfilter([1.0], [1.0, -phi], noise, axis=0)[500:]
 
 
-def group(count: int, places: int = 1, phase: str = "taut", first: int = 0) -> Group:
+def group(
+    count: int,
+    places: int = 1,
+    phase: str = "taut",
+    first: int = 0,
+    channel: str = "force_y",
+    part: int = 0,
+) -> Group:
     when, where = np.meshgrid(np.arange(count), np.arange(places), indexing="ij")
     grid = np.stack([when.ravel(), where.ravel()], axis=1)
-    return Group("force_y", phase, 0, first + np.arange(count * places), grid)
+    return Group(channel, phase, part, first + np.arange(count * places), grid)
+
+
+def independent(group: Group, residual: np.ndarray) -> float:
+    """What those of a group alone in its phase are worth."""
+    return weights([group], residual)[1][0]["independent"]
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.5, 0.9])
@@ -95,3 +113,50 @@ def test_a_group_that_is_given_up_weighs_no_less() -> None:
     once, _ = weights([group(100)], residual)
     worse, _ = weights([group(100)], 10 * residual, most=np.array([np.mean(residual**2)]))
     assert worse[0] == pytest.approx(once[0])
+
+
+def test_a_common_offset_is_worth_one_residual_however_many_groups_show_it() -> None:
+    """All parts of a phase are off by the same: the level of 1 to 12 groups is no better known."""
+    rng = np.random.default_rng(8)
+    count, offset = 60, 0.5
+    for many in (1, 4, 12):
+        groups = [group(count, first=count * i, phase="swing", part=i) for i in range(many)]
+        residual = offset + rng.normal(0, 0.02, many * count)
+        weight, table = weights(groups, residual)
+        assert weight.sum() * count * offset**2 == pytest.approx(1.0, rel=0.02)
+        assert sum(one["independent"] for one in table) == pytest.approx(1.0, rel=0.02)
+
+
+def test_what_exceeds_the_noise_of_the_held_band_is_discrepancy() -> None:
+    """Errors that change sign from sample to sample, five times the noise: one residual, not 50."""
+    rng = np.random.default_rng(9)
+    groups = [group(400), group(50, phase="swing", first=400)]
+    residual = np.concatenate([rng.normal(0, 0.1, 400), rng.normal(0, 0.5, 50)])
+    _, table = weights(groups, residual)
+    assert table[0]["independent"] > 200
+    assert 1 < table[1]["independent"] < 2
+    assert table[1]["noise"] == pytest.approx(0.1, rel=0.1)
+
+
+def test_without_discrepancy_all_groups_keep_their_weight() -> None:
+    """White noise in 18 groups of a phase, small ones as well: 1 / variance each."""
+    rng, sizes = np.random.default_rng(10), [12, 14, 19, 80] * 4 + [200, 1000]
+    first = np.cumsum([0, *sizes])
+    groups = [
+        group(size, first=start, channel=f"force_{i // 4}", part=i % 4)
+        for i, (size, start) in enumerate(zip(sizes, first, strict=False))
+    ]
+    noise = rng.normal(0, 0.3, first[-1])
+    weight, table = weights(groups, noise)
+    full = sum(one["independent"] for one in table)
+    assert full > first[-1] / 2  # as many as estimated correlation times leave
+    assert np.median(weight) == pytest.approx(1 / 0.09, rel=0.4)
+
+
+def test_noise_is_told_from_what_is_smooth() -> None:
+    rng = np.random.default_rng(11)
+    wave = 3 * np.sin(np.arange(2000) / 100)
+    found = noise_variance(group(2000), wave + rng.normal(0, 0.2, 2000))
+    assert found == pytest.approx(0.04, rel=0.1)
+    assert discrepant(group(2000), wave, float(np.mean(wave**2)), found) > 0.98
+    assert np.isnan(noise_variance(group(1), np.ones(1)))

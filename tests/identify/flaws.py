@@ -16,6 +16,7 @@ def flawed_episode(
     sling: Sling, episode: Episode, theta: np.ndarray, flaws: dict[str, float], **options
 ) -> Episode:
     """`own_law_episode` with `options`, seen and felt with `flaws`, by names of nuisances."""
+    sling = replace(sling, air_drag=flaws.get("air_drag", 0.0))
     hand = CubicSpline(episode.time, episode.position, axis=0)
     early = episode.time - flaws.get("force_delay", 0)
     felt = replace(episode, time=early, position=hand(early))

@@ -89,10 +89,10 @@ def correlated() -> np.ndarray:
     return matrix
 
 
-def chain(evaluate, optimizer=BUDGET) -> tuple[History, History, list[Region]]:
+def chain(evaluate, optimizer=BUDGET, names=NAMES) -> tuple[History, History, list[Region]]:
     """Explore, find regions, refine: both histories and the regions."""
     first, second = budget(optimizer, "multistart")
-    explored = alone("de", evaluate, first, optimizer)
+    explored = alone("de", evaluate, first, optimizer, names)
     regions = find_regions(
         explored.unit,
         explored.total,

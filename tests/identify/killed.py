@@ -16,7 +16,7 @@ from pipeline.identify.history import History
 from pipeline.identify.memo import Memo
 from tests.identify.functions import CENTRE, Evaluate, alone, chain, correlated, quadratic
 
-ROLLOUTS = 250
+ROLLOUTS = 150
 VALLEY = quadratic(CENTRE, correlated()).function
 
 

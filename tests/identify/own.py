@@ -33,6 +33,30 @@ class Flat(RandomSearch):
         return np.zeros((1, 5))
 
 
+class Words(RandomSearch):
+    """Asks for no numbers."""
+
+    def ask(self):
+        return [["here", "there"]]
+
+
+class Crowd(RandomSearch):
+    """Says of one of its points who asked for it."""
+
+    owner = (0,)
+
+
+class Choosy(RandomSearch):
+    """Does not like what it is given."""
+
+    def __init__(self, dimension: int, *, name: str = "x", **settings):
+        raise ValueError(f"no such name,\nsorry: {name}")
+
+
+class Nameless(RandomSearch):
+    phase = 3
+
+
 class Deaf:
     """Cannot be told."""
 

@@ -7,13 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.bench import recorded_yardstick
 from pipeline.errors import UserError
 from pipeline.identify import session
 from pipeline.identify.evaluate import Evaluator, Penalty
 from pipeline.identify.loss import TERMS, EpisodeLoss
 from pipeline.identify.space import Space
+from pipeline.params import load
 from tests.identify import toy
 
+PARAMS = load("params.yaml")
 EPISODE = toy.episode()
 SPACE = Space(
     ("offset", "pull"), np.array([0.0, 0.1]), np.array([0.01, 10]), np.array([0, 1], bool)
@@ -61,6 +64,33 @@ def test_the_number_of_workers_changes_nothing() -> None:
     assert one.failure == three.failure
     for name in TERMS:
         np.testing.assert_array_equal(one.terms[name], three.terms[name])
+
+
+def test_nor_does_it_where_nuisances_are_searched() -> None:
+    """Those of the simulator and those of the loss, in the real ones."""
+    sling, recorded = recorded_yardstick(PARAMS)
+    bounds = {
+        "air_drag": (0.0, 8.0),
+        "camera_delay": (-0.003, 0.003),
+        "force_delay": (0.0, 0.004),
+        "cloud_shift_z": (-0.01, 0.01),
+    }
+    about = PARAMS.methods["sling2sim2real_taut"].model_copy(update={"nuisances": bounds})
+    params = PARAMS.model_copy(update={"methods": {"toy": about}})
+    space = Space.of_method(params, "toy")
+    unit = np.random.default_rng(1).random((40, space.dimension))
+    unit[1:3] = unit[0]
+    unit[1, space.names.index("air_drag")] += 0.1
+    unit[2, space.names.index("cloud_shift_z")] += 0.1
+    unit[:3] %= 1
+    found = []
+    for workers in (1, 2):
+        loss = EpisodeLoss.of(params, "toy", recorded, sling)
+        found.append(Evaluator(recorded, sling, loss, space, workers=workers)(unit))
+    assert found[0].failure == found[1].failure
+    assert np.isfinite(found[0].total[:3]).all() and len(set(found[0].total[:3])) == 3
+    for name in TERMS:
+        np.testing.assert_array_equal(found[0].terms[name], found[1].terms[name])
 
 
 def test_failures_are_infinite_and_have_a_reason() -> None:

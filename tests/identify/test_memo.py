@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from pipeline.identify.evaluate import Evaluation, Evaluator
 from pipeline.identify.memo import NOT_FINITE, Memo, fingerprint
@@ -39,6 +43,8 @@ def run(name: str, folder: Path, output: Path, fatal: int) -> subprocess.Complet
     [
         ("multistart", 13 + 8, (5, 10)),  # in the exploration, and in the refinement
         ("de", -(-ROLLOUTS // 24), (4,)),
+        ("bo", -(-ROLLOUTS // 24), (4,)),
+        ("adam", 1 + -(-(ROLLOUTS - 24) // 24), (4,)),
         ("tests.identify.own:RandomSearch", -(-ROLLOUTS // 7), (4,)),
     ],
 )
@@ -117,12 +123,79 @@ def test_other_inputs_start_over_and_replace_the_old(remembered, tmp_path: Path)
     assert [folder.name for folder in (tmp_path / "memory").iterdir()] == ["y"]
 
 
-def test_a_damaged_batch_is_evaluated_again(remembered, tmp_path: Path) -> None:
+def test_a_truncated_batch_is_evaluated_again(remembered, tmp_path: Path) -> None:
     remembered(batches(0.1, 0.2))
     damaged = next((tmp_path / "memory" / "x").iterdir())
     damaged.write_bytes(damaged.read_bytes()[:200])
     assert remembered(batches(0.1, 0.2))[0] == 1
     assert remembered(batches(0.1, 0.2))[0] == 0
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(place=st.integers(0, 1500), flip=st.integers(1, 255), length=st.integers(1, 40))
+def test_a_damaged_batch_never_gives_other_losses(
+    remembered, tmp_path: Path, place: int, flip: int, length: int
+) -> None:
+    """Wherever its bytes are damaged, headers of the archive included: recalled right or not."""
+    _, (expected,) = remembered(batches(0.1))
+    file = next((tmp_path / "memory" / "x").iterdir())
+    whole = bytearray(file.read_bytes())
+    for byte in range(place, min(place + length, len(whole))):
+        whole[byte] ^= flip
+    file.write_bytes(whole)
+    _, (found,) = remembered(batches(0.1))
+    np.testing.assert_array_equal(found.total, expected.total)
+    assert found.failure == expected.failure
+
+
+def test_a_memory_that_another_run_throws_away_stops_nobody(
+    remembered, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another run of the band began with other inputs while this one wrote a batch."""
+    written = np.savez
+
+    def interrupted(file, **arrays) -> None:
+        written(file, **arrays)
+        remembered([], "y")
+
+    monkeypatch.setattr(np, "savez", interrupted)
+    count, found = remembered(batches(0.1, 0.2))
+    assert (count, len(found)) == (2, 2)
+    monkeypatch.undo()
+    assert remembered(batches(0.1, 0.2))[0] == 2
+
+
+def test_runs_side_by_side_share_a_memory(remembered, tmp_path: Path) -> None:
+    """None sees a batch that another has half written."""
+    firsts = [batches(*np.random.default_rng(seed).permutation(20) / 50) for seed in range(4)]
+    with ThreadPoolExecutor(4) as pool:
+        runs = list(pool.map(remembered, firsts))
+    for units, (_, found) in zip(firsts, runs, strict=True):
+        for unit, one in zip(units, found, strict=True):
+            np.testing.assert_array_equal(one.total, bowl(fails=fails)(unit).total)
+    assert len(list((tmp_path / "memory" / "x").iterdir())) == 20
+
+
+def test_a_full_disk_is_said_in_one_line(tmp_path: Path) -> None:
+    """A limit on the size of files stands for the disk."""
+    code = """
+import resource
+from pathlib import Path
+from pipeline import errors
+from pipeline.identify.memo import Memo
+from tests.identify.test_memo import batches, bowl
+resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))
+errors.run(lambda: Memo(bowl(), Path("memory"), "x")(batches(0.1)[0]) and None)
+"""
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True
+    )
+    assert re.fullmatch(
+        r"error: memory/x/\w+\.npz: cannot be written \(File too large\)\n", done.stderr
+    )
+    assert done.returncode == 1
+    assert not list((tmp_path / "memory" / "x").iterdir())
 
 
 class Loss:

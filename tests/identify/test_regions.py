@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from pipeline.errors import UserError
 from pipeline.identify.regions import (
@@ -21,6 +22,8 @@ from pipeline.identify.regions import (
 )
 
 NAMES = ("a", "b", "c", "d", "e")
+
+COARSE = st.sampled_from([0.0, 0.05, 0.3, 0.5, 1.0])  # so that points coincide
 
 
 def test_suppression_equals_its_definition() -> None:
@@ -107,3 +110,29 @@ def test_a_history_that_failed_has_no_regions() -> None:
     total = np.full(9, np.inf)
     with pytest.raises(UserError, match="only 0 of 9 simulations succeeded"):
         find_regions(np.random.default_rng(1).random((9, 2)), total, k_top=2, k_nn=6, delta=0.1)
+
+
+@given(
+    unit=arrays(float, st.tuples(st.integers(2, 20), st.integers(1, 6)), elements=COARSE),
+    delta=st.floats(1e-3, 2),
+    k_top=st.integers(1, 50),
+    k_nn=st.integers(6, 30),
+    data=st.data(),
+)
+def test_regions_of_any_history(unit, delta: float, k_top: int, k_nn: int, data) -> None:
+    """Equal points and losses, failures, more neighbours than points, one axis: all can start."""
+    losses = st.sampled_from([1.0, 2.0, 3.0, np.inf])
+    total = np.array(data.draw(st.lists(losses, min_size=len(unit), max_size=len(unit))))
+    total[:2] = 1.5, 2.5
+    good = np.isfinite(total)
+    regions = find_regions(unit, total, k_top=k_top, k_nn=k_nn, delta=delta)
+    assert 1 <= len(regions) <= k_top
+    assert regions[0].loss == total.min()
+    for number, region in enumerate(regions):
+        assert np.linalg.eigvalsh(region.sigma).min() > 0
+        assert len(set(region.members)) == min(k_nn, good.sum())
+        assert good[region.members].all()
+        np.testing.assert_array_equal(unit[region.members[0]], region.mu)
+        for better in regions[:number]:
+            assert better.loss <= region.loss
+            assert np.linalg.norm(better.mu - region.mu) > delta

@@ -122,6 +122,17 @@ def test_fixed_axes_keep_their_physical_values() -> None:
     np.testing.assert_allclose(best, CENTRE[[0, 3, 4]], atol=1e-3)
 
 
+@pytest.mark.parametrize("name", ["multistart", "de", "bo", "adam"])
+def test_one_free_axis_is_enough(name: str) -> None:
+    evaluate = quadratic(CENTRE[:1], np.eye(1), names=NAMES[:1])
+    budget = changed(population=10, generations=5, k_nn=6, k_top=2, cma_rollouts=64)
+    if name == "multistart":
+        explored, history, _ = chain(evaluate, budget, NAMES[:1])
+    else:
+        history = alone(name, evaluate, 124, budget, NAMES[:1])
+    assert abs(history.best()["unit_a"] - CENTRE[0]) < 0.02
+
+
 def test_every_search_has_the_same_budget() -> None:
     optimizer = load("params.yaml").optimizer
     explore, refine = budget(optimizer, "multistart")

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UserError
-from pipeline.policy.aim import aim, policy_draws
+from pipeline.params import load
+from pipeline.policy.aim import aim, policy_draws, simulator
 from pipeline.policy.export import write_onnx
 from pipeline.sling.model import THETA
 from tests.policy import toy
+from tests.project import ROOT
 
 PARAMS = SimpleNamespace(
     bands={"toy": None},
@@ -83,6 +85,38 @@ def test_what_is_known_of_theta_widens_the_interval(root) -> None:
     assert answer["warnings"] == []
     np.testing.assert_allclose(answer["interval_90_m"], [0.91 * landing, 1.09 * landing], rtol=0.01)
     assert np.ptp(narrow) < 0.5 * np.ptp(answer["interval_90_m"])
+
+
+def test_what_the_recording_shows_of_the_law_widens_the_interval(root) -> None:
+    """A theta file whose recording is off by a tenth: 1.645 tenths on each side, and the draw's."""
+    file = root / "data/theta/toy/none.json"
+    before = file.read_text()
+    narrow = np.ptp(shoot(root, 1.925)["interval_90_m"])
+    known = {"discrepancy": {"energy": 0.06, "recoil": 0.04, "landing": 0.1}}
+    file.write_text(json.dumps(json.loads(before) | {"confidence": known}))
+    answer = shoot(root, 1.925)
+    file.write_text(before)
+    expected = np.hypot(narrow, 2 * 1.645 * 0.1 * answer["predicted_landing_m"])
+    assert np.ptp(answer["interval_90_m"]) == pytest.approx(expected, rel=0.03)
+
+
+def test_the_simulator_launches_in_the_air_of_the_theta_file(tmp_path) -> None:
+    """Drag takes speed; a sixth column takes the place of the file's, launch by launch."""
+    params = load(ROOT / "params.yaml")
+    coarse = {"edges": 16, "launch_step": 1e-3}
+    params = params.model_copy(update={"sling": params.sling.model_copy(update=coarse)})
+    band, draw = next(iter(params.bands)), np.array([[-0.33, -0.15]])
+    theta = dict(zip(THETA, (2.5e5, 0.47, 2e-3, 0.8, 0.6), strict=True))
+    point = np.array([*theta.values()])
+    contents = [{"theta": theta, "nuisances": {"air_drag": drag}} for drag in (0.0, 6.0)]
+    still, moving = (simulator(params, band, one, root=tmp_path) for one in contents)
+    calm, windy = (one(draw).landing_y[0] for one in (still, moving))
+    assert windy < 0.99 * calm
+    samples = np.array([[*point, 0.0], [*point, 6.0]])
+    both = moving(np.repeat(draw, 2, axis=0), samples).landing_y
+    np.testing.assert_allclose(both, [calm, windy], rtol=1e-5)
+    alone = moving(draw, point[None]).landing_y
+    np.testing.assert_allclose(alone, [windy], rtol=1e-5)
 
 
 def test_warns_outside_the_trained_range_and_above_the_force(root) -> None:

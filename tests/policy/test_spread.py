@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UserError
-from pipeline.policy.spread import landing_intervals, load_samples
+from pipeline.policy.spread import landing_intervals, law_discrepancy, load_samples
 from pipeline.sling.model import THETA
 from tests.policy import toy
 
@@ -42,6 +42,35 @@ def test_nine_landings_of_ten_lie_inside(error: float, known: bool) -> None:
         assert 0.85 < ((landing > low) & (landing < high)).mean() < 0.94
 
 
+def test_the_laws_error_adds_in_quadrature() -> None:
+    """Half widths of normal errors: 1.645 hypot(draw, law) of the landing."""
+    none, drawn, law, both = (
+        landing_intervals(launcher, DRAWS, None, error, share)
+        for error, share in ((0.0, 0.0), (0.001, 0.0), (0.0, 0.03), (0.001, 0.03))
+    )
+    landing = toy.launch(DRAWS).landing_y
+    np.testing.assert_allclose(none, np.stack([landing, landing], axis=1))
+    np.testing.assert_allclose(np.ptp(law, axis=1), 2 * 1.645 * 0.03 * landing, rtol=0.03)
+    quadrature = np.hypot(np.ptp(drawn, axis=1), np.ptp(law, axis=1))
+    np.testing.assert_allclose(np.ptp(both, axis=1), quadrature, rtol=1e-6)
+    np.testing.assert_allclose(both.mean(axis=1), landing, rtol=1e-6)
+
+
+def test_nine_of_ten_landings_of_another_law_lie_inside() -> None:
+    intervals = landing_intervals(launcher, DRAWS, samples(), 0.001, 0.05)
+    rng = np.random.default_rng(3)
+    for draw, (low, high) in zip(DRAWS, intervals, strict=True):
+        landing = toy.launch(draw + rng.normal(0, 0.001, (4000, 2))).landing_y
+        landing = landing * (1 + np.hypot(STIFFNESS, 0.05) * rng.normal(size=4000))
+        assert 0.87 < ((landing > low) & (landing < high)).mean() < 0.93
+
+
+def test_a_theta_file_that_says_nothing_of_the_law_adds_nothing() -> None:
+    for content in ({}, {"confidence": None}, {"confidence": {"level": 0.9}}):
+        assert law_discrepancy(content) == 0.0
+    assert law_discrepancy({"confidence": {"discrepancy": {"landing": 0.07}}}) == 0.07
+
+
 def test_failures_of_the_few_are_left_out_and_of_the_many_are_none() -> None:
     def fragile(share: float):
         def launch(draws, thetas=None):
@@ -63,6 +92,12 @@ def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:
     content = {"names": list(THETA), "samples": samples(3).tolist()}
     path.write_text(json.dumps(content))
     np.testing.assert_array_equal(load_samples(path, "toy", "ours"), samples(3))
+    with_drag = {"names": [*THETA, "air_drag"], "samples": [[0.5] * 6] * 4}
+    path.write_text(json.dumps(with_drag))
+    assert load_samples(path, "toy", "ours").shape == (4, 6)
+    path.write_text(json.dumps(content | {"names": with_drag["names"]}))
+    with pytest.raises(UserError, match="damaged"):
+        load_samples(path, "toy", "ours")
     for damaged in ("{", "[]", json.dumps(content | {"names": ["a"]}), '{"names": []}'):
         path.write_text(damaged)
         with pytest.raises(UserError, match="damaged; `dvc repro --force theta@toy-ours`"):

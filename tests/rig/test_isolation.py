@@ -16,7 +16,7 @@ from pipeline.sling.model import Sling
 from tests.rig.conftest import ROOT
 
 STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
-WORLD = {"record", "trials"}
+WORLD = {"record", "trials", "ablation_trials"}
 
 
 class Hidden:

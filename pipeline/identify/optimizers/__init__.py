@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import sys
+from pathlib import Path
 
 from pipeline.errors import UserError
 from pipeline.identify.search import Optimizer
@@ -37,7 +39,7 @@ def explorer(method, optimizer, dimension: int, rollouts: int) -> Optimizer:
 
 
 def build(
-    name: str, dimension: int, *, rollouts: int, seed: int, population: int, **settings
+    name: str, dimension: int, /, *, rollouts: int, seed: int, population: int, **settings
 ) -> Optimizer:
     """The optimiser of a name: de, bo, adam, or a class of the user's as `package.module:Class`.
 
@@ -48,27 +50,34 @@ def build(
         settings: What else its class takes.
 
     Raises:
-        UserError: There is no such class, it takes no such settings, or it is no optimiser.
+        UserError: There is no such class, it takes no such settings or refuses their values, or
+            it is no optimiser.
     """
     settings = {"rollouts": rollouts, "seed": seed, "population": population, **settings}
     try:
         kind = _class(name)
-    except (ImportError, AttributeError, SyntaxError) as error:
-        raise _refusal(name, f"cannot be imported ({error})") from error
+    except Exception as error:  # a module of the user's may raise anything
+        raise _refusal(name, f"cannot be imported ({type(error).__name__}: {error})") from error
     try:
         inspect.signature(kind).bind(dimension, **settings)
     except (TypeError, ValueError) as error:
         raise _refusal(
             name, f"cannot be called as Class(dimension, {', '.join(settings)}): {error}"
         ) from error
-    optimizer = kind(dimension, **settings)
-    lacking = [part for part in ("phase", "ask", "tell") if not hasattr(optimizer, part)]
+    try:
+        optimizer = kind(dimension, **settings)
+    except (TypeError, ValueError) as error:
+        raise _refusal(name, f"does not take its settings: {error}") from error
+    lacking = [part for part in ("ask", "tell") if not callable(getattr(optimizer, part, None))]
+    if not isinstance(getattr(optimizer, "phase", None), str):
+        lacking.append("phase, a text")
     if lacking:
         raise _refusal(name, f"is no optimiser, it lacks {', '.join(lacking)}")
     return optimizer
 
 
 def _refusal(name: str, what: str) -> UserError:
+    what = " ".join(what.split())  # one line
     return UserError(f"optimiser {name}: {what}; see `search` under `methods` in params.yaml")
 
 
@@ -85,5 +94,7 @@ def _class(name: str) -> type:
         from pipeline.identify.optimizers.adam import Adam
 
         return Adam
+    if str(Path.cwd()) not in sys.path:  # a command's is where it is installed
+        sys.path.append(str(Path.cwd()))
     module, _, attribute = name.partition(":")
     return getattr(importlib.import_module(module), attribute)

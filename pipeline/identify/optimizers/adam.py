@@ -41,7 +41,12 @@ class Adam:
         Args:
             rate: The first learning rate: what a coordinate moves in a step, in edges of the cube.
             step: Of the differences, in edges of the cube.
+
+        Raises:
+            ValueError: One is not above 0, or the step is more than half an edge.
         """
+        if not (rate > 0 and 0 < step <= 0.5):
+            raise ValueError(f"rate and step must be above 0, step at most 0.5: {rate}, {step}")
         starts = max(population // (dimension + 1), 1)
         self._step, self._rate = step, rate
         self._steps = max((rollouts - population) // (starts * (dimension + 1)), 1)

@@ -45,7 +45,12 @@ class Bayes:
     def __init__(
         self, dimension: int, *, rollouts: int, seed: int, population: int, points: int = 400
     ) -> None:
-        """Start with the Latin hypercube; the budget `rollouts` changes nothing here."""
+        """Start with the Latin hypercube; the budget `rollouts` changes nothing here.
+
+        Raises ValueError if `points` is no whole number above 1.
+        """
+        if not (isinstance(points, int) and points > 1):
+            raise ValueError(f"points must be a whole number above 1, got {points}")
         self._asked = latin_hypercube(dimension, population, seed)
         self._population, self._seed, self._points = population, seed, points
         self._unit, self._loss = np.zeros((0, dimension)), np.zeros(0)

@@ -37,7 +37,16 @@ class Evolution:
         Args:
             mutation: Between which the factor of the differences is drawn, anew each generation.
             recombination: Probability by which a coordinate comes from the mutant.
+
+        Raises:
+            ValueError: A factor is not within 0 to 2, or the probability not within 0 to 1.
         """
+        factors = np.array(mutation, float)
+        if not (((factors >= 0) & (factors < 2)).all() and 0 <= recombination <= 1):
+            raise ValueError(
+                f"mutation must be from 0 to below 2 and recombination from 0 to 1,"
+                f" got {mutation} and {recombination}"
+            )
         self._asked, self._told = SimpleQueue(), SimpleQueue()
         options = {
             "init": latin_hypercube(dimension, population, seed),

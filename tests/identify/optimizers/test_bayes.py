@@ -71,11 +71,15 @@ def test_it_beats_random_points(function, names, least: float, near: float, seed
 def test_it_goes_round_a_part_that_fails() -> None:
     """A valley of two pairs that trade off, its minimum two tenths from a wall of failures."""
     evaluate = quadratic(CENTRE, correlated(), fails=lambda unit: unit[:, 3] > 0.9)
-    history = alone("bo", evaluate, 160, changed(population=20))
-    assert np.isinf(history.total).any()
-    assert np.isinf(history.total[-60:]).mean() < 0.1
-    random = [evaluate(random_points(160, 5, other)).total.min() for other in range(10)]
-    assert history.total.min() - 1 < (np.median(random) - 1) / 3
+    random = [evaluate(random_points(240, 5, other)).total.min() for other in range(10)]
+    found = []
+    for seed in (1, 2, 3):
+        history = alone("bo", evaluate, 240, changed(population=20, seed=seed))
+        assert np.isinf(history.total).any()
+        assert np.isinf(history.total[-60:]).mean() < 0.1
+        found.append(history.total.min())
+    assert np.median(found) < min(random)  # ten times as many points
+    assert max(found) - 1 < (np.median(random) - 1) / 3
 
 
 def test_its_first_batch_is_the_latin_hypercube() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -50,15 +51,39 @@ def test_a_class_of_ones_own_spends_its_budget() -> None:
     assert explorer(*method(search=OWN, settings={"batch": 3}), 4, 60).ask().shape == (3, 4)
 
 
+def test_a_class_beside_params_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By commands as well, which do not look where they are called."""
+    source = "from tests.identify.own import RandomSearch as Mine\n"
+    (tmp_path / "beside_params.py").write_text(source)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.chdir(tmp_path)
+    one = build("beside_params:Mine", 4, rollouts=60, seed=1, population=20)
+    assert one.ask().shape == (7, 4)
+
+
 @pytest.mark.parametrize(
     ("name", "settings", "expected"),
     [
-        ("nowhere.at_all:Class", {}, "cannot be imported (No module named 'nowhere')"),
-        ("tests.identify.own:Absent", {}, "cannot be imported (module 'tests.identify.own' has no"),
-        ("tests.identify.own:Deaf", {}, "is no optimiser, it lacks tell"),
+        ("nowhere.at_all:Class", {}, "(ModuleNotFoundError: No module named 'nowhere')"),
+        ("tests.identify.own:Absent", {}, "cannot be imported (AttributeError: module 'tests."),
+        ("tests.identify.broken:Class", {}, "cannot be imported (ZeroDivisionError: division"),
+        ("tests.identify.own:Deaf", {}, "is no optimiser, it lacks ask, tell"),
+        ("tests.identify.own:Nameless", {}, "is no optimiser, it lacks phase, a text"),
+        (
+            "tests.identify.own:Choosy",
+            {"name": "y"},
+            "does not take its settings: no such name, sorry: y",
+        ),
         ("math:hypot", {}, "cannot be called as Class(dimension, rollouts, seed, population)"),
         (OWN, {"rate": 1.0}, "got an unexpected keyword argument 'rate'"),
         ("de", {"rate": 1.0}, "got an unexpected keyword argument 'rate'"),
+        ("de", {"dimension": 3}, "multiple values for argument 'dimension'"),
+        ("de", {"mutation": 7.0}, "mutation must be from 0 to below 2"),
+        ("de", {"mutation": "much"}, "could not convert string to float"),
+        ("de", {"recombination": True, "mutation": -1}, "got -1 and True"),
+        ("bo", {"points": 1}, "points must be a whole number above 1, got 1"),
+        ("adam", {"step": 0.0}, "rate and step must be above 0"),
+        ("adam", {"rate": "fast"}, "does not take its settings: '>' not supported"),
     ],
 )
 def test_what_is_no_optimiser_is_refused_in_one_line(
@@ -76,3 +101,7 @@ def test_points_outside_the_cube_are_refused() -> None:
         alone("tests.identify.own:Outside", Evaluate(rosenbrock), 50)
     with pytest.raises(UserError, match=r"shape \(N, 4\), and gave shape \(1, 5\)"):
         alone("tests.identify.own:Flat", Evaluate(rosenbrock), 50, names=tuple("abcd"))
+    with pytest.raises(UserError, match=r"shape \(N, 5\), and gave no array of numbers"):
+        alone("tests.identify.own:Words", Evaluate(rosenbrock), 50)
+    with pytest.raises(UserError, match="Crowd: owner must say for each of 7 points"):
+        alone("tests.identify.own:Crowd", Evaluate(rosenbrock), 50)

@@ -104,11 +104,12 @@ def test_no_thread_is_left(told: int) -> None:
     assert not left()
 
 
-def test_a_failing_evaluation_surfaces_and_leaves_no_thread() -> None:
+@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
+def test_a_failing_evaluation_surfaces_and_leaves_no_thread(error: type[BaseException]) -> None:
     def broken(unit: np.ndarray):
-        raise ZeroDivisionError
+        raise error
 
-    with pytest.raises(ZeroDivisionError):
+    with pytest.raises(error):
         search(
             Evolution(2, rollouts=15, seed=1, population=5),
             broken,
@@ -120,7 +121,9 @@ def test_a_failing_evaluation_surfaces_and_leaves_no_thread() -> None:
 
 def test_what_scipy_raises_surfaces() -> None:
     with pytest.raises(ValueError, match="mutation"):
-        Evolution(2, rollouts=15, seed=1, population=5, mutation=(0.5, 7.0)).ask()
+        Evolution(2, rollouts=15, seed=1, population=5, mutation=(0.5, 7.0))
+    with pytest.raises(ValueError, match="population supplied"):
+        Evolution(2, rollouts=15, seed=1, population=3).ask()
     one = Evolution(2, rollouts=10, seed=1, population=5)
     for _ in range(3):
         one.tell(rosenbrock(one.ask()))

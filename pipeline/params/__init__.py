@@ -70,9 +70,8 @@ class Params(Section):
             ("methods", self.run.methods, self.methods),
             ("ablations.methods", self.run.ablations.methods, self.methods),
         ):
-            for name in names:
-                if name not in known:
-                    raise refusal(f"run.{key}: {name} is not one of {', '.join(known)}")
+            _expect_all(names, known, f"run.{key}")
+        _expect_all(self.policy.robust.methods, self.methods, "policy.robust.methods")
         rig = [name for name in self.run.bands if self.bands[name].source == "rig"]
         if list(self.run.rig) != rig:
             raise refusal(
@@ -114,6 +113,12 @@ class Params(Section):
                     f" {list(TARGET_AREA)}, where every landing counts as failed"
                 )
         return self
+
+
+def _expect_all(names, known, key: str) -> None:
+    for name in names:
+        if name not in known:
+            raise refusal(f"{key}: {name} is not one of {', '.join(known)}")
 
 
 def pairs(run: Run) -> list[tuple[str, str]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pipeline.schema import ASCENDING, FILLED, LIST, UNIQUE, Range, Section, Seed
+from pipeline.schema import ASCENDING, FILLED, LIST, UNIQUE, Name, Range, Section, Seed
 
 # y of the paper's fixed target of 1 m by 1 m: a landing outside is a failure, so trials aim inside.
 TARGET_AREA = (1.425, 2.425)
@@ -21,6 +21,14 @@ Nodes = Annotated[int, Range(4, 1000)]  # a cubic spline needs four
 Width = Annotated[int, Range(1, 4096)]
 
 
+class Robust(Section):
+    """A second policy, trained over what the identification leaves open."""
+
+    methods: Annotated[tuple[Name, ...], LIST, UNIQUE]  # that get one
+    samples: Annotated[int, Range(2, 1000)]  # of the posterior, each with a landing map of its own
+    map_size: Annotated[tuple[Nodes, Nodes], LIST]
+
+
 class Policy(Section):
     seed: Seed
     targets: Annotated[tuple[Distance, Distance], LIST, ASCENDING]
@@ -33,6 +41,7 @@ class Policy(Section):
     init_std: Annotated[float, Range(1e-3, 10)]
     final_std: Annotated[float, Range(1e-4, 10)]
     reward: Reward
+    robust: Robust
 
 
 class Trials(Section):

@@ -1,5 +1,5 @@
 # Each target works first on a fresh clone: it sets up .venv where that is missing or out of date.
-.PHONY: setup run test lint validate clean
+.PHONY: setup run paper test lint validate clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready
@@ -9,6 +9,9 @@ setup: .venv/ready
 
 run: setup            # everything that is stale, by the budget of params.yaml
 	PATH="$(CURDIR)/.venv/bin:$$PATH" dvc repro
+
+paper: setup          # the same with the paper's budget; an hour and more
+	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/python tools/paper.py
 
 test: setup
 	.venv/bin/python -m pytest

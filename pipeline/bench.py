@@ -24,9 +24,9 @@ from scipy.stats import qmc
 
 from pipeline.episode import Episode
 from pipeline.errors import UserError
+from pipeline.fingerprint import fingerprint
 from pipeline.identify.evaluate import Evaluator
 from pipeline.identify.loss import EpisodeLoss
-from pipeline.identify.memo import fingerprint
 from pipeline.identify.space import Space
 from pipeline.sling.interaction import interact, schedule_of
 from pipeline.sling.launch import launch

@@ -22,7 +22,7 @@ from pipeline.identify.loss import EpisodeLoss
 from pipeline.identify.memo import Memo
 from pipeline.identify.optimizers import explorer
 from pipeline.identify.optimizers.multistart import Multistart
-from pipeline.identify.regions import find_regions
+from pipeline.identify.regions import regions_of
 from pipeline.identify.search import Free, budget, latin_hypercube, search
 from pipeline.identify.space import Space
 from pipeline.params import expect_known
@@ -111,14 +111,7 @@ def complete(params, method: str, optimizer, evaluate) -> History:
     search(first, evaluate, history, rollouts=explore, free=free)
     if refine:
         explored = History(method, free.names, [history.table])
-        regions = find_regions(
-            explored.unit,
-            explored.total,
-            k_top=about.k_top or optimizer.k_top,
-            k_nn=optimizer.k_nn,
-            delta=optimizer.delta,
-            covariance=about.covariance,
-        )
+        regions, _ = regions_of(about, optimizer, explored)
         solvers = Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed)
         search(solvers, evaluate, history, rollouts=refine, free=free)
     return history

@@ -100,6 +100,7 @@ def parser() -> argparse.ArgumentParser:
     sub.add_argument("--band", required=True)
     sub.add_argument("--method", default=DEFAULT_METHOD, help=f"default {DEFAULT_METHOD}")
     sub.add_argument("--target", type=target, required=True, metavar="M", help="along the floor")
+    sub.add_argument("--robust", action="store_true", help="by the method's second policy")
     sub.add_argument("--json", action="store_true")
 
     sub = command(run_verify, "hold the simulator against closed forms, finer steps, other engines")
@@ -251,8 +252,16 @@ def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
 def run_aim(arguments: argparse.Namespace) -> tuple[str, int]:
     from pipeline.params import load
     from pipeline.policy.aim import aim
+    from pipeline.policy.pose import posed
 
-    return shown(aim(load(), arguments.band, arguments.method, arguments.target), arguments.json)
+    params, band = load(), arguments.band
+    answer = aim(params, band, arguments.method, arguments.target, robust=arguments.robust)
+    answer = posed(answer, params, band)
+    if arguments.json:
+        return shown(answer, True)
+    warnings = answer.pop("warnings")
+    text, status = shown(answer, False)
+    return "\n".join([text, *(f"warning: {line}" for line in warnings)]), status
 
 
 def run_verify(arguments: argparse.Namespace) -> tuple[str, int]:

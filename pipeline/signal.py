@@ -8,6 +8,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 NOMINAL_RATE = 1000.0  # Hz: "rad/sample" counts samples of a 1 kHz sensor
+SIMULATED_RATE = 1000.0  # of simulated forces on their way through the filter [Hz]
 ORDER = 2
 SETTLING = 0.2  # s of odd extension at each end, many time constants of any useful cutoff
 
@@ -66,6 +67,24 @@ def average(t: np.ndarray, x: np.ndarray, t0: float, period: float, samples: int
     areas = np.concatenate([np.zeros_like(values[:1]), steps * (values[1:] + values[:-1]) / 2])
     integral = np.cumsum(areas, axis=0)
     return np.diff(integral[np.searchsorted(knots, edges)], axis=0) / period
+
+
+def as_recorded(
+    t: np.ndarray, x: np.ndarray, cutoff: float, t0: float, period: float, samples: int
+) -> np.ndarray:
+    """Simulated values on the recorded force's way: low-pass, then means over its samples.
+
+    Args:
+        t: Increasing times of the simulation's steps, shape (S,).
+        x: Values, shape (S, ...).
+        cutoff: As for `lowpass`.
+        t0, period, samples: As for `average`.
+
+    Returns:
+        Shape (samples, ...).
+    """
+    grid, x = uniform(t, x, SIMULATED_RATE)
+    return average(grid, lowpass(x, SIMULATED_RATE, cutoff), t0, period, samples)
 
 
 def _at(times: np.ndarray, t: np.ndarray, x: np.ndarray) -> np.ndarray:

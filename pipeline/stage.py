@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from pipeline.errors import UserError
-from pipeline.params import Params, expect_known, load
+from pipeline.params import Params, expect_known, load, pairs
 
 
 def arguments(*names: str) -> list[str]:
@@ -33,6 +33,23 @@ def expect(path: Path, stage: str) -> Path:
     if not path.is_file():
         raise UserError(f"{path}: missing; `dvc repro {stage}` makes it")
     return path
+
+
+def expect_from(run, step: str, band: str, method: str, path: Path) -> Path:
+    """`path`, which `step` makes for a band and a method. Raises UserError where it is missing.
+
+    Args:
+        run: params.yaml's `run`, which says by what name the step goes; read only if need be.
+    """
+    if path.is_file():
+        return path
+    if (band, method) not in pairs(run):
+        raise UserError(
+            f"{path}: missing; name {method} under run.methods or run.ablations in params.yaml,"
+            " then `dvc repro` makes it"
+        )
+    prefix = "" if method in run.methods else "ablation_"
+    return expect(path, f"{prefix}{step}@{band}-{method}")
 
 
 def expect_episode(band: str) -> Path:

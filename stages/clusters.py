@@ -12,17 +12,18 @@ from pathlib import Path
 
 from pipeline import errors
 from pipeline.identify.history import History
-from pipeline.identify.regions import find_regions, save_regions
+from pipeline.identify.regions import regions_of, save_regions
 from pipeline.identify.search import Free
 from pipeline.identify.space import Space
-from pipeline.stage import expect, started
+from pipeline.stage import expect_from, started
 
 
 def main() -> None:
     params, band, method = started("band", "method")
     about, optimizer = params.methods[method], params.optimizer
     free = Free.of(Space.of_method(params, method), about.fixed)
-    source = expect(Path("data/history", band, f"{method}.parquet"), f"history@{band}-{method}")
+    source = Path("data/history", band, f"{method}.parquet")
+    expect_from(params.run, "history", band, method, source)
     history = History.load(method, free.names, source)
     target = Path("data/clusters", band, f"{method}.json")
     if about.search != "multistart":
@@ -30,17 +31,9 @@ def main() -> None:
         print(f"{band} {method}: {about.search} has no second phase")
         return
     history.best()  # says why, where all failed
-    k_top = about.k_top or optimizer.k_top
-    regions = find_regions(
-        history.unit,
-        history.total,
-        k_top=k_top,
-        k_nn=optimizer.k_nn,
-        delta=optimizer.delta,
-        covariance=about.covariance,
-    )
-    save_regions(target, free.names, regions, k_top)
-    fewer = f" (k_top asks for {k_top})" if len(regions) < k_top else ""
+    regions, asked = regions_of(about, optimizer, history)
+    save_regions(target, free.names, regions, asked)
+    fewer = f" (k_top asks for {asked})" if len(regions) < asked else ""
     print(f"{band} {method}: {len(regions)} regions{fewer}, best loss {regions[0].loss:.5g}")
 
 

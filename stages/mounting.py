@@ -14,7 +14,8 @@ from pipeline import errors
 from pipeline.files import write_json
 from pipeline.identify.loss import EpisodeLoss
 from pipeline.identify.mounting import fit_mounting
-from pipeline.identify.session import load_episode, workers
+from pipeline.identify.session import load_episode
+from pipeline.machine import workers
 from pipeline.sling.model import Sling
 from pipeline.stage import started
 

@@ -1,63 +1,98 @@
-"""Train, check and export the slingshot policy of one band and method.
+"""Train, check and export the slingshot policies of one band and method.
 
     python -m stages.policy band1 sling2sim2real
 
 Reads data/theta/<band>/<method>.json; writes data/policies/<band>/<method>/: policy.onnx and
 policy.pt (metres to metres), card.json, map.parquet (the simulated launches) and training.parquet.
+A method of policy.robust.methods gets a second policy in its folder robust/, by the samples of
+data/confidence/<band>/<method>.json. A killed training goes on from .checkpoints/policy/.
+SLING_DEVICE says where launches are simulated; PPO runs on one thread of the CPU.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline import errors
 from pipeline.files import replacing, write_json
-from pipeline.policy.aim import simulator
-from pipeline.policy.export import card, write_onnx, write_torchscript
-from pipeline.policy.landing_map import LandingMap
-from pipeline.policy.train import train
-from pipeline.stage import started
+from pipeline.machine import device
+from pipeline.policy.aim import ROBUST, simulator
+from pipeline.policy.check import check, check_expected, figures, robust_figures, verdict
+from pipeline.policy.export import PLAIN, card, write_onnx, write_torchscript
+from pipeline.policy.landing_map import LandingMap, validation
+from pipeline.policy.landscape import Landscape
+from pipeline.policy.robust import refine, robust_maps
+from pipeline.policy.spread import load_samples
+from pipeline.policy.train import Policy, Trained, train
+from pipeline.stage import expect_from, started
 from pipeline.theta import load_theta
 
 
 def main() -> None:
     params, band, method = started("band", "method")
-    theta = load_theta(Path("data/theta", band, f"{method}.json"), band)
-    folder = Path("data/policies", band, method)
-
+    source = expect_from(
+        params.run, "theta", band, method, Path("data/theta", band, f"{method}.json")
+    )
+    theta = load_theta(source, band)
+    launcher = simulator(params, band, theta, device=device())
     landing_map = LandingMap.simulate(
-        simulator(params, band, theta),
+        launcher,
         draw_y=params.setup.draw_y,
         draw_z=params.setup.draw_z,
         size=params.policy.map_size,
         max_force=params.setup.max_force,
         seed=params.policy.seed,
     )
-    trained = train(landing_map, params.policy)
+    kept = Path(".checkpoints/policy", f"{band}-{method}.pt")
+    plain = train(Landscape([landing_map]), params.policy, kept)
+    checked = check(plain.policy, launcher, params)
+    training = figures(plain, checked)
 
+    folder = Path("data/policies", band, method)
     landing_map.save(folder / "map.parquet", {"band": band, "method": method})
+    about = {"params": params, "band": band, "method": method, "theta": theta, "device": device()}
+    validated = landing_map.validation(params.policy.targets)
+    _write(folder, plain, about, kind=PLAIN, training=training, landing_map=validated)
+    print(f"{band} {method}: {verdict(training, checked.failures)}", flush=True)
+
+    if method in params.policy.robust.methods:
+        source = Path("data/confidence", band, f"{method}.json")
+        samples = load_samples(source, band, method)
+        if samples is None:
+            print(f"{band} {method}: no robust policy, for there is no {source}")
+        else:
+            _robust(folder / ROBUST, plain.policy, samples, launcher, about)
+    kept.unlink(missing_ok=True)
+
+
+def _robust(folder: Path, plain: Policy, samples: np.ndarray, launcher, about) -> None:
+    """Train, check and export the policy that knows what the identification leaves open."""
+    params, error = about["params"], about["params"].trials.actuation_error
+    middle = plain.draws(np.mean(params.policy.targets, keepdims=True))[0]
+    maps = robust_maps(launcher, samples, middle, params)
+    trained = refine(plain, Landscape(maps, error), params.policy)
+    checked = check(trained.policy, launcher, params)
+    expected = [check_expected(one, launcher, samples, params) for one in (trained.policy, plain)]
+    training = robust_figures(trained, checked, *expected, len(maps), error)
+    validated = validation(maps, params.policy.targets)
+    _write(folder, trained, about, kind=ROBUST, training=training, landing_map=validated)
+    ours, theirs = (100 * one.mean_error for one in expected)
+    print(
+        f"{about['band']} {about['method']}, robust: {verdict(training, checked.failures)};"
+        f" expected over samples of θ and errors of the draw {ours:.2f} cm, plain {theirs:.2f} cm"
+    )
+
+
+def _write(folder: Path, trained: Trained, about: dict, **figures) -> None:
     with replacing(folder / "training.parquet") as temporary:
         pq.write_table(pa.table(trained.curve), temporary)
     write_onnx(trained.policy, folder / "policy.onnx")
     write_torchscript(trained.policy, folder / "policy.pt")
-    content = card(
-        trained,
-        band=band,
-        method=method,
-        theta=theta["theta"],
-        targets=params.policy.targets,
-        max_force=params.setup.max_force,
-        map_error=landing_map.validation(params.policy.targets),
-    )
-    write_json(folder / "card.json", content)
-    state = "converged" if trained.converged else "NOT converged"
-    print(
-        f"{band} {method}: {state}, mean |y_p - g| {100 * trained.mean_error:.2f} cm,"
-        f" {trained.failed_targets} targets fail"
-    )
+    write_json(folder / "card.json", card(trained.policy, **about, **figures))
 
 
 if __name__ == "__main__":

@@ -18,15 +18,15 @@ from pipeline.identify.regions import load_regions
 from pipeline.identify.search import Free, search
 from pipeline.identify.session import service
 from pipeline.identify.space import Space
-from pipeline.stage import expect, started
+from pipeline.stage import expect_from, started
 
 
 def main() -> None:
     params, band, method = started("band", "method")
     about, optimizer = params.methods[method], params.optimizer
     space = Space.of_method(params, method)
-    source = expect(Path("data/clusters", band, f"{method}.json"), f"clusters@{band}-{method}")
-    regions = load_regions(source)
+    source = Path("data/clusters", band, f"{method}.json")
+    regions = load_regions(expect_from(params.run, "clusters", band, method, source))
     history = History(method, space.names)
     if regions:
         search(

@@ -15,16 +15,17 @@ from pipeline import errors
 from pipeline.confidence.summary import confidence
 from pipeline.files import write_json
 from pipeline.identify.history import History, theta_content
-from pipeline.identify.session import load_episode, workers
+from pipeline.identify.session import load_episode
+from pipeline.machine import workers
 from pipeline.sling.model import THETA, load_sling
-from pipeline.stage import expect, started
+from pipeline.stage import expect_from, started
 
 
 def main() -> None:
     params, band, method = started("band", "method")
     sources = [
-        expect(Path("data", phase, band, f"{method}.parquet"), f"{phase}@{band}-{method}")
-        for phase in ("history", "refined")
+        expect_from(params.run, step, band, method, Path("data", step, band, f"{method}.parquet"))
+        for step in ("history", "refined")
     ]
     content = theta_content(History.load(method, THETA, *sources), band)
     episode, sling = load_episode(band), load_sling(params, band)

@@ -1,11 +1,11 @@
-"""Launch with the policy of one band and method, or predict what was launched.
+"""Launch with the policies of one band and method, and predict what is launched.
 
     python -m stages.trials band1 sling2sim2real
 
-Reads data/policies/, data/theta/, data/confidence/ and data/episodes/, and for a recorded band
+Reads data/policies/, data/theta/, data/confidence/ and data/episodes/, and
 data/trials/measured/<band>.csv where it is there; writes data/trials/<band>/<method>.parquet.
-A rig band is launched on the virtual rig, with the same actuation errors for every method. For a
-recorded band the calibrated simulator predicts the measured launches, or else the policy's own.
+A rig band is launched on the virtual rig, with the same errors for every method and policy. For a
+recorded band the calibrated simulator predicts the measured launches, or else the policies' own.
 """
 
 from __future__ import annotations
@@ -19,69 +19,95 @@ import numpy as np
 
 from pipeline import errors
 from pipeline.episode import Episode
-from pipeline.params import load
+from pipeline.params import Params, load
 from pipeline.policy import trials
-from pipeline.policy.aim import policy_draws, simulator
+from pipeline.policy.aim import ROBUST, policy_draws, simulator
+from pipeline.policy.measured import read_measured
 from pipeline.policy.spread import landing_intervals, law_discrepancy, load_samples
-from pipeline.stage import expect_episode, started
+from pipeline.policy.trials import Batch
+from pipeline.stage import expect_episode, expect_from, started
 from pipeline.theta import load_theta
 
 
 def main() -> None:
     params, band, method = started("band", "method")
     about, fork_width = params.bands[band], params.setup.fork_width
-    theta = load_theta(Path("data/theta", band, f"{method}.json"), band)
-    episode = Episode.load(expect_episode(band))
-    measured = Path("data/trials/measured", f"{band}.csv")
-
-    launches = []
-    if about.source == "recording" and measured.is_file():
-        launches = trials.read_measured(measured, method)
-    if launches:
-        kind = "measured"
-        draws = np.array([[row["draw_y_m"], row["draw_z_m"]] for row in launches])
-        targets = [row["target_m"] for row in launches]
-        landing = [row["landing_y_m"] for row in launches]
-        failure = [None if y is not None else "did not land" for y in landing]
-    else:
-        repeats = params.trials.repeats if about.source == "rig" else 1
-        targets = [target for target in params.trials.targets for _ in range(repeats)]
-        draws = policy_draws(Path("data/policies", band, method), np.array(targets))
-        kind, landing, failure = "predicted", [None] * len(draws), [None] * len(draws)
-
-    predicted = simulator(params, band, theta, params.setup.max_force)(draws)
+    source = expect_from(
+        params.run, "theta", band, method, Path("data/theta", band, f"{method}.json")
+    )
+    theta = load_theta(source, band)
     samples = load_samples(Path("data/confidence", band, f"{method}.json"), band, method)
-    error, discrepancy = params.trials.actuation_error, law_discrepancy(theta)
-    launcher = simulator(params, band, theta)
-    intervals = landing_intervals(launcher, draws, samples, error, discrepancy)
-    hold_force = predicted.hold_force
-    if about.source == "rig":
-        seeds = [1_000_000 * params.trials.seed + number for number in range(len(draws))]
-        with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-            launched = list(pool.map(partial(_on_the_rig, band), draws, seeds))
-        kind, failure = "virtual", [one.failure for one in launched]
-        landing = [one.landing_y if one.failure is None else None for one in launched]
-        hold_force = np.array([one.hold_force for one in launched])
+    episode = Episode.load(expect_episode(band))
 
+    batches = _measured(params, band, method)
+    if about.source == "rig":
+        batches = [*_on_the_rig(params, band, method), *batches]
+    batches = batches or _aimed(params, band, method, repeats=1)
+
+    draws = np.concatenate([batch.draws for batch in batches])
+    launcher = simulator(params, band, theta)
+    once, again = np.unique(draws, axis=0, return_inverse=True)
+    error, discrepancy = params.trials.actuation_error, law_discrepancy(theta)
     table = trials.table(
-        band=band,
-        method=method,
-        kind=kind,
-        draws=draws,
-        targets=targets,
-        predicted=predicted,
-        intervals=intervals,
-        landing=landing,
-        failure=failure,
-        hold_force=hold_force,
+        band,
+        method,
+        batches,
+        predicted=trials.limited(launcher(draws), params.setup.max_force),
+        intervals=landing_intervals(launcher, once, samples, error, discrepancy)[again],
         stretch=trials.stretch_of(np.insert(draws, 0, 0, axis=1), fork_width, about.rest_length),
         recorded=trials.recorded_stretch(episode, fork_width, about.rest_length),
     )
     trials.save(table, Path("data/trials", band, f"{method}.parquet"))
-    print(f"{band} {method}: {len(draws)} launches ({kind})")
+    said = [" ".join(filter(None, (g.kind, g.policy, str(len(g.draws))))) for g in batches]
+    print(f"{band} {method}: launches: {', '.join(said)}")
 
 
-def _on_the_rig(band: str, draw: np.ndarray, seed: int):
+def _measured(params: Params, band: str, method: str) -> list[Batch]:
+    """The user's launches of the band that say something about the method, if there are any."""
+    path = Path("data/trials/measured", f"{band}.csv")
+    launches = read_measured(path, method, params.methods) if path.is_file() else []
+    if not launches:
+        return []
+    draws, landing, targets = zip(*((o.draw, o.landing, o.target) for o in launches), strict=True)
+    failure = [None if y is not None else "did not land" for y in landing]
+    return [Batch.without_flight("measured", None, draws, targets, list(landing), failure)]
+
+
+def _aimed(params: Params, band: str, method: str, repeats: int) -> list[Batch]:
+    """What the method's policies would launch: the plain one, and the robust one if it has one."""
+    targets = [target for target in params.trials.targets for _ in range(repeats)]
+    folder = Path("data/policies", band, method)
+    policies = {"plain": folder}
+    if (folder / ROBUST / "policy.onnx").is_file():
+        policies["robust"] = folder / ROBUST
+    return [
+        Batch.without_flight("predicted", name, policy_draws(path, np.array(targets)), targets)
+        for name, path in policies.items()
+    ]
+
+
+def _on_the_rig(params: Params, band: str, method: str) -> list[Batch]:
+    """Launches of the policies on the virtual rig; equal numbers have equal errors."""
+    batches = _aimed(params, band, method, params.trials.repeats)
+    seeds = trials.trial_seed(params.trials, np.arange(len(batches[0].draws))).tolist()
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        launched = [list(pool.map(partial(_launch, band), g.draws, seeds)) for g in batches]
+    return [
+        Batch(
+            kind="virtual",
+            policy=batch.policy,
+            draws=batch.draws,
+            targets=batch.targets,
+            landing=[one.landing_y if one.failure is None else None for one in tried],
+            failure=[one.failure for one in tried],
+            hold_force=[one.hold_force for one in tried],
+            flight=[one.flight for one in tried],
+        )
+        for batch, tried in zip(batches, launched, strict=True)
+    ]
+
+
+def _launch(band: str, draw: np.ndarray, seed: int):
     """One launch in a process of its own: the rig takes seconds, on one core."""
     from pipeline.rig.launch import launch
 

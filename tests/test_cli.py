@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 
 from pipeline.cli import draw, parser, positive, shown
 from pipeline.sling.model import THETA
+from tests.policy.linear import write_policy
 
 ROOT = Path(__file__).parents[1]
 SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
@@ -64,6 +66,7 @@ def test_the_documented_commands_are_understood() -> None:
     assert (launched.theta, launched.draw) == (Path("t.json"), (-0.30, -0.17))
     aimed = parse("aim --band band1 --target 1.925".split())
     assert (aimed.method, aimed.target, aimed.json) == ("sling2sim2real_taut", 1.925, False)
+    assert not aimed.robust and parse("aim --band b --target 2 --robust".split()).robust
     assert parse("aim --band band1 --method m --target 1.925".split()).method == "m"
     assert parse("bench --device cuda:0 --json".split()).device == "cuda:0"
 
@@ -92,6 +95,8 @@ def test_results_are_json_or_lines() -> None:
         ("aim --band band1 --target inf", "must be a number, got 'inf'"),
         ("aim --band band1 --target 1e30", "must be at most 100 m"),
         ("aim --band band1 --target far", "must be a number, got 'far'"),
+        ("aim --band band1 --target -1.9", "must be above 0"),
+        ("aim --band band1", "required: --target"),
         ("add-band new --recording new.mcap --mass 0", "must be above 0"),
     ],
 )
@@ -133,6 +138,50 @@ def test_a_reader_that_has_seen_enough() -> None:
 def test_a_folder_without_params(tmp_path: Path) -> None:
     done = sling("aim", "--band", "band1", "--target", "1.9", folder=tmp_path)
     assert "params.yaml: cannot be read" in refused(done, 1)
+
+
+def aimable(folder: Path) -> None:
+    """A project with a policy of band1."""
+    shutil.copy(ROOT / "params.yaml", folder)
+    theta = folder / "data/theta/band1/sling2sim2real_taut.json"
+    theta.parent.mkdir(parents=True)
+    theta.write_text(json.dumps({"band": "band1", "theta": SOFT}))
+    policy = folder / "data/policies/band1/sling2sim2real_taut/policy.onnx"
+    write_policy(policy, slope=(-0.01, 0.0), offset=(-0.31, -0.15))
+
+
+def test_aim_prints_one_json_object(tmp_path: Path) -> None:
+    """The keys that scripts rely on, and the pose in the robot's base; the text has them too."""
+    aimable(tmp_path)
+    arguments = ("aim", "--band", "band1", "--target", "1.9")
+    done = sling(*arguments, "--json", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    stable = ["draw_y_m", "draw_z_m", "predicted_landing_m", "interval_90_m", "hold_force_n"]
+    pose = ["pitch_rad", "tcp_frame", "tcp_position_m", "tcp_quaternion_xyzw"]
+    assert list(answer) == [*stable, "max_force_n", *pose, "warnings"]
+    assert answer["draw_y_m"] == pytest.approx(-0.329, abs=1e-6)
+    assert answer["tcp_position_m"] is None
+    assert "setup.base_to_fork is null" in answer["warnings"][-1]
+    assert answer["interval_90_m"][0] < answer["predicted_landing_m"] < answer["interval_90_m"][1]
+
+    params = tmp_path / "params.yaml"
+    known = "base_to_fork: [0.5, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0]"
+    params.write_text(params.read_text().replace("base_to_fork: null", known))
+    lines = sling(*arguments, folder=tmp_path).stdout.splitlines()
+    shown = dict(line.split(maxsplit=1) for line in lines if not line.startswith("warning: "))
+    assert shown["tcp_position_m"] == "0.5 -0.329 0.25"
+    assert shown["max_force_n"] == "30"
+    assert any(line.startswith("warning: the interval leaves out") for line in lines)
+
+
+def test_aim_by_a_robust_policy_that_is_not_there(tmp_path: Path) -> None:
+    aimable(tmp_path)
+    line = refused(
+        sling("aim", "--band", "band1", "--target", "1.9", "--robust", folder=tmp_path), 1
+    )
+    assert "robust/policy.onnx: no such file" in line
+    assert "dvc repro policy@band1-sling2sim2real_taut" in line
 
 
 def test_launch_prints_one_json_object(tmp_path: Path) -> None:

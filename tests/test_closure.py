@@ -13,7 +13,10 @@ from tools.closure import CODE, ROOT, closure, imports, script_of
 
 STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
 HIDDEN = "pipeline/rig/"
-MAY_SEE_THE_RIG = {"stages/record.py", "stages/trials.py"}
+MAY_SEE_THE_RIG = {"stages/record.py", "stages/trials.py", "stages/floor.py"}
+MAY_SEE_THE_RIG |= {"pipeline/oracle/world.py"}
+ORACLE = "pipeline/oracle/"
+MAY_ASK_THE_ORACLE = {"stages/floor.py": ORACLE, "pipeline/report/": "pipeline/oracle/floor.py"}
 
 
 def code() -> list[Path]:
@@ -43,6 +46,20 @@ def test_the_rig_stays_hidden() -> None:
         seen = [relative(other) for other in imports(file) if relative(other).startswith(HIDDEN)]
         assert not seen, f"{name} imports {seen[0]}"
         assert not re.search(r"\bparams\.rig\b", file.read_text()), f"{name} reads params.rig"
+
+
+def test_the_oracle_feeds_no_method() -> None:
+    """Its own stage asks it; the report reads what that wrote."""
+    for file in code():
+        name = relative(file)
+        seen = {relative(other) for other in imports(file)} - {f"{ORACLE}__init__.py"}
+        seen = {other for other in seen if other.startswith(ORACLE)}
+        allowed = [what for who, what in MAY_ASK_THE_ORACLE.items() if name.startswith(who)]
+        allowed += [ORACLE] if name.startswith(ORACLE) else []
+        assert all(other.startswith(tuple(allowed)) for other in seen), f"{name} imports {seen}"
+    for stage in ("history", "clusters", "refined", "theta", "policy", "trials"):
+        reached = closure(ROOT / "stages" / f"{stage}.py")
+        assert not any(other.startswith(ORACLE) for other in reached), stage
 
 
 def test_pipeline_folders_import_each_other_in_one_direction() -> None:

@@ -71,6 +71,22 @@ def test_a_history_that_failed_says_why(stage) -> None:
     )
 
 
+def test_a_hint_names_the_group_by_which_a_method_runs(stage) -> None:
+    """`run.methods` and `run.ablations` are stages of different names; another method is none."""
+    path = Path("params.yaml")
+    run = load(path).run
+    ablated = "{bands: [band1], methods: [de]}"
+    path.write_text(path.read_text().replace("{bands: [], methods: []}", ablated))
+    assert load(path).run != run
+    makes = {"clusters": "history", "refined": "clusters", "theta": "history"}
+    for name, step in makes.items():
+        for method, group in (("sling2sim2real", step), ("de", f"ablation_{step}")):
+            _, line = stage(name, "band1", method)
+            assert line.endswith(f"missing; `dvc repro {group}@band1-{method}` makes it")
+        _, line = stage(name, "band1", "adam")
+        assert "missing; name adam under run.methods or run.ablations" in line
+
+
 @pytest.mark.parametrize("name", [*OF_A_BAND[1:], *OF_A_METHOD, "report"])
 def test_missing_inputs(name: str, stage) -> None:
     method = ("sling2sim2real",) if name in OF_A_METHOD else ()

@@ -19,7 +19,7 @@ from ruamel.yaml import YAML
 
 ROOT = Path(__file__).parents[1]
 CODE = ("pipeline/", "stages/")
-NATIVE = (".h", ".cpp")
+NATIVE = (".h", ".cpp", ".html", ".css", ".js")
 
 
 def files_of(module: str, root: Path = ROOT) -> list[Path]:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.confidence.residuals import Residuals, filtered
+from pipeline.confidence.residuals import Residuals
 from pipeline.confidence.whitening import noise_variance
 from pipeline.episode import Episode
 from pipeline.sling.interaction import interact
@@ -36,9 +36,9 @@ def discrepancy(
     """
     windy, thetas = in_air(sling, theta[None])
     rollouts = interact(windy, episode, thetas)
-    energy = energy_gap(episode, filtered(rollouts, episode, cutoff)[0])
     line = rollouts.center_line[0]
     residuals = Residuals(episode, sling, cutoff, line)
+    energy = energy_gap(episode, residuals.force(rollouts)[0])
     recoil = recoil_gap(residuals, residuals(rollouts)[0], episode, line)
     landing = float(np.hypot(energy, 2 * (recoil or 0.0)))
     return {"energy": energy, "recoil": recoil, "landing": landing}

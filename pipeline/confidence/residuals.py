@@ -18,9 +18,8 @@ import numpy as np
 
 from pipeline.episode import Episode
 from pipeline.identify.phases import phases, reach
-from pipeline.signal import average, lowpass, uniform
+from pipeline.signal import as_recorded
 
-RATE = 1000.0  # of the simulated force on its way through the filter [Hz]
 BINS = 16  # along the band, equal at rest
 LEAST_POINTS = 4  # of a bin
 MOST_POINTS = 320  # of a frame that are looked at
@@ -29,6 +28,7 @@ VISIBLE = 2 / np.pi  # mean of cos over the half of a tube that faces the camera
 PHASES = ("slack", "taut", "recoil", "swing")
 DRAWN = (0.33, 0.67, 0.95)  # of the way from taut to the farthest: parts of the taut phase
 LATER = (0.1, 0.2, 0.4)  # after the recoil: parts of the swing, which goes astray with time [s]
+HELD = (0.05, 0.5)  # before the release: when the hand holds the drawn band still [s]
 
 
 @dataclass(frozen=True)
@@ -143,8 +143,7 @@ class Residuals:
 
     def __call__(self, rollouts) -> np.ndarray:
         """Residual vectors of N rollouts, shape (N, R)."""
-        force = filtered(rollouts, self.episode, self.cutoff)
-        gap = (self.episode.force - force)[:, self._samples]
+        gap = (self.episode.force - self.force(rollouts))[:, self._samples]
         line = np.asarray(rollouts.center_line, np.float32)
         point = self.point.astype(np.float32)[:, None]
         start = line[:, self.frame[:, None], self._window]  # (N, M, W, 3)
@@ -156,6 +155,23 @@ class Residuals:
         offset = -np.take_along_axis(start, best[:, :, None, None], 2)[:, :, 0]  # (N, M, 3)
         cloud = [_dot(offset, self.depth) - self._bias[0], _dot(offset, self.side) - self._bias[1]]
         return np.concatenate([*gap.transpose(2, 0, 1), *cloud], axis=1).astype(float)
+
+    def force(self, rollouts) -> np.ndarray:
+        """Of N rollouts on the gripper, as the recorded one was filtered [N], shape (N, T, 3)."""
+        episode = self.episode
+        steps = np.moveaxis(np.asarray(rollouts.force, float), 0, 1)  # (S, N, 3)
+        sampling = episode.time[0] - episode.sample_period / 2, episode.sample_period
+        force = as_recorded(rollouts.times, steps, self.cutoff, *sampling, len(episode.time))
+        return np.moveaxis(force, 1, 0)
+
+    def hold_force(self, vectors: np.ndarray) -> np.ndarray:
+        """Simulated force of the drawn band on the hand [N], (N,), of residual vectors (N, R)."""
+        count = len(self._samples)
+        until = self.episode.release_time - self.episode.time[self._samples]
+        held = np.flatnonzero((until > HELD[0]) & (until < HELD[1]))
+        gap = vectors[:, : 3 * count].reshape(-1, 3, count)[:, :, held]
+        force = self.episode.force[self._samples[held]].T - gap
+        return np.linalg.norm(force.mean(axis=2), axis=1)
 
     def columns(self) -> dict[str, np.ndarray]:
         """How the residuals change with what moves all measured forces or points alike, (R,) each.
@@ -195,15 +211,6 @@ def _split(channel: str, first: int, grid: np.ndarray, phase: np.ndarray, part: 
     ]
 
 
-def filtered(rollouts, episode: Episode, cutoff: float) -> np.ndarray:
-    """Simulated force on the recorded one's way: low-pass and means over samples, (N, T, 3)."""
-    force = np.moveaxis(np.asarray(rollouts.force, float), 0, 1)  # (S, N, 3)
-    grid, force = uniform(rollouts.times, force, RATE)
-    start, period = episode.time[0] - episode.sample_period / 2, episode.sample_period
-    force = average(grid, lowpass(force, RATE, cutoff), start, period, len(episode.time))
-    return np.moveaxis(force, 1, 0)
-
-
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.einsum("...c,...c->...", a, b)
 
@@ -220,7 +227,8 @@ def _nearest(points: np.ndarray, line: np.ndarray) -> tuple[np.ndarray, np.ndarr
     gap = points[:, None] - line[:-1]
     part = np.clip(_dot(gap, step) / np.maximum(_dot(step, step), 1e-12), 0, 1)
     foot = line[:-1] + part[..., None] * step
-    edge = np.linalg.norm(points[:, None] - foot, axis=2).argmin(axis=1)
+    offset = points[:, None] - foot
+    edge = _dot(offset, offset).argmin(axis=1)
     row = np.arange(len(points))
     return foot[row, edge], edge, part[row, edge]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.confidence.axes import Axes
 from pipeline.confidence.ensemble import sample
-from pipeline.confidence.residuals import Residuals, filtered
+from pipeline.confidence.residuals import Residuals
 from pipeline.confidence.surrogate import Surrogate, monomials
 from pipeline.confidence.whitening import weights
 from pipeline.episode import Episode
@@ -131,8 +131,6 @@ class Rounds:
         self.tolerances, self.priors, self.pool = tolerances, priors, pool
         self.rollouts = 0
         self._most: np.ndarray | None = None
-        until = episode.release_time - episode.time
-        self._held = np.flatnonzero((until > 0.05) & (until < 0.5))
 
     def simulate(self, theta: np.ndarray, times: np.ndarray) -> list[Rollouts]:
         """Batches of LANES physical theta (N, P); each has its times (N / LANES, 2)."""
@@ -178,8 +176,7 @@ class Rounds:
         residuals = Residuals(self.episode, self.sling, self.cutoff, reference)
         vectors = np.concatenate(list(self.pool.map(residuals, rollouts)))
         good &= np.isfinite(vectors).all(axis=1)
-        force = [filtered(one, self.episode, self.cutoff)[:, self._held] for one in rollouts]
-        hold = np.linalg.norm(np.concatenate(force).mean(axis=1), axis=1)[good]
+        hold = residuals.hold_force(vectors[good])
         z, shifted = z[good], np.repeat(star, LANES, axis=0)[good]
         surrogate = self._surrogate(place, residuals, z, shifted, vectors[good])
         misfit, density = self._density(place, surrogate, z)

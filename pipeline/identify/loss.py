@@ -26,10 +26,9 @@ from pipeline.errors import UserError
 from pipeline.identify.chamfer import Chamfer
 from pipeline.identify.nuisance import Delay, DelayedFrames, along_axes
 from pipeline.identify.phases import held_out_blocks, reach, taut_frames, within
-from pipeline.signal import average, cutoff_hz, lowpass, uniform
+from pipeline.signal import as_recorded, cutoff_hz
 
 TERMS = ("geom", "force", "work", "taut")
-RATE = 1000.0  # of the simulated force on its way through the filter [Hz]
 
 Nuisances = dict[str, np.ndarray] | None
 
@@ -261,10 +260,9 @@ class EpisodeLoss:
                 columns = [[] for _ in start]
                 for first in range(0, len(times), 32):
                     pulses = np.eye(len(times), min(32, len(times) - first), -first)
-                    grid, signal = uniform(times, pulses, RATE)
-                    signal = lowpass(signal, RATE, self.cutoff)
                     for begin, part in zip(start, columns, strict=True):
-                        part.append(average(grid, signal, begin, self.period, len(self.time)))
+                        sampling = begin, self.period, len(self.time)
+                        part.append(as_recorded(times, pulses, self.cutoff, *sampling))
                 weights = [np.hstack(part) for part in columns]
                 weights = [csr_array(np.where(np.abs(one) > 1e-18, one, 0)) for one in weights]
                 self._cached = times, weights

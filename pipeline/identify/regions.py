@@ -35,6 +35,29 @@ class Region:
     members: list[int]
 
 
+def regions_of(about, optimizer, history) -> tuple[list[Region], int]:
+    """Where a method's refinement begins, and how many regions were asked for.
+
+    Args:
+        about: params.yaml's `methods.<name>`.
+        optimizer: params.yaml's `optimizer`.
+        history: The `History` of what its exploration evaluated, on its free axes.
+
+    Raises:
+        UserError: As `find_regions`.
+    """
+    asked = about.k_top or optimizer.k_top
+    regions = find_regions(
+        history.unit,
+        history.total,
+        k_top=asked,
+        k_nn=optimizer.k_nn,
+        delta=optimizer.delta,
+        covariance=about.covariance,
+    )
+    return regions, asked
+
+
 def find_regions(
     unit: np.ndarray,
     total: np.ndarray,

@@ -1,22 +1,19 @@
-"""What the searching stages share: an evaluator that reports, and remembers what it simulated.
-
-Where it runs is said by the environment, because results do not depend on it beyond rounding:
-SLING_DEVICE (cpu or cuda:0; default cpu) and SLING_WORKERS (threads on the CPU; default all cores).
-"""
+"""What the searching stages share: an evaluator that reports, and remembers what it simulated."""
 
 from __future__ import annotations
 
-import os
 from importlib.metadata import version
 from pathlib import Path
 
 from pipeline.episode import Episode
 from pipeline.errors import UserError
+from pipeline.fingerprint import fingerprint
 from pipeline.identify.evaluate import Evaluator
 from pipeline.identify.loss import EpisodeLoss
-from pipeline.identify.memo import Memo, fingerprint
+from pipeline.identify.memo import Memo
 from pipeline.identify.progress import Progress
 from pipeline.identify.space import Space
+from pipeline.machine import device, workers
 from pipeline.sling.model import load_sling, mounting_path
 from pipeline.stage import expect_episode
 
@@ -69,21 +66,3 @@ def load_episode(band: str) -> Episode:
     """The recorded episode of a band. Raises UserError where it is missing."""
     expect_episode(band)
     return Episode.load(Path("data/episodes", band))
-
-
-def device() -> str:
-    """SLING_DEVICE. Raises UserError."""
-    name = os.environ.get("SLING_DEVICE") or "cpu"
-    if name != "cpu" and not name.startswith("cuda"):
-        raise UserError(f"SLING_DEVICE must be cpu or cuda:0 and the like, got {name!r}")
-    return name
-
-
-def workers() -> int | None:
-    """SLING_WORKERS; None is all cores. Raises UserError."""
-    text = os.environ.get("SLING_WORKERS")
-    if not text:
-        return None
-    if not (text.isascii() and text.isdigit() and int(text) > 0):
-        raise UserError(f"SLING_WORKERS must be a whole number above 0, got {text!r}")
-    return int(text)

@@ -22,7 +22,7 @@ from pipeline.params.identification import (
     check_method,
 )
 from pipeline.params.lab import Band, BandName, Plan, Run, Setup
-from pipeline.params.launches import TARGET_AREA, Policy, Trials
+from pipeline.params.launches import TARGET_AREA, Floor, Policy, Trials
 from pipeline.params.recording import Cloud, Episode, Force
 from pipeline.params.virtual_rig import Rig, RigArm, RigBand, RigCamera, RigClock, RigWrench
 from pipeline.schema import FILLED, Name, Section, one_line, refusal
@@ -61,6 +61,7 @@ class Params(Section):
     methods: Annotated[dict[Name, Method], FILLED]
     policy: Policy
     trials: Trials
+    floor: Floor
     rig: Rig
 
     @model_validator(mode="after")

@@ -44,6 +44,13 @@ class Policy(Section):
     robust: Robust
 
 
+class Floor(Section):
+    """How far launches of an oracle policy miss: what no method can help."""
+
+    map_size: Annotated[tuple[Nodes, Nodes], LIST]
+    launches: Annotated[int, Range(0, 10_000)]  # a target, beside those with the trials' errors
+
+
 class Trials(Section):
     seed: Seed
     targets: Annotated[tuple[Distance, ...], LIST, FILLED, UNIQUE]

@@ -7,7 +7,6 @@ import io
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pipeline.plan.trajectory import Trajectory
 from pipeline.recording.input.frames import Transform
@@ -124,11 +123,6 @@ def draw_picture(trajectory: Trajectory, path: Path) -> None:
                 fontsize=7,
             )
         figure.savefig(path, dpi=150, format="png")
-
-
-def quaternion(rotation: Rotation) -> np.ndarray:
-    """As x, y, z, w with w not negative."""
-    return rotation.as_quat(canonical=True)
 
 
 def _vector(v: np.ndarray) -> dict[str, float]:

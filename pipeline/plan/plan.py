@@ -15,6 +15,7 @@ from pipeline.files import replacing, write_json, write_text
 from pipeline.params import expect_known
 from pipeline.plan import limits, messages
 from pipeline.plan.force import Held, Prediction, predict, read_earlier
+from pipeline.plan.hand import along_pull, quaternion
 from pipeline.plan.pull import hanging_middle, trajectory_of
 from pipeline.plan.trajectory import Trajectory
 from pipeline.recording.input.frames import Transform
@@ -96,7 +97,7 @@ class Plan:
 
     @property
     def _fork_in_base(self) -> np.ndarray:
-        return messages.quaternion(self.base.rotation)
+        return quaternion(self.base.rotation)
 
     def to_json(self, files: list[Path]) -> str:
         written = [str(path) for path in files]
@@ -213,7 +214,7 @@ def plan_recording(
         base=base,
         base_source=source,
         frame=frame,
-        hand=messages.quaternion(hand),
+        hand=quaternion(hand),
         stretch=held.stretch(drawn),
         force=prediction,
         max_force=setup.max_force,
@@ -225,16 +226,8 @@ def plan_recording(
 
 
 def _orientation(given: tuple[float, ...] | None, base: Transform, drawn: np.ndarray) -> Rotation:
-    """Of the hand in the base: as given, else looking along the pull at the fork.
-
-    Its z points ahead and its x along the fork, so that the fingers move up and down (y) and close
-    on the band, as a Panda's hand has them.
-    """
-    if given is not None:
-        return Rotation.from_quat(given)
-    side, ahead = np.array([1.0, 0.0, 0.0]), -drawn / np.linalg.norm(drawn)
-    axes = np.stack([side, np.cross(ahead, side), ahead], axis=1)
-    return base.rotation * Rotation.from_matrix(axes)
+    """Of the hand in the base: as given, else looking along the pull at the fork."""
+    return base.rotation * along_pull(drawn) if given is None else Rotation.from_quat(given)
 
 
 def _plain(vector: np.ndarray) -> list[float]:

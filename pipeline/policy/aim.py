@@ -11,19 +11,31 @@ from pipeline.params import expect_known
 from pipeline.policy.spread import landing_intervals, law_discrepancy, load_samples
 from pipeline.theta import calibrated, in_air, load_theta, vector
 
+ROBUST = "robust"  # folder of a method's second policy
+
 
 def policy_draws(folder: Path, targets: np.ndarray) -> np.ndarray:
     """Draws (y, z) [m], shape (N, 2), of the exported policy in `folder` for targets [m], (N,).
+
+    Args:
+        folder: data/policies/<band>/<method>, or its folder ROBUST.
 
     Raises:
         UserError: The policy is not there, or damaged.
     """
     import onnxruntime
 
-    path = Path(folder) / "policy.onnx"
-    band, method = path.parts[-3:-1]
+    path = Path(folder, "policy.onnx")
+    robust = path.parent.name == ROBUST
+    band, method = path.parent.parts[-3:-1] if robust else path.parent.parts[-2:]
     if not path.is_file():
-        raise UserError(f"{path}: no such file; `dvc repro policy@{band}-{method}` trains it")
+        where = (
+            f" where policy.robust.methods in params.yaml names {method} and its θ file tells its"
+            " confidence"
+        )
+        raise UserError(
+            f"{path}: no such file; `dvc repro policy@{band}-{method}` trains it{where * robust}"
+        )
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.log_severity_level = 4  # what is wrong is said below
@@ -40,20 +52,28 @@ def policy_draws(folder: Path, targets: np.ndarray) -> np.ndarray:
 
 
 def aim(
-    params, band: str, method: str, target: float, root: str | Path = ".", launcher=None
+    params,
+    band: str,
+    method: str,
+    target: float,
+    root: str | Path = ".",
+    launcher=None,
+    robust: bool = False,
 ) -> dict:
     """Where to draw `band` so that the projectile lands at `target` [m].
 
     Args:
         params: The whole of params.yaml.
+        robust: By the policy that was trained over what the identification leaves open.
         launcher: Simulates draws, shape (N, 2) [m], and with a second argument those of other θ,
             as `simulator` does; the calibrated simulator by default.
 
     Returns:
-        draw_y_m, draw_z_m, predicted_landing_m, interval_90_m, hold_force_n, warnings. The
-        interval holds 90 % of the landings that samples of θ (data/confidence), the law's own error
-        as the recording shows it, and an error of `trials.actuation_error` in the drawn position
-        give. Landing and interval are None where the launch fails.
+        draw_y_m, draw_z_m, predicted_landing_m, interval_90_m, hold_force_n, max_force_n (the
+        arm's limit), warnings. The interval holds 90 % of the landings that samples of θ
+        (data/confidence), the law's own error as the recording shows it, and an error of
+        `trials.actuation_error` in the drawn position give. Landing and interval are None where
+        the launch fails.
 
     Raises:
         UserError: Unknown band or method, or a file that is missing.
@@ -62,7 +82,8 @@ def aim(
     expect_known(params, "method", method)
     root = Path(root)
     content = load_theta(root / "data" / "theta" / band / f"{method}.json", band)
-    draw = policy_draws(root / "data" / "policies" / band / method, np.array([target]))[0]
+    folder = root / "data" / "policies" / band / method
+    draw = policy_draws(folder / ROBUST if robust else folder, np.array([target]))[0]
     launcher = launcher or simulator(params, band, content, root=root)
     launched = launcher(draw[None])
     warnings = []
@@ -83,6 +104,8 @@ def aim(
         found = landing_intervals(launcher, draw, samples, error, discrepancy)[0]
         if np.isfinite(found).all():
             interval = found.tolist()
+        else:
+            warnings.append("no interval: too many launches beside the predicted one fail")
     force = float(launched.hold_force[0])
     if force > params.setup.max_force:
         warnings.append(
@@ -95,11 +118,19 @@ def aim(
         "predicted_landing_m": landing,
         "interval_90_m": interval,
         "hold_force_n": force if np.isfinite(force) else None,
+        "max_force_n": params.setup.max_force,
         "warnings": warnings,
     }
 
 
-def simulator(params, band: str, content: dict, max_force: float = np.inf, root: str | Path = "."):
+def simulator(
+    params,
+    band: str,
+    content: dict,
+    max_force: float = np.inf,
+    root: str | Path = ".",
+    device: str = "cpu",
+):
     """Function that launches draws, shape (N, 2) [m], in the simulator calibrated by a θ file.
 
     A second argument gives each launch a θ of its own, shape (N, 5), or with a sixth column a drag
@@ -114,6 +145,6 @@ def simulator(params, band: str, content: dict, max_force: float = np.inf, root:
 
     def launcher(draws: np.ndarray, thetas: np.ndarray | None = None):
         moving, thetas = in_air(sling, best if thetas is None else thetas)
-        return launch(moving, thetas, draws, max_force=max_force, workers=workers)
+        return launch(moving, thetas, draws, max_force=max_force, device=device, workers=workers)
 
     return launcher

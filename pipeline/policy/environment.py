@@ -5,25 +5,29 @@
     reward             height * exp(-|y_p - g| / scale), or -penalty for a failed launch
 
 Every step ends the episode, so discounting plays no part. Observations are normalised to [-1, 1]
-over the range of targets.
+over the range of targets. Where the landscape has several θ, or draws have an error, the reward is
+the expected one over both: its gradient is that of rewards of single launches, without their noise.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 
+import numpy as np
 import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from pipeline.policy.landing_map import LandingMap
+from pipeline.policy.expected import closeness
+from pipeline.policy.landscape import Landings, Landscape
 
 
 class SlingshotEnv(VecEnv):
     """One launch an episode, `num_envs` at a time.
 
     Attributes:
-        failures: How often each reason of failure has occurred since the last `take_failures`.
+        failures: How often each reason of failure has occurred since the last `take_failures`;
+            a draw counts once for each θ.
     """
 
     num_actions = 2
@@ -31,25 +35,29 @@ class SlingshotEnv(VecEnv):
 
     def __init__(
         self,
-        landing_map: LandingMap,
+        landscape: Landscape,
         *,
         targets: tuple[float, float],
         num_envs: int,
-        height: float,
-        scale: float,
-        penalty: float,
+        reward,
         seed: int,
     ):
-        self.landing_map = landing_map
+        """Set targets.
+
+        Args:
+            targets: Range they are drawn from [m].
+            reward: Its height, scale [m] and penalty (`policy.reward` of params.yaml).
+        """
+        self.landscape = landscape
         self.targets = targets
         self.num_envs = num_envs
-        self.height, self.scale, self.penalty = height, scale, penalty
+        self.reward = reward
         self.device = "cpu"
         self.cfg = {}
         self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long)
         self.failures: Counter[str] = Counter()
         self._random = torch.Generator().manual_seed(seed)
-        self._box = draw_box(landing_map)
+        self._box = draw_box(landscape)
         self._goal = self._new_goals()
 
     def get_observations(self) -> TensorDict:
@@ -62,15 +70,15 @@ class SlingshotEnv(VecEnv):
         """Launch, then set new targets. Actions have shape (num_envs, 2); every episode ends."""
         center, half = self._box
         draws = center + half * torch.tanh(actions)
-        launched = self.landing_map(draws.double().numpy())
-        landing = torch.from_numpy(launched.landing_y).float()
-        failed = torch.from_numpy(launched.failure > 0)
-        hit = self.height * torch.exp(-(landing - self._goal).abs() / self.scale)
-        reward = torch.where(failed, torch.full_like(hit, -self.penalty), hit)
-        reasons = self.landing_map.reasons
-        self.failures.update(reasons[code] for code in launched.failure if code)
+        goal = self._goal.double().numpy()
+        reward, launched = rewarded(self.landscape, draws.double().numpy(), goal, self.reward)
+        codes, counts = np.unique(launched.failure, return_counts=True)
+        for code, count in zip(codes.tolist(), counts.tolist(), strict=True):
+            if code:
+                self.failures[self.landscape.reasons[code]] += count
         self._goal = self._new_goals()
         # No "time_outs": they would bootstrap a value into a problem that has no next state.
+        reward = torch.from_numpy(reward).float()
         return self.get_observations(), reward, torch.ones(self.num_envs), {}
 
     def take_failures(self) -> dict[str, int]:
@@ -79,14 +87,31 @@ class SlingshotEnv(VecEnv):
         self.failures.clear()
         return counted
 
+    def state(self) -> dict[str, torch.Tensor]:
+        """What the next steps hang on, after `take_failures`."""
+        return {"random": self._random.get_state(), "goal": self._goal}
+
+    def restore(self, state: dict[str, torch.Tensor]) -> None:
+        self._random.set_state(state["random"])
+        self._goal = state["goal"]
+
     def _new_goals(self) -> torch.Tensor:
         low, high = self.targets
         # A fresh tensor: rsl_rl keeps observations by reference until the step is stored.
         return low + (high - low) * torch.rand(self.num_envs, generator=self._random)
 
 
-def draw_box(landing_map: LandingMap) -> tuple[torch.Tensor, torch.Tensor]:
+def rewarded(
+    landscape: Landscape, draws: np.ndarray, targets: np.ndarray, reward
+) -> tuple[np.ndarray, Landings]:
+    """Expected rewards, shape (N,), and landings of draws (N, 2) [m] for targets (N,) [m]."""
+    launched = landscape(draws)
+    gap = launched.landing_y - targets[:, None]
+    hit = reward.height * closeness(gap, launched.spread, reward.scale)
+    return np.where(launched.failure > 0, -reward.penalty, hit).mean(1), launched
+
+
+def draw_box(landscape: Landscape) -> tuple[torch.Tensor, torch.Tensor]:
     """Centre and half size of the box of draws [m], each of shape (2,)."""
-    low = torch.tensor([landing_map.draw_y[0], landing_map.draw_z[0]], dtype=torch.float32)
-    high = torch.tensor([landing_map.draw_y[-1], landing_map.draw_z[-1]], dtype=torch.float32)
+    low, high = (torch.tensor(one, dtype=torch.float32) for one in (landscape.low, landscape.high))
     return (low + high) / 2, (high - low) / 2

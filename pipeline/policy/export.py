@@ -7,6 +7,7 @@ normalisation is inside. Equal networks give equal bytes, so the cache sees when
 from __future__ import annotations
 
 import io
+import platform
 import warnings
 import zipfile
 from importlib.metadata import version
@@ -17,10 +18,32 @@ import torch
 from torch import nn
 
 from pipeline.files import replacing
-from pipeline.policy.train import CHECKED_TARGETS, CONVERGED, Policy, Trained
+from pipeline.policy.aim import ROBUST
+from pipeline.policy.train import Policy
 
 OPSET, IR_VERSION = 18, 10  # any onnxruntime from 1.18 (2024) on reads these
 INPUT, OUTPUT = "target", "draw"
+PLAIN = "plain"
+USED = ("sling2sim2real", "torch", "rsl-rl-lib", "onnx", "numpy")
+
+# What a card tells of the training; errors are |y_p - g| of the deterministic policy's launches.
+TRAINING = (
+    "converged",  # by the criterion
+    "criterion",  # in words
+    "iteration",  # that the policy comes from
+    "iterations",
+    "mean_error_m",  # launched in the calibrated simulator, over the checked targets
+    "max_error_m",
+    "failed_targets",
+    "map_mean_error_m",  # the same by the interpolated landing map
+    "failed_launches",  # exploring ones, by reason
+)
+ROBUST_TRAINING = (
+    "expected_error_m",  # over samples of theta and actuation error
+    "plain_expected_error_m",  # the plain policy's by the same measure
+    "samples",  # of theta, how many
+    "actuation_error_m",  # of each axis of the draw, standard deviation
+)
 
 
 def write_onnx(policy: Policy, path: Path) -> None:
@@ -88,53 +111,81 @@ def write_torchscript(policy: Policy, path: Path) -> None:
 
 
 def card(
-    trained: Trained,
-    *,
+    policy: Policy,
+    params,
     band: str,
     method: str,
-    theta: dict[str, float],
-    targets: tuple[float, float],
-    max_force: float,
-    map_error: dict,
+    theta: dict,
+    *,
+    kind: str,
+    training: dict,
+    landing_map: dict,
+    device: str = "cpu",
 ) -> dict:
-    """What a user of the files must know; no dates and no wall times: it is reproducible."""
-    center, half = trained.policy.draw_center, trained.policy.draw_half
+    """What a user of the files must know; no dates and no wall times: it is reproducible.
+
+    Args:
+        params: The whole of params.yaml.
+        theta: Content of the theta file whose simulator the policy was trained in.
+        kind: PLAIN, or ROBUST: trained over what the identification leaves open.
+        training: Figures of TRAINING, and for a robust policy of ROBUST_TRAINING too; NaN becomes
+            null.
+        landing_map: How well the interpolated launches go with simulated ones
+            (`LandingMap.validation`).
+        device: Where it was trained, "cpu" or "cuda:0".
+
+    Raises:
+        ValueError: A figure of the training is missing, or one too many.
+    """
+    wanted = {*TRAINING, *(ROBUST_TRAINING if kind == ROBUST else ())}
+    if kind not in (PLAIN, ROBUST) or set(training) != wanted:
+        raise ValueError(f"a {kind} policy tells {sorted(wanted)}, got {sorted(training)}")
+    center, half = policy.draw_center, policy.draw_half
     low, high = (np.round((center + sign * half).tolist(), 6).tolist() for sign in (-1, 1))
-    criterion = f"mean |y_p - g| <= {CONVERGED} m over {CHECKED_TARGETS} targets, no failure"
+    setup, about = params.setup, params.bands[band]
     return {
         "band": band,
         "method": method,
-        "theta": theta,
+        "kind": kind,
+        "theta": theta["theta"],
+        "nuisances": theta.get("nuisances", {}),
         "input": {
             "name": INPUT,
             "unit": "m",
             "shape": ["batch", 1],
-            "trained_range": list(targets),
+            "meaning": "displacement of the target along y, on the floor",
+            "trained_range": list(params.policy.targets),
         },
         "output": {
             "name": OUTPUT,
             "unit": "m",
             "shape": ["batch", 2],
             "axes": ["y", "z"],
+            "meaning": "drawn position of the projectile",
             "frame": "origin midway between the fork tips, y towards the target, z up",
             "low": low,
             "high": high,
         },
-        "max_force_n": max_force,
-        "training": {
-            "converged": trained.converged,
-            "criterion": criterion,
-            "iteration": trained.iteration,
-            "iterations": len(trained.curve["iteration"]),
-            "mean_error_m": _number(trained.mean_error),
-            "max_error_m": _number(trained.max_error),
-            "failed_targets": trained.failed_targets,
-            "failed_launches": trained.failures,
+        "max_force_n": setup.max_force,
+        "setup": {
+            "fork_width_m": setup.fork_width,
+            "fork_height_m": setup.fork_height,
+            "projectile_mass_kg": setup.projectile_mass,
+            "band_mass_kg": about.mass,
+            "band_diameter_m": about.diameter,
+            "band_rest_length_m": about.rest_length,
         },
-        "landing_map": map_error,
-        "versions": {name: version(name) for name in ("torch", "rsl-rl-lib", "onnx", "numpy")},
+        "training": {name: _strict(training[name]) for name in training},
+        "landing_map": landing_map,
+        "trained_on": {"device": device, "machine": platform.machine()},
+        "versions": {"python": platform.python_version(), **{name: version(name) for name in USED}},
     }
 
 
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+def _strict(value: object) -> object:
+    """As strict JSON has it: no NaN, no numbers of NumPy's."""
+    if isinstance(value, dict):
+        return {name: _strict(one) for name, one in value.items()}
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value

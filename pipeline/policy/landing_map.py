@@ -1,54 +1,33 @@
-"""Landing map: where a launch lands as a smooth function of the draw, for one θ.
+"""Landing map: launches over a grid of draws, simulated in one batch, for one θ.
 
 For a fixed θ the landing depends on the draw (y, z) alone, and smoothly. So a grid of launches is
-simulated once, in one batch, and cubic splines read between them: training then asks for a million
+simulated once, and cubic splines read between them (landscape.py): training then asks for a million
 launches in seconds, and the error of reading between is itself measured on random draws.
-
-A draw is a failure, and not interpolated, where the interpolated holding force exceeds the limit
-of the arm or where a corner of its grid cell failed in simulation.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from scipy.interpolate import RBFInterpolator, RectBivariateSpline
 
 from pipeline.files import replacing
+from pipeline.policy.landscape import NO_FAILURE, Landings, Landscape
 
-TOO_MUCH_FORCE = "holding force above the limit"
-OUTSIDE = "draw outside the box"
-NO_FAILURE = ""
-
-# draws (N, 2) [m] -> object with landing_y (N,) [m], hold_force (N,) [N], failure list[str | None]
-Launcher = Callable[[np.ndarray], object]
-
-
-@dataclass(frozen=True)
-class Landings:
-    """What a set of draws leads to.
-
-    Attributes:
-        landing_y: Landing on the floor [m], NaN where failed, shape (N,).
-        hold_force: Force that the hand holds before the release [N], shape (N,).
-        failure: Index into `LandingMap.reasons`, 0 where the launch succeeds, shape (N,).
-    """
-
-    landing_y: np.ndarray
-    hold_force: np.ndarray
-    failure: np.ndarray
+# draws (N, 2) [m], and θ (N, P) or none -> object with landing_y (N,) [m], hold_force (N,) [N],
+# failure list[str | None]; without a force limit of its own
+Launcher = Callable[..., object]
 
 
 @dataclass(frozen=True)
 class LandingMap:
-    """Launches over a grid of draws, and cubic splines between them.
+    """Launches over a grid of draws, and what is read between them.
 
     Attributes:
         draw_y: Grid along y [m], ascending, shape (Y,), at least 4.
@@ -91,64 +70,66 @@ class LandingMap:
             checks: Number of random draws that validate the interpolation.
             seed: Seed of those draws.
         """
-        grid_y, grid_z = np.linspace(*draw_y, size[0]), np.linspace(*draw_z, size[1])
-        nodes = np.stack(np.meshgrid(grid_y, grid_z, indexing="ij"), -1).reshape(-1, 2)
+        grid = [np.linspace(*draw_y, size[0]), np.linspace(*draw_z, size[1])]
         low, high = np.array([draw_y, draw_z]).T
         random = np.random.default_rng(seed).uniform(low, high, (checks, 2))
-        launched = launcher(np.concatenate([nodes, random]))
-        failure = np.array([reason or NO_FAILURE for reason in launched.failure], object)
-        landing = np.where(failure == NO_FAILURE, launched.landing_y, np.nan)
-        force = np.asarray(launched.hold_force, float)
-        on_grid = slice(len(nodes))
+        launched = launcher(np.concatenate([_nodes(*grid), random]))
+        return cls._of(grid, random, max_force, *_columns(launched))
+
+    @classmethod
+    def simulate_each(
+        cls,
+        launcher: Launcher,
+        thetas: np.ndarray,
+        *,
+        draw_y: tuple[float, float],
+        draw_z: tuple[float, float],
+        size: tuple[int, int],
+        max_force: float,
+        checks: int = 16,
+        seed: int = 0,
+    ) -> list[LandingMap]:
+        """A map for each of several θ, shape (S, P), all launched in one batch, checked alike."""
+        grid = [np.linspace(*draw_y, size[0]), np.linspace(*draw_z, size[1])]
+        low, high = np.array([draw_y, draw_z]).T
+        random = np.random.default_rng(seed).uniform(low, high, (checks, 2))
+        draws = np.concatenate([_nodes(*grid), random])
+        launched = launcher(np.tile(draws, (len(thetas), 1)), np.repeat(thetas, len(draws), axis=0))
+        each = (np.split(column, len(thetas)) for column in _columns(launched))
+        return [cls._of(grid, random, max_force, *one) for one in zip(*each, strict=True)]
+
+    @classmethod
+    def _of(cls, grid, random, max_force, landing, force, failure) -> LandingMap:
+        """Of launches of the nodes, then of random draws."""
+        shape = (len(grid[0]), len(grid[1]))
+        count = shape[0] * shape[1]
         return cls(
-            draw_y=grid_y,
-            draw_z=grid_z,
-            landing_y=landing[on_grid].reshape(size),
-            hold_force=force[on_grid].reshape(size),
-            failure=failure[on_grid].reshape(size),
+            draw_y=grid[0],
+            draw_z=grid[1],
+            landing_y=landing[:count].reshape(shape),
+            hold_force=force[:count].reshape(shape),
+            failure=failure[:count].reshape(shape),
             max_force=float(max_force),
-            checks=np.column_stack([random, landing[len(nodes) :], force[len(nodes) :]]),
+            checks=np.column_stack([random, landing[count:], force[count:]]),
         )
 
-    @cached_property
+    @property
     def reasons(self) -> list[str]:
         """Names of the failure codes; code 0 is success."""
-        return [NO_FAILURE, TOO_MUCH_FORCE, OUTSIDE, *sorted(set(self.failure.flat) - {NO_FAILURE})]
+        return self._landscape.reasons
 
     def __call__(self, draws: np.ndarray) -> Landings:
-        """Landings of draws, shape (N, 2) [m], read off the splines."""
-        draws = np.asarray(draws, float)
-        force = self._force_spline.ev(draws[:, 0], draws[:, 1])
-        landing = self._landing_spline.ev(draws[:, 0], draws[:, 1])
-        row = np.clip(np.searchsorted(self.draw_y, draws[:, 0]) - 1, 0, len(self.draw_y) - 2)
-        column = np.clip(np.searchsorted(self.draw_z, draws[:, 1]) - 1, 0, len(self.draw_z) - 2)
-        failure = self._cell_failure[row, column]
-        failure = np.where((failure == 0) & (force > self.max_force), 1, failure)
-        low = np.array([self.draw_y[0], self.draw_z[0]])
-        high = np.array([self.draw_y[-1], self.draw_z[-1]])
-        tolerance = 1e-6  # float32 draws at the edge of the box
-        outside = ((draws < low - tolerance) | (draws > high + tolerance)).any(1)
-        failure = np.where(outside, 2, failure)
-        return Landings(np.where(failure > 0, np.nan, landing), force, failure)
+        """Landings of draws, shape (N, 2) [m], read off the splines: fields of shape (N,)."""
+        several = self._landscape(draws)
+        return Landings(*(getattr(several, one.name)[:, 0] for one in fields(Landings)))
+
+    @cached_property
+    def _landscape(self) -> Landscape:
+        return Landscape([self])
 
     def validation(self, targets: tuple[float, float]) -> dict:
         """Interpolation error [m] on the random draws: over the box, and where targets lie."""
-        predicted = self(self.checks[:, :2]).landing_y
-        simulated = self.checks[:, 2]
-        error = np.abs(predicted - simulated)
-        known = np.isfinite(error)
-        near = known & (simulated >= targets[0]) & (simulated <= targets[1])
-
-        def summary(chosen: np.ndarray) -> dict:
-            if not chosen.any():
-                return {"draws": 0, "mean_error_m": None, "max_error_m": None}
-            return {
-                "draws": int(chosen.sum()),
-                "mean_error_m": float(error[chosen].mean()),
-                "max_error_m": float(error[chosen].max()),
-            }
-
-        return {"box": summary(known), "target_range": summary(near)}
+        return validation([self], targets)
 
     def save(self, path: Path, header: dict | None = None) -> None:
         """Write one row a launch: grid nodes first (y slowest), then the validation draws."""
@@ -193,32 +174,34 @@ class LandingMap:
             checks=np.column_stack([values[check] for values in column.values()]),
         )
 
-    @cached_property
-    def _cell_failure(self) -> np.ndarray:
-        """Failure code of each cell of the grid, shape (Y - 1, Z - 1): a failed corner fails it."""
-        codes = np.vectorize(self.reasons.index, otypes=[int])(self.failure)
-        return np.max([codes[:-1, :-1], codes[1:, :-1], codes[:-1, 1:], codes[1:, 1:]], axis=0)
 
-    @cached_property
-    def _landing_spline(self) -> RectBivariateSpline:
-        return self._spline(self.landing_y)
+def validation(maps: list[LandingMap], targets: tuple[float, float]) -> dict:
+    """Interpolation error [m] on the random draws of maps: over the box, and where targets lie."""
+    predicted = np.concatenate([one(one.checks[:, :2]).landing_y for one in maps])
+    simulated = np.concatenate([one.checks[:, 2] for one in maps])
+    error = np.abs(predicted - simulated)
+    known = np.isfinite(error)
+    near = known & (simulated >= targets[0]) & (simulated <= targets[1])
 
-    @cached_property
-    def _force_spline(self) -> RectBivariateSpline:
-        return self._spline(self.hold_force)
+    def summary(chosen: np.ndarray) -> dict:
+        if not chosen.any():
+            return {"draws": 0, "mean_error_m": None, "max_error_m": None}
+        return {
+            "draws": int(chosen.sum()),
+            "mean_error_m": float(error[chosen].mean()),
+            "max_error_m": float(error[chosen].max()),
+        }
 
-    def _spline(self, values: np.ndarray) -> RectBivariateSpline:
-        """Interpolating bicubic spline. Failed nodes are filled by a smooth continuation, so that
-        they do not disturb their neighbours; no answer is read from a cell that they touch.
-        """
-        known = np.isfinite(values)
-        if not known.any():
-            values = np.zeros(values.shape)
-        elif not known.all():
-            nodes = np.stack(np.indices(values.shape), -1).astype(float)
-            continuation = RBFInterpolator(
-                nodes[known], values[known], neighbors=min(24, int(known.sum())), kernel="linear"
-            )
-            values = values.copy()
-            values[~known] = continuation(nodes[~known])
-        return RectBivariateSpline(self.draw_y, self.draw_z, values)
+    return {"box": summary(known), "target_range": summary(near)}
+
+
+def _nodes(grid_y: np.ndarray, grid_z: np.ndarray) -> np.ndarray:
+    """Draws of a grid, y slowest, shape (Y * Z, 2)."""
+    return np.stack(np.meshgrid(grid_y, grid_z, indexing="ij"), -1).reshape(-1, 2)
+
+
+def _columns(launched) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Landing [m], NaN where failed, force [N] and reason of each launch, "" where none."""
+    failure = np.array([reason or NO_FAILURE for reason in launched.failure], object)
+    landing = np.where(failure == NO_FAILURE, launched.landing_y, np.nan)
+    return landing, np.asarray(launched.hold_force, float), failure

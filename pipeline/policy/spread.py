@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from pipeline.errors import UserError
 from pipeline.sling.model import THETA
@@ -16,7 +16,7 @@ LEVEL = 0.9
 MOST = 60  # samples of θ that are launched
 STEP = 1e-3  # m, small against the box of draws and large against the simulator's rounding
 CROSS = STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
-ERRORS = norm.ppf((np.arange(401) + 0.5) / 401)  # equally likely; 41 end 6 % too soon
+ERRORS = ndtri((np.arange(401) + 0.5) / 401)  # equally likely; 41 end 6 % too soon
 
 
 def load_samples(path: Path, band: str, method: str) -> np.ndarray | None:

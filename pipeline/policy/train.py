@@ -1,8 +1,8 @@
-"""Train the slingshot policy with PPO (rsl_rl) on a landing map.
+"""Train the slingshot policy with PPO (rsl_rl) on a landscape of simulated launches.
 
-The landing map is the simulator read between simulated launches (landing_map.py), so what the
-policy learns is the calibrated simulator's own landing. Training keeps the network whose
-deterministic draws land nearest to 256 targets spread over the trained range.
+The landscape is the simulator read between simulated launches (landing_map.py), so what the policy
+learns is the calibrated simulator's own landing. Training keeps the network whose deterministic
+draws earn most over 256 targets spread over the trained range.
 """
 
 from __future__ import annotations
@@ -10,26 +10,37 @@ from __future__ import annotations
 import contextlib
 import copy
 import io
+from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 import torch
 from torch import nn
 
-from pipeline.policy.environment import SlingshotEnv, draw_box
-from pipeline.policy.landing_map import LandingMap
+from pipeline.fingerprint import fingerprint
+from pipeline.policy.checkpoint import Checkpoint
+from pipeline.policy.environment import SlingshotEnv, draw_box, rewarded
+from pipeline.policy.expected import distance
+from pipeline.policy.landscape import Landscape
 
-CONVERGED = 0.01  # mean |y_p - g| [m] over the checked targets that counts as converged
 CHECKED_TARGETS = 256
+KEPT_EVERY = 5  # iterations; a checkpoint takes some 10 ms
+SOURCES = [
+    Path(__file__).with_name(f"{name}.py")
+    for name in ("environment", "expected", "landscape", "train")
+]
+PACKAGES = ("torch", "rsl-rl-lib", "tensordict", "numpy", "scipy")
 
 
 class Policy(nn.Module):
     """Target in metres to draw in metres; the normalisation of both is part of it."""
 
-    def __init__(self, network: nn.Module, targets: tuple[float, float], landing_map: LandingMap):
+    def __init__(self, network: nn.Module, targets: tuple[float, float], landscape: Landscape):
         super().__init__()
         low, high = targets
-        center, half = draw_box(landing_map)
+        center, half = draw_box(landscape)
         self.network = network
         self.register_buffer("target_center", torch.tensor([(low + high) / 2]))
         self.register_buffer("target_half", torch.tensor([(high - low) / 2]))
@@ -41,19 +52,24 @@ class Policy(nn.Module):
         action = self.network((target - self.target_center) / self.target_half)
         return self.draw_center + self.draw_half * torch.tanh(action)
 
+    def draws(self, targets: np.ndarray) -> np.ndarray:
+        """The same for arrays, shapes (N,) and (N, 2)."""
+        with torch.inference_mode():
+            return self(torch.as_tensor(targets, dtype=torch.float32)[:, None]).double().numpy()
+
 
 @dataclass(frozen=True)
 class Trained:
     """A trained policy and how it came about.
 
     Attributes:
-        policy: The network with the smallest error, in evaluation mode.
-        curve: One row an iteration: iteration, mean_reward, mean_error [m] (deterministic, over
-            the checked targets; NaN if all fail), failed_targets (deterministic), failures
-            (exploring launches that failed), learning_rate, std (of the exploration).
+        policy: The network that earned most, in evaluation mode.
+        curve: One row an iteration: iteration, mean_reward (of exploring launches), mean_error [m]
+            (deterministic, over the checked targets; NaN if all fail), failed_targets
+            (deterministic), failures (exploring launches that failed), learning_rate, std (of the
+            exploration). Under several θ errors and failed targets are their mean.
         iteration: The iteration that `policy` comes from.
-        mean_error, max_error: Deterministic |y_p - g| [m] over the checked targets.
-        failed_targets: Checked targets whose launch fails.
+        mean_error: Its error [m], as in the curve.
         failures: Exploring launches that failed, by reason, over the whole training.
     """
 
@@ -61,77 +77,93 @@ class Trained:
     curve: dict[str, list]
     iteration: int
     mean_error: float
-    max_error: float
-    failed_targets: int
     failures: dict[str, int]
 
-    @property
-    def converged(self) -> bool:
-        return self.failed_targets == 0 and self.mean_error <= CONVERGED
 
-
-def train(landing_map: LandingMap, params) -> Trained:
+def train(landscape: Landscape, params, kept: Path | None = None) -> Trained:
     """Train with the settings of `params` (the `policy:` section of params.yaml).
 
+    Args:
+        kept: File of the checkpoint, which the caller removes once it has written what it wants.
+
     Runs on one thread with seeded generators: the same input gives the same network, bit for bit,
-    on one machine.
+    on one machine, also where a training was killed and goes on from its checkpoint.
     """
     from rsl_rl.runners import OnPolicyRunner
 
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
+    with one_thread():
         torch.manual_seed(params.seed)
-        np.random.seed(params.seed)
         env = SlingshotEnv(
-            landing_map,
+            landscape,
             targets=tuple(params.targets),
             num_envs=params.envs,
-            height=params.reward.height,
-            scale=params.reward.scale,
-            penalty=params.reward.penalty,
+            reward=params.reward,
             seed=params.seed,
         )
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
             runner = OnPolicyRunner(env, _runner_config(params), log_dir=None, device="cpu")
-        log_std = np.linspace(*np.log([params.init_std, params.final_std]), params.iterations)
-        curve = _Curve(runner, env, log_std)
-        runner.logger = curve
-        runner.learn(params.iterations)  # once: a second call would start from stale observations
+        checkpoint = kept and Checkpoint(kept, _stamp(landscape, params))
+        training = _Training(runner, env, params, checkpoint)
+        runner.logger = training
+        training.resume()
+        # Once: a second call would start from stale observations.
+        runner.learn(params.iterations - len(training.rows))
+    return training.result()
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Sums of several threads would hang on how many there are."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
     finally:
         torch.set_num_threads(threads)
-    return curve.result()
 
 
-def evaluate(policy: Policy, landing_map: LandingMap, targets: np.ndarray) -> np.ndarray:
-    """|y_p - g| [m] of the deterministic draws for targets [m], NaN where failed, shape (N,)."""
-    with torch.inference_mode():
-        draws = policy(torch.as_tensor(targets, dtype=torch.float32)[:, None])
-    return np.abs(landing_map(draws.double().numpy()).landing_y - targets)
+def earned(
+    landscape: Landscape, draws: np.ndarray, targets: np.ndarray, reward
+) -> tuple[float, float, float]:
+    """Mean reward and |y_p - g| [m] (NaN if all fail) of draws for targets, and failed targets."""
+    rewards, launched = rewarded(landscape, draws, targets, reward)
+    error = distance(launched.landing_y - targets[:, None], launched.spread)
+    failed = launched.failure > 0
+    mean = float(error[~failed].mean()) if not failed.all() else float("nan")
+    return float(rewards.mean()), mean, float(failed.mean(1).sum())
 
 
-class _Curve:
-    """Stands where rsl_rl has its logger: checks the policy after every iteration, keeps the best.
+def _stamp(landscape: Landscape, params) -> str:
+    """Of everything that a training hangs on."""
+    versions = (f"{name} {version(name)}" for name in PACKAGES)
+    return fingerprint(*SOURCES, landscape.fingerprint(), repr(params), *versions)
+
+
+class _Training:
+    """Stands where rsl_rl has its logger: after every iteration it checks the policy, keeps the
+    best, narrows the exploration, and now and then writes a checkpoint.
 
     rsl_rl's own mean reward covers the last 100 episodes only, and its log folder copies git diffs.
-    The exploration also narrows here, geometrically from init_std to final_std: left to itself
-    PPO narrows it so slowly that the mean still wanders by centimetres of landing at the end.
+    The exploration narrows geometrically from init_std to final_std: left to itself PPO narrows it
+    so slowly that the mean still wanders by centimetres of landing at the end.
     """
 
     writer = None
     log_dir = None
 
-    def __init__(self, runner, env: SlingshotEnv, log_std: np.ndarray):
-        self.env = env
-        self.log_std = log_std  # exploration after each iteration, shape (iterations,)
+    def __init__(self, runner, env: SlingshotEnv, params, checkpoint: Checkpoint | None):
+        self.runner, self.env, self.checkpoint = runner, env, checkpoint
+        spread = np.log([params.init_std, params.final_std])
+        schedule = np.linspace(*spread, params.iterations)
+        self.log_std = np.append(schedule, schedule[-1])  # of each iteration, and after the last
         network = runner.alg.get_policy()
         self.distribution = network.distribution
-        self.policy = Policy(network.mlp, env.targets, env.landing_map)
+        self.policy = Policy(network.mlp, env.targets, env.landscape)
         self.checked = np.linspace(*env.targets, CHECKED_TARGETS)
         self.rewards: list[float] = []
         self.rows: list[dict] = []
         self.reasons: dict[str, int] = {}
-        self.best: tuple | None = None
+        self.best: dict | None = None
 
     def init_logging_writer(self) -> None:
         """Nothing to open."""
@@ -140,40 +172,63 @@ class _Curve:
         self.rewards.append(float(rewards.mean()))
 
     def log(self, it: int, learning_rate: float, action_std: torch.Tensor, **_) -> None:
-        error = evaluate(self.policy, self.env.landing_map, self.checked)
-        failed = int(np.isnan(error).sum())
-        mean = float(np.nanmean(error)) if failed < len(error) else float("nan")
         reasons = self.env.take_failures()
         for reason, count in reasons.items():
             self.reasons[reason] = self.reasons.get(reason, 0) + count
+        worth, error, failed = self._check()
         self.rows.append(
             {
                 "iteration": it + 1,
                 "mean_reward": float(np.mean(self.rewards)),
-                "mean_error": mean,
+                "mean_error": error,
                 "failed_targets": failed,
                 "failures": sum(reasons.values()),
-                "learning_rate": learning_rate,
+                "learning_rate": float(learning_rate),
                 "std": float(action_std.detach().mean()),
             }
         )
-        with torch.no_grad():
-            self.distribution.log_std_param.fill_(self.log_std[it])
         self.rewards.clear()
-        quality = (failed, mean if failed < len(error) else float("inf"))
-        if self.best is None or quality < self.best[0]:
-            maximum = float(np.nanmax(error)) if failed < len(error) else float("nan")
-            self.best = (quality, it + 1, mean, maximum, copy.deepcopy(self.policy))
+        with torch.no_grad():
+            self.distribution.log_std_param.fill_(self.log_std[it + 1])
+        if self.best is None or worth > self.best["earned"]:
+            weights = copy.deepcopy(self.policy.state_dict())
+            self.best = {"earned": worth, "row": it, "weights": weights}
+        if self.checkpoint and len(self.rows) % KEPT_EVERY == 0:
+            self.checkpoint.save(self._state())
+
+    def _check(self) -> tuple[float, float, float]:
+        draws = self.policy.draws(self.checked)
+        return earned(self.env.landscape, draws, self.checked, self.env.reward)
+
+    def _state(self) -> dict:
+        return {
+            "algorithm": self.runner.alg.save(),
+            "random": torch.get_rng_state(),
+            "environment": self.env.state(),
+            "rows": self.rows,
+            "reasons": self.reasons,
+            "best": self.best,
+        }
+
+    def resume(self) -> None:
+        """Take up the checkpoint's state, if there is one."""
+        state = self.checkpoint.load() if self.checkpoint else None
+        if state is None:
+            return
+        self.runner.alg.load(state["algorithm"], None, strict=True)
+        self.runner.current_learning_iteration = len(state["rows"])
+        torch.set_rng_state(state["random"])
+        self.env.restore(state["environment"])
+        self.rows, self.reasons, self.best = (state[key] for key in ("rows", "reasons", "best"))
 
     def result(self) -> Trained:
-        (failed, _), iteration, mean, maximum, policy = self.best
+        self.policy.load_state_dict(self.best["weights"])
+        row = self.rows[self.best["row"]]
         return Trained(
-            policy=policy.eval(),
+            policy=self.policy.eval(),
             curve={name: [row[name] for row in self.rows] for name in self.rows[0]},
-            iteration=iteration,
-            mean_error=mean,
-            max_error=maximum,
-            failed_targets=failed,
+            iteration=row["iteration"],
+            mean_error=row["mean_error"],
             failures=dict(sorted(self.reasons.items())),
         )
 
@@ -199,7 +254,7 @@ def _runner_config(params) -> dict:
             "lam": 0.0,
             "entropy_coef": 0.0,
             "num_learning_epochs": 5,
-            "num_mini_batches": 4,
+            "num_mini_batches": 2,
             "schedule": "adaptive",
             "desired_kl": 0.01,
         },

@@ -1,4 +1,4 @@
-"""Trials: what the policy's draws, or a user's own, lead to beside what the simulator predicts.
+"""Trials: what the policies' draws, or a user's own, lead to beside what the simulator predicts.
 
 One row a launch. `kind` says where the landing comes from: "virtual" (the rig, whose rubber is not
 the simulator's), "measured" (a user's CSV) or "predicted" (nothing but the calibrated simulator).
@@ -6,8 +6,7 @@ the simulator's), "measured" (a user's CSV) or "predicted" (nothing but the cali
 
 from __future__ import annotations
 
-import csv
-import math
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.episode import Episode
-from pipeline.errors import UserError
 from pipeline.files import replacing
 
 SCHEMA = pa.schema(
@@ -23,23 +21,68 @@ SCHEMA = pa.schema(
         ("band", pa.string()),
         ("method", pa.string()),
         ("kind", pa.string()),  # virtual, measured or predicted
+        ("policy", pa.string()),  # plain or robust; null where the launch was measured
         ("target", pa.float64()),  # m; null where the launch had none
-        ("trial", pa.int64()),
+        ("trial", pa.int64()),  # counts launches at a target; virtual ones of equal number are
+        # off by the same errors, whatever the method and the policy
         ("draw_y", pa.float64()),  # m, as commanded
         ("draw_z", pa.float64()),
         ("predicted_y", pa.float64()),  # m, by the calibrated simulator; null where it fails
         ("predicted_low", pa.float64()),  # m, central 90 % by what is known of theta, law and draw
         ("predicted_high", pa.float64()),
         ("predicted_failure", pa.string()),
+        ("predicted_leave_y", pa.float64()),  # m, where the simulated projectile leaves the pouch
+        ("predicted_leave_z", pa.float64()),
+        ("predicted_speed", pa.float64()),  # m/s, there
+        ("predicted_angle", pa.float64()),  # rad above the horizon, there
         ("landing_y", pa.float64()),  # m; null where failed, and for predictions
+        ("flight_y", pa.list_(pa.float64())),  # m, from the pouch to the floor; null where none,
+        ("flight_z", pa.list_(pa.float64())),  # and where not virtual
         ("hold_force", pa.float64()),  # N, of the rig where kind is virtual, else as predicted
         ("failure", pa.string()),
         ("stretch", pa.float64()),  # length of the drawn band over its rest length
         ("recorded_stretch", pa.float64()),  # largest of the recording
     ]
 )
-REQUIRED = ("draw_y_m", "draw_z_m", "landing_y_m")
-OPTIONAL = ("target_m", "method")
+
+
+@dataclass(frozen=True)
+class Batch:
+    """N launches of one kind and policy; a cell is None where there is nothing to tell.
+
+    Attributes:
+        draws: As commanded (y, z) [m], shape (N, 2).
+        targets: Aimed at [m].
+        landing: Where they landed [m].
+        failure: Why they did not.
+        hold_force: Of the drawn band on the hand [N]; None: as predicted.
+        flight: Way of the projectile (y, z) [m], shape (K, 2) each.
+    """
+
+    kind: str
+    policy: str | None
+    draws: np.ndarray
+    targets: list[float | None]
+    landing: list[float | None]
+    failure: list[str | None]
+    hold_force: list[float | None]
+    flight: list[np.ndarray | None]
+
+    @classmethod
+    def without_flight(
+        cls, kind: str, policy: str | None, draws, targets, landing=None, failure=None
+    ) -> Batch:
+        """Launches of which nobody saw more than the landing, if that."""
+        nothing = [None] * len(draws)
+        return cls(
+            kind, policy, np.asarray(draws, float), list(targets),
+            landing or nothing, failure or nothing, nothing, nothing,
+        )  # fmt: skip
+
+
+def trial_seed(trials, number):
+    """Seed of a band's launch by its number, an int or an array; the same for every policy."""
+    return 1_000_000 * trials.seed + number
 
 
 def stretch_of(points: np.ndarray, fork_width: float, rest_length: float) -> np.ndarray:
@@ -58,106 +101,82 @@ def recorded_stretch(episode: Episode, fork_width: float, rest_length: float) ->
     return float(stretch_of(episode.position[held], fork_width, rest_length).max())
 
 
-def read_measured(path: Path, method: str) -> list[dict]:
-    """Measured launches of a CSV: those of `method`, and those that name no method.
-
-    Columns draw_y_m, draw_z_m, landing_y_m, and where known target_m and method. An empty
-    landing_y_m is a launch that did not land. Raises UserError.
-    """
-    try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            names = [name.strip() for name in reader.fieldnames or []]
-            reader.fieldnames = names
-            lines = list(enumerate(reader, start=2))
-    except UnicodeDecodeError as error:
-        raise UserError(f"{path}: not UTF-8 text, save it as CSV (UTF-8)") from error
-    except (OSError, csv.Error) as error:
-        raise UserError(f"{path}: cannot be read as CSV ({error})") from error
-    missing = [name for name in REQUIRED if name not in names]
-    unknown = [name for name in names if name not in REQUIRED + OPTIONAL]
-    if missing or unknown:
-        what = f"lacks the column {missing[0]}" if missing else f"unknown column {unknown[0]!r}"
-        raise UserError(f"{path}: {what}; columns are {','.join(REQUIRED + OPTIONAL)}")
-    rows = []
-    for line, cells in lines:
-        row = {name: (cells.get(name) or "").strip() for name in REQUIRED + OPTIONAL}
-        if row["method"] not in ("", method):
-            continue
-        numbers = {name: _cell(path, line, name, row) for name in (*REQUIRED, "target_m")}
-        if numbers["draw_y_m"] is None or numbers["draw_z_m"] is None:
-            raise UserError(f"{path}, line {line}: a draw needs draw_y_m and draw_z_m")
-        if numbers["draw_y_m"] >= 0:
-            raise UserError(
-                f"{path}, line {line}: draw_y_m must be below 0 (behind the fork),"
-                f" got {numbers['draw_y_m']:g}"
-            )
-        rows.append(numbers)
-    return rows
-
-
-def _cell(path: Path, line: int, name: str, row: dict) -> float | None:
-    text = row[name]
-    if not text:
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise UserError(f"{path}, line {line}: {name} must be a number of metres, got {text!r}")
-    return value
+def limited(launches, max_force: float):
+    """Launches of a simulator without a limit, by an arm that can hold no more than `max_force`."""
+    force = launches.hold_force
+    over = force > max_force
+    failure = [
+        f"holding takes {force[i]:.1f} N, more than {max_force:g} N" if over[i] else reason
+        for i, reason in enumerate(launches.failure)
+    ]
+    unknown = {
+        field.name: np.where(over, np.nan, getattr(launches, field.name))
+        for field in fields(launches)
+        if field.name not in ("hold_force", "failure")
+    }
+    return replace(launches, **unknown, failure=failure)
 
 
 def table(
-    *,
     band: str,
     method: str,
-    kind: str,
-    draws: np.ndarray,
-    targets: list[float | None],
+    batches: list[Batch],
+    *,
     predicted,
     intervals: np.ndarray,
-    landing: list[float | None],
-    failure: list[str | None],
-    hold_force: np.ndarray,
     stretch: np.ndarray,
     recorded: float | None,
 ) -> pa.Table:
-    """Trials as a table of `SCHEMA`.
+    """Trials as a table of `SCHEMA`, batch after batch; N launches in all.
 
     Args:
-        draws: Commanded draws (y, z) [m], shape (N, 2).
-        predicted: The calibrated simulator's launches of those draws.
+        predicted: The calibrated simulator's launches of their draws.
         intervals: Where 90 % of them would land [m], shape (N, 2); NaN where that is not known.
-        landing: Where they landed [m], None where nowhere or unknown.
+        stretch: Of the drawn band, shape (N,).
         recorded: Largest stretch of the recording.
     """
-    count = len(draws)
-    seen: dict[float | None, int] = {}
-    trial = []
-    for target in targets:
-        seen[target] = seen.get(target, 0) + 1
-        trial.append(seen[target])
+
+    def every(name: str) -> list:
+        return [value for batch in batches for value in getattr(batch, name)]
+
+    def each(name: str) -> list:
+        return [getattr(batch, name) for batch in batches for _ in batch.draws]
+
+    def known(values) -> pa.Array:
+        return pa.array(values, pa.float64(), from_pandas=True)
+
+    force = zip(every("hold_force"), predicted.hold_force, strict=True)
     columns = {
-        "band": [band] * count,
-        "method": [method] * count,
-        "kind": [kind] * count,
-        "target": targets,
-        "trial": trial,
-        "draw_y": draws[:, 0],
-        "draw_z": draws[:, 1],
-        "predicted_y": pa.array(predicted.landing_y, pa.float64(), from_pandas=True),
-        "predicted_low": pa.array(intervals[:, 0], pa.float64(), from_pandas=True),
-        "predicted_high": pa.array(intervals[:, 1], pa.float64(), from_pandas=True),
+        "band": [band] * len(stretch),
+        "method": [method] * len(stretch),
+        "kind": each("kind"),
+        "policy": each("policy"),
+        "target": every("targets"),
+        "trial": [number for batch in batches for number in _counted(batch.targets)],
+        "draw_y": [y for y, _ in every("draws")],
+        "draw_z": [z for _, z in every("draws")],
+        "predicted_y": known(predicted.landing_y),
+        "predicted_low": known(intervals[:, 0]),
+        "predicted_high": known(intervals[:, 1]),
         "predicted_failure": predicted.failure,
-        "landing_y": landing,
-        "hold_force": pa.array(hold_force, pa.float64(), from_pandas=True),
-        "failure": failure,
+        "predicted_leave_y": known(predicted.leave_y),
+        "predicted_leave_z": known(predicted.leave_z),
+        "predicted_speed": known(predicted.speed),
+        "predicted_angle": known(predicted.angle),
+        "landing_y": every("landing"),
+        "flight_y": [None if way is None else way[:, 0] for way in every("flight")],
+        "flight_z": [None if way is None else way[:, 1] for way in every("flight")],
+        "hold_force": known([theirs if own is None else own for own, theirs in force]),
+        "failure": every("failure"),
         "stretch": stretch,
-        "recorded_stretch": [recorded] * count,
+        "recorded_stretch": [recorded] * len(stretch),
     }
     return pa.table(columns, schema=SCHEMA)
+
+
+def _counted(targets: list[float | None]) -> list[int]:
+    """How many launches a target has had with each, from 1."""
+    return [targets[: i + 1].count(target) for i, target in enumerate(targets)]
 
 
 def save(trials: pa.Table, path: Path) -> None:

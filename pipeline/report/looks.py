@@ -21,8 +21,9 @@ KNOWN = {
     "package_si": ("Package SI", "#33673b"),
 }
 SPARE = ("#2e4057", "#8c8c8c", "#c2187b", "#00b5a0", "#5e35b1", "#9e9d24")  # of a user's methods
-DRAWN = ("sling2sim2real_taut", "sling2sim2real")  # rather than others where curves would crowd
-COUNT = 2  # of methods in such pictures
+# Rather than others where curves would crowd: two in a band's own pictures, four side by side.
+DRAWN = ("sling2sim2real_taut", "sling2sim2real", "package_si", "real2sim2real")
+FEW, SIDE_BY_SIDE = 2, 4
 
 
 @dataclass(frozen=True)
@@ -45,12 +46,12 @@ def looks(methods: Iterable[str]) -> dict[str, Look]:
     }
 
 
-def drawn(methods: Iterable[str]) -> list[str]:
-    """Which methods stand in pictures that can hold only two: ours and the paper's before others.
+def drawn(methods: Iterable[str], count: int = FEW) -> list[str]:
+    """Which methods stand in pictures that can hold only `count`: ours, the paper's, its baselines.
 
     In the order of `methods`.
     """
     methods = list(methods)
     first = [method for method in DRAWN if method in methods]
-    chosen = (first + [method for method in methods if method not in first])[:COUNT]
+    chosen = (first + [method for method in methods if method not in first])[:count]
     return [method for method in methods if method in chosen]

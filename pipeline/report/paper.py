@@ -31,7 +31,9 @@ LANDING = {
     ("Band 3", "Real2Sim2Real"): (None, None, None, None),
 }
 TARGETS = (1.725, 1.925, 2.125)
+REPEATS = 5  # launches a cell
 BANDS = {"band1": "Band 1", "band2": "Band 2", "band3": "Band 3"}  # ours that imitate them
+KINDS = {"Band 1": "soft", "Band 2": "medium", "Band 3": "stiff"}
 METHODS = {  # ours that are theirs
     "sling2sim2real": "Sling2Sim2Real",
     "package_si": "Package SI",
@@ -44,6 +46,16 @@ METHODS = {  # ours that are theirs
     "no_covariance_no_multistart": "without covariance and multi-start",
     "no_work": "without the work term",
 }
+# Rows of its tables, in its order; the method itself comes last in each.
+BENCHMARK = ("real2sim2real", "package_si", "sling2sim2real")  # tables 1 and 2
+OPTIMISERS = ("de", "bo", "adam", "sling2sim2real")  # table 3
+ABLATIONS = (  # table 4
+    "no_covariance_no_multistart",
+    "no_multistart",
+    "no_covariance",
+    "no_work",
+    "sling2sim2real",
+)
 
 # Identified E [Pa], nu, damping [s], friction, damping scale, and the loss.
 THETA = {

@@ -12,6 +12,7 @@ from pipeline.identify.loss import EpisodeLoss
 from pipeline.identify.nuisance import along_axes
 from pipeline.theta import calibrated, vector
 
+LOAD = 1.5  # kg: the paper's dumbbell
 SEEN_BY_CAMERA = ("camera_delay", "cloud_shift_x", "cloud_shift_y", "cloud_shift_z")
 
 
@@ -26,6 +27,8 @@ class Replay:
         measured_work, work: Of the band on the hand since the start [J], shape (T,); forces and
             velocity through the loss's median filter, so that they end apart by its work term.
         residuals: "force" [N] and "cloud" [cm] during the pull, each "fitted" and "held_out".
+        loaded: Nodes of the band at rest with `LOAD` at its middle [m], shape (L, 3), NaN where
+            that was not found; no recording shows this.
     """
 
     force: np.ndarray
@@ -34,6 +37,7 @@ class Replay:
     measured_work: np.ndarray
     work: np.ndarray
     residuals: dict[str, dict[str, float]]
+    loaded: np.ndarray
 
 
 def replay(params, band: str, method: str, episode: Episode, theta: dict) -> Replay:
@@ -42,6 +46,7 @@ def replay(params, band: str, method: str, episode: Episode, theta: dict) -> Rep
     Raises:
         UserError: θ fails in simulation.
     """
+    from pipeline.sling.hang import hang
     from pipeline.sling.interaction import interact
 
     sling = calibrated(params, band, theta)
@@ -66,6 +71,7 @@ def replay(params, band: str, method: str, episode: Episode, theta: dict) -> Rep
             kind: {part: float(value[0]) for part, value in parts.items()}
             for kind, parts in loss.residuals(rollouts, nuisances).items()
         },
+        loaded=hang(sling, vector(theta), LOAD)[0],
     )
 
 

@@ -10,9 +10,11 @@ import pandas as pd
 
 from pipeline.episode import Episode
 from pipeline.identify.regions import Region, load_regions
+from pipeline.oracle.floor import load_floor
 from pipeline.params import pairs
+from pipeline.policy.aim import ROBUST
 from pipeline.policy.landing_map import LandingMap
-from pipeline.stage import expect
+from pipeline.stage import expect, expect_from
 from pipeline.theta import load_theta
 
 
@@ -26,10 +28,11 @@ class Result:
         regions: Where the refinement began; none for a search of one phase.
         axes: Names of the regions' axes in the unit cube.
         posterior: "names", "samples", "profiles", "mean"; None where θ has no confidence.
-        card: The policy's card.
+        card: The policy's card; `robust_card` that of the second policy, None without one.
         training: One row an iteration of the policy's training.
         landing_map: Simulated launches over the box of draws.
-        trials: One row a launch (pipeline/policy/trials.py).
+        trials: One row a launch (pipeline/policy/trials.py), those of the robust policy apart.
+        robust_trials: Its launches; no rows where the method has none.
     """
 
     band: str
@@ -40,9 +43,11 @@ class Result:
     axes: list[str]
     posterior: dict | None
     card: dict
+    robust_card: dict | None
     training: pd.DataFrame
     landing_map: LandingMap
     trials: pd.DataFrame
+    robust_trials: pd.DataFrame
 
     @property
     def confidence(self) -> dict:
@@ -52,10 +57,14 @@ class Result:
 
 @dataclass(frozen=True)
 class Results:
-    """All that ran: `episodes` by band, `methods` by band and then method, in the order of run."""
+    """All that ran: `episodes` by band, `methods` by band and then method, in the order of run.
+
+    `floors` is the actuation floor of each band that the rig launches (pipeline/oracle/floor.py).
+    """
 
     episodes: dict[str, Episode]
     methods: dict[str, dict[str, Result]]
+    floors: dict[str, dict]
 
     @property
     def trials(self) -> pd.DataFrame:
@@ -75,14 +84,17 @@ def gather(params, root: str | Path = ".") -> Results:
         expect(data / "episodes" / band / "signals.parquet", f"episode@{band}")
         episodes[band] = Episode.load(data / "episodes" / band)
     for band, method in pairs(params.run):
-        prefix = "" if method in params.run.methods else "ablation_"
-        methods[band][method] = _result(data, band, method, prefix)
-    return Results(episodes, methods)
+        methods[band][method] = _result(params.run, data, band, method)
+    floors = {
+        band: load_floor(expect(data / "floor" / f"{band}.json", f"floor@{band}"))
+        for band in params.run.rig
+    }
+    return Results(episodes, methods, floors)
 
 
-def _result(data: Path, band: str, method: str, prefix: str) -> Result:
+def _result(run, data: Path, band: str, method: str) -> Result:
     def path(step: str, name: str, stage: str) -> Path:
-        return expect(data / step / band / name, f"{prefix}{stage}@{band}-{method}")
+        return expect_from(run, stage, band, method, data / step / band / name)
 
     policy = f"{method}/"
     history = [
@@ -93,6 +105,9 @@ def _result(data: Path, band: str, method: str, prefix: str) -> Result:
     posterior = None
     if theta.get("confidence"):
         posterior = json.loads(path("confidence", f"{method}.json", "theta").read_text("utf-8"))
+    trials = pd.read_parquet(path("trials", f"{method}.parquet", "trials"))
+    robust = trials.policy == "robust"
+    robust_card = data / "policies" / band / method / ROBUST / "card.json"
     return Result(
         band=band,
         method=method,
@@ -102,7 +117,9 @@ def _result(data: Path, band: str, method: str, prefix: str) -> Result:
         axes=json.loads(clusters.read_text("utf-8"))["names"],
         posterior=posterior,
         card=json.loads(path("policies", policy + "card.json", "policy").read_text("utf-8")),
+        robust_card=json.loads(robust_card.read_text("utf-8")) if robust_card.is_file() else None,
         training=pd.read_parquet(path("policies", policy + "training.parquet", "policy")),
         landing_map=LandingMap.load(path("policies", policy + "map.parquet", "policy")),
-        trials=pd.read_parquet(path("trials", f"{method}.parquet", "trials")),
+        trials=trials[~robust].reset_index(drop=True),
+        robust_trials=trials[robust].reset_index(drop=True),
     )

@@ -1,4 +1,4 @@
-"""Write reports/README.md, its pictures and metrics.json."""
+"""Write reports/: README.md, its pictures, tables and metrics, and all in index.html."""
 
 from __future__ import annotations
 
@@ -7,42 +7,80 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.files import write_json, write_text
-from pipeline.policy.aim import policy_draws
-from pipeline.report.chapters.appendix import budget, papers_numbers, policies
+from pipeline.policy.aim import ROBUST, policy_draws
+from pipeline.report.chapters.appendix import budget, policies
 from pipeline.report.chapters.band import band_chapter, compared
 from pipeline.report.chapters.identification import identification
+from pipeline.report.chapters.pictures import pictures
 from pipeline.report.chapters.summary import summary
-from pipeline.report.figures import confidence, episode, policy, search
-from pipeline.report.looks import Look, drawn, looks
+from pipeline.report.figures import confidence, episode, launches, loaded, policy, search
+from pipeline.report.looks import SIDE_BY_SIDE, Look, drawn, looks
 from pipeline.report.losses import has_another_loss
 from pipeline.report.metrics import metrics
+from pipeline.report.page import write_page
 from pipeline.report.replay import Replay, replay
-from pipeline.report.results import Results, gather
+from pipeline.report.results import Result, Results, gather
+from pipeline.report.tables.paper_tables import write_tables
 
 
 def write(params, root: str | Path = ".") -> None:
     """Write the report of everything in params.run. Raises UserError where an input is missing."""
     root = Path(root)
+    folder = root / "reports"
     results = gather(params, root)
     named = looks(dict.fromkeys(result.method for result in results))
-    parts = [summary(results, named), identification(params, results, named)]
+    replays = {band: _replays(params, results, band) for band in params.run.bands}
+    common_figures(params, results, replays, named, folder / "figures")
+    parts = [
+        summary(results, named),
+        write_tables(params, results, named, results.floors, folder / "tables"),
+        pictures(params, results, replays),
+    ]
     for band in params.run.bands:
-        replays = _replays(params, results, band)
-        parts.append(band_chapter(params, results, band, replays, named, root))
-        draw_figures(params, results, band, replays, named, root)
-    parts += [policies(params, results, named), papers_numbers(), budget(params)]
-    folder = root / "reports"
-    write_json(folder / "metrics.json", metrics(results))
-    write_text(folder / "README.md", "\n".join(parts))
+        parts.append(band_chapter(params, results, band, replays[band], named, root))
+        draw_figures(params, results, band, replays[band], named, root)
+    parts += [identification(params, results, named), policies(params, results, named)]
+    parts.append(budget(params))
+    markdown = "\n".join(parts)
+    for name, content in metrics(results).items():
+        write_json(folder / "metrics" / f"{name}.json", content)
+    write_text(folder / "README.md", markdown)
+    write_page(params, results, replays, named, markdown, folder)
 
 
 def _replays(params, results: Results, band: str) -> dict[str, Replay]:
     """Of the methods that are drawn; of all where held-out data are to be compared."""
     recorded, methods = results.episodes[band], results.methods[band]
+    everyone = params.loss.held_out.blocks
     return {
         method: replay(params, band, method, recorded, methods[method].theta)
-        for method in (methods if params.loss.held_out.blocks else drawn(methods))
+        for method in (methods if everyone else drawn(methods, SIDE_BY_SIDE))
     }
+
+
+def common_figures(
+    params,
+    results: Results,
+    replays: dict[str, dict[str, Replay]],
+    named: dict[str, Look],
+    folder: Path,
+) -> None:
+    """Pictures that show all bands beside each other."""
+    methods = drawn(params.run.methods, SIDE_BY_SIDE)
+    launches.trajectories(
+        folder / "trajectories.png", results, methods, named, params.setup.fork_height
+    )
+    launches.scatter(folder / "scatter.png", results, methods, named)
+    shown = {band: {m: of_band[m] for m in methods} for band, of_band in replays.items()}
+    setup = params.setup
+    loaded.loaded(
+        folder / "loaded.png",
+        results.episodes,
+        shown,
+        named,
+        setup.fork_width,
+        setup.fork_height,
+    )
 
 
 def draw_figures(
@@ -83,9 +121,17 @@ def draw_figures(
         policy.landing_map(
             path(f"{method}-map"),
             result,
-            policy_draws(root / "data" / "policies" / band / method, targets),
+            _draws(root / "data" / "policies" / band / method, targets, result),
             np.array(params.trials.targets),
             float(result.trials.recorded_stretch.max()),
             params.setup.fork_width,
             about.rest_length,
         )
+
+
+def _draws(folder: Path, targets: np.ndarray, result: Result) -> dict[str, np.ndarray]:
+    """Draws (N, 2) for targets (N,) of a method's policy, and of its robust one where there is."""
+    draws = {"the policy's": policy_draws(folder, targets)}
+    if result.robust_card:
+        draws["the robust policy's"] = policy_draws(folder / ROBUST, targets)
+    return draws

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 PATIENCE = 0.5  # s within which the projectile leaves the pouch, if it ever does
 FLIGHT = 20.0  # s, more than any flight takes
 FOOT = ROD  # m: height of the bar that joins the fork's rods on the floor
+POINTS = 40  # of a flight, evenly in time
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class Trial:
         failure: None, or why there is no landing.
         hold_force: Of the drawn band on the hand.
         speed, angle: Of the projectile as it leaves the pouch [m/s, rad above the horizon].
+        flight: Its way (y, z) [m] from the pouch to the floor, or to the fork if it hits that,
+            shape (K, 2); None where it did not fly.
     """
 
     landing_y: float
@@ -37,6 +40,7 @@ class Trial:
     hold_force: float
     speed: float = float("nan")
     angle: float = float("nan")
+    flight: np.ndarray | None = field(default=None, compare=False)
 
 
 def launch(
@@ -88,20 +92,21 @@ def launch_from(
     position, velocity = states[-1, loaded.middle, 1:3], states[-1, loaded.middle, 4:6]
     floor = -params.setup.fork_height
     drag = params.rig.projectile_drag / mass
-    landing = fly(position, velocity, floor, drag)
+    way = flight(position, velocity, floor, drag)
+    landing = float(way[-1, 0])
     speed, angle = float(np.hypot(*velocity)), float(np.arctan2(velocity[1], velocity[0]))
     if not landing > 0:
         reason = "too short: the projectile fell before the fork"
-        return Trial(float("nan"), reason, hold_force, speed, angle)
+        return Trial(float("nan"), reason, hold_force, speed, angle, way)
     if fly(position, velocity, floor + FOOT, drag) < 0:
         reason = "hits the fork: too low where it passes"
-        return Trial(float("nan"), reason, hold_force, speed, angle)
+        return Trial(float("nan"), reason, hold_force, speed, angle, way[way[:, 0] < 0])
     low, high = TARGET_AREA
     if not low <= landing <= high:
         where = "too short" if landing < low else "beyond the area"
         reason = f"{where}: lands at {landing:.3f} m, not within {low:g} to {high:g} m"
-        return Trial(landing, reason, hold_force, speed, angle)
-    return Trial(landing, None, hold_force, speed, angle)
+        return Trial(landing, reason, hold_force, speed, angle, way)
+    return Trial(landing, None, hold_force, speed, angle, way)
 
 
 def fly(position: np.ndarray, velocity: np.ndarray, floor: float, drag: float) -> float:
@@ -110,8 +115,13 @@ def fly(position: np.ndarray, velocity: np.ndarray, floor: float, drag: float) -
     Args:
         drag: Deceleration per squared speed [1/m].
     """
+    return float(flight(position, velocity, floor, drag)[-1, 0])
+
+
+def flight(position: np.ndarray, velocity: np.ndarray, floor: float, drag: float) -> np.ndarray:
+    """Its way there (y, z) [m], evenly in time, shape (POINTS, 2); where it is, if below."""
     if position[1] <= floor:
-        return float(position[0])
+        return position[None]
 
     def rates(time: float, state: np.ndarray) -> np.ndarray:
         speed = np.hypot(state[2], state[3])
@@ -122,5 +132,10 @@ def fly(position: np.ndarray, velocity: np.ndarray, floor: float, drag: float) -
 
     height.terminal, height.direction = True, -1
     state = np.concatenate([position, velocity])
-    flight = solve_ivp(rates, (0, FLIGHT), state, events=height, rtol=1e-9, atol=1e-9)
-    return float(flight.y_events[0][0][0])
+    path = solve_ivp(
+        rates, (0, FLIGHT), state, events=height, rtol=1e-9, atol=1e-9, dense_output=True
+    )
+    end = path.t_events[0][0]
+    way = path.sol(np.linspace(0, end, POINTS))[:2].T
+    way[-1] = path.y_events[0][0][:2]
+    return way

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from pipeline.rig.rubber import UNIT_MODULUS, Rubber, energy_density, nominal_stress
+from pipeline.rig.statics import balanced
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 AIR_DENSITY = 1.2  # kg/m3
@@ -246,6 +247,8 @@ class ElasticString:
         frozen = replace(rubber, relaxation=np.array([[excess, FOREVER]]))
         sticky = replace(self, rubber=frozen, damping=2 * np.sqrt(-GRAVITY[2] / (self.length / 2)))
         start, hand = sticky.state(x, np.zeros(1)), still if held else None
+        if held and (nodes := balanced(sticky, start, tolerance / 100)) is not None:
+            return self.state(nodes, memory)
         end = sticky.integrate(start, np.array([0.0, SETTLING_TIME]), tolerance, hand=hand)[1][-1]
         return self.state(end[:, :3], memory)
 

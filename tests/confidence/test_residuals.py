@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.confidence.residuals import BINS, Residuals, filtered
+from pipeline.confidence.residuals import BINS, Residuals
 from pipeline.identify.loss import EpisodeLoss
 from tests.identify import toy
 from tests.identify.own_law import visible
@@ -124,8 +124,12 @@ def test_forces_pass_the_filter_of_the_loss(episode) -> None:
     )
     rollouts = toy.rollouts(episode, 2)
     rollouts.force[:] = np.sin(3 * rollouts.times)[:, None] * [1.0, 2.0, -1.0]
-    ours = filtered(rollouts, episode, toy.CUTOFF)
-    np.testing.assert_allclose(ours, loss.filtered(rollouts), atol=1e-9)
+    residuals, expected = made(episode), loss.filtered(rollouts)
+    np.testing.assert_allclose(residuals.force(rollouts), expected, atol=1e-9)
+    until = episode.release_time - episode.time
+    held = expected[:, (until > 0.05) & (until < 0.5)].mean(axis=1)
+    found = residuals.hold_force(residuals(rollouts))
+    np.testing.assert_allclose(found, np.linalg.norm(held, axis=1), atol=1e-9)
 
 
 def test_frames_without_points_are_masked(episode) -> None:

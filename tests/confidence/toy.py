@@ -63,6 +63,9 @@ class ToyResiduals:
     def __init__(self, toy: Toy) -> None:
         self.toy = toy
 
+    def hold_force(self, vectors: np.ndarray) -> np.ndarray:
+        return np.ones(len(vectors))
+
     def __call__(self, rollouts) -> np.ndarray:
         gap = (rollouts.even - self.toy.truth) @ self.toy.columns.T
         return self.toy.noise - gap - self.toy.late @ rollouts.shift
@@ -81,8 +84,6 @@ def fitted(
     toy.times = np.array([episode.release_time, episode.cloud_time[0]])
     monkeypatch.setattr(rounds, "interact", toy.interact)
     monkeypatch.setattr(rounds, "Residuals", toy.residuals)
-    force = np.ones((rounds.LANES, len(episode.time), 3))
-    monkeypatch.setattr(rounds, "filtered", lambda *_: force)
     small = Tolerances(release=1e-7, camera=1e-7)
     return fit(
         episode, None, 35.0, axes or toy.axes, start, tolerances=small, workers=1, **settings

@@ -108,19 +108,6 @@ def test_a_failure_counts_twice_the_worst_so_far() -> None:
     assert np.isfinite(Penalty()(np.array([np.inf]))).all()
 
 
-@pytest.mark.parametrize("text", ["0", "-1", "two", "1.5", "²"])
-def test_an_impossible_number_of_workers_is_refused(text: str, monkeypatch) -> None:
-    monkeypatch.setenv("SLING_WORKERS", text)
-    with pytest.raises(UserError, match="SLING_WORKERS"):
-        session.workers()
-
-
-def test_an_unknown_device_is_refused(monkeypatch) -> None:
-    monkeypatch.setenv("SLING_DEVICE", "tpu")
-    with pytest.raises(UserError, match="SLING_DEVICE"):
-        session.device()
-
-
 @pytest.mark.parametrize(("band", "method"), [("no", "yes"), ("yes", "no")])
 def test_an_unknown_band_or_method_is_refused(band: str, method: str) -> None:
     params = SimpleNamespace(bands={"yes": None}, methods={"yes": None})

@@ -15,8 +15,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from pipeline.fingerprint import fingerprint
 from pipeline.identify.evaluate import Evaluation, Evaluator
-from pipeline.identify.memo import NOT_FINITE, Memo, fingerprint
+from pipeline.identify.memo import NOT_FINITE, Memo
 from pipeline.identify.session import SOURCES
 from tests.identify import toy
 from tests.identify.functions import NAMES, Evaluate, quadratic

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from pipeline.identify.regions import (
     find_regions,
     isotropic,
     load_regions,
+    regions_of,
     regularised,
     save_regions,
     suppress,
@@ -104,6 +106,20 @@ def test_regions_without_covariance_are_balls_at_the_same_places() -> None:
         np.testing.assert_array_equal(ball.mu, ellipsoid.mu)
         np.testing.assert_array_equal(ball.sigma, isotropic(ellipsoid.sigma))
         assert np.ptp(np.linalg.eigvalsh(ellipsoid.sigma)) > 0
+
+
+def test_a_method_may_ask_for_regions_of_its_own() -> None:
+    """As many as `optimizer` says unless the method says so, and balls where it asks for them."""
+    rng = np.random.default_rng(1)
+    history = SimpleNamespace(unit=rng.random((80, 3)), total=rng.random(80))
+    optimizer = SimpleNamespace(k_top=4, k_nn=15, delta=0.1)
+    many, asked = regions_of(SimpleNamespace(k_top=None, covariance=True), optimizer, history)
+    assert (len(many), asked) == (4, 4)
+    few, asked = regions_of(SimpleNamespace(k_top=2, covariance=False), optimizer, history)
+    assert (len(few), asked) == (2, 2)
+    for ball, ellipsoid in zip(few, many, strict=False):
+        np.testing.assert_array_equal(ball.mu, ellipsoid.mu)
+        np.testing.assert_array_equal(ball.sigma, isotropic(ellipsoid.sigma))
 
 
 def test_a_history_that_failed_has_no_regions() -> None:

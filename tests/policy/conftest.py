@@ -5,18 +5,19 @@ from types import SimpleNamespace
 import pytest
 
 from pipeline.policy.landing_map import LandingMap
+from pipeline.policy.landscape import Landscape
 from tests.policy import toy
 
 SETTINGS = SimpleNamespace(
     seed=1,
     targets=(1.425, 2.425),
     envs=512,
-    steps=8,
+    steps=4,
     iterations=50,
     hidden=(256, 128, 64),
     learning_rate=1e-3,
     init_std=0.5,
-    final_std=0.02,
+    final_std=0.005,
     reward=SimpleNamespace(height=5.0, scale=1.0, penalty=1.0),
 )
 
@@ -38,4 +39,4 @@ def toy_map() -> LandingMap:
 def trained(toy_map):
     from pipeline.policy.train import train
 
-    return train(toy_map, SETTINGS)
+    return train(Landscape([toy_map]), SETTINGS)

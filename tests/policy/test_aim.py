@@ -14,6 +14,7 @@ from pipeline.policy.aim import aim, policy_draws, simulator
 from pipeline.policy.export import write_onnx
 from pipeline.sling.model import THETA
 from tests.policy import toy
+from tests.policy.linear import write_policy
 from tests.project import ROOT
 
 PARAMS = SimpleNamespace(
@@ -25,6 +26,7 @@ PARAMS = SimpleNamespace(
 )
 
 
+ROBUST_DRAW = (-0.37, -0.21)
 LEFT_OUT = "the interval leaves out how well the parameters are known"
 
 
@@ -32,6 +34,7 @@ LEFT_OUT = "the interval leaves out how well the parameters are known"
 def root(trained, tmp_path_factory):
     root = tmp_path_factory.mktemp("root")
     write_onnx(trained.policy, root / "data/policies/toy/none/policy.onnx")
+    write_policy(root / "data/policies/toy/none/robust/policy.onnx", (0, 0), ROBUST_DRAW)
     file = root / "data/theta/toy/none.json"
     file.parent.mkdir(parents=True)
     theta = dict.fromkeys(THETA, 0.4) | {"youngs_modulus": 4e5}
@@ -39,9 +42,9 @@ def root(trained, tmp_path_factory):
     return root
 
 
-def shoot(root, target: float, launcher=toy.launch, **settings) -> dict:
+def shoot(root, target: float, launcher=toy.launch, robust=False, **settings) -> dict:
     params = SimpleNamespace(**{**vars(PARAMS), **settings})
-    return aim(params, "toy", "none", target, root, launcher=launcher)
+    return aim(params, "toy", "none", target, root, launcher=launcher, robust=robust)
 
 
 def test_the_draw_lands_on_the_target(root) -> None:
@@ -51,8 +54,20 @@ def test_the_draw_lands_on_the_target(root) -> None:
     assert truth.landing_y[0] == pytest.approx(1.925, abs=0.02)
     assert answer["predicted_landing_m"] == pytest.approx(truth.landing_y[0], abs=1e-6)
     assert answer["hold_force_n"] == pytest.approx(truth.hold_force[0], abs=1e-6)
+    assert answer["max_force_n"] == 15.0
     assert answer["warnings"] == [LEFT_OUT]
     np.testing.assert_allclose(policy_draws(root / "data/policies/toy/none", [1.925]), draw)
+
+
+def test_the_robust_policy_is_another_one_with_an_interval_of_its_own(root) -> None:
+    answer = shoot(root, 1.925, robust=True)
+    draw = [answer["draw_y_m"], answer["draw_z_m"]]
+    np.testing.assert_allclose(draw, ROBUST_DRAW, atol=1e-7)
+    truth = toy.launch(np.array([draw])).landing_y[0]
+    assert answer["predicted_landing_m"] == pytest.approx(truth)
+    low, high = answer["interval_90_m"]
+    assert low < truth < high
+    assert f"{truth - 1.925:+.2f} m off the target" in answer["warnings"][0]
 
 
 def test_nine_landings_of_ten_lie_in_the_interval(root) -> None:
@@ -136,6 +151,19 @@ def test_a_failed_launch_has_no_prediction(root) -> None:
     assert any("it broke" in line for line in answer["warnings"])
 
 
+def test_says_why_there_is_no_interval(root) -> None:
+    """The draw lands, and one a millimetre shorter does not."""
+
+    def brittle(draws: np.ndarray):
+        launched = toy.launch(draws)
+        launched.failure = ["it broke" if len(draws) > 1 else None] * len(draws)
+        return launched
+
+    answer = shoot(root, 1.925, launcher=brittle)
+    assert answer["predicted_landing_m"] is not None and answer["interval_90_m"] is None
+    assert any(line.startswith("no interval: ") for line in answer["warnings"])
+
+
 @pytest.mark.parametrize(
     ("band", "method", "message"),
     [
@@ -161,5 +189,12 @@ def test_a_damaged_policy_is_one_line(root, tmp_path) -> None:
 
 
 def test_says_which_stage_trains_the_policy(root, tmp_path) -> None:
-    with pytest.raises(UserError, match="dvc repro policy@toy-none"):
-        policy_draws(tmp_path / "data/policies/toy/none", np.array([1.9]))
+    folder = tmp_path / "data/policies/toy/none"
+    with pytest.raises(UserError, match="`dvc repro policy@toy-none` trains it$"):
+        policy_draws(folder, np.array([1.9]))
+    with pytest.raises(UserError, match="policy@toy-none` trains it where policy.robust.methods"):
+        policy_draws(folder / "robust", np.array([1.9]))
+    (folder / "robust").mkdir(parents=True)
+    (folder / "robust" / "policy.onnx").write_bytes(b"not a network")
+    with pytest.raises(UserError, match="damaged; `dvc repro --force policy@toy-none`"):
+        policy_draws(folder / "robust", np.array([1.9]))

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import torch
 
-from pipeline.policy.environment import SlingshotEnv
-from pipeline.policy.landing_map import TOO_MUCH_FORCE
+from pipeline.policy.environment import SlingshotEnv, rewarded
+from pipeline.policy.landing_map import LandingMap
+from pipeline.policy.landscape import TOO_MUCH_FORCE, Landscape
 from tests.policy import toy
 
 TARGETS = (1.425, 2.425)
+REWARD = SimpleNamespace(height=5.0, scale=0.5, penalty=1.0)
 
 
 @pytest.fixture
 def env(toy_map) -> SlingshotEnv:
-    return SlingshotEnv(
-        toy_map, targets=TARGETS, num_envs=400, height=5.0, scale=0.5, penalty=1.0, seed=7
-    )
+    return make(Landscape([toy_map]))
+
+
+def make(landscape: Landscape, **changes) -> SlingshotEnv:
+    usual = {"num_envs": 400, "seed": 7}
+    return SlingshotEnv(landscape, targets=TARGETS, **{"reward": REWARD, **usual, **changes})
 
 
 def targets_of(observations) -> np.ndarray:
@@ -57,8 +64,57 @@ def test_asking_twice_observes_the_same(env) -> None:
 
 
 def test_equal_seeds_give_equal_targets(toy_map, env) -> None:
-    options = {"targets": TARGETS, "num_envs": 400, "height": 5.0, "scale": 0.5, "penalty": 1.0}
-    twin = SlingshotEnv(toy_map, seed=7, **options)
-    other = SlingshotEnv(toy_map, seed=8, **options)
+    twin, other = (make(Landscape([toy_map]), seed=seed) for seed in (7, 8))
     assert (twin.get_observations()["target"] == env.get_observations()["target"]).all()
     assert (other.get_observations()["target"] != env.get_observations()["target"]).any()
+
+
+def test_each_part_of_the_reward_counts(toy_map) -> None:
+    actions = torch.randn(400, 2, generator=torch.Generator().manual_seed(0))
+
+    def reward(**changes) -> np.ndarray:
+        other = SimpleNamespace(**{**vars(REWARD), **changes})
+        return make(Landscape([toy_map]), reward=other).step(actions)[1].numpy()
+
+    usual = reward()
+    failed = usual == -1
+    np.testing.assert_allclose(reward(height=10.0)[~failed], 2 * usual[~failed], rtol=1e-6)
+    np.testing.assert_allclose(reward(scale=1.0)[~failed], np.sqrt(5 * usual[~failed]), rtol=1e-5)
+    np.testing.assert_array_equal(reward(penalty=3.0)[failed], -3.0)
+
+
+def test_the_reward_is_the_mean_over_thetas_and_errors_of_the_draw() -> None:
+    """Of single launches: the toy's landing times a factor, from draws with a random error."""
+    factors, error = (0.97, 1.05), 0.004
+
+    def launcher(draws, thetas):
+        launched = toy.launch(draws)
+        launched.landing_y = launched.landing_y * thetas[:, 0]
+        return launched
+
+    maps = LandingMap.simulate_each(
+        launcher,
+        np.array(factors)[:, None],
+        draw_y=toy.DRAW_Y,
+        draw_z=toy.DRAW_Z,
+        size=(33, 25),
+        max_force=1e3,
+    )
+    draws = np.array([[-0.35, -0.2], [-0.3, -0.15], [-0.38, -0.25]])
+    targets = toy.launch(draws).landing_y + np.array([0.0, 0.01, -0.05])
+    expected, _ = rewarded(Landscape(maps, error), draws, targets, REWARD)
+    errors = np.random.default_rng(0).normal(0, error, (40_000, 2))
+    for draw, target, one in zip(draws, targets, expected, strict=True):
+        landing = toy.launch(draw + errors).landing_y
+        single = [5 * np.exp(-np.abs(landing * factor - target) / 0.5) for factor in factors]
+        assert one == pytest.approx(np.mean(single), abs=0.01)
+
+
+def test_it_goes_on_from_a_state(env, toy_map) -> None:
+    env.step(torch.zeros(400, 2))
+    state = env.state()
+    twin = make(Landscape([toy_map]), seed=99)
+    twin.restore({name: value.clone() for name, value in state.items()})
+    for _ in range(2):
+        once, again = (one.step(torch.zeros(400, 2)) for one in (env, twin))
+        assert (once[0]["target"] == again[0]["target"]).all() and (once[1] == again[1]).all()

@@ -1,18 +1,37 @@
-"""The exported files against the trained network."""
+"""The exported files against the trained network, in processes that know nothing of us."""
 
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 
+import jsonschema
 import numpy as np
 import onnx
 import onnxruntime
 import pytest
 import torch
 
-from pipeline.policy.export import card, write_onnx, write_torchscript
+from pipeline.params import load
+from pipeline.policy.aim import policy_draws
+from pipeline.policy.export import (
+    PLAIN,
+    ROBUST,
+    ROBUST_TRAINING,
+    TRAINING,
+    card,
+    write_onnx,
+    write_torchscript,
+)
+from pipeline.sling.model import THETA
+from tests.policy import toy
+from tests.policy.card_schema import SCHEMA
+from tests.project import ROOT
 
-TARGETS = np.linspace(1.425, 2.425, 1000, dtype=np.float32)[:, None]
+TARGETS = np.random.default_rng(0).uniform(1.425, 2.425, (1000, 1)).astype(np.float32)
 
 
 @pytest.fixture(scope="module")
@@ -23,22 +42,41 @@ def folder(trained, tmp_path_factory):
     return folder
 
 
+def apart(code: str, folder: Path, **environment: str) -> str:
+    """What another process prints that runs `code` in `folder`, with the project out of reach."""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env={**os.environ, "OMP_NUM_THREADS": "1", **environment},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def test_onnx_and_torchscript_agree_with_the_network(trained, folder) -> None:
+    """On 1,000 targets to 1e-5 m; and it is a network that has learned to hit."""
     with torch.inference_mode():
         network = trained.policy(torch.from_numpy(TARGETS)).numpy()
         script = torch.jit.load(folder / "policy.pt")(torch.from_numpy(TARGETS)).numpy()
     session = onnxruntime.InferenceSession(folder / "policy.onnx")
     graph = session.run(["draw"], {"target": TARGETS})[0]
-    assert network.shape == (1000, 2) and np.ptp(network[:, 0]) > 1e-3
-    np.testing.assert_allclose(script, network, atol=1e-5)
-    np.testing.assert_allclose(graph, network, atol=1e-5)
+    assert network.shape == script.shape == graph.shape == (1000, 2)
+    np.testing.assert_allclose(script, network, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(graph, network, rtol=0, atol=1e-5)
+    np.testing.assert_array_equal(policy_draws(folder, TARGETS[:, 0]), graph.astype(float))
+    landing = toy.launch(graph.astype(float)).landing_y
+    assert np.abs(landing - TARGETS[:, 0]).mean() < 0.02
 
 
 def test_any_batch_size(folder) -> None:
     session = onnxruntime.InferenceSession(folder / "policy.onnx")
     script = torch.jit.load(folder / "policy.pt")
+    one_by_one = np.vstack([session.run(None, {"target": TARGETS[[i]]})[0] for i in range(7)])
     for count in (1, 7):
-        assert session.run(None, {"target": TARGETS[:count]})[0].shape == (count, 2)
+        graph = session.run(None, {"target": TARGETS[:count]})[0]
+        np.testing.assert_allclose(graph, one_by_one[:count], rtol=0, atol=1e-6)
         assert script(torch.from_numpy(TARGETS[:count])).shape == (count, 2)
 
 
@@ -46,21 +84,124 @@ def test_one_file_each_without_paths(folder) -> None:
     assert sorted(file.name for file in folder.iterdir()) == ["policy.onnx", "policy.pt"]
     onnx.checker.check_model(onnx.load(folder / "policy.onnx"), full_check=True)
     for file in folder.iterdir():
-        assert b"site-packages" not in file.read_bytes()
+        for path in (b"site-packages", os.fsencode(ROOT)):
+            assert path not in file.read_bytes()
 
 
-def test_the_card_tells_units_and_is_strict_json(trained) -> None:
-    content = card(
-        trained,
-        band="toy",
-        method="none",
-        theta={"youngs_modulus": 1e5},
-        targets=(1.425, 2.425),
-        max_force=15.0,
-        map_error={},
+def test_the_files_need_nothing_of_ours(folder, tmp_path) -> None:
+    """Copied elsewhere: ONNX with onnxruntime alone, TorchScript with torch alone."""
+    for name in ("policy.onnx", "policy.pt"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    expected = policy_draws(folder, np.array([1.9, 2.1]))
+    by_onnx = """
+import sys, numpy, onnxruntime
+session = onnxruntime.InferenceSession("policy.onnx")
+print(session.run(None, {"target": numpy.array([[1.9], [2.1]], numpy.float32)})[0].tolist())
+assert not {"torch", "onnx", "pipeline", "rsl_rl"} & set(sys.modules)
+"""
+    by_torch = """
+import sys, torch
+print(torch.jit.load("policy.pt")(torch.tensor([[1.9], [2.1]])).tolist())
+assert not {"pipeline", "rsl_rl"} & set(sys.modules)
+"""
+    for code in (by_onnx, by_torch):
+        draws = json.loads(apart(code, tmp_path))
+        np.testing.assert_allclose(draws, expected, rtol=0, atol=1e-5)
+
+
+def test_equal_networks_give_equal_bytes(trained, folder, tmp_path) -> None:
+    """In another process too, whose sets are in another order."""
+    torch.save(trained.policy, tmp_path / "network.pickle")
+    code = """
+import torch
+from pathlib import Path
+from pipeline.policy.export import write_onnx, write_torchscript
+policy = torch.load("network.pickle", weights_only=False)
+write_onnx(policy, Path("policy.onnx"))
+write_torchscript(policy, Path("policy.pt"))
+"""
+    apart(code, tmp_path, PYTHONHASHSEED="1", PYTHONPATH=str(ROOT))
+    for name in ("policy.onnx", "policy.pt"):
+        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+
+
+FIGURES = {
+    "converged": True,
+    "criterion": "mean |y_p - g| <= 0.01 m over 256 targets, no failure",
+    "iteration": 37,
+    "iterations": 60,
+    "mean_error_m": np.float64(0.004),
+    "max_error_m": np.float32(0.011),
+    "failed_targets": np.int64(0),
+    "map_mean_error_m": 0.004,
+    "failed_launches": {"holding force above the limit": 12},
+}
+BY_SAMPLES = {
+    "expected_error_m": 0.031,
+    "plain_expected_error_m": 0.035,
+    "samples": 24,
+    "actuation_error_m": 0.001,
+}
+NEAR = {"draws": 60, "mean_error_m": 0.001, "max_error_m": 0.004}
+MAP = {"box": {"draws": 0, "mean_error_m": None, "max_error_m": None}, "target_range": NEAR}
+
+
+def written(trained, kind: str, training: dict, **theta) -> dict:
+    """A card of band1 as a reader of the file finds it."""
+    params = load(ROOT / "params.yaml")
+    content = {"theta": dict.fromkeys(THETA, 0.4), **theta}
+    made = card(
+        trained.policy,
+        params,
+        "band1",
+        "ours",
+        content,
+        kind=kind,
+        training=training,
+        landing_map=MAP,
     )
-    again = json.loads(json.dumps(content, allow_nan=False))
-    assert again["input"]["unit"] == again["output"]["unit"] == "m"
-    assert again["output"]["low"] == [-0.45, -0.3] and again["output"]["high"] == [-0.25, -0.1]
-    assert again["training"]["converged"] is True
-    assert set(again["versions"]) == {"torch", "rsl-rl-lib", "onnx", "numpy"}
+    return json.loads(json.dumps(made, allow_nan=False))
+
+
+@pytest.mark.parametrize(
+    ("kind", "training"), [(PLAIN, FIGURES), (ROBUST, {**FIGURES, **BY_SAMPLES})]
+)
+def test_the_card_keeps_to_its_schema(trained, kind, training) -> None:
+    content = written(trained, kind, training, nuisances={"air_drag": 2.5})
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    jsonschema.validate(content, SCHEMA, jsonschema.Draft202012Validator)
+    for broken in (
+        {**content, "theta": {}},
+        {**content, "nuisances": {"air_drag": None}},
+        {**content, "kind": ROBUST if kind == PLAIN else PLAIN},
+        {key: value for key, value in content.items() if key != "versions"},
+    ):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(broken, SCHEMA, jsonschema.Draft202012Validator)
+
+
+def test_the_card_tells_units_ranges_and_the_air(trained) -> None:
+    content = written(trained, PLAIN, FIGURES, nuisances={"air_drag": 2.5})
+    assert content["input"]["unit"] == content["output"]["unit"] == "m"
+    assert content["input"]["trained_range"] == [1.425, 2.425]
+    assert content["output"]["low"] == [-0.45, -0.3] and content["output"]["high"] == [-0.25, -0.1]
+    assert content["nuisances"] == {"air_drag": 2.5}
+    assert content["setup"]["projectile_mass_kg"] == 0.039
+    assert content["setup"]["band_mass_kg"] == 0.023
+    assert content["versions"]["torch"].startswith(torch.__version__.partition("+")[0])
+    assert written(trained, PLAIN, FIGURES)["nuisances"] == {}
+
+
+def test_a_policy_that_never_hits_has_no_errors_in_its_card(trained) -> None:
+    never = {"converged": False, "mean_error_m": np.nan, "max_error_m": float("nan")}
+    content = written(trained, PLAIN, {**FIGURES, **never, "failed_targets": 256})
+    assert content["training"]["mean_error_m"] is content["training"]["max_error_m"] is None
+    jsonschema.validate(content, SCHEMA, jsonschema.Draft202012Validator)
+
+
+def test_a_card_with_a_figure_missing_is_not_made(trained) -> None:
+    assert set(FIGURES) == set(TRAINING) and set(BY_SAMPLES) == set(ROBUST_TRAINING)
+    with pytest.raises(ValueError, match="a robust policy tells"):
+        written(trained, ROBUST, FIGURES)
+    with pytest.raises(ValueError, match="a plain policy tells"):
+        written(trained, PLAIN, {**FIGURES, **BY_SAMPLES})

@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UserError
-from pipeline.policy.spread import landing_intervals, law_discrepancy, load_samples
+from pipeline.policy.spread import (
+    CROSS,
+    MOST,
+    landing_intervals,
+    law_discrepancy,
+    load_samples,
+)
 from pipeline.sling.model import THETA
 from tests.policy import toy
 
@@ -84,6 +90,20 @@ def test_failures_of_the_few_are_left_out_and_of_the_many_are_none() -> None:
 
     assert np.isfinite(landing_intervals(fragile(0.05), DRAWS, samples(), 0.001)).all()
     assert np.isnan(landing_intervals(fragile(0.25), DRAWS, samples(), 0.001)).all()
+
+
+def test_an_answer_takes_few_launches() -> None:
+    """However many samples there are: `sling aim` answers in seconds."""
+    launched = []
+
+    def counted(draws, thetas=None):
+        launched.append(len(draws))
+        return launcher(draws, thetas)
+
+    few = landing_intervals(counted, DRAWS[:1], samples(2000), 0.001)
+    assert sum(launched) == len(CROSS) + MOST
+    many = np.quantile(toy.launch(DRAWS[:1]).landing_y * samples(2000)[:, 0], [0.05, 0.95])
+    np.testing.assert_allclose(few[0], many, rtol=0.02)
 
 
 def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:

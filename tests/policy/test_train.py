@@ -2,46 +2,143 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 import torch
 
-from pipeline.policy.train import train
-from tests.policy import toy
+from pipeline.policy import train as module
+from pipeline.policy.checkpoint import Checkpoint
+from pipeline.policy.landing_map import LandingMap
+from pipeline.policy.landscape import Landscape
+from pipeline.policy.train import Trained, train
+from tests.policy import killed, toy
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_the_policy_hits_the_closed_form_within_a_centimetre(trained) -> None:
     targets = np.linspace(1.425, 2.425, 256)
-    with torch.inference_mode():
-        draws = trained.policy(torch.tensor(targets, dtype=torch.float32)[:, None]).double().numpy()
-    truth = toy.launch(draws)
+    truth = toy.launch(trained.policy.draws(targets))
     error = np.abs(truth.landing_y - targets)
     assert error.mean() <= 0.01
     assert (truth.hold_force <= 15.0).all()
-    assert trained.converged and trained.failed_targets == 0
     np.testing.assert_allclose(trained.mean_error, error.mean(), atol=1e-4)
-    np.testing.assert_allclose(trained.max_error, error.max(), atol=1e-4)
 
 
 def test_the_curve_has_one_row_an_iteration(trained, settings) -> None:
     curve = trained.curve
     assert curve["iteration"] == list(range(1, settings.iterations + 1))
-    assert (
-        curve["mean_error"][trained.iteration - 1] == trained.mean_error == min(curve["mean_error"])
-    )
+    assert curve["mean_error"][trained.iteration - 1] == trained.mean_error
+    assert trained.mean_error < 1.1 * min(curve["mean_error"])
     assert curve["mean_reward"][-1] > curve["mean_reward"][0]
+    assert curve["std"][0] == pytest.approx(settings.init_std)
     assert sum(curve["failures"]) == sum(trained.failures.values()) > 0
 
 
-def test_the_same_seed_gives_the_same_network(toy_map, settings) -> None:
-    def weights(seed: int) -> list[torch.Tensor]:
-        short = type(settings)(**{**vars(settings), "iterations": 2, "envs": 64, "seed": seed})
-        return list(train(toy_map, short).policy.parameters())
-
-    once, again, other = weights(1), weights(1), weights(2)
-    assert all(torch.equal(a, b) for a, b in zip(once, again, strict=True))
-    assert not all(torch.equal(a, b) for a, b in zip(once, other, strict=True))
+def short(settings, **changes) -> SimpleNamespace:
+    return SimpleNamespace(**{**vars(settings), "iterations": 2, "envs": 64, **changes})
 
 
-def test_says_that_it_did_not_converge(toy_map, settings) -> None:
-    short = type(settings)(**{**vars(settings), "iterations": 1, "envs": 64})
-    assert not train(toy_map, short).converged
+def same(one: Trained, other: Trained) -> bool:
+    pairs = zip(one.policy.parameters(), other.policy.parameters(), strict=True)
+    return one.curve == other.curve and all(torch.equal(a, b) for a, b in pairs)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"seed": 2},
+        {"targets": (1.5, 2.0)},
+        {"envs": 128},
+        {"steps": 2},
+        {"iterations": 3},
+        {"hidden": (32, 16)},
+        {"learning_rate": 1e-4},
+        {"init_std": 0.3},
+        {"final_std": 0.1},
+        {"reward": SimpleNamespace(height=5.0, scale=0.2, penalty=1.0)},
+        {"reward": SimpleNamespace(height=2.0, scale=1.0, penalty=1.0)},
+        {"reward": SimpleNamespace(height=5.0, scale=1.0, penalty=3.0)},
+    ],
+)
+def test_the_same_settings_give_the_same_training_and_each_counts(
+    toy_map, settings, change: dict
+) -> None:
+    landscape = Landscape([toy_map])
+    once, again = (train(landscape, short(settings)) for _ in range(2))
+    other = train(landscape, short(settings, **change))
+    assert same(once, again)
+    assert once.curve != other.curve
+
+
+def test_without_a_launch_that_lands_it_says_so(settings) -> None:
+    def broken(draws: np.ndarray) -> SimpleNamespace:
+        nan = np.full(len(draws), np.nan)
+        reason = "the simulation did not converge"
+        return SimpleNamespace(landing_y=nan, hold_force=nan, failure=[reason] * len(draws))
+
+    box = {"draw_y": toy.DRAW_Y, "draw_z": toy.DRAW_Z, "size": (5, 5), "max_force": 15.0}
+    trained = train(Landscape([LandingMap.simulate(broken, **box)]), short(settings))
+    assert np.isnan(trained.mean_error)
+    assert trained.failures == {"the simulation did not converge": 2 * 4 * 64}
+    assert trained.curve["failed_targets"] == [256.0, 256.0]
+    assert np.isfinite(trained.policy.draws(np.array([1.9]))).all()
+
+
+def test_sigkill_and_on_to_the_same_training(tmp_path) -> None:
+    """Killed in the eighth iteration of twelve, it goes on after the fifth."""
+    run = subprocess.run(
+        [sys.executable, "-m", "tests.policy.killed", str(tmp_path / "kept.pt"), "8"],
+        cwd=ROOT,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode == -signal.SIGKILL, run.stderr
+    left = torch.load(tmp_path / "kept.pt", weights_only=True)
+    assert len(left["state"]["rows"]) == 5
+    steps: list[int] = []
+    went_on = killed.training(tmp_path / "kept.pt", on_iteration=steps.append)
+    assert steps == list(range(5, 12))
+    whole = killed.training(tmp_path / "other.pt")
+    assert same(went_on, whole)
+    assert went_on.iteration == whole.iteration and went_on.failures == whole.failures
+
+
+def test_a_finished_training_is_not_done_again(tmp_path) -> None:
+    """As where a stage is killed while it exports."""
+    once = killed.training(tmp_path / "kept.pt", iterations=10)
+    steps: list[int] = []
+    again = killed.training(tmp_path / "kept.pt", on_iteration=steps.append, iterations=10)
+    assert steps == [] and same(once, again)
+
+
+def test_another_training_or_a_damaged_file_starts_over(tmp_path, monkeypatch) -> None:
+    path = tmp_path / "kept.pt"
+    killed.training(path)
+    whole = path.read_bytes()
+
+    def begins(**changes) -> int:
+        steps: list[int] = []
+        killed.training(path, on_iteration=steps.append, **changes)
+        path.write_bytes(whole)
+        return steps[0]
+
+    assert begins() == 10
+    assert begins(learning_rate=2e-3) == 0
+    assert begins(error=0.001) == 0
+    monkeypatch.setattr(module, "PACKAGES", ())
+    assert begins() == 0
+    monkeypatch.undo()
+    path.write_bytes(whole[: len(whole) // 2])
+    assert Checkpoint(path, "any").load() is None
+    steps: list[int] = []
+    killed.training(path, on_iteration=steps.append)
+    assert steps[0] == 0

@@ -1,15 +1,15 @@
-"""Trials: measured launches read from CSV, and the stretch of a draw."""
+"""Trials as a table: what stands in it, the limit of the arm, and the stretch of a draw."""
 
 from __future__ import annotations
-
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pipeline.episode import Episode
-from pipeline.errors import UserError
-from pipeline.policy.trials import SCHEMA, read_measured, recorded_stretch, stretch_of, table
+from pipeline.params import load
+from pipeline.policy.trials import SCHEMA, Batch, limited, recorded_stretch, stretch_of, table
+from pipeline.sling.launch import Launches, launch
+from pipeline.sling.model import Sling
 
 
 def test_stretch_of_a_345_triangle() -> None:
@@ -29,77 +29,99 @@ def test_the_recorded_stretch_counts_only_while_the_band_is_held() -> None:
     assert recorded_stretch(episode, 6.0, 8.0) == pytest.approx(10 / 8)
 
 
-def test_reads_measured_launches_of_a_method(tmp_path) -> None:
-    file = tmp_path / "toy.csv"
-    file.write_text(
-        "\ufeffdraw_y_m, draw_z_m,landing_y_m,target_m,method\n"
-        "-0.3,-0.17,2.2,,\n-0.3,-0.17,1.9,1.925,ours\n-0.3,-0.17,1.8,1.925,theirs\n"
-        "-0.35,-0.17,,1.925,ours\n"
-    )
-    rows = read_measured(file, "ours")
-    assert [row["landing_y_m"] for row in rows] == [2.2, 1.9, None]
-    assert [row["target_m"] for row in rows] == [None, 1.925, 1.925]
-    assert len(read_measured(file, "theirs")) == 2
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("draw_y_m,draw_z_m\n-0.3,-0.1\n", "lacks the column landing_y_m"),
-        ("draw_y_m,draw_z_m,landing_y_m,speed\n", "unknown column 'speed'"),
-        ("", "lacks the column draw_y_m"),
-        ("draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.1,far\n", "line 2: landing_y_m must be a number"),
-        ("draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.1,1\n-0.3,,1\n", "line 3: a draw needs"),
-        ("draw_y_m,draw_z_m,landing_y_m\n0.3,-0.1,1\n", "line 2: draw_y_m must be below 0"),
-        ("draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.1,inf\n", "line 2: landing_y_m must be a number"),
-    ],
+PREDICTED = Launches(
+    landing_y=np.array([1.9, np.nan, 2.0]),
+    speed=np.array([4.5, np.nan, 4.7]),
+    angle=np.array([0.5, np.nan, 0.5]),
+    hold_force=np.array([9.0, np.nan, 31.0]),
+    leave_time=np.array([0.04, np.nan, 0.04]),
+    leave_y=np.array([-0.05, np.nan, -0.06]),
+    leave_z=np.array([-0.03, np.nan, -0.03]),
+    failure=[None, "it broke", None],
 )
-def test_refuses_a_bad_csv(tmp_path, text: str, message: str) -> None:
-    file = tmp_path / "toy.csv"
-    file.write_text(text)
-    with pytest.raises(UserError, match=message):
-        read_measured(file, "ours")
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.1,1\n".encode("utf-16"), "not UTF-8"),
-        (b"draw_y_m,draw_z_m,landing_y_m,method\n-0.3,-0.1,1,m\xfcller\n", "not UTF-8"),
-        (b"draw_y_m,draw_z_m,landing_y_m\n" + b"1" * 200_000, "cannot be read as CSV"),
-    ],
-)
-def test_refuses_a_file_that_is_no_csv(tmp_path, content: bytes, message: str) -> None:
-    file = tmp_path / "toy.csv"
-    file.write_bytes(content)
-    with pytest.raises(UserError, match=message):
-        read_measured(file, "ours")
-
-
-def test_a_table_counts_trials_by_target_and_keeps_what_failed_empty() -> None:
-    predicted = SimpleNamespace(
-        landing_y=np.array([1.9, np.nan, 2.0]),
-        hold_force=np.array([9.0, np.nan, 31.0]),
-        failure=[None, "it broke", None],
-    )
-    made = table(
-        band="toy",
-        method="ours",
-        kind="virtual",
-        draws=np.array([[-0.3, -0.17]] * 3),
-        targets=[1.9, 1.9, 2.1],
+def made(batches: list[Batch], predicted: Launches = PREDICTED) -> dict[str, list]:
+    whole = table(
+        "toy",
+        "ours",
+        batches,
         predicted=predicted,
         intervals=np.array([[1.8, 2.0], [np.nan, np.nan], [1.9, 2.1]]),
-        landing=[1.95, None, None],
-        failure=[None, "too far", "too strong"],
-        hold_force=predicted.hold_force,
         stretch=np.array([1.4, 1.4, 1.4]),
         recorded=1.6,
     )
-    assert made.schema.equals(SCHEMA)
-    assert made["trial"].to_pylist() == [1, 2, 1]
-    assert made["predicted_y"].to_pylist() == [1.9, None, 2.0]
-    assert made["predicted_low"].to_pylist() == [1.8, None, 1.9]
-    assert made["predicted_high"].to_pylist() == [2.0, None, 2.1]
-    assert made["hold_force"].to_pylist() == [9.0, None, 31.0]
-    assert made["landing_y"].null_count == 2
+    assert whole.schema.equals(SCHEMA)
+    return whole.to_pydict()
+
+
+DRAWS = [[-0.3, -0.17], [-0.31, -0.17], [-0.32, -0.18]]
+
+
+def test_a_table_holds_what_is_known_and_nothing_else() -> None:
+    flight = np.array([[-0.05, -0.03], [1.0, 0.2], [1.95, -0.52]])
+    launched = Batch(
+        kind="virtual",
+        policy="plain",
+        draws=np.array(DRAWS),
+        targets=[1.9, 1.9, 2.1],
+        landing=[1.95, None, None],
+        failure=[None, "too far", "too strong"],
+        hold_force=[9.1, 9.2, 31.5],
+        flight=[flight, flight[:2], None],
+    )
+    rows = made([launched])
+    assert rows["trial"] == [1, 2, 1] and rows["policy"] == ["plain"] * 3
+    assert rows["draw_y"] == [-0.3, -0.31, -0.32] and rows["draw_z"] == [-0.17, -0.17, -0.18]
+    assert rows["predicted_y"] == [1.9, None, 2.0]
+    assert rows["predicted_low"] == [1.8, None, 1.9]
+    assert rows["predicted_high"] == [2.0, None, 2.1]
+    assert rows["predicted_leave_y"] == [-0.05, None, -0.06]
+    assert rows["predicted_leave_z"] == [-0.03, None, -0.03]
+    assert rows["predicted_speed"] == [4.5, None, 4.7]
+    assert rows["predicted_angle"] == [0.5, None, 0.5]
+    assert rows["landing_y"] == [1.95, None, None]
+    assert rows["hold_force"] == [9.1, 9.2, 31.5]  # the rig's own
+    assert rows["flight_y"] == [[-0.05, 1.0, 1.95], [-0.05, 1.0], None]
+    assert rows["flight_z"] == [[-0.03, 0.2, -0.52], [-0.03, 0.2], None]
+
+
+def test_batches_follow_each_other_and_count_anew() -> None:
+    """Plain, robust and measured launches in one table, each with trials of its own."""
+    rows = made(
+        [
+            Batch.without_flight("predicted", "plain", DRAWS[:1], [1.9]),
+            Batch.without_flight("predicted", "robust", DRAWS[1:2], [1.9]),
+            Batch.without_flight("measured", None, DRAWS[2:], [None], [2.2]),
+        ]
+    )
+    assert rows["kind"] == ["predicted", "predicted", "measured"]
+    assert rows["policy"] == ["plain", "robust", None]
+    assert rows["trial"] == [1, 1, 1] and rows["target"] == [1.9, 1.9, None]
+    assert rows["hold_force"] == [9.0, None, 31.0]  # as predicted
+    assert rows["landing_y"] == [None, None, 2.2] and rows["flight_y"] == [None] * 3
+
+
+def test_a_weak_arm_fails_what_a_strong_one_launches() -> None:
+    """As the simulator says it, and with nothing else changed."""
+    weak = limited(PREDICTED, 30.0)
+    assert weak.failure == [None, "it broke", "holding takes 31.0 N, more than 30 N"]
+    np.testing.assert_array_equal(weak.hold_force, PREDICTED.hold_force)
+    np.testing.assert_array_equal(weak.landing_y, [1.9, np.nan, np.nan])
+    np.testing.assert_array_equal(weak.speed, [4.5, np.nan, np.nan])
+    strong = limited(PREDICTED, 31.0)
+    np.testing.assert_array_equal(strong.landing_y, PREDICTED.landing_y)
+    assert strong.failure == PREDICTED.failure
+
+
+def test_the_limit_is_the_simulators_own() -> None:
+    """Launched with a limit, or limited afterwards: the same."""
+    params = load()
+    sling = Sling.of(params.bands["band1"], params.setup, params.sling)
+    draws, theta = np.array([[-0.28, -0.1], [-0.44, -0.28]]), np.array([2e5, 0.45, 2e-3, 0.5, 0.5])
+    free = launch(sling, theta, draws)
+    limit = float(free.hold_force.mean())
+    expected, found = launch(sling, theta, draws, max_force=limit), limited(free, limit)
+    assert found.failure == expected.failure and found.failure[0] is None
+    for name in ("landing_y", "speed", "angle", "leave_y", "leave_z", "hold_force"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))

@@ -17,6 +17,7 @@ from pipeline.identify.regions import Region, save_regions
 from pipeline.params import load
 from pipeline.policy.export import write_onnx
 from pipeline.policy.landing_map import LandingMap
+from pipeline.policy.landscape import Landscape
 from pipeline.policy.train import Policy
 from pipeline.sling.model import THETA as NAMES
 from tests.policy import toy
@@ -69,12 +70,19 @@ def launches() -> pd.DataFrame:
             "band": BAND,
             "method": METHOD,
             "kind": "measured",
+            "policy": None,
             "target": [target for target, _ in rows],
             "trial": [1, 2, 1, 1],
             "draw_y": -0.3,
             "draw_z": -0.2,
             "predicted_y": [1.725, 1.725, 1.925, 2.125],
             "predicted_failure": None,
+            "predicted_leave_y": -0.05,
+            "predicted_leave_z": -0.03,
+            "predicted_speed": 4.5,
+            "predicted_angle": 0.5,
+            "flight_y": None,
+            "flight_z": None,
             "predicted_low": [1.7, 1.7, 1.9, 2.1],
             "predicted_high": [1.75, 1.75, 1.95, 2.15],
             "landing_y": [landing for _, landing in rows],
@@ -175,7 +183,7 @@ def root(tmp_path: Path) -> Path:
     (folder / "card.json").write_text(json.dumps(card))
     torch.manual_seed(0)
     network = nn.Sequential(nn.Linear(1, 8), nn.ELU(), nn.Linear(8, 2))
-    write_onnx(Policy(network, (1.425, 2.425), chart), folder / "policy.onnx")
+    write_onnx(Policy(network, (1.425, 2.425), Landscape([chart])), folder / "policy.onnx")
     launches().to_parquet(data / "trials" / BAND / f"{METHOD}.parquet")
     return tmp_path
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pipeline.params import load
 from pipeline.report import paper
-from pipeline.report.looks import COUNT, KNOWN, drawn, looks
+from pipeline.report.looks import FEW, KNOWN, SIDE_BY_SIDE, drawn, looks
 
 METHODS = st.lists(st.sampled_from([*KNOWN, "mine", "yours", "theirs"]), unique=True, min_size=1)
 
@@ -30,10 +30,10 @@ def test_a_method_looks_the_same_in_every_company(methods: list[str]) -> None:
     assert all(named[method].name == method for method in others)
 
 
-@given(METHODS)
-def test_ours_and_the_papers_are_drawn_first(methods: list[str]) -> None:
-    chosen = drawn(methods)
-    assert len(chosen) == min(COUNT, len(methods))
+@given(METHODS, st.sampled_from([FEW, SIDE_BY_SIDE]))
+def test_ours_the_papers_and_its_baselines_are_drawn_first(methods: list[str], count: int) -> None:
+    chosen = drawn(methods, count)
+    assert len(chosen) == min(count, len(methods))
     assert chosen == [method for method in methods if method in chosen]
-    first = {"sling2sim2real", "sling2sim2real_taut"} & set(methods)
-    assert first <= set(chosen)
+    first = ["sling2sim2real_taut", "sling2sim2real", "package_si", "real2sim2real"]
+    assert set(first[:count]) & set(methods) <= set(chosen)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 
 import pandas as pd
@@ -44,3 +45,33 @@ def test_further_methods_run_on_some_bands_only(root, params) -> None:
         copy = file.with_name(file.name.replace(METHOD, "de"))
         shutil.copytree(file, copy) if file.is_dir() else shutil.copy(file, copy)
     assert list(gather(params, root).methods[BAND]) == [METHOD, "de"]
+
+
+def test_robust_launches_stand_apart(root, params) -> None:
+    file = root / "data" / "trials" / BAND / f"{METHOD}.parquet"
+    plain = pd.read_parquet(file)
+    second = plain.assign(policy="robust", landing_y=2.0)
+    pd.concat([plain.assign(policy="plain"), second]).to_parquet(file)
+    result = gather(params, root).methods[BAND][METHOD]
+    assert len(result.trials) == len(result.robust_trials) == len(plain)
+    assert (result.robust_trials.landing_y == 2.0).all() and result.robust_card is None
+    assert result.trials.index.tolist() == result.robust_trials.index.tolist()
+    card = root / "data" / "policies" / BAND / METHOD / "robust" / "card.json"
+    card.parent.mkdir()
+    card.write_text('{"kind": "robust"}')
+    assert gather(params, root).methods[BAND][METHOD].robust_card == {"kind": "robust"}
+
+
+def test_a_band_of_the_rig_has_a_floor(root, params) -> None:
+    run = params.run.model_copy(update={"rig": (BAND,)})
+    virtual = params.model_copy(update={"run": run})
+    assert gather(params, root).floors == {}
+    with pytest.raises(UserError, match=f"{BAND}.json: missing; `dvc repro floor@{BAND}`"):
+        gather(virtual, root)
+    (root / "data" / "floor").mkdir()
+    floor = {
+        "band": BAND, "mean_error_m": 0.02, "launches": 5, "actuation_error_m": 1e-3,
+        "release_jitter": 0.02, "targets": {"1.725": {"mean_error_m": 0.02}},
+    }  # fmt: skip
+    (root / "data" / "floor" / f"{BAND}.json").write_text(json.dumps(floor))
+    assert gather(virtual, root).floors == {BAND: floor}

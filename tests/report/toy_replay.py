@@ -6,6 +6,7 @@ import numpy as np
 
 from pipeline.report.replay import Replay, work
 
+LOADED = -0.4 * (1 - np.abs(np.linspace(-1, 1, 25)))  # z [m]: 40 cm deep in the middle
 NOTHING = {kind: {"fitted": 0.2, "held_out": np.nan} for kind in ("force", "cloud")}
 
 
@@ -18,4 +19,5 @@ def toy_replay(params, band, method, episode, theta, residuals=NOTHING) -> Repla
         measured_work=work(episode.force, episode.velocity, period),
         work=0.9 * work(episode.force, episode.velocity, period),
         residuals=residuals,
+        loaded=np.stack([np.linspace(-0.1375, 0.1375, 25), np.zeros(25), LOADED], 1),
     )

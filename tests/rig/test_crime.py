@@ -7,13 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.bench_methods import complete
 from pipeline.identify.evaluate import Evaluator
-from pipeline.identify.history import History
 from pipeline.identify.loss import EpisodeLoss
-from pipeline.identify.optimizers import explorer
-from pipeline.identify.optimizers.multistart import Multistart
-from pipeline.identify.regions import find_regions
-from pipeline.identify.search import budget, search
 from pipeline.identify.space import Space
 from pipeline.recording.build import build_episode
 from pipeline.rig.record import EPOCH
@@ -30,22 +26,18 @@ def best_loss(params, sling, episode) -> tuple[float, np.ndarray]:
     """Least total that a budget finds which follows the ridge of E and nu, and its theta."""
     loss = EpisodeLoss.of(params, METHOD, episode, sling)
     evaluate = Evaluator(episode, sling, loss, Space.of(params.parameters))
-    history, optimizer, about = History(METHOD, THETA), params.optimizer, params.methods[METHOD]
-    explore, refine = budget(optimizer, about.search)
-    search(explorer(about, optimizer, len(THETA), explore), evaluate, history, rollouts=explore)
-    settings = {name: getattr(optimizer, name) for name in ("k_top", "k_nn", "delta")}
-    regions = find_regions(history.unit, history.total, **settings)
-    solvers = Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed)
-    search(solvers, evaluate, history, rollouts=refine)
-    best = history.best()
+    best = complete(params, METHOD, params.optimizer, evaluate).best()
     return best["total"], np.array([best[name] for name in THETA])
 
 
 @pytest.fixture(scope="module")
 def quick(coarse):
+    """Its search, and a simulator of half the edges and steps for both rubbers."""
+    sling = {"edges": 16, "grip_step": 0.01, "recoil_step": 5e-4, "swing_step": 2e-3}
     budget = {"generations": 12, "population": 20, "k_top": 2, "cma_rollouts": 960}
     optimizer = coarse.optimizer.model_copy(update=budget)
-    return coarse.model_copy(update={"optimizer": optimizer})
+    sling = coarse.sling.model_copy(update=sling)
+    return coarse.model_copy(update={"optimizer": optimizer, "sling": sling})
 
 
 def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorded) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.integrate import simpson
 
 from pipeline.params import Params
-from pipeline.rig.launch import FOOT, fly, launch, launch_from
+from pipeline.rig.launch import FOOT, POINTS, flight, fly, launch, launch_from
 from pipeline.rig.world import bent_at, string_of
 
 DRAW = (-0.30, -0.15)
@@ -28,6 +28,18 @@ def test_drag_shortens_the_flight() -> None:
         velocity = velocity + step * ([0.0, -9.81] - k * np.hypot(*velocity) * velocity)
     assert np.isclose(landing, position[0], rtol=1e-4)
     assert landing < 0.99 * fly(np.zeros(2), np.array([6.0, 2.0]), -0.52, 0.0)
+
+
+def test_a_flight_is_kept_evenly_in_time() -> None:
+    """Without drag a parabola from the first point to the floor."""
+    position, velocity, floor = np.array([-0.1, -0.05]), np.array([4.0, 1.5]), -0.52
+    way = flight(position, velocity, floor, 0.0)
+    time = (way[:, 0] - position[0]) / velocity[0]
+    assert way.shape == (POINTS, 2) and np.allclose(np.diff(time), time[1], rtol=1e-6)
+    height = position[1] + velocity[1] * time - 9.81 * time**2 / 2
+    np.testing.assert_allclose(way[:, 1], height, atol=1e-6)
+    assert way[-1, 0] == fly(position, velocity, floor, 0.0) and np.isclose(way[-1, 1], floor)
+    assert flight(np.array([0.1, floor]), velocity, floor, 0.0).tolist() == [[0.1, floor]]
 
 
 def test_equal_seeds_give_equal_errors(coarse: Params) -> None:
@@ -60,11 +72,12 @@ def test_failures_say_why(coarse: Params) -> None:
     )
     strong = launch("band1", weak_arm, DRAW, None)
     assert strong.failure.startswith("holding takes")
-    assert strong.hold_force > 5 and np.isnan(strong.landing_y)
+    assert strong.hold_force > 5 and np.isnan(strong.landing_y) and strong.flight is None
     assert "slack" in launch("band1", coarse, (-0.15, -0.1), None).failure
     assert "too short: lands" in launch("band1", coarse, (-0.24, -0.02), None).failure
     far = launch("band1", coarse, (-0.44, -0.28), None)
     assert far.failure.startswith("beyond the area") and far.landing_y > 2.425
+    assert far.flight[-1, 0] == far.landing_y
 
 
 def test_a_low_flight_hits_the_forks_foot(coarse: Params) -> None:
@@ -76,6 +89,7 @@ def test_a_low_flight_hits_the_forks_foot(coarse: Params) -> None:
     table = coarse.model_copy(update={"setup": table})
     trial = launch("band1", table, (-0.27, 0.0), None)
     assert trial.failure.startswith("hits the fork") and np.isnan(trial.landing_y)
+    assert (trial.flight[:, 0] < 0).all()  # it ends there
     short = launch("band1", table, (-0.24, 0.0), None)
     assert "fell before the fork" in short.failure and np.isnan(short.landing_y)
 

@@ -21,7 +21,6 @@ from pipeline.confidence.discrepancy import discrepancy
 from pipeline.confidence.intervals import LEVEL, identifiable, interval
 from pipeline.confidence.posterior import fit
 from pipeline.confidence.profile import profiles
-from pipeline.confidence.residuals import filtered
 from pipeline.confidence.summary import SLIP
 from pipeline.identify.evaluate import Evaluator
 from pipeline.identify.history import History, theta_content
@@ -106,7 +105,7 @@ def one(params, number: int) -> dict:
 
     # held in full: the force while the band is drawn
     three = replayed(sling, plan, np.array([true, best, posterior.mean]))
-    held = np.linalg.norm(filtered(three, plan, cutoff), axis=2)
+    held = np.linalg.norm(EpisodeLoss.plain(params, plan, sling).filtered(three), axis=2)
     curve = np.abs(held[1:] - held[0]).mean(axis=1) / held[0].max()
     late = episode.release_time - episode.time
     hold = held[0, (late > 0.05) & (late < 0.5)].mean()

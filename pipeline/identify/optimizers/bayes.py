@@ -26,7 +26,7 @@ POLISH_STEPS = 20  # of L-BFGS on the whole batch
 class Bayes:
     """Each round asks for `population` points, chosen together by qLogExpectedImprovement.
 
-    The model is BoTorch's SingleTaskGP with an exponential kernel (Matern 1/2), a length scale an
+    The model is a Gaussian process with an exponential kernel (Matern 1/2), a length scale an
     axis: losses are means of norms, whose valley is a kink, and smoother kernels foresee minima
     where there are none. Losses that lie further above the median than the least lies below it
     count as that far, because a few huge ones (a stiff band, a failure) would hide the rest; then
@@ -55,12 +55,12 @@ class Bayes:
         self._population, self._seed, self._points = population, seed, points
         self._unit, self._loss = np.zeros((0, dimension)), np.zeros(0)
         self._round = 0
-        self._hyperparameters: dict | None = None
+        self._hyperparameters = None  # those of the last round
 
     def ask(self) -> np.ndarray:
         """The Latin hypercube, then the batch of a round, shape (population, D)."""
         if self._round:
-            with _one_quiet_thread():
+            with one_quiet_thread():
                 self._asked = self._batch()
         return self._asked
 
@@ -76,9 +76,13 @@ class Bayes:
         from botorch.generation import gen_candidates_scipy
         from botorch.sampling.normal import SobolQMCNormalSampler
 
+        from pipeline.identify.optimizers.process import Hyperparameters, Process, fitted
+
         rows = training_rows(self._loss, self._points)
         unit, value = self._unit[rows], -standardised(self._loss[rows])
-        model = self._fitted(torch.from_numpy(unit), torch.from_numpy(value)[:, None])
+        start = self._hyperparameters or Hyperparameters.usual(unit.shape[1])
+        self._hyperparameters = fitted(unit, value, start, FIT_STEPS)
+        model = Process(unit, value, self._hyperparameters)
         sampler = SobolQMCNormalSampler(torch.Size([SAMPLES]), seed=self._seed + self._round)
         candidates = torch.from_numpy(self._candidates(unit[np.argsort(-value, kind="stable")]))
         with torch.no_grad():
@@ -92,23 +96,6 @@ class Bayes:
             options={"maxiter": POLISH_STEPS},
         )
         return np.clip(batch[0].detach().numpy(), 0, 1)
-
-    def _fitted(self, unit, value):
-        """The Gaussian process of values (N, 1) at points (N, D), its likelihood climbed."""
-        from botorch.models import SingleTaskGP
-        from botorch.models.utils.gpytorch_modules import get_covar_module_with_dim_scaled_prior
-        from botorch.optim.fit import fit_gpytorch_mll_scipy
-        from gpytorch.mlls import ExactMarginalLogLikelihood
-
-        kernel = get_covar_module_with_dim_scaled_prior(unit.shape[1], use_rbf_kernel=False)
-        kernel.nu = 0.5
-        model = SingleTaskGP(unit, value, covar_module=kernel, outcome_transform=None)
-        if self._hyperparameters:
-            model.load_state_dict(self._hyperparameters)
-        likelihood = ExactMarginalLogLikelihood(model.likelihood, model)
-        fit_gpytorch_mll_scipy(likelihood, options={"maxiter": FIT_STEPS})
-        self._hyperparameters = {name: x.clone() for name, x in model.state_dict().items()}
-        return model.eval()
 
     def _candidates(self, best: np.ndarray) -> np.ndarray:
         """Half from a Sobol sequence, half near the first of `best`, at all scales."""
@@ -155,15 +142,14 @@ def greedy(samples: np.ndarray, best: float, count: int) -> list[int]:
 
 
 @contextmanager
-def _one_quiet_thread() -> Iterator[None]:
+def one_quiet_thread() -> Iterator[None]:
     """Torch on one thread; unconverged L-BFGS and jitter on a diagonal are no news here."""
     import torch
 
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(record=True):  # no filter does: BoTorch sets its own
             yield
     finally:
         torch.set_num_threads(threads)

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.params import TARGET_AREA
-from pipeline.policy.aim import policy_draws
+from pipeline.policy.aim import ROBUST, policy_draws
 from pipeline.report.looks import Look, drawn
 from pipeline.report.replay import Replay
 from pipeline.report.results import Results
@@ -42,18 +41,6 @@ def band_chapter(
         f"{about.mass * 1e3:g} g, {about.rest_length * 100:g} cm between the clamps,"
         f" {about.diameter * 1e3:g} mm thick; {SOURCE[about.source]}.\n",
     ]
-    for kind, words in (
-        ("virtual", "Launches on the **virtual rig**, not on a robot."),
-        ("measured", "Launches that were measured by the user."),
-    ):
-        table = landings.landings(results, band, kind, looks)
-        if table:
-            text.append(
-                f"### Landing errors, {kind}\n\n{words} Mean ± deviation of |landing − target| in"
-                " cm, and the bias, the mean of landing − target. A launch that fails or lands"
-                f" outside y = {TARGET_AREA[0]} – {TARGET_AREA[1]} m is counted as failed and"
-                f" left out of the mean.\n\n{markdown(table)}"
-            )
     text += _predictions(results, band, looks)
     text += _recording(results, band, replays, looks)
     text += _search(results, band, looks)
@@ -152,16 +139,18 @@ def _search(results: Results, band: str, looks: dict[str, Look]) -> list[str]:
 
 
 def _policy(params, results: Results, band: str, looks: dict[str, Look], root: Path) -> list[str]:
-    methods = {method: results.methods[band][method] for method in drawn(results.methods[band])}
-    targets = np.array(params.trials.targets)
-    draws = {
-        method: policy_draws(root / "data" / "policies" / band / method, targets)
-        for method in methods
-    }
+    methods = drawn(results.methods[band])
+    targets, named = np.array(params.trials.targets), {}
+    for method in methods:
+        result, name = results.methods[band][method], looks[method].name
+        folder = root / "data" / "policies" / band / method
+        named[name] = result.landing_map, policy_draws(folder, targets)
+        if result.robust_card:
+            named[f"{name}, robust"] = result.landing_map, policy_draws(folder / ROBUST, targets)
     text = [
         f"### Policy\n\n![training](figures/{band}-training.png)\n",
         "Draws for the targets of the trials, each in the method's own simulator:\n",
-        markdown(policies.aims(methods, targets, draws, looks)),
+        markdown(policies.aims(named, targets)),
         "Where each draw of the box lands there, and the policy's path over it:\n",
     ]
     return text + [

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pandas as pd
 
 from pipeline.report.looks import Look
-from pipeline.report.results import Results
+from pipeline.report.results import Result, Results
+from pipeline.report.tables.benchmark import APART
 from pipeline.report.tables.landings import AIM, intervals, landing_errors, prediction_error
 
 INTRODUCTION = """\
@@ -22,55 +23,86 @@ position (y, z) of the projectile, y < 0; a *target* g is a distance along y on 
 
 
 def summary(results: Results, looks: dict[str, Look]) -> str:
-    """A line a band and method, and what did not go well."""
+    """A line a band of the rig, one a method where launches were measured, and what went wrong."""
     lines = [INTRODUCTION, "## In short\n"]
-    for result in results:
-        best = result.theta.get("loss", {}).get("total")
-        said = [f"loss {best:.4g} after {len(result.history)} rollouts"] if best else []
-        said += landed(result.trials, "virtual") + landed(result.trials, "measured")
-        unpredicted = int(result.trials.predicted_y.isna().sum())
-        if unpredicted:
-            said.append(f"{unpredicted} of {len(result.trials)} launches could not be predicted")
-        if result.trials.landing_y.isna().all():
-            said.append("no launch to compare its predictions with")
-        lines.append(f"- **{result.band}, {looks[result.method].name}**: {'; '.join(said)}.")
-    lines += [
-        f"- The policy of {one.band}, {looks[one.method].name} did **not** converge in its own"
-        " simulator."
-        for one in results
-        if not one.card["training"]["converged"]
-    ]
+    lines += [line for band in results.methods for line in _virtual(results, band, looks)]
+    for one in results:
+        said = measured(one.trials)
+        if said:
+            lines.append(f"- **{_name(one, looks)}**: {'; '.join(said)}.")
+    lines += [f"- {line}" for one in results for line in _doubts(one, _name(one, looks))]
     return "\n".join(lines) + "\n"
 
 
-def landed(trials: pd.DataFrame, kind: str) -> list[str]:
-    """What the launches of a kind say, in words."""
-    trials, said = trials[trials.kind == kind], []
+def _name(result: Result, looks: dict[str, Look]) -> str:
+    return f"{result.band}, {looks[result.method].name}"
+
+
+def _virtual(results: Results, band: str, looks: dict[str, Look]) -> list[str]:
+    """How far the methods miss, beside what errors of the launch alone would give.
+
+    Ablations are left to their tables.
+    """
+    said, floor = [], results.floors.get(band, {}).get("mean_error_m")
+    for method, result in results.methods[band].items():
+        trials = result.trials[result.trials.kind == "virtual"]
+        if method in APART or trials.empty:
+            continue
+        total = landing_errors(trials)["all"]
+        words = f"{looks[method].name} {100 * total['mean']:.1f} cm"
+        if total["failed"] == total["launches"]:
+            words = f"{looks[method].name} N/A"
+        elif total["failed"]:
+            words += f" ({total['failed']} of {total['launches']} launches failed)"
+        elif floor:
+            words += f" ({total['mean'] / floor:.1f} times the floor)"
+        said.append(words)
+    least = f"; the actuation floor is {100 * floor:.1f} cm" if floor else ""
+    launches = "virtual launches, mean distance from the target"
+    return [f"- **{band}**, {launches}: {', '.join(said)}{least}."] if said else []
+
+
+def _doubts(result: Result, name: str) -> list[str]:
+    """What did not go well."""
+    said, count = [], len(result.trials)
+    unpredicted = int(result.trials.predicted_y.isna().sum())
+    if unpredicted:
+        said.append(f"{name}: {unpredicted} of {count} launches could not be predicted.")
+    if set(result.trials.kind) == {"predicted"}:
+        said.append(f"{name}: no launch to compare its predictions with.")
+    if not result.card["training"]["converged"]:
+        said.append(f"The policy of {name} did **not** converge in its own simulator.")
+    return said
+
+
+def measured(trials: pd.DataFrame) -> list[str]:
+    """What the measured launches say of a method, in words; nothing where there are none."""
+    trials, said = trials[trials.kind == "measured"], []
+    if trials.empty:
+        return []
     if trials.target.notna().any():
         total = landing_errors(trials)["all"]
-        failed = f"{total['failed']} of {total['launches']} {kind} launches failed"
         if total["failed"] < total["launches"]:
-            said.append(f"{kind} launches land {100 * total['mean']:.1f} cm off their target")
+            said.append(f"measured launches land {100 * total['mean']:.1f} cm off their target")
         if total["failed"]:
-            said.append(failed)
-    if kind == "measured" and not trials.empty:
-        error = prediction_error(trials)
-        parts = [
-            f"{100 * error[part]['mean']:.1f} % {where} ({error[part]['launches']} launches)"
-            for part, where in (("inside", "inside the recorded stretch"), ("beyond", "beyond it"))
-            if error[part]["launches"]
-        ]
-        if parts:
-            bias = 100 * error["all"]["bias"]
-            said.append(
-                f"measured landings are predicted within {' and '.join(parts)} on average,"
-                f" with a bias of {bias:+.1f} %"
-            )
-        said.append(_aim(error["inside"]))
+            said.append(f"{total['failed']} of {total['launches']} measured launches failed")
+    error = prediction_error(trials)
+    parts = [
+        f"{100 * error[part]['mean']:.1f} % {where} ({error[part]['launches']} launches)"
+        for part, where in (("inside", "inside the recorded stretch"), ("beyond", "beyond it"))
+        if error[part]["launches"]
+    ]
+    if parts:
+        bias = 100 * error["all"]["bias"]
+        said.append(
+            f"measured landings are predicted within {' and '.join(parts)} on average,"
+            f" with a bias of {bias:+.1f} %"
+        )
+    said.append(_aim(error["inside"]))
     ranges = (intervals(trials) or {}).get("inside")
     if ranges and ranges["launches"]:
         said.append(
-            f"{ranges['covered']} of {ranges['launches']} {kind} landings inside the recorded"
+            f"{ranges['covered']} of {ranges['launches']} measured landings inside the recorded"
             " stretch lie in their 90 % interval"
         )
     return said

@@ -5,10 +5,12 @@ Black is what was measured; a method has one colour everywhere (pipeline/report/
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 from matplotlib.ticker import LogFormatter
+from PIL import Image
 
 from pipeline.files import replacing
 
@@ -40,7 +42,11 @@ def few_ticks(axis) -> None:
 
 
 def save(figure: plt.Figure, path: Path, dpi: int = 130) -> None:
-    """Write the picture as PNG, and forget it."""
-    with replacing(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=dpi, metadata={"Software": None})
+    """Write the picture as PNG of 256 colours, a third of the size, and forget it."""
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=dpi)
     plt.close(figure)
+    few = Image.open(drawn).convert("RGB")
+    few = few.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    with replacing(path) as temporary:
+        few.save(temporary, format="png")

@@ -11,12 +11,13 @@ import pandas as pd
 from pipeline.policy.landing_map import LandingMap
 from pipeline.policy.trials import stretch_of
 from pipeline.report.figures.canvas import log_y, save
-from pipeline.report.looks import Look
+from pipeline.report.looks import SIDE_BY_SIDE, Look, drawn
 from pipeline.report.results import Result
 from pipeline.style import COLORS, STYLE
 
 FAIR = 0.05  # of the distance, shaded
 ERRORS = (-80, -50, -20, -10, -5, 0, 5, 10, 20, 50, 100, 200)  # % at the axis
+REACH = 2.0  # of the farthest target, up to which a landing map tells landings apart
 LEVEL = 90  # % that the predicted intervals are of
 
 
@@ -84,11 +85,14 @@ def _with_intervals(ax: plt.Axes, trials: pd.DataFrame, color: str, face: str) -
 
 def training(path: Path, results: dict[str, Result], looks: dict[str, Look]) -> None:
     """Landing error of the deterministic policy by iteration of PPO, in its own simulator."""
+    first = drawn(results, SIDE_BY_SIDE)  # on top where curves lie on each other
     with plt.rc_context(STYLE):
         figure, ax = plt.subplots(figsize=(7.2, 3.4))
         for method, result in results.items():
             curve, look = result.training, looks[method]
-            ax.plot(curve.iteration, 100 * curve.mean_error, color=look.color, label=look.name)
+            style = {"lw": 1.6, "zorder": 3} if method in first else {"lw": 0.9, "zorder": 2}
+            error = 100 * curve.mean_error
+            ax.plot(curve.iteration, error, color=look.color, label=look.name, **style)
         ax.axhline(1, color="0.6", lw=1)
         ax.set(
             xlabel="PPO iteration (line: the aim of 1 cm)",
@@ -102,16 +106,17 @@ def training(path: Path, results: dict[str, Result], looks: dict[str, Look]) -> 
 def landing_map(
     path: Path,
     result: Result,
-    draws: np.ndarray,
+    draws: dict[str, np.ndarray],
     targets: np.ndarray,
     recorded: float,
     fork_width: float,
     rest_length: float,
 ) -> None:
-    """Landing against draw, with the policy's path over its targets.
+    """Landing against draw, with the policies' paths over their targets.
 
     Args:
-        draws: The policy's draws [m] for `targets` [m], shape (N, 2).
+        draws: By whose they are, draws [m] from the near to the far target, shape (N, 2).
+        targets: Whose landings are drawn as lines [m].
         recorded: Largest stretch of the recording; what lies beyond is extrapolated.
     """
     chart: LandingMap = result.landing_map
@@ -127,21 +132,25 @@ def landing_map(
         ax.set_facecolor("0.8")
         ax.grid(False)
         if np.isfinite(landing).any():
-            filled = ax.contourf(y, z, landing, levels=_round(landing), cmap="viridis")
+            levels = _round(landing, REACH * targets.max())
+            filled = ax.contourf(y, z, landing, levels=levels, cmap="viridis", extend="max")
             figure.colorbar(filled, label="simulated landing [m] (grey: the launch fails)")
             lines = ax.contour(y, z, landing, levels=np.unique(targets), colors="w", linewidths=0.8)
             ax.clabel(lines, fmt="%g m", fontsize=7)
         if stretch.min() < recorded < stretch.max():
             ax.contour(y, z, stretch, levels=[recorded], colors="k", linestyles=":")
             ax.plot([], [], "k:", label=f"recorded stretch {recorded:.2f}: beyond is extrapolated")
-        ax.plot(*draws.T, color=COLORS[0], lw=2.5, label="the policy's draws, near to far target")
-        ax.plot(*draws[0], "o", color=COLORS[0])
+        for (whose, path_), color in zip(draws.items(), (COLORS[0], COLORS[6]), strict=False):
+            label = f"{whose} draws, near (dot) to far target"
+            ax.plot(*path_.T, color=color, lw=2.5, label=label)
+            ax.plot(*path_[0], "o", color=color)
         ax.set(xlabel="draw y [m]", ylabel="draw z [m]")
         ax.set(xlim=(fine_y[0], fine_y[-1]), ylim=(fine_z[0], fine_z[-1]))
         figure.legend(loc="outside lower center", ncols=2, fontsize=8)
         save(figure, path)
 
 
-def _round(values: np.ndarray) -> np.ndarray:
-    """Some twenty round levels over finite values."""
-    return plt.MaxNLocator(20).tick_values(np.nanmin(values), np.nanmax(values))
+def _round(values: np.ndarray, most: float) -> np.ndarray:
+    """Some twenty round levels over finite values, but for those beyond `most`."""
+    low, high = np.nanmin(values), np.nanmax(values)
+    return plt.MaxNLocator(20).tick_values(low, min(high, most) if low < most else high)

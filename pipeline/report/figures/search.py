@@ -11,7 +11,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Ellipse
 
 from pipeline.report.figures.canvas import PARAMETERS, few_ticks, log_y, save
-from pipeline.report.looks import Look
+from pipeline.report.looks import SIDE_BY_SIDE, Look, drawn
 from pipeline.report.losses import best_so_far, printed
 from pipeline.report.results import Result
 from pipeline.sling.model import THETA
@@ -30,6 +30,7 @@ def convergence(path: Path, results: dict[str, Result], looks: dict[str, Look], 
         own: Methods that minimise another loss than the printed one: their curves may rise.
     """
     least = min(printed(result.history).min() for result in results.values())
+    first = drawn(results, SIDE_BY_SIDE)  # on top where curves lie on each other
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(1, 2, figsize=(10.5, 4.2))
         for method, result in results.items():
@@ -37,7 +38,8 @@ def convergence(path: Path, results: dict[str, Result], looks: dict[str, Look], 
             best = common[best_so_far(result.history)]
             best = np.where(np.isfinite(best), best, np.nan)
             rollouts = np.arange(1, len(best) + 1)
-            style = {"color": looks[method].color, "lw": 1.6, "ls": "--" if method in own else "-"}
+            style = {"color": looks[method].color, "ls": "--" if method in own else "-"}
+            style |= {"lw": 1.6, "zorder": 3} if method in first else {"lw": 1.0, "zorder": 2}
             label = f"{looks[method].name}: {best[-1]:.3f}"
             later = np.flatnonzero(result.history.phase.to_numpy() == "cma")[:1]
             for ax in axes:

@@ -11,10 +11,23 @@ Table = tuple[list[str], list[list[str]]]
 NONE = "–"
 
 
-def markdown(table: Table) -> str:
+def markdown(table: Table, repeats: bool = True) -> str:
+    """As markdown; without `repeats`, first cells that repeat those above are blank."""
     heads, rows = table
+    rows = rows if repeats else without_repeats(rows)
     lines = [heads, ["---"] * len(heads), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+
+
+def without_repeats(rows: list[list[str]], columns: int = 2) -> list[list[str]]:
+    """Rows whose first cells are blank where they repeat those of the row above."""
+    shown = []
+    for above, row in zip([None, *rows], rows, strict=False):
+        same = 0
+        while above and same < columns and row[same] == above[same]:
+            same += 1
+        shown.append([""] * same + row[same:])
+    return shown
 
 
 def number(value: float | None, form: str, otherwise: str | None = NONE) -> str:

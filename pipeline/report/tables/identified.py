@@ -1,4 +1,4 @@
-"""What the searches found: parameters with intervals, derived quantities, losses, residuals."""
+"""What the searches found beside the parameters: derived quantities, losses, residuals."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ import math
 
 import numpy as np
 
-from pipeline.report import paper
 from pipeline.report.looks import Look
-from pipeline.report.losses import PRINTED
 from pipeline.report.replay import Replay
-from pipeline.report.results import Result, Results
+from pipeline.report.results import Results
 from pipeline.report.tables.cells import NONE, Table, number, percent
-from pipeline.sling.model import THETA
+from pipeline.report.tables.parameters import printed_loss
 
 NAMES = {
     "youngs_modulus": "E [Pa]",
@@ -64,57 +62,6 @@ def _held(name: str, value: float) -> str:
     """As in "d 5 ms"."""
     symbol, _, unit = NAMES.get(name, name).partition(" [")
     return f"{symbol} {physical(name, value)} {unit.rstrip(']')}".rstrip()
-
-
-def parameters(results: Results, params, looks: dict[str, Look]) -> Table:
-    """Identified θ by band and method, with intervals, the box of the search, the paper's own."""
-    box = {name: getattr(params.parameters, name) for name in THETA}
-    heads = ["band", "method", *(NAMES[name] for name in THETA)]
-    bounds = [f"{physical(n, box[n].low)} – {physical(n, box[n].high)}" for n in THETA]
-    rows = [["*box*", f"*{'/'.join(sorted({b.scale for b in box.values()}))} scale*", *bounds]]
-    for band, of_band in results.methods.items():
-        for method, result in of_band.items():
-            fixed = params.methods[method].fixed
-            cells = [_parameter(result, name, box[name], name in fixed) for name in THETA]
-            rows.append([band, looks[method].name, *cells])
-        for method in of_band:
-            key = paper.BANDS.get(band), paper.METHODS.get(method)
-            if key in paper.THETA:
-                theirs = paper.THETA[key]
-                cells = [physical(name, value) for name, value in zip(THETA, theirs, strict=False)]
-                rows.append([f"*{key[0]}*", f"*paper: {looks[method].name}*", *cells])
-    return heads, rows
-
-
-def _parameter(result: Result, name: str, box, fixed: bool) -> str:
-    value = result.theta["theta"][name]
-    if fixed:
-        return f"{physical(name, value)}, fixed"
-    text = physical(name, value) + (" ⚠" if at_edge(value, box) else "")
-    about = result.confidence.get("parameters", {}).get(name)
-    if about is None:
-        return text
-    if not about["identifiable"]:
-        return f"{text}, not identifiable"
-    outside = "" if about["low"] <= value <= about["high"] else " †"
-    return f"{text}{outside} ({_between(name, about['low'], about['high'])})"
-
-
-def _between(name: str, low: float, high: float) -> str:
-    """An interval with three digits, or as many more as tell its ends apart."""
-    for digits in (3, 4, 5, 6):
-        ends = physical(name, low, digits), physical(name, high, digits)
-        if ends[0] != ends[1]:
-            break
-    return " – ".join(ends)
-
-
-def at_edge(value: float, box) -> bool:
-    """Whether the search ended within 1 % of a side of its box: the optimum may lie outside."""
-    low, high = box.low, box.high
-    if box.scale == "log":
-        value, low, high = math.log(value), math.log(low), math.log(high)
-    return not 0.01 <= (value - low) / (high - low) <= 0.99
 
 
 def derived(results: Results, looks: dict[str, Look]) -> Table | None:
@@ -180,15 +127,9 @@ def losses(results: Results, params, looks: dict[str, Look]) -> Table:
             weight, value = weights.get(term, 0.0), loss.get(term, math.nan)
             share = f" ({percent(weight * value / total)})" if weight else " (unused)"
             cells.append(number(value, ".3g") + (share if np.isfinite(value) else ""))
-        common = sum(loss.get(term, math.nan) for term in PRINTED)
+        common = printed_loss(result)
         cells += [number(total, ".4g"), number(common, ".4g"), str(len(result.history))]
         rows.append([result.band, looks[result.method].name, *cells])
-    for band, of_band in results.methods.items():
-        for method in of_band:
-            key = paper.BANDS.get(band), paper.METHODS.get(method)
-            if key in paper.THETA:
-                cells = [NONE] * len(terms) + [NONE, f"{paper.THETA[key][5]:.4f}", NONE]
-                rows.append([f"*{key[0]}*", f"*paper: {looks[method].name}*", *cells])
     return heads, rows
 
 

@@ -1,4 +1,4 @@
-"""Where launches landed: beside their targets, beside their predictions, beside the paper's."""
+"""Where launches landed: beside their targets, and beside their predictions."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pandas as pd
 
-from pipeline.params import TARGET_AREA
-from pipeline.report import paper
 from pipeline.report.looks import Look
+from pipeline.report.noise import landed
 from pipeline.report.results import Results
 from pipeline.report.tables.cells import Table, number, percent
 
@@ -25,8 +24,7 @@ def landing_errors(trials: pd.DataFrame) -> dict:
     `std` (over all launches). Deviations are those of a sample, NaN for fewer than two.
     """
     trials = trials[trials.target.notna()]
-    inside = trials.landing_y.between(*TARGET_AREA)
-    good = trials.failure.isna() & trials.landing_y.notna() & inside
+    good = landed(trials)
 
     def statistics(chosen: pd.Series) -> dict:
         rows = trials[chosen & good]
@@ -44,50 +42,6 @@ def landing_errors(trials: pd.DataFrame) -> dict:
     everything = statistics(pd.Series(True, index=trials.index))
     everything["pooled_std"] = math.sqrt(np.mean(variances)) if variances else math.nan
     return {**result, "all": everything}
-
-
-def landings(results: Results, band: str, kind: str, looks: dict[str, Look]) -> Table | None:
-    """Landing error by method and target [cm] with the paper's beside it; None without launches."""
-    rows = []
-    targets: list[float] = []
-    for method, result in results.methods[band].items():
-        trials = result.trials[(result.trials.kind == kind) & result.trials.target.notna()]
-        if trials.empty:
-            continue
-        errors = landing_errors(trials)
-        targets = [key for key in errors if key != "all"]
-        total = errors["all"]
-        rows.append(
-            [
-                looks[method].name,
-                kind,
-                *(_spread(errors[target], "std") for target in targets),
-                _spread(total, "pooled_std"),
-                number(100 * total["std"], ".2f"),
-                number(100 * total["bias"], "+.2f"),
-                f"{total['failed']} of {total['launches']}",
-            ]
-        )
-    if not rows:
-        return None
-    if tuple(targets) == paper.TARGETS:
-        for method in results.methods[band]:
-            key = paper.BANDS.get(band), paper.METHODS.get(method)
-            if key in paper.LANDING:
-                shown = [f"{c[0]:.2f} ± {c[1]:.2f}" if c else "N/A" for c in paper.LANDING[key]]
-                rows.append(
-                    [f"*paper: {looks[method].name}*", "*paper, real robot*", *shown, "", "", ""]
-                )
-    heads = [
-        "method",
-        "launches",
-        *(f"g = {target:g} m" for target in targets),
-        "all targets (± within targets)",
-        "± over all",
-        "bias",
-        "failed",
-    ]
-    return heads, rows
 
 
 def predictions(trials: pd.DataFrame) -> Table:
@@ -187,16 +141,6 @@ def prediction_summary(
     heads = ["method", "inside the recorded stretch", "beyond it", "all launches", "bias [%]"]
     heads += ["not predicted", "in the 90 % interval, inside", "beyond"]
     return (heads, rows) if rows else None
-
-
-def _spread(one: dict, deviation: str) -> str:
-    """Mean ± deviation in cm, N/A where every launch failed; partial failures are counted."""
-    if one["failed"] == one["launches"]:
-        return "N/A"
-    failed = f" ({one['failed']} failed)" if one["failed"] else ""
-    if not np.isfinite(one[deviation]):
-        return f"{100 * one['mean']:.2f}{failed}"
-    return f"{100 * one['mean']:.2f} ± {100 * one[deviation]:.2f}{failed}"
 
 
 def _share(part: dict) -> str:

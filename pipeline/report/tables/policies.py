@@ -4,49 +4,75 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.policy.landing_map import LandingMap
 from pipeline.report.looks import Look
 from pipeline.report.results import Result, Results
-from pipeline.report.tables.cells import Table, number
+from pipeline.report.tables.cells import NONE, Table, number
 
 
-def aims(
-    results: dict[str, Result], targets: np.ndarray, draws: dict, looks: dict[str, Look]
-) -> Table:
-    """Draws of each method's policy, shape (N, 2) [m], for targets [m], and its simulator's say."""
+def aims(named: dict[str, tuple[LandingMap, np.ndarray]], targets: np.ndarray) -> Table:
+    """What draws come to in a calibrated simulator.
+
+    Args:
+        named: By whose they are, the simulator's map and draws (N, 2) [m] for `targets` (N,) [m].
+    """
     rows = []
-    for method, result in results.items():
-        landed = result.landing_map(draws[method])
-        reasons = (result.landing_map.reasons[code] for code in landed.failure)
-        columns = (targets, draws[method], landed.landing_y, landed.hold_force, reasons)
+    for name, (landing_map, draws) in named.items():
+        landed = landing_map(draws)
+        reasons = (landing_map.reasons[code] for code in landed.failure)
         rows += [
             [
-                looks[method].name,
+                name,
                 f"{target:.3f}",
                 f"{y:.4f}, {z:.4f}",
                 number(landing, ".3f", reason),
                 number(force, ".1f"),
             ]
-            for target, (y, z), landing, force, reason in zip(*columns, strict=True)
+            for target, (y, z), landing, force, reason in zip(
+                targets, draws, landed.landing_y, landed.hold_force, reasons, strict=True
+            )
         ]
-    return ["method", "target [m]", "draw y, z [m]", "predicted [m]", "hold force [N]"], rows
+    return ["policy", "target [m]", "draw y, z [m]", "predicted [m]", "hold force [N]"], rows
 
 
 def policies(results: Results, looks: dict[str, Look]) -> Table:
     """How each policy converged in its own simulator, and how well its map interpolates."""
-    heads = ["band", "method", "converged", "mean error [cm]", "largest", "map error", "largest"]
+    heads = [
+        "band",
+        "method",
+        "policy",
+        "converged",
+        "mean error [cm]",
+        "largest",
+        "failed targets",
+    ]
+    heads += ["map error", "largest", "expected [cm]"]
     rows = []
-    for result in results:
-        training, near = result.card["training"], result.card["landing_map"]["target_range"]
-        rows.append(
-            [
-                result.band,
-                looks[result.method].name,
-                "yes" if training["converged"] else "**no**",
-                *(
-                    number(value and 100 * value, ".2f")
-                    for source in (training, near)
-                    for value in (source["mean_error_m"], source["max_error_m"])
-                ),
-            ]
-        )
+    for one in results:
+        for name, card in (("plain", one.card), ("robust", one.robust_card)):
+            if card is not None:
+                names = one.band, looks[one.method].name, name
+                rows.append([*names, *_converged(card), _expected(one, name)])
     return heads, rows
+
+
+def _converged(card: dict) -> list[str]:
+    training, near = card["training"], card["landing_map"]["target_range"]
+    own, by_map = (
+        [_centimetres(source.get(name)) for name in ("mean_error_m", "max_error_m")]
+        for source in (training, near)
+    )
+    failed = training.get("failed_targets")
+    said = "yes" if training["converged"] else "**no**"
+    return [said, *own, NONE if failed is None else str(failed), *by_map]
+
+
+def _expected(result: Result, policy: str) -> str:
+    """Of either policy, where there is a robust one that both were compared with."""
+    known = (result.robust_card or {}).get("training", {})
+    prefix = "" if policy == "robust" else "plain_"
+    return _centimetres(known.get(f"{prefix}expected_error_m"))
+
+
+def _centimetres(metres: float | None) -> str:
+    return NONE if metres is None else number(100 * metres, ".2f")

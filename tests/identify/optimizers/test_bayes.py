@@ -8,12 +8,20 @@ import sys
 import numpy as np
 import pytest
 import torch
+from botorch.generation.gen import _process_scipy_result
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.optimize import OptimizeResult
 from scipy.stats import norm
 
-from pipeline.identify.optimizers.bayes import Bayes, greedy, standardised, training_rows
+from pipeline.identify.optimizers.bayes import (
+    Bayes,
+    greedy,
+    one_quiet_thread,
+    standardised,
+    training_rows,
+)
 from pipeline.identify.search import latin_hypercube
 from tests.identify.functions import CENTRE, NAMES, Evaluate, alone, changed, correlated, quadratic
 
@@ -116,6 +124,16 @@ def test_the_same_seed_asks_for_the_same_points() -> None:
 def test_it_survives_losses_that_are_all_alike() -> None:
     history = alone("bo", Evaluate(lambda unit: np.ones(len(unit))), 60, changed(population=20))
     assert len(np.unique(history.unit, axis=0)) > 50
+
+
+def test_a_line_search_that_fails_is_not_told_to_users(recwarn) -> None:
+    """BoTorch resets the filters of warnings before it warns."""
+    failed = OptimizeResult(success=False, status=2, message="ABNORMAL")
+    with one_quiet_thread():
+        _process_scipy_result(failed, {})
+    assert not recwarn.list
+    _process_scipy_result(failed, {})
+    assert len(recwarn.list) == 1
 
 
 def test_greedy_takes_what_adds_most() -> None:

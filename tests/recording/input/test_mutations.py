@@ -1,4 +1,4 @@
-"""Thousands of damaged recordings: each an episode or one clear line, and nothing passes silently.
+"""Thousands of damaged recordings, each an episode or one clear line; nothing passes silently.
 
 The episode of a damaged file equals the undamaged one's, or the recording says what it lost. Where
 checksums were mended after the damage, or never were, nobody can ask for that; what remains is no
@@ -77,9 +77,10 @@ def counts(results: list[dict]) -> dict[str, dict[str, int]]:
 
 
 @pytest.mark.slow
-def test_two_thousand_mutations(tmp_path) -> None:
-    results = campaign(tmp_path, 335, 1)
-    assert len(results) == 335 * len(KINDS) > 2000
+def test_a_thousand_mutations(tmp_path) -> None:
+    """The first of those of the campaign below."""
+    results = campaign(tmp_path, 170, 1)
+    assert len(results) == 170 * len(KINDS) > 1000
     assert failures(results) == []
     # The damage was not all of one sort.
     for kind, found in counts(results).items():

@@ -9,7 +9,8 @@ import pytest
 
 from pipeline.report.figures import policy
 from pipeline.report.looks import looks
-from tests.report.conftest import METHOD, launches
+from pipeline.report.results import gather
+from tests.report.conftest import BAND, METHOD, launches
 
 
 @pytest.fixture
@@ -42,3 +43,30 @@ def test_launches_without_intervals_are_drawn_too(kept) -> None:
     trials = launches().drop(columns=["predicted_low", "predicted_high"])
     policy.landings("", trials, looks([METHOD]), [METHOD])
     assert "90 % interval" not in [text.get_text() for text in kept[0].legends[0].get_texts()]
+
+
+@pytest.fixture
+def result(root, params):
+    return gather(params, root).methods[BAND][METHOD]
+
+
+def test_the_map_shows_the_paths_of_both_policies(kept, result) -> None:
+    targets, near = np.array([1.725, 2.125]), np.array([[-0.30, -0.14], [-0.34, -0.13]])
+    draws = {"the policy's": near, "the robust policy's": near - [0, 0.05]}
+    policy.landing_map("", result, draws, targets, 1.63, 0.275, 0.52)
+    ax, bar = kept[0].axes
+    paths = [line for line in ax.lines if line.get_label().endswith("far target")]
+    for line, expected in zip(paths, draws.values(), strict=True):
+        np.testing.assert_array_equal(np.transpose(line.get_data()), expected)
+    first = [line for line in ax.lines if line.get_marker() == "o"]
+    starts = [[line.get_xdata()[0], line.get_ydata()[0]] for line in first]
+    np.testing.assert_array_equal(starts, [near[0], near[0] - [0, 0.05]])
+    assert len({line.get_color() for line in paths}) == 2
+    assert bar.get_ylim()[1] <= policy.REACH * 2.125 + 0.5  # colours tell the targets apart
+
+
+def test_training_is_drawn_in_centimetres(kept, result) -> None:
+    policy.training("", {METHOD: result, "de": result}, looks([METHOD, "de"]))
+    curve = kept[0].axes[0].lines[0]
+    np.testing.assert_array_equal(curve.get_xdata(), [1, 2])
+    np.testing.assert_allclose(curve.get_ydata(), [30, 0.4])

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import pytest
 
 from pipeline.report.looks import looks
 from pipeline.report.results import gather
 from pipeline.report.tables.identified import (
-    at_edge,
     derived,
     held_out,
     losses,
     methods,
-    parameters,
     phases,
 )
-from tests.report.conftest import BAND, METHOD, confidence, episode
+from tests.report.conftest import BAND, METHOD, episode
 from tests.report.toy_replay import toy_replay
 
 
@@ -36,36 +32,11 @@ def column(table, heading: str) -> list[str]:
     return [row[heads.index(heading)] for row in rows]
 
 
-def test_edge_of_the_box_on_both_scales() -> None:
-    log = SimpleNamespace(low=1e-4, high=1e-2, scale="log")
-    line = SimpleNamespace(low=0.0, high=1.0, scale="linear")
-    assert at_edge(1.01e-4, log) and not at_edge(1.2e-4, log) and at_edge(1e-2, log)
-    assert at_edge(0.995, line) and not at_edge(0.98, line)
-
-
-def test_intervals_and_what_cannot_be_identified(results, params, named) -> None:
-    table = parameters(results, params, named)
-    assert column(table, "d [ms]") == ["0.1 – 50", "3 (2.7 – 3.3)"]
-    assert column(table, "friction")[1] == "0.5, not identifiable"
-    assert column(table, "method") == ["*linear/log scale*", "Sling2Sim2Real"]
-
-
-def test_a_theta_outside_its_interval_is_marked(results, params, named) -> None:
-    about = results.methods[BAND][METHOD].theta["confidence"]["parameters"]
-    about["poissons_ratio"] |= {"low": 0.4891, "high": 0.4899}
-    about["youngs_modulus"] |= {"low": 3.001e5, "high": 3.003e5}
-    table = parameters(results, params, named)
-    assert column(table, "ν")[1] == "0.45 † (0.489 – 0.49)"
-    assert column(table, "E [Pa]")[1] == "3.00e5 † (3.001e5 – 3.003e5)"
-
-
-def test_a_parameter_that_is_not_searched_is_called_fixed(results, params, named) -> None:
+def test_what_a_method_holds_fixed(params, named) -> None:
     method = params.methods[METHOD].model_copy(
         update={"fixed": {"poissons_ratio": 0.45, "elasticity_damping": 5e-3}}
     )
     params = params.model_copy(update={"methods": {METHOD: method}})
-    results.methods[BAND][METHOD].theta["confidence"] = confidence(fixed="poissons_ratio")
-    assert column(parameters(results, params, named), "ν")[1] == "0.45, fixed"
     assert column(methods(params, named), "held fixed") == ["ν 0.45, d 5 ms"]
 
 

@@ -1,0 +1,86 @@
+"""The actuation floor of a band: how far an oracle's launches land from their targets.
+
+The oracle's draws are exact but for what no policy can help: the error of the drawn position and
+the kick of the opening fingers. Launches of a policy that come near this floor miss for no other
+reason.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.errors import UserError
+from pipeline.policy.trials import trial_seed
+
+NUMBERS = ("mean_error_m", "launches", "actuation_error_m", "release_jitter")
+
+
+def trial_seeds(params) -> np.ndarray:
+    """Seeds of a floor's launches, one row a target: first the trials' own, then others."""
+    trials, more = params.trials, params.floor.launches
+    shape = len(trials.targets), trials.repeats
+    own = np.arange(shape[0] * shape[1]).reshape(shape)
+    others = own.size + np.arange(shape[0] * more).reshape(shape[0], more)
+    return trial_seed(trials, np.hstack([own, others]))
+
+
+def errors_of(draws: np.ndarray, landings: np.ndarray, params) -> dict:
+    """How far launches land from the targets of the trials.
+
+    Args:
+        draws: One a target (y, z) [m], shape (T, 2).
+        landings: Of launches from them [m], NaN where one failed, shape (T, N), their seeds those
+            of `trial_seeds`.
+
+    Returns:
+        For all launches, and under "targets" for each target with its "draw": mean_error_m and
+        std_m (of a sample) of |y - g|, bias_m, the mean of y - g, launches, failed ones, and
+        trials_mean_error_m, the mean over launches with the errors of the trials. None where
+        nothing landed.
+    """
+    targets = np.array(params.trials.targets)
+    missed = landings - targets[:, None]
+    own = missed[:, : params.trials.repeats]
+    return {
+        "targets": {
+            f"{target:g}": {"draw": list(map(float, draw)), **_error(miss, mine)}
+            for target, draw, miss, mine in zip(targets, draws, missed, own, strict=True)
+        },
+        **_error(missed, own),
+    }
+
+
+def _error(missed: np.ndarray, own: np.ndarray) -> dict:
+    landed = missed[np.isfinite(missed)]
+    size = np.abs(landed)
+    return {
+        "mean_error_m": _mean(size),
+        "std_m": float(size.std(ddof=1)) if len(size) > 1 else None,
+        "bias_m": _mean(landed),
+        "launches": missed.size,
+        "failed": missed.size - len(landed),
+        "trials_mean_error_m": _mean(np.abs(own[np.isfinite(own)])),
+    }
+
+
+def _mean(values: np.ndarray) -> float | None:
+    return float(values.mean()) if len(values) else None
+
+
+def load_floor(path: Path) -> dict:
+    """Read what stages/floor.py wrote. Raises UserError."""
+    path = Path(path)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        [float(content[name]) for name in NUMBERS]
+        [float(one["mean_error_m"]) for one in content["targets"].values()]
+    except FileNotFoundError as error:
+        raise UserError(f"{path}: no such file; `dvc repro floor@{path.stem}` makes it") from error
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UserError(
+            f"{path}: damaged; `dvc repro --force floor@{path.stem}` makes it anew"
+        ) from error
+    return content

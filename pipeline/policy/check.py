@@ -1,0 +1,125 @@
+"""What a trained policy is worth, by launches in the calibrated simulator and not by a map."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.policy.landing_map import Launcher
+from pipeline.policy.landscape import TOO_MUCH_FORCE
+from pipeline.policy.train import CHECKED_TARGETS, Policy, Trained
+
+CONVERGED = 0.01  # mean |y_p - g| [m] over the checked targets that counts as converged
+SLACK = 0.001  # m, by which a robust policy's expected error may exceed the plain one's
+CRITERION = (
+    f"mean |y_p - g| <= {CONVERGED:g} m over {CHECKED_TARGETS} targets launched in the calibrated"
+    " simulator, no failure"
+)
+ROBUST_CRITERION = (
+    "expected |y_p - g| over samples of theta and errors of the draw <= the plain policy's"
+    f" + {SLACK:g} m, no failure in the calibrated simulator"
+)
+TRIED = 8  # launches of each target with a θ and an error of the draw of their own
+
+
+@dataclass(frozen=True)
+class Check:
+    """Launches of a policy's draws.
+
+    Attributes:
+        mean_error, max_error: |y_p - g| [m] of those that land; NaN where none does.
+        failures: How many fail, by reason.
+    """
+
+    mean_error: float
+    max_error: float
+    failures: dict[str, int]
+
+
+def check(policy: Policy, launcher: Launcher, params) -> Check:
+    """Launch the policy's draws for targets spread over the trained range, as they are.
+
+    Args:
+        params: The whole of params.yaml.
+    """
+    targets = np.linspace(*params.policy.targets, CHECKED_TARGETS)
+    return _checked(launcher(policy.draws(targets)), targets, params.setup.max_force)
+
+
+def check_expected(policy: Policy, launcher: Launcher, thetas: np.ndarray, params) -> Check:
+    """The same with θ drawn from `thetas`, shape (M, P), and an error in each drawn position.
+
+    Which θ and which error a launch gets hangs on params.policy.seed alone: policies that are
+    compared get the same.
+    """
+    targets = np.repeat(np.linspace(*params.policy.targets, CHECKED_TARGETS), TRIED)
+    random = np.random.default_rng(params.policy.seed)
+    errors = random.normal(0, params.trials.actuation_error, (len(targets), 2))
+    chosen = thetas[random.integers(len(thetas), size=len(targets))]
+    launched = launcher(policy.draws(targets) + errors, chosen)
+    return _checked(launched, targets, params.setup.max_force)
+
+
+def _checked(launched, targets: np.ndarray, max_force: float) -> Check:
+    heavy = np.asarray(launched.hold_force) > max_force
+    pairs = zip(launched.failure, heavy, strict=True)
+    reasons = [reason or (TOO_MUCH_FORCE if much else None) for reason, much in pairs]
+    landed = np.array([reason is None for reason in reasons])
+    error = np.abs(np.asarray(launched.landing_y)[landed] - targets[landed])
+    failures = Counter(reason for reason in reasons if reason)
+    nan = float("nan")
+    return Check(
+        mean_error=float(error.mean()) if len(error) else nan,
+        max_error=float(error.max()) if len(error) else nan,
+        failures=dict(sorted(failures.items())),
+    )
+
+
+def figures(trained: Trained, checked: Check) -> dict:
+    """What a card tells of a training (export.TRAINING)."""
+    return {
+        "converged": not checked.failures and checked.mean_error <= CONVERGED,
+        "criterion": CRITERION,
+        "iteration": trained.iteration,
+        "iterations": len(trained.curve["iteration"]),
+        "mean_error_m": checked.mean_error,
+        "max_error_m": checked.max_error,
+        "failed_targets": sum(checked.failures.values()),
+        "map_mean_error_m": trained.mean_error,
+        "failed_launches": trained.failures,
+    }
+
+
+def robust_figures(
+    trained: Trained, checked: Check, expected: Check, plain: Check, samples: int, error: float
+) -> dict:
+    """The same of a robust policy (export.ROBUST_TRAINING).
+
+    Args:
+        expected, plain: Of the robust and the plain policy's `check_expected`.
+        samples: Of θ, how many it was trained over.
+        error: Standard deviation of the drawn position along each axis [m].
+    """
+    better = expected.mean_error <= plain.mean_error + SLACK
+    return {
+        **figures(trained, checked),
+        "converged": not checked.failures and better,
+        "criterion": ROBUST_CRITERION,
+        "expected_error_m": expected.mean_error,
+        "plain_expected_error_m": plain.mean_error,
+        "samples": samples,
+        "actuation_error_m": error,
+    }
+
+
+def verdict(training: dict, failures: dict[str, int]) -> str:
+    """A line about a training's figures: whether it converged, and what stood in the way."""
+    state = "converged" if training["converged"] else "NOT converged"
+    mean = training["mean_error_m"]
+    text = f"{state}, mean |y_p - g| {100 * mean:.2f} cm" if mean == mean else state
+    if failures:
+        reasons = ", ".join(f"{reason} {count}" for reason, count in failures.items())
+        text += f"; {training['failed_targets']} of {CHECKED_TARGETS} targets fail: {reasons}"
+    return text

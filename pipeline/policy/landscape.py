@@ -1,0 +1,122 @@
+"""Where a draw lands under one θ or several, read off landing maps by cubic splines.
+
+Under each θ the landing is a smooth function of the draw. A normal error of the drawn position,
+small against the grid, spreads it in proportion to its gradient: so expectations over that error
+have a closed form (expected.py), and none is drawn at random.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import NdBSpline, RBFInterpolator, make_interp_spline
+
+if TYPE_CHECKING:
+    from pipeline.policy.landing_map import LandingMap
+
+TOO_MUCH_FORCE = "holding force above the limit"
+OUTSIDE = "draw outside the box"
+NO_FAILURE = ""
+
+
+@dataclass(frozen=True)
+class Landings:
+    """What draws lead to under each θ, shapes (N, S).
+
+    Attributes:
+        landing_y: Landing on the floor [m], NaN where failed.
+        spread: Standard deviation of it by the error of the draw [m].
+        hold_force: Force that the hand holds before the release [N].
+        failure: Index into `Landscape.reasons`, 0 where the launch succeeds.
+    """
+
+    landing_y: np.ndarray
+    spread: np.ndarray
+    hold_force: np.ndarray
+    failure: np.ndarray
+
+
+class Landscape:
+    """Landings of draws under S θ.
+
+    A draw is a failure, and not interpolated, where the interpolated holding force exceeds the
+    arm's limit or where a corner of its grid cell failed in simulation.
+
+    Attributes:
+        reasons: Names of the failure codes; code 0 is success.
+        low, high: Corners of the box of draws [m], shape (2,).
+    """
+
+    def __init__(self, maps: Sequence[LandingMap], error: float = 0.0):
+        """Read `maps`, which share grid and force limit.
+
+        Args:
+            error: Standard deviation of the drawn position along each axis [m].
+        """
+        first = maps[0]
+        self.grid = (first.draw_y, first.draw_z)
+        self.max_force, self.error = first.max_force, error
+        self.low, self.high = (np.array([axis[end] for axis in self.grid]) for end in (0, -1))
+        known = {reason for one in maps for reason in one.failure.flat} - {NO_FAILURE}
+        self.reasons = [NO_FAILURE, TOO_MUCH_FORCE, OUTSIDE, *sorted(known)]
+        failure = np.stack([one.failure for one in maps], -1)
+        code = np.vectorize(self.reasons.index, otypes=[int])(failure)
+        self._cell = np.max([code[:-1, :-1], code[1:, :-1], code[:-1, 1:], code[1:, 1:]], axis=0)
+        self._landing = self._spline([one.landing_y for one in maps])
+        self._force = self._spline([one.hold_force for one in maps])
+
+    def fingerprint(self) -> str:
+        """Of all that landings hang on."""
+        digest = hashlib.sha256(repr((self.reasons, self.max_force, self.error)).encode())
+        for one in (*self.grid, self._cell, self._landing.c, self._force.c):
+            digest.update(np.ascontiguousarray(one).tobytes())
+        return digest.hexdigest()
+
+    def __call__(self, draws: np.ndarray) -> Landings:
+        """Landings of draws, shape (N, 2) [m]."""
+        draws = np.asarray(draws, float)
+        outside = ((draws < self.low - 1e-6) | (draws > self.high + 1e-6)).any(1)  # float32 draws
+        inside = np.clip(draws, self.low, self.high)
+        cell = [
+            np.clip(np.searchsorted(axis, along) - 1, 0, len(axis) - 2)
+            for axis, along in zip(self.grid, inside.T, strict=True)
+        ]
+        landing, force = self._landing(inside), self._force(inside)
+        failure = self._cell[*cell]
+        failure = np.where((failure == 0) & (force > self.max_force), 1, failure)
+        failure = np.where(outside[:, None], 2, failure)
+        spread = np.zeros(landing.shape)
+        if self.error:
+            slopes = [self._landing(inside, nu=order) for order in ((1, 0), (0, 1))]
+            spread = self.error * np.hypot(*slopes)
+        return Landings(np.where(failure > 0, np.nan, landing), spread, force, failure)
+
+    def _spline(self, values: list[np.ndarray]) -> NdBSpline:
+        """Interpolating bicubic splines through values (Y, Z) of each θ."""
+        whole = np.stack([_continued(one) for one in values], -1)
+        along_y = make_interp_spline(self.grid[0], whole)
+        along_z = make_interp_spline(self.grid[1], np.moveaxis(along_y.c, 1, 0))
+        coefficients = np.ascontiguousarray(np.moveaxis(along_z.c, 0, 1))
+        return NdBSpline((along_y.t, along_z.t), coefficients, 3)
+
+
+def _continued(values: np.ndarray) -> np.ndarray:
+    """Failed nodes filled by a smooth continuation, so that they do not disturb their neighbours;
+    no answer is read from a cell that they touch.
+    """
+    known = np.isfinite(values)
+    if not known.any():
+        return np.zeros(values.shape)
+    if known.all():
+        return values
+    nodes = np.stack(np.indices(values.shape), -1).astype(float)
+    continuation = RBFInterpolator(
+        nodes[known], values[known], neighbors=min(24, int(known.sum())), kernel="linear"
+    )
+    filled = values.copy()
+    filled[~known] = continuation(nodes[~known])
+    return filled

@@ -1,0 +1,241 @@
+"""Launches of every band and method side by side: flights, and landings on the target."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Circle, Rectangle
+
+from pipeline.params import TARGET_AREA
+from pipeline.report.figures.canvas import save
+from pipeline.report.looks import SIDE_BY_SIDE, Look
+from pipeline.report.results import Results
+from pipeline.sling.model import GRAVITY
+from pipeline.style import INK, STYLE
+
+BEHIND, BEYOND = -0.45, 0.35  # how far a picture reaches behind the fork, and past the target [m]
+RINGS = (0.05, 0.10)  # around a target [m]
+MARKS = ("v", "o", "^", "s", "D", "P")  # of targets, near to far
+FLOOR, AREA = "0.55", "#dccaa6"
+
+
+def flight(y: float, z: float, speed: float, angle: float, floor: float) -> np.ndarray:
+    """Points (40, 2) of a flight without drag from (y, z) down to z = `floor` [m]."""
+    up = speed * np.sin(angle)
+    duration = (up + np.sqrt(up**2 + 2 * GRAVITY * max(z - floor, 0.0))) / GRAVITY
+    time = np.linspace(0, duration, 40)
+    return np.stack(
+        [y + speed * np.cos(angle) * time, z + up * time - GRAVITY * time**2 / 2], axis=1
+    )
+
+
+def trajectories(
+    path: Path, results: Results, methods: list[str], looks: dict[str, Look], fork_height: float
+) -> None:
+    """Flights from the pouch to the floor, a panel a band and method, to scale.
+
+    Args:
+        methods: Those that ran on every band and are drawn.
+    """
+    panels = [(band, method) for band in results.methods for method in methods]
+    columns = len(methods) if len(results.methods) > 1 else min(2, len(methods))
+    rows = -(-len(panels) // columns)
+    view = (BEHIND, TARGET_AREA[1] + BEYOND)
+    trials = {pair: _with_target(results.methods[pair[0]][pair[1]].trials) for pair in panels}
+    predicted = {pair: _predicted(one, -fork_height) for pair, one in trials.items()}
+    flown = [z for one in trials.values() for z in one.flight_z.dropna()]
+    flown += [points[:, 1] for flights in predicted.values() for points in flights]
+    highest = max((max(z) for z in flown), default=0.0)
+    low, high = -fork_height - 0.13, max(0.1, float(highest) + 0.05)
+    wide = min(14.0 / columns, 5.6)
+    tall = wide * (high - low) / (view[1] - view[0])
+    with plt.rc_context({**STYLE, "axes.grid": False, "axes.spines.bottom": False}):
+        figure, axes = plt.subplots(
+            rows, columns, figsize=(columns * wide, rows * (tall + 0.35) + 0.9),
+            sharex=True, sharey=True, squeeze=False,
+        )  # fmt: skip
+        for ax in axes.flat[len(panels) :]:
+            ax.remove()
+        for number, (ax, (band, method)) in enumerate(zip(axes.flat, panels, strict=False)):
+            rows_of, look = trials[band, method], looks[method]
+            _scenery(ax, fork_height, sorted(set(rows_of.target)), look.color)
+            _flights(ax, rows_of, predicted[band, method], look.color, fork_height)
+            ax.set_title(f"{band}, {look.name}", fontsize=9, color=look.color)
+            ax.set(xlim=view, ylim=(low, high), aspect="equal")
+            if number % columns == 0:
+                ax.set_ylabel("z [m]")
+            if number >= len(panels) - columns:
+                ax.set_xlabel("y [m]")
+        kinds = sorted({kind for one in trials.values() for kind in one.kind} - {"predicted"})
+        _key(figure, kinds)
+        save(figure, path)
+
+
+def _with_target(trials: pd.DataFrame) -> pd.DataFrame:
+    return trials[trials.target.notna()]
+
+
+def _shades(targets: list[float], color: str) -> dict[float, tuple]:
+    """Of a method's colour, by target: the near one palest."""
+    count = max(len(targets) - 1, 1)
+    white = [0.5 * (1 - number / count) for number in range(len(targets))]
+    return {
+        target: tuple(np.array(to_rgb(color)) * (1 - pale) + pale)
+        for target, pale in zip(targets, white, strict=True)
+    }
+
+
+def _scenery(ax: plt.Axes, fork_height: float, targets: list[float], color: str) -> None:
+    """Fork, floor, the target on it, and the places on it that are aimed at."""
+    floor, (near, far) = -fork_height, TARGET_AREA
+    ax.axhline(floor, color=FLOOR, lw=1, zorder=1)
+    ax.add_patch(Rectangle((near, floor - 0.04), far - near, 0.04, color=AREA, zorder=1, lw=0))
+    ax.plot([0, 0], [floor, 0], color=INK, lw=2, solid_capstyle="butt", zorder=2)
+    for target, shade in _shades(targets, color).items():
+        style = {"color": shade, "mec": INK, "mew": 0.5, "zorder": 4}
+        ax.plot(target, floor - 0.08, "^", ms=5, **style)
+
+
+def _predicted(trials: pd.DataFrame, floor: float) -> list[np.ndarray]:
+    """Flights of the calibrated simulator, one for equal draws."""
+    leaves = ["predicted_leave_y", "predicted_leave_z", "predicted_speed", "predicted_angle"]
+    rows = trials[leaves].dropna().drop_duplicates()
+    return [flight(*leave, floor) for leave in rows.itertuples(index=False)]
+
+
+def _flights(
+    ax: plt.Axes,
+    trials: pd.DataFrame,
+    predicted: list[np.ndarray],
+    color: str,
+    fork_height: float,
+) -> None:
+    shades = _shades(sorted(set(trials.target)), color)
+    for one in trials.itertuples():
+        if one.flight_y is not None:
+            ax.plot(one.flight_y, one.flight_z, color=shades[one.target], lw=1, alpha=0.8, zorder=3)
+        elif one.landing_y is not None and np.isfinite(one.landing_y):
+            ax.plot(one.landing_y, -fork_height, "x", color=shades[one.target], ms=5, zorder=3)
+    for points in predicted:
+        ax.plot(*points.T, color=INK, lw=0.6, ls=(0, (5, 3)), zorder=5)
+    launched = trials[trials.kind != "predicted"]
+    failed = int(launched.landing_y.isna().sum())
+    said = f"{failed} of {len(launched)} failed" if failed else ""
+    behind = {"facecolor": "w", "edgecolor": "none", "alpha": 0.8, "pad": 1}
+    ax.text(
+        0.99, 0.97, said, transform=ax.transAxes, ha="right", va="top", fontsize=8, zorder=6,
+        bbox=behind if said else None,
+    )  # fmt: skip
+
+
+def _key(figure: plt.Figure, kinds: list[str]) -> None:
+    line = plt.Line2D
+    entries = []
+    if "virtual" in kinds:
+        entries.append(
+            ("virtual flight, with drag (paler: nearer target)", line([], [], color="0.3"))
+        )
+    if "measured" in kinds:
+        entries.append(("measured landing", line([], [], color="0.3", ls="", marker="x")))
+    predicted = line([], [], color=INK, lw=0.6, ls=(0, (5, 3)))
+    entries += [
+        ("predicted by the calibrated simulator", predicted),
+        ("fork", line([], [], color=INK, lw=2)),
+        ("target on the floor, 1 m", Rectangle((0, 0), 1, 1, color=AREA)),
+        ("aimed at", line([], [], ls="", marker="^", color="0.7", mec=INK, mew=0.5)),
+    ]
+    names, marks = zip(*entries, strict=True)
+    figure.legend(
+        marks, names, loc="outside lower center", ncols=len(names) if len(names) < 4 else 3
+    )
+
+
+def scatter(path: Path, results: Results, methods: list[str], looks: dict[str, Look]) -> None:
+    """Landings on the target, seen from above, a panel a band and a strip a method.
+
+    Launches go in the plane of the band: nothing is known across it, and nothing is shown.
+
+    Args:
+        methods: Those that ran on every band and are drawn.
+    """
+    bands, (near, far) = list(results.methods), TARGET_AREA
+    with plt.rc_context({**STYLE, "axes.grid": False}):
+        figure, axes = plt.subplots(
+            1, len(bands), figsize=(min(4.5 * len(bands) + 0.6, 13.5), 5.6), sharey=True,
+            squeeze=False,
+        )  # fmt: skip
+        for ax, band in zip(axes.flat, bands, strict=True):
+            strips = _strips(results, band, methods, looks)
+            width = (far - near) / max(len(strips), 1)
+            ax.add_patch(Rectangle((0, near), far - near, far - near, color=AREA, lw=0, alpha=0.6))
+            for number, (_, color, trials) in enumerate(strips):
+                middle = (number + 0.5) * width
+                if number:
+                    ax.plot([number * width] * 2, TARGET_AREA, color="w", lw=2)
+                _landings(ax, trials, middle, width, color)
+            places = (np.arange(len(strips)) + 0.5) * width
+            names = [name.replace(", ", ",\n") for name, _, _ in strips]
+            ax.set_xticks(places, names, fontsize=8 if len(strips) <= SIDE_BY_SIDE else 6.8)
+            ax.tick_params(axis="x", length=0)
+            ax.set(xlim=(-0.03, 1.03), ylim=(near - 0.02, far + 0.08), aspect="equal")
+            ax.set_title(band, fontsize=10)
+            for label, (_, color, _) in zip(ax.get_xticklabels(), strips, strict=True):
+                label.set_color(color)
+        axes[0, 0].set_ylabel("landing, y [m]")
+        _key_of_targets(figure, results)
+        save(figure, path)
+
+
+def _strips(results: Results, band: str, methods: list[str], looks: dict[str, Look]) -> list:
+    """Name, colour and launches of each strip; a robust policy has one of its own."""
+    strips = []
+    for method in methods:
+        result, look = results.methods[band][method], looks[method]
+        strips.append((look.name, look.color, _with_target(result.trials)))
+        if len(result.robust_trials):
+            robust = _with_target(result.robust_trials)
+            strips.append((f"{look.name}, robust", look.color, robust))
+    return strips
+
+
+def _landings(ax: plt.Axes, trials: pd.DataFrame, middle: float, width: float, color: str) -> None:
+    """Rings around the targets and a mark a landing, in the strip about x = `middle`."""
+    targets = sorted(set(trials.target))
+    for target, mark in zip(targets, _marks(targets), strict=True):
+        for radius in RINGS:
+            if radius <= 0.501 * width:
+                ax.add_patch(Circle((middle, target), radius, fill=False, color="w", lw=1.2))
+        ax.plot([middle - 0.015, middle + 0.015], [target] * 2, color=INK, lw=0.8)
+        landed = trials[(trials.target == target) & trials.landing_y.notna()]
+        ax.scatter(
+            np.full(len(landed), middle), landed.landing_y, s=20, marker=mark, facecolors=color,
+            edgecolors="w", linewidths=0.4, alpha=0.85, zorder=3,
+        )  # fmt: skip
+    launched = trials[trials.kind != "predicted"]
+    failed = int(launched.landing_y.isna().sum())
+    if failed:
+        text = f"{failed} of {len(launched)}\nfailed"
+        ax.text(middle, TARGET_AREA[1] + 0.01, text, ha="center", va="bottom", fontsize=7)
+
+
+def _marks(targets: list[float]) -> list[str]:
+    return [MARKS[number % len(MARKS)] for number in range(len(targets))]
+
+
+def _key_of_targets(figure: plt.Figure, results: Results) -> None:
+    targets = sorted(set(results.trials.target.dropna()))
+    entries = [
+        (f"aimed at {target:g} m", plt.Line2D([], [], ls="", marker=mark, color="0.4", mec="w"))
+        for target, mark in zip(targets, _marks(targets), strict=True)
+    ]
+    ring = plt.Line2D([], [], ls="", marker="o", ms=11, mfc=AREA, mec="w", mew=1.2)
+    words = " and ".join(f"{100 * radius:g}" for radius in RINGS)
+    entries.append((f"rings of {words} cm around the targets", ring))
+    strip = Rectangle((0, 0), 1, 1, color=AREA, alpha=0.6)
+    entries.append(("target of 1 m × 1 m, a strip a method", strip))
+    names, marks = zip(*entries, strict=True)
+    figure.legend(marks, names, loc="outside lower center", ncols=3)

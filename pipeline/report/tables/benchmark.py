@@ -1,0 +1,185 @@
+"""Landing errors in the layout of the paper's tables 1, 3 and 4, its own numbers below ours."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from pipeline.report import paper
+from pipeline.report.looks import KNOWN, Look
+from pipeline.report.looks import looks as looks_of
+from pipeline.report.results import Results
+from pipeline.report.tables.cells import NONE, Table, number
+from pipeline.report.tables.landings import landing_errors
+
+PAPER = "paper, real robot"
+FLOOR, ORACLE = "actuation floor", "virtual, oracle"
+NOT_RUN, NOT_LAUNCHED = "not run", "no launch yet"
+LAUNCHED = ("virtual", "measured")
+NOTHING = {"launches": 0, "failed": None, "mean": math.nan, "std": math.nan}
+LOOKS = looks_of(KNOWN)
+APART = {*paper.OPTIMISERS, *paper.ABLATIONS} - set(paper.BENCHMARK)  # tables 3 and 4 hold these
+
+
+@dataclass(frozen=True)
+class Row:
+    """Landing errors of one method on one band, by whom they were found.
+
+    Attributes:
+        band: As in params.yaml.
+        method: As in params.yaml, or FLOOR.
+        source: "virtual", "measured", PAPER, ORACLE, or why there are none.
+        errors: As `landing_errors` gives them; empty where there are none.
+    """
+
+    band: str
+    method: str
+    source: str
+    errors: dict
+
+
+def benchmark(results: Results, floors: dict[str, dict]) -> list[Row]:
+    """Table 1: the paper's methods and all that stand in no other table, on every band."""
+    rows = []
+    for band in dict.fromkeys([*paper.BANDS, *results.methods]):
+        ran = [method for method in results.methods.get(band, {}) if method not in APART]
+        theirs = [m for m in paper.BENCHMARK if band in paper.BANDS or m in ran]
+        rows += _rows(results, band, dict.fromkeys([*theirs, *ran]))
+        if band in floors:
+            rows.append(Row(band, FLOOR, ORACLE, _floor(floors[band])))
+    return rows
+
+
+def ablation(results: Results, methods: tuple[str, ...]) -> list[Row]:
+    """Tables 3 and 4: the paper's rows, on its Band 1 and wherever one of them ran."""
+    bands = [band for band, ran in results.methods.items() if APART & {*methods} & {*ran}]
+    rows = []
+    for band in dict.fromkeys(["band1", *bands]):
+        rows += _rows(results, band, methods)
+    return rows
+
+
+def _rows(results: Results, band: str, methods: Iterable[str]) -> list[Row]:
+    rows = []
+    for method in methods:
+        result = results.methods.get(band, {}).get(method)
+        found = [] if result is None else _launched(result.trials)
+        nothing = NOT_RUN if result is None else NOT_LAUNCHED
+        rows += [Row(band, method, kind, errors) for kind, errors in found or [(nothing, {})]]
+        cells = paper.LANDING.get((paper.BANDS.get(band), paper.METHODS.get(method)))
+        if cells:
+            rows.append(Row(band, method, PAPER, _papers(cells)))
+    return rows
+
+
+def _launched(trials: pd.DataFrame) -> list[tuple[str, dict]]:
+    aimed = trials[trials.target.notna()]
+    by_kind = {kind: aimed[aimed.kind == kind] for kind in LAUNCHED}
+    return [(kind, landing_errors(some)) for kind, some in by_kind.items() if len(some)]
+
+
+def _papers(cells: tuple) -> dict:
+    """The paper's cells, as `landing_errors` would give them; its total's ± is what it prints."""
+
+    def errors(cell: tuple[float, float] | None, launches: int) -> dict:
+        mean, deviation = (math.nan, math.nan) if cell is None else (c / 100 for c in cell)
+        return {"launches": launches, "failed": None, "mean": mean, "std": deviation}
+
+    *targets, total = cells
+    result = {g: errors(c, paper.REPEATS) for g, c in zip(paper.TARGETS, targets, strict=True)}
+    everything = errors(total, paper.REPEATS * len(targets))
+    return result | {"all": everything | {"pooled_std": everything["std"], "std": math.nan}}
+
+
+def _floor(floor: dict) -> dict:
+    """The oracle's launches (pipeline/oracle/floor.py), as `landing_errors` would give them."""
+
+    def errors(one: dict) -> dict:
+        names = {"mean": "mean_error_m", "std": "std_m", "bias": "bias_m"}
+        known = {ours: one.get(theirs) for ours, theirs in names.items()}
+        counts = {"launches": one["launches"], "failed": one.get("failed", 0)}
+        return counts | {n: math.nan if value is None else value for n, value in known.items()}
+
+    result = {float(g): errors(one) for g, one in floor["targets"].items()}
+    within = [one["std"] ** 2 for one in result.values() if np.isfinite(one["std"])]
+    pooled = math.sqrt(np.mean(within)) if within else math.nan
+    return result | {"all": errors(floor) | {"pooled_std": pooled}}
+
+
+def as_table(rows: list[Row], targets: Iterable[float], looks: dict[str, Look]) -> Table:
+    """Mean ± deviation in cm; bold: the lowest of a band where no launch failed."""
+    keys = [*sorted({*targets, *paper.TARGETS}), "all"]
+    lowest = {key: _lowest(rows, key) for key in keys}
+    lines = []
+    for row in rows:
+        cells = []
+        for key in keys:
+            one = row.errors.get(key)
+            best = one and not one["failed"]
+            best = best and one["mean"] == lowest[key].get((row.band, row.source))
+            cells.append(f"**{spread(one)}**" if best else spread(one))
+        total = row.errors.get("all", NOTHING)
+        failed = NONE if total["failed"] is None else f"{total['failed']} of {total['launches']}"
+        names = band_name(row.band), method_name(row.method, looks), row.source
+        lines.append([*names, *cells, number(100 * total["std"], ".2f"), failed])
+    heads = [f"g = {100 * key:.1f}" for key in keys[:-1]]
+    return ["band", "method", "source", *heads, "all targets", "± over all", "failed"], lines
+
+
+def _lowest(rows: list[Row], key: float | str) -> dict[tuple[str, str], float]:
+    """The lowest mean of each band and kind of which two methods or more have no failures."""
+    means: dict[tuple[str, str], list[float]] = {}
+    for row in rows:
+        one = row.errors.get(key)
+        if one and not one["failed"] and np.isfinite(one["mean"]):
+            means.setdefault((row.band, row.source), []).append(one["mean"])
+    return {group: min(some) for group, some in means.items() if len(some) > 1}
+
+
+def spread(one: dict | None) -> str:
+    """Mean ± deviation [cm]; N/A where no launch counts; partial failures are counted."""
+    if one is None:
+        return NONE
+    if not np.isfinite(one["mean"]):
+        return "N/A"
+    around = number(100 * one.get("pooled_std", one["std"]), ".2f", "")
+    failed = f", {one['failed']} failed" if one["failed"] else ""
+    return f"{100 * one['mean']:.2f}{' ± ' * bool(around)}{around}{failed}"
+
+
+def band_name(band: str) -> str:
+    """As the paper calls the band that ours imitates, or its own name."""
+    theirs = paper.BANDS.get(band)
+    return f"{theirs} ({paper.KINDS[theirs]})" if theirs else band
+
+
+def method_name(method: str, looks: dict[str, Look]) -> str:
+    """For readers, also of a method that did not run."""
+    return method if method == FLOOR else (looks | LOOKS)[method].name
+
+
+def records(rows: list[Row]) -> pd.DataFrame:
+    """The same for machines: a line a cell, for every target that was tried; empty: not known."""
+    lines = []
+    for row in rows:
+        for key, one in row.errors.items():
+            counts = np.isfinite(one["mean"])
+            lines.append(
+                {
+                    "band": row.band,
+                    "method": row.method,
+                    "source": row.source,
+                    "target_m": key,
+                    "launches": one["launches"],
+                    "failed": one["failed"],
+                    "mean_error_cm": f"{100 * one['mean']:.6g}" if counts else "N/A",
+                    "std_cm": 100 * one["std"],
+                    "std_within_targets_cm": 100 * one.get("pooled_std", one["std"]),
+                    "bias_cm": 100 * one.get("bias", math.nan),
+                }
+            )
+    return pd.DataFrame(lines).astype({"failed": "Int64"})

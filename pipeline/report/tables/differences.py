@@ -1,0 +1,155 @@
+"""Which landing errors differ by more than noise, and what the robust policies change."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from pipeline.report.looks import Look
+from pipeline.report.noise import Difference, difference
+from pipeline.report.results import Results
+from pipeline.report.tables.benchmark import LAUNCHED, band_name, spread
+from pipeline.report.tables.cells import NONE, Table, number
+from pipeline.report.tables.landings import landing_errors
+
+REFERENCES = ("sling2sim2real_taut", "sling2sim2real")  # ours and the paper's
+
+VERDICTS = ("more error", "less error", "cannot be told apart", "cannot be compared")
+
+
+class Compared(NamedTuple):
+    """By how much a method's launches of a kind miss more than those of each reference."""
+
+    band: str
+    method: str
+    kind: str
+    found: dict[str, Difference | None]
+
+
+def compared(results: Results, seed: int) -> list[Compared]:
+    """Every method beside those of the references that ran on the same band."""
+    rows = []
+    for band, of_band in results.methods.items():
+        for kind in LAUNCHED:
+            aimed = {method: _aimed(one.trials, kind) for method, one in of_band.items()}
+            aimed = {method: trials for method, trials in aimed.items() if len(trials)}
+            for method, trials in aimed.items():
+                others = [one for one in REFERENCES if one in aimed and one != method]
+                found = {one: difference(aimed[one], trials, seed) for one in others}
+                if found:
+                    rows.append(Compared(band, method, kind, found))
+    return rows
+
+
+def _aimed(trials: pd.DataFrame, kind: str) -> pd.DataFrame:
+    return trials[(trials.kind == kind) & trials.target.notna()]
+
+
+def as_table(rows: list[Compared], looks: dict[str, Look]) -> Table:
+    """Differences in cm with their intervals; bold where the interval leaves out zero."""
+    heads = ["band", "method", "launches"]
+    heads += [f"beside {looks[one].name}" for one in REFERENCES if one in looks]
+    lines = [
+        [
+            band_name(band),
+            looks[method].name,
+            kind,
+            *(shown(found[one]) if one in found else NONE for one in REFERENCES if one in looks),
+        ]
+        for band, method, kind, found in rows
+    ]
+    return heads, lines
+
+
+def shown(one: Difference | None) -> str:
+    """As in "+3.20 (+2.10 to +4.40)"."""
+    if one is None:
+        return "N/A"
+    text = _signed(one.mean)
+    if np.isfinite(one.low):
+        text += f" ({_signed(one.low)} to {_signed(one.high)})"
+    text = f"**{text}**" if one.real else text
+    return text + (f", {one.left_out} left out" if one.left_out else "")
+
+
+def _signed(metres: float) -> str:
+    return f"{100 * metres:+.2f}".replace("-", "−")
+
+
+def claims(rows: list[Compared], looks: dict[str, Look]) -> list[str]:
+    """What the intervals allow to be said, a line a band and reference."""
+    said: dict[tuple[str, str, str], dict[str, list[str]]] = {}
+    for band, method, kind, found in rows:
+        for reference, one in found.items():
+            parts = said.setdefault((band, kind, reference), {})
+            few = f" ({one.launches[0]} launches count)" if one and one.left_out else ""
+            parts.setdefault(_verdict(one), []).append(looks[method].name + few)
+    return [
+        f"- {band_name(band)}, {kind}, beside **{looks[reference].name}**: "
+        + "; ".join(
+            f"{verdict}: {', '.join(parts[verdict])}" for verdict in VERDICTS if verdict in parts
+        )
+        + "."
+        for (band, kind, reference), parts in said.items()
+    ]
+
+
+def _verdict(one: Difference | None) -> str:
+    more, less, open_, none = VERDICTS
+    if one is None or not np.isfinite(one.low):
+        return none
+    if not one.real:
+        return open_
+    return more if one.mean > 0 else less
+
+
+def records(rows: list[Compared]) -> pd.DataFrame:
+    """Differences for machines."""
+    return pd.DataFrame(
+        {
+            "band": band,
+            "method": method,
+            "source": kind,
+            "beside": reference,
+            "difference_cm": 100 * one.mean,
+            "low_95_cm": 100 * one.low,
+            "high_95_cm": 100 * one.high,
+            "launches": one.launches[0],
+            "left_out": one.left_out,
+        }
+        for band, method, kind, found in rows
+        for reference, one in found.items()
+        if one is not None
+    )
+
+
+def robust(results: Results, looks: dict[str, Look], seed: int) -> Table | None:
+    """Robust policies beside the plain ones of the same method; None where there is none."""
+    rows = []
+    for result in results:
+        second = _aimed(result.robust_trials, "virtual")
+        first = _aimed(result.trials, "virtual")
+        if second.empty:
+            continue
+        errors = [landing_errors(trials)["all"] for trials in (first, second)]
+        rows.append(
+            [
+                band_name(result.band),
+                looks[result.method].name,
+                "virtual",
+                *(spread(one) for one in errors),
+                *(number(100 * _scatter(trials), ".2f") for trials in (first, second)),
+                shown(difference(first, second, seed)),
+            ]
+        )
+    heads = ["band", "method", "launches", "plain", "robust", "scatter, plain", "scatter, robust"]
+    return ([*heads, "robust less plain"], rows) if rows else None
+
+
+def _scatter(trials: pd.DataFrame) -> float:
+    """Deviation of landings around the mean of their target [m], within targets."""
+    variances = trials[trials.landing_y.notna()].groupby("target").landing_y.var(ddof=1)
+    return math.sqrt(variances.mean())

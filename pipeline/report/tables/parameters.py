@@ -1,0 +1,163 @@
+"""What was identified, in the layout of the paper's table 2, its own numbers below ours."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from pipeline.report import paper
+from pipeline.report.looks import Look
+from pipeline.report.losses import PRINTED
+from pipeline.report.results import Result, Results
+from pipeline.report.tables.benchmark import APART, NOT_RUN, PAPER, band_name, method_name
+from pipeline.report.tables.cells import NONE, Table, number
+from pipeline.sling.model import THETA
+
+HEADS = {  # as the paper has them, with units
+    "youngs_modulus": "E [Pa]",
+    "poissons_ratio": "ν",
+    "elasticity_damping": "d [s]",
+    "dynamic_friction": "friction",
+    "damping_scale": "s",
+}
+UNITS = {"youngs_modulus": "_pa", "elasticity_damping": "_s"}
+RECORDED = {"rig": "virtual", "recording": "measured"}
+
+
+@dataclass(frozen=True)
+class Value:
+    """A parameter: what the search found, and what the posterior says [SI].
+
+    Attributes:
+        state: "identified", "not identifiable", "fixed" (the method does not search it) or
+            "" where no confidence is known.
+        low, high: Of the 90 % interval; NaN where there is none.
+        at_edge: The search ended at a side of its box.
+    """
+
+    value: float
+    state: str = ""
+    low: float = math.nan
+    high: float = math.nan
+    at_edge: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """Parameters of one method on one band in the order of THETA, and the printed loss there."""
+
+    band: str
+    method: str
+    source: str
+    values: list[Value]
+    loss: float
+
+
+def identified(results: Results, params) -> list[Row]:
+    """Table 2: the paper's methods and every other that ran, those of tables 3 and 4 last."""
+    rows = []
+    for band in dict.fromkeys([*paper.BANDS, *results.methods]):
+        ran = results.methods.get(band, {})
+        theirs = [m for m in paper.BENCHMARK if band in paper.BANDS or m in ran]
+        for method in dict.fromkeys([*theirs, *sorted(ran, key=lambda method: method in APART)]):
+            if method in ran:
+                source = RECORDED[params.bands[band].source]
+                values = [_value(params, ran[method], name) for name in THETA]
+                rows.append(Row(band, method, source, values, printed_loss(ran[method])))
+            else:
+                rows.append(Row(band, method, NOT_RUN, [Value(math.nan)] * len(THETA), math.nan))
+            cells = paper.THETA.get((paper.BANDS.get(band), paper.METHODS.get(method)))
+            if cells:
+                *values, loss = cells
+                rows.append(Row(band, method, PAPER, [Value(value) for value in values], loss))
+    return rows
+
+
+def printed_loss(result: Result) -> float:
+    """The paper's loss of the calibrated simulator, whatever the method minimised."""
+    loss = result.theta.get("loss", {})
+    return float(sum(loss.get(term, math.nan) for term in PRINTED))
+
+
+def _value(params, result: Result, name: str) -> Value:
+    value = result.theta["theta"][name]
+    if name in params.methods[result.method].fixed:
+        return Value(value, "fixed")
+    edge = at_edge(value, getattr(params.parameters, name))
+    about = result.confidence.get("parameters", {}).get(name)
+    if about is None:
+        return Value(value, at_edge=edge)
+    state = "identified" if about["identifiable"] else "not identifiable"
+    return Value(value, state, about["low"], about["high"], edge)
+
+
+def at_edge(value: float, box) -> bool:
+    """Whether the search ended within 1 % of a side of its box: the optimum may lie outside."""
+    low, high = box.low, box.high
+    if box.scale == "log":
+        value, low, high = math.log(value), math.log(low), math.log(high)
+    return not 0.01 <= (value - low) / (high - low) <= 0.99
+
+
+def as_table(rows: list[Row], looks: dict[str, Look]) -> Table:
+    """Parameters with their intervals; bold: the least loss of a band."""
+    losses: dict[tuple[str, str], list[float]] = {}
+    for row in rows:
+        losses.setdefault((row.band, row.source), []).append(row.loss)
+    least = {group: np.nanmin([math.inf, *some]) for group, some in losses.items()}
+    lines = []
+    for row in rows:
+        cells = [_cell(name, one) for name, one in zip(THETA, row.values, strict=True)]
+        loss = number(row.loss, ".4f")
+        loss = f"**{loss}**" if row.loss == least[row.band, row.source] else loss
+        lines.append(
+            [band_name(row.band), method_name(row.method, looks), row.source, *cells, loss]
+        )
+    return ["band", "method", "source", *HEADS.values(), "loss"], lines
+
+
+def _cell(name: str, one: Value) -> str:
+    if not math.isfinite(one.value):
+        return NONE
+    shown = _physical(name, one.value) + (" ⚠" if one.at_edge else "")
+    if one.state != "identified":
+        return f"{shown}, {one.state}" if one.state else shown
+    outside = "" if one.low <= one.value <= one.high else " †"
+    return f"{shown}{outside} ({_between(name, one.low, one.high)})"
+
+
+def _between(name: str, low: float, high: float) -> str:
+    """An interval with as few digits as a value, or as many more as tell its ends apart."""
+    for digits in (2, 3, 4, 5):
+        ends = _physical(name, low, digits), _physical(name, high, digits)
+        if ends[0] != ends[1]:
+            break
+    return " – ".join(ends)
+
+
+def _physical(name: str, value: float, digits: int = 2) -> str:
+    """As the paper prints it: 9.29E+5, 0.46."""
+    if name in UNITS:
+        mantissa, exponent = f"{value:.{digits}E}".split("E")
+        return f"{mantissa}E{int(exponent):+d}"
+    return f"{value:.{digits}f}"
+
+
+def records(rows: list[Row]) -> pd.DataFrame:
+    """The same for machines: a line a row; empty: not known."""
+    lines = []
+    for row in rows:
+        line = {"band": row.band, "method": row.method, "source": row.source}
+        for name, one in zip(THETA, row.values, strict=True):
+            head, unit = name, UNITS.get(name, "")
+            line |= {
+                f"{head}{unit}": one.value,
+                f"{head}_low{unit}": one.low,
+                f"{head}_high{unit}": one.high,
+                f"{head}_state": one.state or None,
+            }
+        lines.append(line | {"loss": row.loss})
+    return pd.DataFrame(lines)

@@ -1,0 +1,58 @@
+"""Where a taut band rests that is held in the middle: Newton's method on its forces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import solve_banded
+
+if TYPE_CHECKING:
+    from pipeline.rig.string import ElasticString
+
+REACH = 8  # from the first of a node's x to the last of the node after next, which it feels
+NUDGE = 1e-7  # m, of the difference quotients
+STEPS, SHORTEST = 40, 1e-3  # of Newton's method, and the least part of one
+
+
+def balanced(string: ElasticString, y: np.ndarray, tolerance: float) -> np.ndarray | None:
+    """Nodes (nodes, 3) that no force moves, the clamps and the middle as they are.
+
+    Args:
+        y: A state (nodes, 6 + K) at rest near there, whose memories stay.
+        tolerance: Of the nodes [m].
+
+    Returns:
+        None where Newton's method does not come there, as for a slack band.
+    """
+    size = 3 * string.nodes
+    fixed = np.zeros((string.nodes, 3, 1), bool)
+    fixed[[0, string.middle, -1]] = True
+    columns = np.arange(size)
+    colours = columns % (2 * REACH + 1)  # columns of one colour share no row
+    tint = np.equal.outer(colours, np.arange(2 * REACH + 1)).reshape(string.nodes, 3, -1)
+    rows = columns + np.arange(-REACH, REACH + 1)[:, None]
+    inside = (rows >= 0) & (rows < size)
+
+    def pull(x: np.ndarray) -> np.ndarray:
+        """Forces at several x (nodes, 3, M)."""
+        state = np.repeat(y[..., None], x.shape[-1], axis=-1)
+        state[:, :3] = x
+        return np.where(fixed, 0.0, string.forces(state)[0])
+
+    x = y[:, :3, None]
+    force = pull(x)
+    for _ in range(STEPS):
+        change = ((pull(x + NUDGE * tint) - force) / NUDGE).reshape(size, -1)
+        jacobian = np.where(inside, change[rows.clip(0, size - 1), colours], 0.0)
+        jacobian[REACH, fixed.ravel()] = 1.0
+        step = -solve_banded((REACH, REACH), jacobian, force.ravel()).reshape(x.shape)
+        if np.abs(step).max() < tolerance:
+            return (x + step)[..., 0]
+        part = 1.0
+        while not np.abs(trial := pull(x + part * step)).max() < np.abs(force).max():
+            part /= 2
+            if part < SHORTEST:
+                return None
+        x, force = x + part * step, trial
+    return None

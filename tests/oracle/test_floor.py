@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from pipeline.errors import UserError
+from pipeline.oracle.floor import errors_of, load_floor, trial_seeds
+from pipeline.params import load
+from tests.project import ROOT
+
+
+@pytest.fixture(scope="module")
+def params():
+    return load(ROOT / "params.yaml")
+
+
+def test_seeds_begin_with_the_trials_own(params) -> None:
+    """Those of stages/trials.py: launches are numbered target by target."""
+    repeats, count = params.trials.repeats, len(params.trials.targets)
+    seeds = trial_seeds(params)
+    own = 1_000_000 * params.trials.seed + np.arange(count * repeats)
+    assert seeds.shape == (count, repeats + params.floor.launches)
+    assert np.array_equal(seeds[:, :repeats].ravel(), own)
+    assert len(np.unique(seeds)) == seeds.size
+
+
+def test_a_floor_counts_what_failed_and_averages_the_rest(params) -> None:
+    targets = np.array(params.trials.targets)
+    misses = np.tile([0.01, -0.03, 0.02, 0.0, -0.01, 0.04], (len(targets), 1))
+    misses[1, 2] = np.nan
+    draws = np.array([[-0.3, -0.1 * n] for n in range(len(targets))])
+    floor = errors_of(draws, targets[:, None] + misses, params)
+    first, second = (floor["targets"][f"{target:g}"] for target in targets[:2])
+    assert first["draw"] == [-0.3, 0.0]
+    assert np.isclose(first["mean_error_m"], 0.11 / 6) and np.isclose(first["bias_m"], 0.03 / 6)
+    assert np.isclose(first["std_m"], np.std(np.abs(misses[0]), ddof=1))
+    assert np.isclose(
+        first["trials_mean_error_m"], np.abs(misses[0, : params.trials.repeats]).mean()
+    )
+    assert (second["launches"], second["failed"]) == (6, 1)
+    assert (floor["launches"], floor["failed"]) == (6 * len(targets), 1)
+    assert np.isclose(floor["mean_error_m"], np.nanmean(np.abs(misses)))
+    none = errors_of(draws, np.full(misses.shape, np.nan), params)
+    assert none["mean_error_m"] is None and none["failed"] == none["launches"]
+
+
+def test_a_floor_is_read_or_refused_by_its_name(tmp_path, params) -> None:
+    path = tmp_path / "band1.json"
+    with pytest.raises(UserError, match="no such file; `dvc repro floor@band1` makes it"):
+        load_floor(path)
+    misses = np.zeros((len(params.trials.targets), 6))
+    floor = errors_of(misses[:, :2], misses + np.array(params.trials.targets)[:, None], params)
+    content = {**floor, "band": "band1", "actuation_error_m": 1e-3, "release_jitter": 0.02}
+    path.write_text(json.dumps(content))
+    assert load_floor(path) == content
+    for broken in ("", "[]", "{}", json.dumps(content | {"targets": {"1.725": {}}})):
+        path.write_text(broken)
+        with pytest.raises(UserError, match="damaged; `dvc repro --force floor@band1`"):
+            load_floor(path)
+
+
+def test_reading_a_floor_does_not_bring_in_the_rig() -> None:
+    told = "import sys, pipeline.oracle.floor; print(*[m for m in sys.modules if 'rig' in m])"
+    done = subprocess.run([sys.executable, "-c", told], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0 and "pipeline.rig" not in done.stdout

@@ -1,0 +1,75 @@
+"""How near a robust policy comes to the best draws that there are, on the maps it was trained on.
+
+    python -m tests.policy.best BAND METHOD        # reads data/, prints a line for each error
+
+The best draws are found by trying all of a fine grid: slow, and no policy, but the truth.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.params import load
+from pipeline.policy.aim import policy_draws, simulator
+from pipeline.policy.expected import distance
+from pipeline.policy.landscape import Landscape
+from pipeline.policy.robust import robust_maps
+from pipeline.policy.spread import load_samples
+from pipeline.theta import load_theta
+
+NEAR = 0.06  # m: draws whose median landing is further from the target are not looked at
+
+
+def best_draws(landscape: Landscape, targets: np.ndarray, fine: int = 401) -> np.ndarray:
+    """Draws (N, 2) [m] of least expected |y_p - g| for targets (N,), of a fine x fine grid."""
+    axes = (np.linspace(*ends, fine) for ends in zip(landscape.low, landscape.high, strict=True))
+    draws = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 2)
+    launched = landscape(draws)
+    good = ~(launched.failure > 0).any(1)
+    draws, landing, spread = draws[good], launched.landing_y[good], launched.spread[good]
+    median, found = np.median(landing, axis=1), []
+    for target in targets:
+        near = np.abs(median - target) < NEAR
+        expected = distance(landing[near] - target, spread[near]).mean(1)
+        found.append(draws[near][expected.argmin()])
+    return np.array(found)
+
+
+def expected_error(landscape: Landscape, draws: np.ndarray, targets: np.ndarray) -> float:
+    """Mean expected |y_p - g| [m] of draws for targets."""
+    launched = landscape(draws)
+    return float(np.nanmean(distance(launched.landing_y - targets[:, None], launched.spread)))
+
+
+def main() -> None:
+    band, method = sys.argv[1:]
+    params, folder = load(), Path("data/policies", band, method)
+    launcher = simulator(params, band, load_theta(Path(f"data/theta/{band}/{method}.json"), band))
+    samples = load_samples(Path(f"data/confidence/{band}/{method}.json"), band, method)
+    targets = np.linspace(*params.policy.targets, 64)
+    middle = policy_draws(folder, np.mean(params.policy.targets, keepdims=True))[0]
+    maps = robust_maps(launcher, samples, middle, params)
+    landscape = Landscape(maps, params.trials.actuation_error)
+    draws = {
+        "plain": policy_draws(folder, targets),
+        "robust": policy_draws(folder / "robust", targets),
+        "best": best_draws(landscape, targets),
+    }
+    for name, drawn in draws.items():
+        launched = landscape(drawn)
+        error = 100 * expected_error(landscape, drawn, targets)
+        by_theta = 100 * np.nanstd(launched.landing_y, axis=1).mean()
+        by_draw = 100 * launched.spread.mean()
+        aside = 100 * np.nanmean(np.nanmedian(launched.landing_y, axis=1) - targets)
+        print(
+            f"{name}: expected |y_p - g| {error:.2f} cm,"
+            f" spread by theta {by_theta:.2f} cm, by the draw {by_draw:.2f} cm,"
+            f" median landing off the target by {aside:+.2f} cm"
+        )
+
+
+if __name__ == "__main__":
+    main()

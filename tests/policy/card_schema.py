@@ -1,0 +1,83 @@
+"""JSON schema (draft 2020-12) of the card beside an exported policy."""
+
+from __future__ import annotations
+
+TEXT = {"type": "string", "minLength": 1}
+COUNT = {"type": "integer", "minimum": 0}
+NUMBER = {"type": "number"}
+POSITIVE = {"type": "number", "exclusiveMinimum": 0}
+NOT_NEGATIVE = {"type": "number", "minimum": 0}
+ERROR = {"type": ["number", "null"], "minimum": 0}  # m; null where nothing lands
+PAIR = {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2}
+
+
+def exactly(**properties: dict) -> dict:
+    """An object with these keys and no others."""
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": list(properties),
+        "additionalProperties": False,
+    }
+
+
+def port(name: str, columns: int, **more: dict) -> dict:
+    """Input or output of the network."""
+    shape = {"const": ["batch", columns]}
+    return exactly(name={"const": name}, unit={"const": "m"}, shape=shape, meaning=TEXT, **more)
+
+
+def all_in(names: str, kind: dict) -> dict:
+    return exactly(**dict.fromkeys(names.split(), kind))
+
+
+SETUP = (
+    "fork_width_m fork_height_m projectile_mass_kg band_mass_kg band_diameter_m band_rest_length_m"
+)
+READ_BETWEEN = exactly(draws=COUNT, mean_error_m=ERROR, max_error_m=ERROR)
+PLAIN = {
+    "converged": {"type": "boolean"},
+    "criterion": TEXT,
+    "iteration": {"type": "integer", "minimum": 1},
+    "iterations": {"type": "integer", "minimum": 1},
+    "mean_error_m": ERROR,
+    "max_error_m": ERROR,
+    "failed_targets": COUNT,
+    "map_mean_error_m": ERROR,
+    "failed_launches": {"type": "object", "additionalProperties": COUNT},
+}
+ROBUST = {
+    "expected_error_m": ERROR,
+    "plain_expected_error_m": ERROR,
+    "samples": {"type": "integer", "minimum": 2},
+    "actuation_error_m": NOT_NEGATIVE,
+}
+SCHEMA = {
+    "$schema": "https://json-schema.org/draft/2020-12/schema",
+    **exactly(
+        band=TEXT,
+        method=TEXT,
+        kind={"enum": ["plain", "robust"]},
+        theta=exactly(
+            youngs_modulus=POSITIVE,
+            poissons_ratio={**POSITIVE, "exclusiveMaximum": 0.5},
+            elasticity_damping=NOT_NEGATIVE,
+            dynamic_friction=NOT_NEGATIVE,
+            damping_scale={**NOT_NEGATIVE, "maximum": 1},
+        ),
+        nuisances={"type": "object", "additionalProperties": NUMBER},
+        input=port("target", 1, trained_range=PAIR),
+        output=port("draw", 2, axes={"const": ["y", "z"]}, frame=TEXT, low=PAIR, high=PAIR),
+        max_force_n=POSITIVE,
+        setup=all_in(SETUP, POSITIVE),
+        training={"type": "object"},
+        landing_map=exactly(box=READ_BETWEEN, target_range=READ_BETWEEN),
+        trained_on=exactly(
+            device={"type": "string", "pattern": "^(cpu|cuda:[0-9]+)$"}, machine=TEXT
+        ),
+        versions=all_in("python sling2sim2real torch rsl-rl-lib onnx numpy", TEXT),
+    ),
+    "if": {"properties": {"kind": {"const": "robust"}}},
+    "then": {"properties": {"training": exactly(**PLAIN, **ROBUST)}},
+    "else": {"properties": {"training": exactly(**PLAIN)}},
+}

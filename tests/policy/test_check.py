@@ -1,0 +1,90 @@
+"""What a policy is told to be worth: by launches, with failures counted and never averaged in."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.policy.check import CONVERGED, Check, check, figures, robust_figures, verdict
+from pipeline.policy.landscape import TOO_MUCH_FORCE
+from tests.policy import toy
+
+
+def params(max_force: float = 15.0) -> SimpleNamespace:
+    return SimpleNamespace(
+        policy=SimpleNamespace(targets=(1.425, 2.425)), setup=SimpleNamespace(max_force=max_force)
+    )
+
+
+TRAINED = SimpleNamespace(
+    iteration=7, curve={"iteration": [1, 2]}, mean_error=0.002, failures={"it broke": 3}
+)
+
+
+def test_it_launches_the_draws_themselves(trained) -> None:
+    targets = np.linspace(1.425, 2.425, 256)
+    truth = np.abs(toy.launch(trained.policy.draws(targets)).landing_y - targets)
+    found = check(trained.policy, toy.launch, params())
+    assert found == Check(pytest.approx(truth.mean()), pytest.approx(truth.max()), {})
+    told = figures(trained, found)
+    assert told["converged"] and told["mean_error_m"] <= CONVERGED
+    assert told["map_mean_error_m"] == trained.mean_error != told["mean_error_m"]
+    assert verdict(told, found.failures).startswith("converged, mean |y_p - g| 0.")
+
+
+def test_a_launch_off_the_map_is_no_convergence(trained) -> None:
+    """The simulator lands 3 cm further than the map had it."""
+
+    def further(draws: np.ndarray):
+        launched = toy.launch(draws)
+        launched.landing_y = launched.landing_y + 0.03
+        return launched
+
+    found = check(trained.policy, further, params())
+    told = figures(trained, found)
+    assert not told["converged"] and told["map_mean_error_m"] < CONVERGED
+    assert told["mean_error_m"] == pytest.approx(0.03, abs=0.005)
+    assert verdict(told, found.failures).startswith("NOT converged, mean |y_p - g| ")
+
+
+def test_failures_are_counted_by_reason_and_forbid_convergence(trained) -> None:
+    def broken(draws: np.ndarray):
+        launched = toy.launch(draws)
+        launched.failure = ["it broke"] * 5 + [None] * (len(draws) - 5)
+        return launched
+
+    weak = params(
+        max_force=np.sort(toy.launch(trained.policy.draws(np.array([2.4]))).hold_force)[0]
+    )
+    found = check(trained.policy, broken, weak)
+    assert found.failures["it broke"] == 5 and 1 <= found.failures[TOO_MUCH_FORCE] < 50
+    told = figures(trained, found)
+    assert told["failed_targets"] == sum(found.failures.values())
+    assert told["mean_error_m"] < CONVERGED and not told["converged"]
+    assert "it broke 5" in verdict(told, found.failures)
+
+
+def test_where_nothing_lands_there_is_no_error() -> None:
+    none = Check(float("nan"), float("nan"), {"it broke": 256})
+    told = figures(TRAINED, none)
+    assert not told["converged"]
+    assert verdict(told, none.failures) == "NOT converged; 256 of 256 targets fail: it broke 256"
+    assert not robust_figures(TRAINED, none, none, none, 24, 0.001)["converged"]
+
+
+def test_a_robust_policy_is_judged_by_what_is_expected() -> None:
+    """It may miss θ*'s own landings by more than a plain one."""
+    aside = Check(0.02, 0.03, {})
+
+    def told(expected: float, failures: dict | None = None) -> dict:
+        found = Check(aside.mean_error, aside.max_error, failures or {})
+        ours, plain = Check(expected, 0.1, {}), Check(0.04, 0.1, {})
+        return robust_figures(TRAINED, found, ours, plain, 24, 0.001)
+
+    assert told(0.039)["converged"] and told(0.0405)["converged"]
+    assert not told(0.042)["converged"] and not told(0.039, {"it broke": 1})["converged"]
+    about = told(0.039)
+    assert (about["expected_error_m"], about["plain_expected_error_m"]) == (0.039, 0.04)
+    assert (about["samples"], about["actuation_error_m"]) == (24, 0.001)

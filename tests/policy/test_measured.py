@@ -1,0 +1,86 @@
+"""Measured launches read from CSV: whose they are, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.errors import UserError
+from pipeline.policy.measured import OPTIONAL, REQUIRED, Measured, read_measured
+
+KNOWN = ("ours", "theirs")
+HEAD = "draw_y_m,draw_z_m,landing_y_m"
+
+
+def read(tmp_path: Path, text: str | bytes, method: str = "ours") -> list[Measured]:
+    file = tmp_path / "toy.csv"
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_measured(file, method, KNOWN)
+
+
+def test_launches_of_a_method_and_plain_ones(tmp_path) -> None:
+    """Spaces, a byte order mark and lines of commas are what spreadsheets write."""
+    text = (
+        "\ufeffdraw_y_m, draw_z_m,landing_y_m,target_m,method\n"
+        "-0.3,-0.17,2.2,,\n-0.31, -0.17 ,1.9,1.925,ours\n-0.3,-0.17,1.8,1.925,theirs\n"
+        "-0.35,-0.17,,1.925,ours\n,,,,\n\n"
+    )
+    assert read(tmp_path, text) == [
+        Measured((-0.3, -0.17), 2.2, None),
+        Measured((-0.31, -0.17), 1.9, 1.925),
+        Measured((-0.35, -0.17), None, 1.925),
+    ]
+    assert [one.landing for one in read(tmp_path, text, "theirs")] == [2.2, 1.8]
+
+
+def test_a_target_without_a_method_is_nobodys(tmp_path) -> None:
+    """It would else count as an error of every method alike."""
+    text = f"{HEAD},target_m,method\n-0.3,-0.1,1.9,1.725,\n-0.3,-0.1,1.9,1.725,ours\n"
+    assert [one.target for one in read(tmp_path, text)] == [None, 1.725]
+    assert [one.target for one in read(tmp_path, text, "theirs")] == [None]
+    without = f"{HEAD},target_m\n-0.3,-0.1,1.9,1.725\n"
+    assert [one.target for one in read(tmp_path, without)] == [None]
+
+
+def test_a_method_may_launch_without_a_target(tmp_path) -> None:
+    text = f"{HEAD},method\n-0.3,-0.1,1.9,ours\n"
+    assert read(tmp_path, text) == [Measured((-0.3, -0.1), 1.9, None)]
+    assert read(tmp_path, text, "theirs") == []
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("draw_y_m,draw_z_m\n-0.3,-0.1\n", "lacks the column landing_y_m"),
+        (f"{HEAD},speed\n", "unknown column 'speed'"),
+        (f"{HEAD},landing_y_m\n", "two columns landing_y_m"),
+        (f"{HEAD.replace(',', ';')}\n", "lacks the column draw_y_m"),
+        ("", "lacks the column draw_y_m"),
+        (f"{HEAD}\n-0.3,-0.1,far\n", "line 2: landing_y_m must be a number"),
+        (f"{HEAD}\n-0.3,-0.1,inf\n", "line 2: landing_y_m must be a number"),
+        (f"{HEAD}\n-0.3,-0.1,1\n-0.3,,1\n", "line 3: a draw needs"),
+        (f"{HEAD}\n0.3,-0.1,1\n", "line 2: draw_y_m must lie between -20 and 0 m"),
+        (f"{HEAD}\n-30,-10,192\n", "line 2: draw_y_m must lie between -20 and 0 m"),
+        (f"{HEAD}\n-0.3,-0.1,192.5\n", "line 2: landing_y_m must lie between 0 and 20 m"),
+        (f"{HEAD}\n-0.3,-0.1,-0.1\n", "leave it empty where it did not land"),
+        (f"{HEAD}\n-0.3,-0.1,1,9,9\n", "line 2: more cells than the 3 columns"),
+        (
+            f"{HEAD},target_m,method\n-0.3,-0.1,1,1.9,mine\n",
+            "line 2: method 'mine' is not in params.yaml, which has ours, theirs",
+        ),
+        ((f"{HEAD}\n-0.3,-0.1,1\n").encode("utf-16"), "not UTF-8"),
+        (f"{HEAD},method\n-0.3,-0.1,1,m".encode() + b"\xfcller\n", "not UTF-8"),
+        (f"{HEAD}\n".encode() + b"1" * 200_000, "cannot be read as CSV"),
+    ],
+)
+def test_refuses_what_no_launch_can_have_done(tmp_path, text: str | bytes, message: str) -> None:
+    with pytest.raises(UserError, match=message) as refused:
+        read(tmp_path, text)
+    assert str(refused.value).startswith(str(tmp_path / "toy.csv"))
+    assert "\n" not in str(refused.value)
+
+
+def test_the_format_is_documented() -> None:
+    text = Path("data/trials/measured/README.md").read_text()
+    assert all(name in text for name in REQUIRED + OPTIONAL)

@@ -1,0 +1,136 @@
+"""The stage from θ file to exported policies, on the toy slingshot and a short training."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from ruamel.yaml import YAML
+
+from pipeline.files import write_json
+from pipeline.policy import robust
+from pipeline.policy.aim import policy_draws
+from pipeline.sling.model import THETA
+from stages import policy
+from tests.policy import toy
+from tests.project import ROOT
+
+POINT = (2e5, 0.47, 2e-3, 0.5, 0.6)
+FOLDER = Path("data/policies/band1/sling2sim2real_taut")
+FILES = {"card.json", "policy.onnx", "policy.pt", "training.parquet"}
+
+
+def launcher(draws: np.ndarray, thetas: np.ndarray | None = None) -> SimpleNamespace:
+    """The toy, whose landing goes with Young's modulus."""
+    launched = toy.launch(draws)
+    if thetas is not None:
+        launched.landing_y = launched.landing_y * thetas[:, 0] / POINT[0]
+    return launched
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """A folder with parameters for a short training and a θ file; it runs the stage there."""
+    monkeypatch.chdir(tmp_path)
+    yaml = YAML()
+    content = yaml.load(ROOT / "params.yaml")
+    content["policy"].update({"envs": 64, "iterations": 12, "map_size": [9, 7]})
+    content["policy"]["robust"].update({"samples": 3, "map_size": [7, 5]})
+    yaml.dump(content, tmp_path / "params.yaml")
+    theta = {"band": "band1", "theta": dict(zip(THETA, POINT, strict=True))}
+    for method in ("sling2sim2real_taut", "package_si"):
+        write_json(Path(f"data/theta/band1/{method}.json"), theta)
+    samples = np.tile(POINT, (20, 1))
+    samples[:, 0] *= np.linspace(0.95, 1.05, 20)
+    write_json(
+        Path("data/confidence/band1/sling2sim2real_taut.json"),
+        {"names": list(THETA), "samples": samples.tolist()},
+    )
+
+    monkeypatch.setattr(robust, "STEPS", 30)
+
+    def run(method: str = "sling2sim2real_taut", launch=launcher) -> None:
+        monkeypatch.setattr(policy, "simulator", lambda *args, **kwargs: launch)
+        monkeypatch.setattr(sys, "argv", ["policy.py", "band1", method])
+        policy.main()
+
+    return run
+
+
+def test_both_policies_are_written_with_their_cards(project, capsys) -> None:
+    project()
+    plain, second = (json.loads((FOLDER / one / "card.json").read_text()) for one in ("", "robust"))
+    assert {file.name for file in FOLDER.iterdir()} == FILES | {"map.parquet", "robust"}
+    assert {file.name for file in (FOLDER / "robust").iterdir()} == FILES
+    assert (plain["kind"], second["kind"]) == ("plain", "robust")
+    targets = np.linspace(1.425, 2.425, 256)
+    landing = toy.launch(policy_draws(FOLDER, targets)).landing_y
+    assert plain["training"]["mean_error_m"] == pytest.approx(
+        np.abs(landing - targets).mean(), 1e-3
+    )
+    about = second["training"]
+    assert about["expected_error_m"] < about["plain_expected_error_m"] and about["samples"] == 3
+    assert not (policy_draws(FOLDER, targets) == policy_draws(FOLDER / "robust", targets)).all()
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 2 and "robust" in lines[1]
+    assert len(pq.read_table(FOLDER / "training.parquet")) == 12
+    assert len(pq.read_table(FOLDER / "map.parquet")) == 9 * 7 + 128  # policy.map_size, and checks
+    assert not list(Path(".checkpoints/policy").iterdir())
+
+
+def test_the_same_input_gives_the_same_bytes(project) -> None:
+    def content() -> dict[Path, bytes]:
+        project()
+        files = [file for file in FOLDER.rglob("*") if file.is_file()]
+        # TorchScript numbers what a process has scripted: its bytes are equal by process alone.
+        return {file: file.read_bytes() for file in files if file.suffix != ".pt"}
+
+    assert content() == content()
+
+
+def test_without_confidence_there_is_no_robust_policy(project, capsys) -> None:
+    os.remove("data/confidence/band1/sling2sim2real_taut.json")
+    project()
+    assert {file.name for file in FOLDER.iterdir()} == FILES | {"map.parquet"}
+    assert "no robust policy, for there is no data/confidence" in capsys.readouterr().out
+
+
+def test_a_method_that_is_not_named_gets_a_plain_one_alone(project, capsys) -> None:
+    project("package_si")
+    assert not Path("data/policies/band1/package_si/robust").exists()
+    assert len(capsys.readouterr().out.splitlines()) == 1
+
+
+def test_a_theta_whose_launches_all_fail_is_said_not_to_converge(project, capsys) -> None:
+    def broken(draws: np.ndarray, thetas: np.ndarray | None = None) -> SimpleNamespace:
+        nan = np.full(len(draws), np.nan)
+        reason = "the simulation did not converge"
+        return SimpleNamespace(landing_y=nan, hold_force=nan, failure=[reason] * len(draws))
+
+    project(launch=broken)
+    for line in capsys.readouterr().out.splitlines():
+        assert "NOT converged; 256 of 256 targets fail: the simulation did not converge 256" in line
+    for folder in (FOLDER, FOLDER / "robust"):
+        told = json.loads((folder / "card.json").read_text())["training"]
+        assert told["converged"] is False and told["mean_error_m"] is None
+        assert np.isfinite(policy_draws(folder, np.array([1.9]))).all()
+
+
+def test_targets_out_of_reach_are_said_not_to_converge(project, capsys) -> None:
+    """All land before the nearest target: nothing fails, and nothing hits."""
+
+    def weak(draws: np.ndarray, thetas: np.ndarray | None = None) -> SimpleNamespace:
+        launched = launcher(draws, thetas)
+        launched.landing_y = 0.05 * launched.landing_y
+        return launched
+
+    project(launch=weak)
+    assert "NOT converged, mean |y_p - g|" in capsys.readouterr().out.splitlines()[0]
+    told = json.loads((FOLDER / "card.json").read_text())["training"]
+    assert told["converged"] is False and told["failed_targets"] == 0

@@ -1,0 +1,125 @@
+"""Flights and landings, read back from the objects that were drawn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.patches import Circle
+from scipy.integrate import solve_ivp
+
+from pipeline.report.figures import launches as drawing
+from pipeline.report.looks import looks
+from pipeline.report.results import gather
+from pipeline.sling.model import GRAVITY
+from tests.report.conftest import BAND, METHOD
+
+FLOOR = -0.52
+LEAVE = {"y": -0.2, "z": -0.08, "speed": 4.3, "angle": 0.4}
+
+
+@pytest.fixture
+def kept(monkeypatch) -> list[plt.Figure]:
+    figures: list[plt.Figure] = []
+    monkeypatch.setattr(drawing, "save", lambda figure, path: figures.append(figure))
+    yield figures
+    plt.close("all")
+
+
+@pytest.fixture
+def results(root, params):
+    """Two virtual launches at each of two targets; the last one failed and has no flight."""
+    one = drawing.flight(*LEAVE.values(), FLOOR)
+    trials = pd.DataFrame(
+        {
+            "band": BAND,
+            "method": METHOD,
+            "kind": "virtual",
+            "target": [1.725, 1.725, 1.925, 1.925],
+            "trial": [1, 2, 1, 2],
+            "landing_y": [1.70, 1.76, 1.93, None],
+            "flight_y": [one[:, 0] + off for off in (-0.02, 0.04, 0.21)] + [None],
+            "flight_z": [one[:, 1]] * 3 + [None],
+            "predicted_leave_y": LEAVE["y"],
+            "predicted_leave_z": LEAVE["z"],
+            "predicted_speed": [4.3, 4.3, None, None],
+            "predicted_angle": LEAVE["angle"],
+        }
+    )
+    found = gather(params, root)
+    result = replace(found.methods[BAND][METHOD], trials=trials, robust_trials=trials.iloc[:0])
+    found.methods[BAND][METHOD] = result
+    found.methods[BAND]["de"] = replace(result, trials=trials.iloc[:2])
+    return found
+
+
+METHODS = [METHOD, "de"]
+
+
+def test_a_predicted_flight_is_that_of_a_falling_point() -> None:
+    points = drawing.flight(*LEAVE.values(), FLOOR)
+    velocity = LEAVE["speed"] * np.array([np.cos(LEAVE["angle"]), np.sin(LEAVE["angle"])])
+
+    def landed(_, state):
+        return state[1] - FLOOR
+
+    landed.terminal = True
+    start = [LEAVE["y"], LEAVE["z"], *velocity]
+    fall = solve_ivp(
+        lambda _, s: [s[2], s[3], 0, -GRAVITY], (0, 5), start, events=landed, rtol=1e-10, atol=1e-10
+    )
+    np.testing.assert_allclose(points[0], [LEAVE["y"], LEAVE["z"]])
+    np.testing.assert_allclose(points[-1], fall.y_events[0][0][:2], atol=1e-8)
+    assert points[:, 1].max() > LEAVE["z"]
+
+
+def test_flights_end_where_they_land_and_targets_stand_on_the_floor(kept, results) -> None:
+    drawing.trajectories("", results, METHODS, looks(METHODS), -FLOOR)
+    first, second = kept[0].axes
+    flights = [line for line in first.lines if len(line.get_xdata()) == 40]
+    assert len(flights) == 3 + 1  # of the rig, and one prediction for two equal draws
+    for line in flights:
+        assert line.get_ydata()[-1] == pytest.approx(FLOOR)
+    predicted = [line for line in flights if line.is_dashed()]
+    expected = drawing.flight(*LEAVE.values(), FLOOR)[-1, 0]
+    assert [line.get_xdata()[-1] for line in predicted] == [pytest.approx(expected)]
+    ends = sorted(line.get_xdata()[-1] for line in flights if not line.is_dashed())
+    np.testing.assert_allclose(ends, expected + np.array([-0.02, 0.04, 0.21]))
+    targets = [line.get_xdata()[0] for line in first.lines if line.get_marker() == "^"]
+    assert targets == [1.725, 1.925]
+    assert first.texts[0].get_text() == "1 of 4 failed" and second.texts[0].get_text() == ""
+    assert first.get_aspect() == 1 and second.get_title().endswith("DE_L")
+
+
+def test_measured_landings_without_a_flight_are_crosses_on_the_floor(kept, results) -> None:
+    result = results.methods[BAND][METHOD]
+    bare = result.trials.assign(kind="measured", flight_y=None, flight_z=None)
+    results.methods[BAND][METHOD] = replace(result, trials=bare)
+    drawing.trajectories("", results, [METHOD], looks(METHODS), -FLOOR)
+    crosses = [line for line in kept[0].axes[0].lines if line.get_marker() == "x"]
+    np.testing.assert_allclose([line.get_xdata()[0] for line in crosses], [1.70, 1.76, 1.93])
+    np.testing.assert_allclose([line.get_ydata()[0] for line in crosses], FLOOR)
+    assert "measured landing" in [text.get_text() for text in kept[0].legends[0].get_texts()]
+
+
+def test_every_landing_lies_in_its_strip_at_its_distance(kept, results) -> None:
+    robust = results.methods[BAND][METHOD].trials.iloc[:1].assign(landing_y=1.8)
+    results.methods[BAND][METHOD] = replace(results.methods[BAND][METHOD], robust_trials=robust)
+    drawing.scatter("", results, METHODS, looks(METHODS))
+    (ax,) = kept[0].axes
+    names = [label.get_text() for label in ax.get_xticklabels()]
+    assert names == ["Sling2Sim2Real", "Sling2Sim2Real,\nrobust", "DE_L"]
+    places = np.concatenate([dots.get_offsets() for dots in ax.collections])
+    strip = np.floor(3 * places[:, 0])
+    np.testing.assert_allclose(3 * places[:, 0] - strip, 0.5)  # on the strip's middle line
+    landed = [sorted(places[strip == number, 1]) for number in range(3)]
+    assert landed == [[1.70, 1.76, 1.93], [1.8], [1.70, 1.76]]
+    rings = [(*ring.center, ring.radius) for ring in ax.patches if isinstance(ring, Circle)]
+    first = [(y, radius) for x, y, radius in rings if x < 1 / 3]
+    assert first == [(1.725, 0.05), (1.725, 0.10), (1.925, 0.05), (1.925, 0.10)]
+    assert {y for x, y, _ in rings if 1 / 3 < x} == {1.725}  # the others aim there alone
+    assert ax.get_aspect() == 1
+    assert [text.get_text() for text in ax.texts] == ["1 of 4\nfailed"]

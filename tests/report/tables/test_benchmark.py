@@ -1,0 +1,176 @@
+"""Tables 1, 3 and 4 from constructed launches, by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipeline.report import paper
+from pipeline.report.looks import looks
+from pipeline.report.tables.benchmark import ablation, as_table, benchmark, records, spread
+from tests.report.tables.toy_results import TARGETS, floor, launches, result, results
+
+NAMED = looks(["sling2sim2real", "sling2sim2real_taut", "package_si", "mine", "de"])
+CLOSE = launches([[0.01, 0.03], [-0.02, 0.02], [0.04, -0.04]])
+FAR = launches([[0.1, 0.1], [0.2, 0.2], [0.3, 0.3]])
+
+
+def lines(rows, targets=TARGETS) -> dict[tuple[str, str, str], list[str]]:
+    _, found = as_table(rows, targets, NAMED)
+    return {tuple(line[:3]): line[3:] for line in found}
+
+
+def test_cells_by_hand() -> None:
+    """|miss| 1 and 3, 2 and 2, 4 and 4 cm: deviations 1.41, 0 and 0 within targets."""
+    rows = benchmark(results(result("band1", "sling2sim2real", CLOSE)), {})
+    found = lines(rows)["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
+    pooled = math.sqrt(2 / 3)
+    over_all = np.std([1, 3, 2, 2, 4, 4], ddof=1)
+    assert found[:3] == ["2.00 ± 1.41", "2.00 ± 0.00", "4.00 ± 0.00"]
+    assert found[3:] == [f"2.67 ± {pooled:.2f}", f"{over_all:.2f}", "0 of 6"]
+
+
+def test_the_papers_rows_stand_below_ours_in_its_order() -> None:
+    ran = [result("band1", method, CLOSE) for method in ("mine", "sling2sim2real", "package_si")]
+    rows = benchmark(results(*ran), {})
+    first = [(row.method, row.source) for row in rows if row.band == "band1"]
+    assert first == [
+        ("real2sim2real", "not run"),
+        ("real2sim2real", "paper, real robot"),
+        ("package_si", "virtual"),
+        ("package_si", "paper, real robot"),
+        ("sling2sim2real", "virtual"),
+        ("sling2sim2real", "paper, real robot"),
+        ("mine", "virtual"),
+    ]
+    found = lines(rows)
+    theirs = found["Band 2 (medium)", "Package SI", "paper, real robot"]
+    assert theirs[:4] == ["60.00 ± 2.74", "34.50 ± 3.32", "**11.00 ± 6.44**", "35.17 ± 4.58"]
+    assert theirs[4:] == ["–", "–"]
+    assert found["Band 1 (soft)", "Real2Sim2Real", "paper, real robot"][:4] == ["N/A"] * 4
+    assert found["Band 1 (soft)", "Real2Sim2Real", "not run"] == ["–"] * 6
+    assert found["Band 3 (stiff)", "Sling2Sim2Real", "not run"] == ["–"] * 6
+
+
+def test_partial_failures_are_counted_and_total_ones_are_not_available() -> None:
+    some = launches([[0.1] * 5] * 3, failed=2)
+    none = launches([[0.1] * 5] * 3, failed=15)
+    beyond = launches([[0.9] * 5] * 3)  # lands, but never within the target area
+    rows = benchmark(
+        results(
+            result("band1", "sling2sim2real", some),
+            result("band1", "package_si", none),
+            result("band1", "real2sim2real", beyond),
+        ),
+        {},
+    )
+    found = lines(rows)
+    ours = found["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
+    assert ours[2] == "10.00 ± 0.00, 2 failed" and ours[3:] == [
+        "10.00 ± 0.00, 2 failed", "0.00", "2 of 15",
+    ]  # fmt: skip
+    for method in ("Package SI", "Real2Sim2Real"):
+        assert found["Band 1 (soft)", method, "virtual"] == [*["N/A"] * 4, "–", "15 of 15"]
+    assert spread({"launches": 1, "failed": 0, "mean": 0.05, "std": math.nan}) == "5.00"
+
+
+def test_bold_is_the_lowest_of_equals_that_all_landed() -> None:
+    rows = benchmark(
+        results(
+            result("band1", "sling2sim2real", CLOSE),
+            result("band1", "package_si", FAR),
+            result("band1", "mine", launches([[0.0, 0.0]] * 3, failed=1)),
+            floors=None,
+        ),
+        {"band1": floor((0.001,) * 3, (0.001,) * 3)},
+    )
+    found = lines(rows)
+    ours = found["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
+    assert all(cell.startswith("**") == (i in (2, 3)) for i, cell in enumerate(ours))
+    assert found["Band 1 (soft)", "mine", "virtual"][0] == "**0.00 ± 0.00**"
+    assert found["Band 1 (soft)", "mine", "virtual"][2] == "0.00, 1 failed"
+    assert not any("**" in cell for cell in found["Band 1 (soft)", "Package SI", "virtual"])
+    assert not any("**" in c for c in found["Band 1 (soft)", "actuation floor", "virtual, oracle"])
+
+
+def test_virtual_and_measured_launches_of_a_band_stand_apart() -> None:
+    both = pd.concat([CLOSE, launches([[0.05]] * 3, "measured")], ignore_index=True)
+    plain = launches([[0.5]], "measured", targets=[math.nan])
+    rows = benchmark(
+        results(
+            result("band1", "sling2sim2real", both),
+            result("orange", "sling2sim2real", plain),  # aimed at nothing
+            result("orange", "mine", launches([[math.nan]] * 3, "predicted")),
+        ),
+        {},
+    )
+    found = lines(rows)
+    assert found["Band 1 (soft)", "Sling2Sim2Real", "virtual"][5] == "0 of 6"
+    assert found["Band 1 (soft)", "Sling2Sim2Real", "measured"][:4] == ["5.00"] * 3 + ["5.00"]
+    assert found["orange", "Sling2Sim2Real", "no launch yet"] == ["–"] * 6
+    assert found["orange", "mine", "no launch yet"] == ["–"] * 6
+    assert ("orange", "Real2Sim2Real", "not run") not in found  # no band of the paper's
+
+
+def test_the_floor_is_a_row_of_its_band() -> None:
+    floors = {"band2": floor((0.01, 0.02, 0.03), (0.003, 0.004, 0.005))}
+    rows = benchmark(results(result("band2", "sling2sim2real", CLOSE)), floors)
+    found = lines(rows)["Band 2 (medium)", "actuation floor", "virtual, oracle"]
+    pooled = math.sqrt((9 + 16 + 25) / 3) / 10
+    assert found[:3] == ["1.00 ± 0.30", "2.00 ± 0.40", "3.00 ± 0.50"]
+    assert found[3:] == [f"2.00 ± {pooled:.2f}", "2.00", "0 of 60"]
+
+
+def test_ablations_stand_in_tables_of_their_own() -> None:
+    ran = results(
+        result("band1", "de", FAR),
+        result("band1", "no_work", FAR),
+        result("band1", "sling2sim2real", CLOSE),
+        result("band2", "sling2sim2real", CLOSE),
+        result("orange", "no_work", FAR),
+    )
+    assert {row.method for row in benchmark(ran, {})} == set(paper.BENCHMARK)
+    third, fourth = ablation(ran, paper.OPTIMISERS), ablation(ran, paper.ABLATIONS)
+    assert {row.band for row in third} == {"band1"}
+    assert {row.band for row in fourth} == {"band1", "orange"}
+    found = lines(third)
+    assert found["Band 1 (soft)", "DE_L", "virtual"][0] == "10.00 ± 0.00"
+    assert found["Band 1 (soft)", "Adam_L", "not run"] == ["–"] * 6
+    assert found["Band 1 (soft)", "DE_L", "paper, real robot"][2] == "**3.00 ± 1.87**"
+    order = list(dict.fromkeys(row.method for row in fourth))
+    assert tuple(order) == paper.ABLATIONS
+
+
+def test_other_targets_have_columns_beside_the_papers() -> None:
+    trials = launches([[0.01, 0.03]], targets=[1.6])
+    rows = benchmark(results(result("band1", "sling2sim2real", trials)), {})
+    heads, _ = as_table(rows, [1.6], NAMED)
+    assert heads[3:8] == ["g = 160.0", "g = 172.5", "g = 192.5", "g = 212.5", "all targets"]
+    found = lines(rows, [1.6])["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
+    assert found[:4] == ["2.00 ± 1.41", "–", "–", "–"]
+
+
+def test_machines_read_the_same(tmp_path) -> None:
+    failing = launches([[0.1] * 5] * 3, failed=5)
+    rows = benchmark(
+        results(result("band1", "sling2sim2real", CLOSE), result("band1", "package_si", failing)),
+        {"band1": floor((0.01,) * 3, (0.002,) * 3)},
+    )
+    records(rows).to_csv(tmp_path / "table1.csv", index=False)
+    read = pd.read_csv(tmp_path / "table1.csv", dtype={"target_m": str})
+    assert not (read.source == "not run").any()  # nothing to tell
+    read = read.set_index(["band", "method", "source", "target_m"])
+    ours = read.loc["band1", "sling2sim2real", "virtual", "1.725"]
+    assert ours.mean_error_cm == pytest.approx(2) and ours.bias_cm == pytest.approx(2)
+    assert ours.std_cm == pytest.approx(math.sqrt(2)) and ours.launches == 2
+    total = read.loc["band1", "sling2sim2real", "virtual", "all"]
+    assert total.std_within_targets_cm == pytest.approx(math.sqrt(2 / 3))
+    gone = read.loc["band1", "package_si", "virtual", "2.125"]
+    assert math.isnan(gone.mean_error_cm) and gone.failed == gone.launches == 5
+    assert "package_si,virtual,2.125,5,5,N/A" in (tmp_path / "table1.csv").read_text()
+    theirs = read.loc["band2", "package_si", "paper, real robot", "all"]
+    assert theirs.mean_error_cm == pytest.approx(35.17) and math.isnan(theirs.failed)
+    assert read.loc["band1", "actuation floor", "virtual, oracle", "all"].mean_error_cm == 1.0

@@ -1,0 +1,100 @@
+"""Table 2: identified parameters with their intervals, and the paper's loss, by hand."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+
+from pipeline.params import load
+from pipeline.report.looks import looks
+from pipeline.report.tables.parameters import as_table, at_edge, identified, records
+from tests.report.conftest import THETA, confidence
+from tests.report.tables.toy_results import launches, result, results
+
+PARAMS, NAMED = load(), looks(["sling2sim2real", "package_si", "adam"])
+TRIALS = launches([[0.0]] * 3)
+
+
+def table_of(**more) -> list[list[str]]:
+    """Rows of band1's Sling2Sim2Real, ours first."""
+    found = results(result("band1", "sling2sim2real", TRIALS, **more))
+    rows = as_table(identified(found, PARAMS), NAMED)[1]
+    return [row for row in rows if row[:2] == ["Band 1 (soft)", "Sling2Sim2Real"]]
+
+
+def test_edge_of_the_box_on_both_scales() -> None:
+    log = SimpleNamespace(low=1e-4, high=1e-2, scale="log")
+    line = SimpleNamespace(low=0.0, high=1.0, scale="linear")
+    assert at_edge(1.01e-4, log) and not at_edge(1.2e-4, log) and at_edge(1e-2, log)
+    assert at_edge(0.995, line) and not at_edge(0.98, line)
+
+
+def test_the_papers_numbers_stand_below_ours_in_its_format() -> None:
+    ours, theirs = table_of()
+    assert ours[2:] == [
+        "virtual",
+        "3.00E+5 (2.70E+5 – 3.30E+5)",
+        "0.45 (0.41 – 0.50)",
+        "3.00E-3 (2.70E-3 – 3.30E-3)",
+        "0.50, not identifiable",
+        "0.70 (0.63 – 0.77)",
+        "**1.7500**",
+    ]
+    assert theirs[2:8] == ["paper, real robot", "9.29E+5", "0.46", "1.11E-2", "0.80", "0.79"]
+    assert theirs[8] == "**1.9785**"  # the paper's least on Band 1
+
+
+def test_what_no_posterior_knows_is_a_number_alone() -> None:
+    ours, _ = table_of(confidence={})
+    assert ours[3:8] == ["3.00E+5", "0.45", "3.00E-3", "0.50", "0.70"]
+
+
+def test_a_theta_outside_its_interval_and_at_an_edge() -> None:
+    about = confidence()
+    about["parameters"]["poissons_ratio"] |= {"low": 0.4891, "high": 0.4899}
+    about["parameters"]["youngs_modulus"] |= {"low": 3.0011e5, "high": 3.0014e5}
+    theta = {"theta": THETA | {"damping_scale": 0.999}}
+    ours, _ = table_of(confidence=about, theta=theta)
+    assert ours[3] == "3.00E+5 † (3.0011E+5 – 3.0014E+5)"
+    assert ours[4] == "0.45 † (0.489 – 0.490)"
+    assert ours[7] == "1.00 ⚠ † (0.63 – 0.77)" and ours[8] == "–"
+
+
+def test_the_loss_is_the_papers_whatever_a_method_minimised() -> None:
+    loss = {"geom": 0.5, "force": 0.25, "work": 0.125, "taut": 9.0, "total": 9.5}
+    ours, _ = table_of(theta={"theta": THETA, "loss": loss})
+    assert ours[8] == "**0.8750**"
+
+
+def test_what_did_not_run_is_a_dash_above_the_papers_number() -> None:
+    found = results(result("band1", "adam", TRIALS), result("orange", "package_si", TRIALS))
+    bands = {**PARAMS.bands, "orange": SimpleNamespace(source="recording")}
+    rows = as_table(
+        identified(
+            found,
+            SimpleNamespace(bands=bands, methods=PARAMS.methods, parameters=PARAMS.parameters),
+        ),
+        NAMED,
+    )[1]
+    assert ["Band 3 (stiff)", "Package SI", "not run", *["–"] * 6] in rows
+    assert rows.index(next(r for r in rows if r[1] == "Adam_L")) > 5  # after the paper's rows
+    orange = [row for row in rows if row[0] == "orange"]
+    assert len(orange) == 1 and orange[0][1:3] == ["Package SI", "measured"]
+    assert orange[0][4] == "0.45, fixed" and orange[0][6] == "0.50, fixed"
+
+
+def test_machines_read_the_same(tmp_path) -> None:
+    rows = identified(results(result("band1", "sling2sim2real", TRIALS)), PARAMS)
+    records(rows).to_csv(tmp_path / "table2.csv", index=False)
+    read = pd.read_csv(tmp_path / "table2.csv").set_index(["band", "method", "source"])
+    ours = read.loc["band1", "sling2sim2real", "virtual"]
+    assert ours.youngs_modulus_pa == pytest.approx(3e5) and ours.loss == 1.75
+    assert ours.elasticity_damping_low_s == pytest.approx(2.7e-3)
+    assert ours.dynamic_friction_state == "not identifiable"
+    theirs = read.loc["band2", "package_si", "paper, real robot"]
+    assert theirs.youngs_modulus_pa == 2.23e6 and theirs.loss == 2.3267
+    assert math.isnan(theirs.youngs_modulus_low_pa)
+    assert math.isnan(read.loc["band2", "package_si", "not run"].loss)

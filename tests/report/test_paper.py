@@ -1,0 +1,94 @@
+"""The paper's numbers, read from its own source where that lies beside the repository."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from pipeline.report import paper
+
+SOURCE = Path("../shared/paper/sling2sim2real.tex")
+BANDS = {"Soft": "Band 1", "Medium": "Band 2", "Stiff": "Band 3"}
+METHODS = {
+    "Real2Sim2Real": "Real2Sim2Real",
+    "Package SI": "Package SI",
+    "Sling2Sim2Real": "Sling2Sim2Real",
+    "$DE_{L}$": "DE",
+    "$BO_{L}$": "BO",
+    "$Adam_{L}$": "Adam",
+    "Sling2Sim2Real$^{-c,-m}$": "without covariance and multi-start",
+    "Sling2Sim2Real$^{-m}$": "without multi-start",
+    "Sling2Sim2Real$^{-c}$": "without covariance",
+    "Sling2Sim2Real$^{-L_{work}}$": "without the work term",
+}
+
+
+def printed() -> dict[str, list[tuple[str, str, list[str]]]]:
+    """Rows of each table by its label: band, method, cells."""
+    if not SOURCE.is_file():
+        pytest.skip(f"the paper's source is not there: {SOURCE}")
+    text = re.sub(r"(?<!\\)%.*", "", SOURCE.read_text(encoding="utf-8"))
+    tables = {}
+    for body in re.findall(r"\\begin\{table\}(.*?)\\end\{table\}", text, re.S):
+        label = re.search(r"\\label\{(.*?)\}", body)[1]
+        rows, band = [], None
+        for line in body.split(r"\midrule", 1)[1].split(r"\\"):
+            named = re.search(r"\((Soft|Medium|Stiff)\)", line)
+            band = BANDS[named[1]] if named else band
+            _, *cells = line.split("&")
+            method = re.sub(r"~?\\cite\{.*?\}", "", cells[0]).strip() if cells else ""
+            method = method.replace(r"\mathcal{L}", "L").replace(r"\text{work}", "work")
+            if method in METHODS:
+                rows.append((band, METHODS[method], [cell.strip() for cell in cells[1:]]))
+        tables[label] = rows
+    return tables
+
+
+def numbers(cell: str) -> tuple[float, ...] | None:
+    """Mean and deviation, or one number; None of N/A."""
+    if "N/A" in cell:
+        return None
+    return tuple(float(one) for one in re.findall(r"\d+\.\d+(?:E[+-]\d+)?", cell))
+
+
+@pytest.mark.parametrize(
+    ("label", "methods", "bands"),
+    [
+        ("tab:rl_eval", paper.BENCHMARK, 3),
+        ("tab:ablation_optimization", paper.OPTIMISERS, 1),
+        ("tab:ablation_combined", paper.ABLATIONS, 1),
+    ],
+)
+def test_landing_errors_are_those_of_the_paper(label: str, methods, bands: int) -> None:
+    """Every cell, and the order of the rows."""
+    rows = printed()[label]
+    theirs = [paper.METHODS[method] for method in methods]
+    assert [method for _, method, _ in rows] == theirs * bands
+    for band, method, cells in rows:
+        assert [numbers(cell) for cell in cells] == list(paper.LANDING[band, method])
+
+
+def test_parameters_are_those_of_the_paper() -> None:
+    rows = printed()["si_loss"]
+    assert [method for _, method, _ in rows] == [paper.METHODS[m] for m in paper.BENCHMARK] * 3
+    assert {(band, method) for band, method, _ in rows} == set(paper.THETA)
+    for band, method, cells in rows:
+        assert tuple(numbers(cell)[0] for cell in cells) == paper.THETA[band, method]
+
+
+def test_every_number_stands_in_a_table() -> None:
+    """What is typed but in no table would never be compared."""
+    shown = {paper.METHODS[m] for m in (*paper.BENCHMARK, *paper.OPTIMISERS, *paper.ABLATIONS)}
+    assert shown == {method for _, method in paper.LANDING}
+    assert {band for band, _ in paper.LANDING} == set(paper.BANDS.values()) == set(paper.KINDS)
+
+
+@pytest.mark.parametrize("key", [key for key, cells in paper.LANDING.items() if cells[0]])
+def test_the_papers_rows_average_to_what_it_prints(key) -> None:
+    """One row does not, and the report says so."""
+    *targets, total = paper.LANDING[key]
+    mean = sum(cell[0] for cell in targets) / 3
+    exception = key[1] == "without covariance and multi-start"
+    assert (abs(mean - total[0]) > 0.01) == exception

@@ -1,0 +1,52 @@
+"""The first page says what came out, band by band."""
+
+from __future__ import annotations
+
+import math
+
+from pipeline.report.chapters.summary import summary
+from pipeline.report.looks import looks
+from tests.report.tables.toy_results import floor, launches, result, results
+
+NAMED = looks(["sling2sim2real", "package_si", "real2sim2real", "de"])
+CLOSE = launches([[0.03, -0.01]] * 3)
+
+
+def said(*some, floors=None) -> list[str]:
+    text = summary(results(*some, floors=floors), NAMED)
+    return [line for line in text.splitlines() if line.startswith("- ")]
+
+
+def test_a_line_a_band_of_the_rig() -> None:
+    ran = (
+        result("band1", "sling2sim2real", CLOSE),
+        result("band1", "package_si", launches([[0.1] * 5] * 3, failed=2)),
+        result("band1", "real2sim2real", launches([[0.1] * 5] * 3, failed=15)),
+        result("band1", "de", CLOSE),  # left to its table
+    )
+    (line,) = said(*ran, floors={"band1": floor((0.01,) * 3, (0.01,) * 3)})
+    assert line == (
+        "- **band1**, virtual launches, mean distance from the target: Sling2Sim2Real 2.0 cm"
+        " (2.0 times the floor), Package SI 10.0 cm (2 of 15 launches failed), Real2Sim2Real N/A;"
+        " the actuation floor is 1.0 cm."
+    )
+    assert "floor" not in said(*ran)[0]
+
+
+def test_what_went_wrong_is_said() -> None:
+    card = {"training": {"converged": False, "mean_error_m": 0.05}}
+    unpredicted = CLOSE.assign(predicted_y=math.nan)
+    lines = said(result("band1", "sling2sim2real", unpredicted, card=card))
+    assert "- band1, Sling2Sim2Real: 6 of 6 launches could not be predicted." in lines
+    assert any("policy of band1, Sling2Sim2Real did **not** converge" in line for line in lines)
+
+
+def test_predictions_alone_say_so() -> None:
+    lines = said(result("mine", "package_si", launches([[math.nan]] * 3, "predicted")))
+    assert lines == ["- mine, Package SI: no launch to compare its predictions with."]
+
+
+def test_measured_launches_are_judged_by_method() -> None:
+    (line,) = said(result("mine", "package_si", launches([[0.02]] * 3, "measured")))
+    assert line.startswith("- **mine, Package SI**: measured launches land 2.0 cm off their target")
+    assert "the aim, at most 5 % of the distance inside the recorded stretch, is met" in line

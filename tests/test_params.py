@@ -115,7 +115,7 @@ def test_exact_lines() -> None:
         ("run.methods", ["best"], "run.methods: best is not one of"),
         ("run.ablations.methods", ["best"], "run.ablations.methods: best is not one of"),
         ("run.ablations.methods", ["sling2sim2real"], "ablations.methods: sling2sim2real is one"),
-        ("run.ablations.bands", ["band2"], "run: ablations.bands: band2 is not one of run.bands"),
+        ("run.ablations.bands", ["other"], "run: ablations.bands: other is not one of run.bands"),
         ("rig.bands", {}, "rig.bands: lacks band1"),
         ("bands", {"band-1": CONTENT["bands"]["band1"]}, "bands.band-1: a name has"),
         ("bands.band1.source", "bag", "bands.band1.source: must be 'recording' or 'rig'"),
@@ -160,9 +160,10 @@ def test_exact_lines() -> None:
             "methods.sling2sim2real_taut.fixed.poissons_ratio: must be between 0.45 and 0.49",
         ),
         (
-            "methods.sling2sim2real_taut.fixed",
-            {"air_drag": 9.0},
-            "methods.sling2sim2real_taut.fixed.air_drag: must be between 0 and 8, got 9",
+            "methods.bo",
+            CONTENT["methods"]["bo"]
+            | {"nuisances": {"air_drag": [0, 8]}, "fixed": {"air_drag": 9}},
+            "methods.bo.fixed.air_drag: must be between 0 and 8, got 9",
         ),
         (
             "methods.de.fixed",
@@ -183,7 +184,7 @@ def test_exact_lines() -> None:
         ("methods.de.k_top", 3, "methods.de: k_top and covariance are for search: multistart"),
         ("methods.de.covariance", False, "methods.de: k_top and covariance are for search"),
         ("methods.no_work.covariance", 1, "methods.no_work.covariance: must be a valid boolean"),
-        ("methods.no_work.k_top", 50, "methods.no_work.k_top: k_top x optimizer.cma_population"),
+        ("policy.robust.methods", ["best"], "policy.robust.methods: best is not one of"),
         ("methods.no_work.k_top", 0, "methods.no_work.k_top: must be between 1 and 50"),
         ("methods.de.fixed", {"poisson": 0.4}, "methods.de.fixed: poisson is not one of youngs_"),
         (
@@ -227,6 +228,15 @@ def test_keys_of_a_method_may_be_left_out() -> None:
     about = about.methods["de"]
     assert (about.search, about.k_top, about.covariance) == ("multistart", None, True)
     assert (about.settings, about.fixed, about.nuisances) == ({}, {}, {})
+
+
+def test_a_methods_regions_need_rollouts() -> None:
+    content = YAML(typ="safe").load(changed(("optimizer", "cma_rollouts"), 100))
+    content["methods"]["no_work"]["k_top"] = 13
+    dumped = io.StringIO()
+    YAML().dump(content, dumped)
+    message = refusal(dumped.getvalue())
+    assert "methods.no_work.k_top: k_top x optimizer.cma_population" in message
 
 
 def test_ablations_run_on_their_bands_only() -> None:

@@ -144,6 +144,7 @@ def root(tmp_path: Path) -> Path:
     yaml = YAML()
     content = yaml.load(Path("params.yaml"))
     content["run"].update(bands=[BAND], rig=[], methods=[METHOD])
+    content["run"]["ablations"].update(bands=[], methods=[])
     content["bands"][BAND] = {
         "source": "recording",
         "mass": 0.04,

@@ -166,6 +166,11 @@ def test_exact_lines() -> None:
             "methods.bo.fixed.air_drag: must be between 0 and 8, got 9",
         ),
         (
+            "methods.de.costs",
+            {"air_drag": 1.0},
+            "methods.de: costs: air_drag is not one of the method's nuisances",
+        ),
+        (
             "methods.de.fixed",
             {"air_drag": 1.0},  # no nuisance of this method
             "methods.de.fixed: air_drag is not one of youngs_modulus",

@@ -84,7 +84,7 @@ class Evaluator:
             unit=unit,
             theta=theta,
             terms={name: np.where(failed, np.nan, values) for name, values in terms.items()},
-            total=np.where(failed, np.inf, self.loss.total(terms)),
+            total=np.where(failed, np.inf, self.loss.total(terms) + self.space.cost(theta)),
             failure=failure,
             seconds=time.perf_counter() - start,
         )

@@ -81,7 +81,7 @@ class Memo:
             return None  # not there, or damaged: a zip file can be in many ways
         if NOT_FINITE in failure and weighed != self._weighed:
             return None
-        total = self.evaluate.loss.total(terms)
+        total = self.evaluate.loss.total(terms) + self.evaluate.space.cost(theta)
         failure = [
             reason or (None if finite else NOT_FINITE)
             for reason, finite in zip(failure, np.isfinite(total), strict=True)

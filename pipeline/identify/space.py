@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,12 +18,14 @@ class Space:
         names: Of the axes, length D.
         low, high: Physical bounds, shape (D,).
         log: Which axes are logarithmic, shape (D,).
+        costs: What a unit of an axis adds to the loss, by name.
     """
 
     names: tuple[str, ...]
     low: np.ndarray
     high: np.ndarray
     log: np.ndarray
+    costs: dict[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -31,6 +33,7 @@ class Space:
         parameters,
         nuisances: dict[str, tuple[float, float]] | None = None,
         bounds: dict[str, tuple[float, float]] | None = None,
+        costs: dict[str, float] | None = None,
     ) -> Space:
         """Make it from params.yaml's `parameters`, in the simulator's order.
 
@@ -48,13 +51,14 @@ class Space:
             low=np.array([low for low, _ in (*known, *others.values())], float),
             high=np.array([high for _, high in (*known, *others.values())], float),
             log=np.array([*(box.scale == "log" for box in boxes), *(False for _ in others)]),
+            costs=costs or {},
         )
 
     @classmethod
     def of_method(cls, params, method: str) -> Space:
         """The box that a method of params.yaml searches: within its bounds, with its nuisances."""
         about = params.methods[method]
-        return cls.of(params.parameters, about.nuisances, about.bounds)
+        return cls.of(params.parameters, about.nuisances, about.bounds, about.costs)
 
     @property
     def dimension(self) -> int:
@@ -64,6 +68,12 @@ class Space:
     def nuisances(self) -> tuple[str, ...]:
         """The last axes: those that are no parameters of the simulator."""
         return tuple(name for name in self.names if name in NUISANCES)
+
+    def cost(self, theta: np.ndarray) -> np.ndarray:
+        """What physical values, shape (N, D), add to the loss by their size, shape (N,)."""
+        sizes = np.abs(theta)
+        each = (cost * sizes[:, self.names.index(name)] for name, cost in self.costs.items())
+        return sum(each, np.zeros(len(sizes)))
 
     def to_physical(self, unit: np.ndarray) -> np.ndarray:
         """Physical values, shape (..., D), of points in the unit cube, shape (..., D)."""

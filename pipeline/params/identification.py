@@ -156,6 +156,7 @@ def _reaches(bounds: dict[str, tuple[float, float]]) -> dict[str, tuple[float, f
 
 
 Value = Annotated[float, Range(-1e9, 1e9)]
+Cost = Annotated[float, Range(0, 1e6)]
 Setting = Annotated[object, AfterValidator(_is_setting)]
 Bounds = Annotated[tuple[Value, Value], LIST]
 
@@ -169,6 +170,7 @@ class Method(Section):
     fixed: dict[str, Value] = {}  # axes that are not searched
     bounds: dict[str, Bounds] = {}  # narrower ones than the box: what is known before
     nuisances: Annotated[dict[str, Bounds], AfterValidator(_reaches)] = {}  # searched besides
+    costs: dict[str, Cost] = {}  # of a nuisance, in the loss, for each unit of its size
     k_top: KTop | None = None  # None: optimizer.k_top
     covariance: bool = True  # else isotropic starts of the same determinant
 
@@ -181,6 +183,15 @@ class Method(Section):
             raise refusal("settings are for another search than multistart, which has none")
         if self.search != "multistart" and not (self.k_top is None and self.covariance):
             raise refusal(f"k_top and covariance are for search: multistart, not {self.search}")
+        return self
+
+    @model_validator(mode="after")
+    def _costs_are_of_nuisances(self) -> Method:
+        for name in self.costs:
+            if name not in self.nuisances:
+                raise refusal(f"costs: {name} is not one of the method's nuisances")
+            if name == "force_gain":
+                raise refusal("costs: force_gain is 1 where it adds nothing, so it can have none")
         return self
 
     @model_validator(mode="after")

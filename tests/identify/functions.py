@@ -41,10 +41,12 @@ class Evaluate:
         names: tuple[str, ...] = NAMES,
         fails: Callable[[np.ndarray], np.ndarray] = lambda unit: unit[:, 0] < 0,
         weights: dict[str, float] | None = None,
+        costs: dict[str, float] | None = None,
     ) -> None:
         self.function, self.fails, self.count = function, fails, 0
         size = len(names)
-        self.space = Space(names, np.zeros(size), np.full(size, 10.0), np.zeros(size, bool))
+        low, high, linear = np.zeros(size), np.full(size, 10.0), np.zeros(size, bool)
+        self.space = Space(names, low, high, linear, costs or {})
         weights = dict.fromkeys(TERMS, 0.0) | (weights or {"geom": 1.0})
         self.loss = SimpleNamespace(
             weights=weights,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -55,6 +56,18 @@ def test_losses_of_a_batch() -> None:
     np.testing.assert_allclose(found.terms["force"], [1.0, 0.1])
     np.testing.assert_allclose(found.total, found.terms["geom"] + 0.5 * found.terms["force"])
     assert found.failure == [None, None]
+
+
+def test_costs_of_the_space_are_in_the_total() -> None:
+    unit = np.random.default_rng(1).random((20, 2))
+    plain, dear = evaluator(1), evaluator(1)
+    dear.space = replace(SPACE, costs={"offset": 100.0})
+    found, with_cost = plain(unit), dear(unit)
+    good = np.isfinite(found.total)
+    added = with_cost.total[good] - found.total[good]
+    assert good.sum() > 5 and np.array_equal(good, np.isfinite(with_cost.total))
+    np.testing.assert_allclose(added, 100 * found.theta[good, 0])
+    np.testing.assert_array_equal(with_cost.terms["geom"], found.terms["geom"])
 
 
 def test_the_number_of_workers_changes_nothing() -> None:

@@ -117,6 +117,13 @@ def test_totals_are_recomputed_by_the_weights(remembered) -> None:
     assert heavy.failure == [None, "no"]
 
 
+def test_totals_are_recomputed_by_the_costs(remembered) -> None:
+    _, (plain,) = remembered(batches(0.1))
+    count, (dear,) = remembered(batches(0.1), costs={"a": 0.5})
+    assert count == 0
+    np.testing.assert_allclose(dear.total, plain.total + 0.5 * plain.theta[:, 0])
+
+
 def test_other_inputs_start_over_and_replace_the_old(remembered, tmp_path: Path) -> None:
     remembered(batches(0.1, 0.2))
     assert remembered(batches(0.1, 0.2), "y")[0] == 2

@@ -62,3 +62,14 @@ def test_reflection_keeps_what_is_inside(unit: np.ndarray) -> None:
 def test_reflection_is_a_mirror_at_the_faces() -> None:
     outside = np.array([-0.2, 1.2, 2.1, -1.3, -2.0])
     np.testing.assert_allclose(reflect(outside), [0.2, 0.8, 0.1, 0.7, 0.0], atol=1e-12)
+
+
+def test_a_cost_grows_with_the_size_of_its_nuisance() -> None:
+    bounds = {"air_drag": (0.0, 8.0), "camera_delay": (-0.01, 0.01)}
+    parameters = load().parameters
+    space = Space.of(parameters, bounds, costs={"air_drag": 0.5, "camera_delay": 100.0})
+    theta = np.tile(space.low, (3, 1))
+    columns = [space.names.index(name) for name in bounds]
+    theta[:, columns] = [[0.0, 0.0], [2.0, -0.01], [4.0, 0.01]]
+    np.testing.assert_allclose(space.cost(theta), [0.0, 2.0, 3.0])
+    assert not Space.of(parameters, bounds).cost(theta).any()

@@ -29,12 +29,10 @@ from pipeline.identify.space import Space
 from pipeline.signal import cutoff_hz
 from pipeline.sling.interaction import interact
 from pipeline.sling.model import THETA, Sling
-from pipeline.theta import in_air
 from tests.identify.own_law import disturbed, own_law_episode
 
 pytestmark = pytest.mark.validation
 
-NAMES = (*THETA, "air_drag")
 METHOD = "sling2sim2real_taut"
 EPISODES = 20
 TRUTH = {  # drawn evenly between these, E and s d on a logarithmic scale
@@ -43,7 +41,6 @@ TRUTH = {  # drawn evenly between these, E and s d on a logarithmic scale
     "damping_product": (5e-4, 5e-3),
     "dynamic_friction": (0.6, 1.0),
     "damping_scale": (0.3, 1.0),
-    "air_drag": (0.0, 8.0),  # the method's own box
 }
 NOISE = {"force_noise": 0.05, "depth_noise": 0.0006}
 ERRORS = {"release": 3e-4, "camera": 5e-4, "shift": 1e-3, "turn": 1e-3, "bias": 0.01}
@@ -53,7 +50,7 @@ E_LIMIT, PRODUCT_LIMIT, FORCE_LIMIT = 0.01, 0.1, 0.01
 
 
 def truth(rng: np.random.Generator) -> np.ndarray:
-    """A θ in the order of THETA, and the air's drag."""
+    """A θ in the order of THETA."""
     drawn = {
         name: np.exp(rng.uniform(*np.log(ends)))
         if name in ("youngs_modulus", "damping_product")
@@ -62,7 +59,7 @@ def truth(rng: np.random.Generator) -> np.ndarray:
     }
     product = drawn.pop("damping_product")
     drawn["elasticity_damping"] = product / drawn["damping_scale"]
-    return np.array([drawn[name] for name in NAMES])
+    return np.array([drawn[name] for name in THETA])
 
 
 def searched(params, episode, sling) -> dict:
@@ -71,12 +68,6 @@ def searched(params, episode, sling) -> dict:
     evaluate = Evaluator(episode, sling, loss, Space.of_method(params, METHOD))
     found = complete(params, METHOD, params.optimizer, evaluate)
     return theta_content(History(METHOD, THETA, [found.table]), episode.band)
-
-
-def replayed(sling, plan, points: np.ndarray):
-    """The plan's interaction with θ and drag (N, 6)."""
-    windy, theta = in_air(sling, points)
-    return interact(windy, plan, theta)
 
 
 def one(params, number: int) -> dict:
@@ -89,8 +80,7 @@ def one(params, number: int) -> dict:
     # a picture is taken at the release: one must show the recoil, or the method refuses the episode
     plan = replace(plan, cloud_time=plan.cloud_time + rng.uniform(*FIRST_PICTURE))
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
-    windy, theta = in_air(sling, true[None])
-    exact = own_law_episode(windy, plan, theta[0], cutoff=cutoff, seed=number, **NOISE)
+    exact = own_law_episode(sling, plan, true, cutoff=cutoff, seed=number, **NOISE)
     episode = disturbed(exact, rng, **ERRORS)
 
     start = time.perf_counter()
@@ -104,13 +94,13 @@ def one(params, number: int) -> dict:
     seconds = time.perf_counter() - start - found_after
 
     # held in full: the force while the band is drawn
-    three = replayed(sling, plan, np.array([true, best, posterior.mean]))
-    held = np.linalg.norm(EpisodeLoss.plain(params, plan, sling).filtered(three), axis=2)
+    three = interact(sling, plan, np.array([true, best, posterior.mean]))
+    held = np.linalg.norm(EpisodeLoss.plain(params, episode, sling).filtered(three), axis=2)
     curve = np.abs(held[1:] - held[0]).mean(axis=1) / held[0].max()
     late = episode.release_time - episode.time
     hold = held[0, (late > 0.05) & (late < 0.5)].mean()
     product = true[2] * true[4]
-    values = dict(zip(NAMES, zip(true, posterior.samples.T, strict=True), strict=True))
+    values = dict(zip(THETA, zip(true, posterior.samples.T, strict=True), strict=True))
     values["damping_product"] = product, posterior.derived["damping_product"]
     values["hold_force"] = hold, posterior.derived["hold_force"]
     values["release_time"] = plan.release_time, posterior.derived["release_time"]
@@ -124,10 +114,10 @@ def one(params, number: int) -> dict:
             "low": low,
             "high": high,
             "error": float(np.median(samples)) - value,
-            "identifiable": name not in NAMES or identifiable(name, low, high, axes),
+            "identifiable": name not in THETA or identifiable(name, low, high, axes),
         }
-        if name in NAMES:
-            quantities[name]["theta_error"] = float(best[NAMES.index(name)] - value)
+        if name in THETA:
+            quantities[name]["theta_error"] = float(best[THETA.index(name)] - value)
             quantities[name]["profile"] = [curves[name]["low"], curves[name]["high"]]
     quantities["damping_product"]["theta_error"] = float(best[2] * best[4] - product)
     return {

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.bench_methods import complete
+from pipeline.bench_methods import PAPER, complete
 from pipeline.episode import Episode
 from pipeline.identify.evaluate import Evaluator
 from pipeline.identify.history import theta_content
@@ -77,9 +77,16 @@ class Recorded:
         """Arguments of `errors` under which something of our method is another."""
         episode = self.episode
         result = {
-            "without the air's drag": {"params": self.changed(nuisances={})},
+            "with the air's drag, 0 to 8 1/s": {
+                "params": self.changed(nuisances={"air_drag": (0.0, 8.0)})
+            },
+            "with five starts": {"params": self.changed(k_top=None)},
+            "with the paper's budget": {
+                "params": self.params.model_copy(
+                    update={"optimizer": self.params.optimizer.model_copy(update=PAPER)}
+                )
+            },
             "without bounds of nu": {"params": self.changed(bounds={})},
-            "without both": {"params": self.changed(nuisances={}, bounds={})},
             "without the taut term": {
                 "params": self.changed(
                     weights=self.params.methods[OURS].weights.model_copy(update={"taut": 0.0})

@@ -32,6 +32,9 @@ def main() -> None:
             draws = world.hits(targets, [find(landing_map, target) for target in targets])
             floors.append(errors_of(draws, world.landings(draws, trial_seeds(params)), params))
     least, ordinary = floors
+    for target, one in least["targets"].items():
+        if one["mean_error_m"] is None:
+            raise UserError(f"{band}: no launch at {target} m lands; move trials.targets inwards")
     content = {
         "band": band,
         "kind": "virtual",

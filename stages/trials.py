@@ -48,12 +48,15 @@ def main() -> None:
     launcher = simulator(params, band, theta)
     once, again = np.unique(draws, axis=0, return_inverse=True)
     error, discrepancy = params.trials.actuation_error, law_discrepancy(theta)
+    predicted = trials.limited(launcher(draws), params.setup.max_force)
+    intervals = landing_intervals(launcher, once, samples, error, discrepancy)[again]
+    intervals[np.isnan(predicted.landing_y)] = np.nan
     table = trials.table(
         band,
         method,
         batches,
-        predicted=trials.limited(launcher(draws), params.setup.max_force),
-        intervals=landing_intervals(launcher, once, samples, error, discrepancy)[again],
+        predicted=predicted,
+        intervals=intervals,
         stretch=trials.stretch_of(np.insert(draws, 0, 0, axis=1), fork_width, about.rest_length),
         recorded=trials.recorded_stretch(episode, fork_width, about.rest_length),
     )

@@ -41,12 +41,12 @@ def errors_of(draws: np.ndarray, landings: np.ndarray, params) -> dict:
         trials_mean_error_m, the mean over launches with the errors of the trials. None where
         nothing landed.
     """
-    targets = np.array(params.trials.targets)
-    missed = landings - targets[:, None]
+    targets = params.trials.targets
+    missed = landings - np.array(targets)[:, None]
     own = missed[:, : params.trials.repeats]
     return {
         "targets": {
-            f"{target:g}": {"draw": list(map(float, draw)), **_error(miss, mine)}
+            repr(target): {"draw": list(map(float, draw)), **_error(miss, mine)}
             for target, draw, miss, mine in zip(targets, draws, missed, own, strict=True)
         },
         **_error(missed, own),

@@ -51,10 +51,11 @@ def write(params, root: str | Path = ".") -> None:
 def _replays(params, results: Results, band: str) -> dict[str, Replay]:
     """Of the methods that are drawn; of all where held-out data are to be compared."""
     recorded, methods = results.episodes[band], results.methods[band]
-    everyone = params.loss.held_out.blocks
+    some = {*drawn(methods, SIDE_BY_SIDE), *drawn(params.run.methods, SIDE_BY_SIDE)}
     return {
         method: replay(params, band, method, recorded, methods[method].theta)
-        for method in (methods if everyone else drawn(methods, SIDE_BY_SIDE))
+        for method in methods
+        if method in some or params.loss.held_out.blocks
     }
 
 

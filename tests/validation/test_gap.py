@@ -158,8 +158,7 @@ def band_figures(params, root: Path, band: str, methods, progress) -> dict:
         landing_map = world.landing_map(params.setup, params.floor.map_size)
         starts = [least_sensitive_draw(landing_map, target) for target in targets]
         draws = world.hits(targets, starts)
-        seeds = trial_seeds(params)[:, : params.trials.repeats]
-        floor = errors_of(draws, world.landings(draws, seeds), params)
+        floor = errors_of(draws, world.landings(draws, trial_seeds(params)), params)
         tried = shots(params, landing_map)
         landing = world.exact(tried).landing_y
         progress(f"  {band}: floor {100 * floor['mean_error_m']:.2f} cm")
@@ -218,7 +217,8 @@ def test_what_the_error_of_a_landing_is_made_of(tmp_path, progress, record) -> N
     draw_figure(figures, ROOT / "reports/validation/gap.png")
     met = {
         band: bool(
-            one["methods"][OURS]["variants"][AS_IT_IS]["mean_error_m"]
+            not one["methods"][OURS]["variants"][AS_IT_IS]["failed"]
+            and one["methods"][OURS]["variants"][AS_IT_IS]["mean_error_m"]
             <= FACTOR * one["floor"]["mean_error_m"]
         )
         for band, one in figures.items()
@@ -226,8 +226,9 @@ def test_what_the_error_of_a_landing_is_made_of(tmp_path, progress, record) -> N
     record(
         "gap",
         asked=f"On the virtual rig, with the errors of the trials: the mean error of {OURS} is at"
-        f" most {FACTOR:g} times the actuation floor on each band. Reported beside it: the error"
-        " with one thing at a time made perfect, and what the bias of each target is made of.",
+        f" most {FACTOR:g} times the actuation floor on each band, and no launch fails. Reported"
+        " beside it: the error with one thing at a time made perfect, and what the bias of each"
+        " target is made of.",
         met=all(met.values()),
         settings={
             "methods": METHODS,

@@ -79,8 +79,8 @@ def _predictions(results: Results, band: str, looks: dict[str, Look]) -> list[st
                 text.append(f"{looks[method].name}, {title}:\n\n{table}")
                 if kind == "predicted":
                     text.append(
-                        "No landing of this band has been measured. Launch from these draws and put"
-                        f" the landings into `data/trials/measured/{band}.csv` to compare.\n"
+                        "No landing of this policy has been measured. Launch from these draws and"
+                        f" put the landings into `data/trials/measured/{band}.csv` to compare.\n"
                     )
     return text
 

@@ -13,6 +13,7 @@ from matplotlib.patches import Circle, Rectangle
 from pipeline.params import TARGET_AREA
 from pipeline.report.figures.canvas import save
 from pipeline.report.looks import SIDE_BY_SIDE, Look
+from pipeline.report.noise import landed
 from pipeline.report.results import Results
 from pipeline.sling.model import GRAVITY
 from pipeline.style import INK, STYLE
@@ -123,7 +124,7 @@ def _flights(
     for points in predicted:
         ax.plot(*points.T, color=INK, lw=0.6, ls=(0, (5, 3)), zorder=5)
     launched = trials[trials.kind != "predicted"]
-    failed = int(launched.landing_y.isna().sum())
+    failed = int((~landed(launched)).sum())
     said = f"{failed} of {len(launched)} failed" if failed else ""
     behind = {"facecolor": "w", "edgecolor": "none", "alpha": 0.8, "pad": 1}
     ax.text(
@@ -210,13 +211,13 @@ def _landings(ax: plt.Axes, trials: pd.DataFrame, middle: float, width: float, c
             if radius <= 0.501 * width:
                 ax.add_patch(Circle((middle, target), radius, fill=False, color="w", lw=1.2))
         ax.plot([middle - 0.015, middle + 0.015], [target] * 2, color=INK, lw=0.8)
-        landed = trials[(trials.target == target) & trials.landing_y.notna()]
+        seen = trials[(trials.target == target) & trials.landing_y.notna()]
         ax.scatter(
-            np.full(len(landed), middle), landed.landing_y, s=20, marker=mark, facecolors=color,
+            np.full(len(seen), middle), seen.landing_y, s=20, marker=mark, facecolors=color,
             edgecolors="w", linewidths=0.4, alpha=0.85, zorder=3,
         )  # fmt: skip
     launched = trials[trials.kind != "predicted"]
-    failed = int(launched.landing_y.isna().sum())
+    failed = int((~landed(launched)).sum())
     if failed:
         text = f"{failed} of {len(launched)}\nfailed"
         ax.text(middle, TARGET_AREA[1] + 0.01, text, ha="center", va="bottom", fontsize=7)

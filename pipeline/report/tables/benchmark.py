@@ -14,7 +14,7 @@ from pipeline.report.looks import KNOWN, Look
 from pipeline.report.looks import looks as looks_of
 from pipeline.report.results import Results
 from pipeline.report.tables.cells import NONE, Table, number
-from pipeline.report.tables.landings import landing_errors
+from pipeline.report.tables.landings import landing_errors, pooled_std
 
 PAPER = "paper, real robot"
 FLOOR, ORACLE = "actuation floor", "virtual, oracle"
@@ -105,14 +105,13 @@ def _floor(floor: dict) -> dict:
         return counts | {n: math.nan if value is None else value for n, value in known.items()}
 
     result = {float(g): errors(one) for g, one in floor["targets"].items()}
-    within = [one["std"] ** 2 for one in result.values() if np.isfinite(one["std"])]
-    pooled = math.sqrt(np.mean(within)) if within else math.nan
-    return result | {"all": errors(floor) | {"pooled_std": pooled}}
+    return result | {"all": errors(floor) | {"pooled_std": pooled_std(result.values())}}
 
 
 def as_table(rows: list[Row], targets: Iterable[float], looks: dict[str, Look]) -> Table:
     """Mean ± deviation in cm; bold: the lowest of a band where no launch failed."""
-    keys = [*sorted({*targets, *paper.TARGETS}), "all"]
+    tried = {key for row in rows for key in row.errors if key != "all"}
+    keys = [*sorted({*targets, *paper.TARGETS, *tried}), "all"]
     lowest = {key: _lowest(rows, key) for key in keys}
     lines = []
     for row in rows:

@@ -51,9 +51,10 @@ def methods(params, looks: dict[str, Look]) -> Table:
             search = f"DE, then CMA-ES in {'1 region' if regions == 1 else f'{regions} regions'}"
             search += "" if about.covariance else ", isotropic starts"
         fixed = [_held(name, value) for name, value in about.fixed.items()]
-        more = ", ".join(about.nuisances) or NONE
+        costs = about.costs
+        more = [f"{n} ({costs[n]:g} a unit)" if n in costs else n for n in about.nuisances]
         shown = [look.name, f"`{method}`", search, " + ".join(terms), ", ".join(fixed) or NONE]
-        rows.append([*shown, more])
+        rows.append([*shown, ", ".join(more) or NONE])
     heads = ["method", "in params.yaml", "search", "minimises", "held fixed", "nuisances besides"]
     return heads, rows
 

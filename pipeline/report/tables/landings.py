@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
@@ -38,10 +39,16 @@ def landing_errors(trials: pd.DataFrame) -> dict:
         }
 
     result = {target: statistics(trials.target == target) for target in sorted(set(trials.target))}
-    variances = [one["std"] ** 2 for one in result.values() if np.isfinite(one["std"])]
     everything = statistics(pd.Series(True, index=trials.index))
-    everything["pooled_std"] = math.sqrt(np.mean(variances)) if variances else math.nan
+    everything["pooled_std"] = pooled_std(result.values())
     return {**result, "all": everything}
+
+
+def pooled_std(parts: Iterable[dict]) -> float:
+    """Deviation within targets, each weighed by its launches less one [m]; NaN of none."""
+    known = [(n["launches"] - n["failed"] - 1, n["std"]) for n in parts if np.isfinite(n["std"])]
+    freedom = sum(count for count, _ in known)
+    return math.sqrt(sum(n * std**2 for n, std in known) / freedom) if freedom else math.nan
 
 
 def predictions(trials: pd.DataFrame) -> Table:

@@ -41,6 +41,7 @@ def results(root, params):
             "target": [1.725, 1.725, 1.925, 1.925],
             "trial": [1, 2, 1, 2],
             "landing_y": [1.70, 1.76, 1.93, None],
+            "failure": [None, None, None, "hits the fork"],
             "flight_y": [one[:, 0] + off for off in (-0.02, 0.04, 0.21)] + [None],
             "flight_z": [one[:, 1]] * 3 + [None],
             "predicted_leave_y": LEAVE["y"],

@@ -11,6 +11,7 @@ SLING_DEVICE says where launches are simulated; PPO runs on one thread of the CP
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,7 @@ def main() -> None:
     _write(folder, plain, about, kind=PLAIN, training=training, landing_map=validated)
     print(f"{band} {method}: {verdict(training, checked.failures)}", flush=True)
 
+    shutil.rmtree(folder / ROBUST, ignore_errors=True)  # of an earlier run by other parameters
     if method in params.policy.robust.methods:
         source = Path("data/confidence", band, f"{method}.json")
         samples = load_samples(source, band, method)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import UserError
+from pipeline.machine import workers
 from pipeline.params import expect_known
 from pipeline.policy.spread import landing_intervals, law_discrepancy, load_samples
 from pipeline.theta import calibrated, in_air, load_theta, vector
@@ -141,10 +142,10 @@ def simulator(
     from pipeline.sling.launch import launch
 
     sling, best = calibrated(params, band, content, root), vector(content)[None]
-    workers = os.cpu_count() or 1
+    threads = workers() or os.cpu_count() or 1
 
     def launcher(draws: np.ndarray, thetas: np.ndarray | None = None):
         moving, thetas = in_air(sling, best if thetas is None else thetas)
-        return launch(moving, thetas, draws, max_force=max_force, device=device, workers=workers)
+        return launch(moving, thetas, draws, max_force=max_force, device=device, workers=threads)
 
     return launcher

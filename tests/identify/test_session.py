@@ -43,7 +43,7 @@ def test_methods_and_stages_share_what_was_simulated(evaluators: list[Evaluate])
     other = serve("sling2sim2real_taut", stage="refined")
     assert [one.count for one in evaluators] == [1, 0]
     np.testing.assert_allclose(first.total, 3 * rosenbrock(UNIT), rtol=1e-12)
-    np.testing.assert_allclose(other.total, 3 * rosenbrock(UNIT), rtol=1e-12)
+    np.testing.assert_allclose(other.total, 4 * rosenbrock(UNIT), rtol=1e-12)  # and taut
 
 
 @pytest.mark.parametrize(

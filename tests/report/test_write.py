@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -134,3 +135,14 @@ def test_names_the_input_that_is_missing(root, params, name: str, stage: str) ->
     with pytest.raises(UserError, match=f"{re.escape(name)}: missing.*dvc repro {stage}`"):
         writing.write(params, root)
     assert not (root / "reports").exists()
+
+
+def test_methods_beside_each_other_are_replayed_on_every_band(params, monkeypatch) -> None:
+    """Those of run.methods, though a band's ablations come before them in its own pictures."""
+    monkeypatch.setattr(writing, "replay", lambda params, band, method, *_: method)
+    always = ["mine", "de", "bo", "sling2sim2real"]
+    methods = {m: SimpleNamespace(theta=None) for m in (*always, "package_si", "real2sim2real")}
+    results = SimpleNamespace(episodes={BAND: None}, methods={BAND: methods})
+    run = params.run.model_copy(update={"methods": tuple(always)})
+    found = writing._replays(params.model_copy(update={"run": run}), results, BAND)
+    assert {*always, "package_si", "real2sim2real"} == {*found}

@@ -37,5 +37,9 @@ def number(value: float | None, form: str, otherwise: str | None = NONE) -> str:
     return otherwise if isinstance(otherwise, str) else NONE
 
 
+def centimetres(metres: float | None) -> str:
+    return number(None if metres is None else 100 * metres, ".2f")
+
+
 def percent(fraction: float, form: str = ".0f") -> str:
     return f"{100 * fraction:{form}} %"

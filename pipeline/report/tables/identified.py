@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.report.looks import Look
 from pipeline.report.replay import Replay
 from pipeline.report.results import Results
-from pipeline.report.tables.cells import NONE, Table, number, percent
+from pipeline.report.tables.cells import NONE, Table, centimetres, number, percent
 from pipeline.report.tables.parameters import printed_loss
 
 NAMES = {
@@ -104,14 +104,10 @@ def phases(results: Results, looks: dict[str, Look]) -> Table | None:
     for result in shown:
         about = result.confidence["phases"]
         force = [number(about[part].get("force_rms"), ".3f") for part in parts]
-        cloud = [number(_centimetres(about[part].get("cloud_rms")), ".2f") for part in parts]
+        cloud = [centimetres(about[part].get("cloud_rms")) for part in parts]
         rows.append([result.band, looks[result.method].name, *force, *cloud])
     heads = [f"force, {part} [N]" for part in parts] + [f"cloud, {part} [cm]" for part in parts]
     return ["band", "method", *heads], rows
-
-
-def _centimetres(metres: float | None) -> float | None:
-    return None if metres is None else 100 * metres
 
 
 def losses(results: Results, params, looks: dict[str, Look]) -> Table:

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.policy.landing_map import LandingMap
 from pipeline.report.looks import Look
 from pipeline.report.results import Result, Results
-from pipeline.report.tables.cells import NONE, Table, number
+from pipeline.report.tables.cells import NONE, Table, centimetres, number
 
 
 def aims(named: dict[str, tuple[LandingMap, np.ndarray]], targets: np.ndarray) -> Table:
@@ -59,7 +59,7 @@ def policies(results: Results, looks: dict[str, Look]) -> Table:
 def _converged(card: dict) -> list[str]:
     training, near = card["training"], card["landing_map"]["target_range"]
     own, by_map = (
-        [_centimetres(source.get(name)) for name in ("mean_error_m", "max_error_m")]
+        [centimetres(source.get(name)) for name in ("mean_error_m", "max_error_m")]
         for source in (training, near)
     )
     failed = training.get("failed_targets")
@@ -71,8 +71,4 @@ def _expected(result: Result, policy: str) -> str:
     """Of either policy, where there is a robust one that both were compared with."""
     known = (result.robust_card or {}).get("training", {})
     prefix = "" if policy == "robust" else "plain_"
-    return _centimetres(known.get(f"{prefix}expected_error_m"))
-
-
-def _centimetres(metres: float | None) -> str:
-    return NONE if metres is None else number(100 * metres, ".2f")
+    return centimetres(known.get(f"{prefix}expected_error_m"))

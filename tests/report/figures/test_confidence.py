@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -11,14 +10,6 @@ from pipeline.report.looks import looks
 from pipeline.report.results import gather
 from tests.report import conftest
 from tests.report.conftest import BAND, METHOD, THETA
-
-
-@pytest.fixture
-def kept(monkeypatch) -> list[plt.Figure]:
-    figures: list[plt.Figure] = []
-    monkeypatch.setattr(confidence, "save", lambda figure, path: figures.append(figure))
-    yield figures
-    plt.close("all")
 
 
 @pytest.fixture

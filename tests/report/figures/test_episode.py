@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -14,14 +13,6 @@ from tests.report.conftest import METHOD, episode
 from tests.report.toy_replay import toy_replay
 
 LOOKS = looks([METHOD])
-
-
-@pytest.fixture
-def kept(monkeypatch) -> list[plt.Figure]:
-    figures: list[plt.Figure] = []
-    monkeypatch.setattr(drawing, "save", lambda figure, path: figures.append(figure))
-    yield figures
-    plt.close("all")
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -19,14 +18,6 @@ from tests.report.conftest import BAND, METHOD
 
 FLOOR = -0.52
 LEAVE = {"y": -0.2, "z": -0.08, "speed": 4.3, "angle": 0.4}
-
-
-@pytest.fixture
-def kept(monkeypatch) -> list[plt.Figure]:
-    figures: list[plt.Figure] = []
-    monkeypatch.setattr(drawing, "save", lambda figure, path: figures.append(figure))
-    yield figures
-    plt.close("all")
 
 
 @pytest.fixture

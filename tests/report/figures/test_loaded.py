@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -12,14 +11,6 @@ from pipeline.report.figures import loaded as drawing
 from pipeline.report.looks import looks
 from tests.report.conftest import BAND, METHOD, episode
 from tests.report.toy_replay import toy_replay
-
-
-@pytest.fixture
-def kept(monkeypatch) -> list[plt.Figure]:
-    figures: list[plt.Figure] = []
-    monkeypatch.setattr(drawing, "save", lambda figure, path: figures.append(figure))
-    yield figures
-    plt.close("all")
 
 
 def drawn(recorded, replays) -> None:

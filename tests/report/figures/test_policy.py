@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,14 +10,6 @@ from pipeline.report.figures import policy
 from pipeline.report.looks import looks
 from pipeline.report.results import gather
 from tests.report.conftest import BAND, METHOD, launches
-
-
-@pytest.fixture
-def kept(monkeypatch) -> list[plt.Figure]:
-    figures: list[plt.Figure] = []
-    monkeypatch.setattr(policy, "save", lambda figure, path: figures.append(figure))
-    yield figures
-    plt.close("all")
 
 
 def test_every_method_has_a_row_and_two_have_intervals(kept) -> None:

@@ -13,7 +13,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
@@ -23,11 +24,11 @@ import numpy as np
 from scipy.stats import qmc
 
 from pipeline.episode import Episode
-from pipeline.errors import UserError
 from pipeline.fingerprint import fingerprint
 from pipeline.identify.evaluate import Evaluator
 from pipeline.identify.loss import EpisodeLoss
 from pipeline.identify.space import Space
+from pipeline.machine import named
 from pipeline.sling.interaction import interact, schedule_of
 from pipeline.sling.launch import launch
 from pipeline.sling.model import Sling
@@ -44,6 +45,9 @@ REPEATS = 3  # the best of them counts: others may use the machine too
 def bench(params, device: str = "cpu") -> dict:
     """Time the yardstick.
 
+    Args:
+        device: Or several that share each batch, as SLING_DEVICE names them.
+
     Returns:
         `batches`: environments, threads on the CPU, rollouts/s without and with the loss,
         launches/s; `yardstick`: its steps, the mean of its Newton iterations, bytes a rollout;
@@ -52,22 +56,21 @@ def bench(params, device: str = "cpu") -> dict:
     Raises:
         UserError: There is no such device.
     """
-    kind = device.partition(":")[0]
-    if kind not in BATCHES or not available(device):
-        raise UserError(f"device {device}: not there; cpu is, and cuda:0 where there is a GPU")
+    devices = named(device, "--device")
+    kind = devices[0].partition(":")[0]
     sling, episode = recorded_yardstick(params)
     space = Space.of(params.parameters)
-    loss = EpisodeLoss.of(params, next(iter(params.methods)), episode, sling, device=device)
-    simulate = partial(interact, sling, episode, device=device, fetch=False)
-    shoot = partial(launch, sling, draws=np.array([[-DRAW, -0.15]]), device=device)
+    loss = EpisodeLoss.of(params, next(iter(params.methods)), episode, sling)
+    simulate = partial(shared, devices, partial(interact, sling, episode, fetch=False))
+    shoot = partial(launch, sling, draws=np.array([[-DRAW, -0.15]]), device=devices)
 
     batches = []
     for count in BATCHES[kind]:
         unit = qmc.LatinHypercube(5, rng=1).random(count)
         thetas = space.to_physical(unit)
         for workers in sorted({1, os.cpu_count() or 1} if kind == "cpu" else {1}):
-            evaluate = Evaluator(episode, sling, loss, space, device=device, workers=workers)
-            evaluate(unit[:1]), shoot(thetas[:1])  # what compiles
+            evaluate = Evaluator(episode, sling, loss, space, devices=devices, workers=workers)
+            evaluate(unit[: len(devices)]), shoot(thetas[:1])  # what compiles
             batches.append(
                 {
                     "environments": count,
@@ -77,17 +80,29 @@ def bench(params, device: str = "cpu") -> dict:
                     "launches_per_s": count / seconds(partial(shoot, thetas, workers=workers)),
                 }
             )
-    iterations = simulate(thetas).iterations.mean()
+    iterations = np.mean([part.iterations.mean() for part in simulate(thetas)])
     schedule = schedule_of(sling, episode)
     return {
         "batches": batches,
         "yardstick": {
             "steps": steps_of(schedule),
             "newton_iterations": round(float(iterations)),
-            "bytes_a_rollout": memory(sling, schedule, len(episode.cloud_time), device),
+            "bytes_a_rollout": memory(sling, schedule, len(episode.cloud_time), devices[0]),
         },
-        "first_start_s": first_start(device),
+        "first_start_s": first_start(devices[0]),
     }
+
+
+def shared(devices: Sequence[str], simulate: Callable, thetas: np.ndarray, **options) -> list:
+    """What `simulate` gives for each device's share of thetas (N, 5), all at once."""
+    with ThreadPoolExecutor(len(devices)) as pool:
+        return list(
+            pool.map(
+                lambda device, share: simulate(share, device=device, **options),
+                devices,
+                np.array_split(thetas, len(devices)),
+            )
+        )
 
 
 def steps_of(schedule) -> dict[str, int]:
@@ -140,9 +155,9 @@ def environment(device: str, command: str = "") -> dict:
     """
     import warp as wp
 
-    name = _processor()
-    if device.startswith("cuda"):
-        name = wp.get_device(device).name
+    devices, name = named(device, "--device"), _processor()
+    if device != "cpu":
+        name = wp.get_device(devices[0]).name
     git = subprocess.run(
         ["git", "describe", "--always", "--dirty"],
         cwd=Path(__file__).parent,
@@ -154,6 +169,7 @@ def environment(device: str, command: str = "") -> dict:
     return {
         "device": device,
         "device_name": name,
+        "devices": len(devices),
         "cores": os.cpu_count(),
         "command": command or f"sling bench --device {device} --json",
         "commit": git.stdout.strip() or None,

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.bench import available, recorded_yardstick, seconds, timed
+from pipeline.bench import recorded_yardstick, seconds, shared, timed
 from pipeline.episode import Episode
-from pipeline.errors import UserError
 from pipeline.identify.evaluate import Evaluator, simulated
 from pipeline.identify.history import History
 from pipeline.identify.loss import EpisodeLoss
@@ -25,6 +25,7 @@ from pipeline.identify.optimizers.multistart import Multistart
 from pipeline.identify.regions import regions_of
 from pipeline.identify.search import Free, budget, latin_hypercube, search
 from pipeline.identify.space import Space
+from pipeline.machine import named
 from pipeline.params import expect_known
 from pipeline.sling.model import THETA, Sling
 
@@ -50,6 +51,7 @@ def bench_methods(
     """Time a search with each of params.yaml's methods.
 
     Args:
+        device: Or several that share each batch, as SLING_DEVICE names them.
         size: Of the budget, laptop (params.yaml's) or paper.
         methods: These alone; none or an empty list means all.
 
@@ -63,32 +65,31 @@ def bench_methods(
     """
     for method in methods or ():
         expect_known(params, "method", method)
-    if device.partition(":")[0] not in ("cpu", "cuda") or not available(device):
-        raise UserError(f"device {device}: not there; cpu is, and cuda:0 where there is a GPU")
+    devices = named(device, "--device")
     optimizer = params.optimizer.model_copy(update=BUDGETS[size])
     sling, episode = recorded_yardstick(params)
     first = next(iter(params.methods))
-    _import_and_compile(params, sling, episode, first, device)
+    _import_and_compile(params, sling, episode, first, devices)
     return {
         "budget": {"name": size} | {name: getattr(optimizer, name) for name in ("k_top", *PAPER)},
-        "batch": _generation(params, sling, episode, first, device, optimizer.population),
+        "batch": _generation(params, sling, episode, first, devices, optimizer.population),
         "methods": {
-            method: time_search(params, method, optimizer, sling, episode, device)
+            method: time_search(params, method, optimizer, sling, episode, devices)[0]
             for method in methods or params.methods
         },
     }
 
 
 def time_search(
-    params, method: str, optimizer, sling: Sling, episode: Episode, device: str
-) -> dict:
-    """One search from nothing, all its rollouts counted."""
+    params, method: str, optimizer, sling: Sling, episode: Episode, devices: Sequence[str]
+) -> tuple[dict, History]:
+    """One search from nothing, all its rollouts counted; and what it evaluated."""
     with tempfile.TemporaryDirectory() as folder:
-        memo = Memo(_evaluator(params, method, sling, episode, device), Path(folder), "bench")
+        memo = Memo(evaluator(params, method, sling, episode, devices), Path(folder), "bench")
         evaluate = Clocked(memo)
         history, cpu, wall = timed(partial(complete, params, method, optimizer, evaluate))
     count = len(history.total)
-    return {
+    row = {
         "rollouts": count,
         "failed": int(np.isinf(history.total).sum()),
         "seconds": wall,
@@ -98,6 +99,7 @@ def time_search(
         "rollouts_per_s": count / wall,
         "best_loss": history.best()["total"],
     }
+    return row, history
 
 
 def complete(params, method: str, optimizer, evaluate) -> History:
@@ -117,27 +119,33 @@ def complete(params, method: str, optimizer, evaluate) -> History:
     return history
 
 
-def _generation(params, sling: Sling, episode: Episode, method: str, device: str, count: int):
-    """Seconds of one generation: simulated on one thread, and with the loss, on all cores."""
-    evaluate = _evaluator(params, method, sling, episode, device)
+def _generation(params, sling: Sling, episode: Episode, method: str, devices, count: int):
+    """Seconds of one generation: simulated, and with the loss, on all cores or GPUs."""
+    evaluate = evaluator(params, method, sling, episode, devices)
     unit = latin_hypercube(evaluate.space.dimension, count, params.optimizer.seed)
     thetas = evaluate.space.to_physical(unit)[:, : len(THETA)]
-    simulate = partial(simulated, sling, episode, thetas, device=device, workers=os.cpu_count())
-    simulation, whole = seconds(simulate), seconds(partial(evaluate, unit))
+    simulate = partial(simulated, sling, episode, workers=os.cpu_count())
+    simulation = seconds(partial(shared, devices, simulate, thetas))
+    whole = seconds(partial(evaluate, unit))
     return {"rollouts": count, "simulation_s": simulation, "with_loss_s": whole}
 
 
-def _evaluator(params, method: str, sling: Sling, episode: Episode, device: str) -> Evaluator:
-    loss = EpisodeLoss.of(params, method, episode, sling, device=device)
-    return Evaluator(episode, sling, loss, Space.of_method(params, method), device=device)
+def evaluator(
+    params, method: str, sling: Sling, episode: Episode, devices: Sequence[str]
+) -> Evaluator:
+    """A method's, with nothing remembered."""
+    loss = EpisodeLoss.of(params, method, episode, sling)
+    return Evaluator(episode, sling, loss, Space.of_method(params, method), devices=devices)
 
 
-def _import_and_compile(params, sling: Sling, episode: Episode, method: str, device: str) -> None:
+def _import_and_compile(
+    params, sling: Sling, episode: Episode, method: str, devices: Sequence[str]
+) -> None:
     """What a machine does once, and a method should not pay for."""
     import botorch  # noqa: F401
 
-    evaluate = _evaluator(params, method, sling, episode, device)
-    evaluate(np.full((1, evaluate.space.dimension), 0.5))
+    evaluate = evaluator(params, method, sling, episode, devices)
+    evaluate(np.full((len(devices), evaluate.space.dimension), 0.5))
 
 
 def table(result: dict) -> str:

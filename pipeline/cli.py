@@ -103,11 +103,30 @@ def parser() -> argparse.ArgumentParser:
     sub.add_argument("--robust", action="store_true", help="by the method's second policy")
     sub.add_argument("--json", action="store_true")
 
+    sub = command(run_flow, "run the stages that are stale in parallel, seen in the Prefect UI")
+    sub.add_argument(
+        "--workers", type=count, metavar="N", help="stages at a time; default all cores"
+    )
+    sub.add_argument("--gpus", type=count, metavar="N", help="GPU stages at a time; default 1")
+    sub.add_argument("--cluster", metavar="ADDRESS", help="of a Dask scheduler: tcp://HOST:8786")
+
+    sub = command(run_ui, "serve the Prefect UI of this project, on this machine's loopback")
+    sub.add_argument("--port", type=count, metavar="N", help="default 4200")
+
     sub = command(run_verify, "hold the simulator against closed forms, finer steps, other engines")
     sub.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
 
     sub = command(run_bench, "measure rollouts and launches a second")
-    sub.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
+    sub.add_argument(
+        "--device", default="cpu", help="cpu (default), cuda:0, cuda:0,cuda:1, or cuda: all GPUs"
+    )
+    sub.add_argument(
+        "--scaling",
+        nargs="?",
+        const="",
+        metavar="BAND",
+        help="several GPUs against one, on a band's recording or the yardstick",
+    )
     sub.add_argument("--peers", action="store_true", help="MuJoCo and Newton beside ours")
     sub.add_argument(
         "--recording", type=Path, metavar="FILE.mcap", help="time how it becomes clouds"
@@ -129,6 +148,13 @@ def positive(text: str) -> float:
     if value <= 0:
         raise argparse.ArgumentTypeError(f"must be above 0, got {text}")
     return value
+
+
+def count(text: str) -> int:
+    """A whole number above 0."""
+    if not (text.isascii() and text.isdigit() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"must be a whole number above 0, got {text!r}")
+    return int(text)
 
 
 def number(text: str) -> float:
@@ -264,6 +290,30 @@ def run_aim(arguments: argparse.Namespace) -> tuple[str, int]:
     return "\n".join([text, *(f"warning: {line}" for line in warnings)]), status
 
 
+def run_flow(arguments: argparse.Namespace) -> tuple[str, int]:
+    from pipeline.flow.run import run
+
+    root, workers, gpus = Path.cwd(), arguments.workers, arguments.gpus
+    if arguments.cluster is None:
+        return run(root, workers=workers, gpus=gpus), 0
+    from pipeline.flow.cluster import Cluster
+
+    with Cluster(root, arguments.cluster) as cluster:
+        done = run(
+            root,
+            workers=workers or cluster.slots,
+            gpus=gpus or cluster.slots,
+            place=cluster.run_stage,
+        )
+    return done, 0
+
+
+def run_ui(arguments: argparse.Namespace) -> tuple[str, int]:
+    from pipeline.flow.server import serve
+
+    return serve(Path.cwd(), arguments.port), 0
+
+
 def run_verify(arguments: argparse.Namespace) -> tuple[str, int]:
     from pipeline.params import load
     from pipeline.peers import checks as peers
@@ -286,6 +336,17 @@ def run_bench(arguments: argparse.Namespace) -> tuple[str, int]:
         if arguments.json:
             return json.dumps(environment("cpu", "sling bench --recording --json") | result), 0
         return recording.table(result), 0
+    if arguments.scaling is not None:
+        from pipeline import bench_scaling as several
+
+        band, device, size = arguments.scaling, arguments.device, arguments.budget
+        method = (arguments.methods or ["sling2sim2real"])[0]
+        result = several.bench_scaling(load(), device, band or None, method, size)
+        if arguments.json:
+            command = f"sling bench --scaling {band} --methods {method} --budget {size}"
+            command += f" --device {device} --json"
+            return json.dumps(environment(device, command) | result), 0
+        return several.table(result), 0
     if arguments.methods is not None:
         from pipeline import bench_methods as methods
 

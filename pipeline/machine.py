@@ -1,21 +1,58 @@
 """Where simulations run: said by the environment, because results depend on it by rounding alone.
 
-SLING_DEVICE (cpu or cuda:0; default cpu) and SLING_WORKERS (threads on the CPU; default all cores).
+SLING_DEVICE: cpu (default), cuda (all GPUs; CUDA_VISIBLE_DEVICES hides some), one such as cuda:0,
+or several such as cuda:0,cuda:2. Several share every batch; how many they are changes no result.
+SLING_WORKERS: threads on the CPU (default: all cores).
 """
 
 from __future__ import annotations
 
 import os
+import re
 
 from pipeline.errors import UserError
 
 
-def device() -> str:
-    """SLING_DEVICE. Raises UserError."""
-    name = os.environ.get("SLING_DEVICE") or "cpu"
-    if name != "cpu" and not name.startswith("cuda"):
-        raise UserError(f"SLING_DEVICE must be cpu or cuda:0 and the like, got {name!r}")
-    return name
+def devices() -> tuple[str, ...]:
+    """Those of SLING_DEVICE, each by its own name. Raises UserError."""
+    return named(os.environ.get("SLING_DEVICE") or "cpu", "SLING_DEVICE")
+
+
+def kind() -> str:
+    """cpu or cuda: what results hang on of SLING_DEVICE. Raises UserError."""
+    return devices()[0].partition(":")[0]
+
+
+def named(text: str, source: str) -> tuple[str, ...]:
+    """The devices that `text` names; `source` says where a user wrote it.
+
+    Raises UserError where it names none, or one twice, or one that is not there.
+    """
+    names = tuple(text.split(","))
+    if names == ("cpu",):
+        return names
+    if names != ("cuda",) and not all(re.fullmatch("cuda:(0|[1-9][0-9]*)", one) for one in names):
+        raise UserError(
+            f"{source} must be cpu, cuda (all GPUs), cuda:0, or several such as cuda:0,cuda:2,"
+            f" got {text!r}"
+        )
+    if len(set(names)) < len(names):
+        raise UserError(f"{source} {text}: names a GPU twice")
+    there = gpus()
+    if not there:
+        raise UserError(f"{source} {text}: CUDA sees no GPU on this machine; take cpu")
+    names = there if names == ("cuda",) else names
+    missing = ", ".join(one for one in names if one not in there)
+    if missing:
+        raise UserError(f"{source} {text}: {missing} is not there; CUDA sees {', '.join(there)}")
+    return names
+
+
+def gpus() -> tuple[str, ...]:
+    """Names of the GPUs that CUDA sees, cuda:0 first."""
+    from pipeline.native import wp
+
+    return tuple(str(one) for one in wp.get_cuda_devices())
 
 
 def workers() -> int | None:
@@ -26,3 +63,8 @@ def workers() -> int | None:
     if not (text.isascii() and text.isdigit() and int(text) > 0):
         raise UserError(f"SLING_WORKERS must be a whole number above 0, got {text!r}")
     return int(text)
+
+
+def cores() -> int:
+    """How many threads or processes a stage may keep busy. Raises UserError."""
+    return workers() or os.cpu_count() or 1

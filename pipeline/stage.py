@@ -43,13 +43,20 @@ def expect_from(run, step: str, band: str, method: str, path: Path) -> Path:
     """
     if path.is_file():
         return path
+    raise UserError(f"{path}: missing; {remedy(run, step, band, method)}")
+
+
+def remedy(run, step: str, band: str, method: str, *, damaged: bool = False) -> str:
+    """In words how a user gets what `step` makes for a band and a method, or gets it anew."""
     if (band, method) not in pairs(run):
-        raise UserError(
-            f"{path}: missing; name {method} under run.methods or run.ablations in params.yaml,"
+        return (
+            f"name {method} under run.methods or run.ablations in params.yaml,"
             " then `dvc repro` makes it"
         )
-    prefix = "" if method in run.methods else "ablation_"
-    return expect(path, f"{prefix}{step}@{band}-{method}")
+    stage = f"{'' if method in run.methods else 'ablation_'}{step}@{band}-{method}"
+    return (
+        f"`dvc repro --force {stage}` makes it anew" if damaged else f"`dvc repro {stage}` makes it"
+    )
 
 
 def expect_episode(band: str) -> Path:

@@ -36,7 +36,7 @@ def load_theta(path: Path, band: str) -> dict:
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise UserError(
-            f"{path}: no such file; `dvc repro theta@{band}-<method>` writes data/theta/{band}/"
+            f"{path}: no such file; `dvc repro` writes those of data/theta/{band}/"
         ) from error
     except (OSError, ValueError, RecursionError) as error:
         raise UserError(f"{path}: cannot be read as JSON ({error})") from error

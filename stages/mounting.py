@@ -7,7 +7,6 @@ Reads data/episodes/<band>/; writes data/mounting/<band>.json.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from pipeline import errors
@@ -15,7 +14,7 @@ from pipeline.files import write_json
 from pipeline.identify.loss import EpisodeLoss
 from pipeline.identify.mounting import fit_mounting
 from pipeline.identify.session import load_episode
-from pipeline.machine import workers
+from pipeline.machine import cores
 from pipeline.sling.model import Sling
 from pipeline.stage import started
 
@@ -28,7 +27,7 @@ def main() -> None:
         sling,
         load_episode(band),
         lambda part: EpisodeLoss.plain(params, part, sling),
-        workers=workers() or os.cpu_count() or 1,
+        workers=cores(),
     )
     write_json(Path("data/mounting", f"{band}.json"), content)
     print(

@@ -20,17 +20,20 @@ import pyarrow.parquet as pq
 
 from pipeline import errors
 from pipeline.files import replacing, write_json
-from pipeline.machine import device
+from pipeline.machine import devices, kind
+from pipeline.policy import robust
 from pipeline.policy.aim import ROBUST, simulator
 from pipeline.policy.check import check, check_expected, figures, robust_figures, verdict
 from pipeline.policy.export import PLAIN, card, write_onnx, write_torchscript
 from pipeline.policy.landing_map import LandingMap, validation
 from pipeline.policy.landscape import Landscape
-from pipeline.policy.robust import refine, robust_maps
 from pipeline.policy.spread import load_samples
 from pipeline.policy.train import Policy, Trained, train
+from pipeline.progress import Progress
 from pipeline.stage import expect_from, started
 from pipeline.theta import load_theta
+
+EVERY = 1.0  # s, between two lines of a training
 
 
 def main() -> None:
@@ -39,7 +42,7 @@ def main() -> None:
         params.run, "theta", band, method, Path("data/theta", band, f"{method}.json")
     )
     theta = load_theta(source, band)
-    launcher = simulator(params, band, theta, device=device())
+    launcher = simulator(params, band, theta, device=devices())
     landing_map = LandingMap.simulate(
         launcher,
         draw_y=params.setup.draw_y,
@@ -49,13 +52,14 @@ def main() -> None:
         seed=params.policy.seed,
     )
     kept = Path(".checkpoints/policy", f"{band}-{method}.pt")
-    plain = train(Landscape([landing_map]), params.policy, kept)
+    told = Progress(f"policy-{band}-{method}", params.policy.iterations, "iterations", every=EVERY)
+    plain = train(Landscape([landing_map]), params.policy, kept, told)
     checked = check(plain.policy, launcher, params)
     training = figures(plain, checked)
 
     folder = Path("data/policies", band, method)
     landing_map.save(folder / "map.parquet", {"band": band, "method": method})
-    about = {"params": params, "band": band, "method": method, "theta": theta, "device": device()}
+    about = {"params": params, "band": band, "method": method, "theta": theta, "device": kind()}
     validated = landing_map.validation(params.policy.targets)
     _write(folder, plain, about, kind=PLAIN, training=training, landing_map=validated)
     print(f"{band} {method}: {verdict(training, checked.failures)}", flush=True)
@@ -63,7 +67,7 @@ def main() -> None:
     shutil.rmtree(folder / ROBUST, ignore_errors=True)  # of an earlier run by other parameters
     if method in params.policy.robust.methods:
         source = Path("data/confidence", band, f"{method}.json")
-        samples = load_samples(source, band, method)
+        samples = load_samples(params.run, source, band, method)
         if samples is None:
             print(f"{band} {method}: no robust policy, for there is no {source}")
         else:
@@ -75,8 +79,10 @@ def _robust(folder: Path, plain: Policy, samples: np.ndarray, launcher, about) -
     """Train, check and export the policy that knows what the identification leaves open."""
     params, error = about["params"], about["params"].trials.actuation_error
     middle = plain.draws(np.mean(params.policy.targets, keepdims=True))[0]
-    maps = robust_maps(launcher, samples, middle, params)
-    trained = refine(plain, Landscape(maps, error), params.policy)
+    maps = robust.robust_maps(launcher, samples, middle, params)
+    title = f"policy-{about['band']}-{about['method']}-robust"
+    told = Progress(title, robust.STEPS, "steps", every=EVERY)
+    trained = robust.refine(plain, Landscape(maps, error), params.policy, told)
     checked = check(trained.policy, launcher, params)
     expected = [check_expected(one, launcher, samples, params) for one in (trained.policy, plain)]
     training = robust_figures(trained, checked, *expected, len(maps), error)

@@ -10,9 +10,7 @@ recorded band the calibrated simulator predicts the measured launches, or else t
 
 from __future__ import annotations
 
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +23,7 @@ from pipeline.policy.aim import ROBUST, policy_draws, simulator
 from pipeline.policy.measured import read_measured
 from pipeline.policy.spread import landing_intervals, law_discrepancy, load_samples
 from pipeline.policy.trials import Batch
+from pipeline.pool import Pool
 from pipeline.stage import expect_episode, expect_from, started
 from pipeline.theta import load_theta
 
@@ -36,7 +35,8 @@ def main() -> None:
         params.run, "theta", band, method, Path("data/theta", band, f"{method}.json")
     )
     theta = load_theta(source, band)
-    samples = load_samples(Path("data/confidence", band, f"{method}.json"), band, method)
+    source = Path("data/confidence", band, f"{method}.json")
+    samples = load_samples(params.run, source, band, method)
     episode = Episode.load(expect_episode(band))
 
     batches = _measured(params, band, method)
@@ -84,7 +84,9 @@ def _aimed(params: Params, band: str, method: str, repeats: int) -> list[Batch]:
     if (folder / ROBUST / "policy.onnx").is_file():
         policies["robust"] = folder / ROBUST
     return [
-        Batch.without_flight("predicted", name, policy_draws(path, np.array(targets)), targets)
+        Batch.without_flight(
+            "predicted", name, policy_draws(params.run, path, np.array(targets)), targets
+        )
         for name, path in policies.items()
     ]
 
@@ -93,7 +95,7 @@ def _on_the_rig(params: Params, band: str, method: str) -> list[Batch]:
     """Launches of the policies on the virtual rig; equal numbers have equal errors."""
     batches = _aimed(params, band, method, params.trials.repeats)
     seeds = trials.trial_seed(params.trials, np.arange(len(batches[0].draws))).tolist()
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+    with Pool() as pool:
         launched = [list(pool.map(partial(_launch, band), g.draws, seeds)) for g in batches]
     return [
         Batch(

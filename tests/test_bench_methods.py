@@ -53,7 +53,7 @@ def test_a_search_is_timed_in_the_box_of_its_method() -> None:
     """Bounds and nuisances of the method included."""
     sling, episode = recorded_yardstick(PARAMS)
     for method in ("sling2sim2real", "sling2sim2real_taut"):
-        evaluate = bench._evaluator(PARAMS, method, sling, episode, "cpu")
+        evaluate = bench.evaluator(PARAMS, method, sling, episode, ["cpu"])
         expected = Space.of_method(PARAMS, method)
         assert evaluate.space.names == expected.names
         np.testing.assert_array_equal(evaluate.space.low, expected.low)
@@ -67,5 +67,5 @@ def test_the_papers_budget_is_the_papers() -> None:
 
 
 def test_a_device_that_is_not_there_is_refused() -> None:
-    with pytest.raises(UserError, match="device tpu:0: not there"):
+    with pytest.raises(UserError, match="--device must be cpu.*got 'tpu:0'"):
         bench.bench_methods(PARAMS, device="tpu:0")

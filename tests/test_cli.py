@@ -184,6 +184,19 @@ def test_aim_by_a_robust_policy_that_is_not_there(tmp_path: Path) -> None:
     assert "dvc repro policy@band1-sling2sim2real_taut" in line
 
 
+def test_aim_by_an_ablation_names_its_own_stages(tmp_path: Path) -> None:
+    aimable(tmp_path)
+    aim = ("aim", "--band", "band1", "--method", "de", "--target", "1.9")
+    assert refused(sling(*aim, folder=tmp_path), 1).endswith(
+        "de.json: missing; `dvc repro ablation_theta@band1-de` makes it"
+    )
+    theta = tmp_path / "data/theta/band1"
+    shutil.copy(theta / "sling2sim2real_taut.json", theta / "de.json")
+    assert refused(sling(*aim, folder=tmp_path), 1).endswith(
+        "policy.onnx: no such file; `dvc repro ablation_policy@band1-de` makes it"
+    )
+
+
 def test_launch_prints_one_json_object(tmp_path: Path) -> None:
     """A hand-written θ file with only band and theta is enough."""
     theta = tmp_path / "theta.json"

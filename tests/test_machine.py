@@ -8,20 +8,63 @@ from pipeline import machine
 from pipeline.errors import UserError
 
 
-def test_the_environment_says_device_and_workers(monkeypatch) -> None:
+@pytest.fixture
+def three(monkeypatch):
+    """A machine on which CUDA sees three GPUs."""
+    monkeypatch.setattr(machine, "gpus", lambda: ("cuda:0", "cuda:1", "cuda:2"))
+
+
+def test_the_environment_says_devices_and_workers(monkeypatch, three) -> None:
     for name in ("SLING_DEVICE", "SLING_WORKERS"):
         monkeypatch.delenv(name, raising=False)
-    assert (machine.device(), machine.workers()) == ("cpu", None)
-    monkeypatch.setenv("SLING_DEVICE", "cuda:0")
+    assert (machine.devices(), machine.kind(), machine.workers()) == (("cpu",), "cpu", None)
+    monkeypatch.setenv("SLING_DEVICE", "cuda:1")
     monkeypatch.setenv("SLING_WORKERS", "3")
-    assert (machine.device(), machine.workers()) == ("cuda:0", 3)
+    assert (machine.devices(), machine.kind(), machine.workers()) == (("cuda:1",), "cuda", 3)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("cuda", ("cuda:0", "cuda:1", "cuda:2")),
+        ("cuda:2", ("cuda:2",)),
+        ("cuda:2,cuda:0", ("cuda:2", "cuda:0")),
+    ],
+)
+def test_several_gpus_are_named(three, text: str, expected: tuple[str, ...]) -> None:
+    assert machine.named(text, "--device") == expected
+
+
+@pytest.mark.parametrize("text", ["cuda:3", "cuda:0,cuda:3"])
+def test_a_gpu_that_is_not_there_is_refused(three, text: str) -> None:
+    with pytest.raises(UserError) as error:
+        machine.named(text, "--device")
+    assert str(error.value) == (
+        f"--device {text}: cuda:3 is not there; CUDA sees cuda:0, cuda:1, cuda:2"
+    )
+
+
+@pytest.mark.parametrize("text", ["cuda", "cuda:0"])
+def test_any_gpu_is_refused_where_cuda_sees_none(monkeypatch, text: str) -> None:
+    monkeypatch.setattr(machine, "gpus", lambda: ())
+    with pytest.raises(UserError, match=f"^--device {text}: CUDA sees no GPU"):
+        machine.named(text, "--device")
+
+
+def test_a_gpu_named_twice_is_refused(three) -> None:
+    with pytest.raises(UserError, match="cuda:0,cuda:0: names a GPU twice"):
+        machine.named("cuda:0,cuda:0", "SLING_DEVICE")
+
+
+DEVICES = ("tpu", "cpu,cpu", "cpu,cuda:0", "cuda,cuda:0", "cuda:", "cuda:-1", "cuda:01", "cuda:0,")
+WORKERS = ("0", "-1", "two", "1.5", "²", "٢")
 
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("DEVICE", "tpu"), *(("WORKERS", text) for text in ("0", "-1", "two", "1.5", "²", "٢"))],
+    [*(("DEVICE", text) for text in DEVICES), *(("WORKERS", text) for text in WORKERS)],
 )
 def test_anything_else_is_refused(monkeypatch, name: str, value: str) -> None:
     monkeypatch.setenv(f"SLING_{name}", value)
     with pytest.raises(UserError, match=f"SLING_{name} must be"):
-        getattr(machine, name.lower())()
+        {"DEVICE": machine.devices, "WORKERS": machine.workers}[name]()

@@ -166,9 +166,36 @@ def test_exact_lines() -> None:
             "methods.bo.fixed.air_drag: must be between 0 and 8, got 9",
         ),
         (
-            "methods.de.costs",
-            {"air_drag": 1.0},
-            "methods.de: costs: air_drag is not one of the method's nuisances",
+            "methods.de.priors",
+            {"air_drag": {"mean": 1.0, "weight": 0.02}},
+            "methods.de: priors: air_drag is not one of the method's nuisances",
+        ),
+        (
+            "methods.bo",
+            CONTENT["methods"]["bo"]
+            | {"nuisances": {"force_gain": [0.8, 1.2]}, "fixed": {"youngs_modulus": 3e5}}
+            | {"priors": {"force_gain": {"mean": 0.1, "weight": 1.0}}},
+            "methods.bo: priors: force_gain is about 1 and a prior about 0, so it has none",
+        ),
+        (
+            "methods.sling2sim2real_taut.priors.air_drag.mean",
+            0,
+            "methods.sling2sim2real_taut.priors.air_drag.mean: must be between 1e-06 and 1000000",
+        ),
+        (
+            "methods.sling2sim2real_taut.priors.air_drag.weight",
+            -1,
+            "methods.sling2sim2real_taut.priors.air_drag.weight: must be between 0 and 1000000",
+        ),
+        (
+            "methods.sling2sim2real_taut.priors.air_drag",
+            {"mean": 1.0},
+            "methods.sling2sim2real_taut.priors.air_drag.weight: is missing",
+        ),
+        (
+            "methods.sling2sim2real_taut.priors",
+            {"air_drag": 0.02},
+            "methods.sling2sim2real_taut.priors.air_drag: must be a mapping",
         ),
         (
             "methods.de.fixed",
@@ -232,7 +259,7 @@ def test_keys_of_a_method_may_be_left_out() -> None:
     about = parse(changed(("methods", "de"), {"weights": CONTENT["methods"]["de"]["weights"]}))
     about = about.methods["de"]
     assert (about.search, about.k_top, about.covariance) == ("multistart", None, True)
-    assert (about.settings, about.fixed, about.nuisances) == ({}, {}, {})
+    assert (about.settings, about.fixed, about.nuisances, about.priors) == ({}, {}, {}, {})
 
 
 def test_a_methods_regions_need_rollouts() -> None:

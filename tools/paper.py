@@ -3,7 +3,8 @@
     python tools/paper.py        # as `make paper`
 
 `dvc exp run` with the budget of pipeline/bench_methods.py: params.yaml keeps it afterwards, for
-`git diff` to show and `git checkout params.yaml` to take back. Killed, it goes on where it was.
+`git diff` to show and `git checkout params.yaml` to take back. Killed, it goes on where it was, and
+`seconds` adds up its stretches.
 """
 
 from __future__ import annotations
@@ -12,14 +13,19 @@ import json
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
+from pipeline import errors  # noqa: E402
 from pipeline.bench import environment  # noqa: E402
 from pipeline.bench_methods import PAPER  # noqa: E402
 from pipeline.files import write_json  # noqa: E402
+
+KEPT = Path(".checkpoints", "paper.json")  # "runs" and the "stretches" [s] of a run without an end
+TICK = 10.0  # s, that a kill may lose of its stretch
 
 
 def command(arguments: list[str]) -> list[str]:
@@ -27,17 +33,40 @@ def command(arguments: list[str]) -> list[str]:
     return ["dvc", "exp", "run", *(part for one in settings for part in ("-S", one)), *arguments]
 
 
+def timed(run: list[str], root: Path = ROOT, tick: float = TICK) -> tuple[int, list[float]]:
+    """Exit status of a command, and the seconds of its stretches [s], those before a kill first.
+
+    They are kept until it succeeds; another command begins anew.
+    """
+    kept = root / KEPT
+    try:
+        content = json.loads(kept.read_text(encoding="utf-8"))
+        before = content["stretches"] if content["runs"] == run else []
+    except (OSError, ValueError, KeyError, TypeError):
+        before = []
+    start, status = time.monotonic(), None
+    process = subprocess.Popen(run, cwd=root)
+    while status is None:
+        with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):  # Ctrl-C ends DVC as well
+            status = process.wait(tick)
+        stretches = [*before, round(time.monotonic() - start, 1)]
+        write_json(kept, {"runs": run, "stretches": stretches})
+    if status == 0:
+        kept.unlink()
+    return status, stretches
+
+
 def main() -> int:
     run = command(sys.argv[1:])
     about = environment("cpu", "make paper")
-    start = time.monotonic()
-    status = subprocess.run(run, cwd=ROOT, check=False).returncode
+    status, stretches = timed(run)
     if status == 0:
-        about |= {"runs": " ".join(run), "seconds": round(time.monotonic() - start)}
+        about |= {"runs": " ".join(run), "seconds": round(sum(stretches))}
+        about |= {"stretches": len(stretches)} if len(stretches) > 1 else {}
         write_json(ROOT / "reports" / "run.json", about)
         print(json.dumps(about, indent=4))
     return status
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    errors.run(main)

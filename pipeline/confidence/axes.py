@@ -2,8 +2,8 @@
 
 Damping acts through the product s d while the band is taut, and friction through the time that the
 opening fingers need to let go, which goes with 1/friction. The prior stays that of the search's
-box: uniform on its axes. The air's drag is one of them where the method searches it, because
-launches feel it and a recoil hardly tells it from damping.
+box, uniform on its axes, times the method's own. The air's drag is one of them where the method
+searches it, because launches feel it and a recoil hardly tells it from damping.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Axes:
         """
         about = params.methods[method]
         drag = {name: ends for name, ends in about.nuisances.items() if name == "air_drag"}
-        space = Space.of(params.parameters, drag, about.bounds)
+        space = Space.of(params.parameters, drag, about.bounds, about.priors)
         theta = [*vector(content), *(content["nuisances"][name] for name in drag)]
         return cls(space, np.array(theta), set(about.fixed), least_friction)
 

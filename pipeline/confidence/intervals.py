@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.confidence.axes import Axes
 
 LEVEL = 0.9
-FILLS = 2 / 3  # of the prior's own interval: from here on a parameter is not identifiable
+FILLS = 2 / 3  # of the box's own interval: from here on a parameter is not identifiable
 
 
 def interval(samples: np.ndarray) -> tuple[float, float]:
@@ -16,25 +16,13 @@ def interval(samples: np.ndarray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def identifiable(name: str, low: float, high: float, axes: Axes, prior=None) -> bool:
-    """Whether an interval is clearly narrower than that of the prior, on the search's axis.
-
-    Args:
-        prior: Mean and standard deviation, where more is known than the box.
-    """
+def identifiable(name: str, low: float, high: float, axes: Axes) -> bool:
+    """Whether an interval is clearly narrower than that of the box, on the search's axis."""
     column = axes.space.names.index(name)
-    edges = np.tile(axes.low, (2, 1))
-    edges[1] = axes.high
-    box = axes.space.to_unit(edges)[:, column]
-    known = box + (1 - LEVEL) / 2 * np.ptp(box) * np.array([1, -1])
-    if prior is not None:
-        mean, deviation = prior
-        values = np.random.default_rng(0).normal(mean, deviation, 20000)
-        values = values[(values > axes.low[column]) & (values < axes.high[column])]
-        edges[:, column] = interval(values) if len(values) else (mean, mean)
-        known = axes.space.to_unit(edges)[:, column]
-    edges[:, column] = low, high
-    return bool(np.ptp(axes.space.to_unit(edges)[:, column]) < FILLS * np.ptp(known))
+    box, found = (np.stack([axes.low, axes.high]) for _ in range(2))
+    found[:, column] = low, high
+    whole, told = (np.ptp(axes.space.to_unit(ends)[:, column]) for ends in (box, found))
+    return bool(told < FILLS * LEVEL * whole)
 
 
 def correlation(columns: dict[str, np.ndarray]) -> dict:

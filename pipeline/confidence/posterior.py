@@ -65,7 +65,6 @@ def fit(
     theta: np.ndarray,
     *,
     tolerances: Tolerances | None = None,
-    priors: dict[str, tuple[float, float]] | None = None,
     seed: int = 1,
     workers: int | None = None,
 ) -> Posterior:
@@ -75,7 +74,6 @@ def fit(
         cutoff: Of the low-pass that the recorded force went through [Hz].
         theta: Where to begin, shape (P,): the best that a search found.
         tolerances: Of the instruments; by default what the episode's metadata say.
-        priors: Mean and standard deviation of parameters that more is known of than their box.
         workers: Threads; they change no result.
     """
     rng = np.random.default_rng(seed)
@@ -85,7 +83,7 @@ def fit(
     times, steps = np.zeros(2), np.array([tolerances.release, tolerances.camera])
     course = []
     with ThreadPoolExecutor(workers) as pool:
-        rounds = Rounds(episode, sling, cutoff, axes, tolerances, priors or {}, pool)
+        rounds = Rounds(episode, sling, cutoff, axes, tolerances, pool)
         moved, last = np.inf, False
         while not last:
             number = len(course)

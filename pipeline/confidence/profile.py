@@ -2,7 +2,9 @@
 
 The surrogate says where the others are at their best, and what the misfit is; the simulator is run
 there and says the same, if all is well. An interval of the profile (misfit below 2.71, the 90 %
-point of chi squared) must agree with the posterior's.
+point of chi squared) must agree with the posterior's. So the misfit holds what the posterior knows
+besides the recording, the tolerances of the instruments and the prior of the drag: a curve does not
+go where only an unlikely drag leads. It leaves out the box's prior, which is no knowledge of θ.
 """
 
 from __future__ import annotations
@@ -29,8 +31,8 @@ def profiles(posterior: Posterior, *, workers: int | None = None) -> dict:
 
     Returns:
         {name: {"value": [...], "misfit": [...], "surrogate": [...], "low", "high"}}: physical
-        values, -2 log of the profile likelihood by the simulator and by the surrogate, 0 at the
-        least, and where the latter is below CUT, within the curve.
+        values, -2 log of the profile likelihood, priors but the box's included, by the simulator
+        and by the surrogate, 0 at the least, and where the latter is below CUT, within the curve.
     """
     rounds, found = posterior.rounds, posterior.last
     axes, place = rounds.axes, found.place
@@ -50,7 +52,7 @@ def profiles(posterior: Posterior, *, workers: int | None = None) -> dict:
         vectors = np.concatenate(list(pool.map(found.residuals, rollouts)))[: len(theta)]
     failed = np.concatenate([[why is not None for why in one.failure] for one in rollouts])
     z = place.standardised(np.array(even))
-    simulated = found.surrogate.least(vectors, found.weight) + rounds.known(theta)
+    simulated = found.surrogate.least(vectors, found.weight) - 2 * axes.space.log_prior(theta)
     simulated[failed[: len(theta)] | ~np.isfinite(simulated)] = np.inf
     expected = found.misfit(z)
     rough = simulated - expected  # of the simulator, on whatever scale: as far as all share it,

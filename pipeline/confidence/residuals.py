@@ -117,7 +117,9 @@ class Residuals:
     def _groups(self) -> list[Group]:
         count, points = len(self._samples), len(self.frame)
         near = reach(self.episode.sample_period, self.cutoff, 1)
-        phase, part = self._phase(self.episode.time[self._samples], near)  # the recoil is the drop
+        # the recoil is the drop, whose filtered end may outlast it: one sample is no swing
+        phase, part = self._phase(self.episode.time[self._samples], near)
+        phase, part = np.where(phase == 3, (2 + 0 * phase, 0 * part), (phase, part))
         groups = []
         for number, channel in enumerate(("force_x", "force_y", "force_z")):
             grid = np.stack([self._samples, 0 * self._samples], axis=1)

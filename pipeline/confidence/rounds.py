@@ -83,7 +83,7 @@ class Round:
     """A surrogate with its weights, and what it rests on.
 
     Attributes:
-        misfit: -2 log likelihood and priors but the box's, of standardised points (N, D).
+        misfit: -2 log of likelihood and priors, the box's left out, of standardised points (N, D).
         log_density: Of the posterior at such points; -inf outside the box and the surrogate.
         weight: Of each squared residual, shape (R,).
         groups: What the weights rest on, as `whitening.weights` says it.
@@ -123,12 +123,11 @@ class Rounds:
         cutoff: float,
         axes: Axes,
         tolerances: Tolerances,
-        priors: dict[str, tuple[float, float]],
         pool,
     ) -> None:
         """`pool` maps over batches; for the rest see `posterior.fit`."""
         self.episode, self.sling, self.cutoff, self.axes = episode, sling, cutoff, axes
-        self.tolerances, self.priors, self.pool = tolerances, priors, pool
+        self.tolerances, self.pool = tolerances, pool
         self.rollouts = 0
         self._most: np.ndarray | None = None
 
@@ -146,15 +145,6 @@ class Rounds:
 
         self.rollouts += len(theta)
         return list(self.pool.map(batch, np.split(theta, len(times)), times))
-
-    def known(self, theta: np.ndarray) -> np.ndarray:
-        """-2 log of the priors of physical parameters (N, P), the box's left out, (N,)."""
-        names = self.axes.space.names
-        gaps = [
-            (theta[:, names.index(name)] - mean) / deviation
-            for name, (mean, deviation) in self.priors.items()
-        ]
-        return sum((gap**2 for gap in gaps), np.zeros(len(theta)))
 
     def run(self, place: Place, even: np.ndarray, heat: float) -> Round:
         """Simulate coordinates (N, D), N a multiple of LANES, and fit the surrogate to them.
@@ -220,13 +210,14 @@ class Rounds:
         box = self.axes
 
         def misfit(z: np.ndarray) -> np.ndarray:
-            return surrogate.misfit(z) + self.known(box.physical(place.coordinates(z)))
+            theta = box.physical(place.coordinates(z))
+            return surrogate.misfit(z) - 2 * box.space.log_prior(theta)
 
         def log_density(z: np.ndarray) -> np.ndarray:
             theta = box.physical(place.coordinates(z))
             inside = box.inside(theta) & (np.abs(z).max(axis=1) < reach)
-            value = surrogate.misfit(z) + self.known(theta)
-            return np.where(inside, box.log_volume(theta) - value / 2, -np.inf)
+            prior = box.log_volume(theta) + box.space.log_prior(theta)
+            return np.where(inside, prior - surrogate.misfit(z) / 2, -np.inf)
 
         return misfit, log_density
 

@@ -78,8 +78,7 @@ def summary(posterior: Posterior, curves: dict) -> dict:
         low, high = interval(posterior.samples[:, column])
         entry = {"low": low, "high": high}
         if name in curves:
-            prior = posterior.rounds.priors.get(name)
-            entry["identifiable"] = identifiable(name, low, high, axes, prior)
+            entry["identifiable"] = identifiable(name, low, high, axes)
             entry["profile"] = [curves[name]["low"], curves[name]["high"]]
         else:
             entry |= {"identifiable": False, "fixed": True}

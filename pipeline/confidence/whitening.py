@@ -102,6 +102,8 @@ def weights(
 
     The recoil shows itself in so few frames and samples that its own fitted residuals say little
     of its variance: that of the held band counts for RECOIL_PRIOR independent ones beside them.
+    And no variance is below the noise of the held band: a few residuals that parameters can fit
+    exactly would else weigh ever more, from round to round, until nothing else counted.
 
     Args:
         residual: At the optimum, shape (R,).
@@ -126,7 +128,10 @@ def weights(
     for group, square in zip(groups, squares, strict=True):
         count, variance = len(group.rows), square
         drawn, noise = held.get(group.channel, (square, np.nan))
-        noise = noise if np.isfinite(noise) else np.inf  # unknown: none is seen above it
+        if np.isfinite(noise):
+            variance = max(variance, min(noise, drawn))
+        else:  # unknown: none is seen above it
+            noise = np.inf
         tau = correlated(group, residual)
         if group.phase == "recoil":
             own = 1 / worth(tau, discrepant(group, residual, variance, noise), count, 1)

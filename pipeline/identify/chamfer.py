@@ -8,6 +8,8 @@ counts for nothing.
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 
 LANES = {"cpu": 16, "cuda": 32}
@@ -25,9 +27,8 @@ class Chamfer:
         radius: float,
         rest_length: float | np.ndarray,
         symmetric: bool = True,
-        device: str = "cpu",
     ) -> None:
-        """Pack the clouds for `device`.
+        """Keep the clouds, and from their first use on a device a copy there.
 
         Args:
             clouds: Points of each frame [m], K arrays of shape (P, 3); an empty one counts as NaN.
@@ -39,14 +40,18 @@ class Chamfer:
         """
         self.camera = np.asarray(camera, float)
         self.radius, self.rest_length = float(radius), np.asarray(rest_length, np.float32)
-        self.symmetric, self.device = symmetric, device
+        self.symmetric, self.clouds = symmetric, clouds
         self.frames = len(clouds)
-        self._lanes = LANES["cuda" if device.startswith("cuda") else "cpu"]
-        self._packed = _pack(clouds, self._lanes)
-        self._on_device = None
+        self._packed, self._lock = {}, threading.Lock()
 
-    def __call__(self, center_line: np.ndarray) -> np.ndarray:
-        """Distances [m], shape (N, K), of centre lines [m] on the CPU or `device`, (N, K, L, 3)."""
+    def __call__(self, center_line: np.ndarray, device: str = "cpu") -> np.ndarray:
+        """Distances [m], shape (N, K), of centre lines [m], (N, K, L, 3), computed on `device`.
+
+        A frame's distance depends on no other frame or rollout, and so not on who shares its batch.
+
+        Args:
+            center_line: NumPy's, or Warp's on that device.
+        """
         import warp as wp
 
         from pipeline.identify.kernel import chamfer_kernel
@@ -55,21 +60,25 @@ class Chamfer:
         count, frames, nodes, _ = center_line.shape
         if frames != self.frames:
             raise ValueError(f"{frames} simulated frames, {self.frames} measured")
-        kernel = chamfer_kernel(nodes - 1, SAMPLES, self.symmetric, self._lanes)
-        if self._on_device is None:
-            self._on_device = [wp.array(array, device=self.device) for array in self._packed]
+        lanes = LANES["cuda" if device.startswith("cuda") else "cpu"]
+        kernel = chamfer_kernel(nodes - 1, SAMPLES, self.symmetric, lanes)
+        with self._lock:
+            if device not in self._packed:
+                arrays = _pack(self.clouds, lanes)
+                self._packed[device] = [wp.array(array, device=device) for array in arrays]
+            packed = self._packed[device]
         if isinstance(center_line, np.ndarray):
             center_line = np.ascontiguousarray(center_line, np.float32)
-            center_line = wp.array(center_line, device=self.device)
+            center_line = wp.array(center_line, device=device)
         line = center_line.flatten()
-        errors = wp.zeros(count * frames * 2, dtype=wp.float32, device=self.device)
+        errors = wp.zeros(count * frames * 2, dtype=wp.float32, device=device)
         rest = self.rest_length
         if rest.ndim == 0:
             rest = np.full(nodes - 1, rest / (nodes - 1), np.float32)
-        rest = wp.array(rest, device=self.device)
+        rest = wp.array(rest, device=device)
         camera = wp.vec3(*self.camera)
-        inputs = [line, *self._on_device, frames, self.radius, rest, camera, errors]
-        launch(kernel, count * frames, inputs, self.device)
+        inputs = [line, *packed, frames, self.radius, rest, camera, errors]
+        launch(kernel, count * frames, inputs, device)
         both = errors.numpy().reshape(count, frames, 2).astype(float)
         return both.mean(axis=2) if self.symmetric else both[:, :, 0]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -41,7 +42,11 @@ class Evaluation:
 
 
 class Evaluator:
-    """Evaluates points of the unit cube against one episode; results ignore the worker count."""
+    """Evaluates points of the unit cube against one episode.
+
+    Results ignore the number of workers, and of GPUs of one kind: a rollout knows none of the
+    others in its batch.
+    """
 
     def __init__(
         self,
@@ -50,13 +55,14 @@ class Evaluator:
         loss: EpisodeLoss,
         space: Space,
         *,
-        device: str = "cpu",
+        devices: Sequence[str] = ("cpu",),
         workers: int | None = None,
         simulate=simulated,
     ) -> None:
         """Keep what every batch needs.
 
         Args:
+            devices: Of one kind; they share each batch evenly, in their order.
             workers: Threads on the CPU (the kernels release the interpreter); None: all cores.
             simulate: Called as `simulate(sling, episode=, thetas=, device=)`.
         """
@@ -65,18 +71,24 @@ class Evaluator:
         if more > 1:
             episode = replace(episode, cloud_time=loss.stamps)
         self._sling = sling
-        self._simulate = partial(simulate, episode=episode, device=device)
-        on_gpu = device.startswith("cuda")
+        self._simulate = partial(simulate, episode=episode)
+        on_gpu = devices[0].startswith("cuda")
         self._slice = int(SLICE["cuda"] / more) if on_gpu else SLICE["cpu"]
-        self._pool = ThreadPoolExecutor(1 if on_gpu else workers or os.cpu_count())
+        threads = 1 if on_gpu else workers or os.cpu_count()
+        self._devices = devices
+        self._pools = [ThreadPoolExecutor(threads) for _ in devices]
 
     def __call__(self, unit: np.ndarray) -> Evaluation:
         """Evaluate points of the unit cube, shape (N, D)."""
         start = time.perf_counter()
         unit = np.array(unit, float)
         theta = self.space.to_physical(unit)
-        slices = [theta[i : i + self._slice] for i in range(0, len(theta), self._slice)]
-        parts = list(self._pool.map(self._evaluate, slices))
+        shares = np.array_split(theta, len(self._devices))
+        begun = [  # on all of them, before any result is waited for
+            pool.map(partial(self._evaluate, device), self._slices(share))
+            for device, pool, share in zip(self._devices, self._pools, shares, strict=True)
+        ]
+        parts = [part for each in begun for part in each]
         terms = {name: np.concatenate([part[0][name] for part in parts]) for name in TERMS}
         failure = [reason for part in parts for reason in part[1]]
         failed = np.array([reason is not None for reason in failure])
@@ -89,17 +101,29 @@ class Evaluator:
             seconds=time.perf_counter() - start,
         )
 
-    def rollouts(self, theta: np.ndarray) -> tuple[Rollouts, dict[str, np.ndarray]]:
-        """Simulate physical points (N, D); the rollouts and their nuisances, as the loss asks."""
+    def rollouts(
+        self, theta: np.ndarray, device: str | None = None
+    ) -> tuple[Rollouts, dict[str, np.ndarray]]:
+        """Simulate physical points (N, D); the rollouts and their nuisances, as the loss asks.
+
+        Args:
+            device: The one that simulates them all; None: the first.
+        """
         first = self.space.dimension - len(self.space.nuisances)
         nuisances = dict(zip(self.space.nuisances, theta[:, first:].T, strict=True))
         sling = self._sling
         if "air_drag" in nuisances:
             sling = replace(sling, air_drag=nuisances["air_drag"])
-        return self._simulate(sling, thetas=theta[:, :first]), nuisances
+        device = device or self._devices[0]
+        return self._simulate(sling, thetas=theta[:, :first], device=device), nuisances
 
-    def _evaluate(self, theta: np.ndarray) -> tuple[dict[str, np.ndarray], list[str | None]]:
-        rollouts, nuisances = self.rollouts(theta)
+    def _slices(self, theta: np.ndarray) -> Iterator[np.ndarray]:
+        return (theta[i : i + self._slice] for i in range(0, len(theta), self._slice))
+
+    def _evaluate(
+        self, device: str, theta: np.ndarray
+    ) -> tuple[dict[str, np.ndarray], list[str | None]]:
+        rollouts, nuisances = self.rollouts(theta, device)
         with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
             terms = self.loss.terms(rollouts, nuisances)
             finite = np.isfinite(self.loss.total(terms))

@@ -56,7 +56,6 @@ class EpisodeLoss:
         frame_cap: float | None = None,
         nuisances: dict[str, tuple[float, float]] | None = None,
         held_out: np.ndarray | None = None,
-        device: str = "cpu",
     ) -> None:
         """Prepare the recorded side.
 
@@ -70,7 +69,6 @@ class EpisodeLoss:
             nuisances: Bounds of those that rollouts will come with.
             held_out: Begin and end [s] of blocks that are not fitted, shape (B, 2). Samples and
                 frames nearer to them than the force's filters reach count nowhere.
-            device: Where the Chamfer distances are computed.
 
         Raises:
             UserError: No cloud has points, or `taut` has weight and no frame is in the recoil.
@@ -88,7 +86,6 @@ class EpisodeLoss:
             radius=radius,
             rest_length=rest_length,
             symmetric=symmetric,
-            device=device,
         )
         bounds = nuisances or {}
         self._force_delay = Delay(bounds.get("force_delay"))
@@ -115,9 +112,7 @@ class EpisodeLoss:
         self._lock = threading.Lock()
 
     @classmethod
-    def of(
-        cls, params, method: str, episode: Episode, sling, *, device: str = "cpu"
-    ) -> EpisodeLoss:
+    def of(cls, params, method: str, episode: Episode, sling) -> EpisodeLoss:
         """Make it from params.yaml's `loss`, `force` and `methods.<method>`."""
         cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
         held = params.loss.held_out
@@ -132,7 +127,6 @@ class EpisodeLoss:
             symmetric=params.loss.chamfer == "symmetric",
             nuisances=params.methods[method].nuisances,
             held_out=held_out_blocks(episode, held.blocks, held.length, guard),
-            device=device,
         )
 
     @classmethod
@@ -151,7 +145,8 @@ class EpisodeLoss:
     def terms(self, rollouts, nuisances: Nuisances = None) -> dict[str, np.ndarray]:
         """Each term of N rollouts, shape (N,); NaN or infinite where a rollout is.
 
-        `taut` is NaN where the episode has no frame in the recoil.
+        `taut` is NaN where the episode has no frame in the recoil. Clouds are compared on the
+        device that holds the rollouts. A rollout's terms are the same to the bit in any batch.
 
         Args:
             nuisances: Values of each that there is, shape (N,).
@@ -222,6 +217,7 @@ class EpisodeLoss:
         """Chamfer distance of each camera frame [m], shape (N, K); NaN where it shows nothing."""
         nuisances = nuisances or {}
         line = rollouts.center_line
+        device = "cpu" if isinstance(line, np.ndarray) else str(line.device)
         delay, shift = nuisances.get("camera_delay"), along_axes(nuisances, "cloud_shift")
         if delay is not None or shift is not None:
             line = line if isinstance(line, np.ndarray) else line.numpy()
@@ -229,7 +225,7 @@ class EpisodeLoss:
             line = self._delayed(line, delay)
         if shift is not None:
             line = line + shift[:, None, None].astype(line.dtype)
-        return np.minimum(self.chamfer(line), self.frame_cap)
+        return np.minimum(self.chamfer(line, device), self.frame_cap)
 
     def smooth(self, signal: np.ndarray) -> np.ndarray:
         """Median filter along the samples of (..., T, 3)."""
@@ -246,7 +242,10 @@ class EpisodeLoss:
 
     def _centimetres(self, frames: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         nothing = np.full(len(frames), np.nan)
-        return 100 * frames[:, chosen].mean(axis=1) if chosen.any() else nothing
+        if not chosen.any():
+            return nothing
+        # not frames[:, chosen]: its order in memory, and so the sum's, would hang on N
+        return 100 * frames.compress(chosen, axis=1).mean(axis=1)
 
     def _filters(self, times: np.ndarray) -> list[csr_array]:
         """Matrices (T, S) from forces at simulated times (S,) to the episode's filtered samples.

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
+
+import numpy as np
 
 from pipeline.episode import Episode
 from pipeline.errors import UserError
 from pipeline.fingerprint import fingerprint
-from pipeline.identify.evaluate import Evaluator
+from pipeline.identify.evaluate import Evaluation, Evaluator
 from pipeline.identify.loss import EpisodeLoss
 from pipeline.identify.memo import Memo
-from pipeline.identify.progress import Progress
 from pipeline.identify.space import Space
-from pipeline.machine import device, workers
+from pipeline.machine import devices, kind, workers
+from pipeline.progress import Progress
 from pipeline.sling.model import load_sling, mounting_path
 from pipeline.stage import expect_episode
 
@@ -25,7 +28,29 @@ SOURCES = (  # the code that a term of the loss hangs on
 )
 
 
-def service(stage: str, band: str, method: str, params, rollouts: int) -> Progress:
+class Told:
+    """An evaluator that tells of each batch: its number as in the history, and the best so far."""
+
+    def __init__(self, evaluate: Callable[[np.ndarray], Evaluation], progress: Progress) -> None:
+        self.evaluate, self.progress = evaluate, progress
+        self._generation, self._best = 0, np.inf
+
+    def __call__(self, unit: np.ndarray) -> Evaluation:
+        evaluation = self.evaluate(unit)
+        count, failed = len(evaluation.total), int(np.isinf(evaluation.total).sum())
+        self._best = min(self._best, evaluation.total.min())
+        self.progress.advance(
+            count,
+            f"generation {self._generation}",
+            f"best {self._best:.5g}",
+            f"failed {failed}/{count}",
+            seconds=evaluation.seconds,
+        )
+        self._generation += 1
+        return evaluation
+
+
+def service(stage: str, band: str, method: str, params, rollouts: int) -> Told:
     """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
     evaluate = evaluator(params, band, method)
     sections = (params.bands[band], params.setup, params.sling, params.force, params.loss)
@@ -38,15 +63,14 @@ def service(stage: str, band: str, method: str, params, rollouts: int) -> Progre
             mounting_path(band),
             *(section.model_dump_json() for section in sections),
             *(f"{package} {version(package)}" for package in ("warp-lang", "numpy", "scipy")),
-            device(),
+            kind(),  # of the devices, not how many: that changes nothing
         ),
     )
-    name = f"{stage}-{band}-{method}"
-    return Progress(memo, name, rollouts, Path("logs", f"{name}.log"))
+    return Told(memo, Progress(f"{stage}-{band}-{method}", rollouts, "rollouts"))
 
 
 def evaluator(params, band: str, method: str) -> Evaluator:
-    """The evaluator of a recorded band, on the device that the environment names."""
+    """The evaluator of a recorded band, on the devices that the environment names."""
     for section, key in (("bands", band), ("methods", method)):
         if key not in getattr(params, section):
             raise UserError(f"params.yaml has no {section}.{key}")
@@ -55,9 +79,9 @@ def evaluator(params, band: str, method: str) -> Evaluator:
     return Evaluator(
         episode,
         sling,
-        EpisodeLoss.of(params, method, episode, sling, device=device()),
+        EpisodeLoss.of(params, method, episode, sling),
         Space.of_method(params, method),
-        device=device(),
+        devices=devices(),
         workers=workers(),
     )
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.params.identification import NUISANCES
+from pipeline.params.identification import NUISANCES, Prior
 from pipeline.sling.model import THETA
 
 
@@ -18,14 +18,14 @@ class Space:
         names: Of the axes, length D.
         low, high: Physical bounds, shape (D,).
         log: Which axes are logarithmic, shape (D,).
-        costs: What a unit of an axis adds to the loss, by name.
+        priors: What is known of axes besides their bounds, by name.
     """
 
     names: tuple[str, ...]
     low: np.ndarray
     high: np.ndarray
     log: np.ndarray
-    costs: dict[str, float] = field(default_factory=dict)
+    priors: dict[str, Prior] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -33,12 +33,12 @@ class Space:
         parameters,
         nuisances: dict[str, tuple[float, float]] | None = None,
         bounds: dict[str, tuple[float, float]] | None = None,
-        costs: dict[str, float] | None = None,
+        priors: dict[str, Prior] | None = None,
     ) -> Space:
         """Make it from params.yaml's `parameters`, in the simulator's order.
 
         Of a method's `nuisances`, bounds by name, each adds a linear axis, in NUISANCES' order. Its
-        `bounds` take the place of a parameter's own.
+        `bounds` take the place of a parameter's own. `priors` of other nuisances are left out.
         """
         boxes = [getattr(parameters, name) for name in THETA]
         bounds = bounds or {}
@@ -51,14 +51,14 @@ class Space:
             low=np.array([low for low, _ in (*known, *others.values())], float),
             high=np.array([high for _, high in (*known, *others.values())], float),
             log=np.array([*(box.scale == "log" for box in boxes), *(False for _ in others)]),
-            costs=costs or {},
+            priors={name: known for name, known in (priors or {}).items() if name in others},
         )
 
     @classmethod
     def of_method(cls, params, method: str) -> Space:
         """The box that a method of params.yaml searches: within its bounds, with its nuisances."""
         about = params.methods[method]
-        return cls.of(params.parameters, about.nuisances, about.bounds, about.costs)
+        return cls.of(params.parameters, about.nuisances, about.bounds, about.priors)
 
     @property
     def dimension(self) -> int:
@@ -70,10 +70,18 @@ class Space:
         return tuple(name for name in self.names if name in NUISANCES)
 
     def cost(self, theta: np.ndarray) -> np.ndarray:
-        """What physical values, shape (N, D), add to the loss by their size, shape (N,)."""
-        sizes = np.abs(theta)
-        each = (cost * sizes[:, self.names.index(name)] for name, cost in self.costs.items())
-        return sum(each, np.zeros(len(sizes)))
+        """What the priors add to the loss of physical values, shape (N, D), shape (N,)."""
+        sizes = self._sizes(theta).items()
+        return sum((self.priors[name].weight * size for name, size in sizes), np.zeros(len(theta)))
+
+    def log_prior(self, theta: np.ndarray) -> np.ndarray:
+        """Log density of the priors at physical values, shape (N, D), up to a constant, (N,)."""
+        return -sum(self._sizes(theta).values(), np.zeros(len(theta)))
+
+    def _sizes(self, theta: np.ndarray) -> dict[str, np.ndarray]:
+        """Sizes of the axes that have a prior, in units of its mean, by name, (N,) each."""
+        columns = {name: np.abs(theta[:, self.names.index(name)]) for name in self.priors}
+        return {name: column / self.priors[name].mean for name, column in columns.items()}
 
     def to_physical(self, unit: np.ndarray) -> np.ndarray:
         """Physical values, shape (..., D), of points in the unit cube, shape (..., D)."""

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,6 +12,7 @@ import numpy as np
 from pipeline.oracle.aim import hit
 from pipeline.params import load
 from pipeline.policy.landing_map import LandingMap
+from pipeline.pool import Pool
 from pipeline.rig.launch import Trial, launch
 
 
@@ -26,9 +25,7 @@ class World:
     def __init__(self, band: str, path: str | Path = "params.yaml", workers: int | None = None):
         """Launch `band` of the params.yaml at `path`."""
         self.band = band
-        self._pool = ProcessPoolExecutor(
-            workers, get_context("spawn"), initializer=_begin, initargs=(band, Path(path).resolve())
-        )
+        self._pool = Pool(_begin, band, Path(path).resolve(), workers=workers)
 
     def __enter__(self) -> World:
         return self

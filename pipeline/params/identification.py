@@ -156,9 +156,15 @@ def _reaches(bounds: dict[str, tuple[float, float]]) -> dict[str, tuple[float, f
 
 
 Value = Annotated[float, Range(-1e9, 1e9)]
-Cost = Annotated[float, Range(0, 1e6)]
 Setting = Annotated[object, AfterValidator(_is_setting)]
 Bounds = Annotated[tuple[Value, Value], LIST]
+
+
+class Prior(Section):
+    """What is known before of a nuisance: it lies about 0, its size by an exponential law."""
+
+    mean: Annotated[float, Range(1e-6, 1e6)]  # of the size, in the nuisance's unit
+    weight: Weight  # of size / mean in the loss, which is no likelihood; the posterior needs none
 
 
 class Method(Section):
@@ -170,7 +176,7 @@ class Method(Section):
     fixed: dict[str, Value] = {}  # axes that are not searched
     bounds: dict[str, Bounds] = {}  # narrower ones than the box: what is known before
     nuisances: Annotated[dict[str, Bounds], AfterValidator(_reaches)] = {}  # searched besides
-    costs: dict[str, Cost] = {}  # of a nuisance, in the loss, for each unit of its size
+    priors: dict[str, Prior] = {}  # of its nuisances
     k_top: KTop | None = None  # None: optimizer.k_top
     covariance: bool = True  # else isotropic starts of the same determinant
 
@@ -186,12 +192,12 @@ class Method(Section):
         return self
 
     @model_validator(mode="after")
-    def _costs_are_of_nuisances(self) -> Method:
-        for name in self.costs:
+    def _priors_are_of_nuisances(self) -> Method:
+        for name in self.priors:
             if name not in self.nuisances:
-                raise refusal(f"costs: {name} is not one of the method's nuisances")
+                raise refusal(f"priors: {name} is not one of the method's nuisances")
             if name == "force_gain":
-                raise refusal("costs: force_gain is 1 where it adds nothing, so it can have none")
+                raise refusal("priors: force_gain is about 1 and a prior about 0, so it has none")
         return self
 
     @model_validator(mode="after")

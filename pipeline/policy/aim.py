@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.errors import UserError
-from pipeline.machine import workers
+from pipeline.machine import cores
 from pipeline.params import expect_known
 from pipeline.policy.spread import landing_intervals, law_discrepancy, load_samples
+from pipeline.stage import expect_from, remedy
 from pipeline.theta import calibrated, in_air, load_theta, vector
 
 ROBUST = "robust"  # folder of a method's second policy
 
 
-def policy_draws(folder: Path, targets: np.ndarray) -> np.ndarray:
+def policy_draws(run, folder: Path, targets: np.ndarray) -> np.ndarray:
     """Draws (y, z) [m], shape (N, 2), of the exported policy in `folder` for targets [m], (N,).
 
     Args:
+        run: params.yaml's `run`, which says what stage trains the policy.
         folder: data/policies/<band>/<method>, or its folder ROBUST.
 
     Raises:
@@ -34,9 +37,8 @@ def policy_draws(folder: Path, targets: np.ndarray) -> np.ndarray:
             f" where policy.robust.methods in params.yaml names {method} and its θ file tells its"
             " confidence"
         )
-        raise UserError(
-            f"{path}: no such file; `dvc repro policy@{band}-{method}` trains it{where * robust}"
-        )
+        trains = remedy(run, "policy", band, method)
+        raise UserError(f"{path}: no such file; {trains}{where * robust}")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.log_severity_level = 4  # what is wrong is said below
@@ -47,9 +49,8 @@ def policy_draws(folder: Path, targets: np.ndarray) -> np.ndarray:
         )
         return session.run(["draw"], {"target": targets})[0].astype(float)
     except Exception as error:  # onnxruntime has an error of its own for each kind of damage
-        raise UserError(
-            f"{path}: damaged; `dvc repro --force policy@{band}-{method}` makes it anew"
-        ) from error
+        trains = remedy(run, "policy", band, method, damaged=True)
+        raise UserError(f"{path}: damaged; {trains}") from error
 
 
 def aim(
@@ -82,9 +83,10 @@ def aim(
     expect_known(params, "band", band)
     expect_known(params, "method", method)
     root = Path(root)
-    content = load_theta(root / "data" / "theta" / band / f"{method}.json", band)
+    source = root / "data" / "theta" / band / f"{method}.json"
+    content = load_theta(expect_from(params.run, "theta", band, method, source), band)
     folder = root / "data" / "policies" / band / method
-    draw = policy_draws(folder / ROBUST if robust else folder, np.array([target]))[0]
+    draw = policy_draws(params.run, folder / ROBUST if robust else folder, np.array([target]))[0]
     launcher = launcher or simulator(params, band, content, root=root)
     launched = launcher(draw[None])
     warnings = []
@@ -98,7 +100,9 @@ def aim(
         landing = float(launched.landing_y[0])
         if abs(landing - target) > 0.05:
             warnings.append(f"the simulated landing is {landing - target:+.2f} m off the target")
-        samples = load_samples(root / "data" / "confidence" / band / f"{method}.json", band, method)
+        samples = load_samples(
+            params.run, root / "data" / "confidence" / band / f"{method}.json", band, method
+        )
         if samples is None:
             warnings.append("the interval leaves out how well the parameters are known")
         error, discrepancy = params.trials.actuation_error, law_discrepancy(content)
@@ -130,19 +134,17 @@ def simulator(
     content: dict,
     max_force: float = np.inf,
     root: str | Path = ".",
-    device: str = "cpu",
+    device: str | Sequence[str] = "cpu",
 ):
     """Function that launches draws, shape (N, 2) [m], in the simulator calibrated by a θ file.
 
     A second argument gives each launch a θ of its own, shape (N, 5), or with a sixth column a drag
     of the air as well.
     """
-    import os
-
     from pipeline.sling.launch import launch
 
     sling, best = calibrated(params, band, content, root), vector(content)[None]
-    threads = workers() or os.cpu_count() or 1
+    threads = cores()
 
     def launcher(draws: np.ndarray, thetas: np.ndarray | None = None):
         moving, thetas = in_air(sling, best if thetas is None else thetas)

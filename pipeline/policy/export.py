@@ -132,7 +132,7 @@ def card(
             null.
         landing_map: How well the interpolated launches go with simulated ones
             (`LandingMap.validation`).
-        device: Where it was trained, "cpu" or "cuda:0".
+        device: Where it was trained, "cpu" or "cuda".
 
     Raises:
         ValueError: A figure of the training is missing, or one too many.

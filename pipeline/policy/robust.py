@@ -17,14 +17,17 @@ import torch
 from pipeline.policy.environment import rewarded
 from pipeline.policy.landing_map import LandingMap, Launcher
 from pipeline.policy.landscape import Landscape
-from pipeline.policy.train import CHECKED_TARGETS, Policy, Trained, earned, one_thread
+from pipeline.policy.train import CHECKED_TARGETS, Policy, Trained, earned, one_thread, told
+from pipeline.progress import Progress
 
 STEPS = 1000  # of the refinement
 STEP = 2e-4  # m, of the differences along the draw: small against the grid
 STEEPEST = 3.0  # medians: no target's gradient counts more
 
 
-def refine(plain: Policy, landscape: Landscape, params) -> Trained:
+def refine(
+    plain: Policy, landscape: Landscape, params, progress: Progress | None = None
+) -> Trained:
     """Ascend the mean expected reward over the checked targets from a policy that hits.
 
     Adam, its rate a half sine of height `params.learning_rate`. The gradient along the draw is the
@@ -32,6 +35,7 @@ def refine(plain: Policy, landscape: Landscape, params) -> Trained:
 
     Args:
         params: The `policy:` section of params.yaml.
+        progress: Is told of each of `STEPS` steps.
     """
     policy = copy.deepcopy(plain).train()
     targets = np.linspace(*params.targets, CHECKED_TARGETS)
@@ -51,6 +55,8 @@ def refine(plain: Policy, landscape: Landscape, params) -> Trained:
             optimizer.zero_grad()
             (-(torch.from_numpy(slope(at)).float() * draws).sum(1).mean()).backward()
             optimizer.step()
+            if progress:
+                progress.advance(1, told(rows[step][2]))
     policy.load_state_dict(weights)
     names = ("iteration", "mean_reward", "mean_error", "failed_targets", "learning_rate")
     curve = dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))

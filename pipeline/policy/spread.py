@@ -11,6 +11,7 @@ from scipy.special import ndtri
 
 from pipeline.errors import UserError
 from pipeline.sling.model import THETA
+from pipeline.stage import remedy
 
 LEVEL = 0.9
 MOST = 60  # samples of θ that are launched
@@ -19,10 +20,11 @@ CROSS = STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
 ERRORS = ndtri((np.arange(401) + 0.5) / 401)  # equally likely; 41 end 6 % too soon
 
 
-def load_samples(path: Path, band: str, method: str) -> np.ndarray | None:
+def load_samples(run, path: Path, band: str, method: str) -> np.ndarray | None:
     """Samples of θ, and of the air's drag if searched, (M, 5) or (M, 6); None where there are none.
 
-    Raises UserError where the file is damaged.
+    `run` is params.yaml's, which says what stage makes them. Raises UserError where the file is
+    damaged.
     """
     if not path.is_file():
         return None
@@ -33,9 +35,8 @@ def load_samples(path: Path, band: str, method: str) -> np.ndarray | None:
         if not known or samples.ndim != 2 or samples.shape[1] != len(content["names"]):
             raise ValueError
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise UserError(
-            f"{path}: damaged; `dvc repro --force theta@{band}-{method}` makes it anew"
-        ) from error
+        makes = remedy(run, "theta", band, method, damaged=True)
+        raise UserError(f"{path}: damaged; {makes}") from error
     return samples
 
 

@@ -24,6 +24,7 @@ from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.environment import SlingshotEnv, draw_box, rewarded
 from pipeline.policy.expected import distance
 from pipeline.policy.landscape import Landscape
+from pipeline.progress import Progress
 
 CHECKED_TARGETS = 256
 KEPT_EVERY = 5  # iterations; a checkpoint takes some 10 ms
@@ -80,11 +81,14 @@ class Trained:
     failures: dict[str, int]
 
 
-def train(landscape: Landscape, params, kept: Path | None = None) -> Trained:
+def train(
+    landscape: Landscape, params, kept: Path | None = None, progress: Progress | None = None
+) -> Trained:
     """Train with the settings of `params` (the `policy:` section of params.yaml).
 
     Args:
         kept: File of the checkpoint, which the caller removes once it has written what it wants.
+        progress: Is told of each iteration.
 
     Runs on one thread with seeded generators: the same input gives the same network, bit for bit,
     on one machine, also where a training was killed and goes on from its checkpoint.
@@ -103,7 +107,7 @@ def train(landscape: Landscape, params, kept: Path | None = None) -> Trained:
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
             runner = OnPolicyRunner(env, _runner_config(params), log_dir=None, device="cpu")
         checkpoint = kept and Checkpoint(kept, _stamp(landscape, params))
-        training = _Training(runner, env, params, checkpoint)
+        training = _Training(runner, env, params, checkpoint, progress)
         runner.logger = training
         training.resume()
         # Once: a second call would start from stale observations.
@@ -133,6 +137,11 @@ def earned(
     return float(rewards.mean()), mean, float(failed.mean(1).sum())
 
 
+def told(error: float) -> str:
+    """A mean error [m], NaN where every launch fails, as progress tells of it."""
+    return "every launch fails" if np.isnan(error) else f"mean error {100 * error:.2f} cm"
+
+
 def _stamp(landscape: Landscape, params) -> str:
     """Of everything that a training hangs on."""
     versions = (f"{name} {version(name)}" for name in PACKAGES)
@@ -151,8 +160,15 @@ class _Training:
     writer = None
     log_dir = None
 
-    def __init__(self, runner, env: SlingshotEnv, params, checkpoint: Checkpoint | None):
-        self.runner, self.env, self.checkpoint = runner, env, checkpoint
+    def __init__(
+        self,
+        runner,
+        env: SlingshotEnv,
+        params,
+        checkpoint: Checkpoint | None,
+        progress: Progress | None,
+    ):
+        self.runner, self.env, self.checkpoint, self.progress = runner, env, checkpoint, progress
         spread = np.log([params.init_std, params.final_std])
         schedule = np.linspace(*spread, params.iterations)
         self.log_std = np.append(schedule, schedule[-1])  # of each iteration, and after the last
@@ -195,6 +211,8 @@ class _Training:
             self.best = {"earned": worth, "row": it, "weights": weights}
         if self.checkpoint and len(self.rows) % KEPT_EVERY == 0:
             self.checkpoint.save(self._state())
+        if self.progress:
+            self.progress.advance(1, told(error))
 
     def _check(self) -> tuple[float, float, float]:
         draws = self.policy.draws(self.checked)
@@ -220,6 +238,8 @@ class _Training:
         torch.set_rng_state(state["random"])
         self.env.restore(state["environment"])
         self.rows, self.reasons, self.best = (state[key] for key in ("rows", "reasons", "best"))
+        if self.progress:
+            self.progress.done = len(self.rows)
 
     def result(self) -> Trained:
         self.policy.load_state_dict(self.best["weights"])

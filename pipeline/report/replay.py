@@ -10,6 +10,7 @@ from pipeline.episode import Episode
 from pipeline.errors import UserError
 from pipeline.identify.loss import EpisodeLoss
 from pipeline.identify.nuisance import along_axes
+from pipeline.stage import remedy
 from pipeline.theta import calibrated, vector
 
 LOAD = 1.5  # kg: the paper's dumbbell
@@ -56,7 +57,8 @@ def replay(params, band: str, method: str, episode: Episode, theta: dict) -> Rep
     late = replace(episode, cloud_time=episode.cloud_time - delay)
     rollouts = interact(sling, late, vector(theta)[None])
     if rollouts.failure[0]:
-        raise UserError(f"theta of {band}: {rollouts.failure[0]}; `dvc repro theta` makes it anew")
+        again = remedy(params.run, "theta", band, method, damaged=True)
+        raise UserError(f"theta of {band}: {rollouts.failure[0]}; {again}")
     if shift is not None:
         rollouts = replace(rollouts, center_line=rollouts.center_line + shift[:, None, None])
     nuisances = {name: one for name, one in nuisances.items() if name not in SEEN_BY_CAMERA}

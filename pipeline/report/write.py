@@ -7,18 +7,18 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.files import write_json, write_text
-from pipeline.policy.aim import ROBUST, policy_draws
 from pipeline.report.chapters.appendix import budget, policies
 from pipeline.report.chapters.band import band_chapter, compared
 from pipeline.report.chapters.identification import identification
 from pipeline.report.chapters.pictures import pictures
 from pipeline.report.chapters.summary import summary
 from pipeline.report.figures import confidence, episode, launches, loaded, policy, search
-from pipeline.report.looks import SIDE_BY_SIDE, Look, drawn, looks
+from pipeline.report.looks import SIDE_BY_SIDE, drawn, looks
 from pipeline.report.losses import has_another_loss
 from pipeline.report.metrics import metrics
 from pipeline.report.page import write_page
 from pipeline.report.replay import Replay, replay
+from pipeline.report.report import Report
 from pipeline.report.results import Result, Results, gather
 from pipeline.report.tables.paper_tables import write_tables
 
@@ -26,26 +26,26 @@ from pipeline.report.tables.paper_tables import write_tables
 def write(params, root: str | Path = ".") -> None:
     """Write the report of everything in params.run. Raises UserError where an input is missing."""
     root = Path(root)
-    folder = root / "reports"
     results = gather(params, root)
     named = looks(dict.fromkeys(result.method for result in results))
     replays = {band: _replays(params, results, band) for band in params.run.bands}
-    common_figures(params, results, replays, named, folder / "figures")
+    report = Report(params, results, replays, named, root)
+    common_figures(report)
     parts = [
         summary(results, named),
-        write_tables(params, results, named, results.floors, folder / "tables"),
-        pictures(params, results, replays),
+        write_tables(params, results, named, results.floors, report.folder / "tables"),
+        pictures(report),
     ]
     for band in params.run.bands:
-        parts.append(band_chapter(params, results, band, replays[band], named, root))
-        draw_figures(params, results, band, replays[band], named, root)
+        parts.append(band_chapter(report, band))
+        draw_figures(report, band)
     parts += [identification(params, results, named), policies(params, results, named)]
     parts.append(budget(params))
     markdown = "\n".join(parts)
     for name, content in metrics(results).items():
-        write_json(folder / "metrics" / f"{name}.json", content)
-    write_text(folder / "README.md", markdown)
-    write_page(params, results, replays, named, markdown, folder)
+        write_json(report.folder / "metrics" / f"{name}.json", content)
+    write_text(report.folder / "README.md", markdown)
+    write_page(report, markdown)
 
 
 def _replays(params, results: Results, band: str) -> dict[str, Replay]:
@@ -59,21 +59,13 @@ def _replays(params, results: Results, band: str) -> dict[str, Replay]:
     }
 
 
-def common_figures(
-    params,
-    results: Results,
-    replays: dict[str, dict[str, Replay]],
-    named: dict[str, Look],
-    folder: Path,
-) -> None:
+def common_figures(report: Report) -> None:
     """Pictures that show all bands beside each other."""
-    methods = drawn(params.run.methods, SIDE_BY_SIDE)
-    launches.trajectories(
-        folder / "trajectories.png", results, methods, named, params.setup.fork_height
-    )
+    results, named, setup = report.results, report.looks, report.params.setup
+    folder, methods = report.folder / "figures", drawn(report.params.run.methods, SIDE_BY_SIDE)
+    launches.trajectories(folder / "trajectories.png", results, methods, named, setup.fork_height)
     launches.scatter(folder / "scatter.png", results, methods, named)
-    shown = {band: {m: of_band[m] for m in methods} for band, of_band in replays.items()}
-    setup = params.setup
+    shown = {band: {m: of_band[m] for m in methods} for band, of_band in report.replays.items()}
     loaded.loaded(
         folder / "loaded.png",
         results.episodes,
@@ -84,22 +76,16 @@ def common_figures(
     )
 
 
-def draw_figures(
-    params,
-    results: Results,
-    band: str,
-    replays: dict[str, Replay],
-    named: dict[str, Look],
-    root: Path,
-) -> None:
+def draw_figures(report: Report, band: str) -> None:
     """Every picture of a band, as reports/figures/<band>-....png."""
+    params, results, named = report.params, report.results, report.looks
     recorded, methods, about = results.episodes[band], results.methods[band], params.bands[band]
     near = drawn(methods)
 
     def path(name: str) -> Path:
-        return root / "reports" / "figures" / f"{band}-{name}.png"
+        return report.folder / "figures" / f"{band}-{name}.png"
 
-    shown = {method: replays[method] for method in near}
+    shown = {method: report.replays[band][method] for method in near}
     frames = episode.moments(recorded)
     episode.force(path("force"), recorded, shown, named)
     episode.work(path("work"), recorded, shown, named)
@@ -122,7 +108,7 @@ def draw_figures(
         policy.landing_map(
             path(f"{method}-map"),
             result,
-            _draws(root / "data" / "policies" / band / method, targets, result),
+            _draws(report, result, targets),
             np.array(params.trials.targets),
             float(result.trials.recorded_stretch.max()),
             params.setup.fork_width,
@@ -130,9 +116,11 @@ def draw_figures(
         )
 
 
-def _draws(folder: Path, targets: np.ndarray, result: Result) -> dict[str, np.ndarray]:
+def _draws(report: Report, result: Result, targets: np.ndarray) -> dict[str, np.ndarray]:
     """Draws (N, 2) for targets (N,) of a method's policy, and of its robust one where there is."""
-    draws = {"the policy's": policy_draws(folder, targets)}
+    draws = {"the policy's": report.draws(result.band, result.method, targets)}
     if result.robust_card:
-        draws["the robust policy's"] = policy_draws(folder / ROBUST, targets)
+        draws["the robust policy's"] = report.draws(
+            result.band, result.method, targets, robust=True
+        )
     return draws

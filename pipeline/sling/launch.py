@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +25,8 @@ from pipeline.sling.solver import (
     run,
     steps,
 )
+
+SHARE = 1024  # launches: a device more for fewer would only cost its start
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ def launch(
     draws: np.ndarray,
     *,
     max_force: float = np.inf,
-    device: str = "cpu",
+    device: str | Sequence[str] = "cpu",
     workers: int = 1,
     refine: int = 1,
     double: bool = False,
@@ -81,6 +85,8 @@ def launch(
 
     Args:
         max_force: A draw that takes more is a failed launch [N].
+        device: Or several of one kind, which share a large batch evenly.
+        workers: Threads, on the CPU; results depend on them as little as on the devices' number.
         refine: How many times finer the steps are than `sling.launch_step`.
     """
     thetas, draws = np.atleast_2d(thetas).astype(float), np.atleast_2d(draws).astype(float)
@@ -91,21 +97,22 @@ def launch(
     distance = np.linalg.norm(draws, axis=1, keepdims=True)
     lane_state[:, DIRECTION][:, 1:] = -draws / np.maximum(distance, 1e-9)
     lane_state[:, PAYLOAD] = sling.projectile_mass
-    result = run(
-        sling,
-        schedule_of(sling, refine),
-        material(sling, thetas),
-        drawn_guess(sling, draws),
-        lane_state,
-        launching=True,
-        device=device,
-        workers=workers,
-        double=double,
-    )
-    hold_force = np.linalg.norm(result.lane_state[:, HELD_FORCE].astype(float), axis=1)
-    code = np.round(result.lane_state[:, FAILURE])
+    schedule = schedule_of(sling, refine)
+    begin = material(sling, thetas), drawn_guess(sling, draws), lane_state
+
+    def launched(place: str, share: np.ndarray) -> np.ndarray:
+        rows = (values[share] for values in begin)
+        options = {"launching": True, "device": place, "workers": workers, "double": double}
+        return run(sling, schedule, *rows, **options).lane_state
+
+    devices = [device] if isinstance(device, str) else device[: max(count // SHARE, 1)]
+    shares = np.array_split(np.arange(count), len(devices))
+    with ThreadPoolExecutor(len(devices)) as pool:
+        lane_state = np.concatenate(list(pool.map(launched, devices, shares)))
+    hold_force = np.linalg.norm(lane_state[:, HELD_FORCE].astype(float), axis=1)
+    code = np.round(lane_state[:, FAILURE])
     hold_force[code > 0] = np.nan
-    time, y, z, vy, vz = result.lane_state[:, LEAVING].astype(float).T
+    time, y, z, vy, vz = lane_state[:, LEAVING].astype(float).T
     landing = ballistic_landing(y, z, vy, vz, -sling.fork_height)
     failure: list[str | None] = []
     for i in range(count):

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pipeline.confidence.axes import Axes
 from pipeline.confidence.intervals import identifiable, interval
 from pipeline.confidence.profile import profiles
+from pipeline.confidence.residuals import Group
 from pipeline.errors import UserError
-from tests.confidence.toy import SCALE, SPACE, TRUTH, Toy, fitted
+from pipeline.params.identification import Prior
+from tests.confidence.toy import COUNT, GRID, SCALE, SPACE, TRUTH, Toy, ToyResiduals, fitted
 from tests.identify.toy import episode
 
 
@@ -73,18 +77,43 @@ def test_the_box_cuts_the_posterior(monkeypatch) -> None:
     assert interval(poisson)[0] > SPACE.high[1] - 0.02
 
 
-def test_fixed_parameters_stay_and_priors_count(monkeypatch) -> None:
-    """A prior as narrow as the data's halves the variance and draws the mean half way."""
+def test_an_exponential_prior_moves_posterior_and_profile(monkeypatch) -> None:
+    """A Gaussian times exp(-x/mean) is the same Gaussian, variance/mean further down."""
     toy = Toy(seed=5)
-    prior = {"poissons_ratio": (toy.optimum[1] + 0.01, SCALE[1])}
-    posterior = fitted(monkeypatch, toy, episode(), priors=prior)
-    poisson = posterior.samples[:, 1]
-    assert poisson.mean() == pytest.approx(toy.optimum[1] + 0.005, abs=0.0015)
-    assert poisson.std() == pytest.approx(SCALE[1] / np.sqrt(2), rel=0.25)
-
-    axes = Axes(SPACE, TRUTH, {"dynamic_friction", "damping_scale"})
+    prior = Prior(mean=SCALE[1] / 2, weight=0.0)  # two deviations down, whatever the loss's weight
+    axes = Axes(replace(SPACE, priors={"poissons_ratio": prior}), TRUTH)
     posterior = fitted(monkeypatch, toy, episode(), axes=axes)
+    poisson, expected = posterior.samples[:, 1], toy.optimum[1] - 2 * SCALE[1]
+    assert poisson.mean() == pytest.approx(expected, abs=0.3 * SCALE[1])
+    assert poisson.std() == pytest.approx(SCALE[1], rel=0.25)
+    curve = profiles(posterior, workers=1)["poissons_ratio"]
+    ends = expected + 1.645 * SCALE[1] * np.array([-1, 1])
+    np.testing.assert_allclose([curve["low"], curve["high"]], ends, atol=0.4 * SCALE[1])
+    parabola = ((curve["value"] - poisson.mean()) / poisson.std()) ** 2
+    np.testing.assert_allclose(curve["misfit"], parabola, atol=0.12 * parabola.max())
+
+
+def test_fixed_parameters_stay(monkeypatch) -> None:
+    axes = Axes(SPACE, TRUTH, {"dynamic_friction", "damping_scale"})
+    posterior = fitted(monkeypatch, Toy(seed=5), episode(), axes=axes)
     np.testing.assert_array_equal(np.unique(posterior.samples[:, 3:], axis=0), [TRUTH[3:]])
+
+
+def test_a_residual_in_a_group_of_its_own_does_not_take_over(monkeypatch) -> None:
+    """Parameters can bring it to nothing: it must not weigh ever more for that, noise 0.2."""
+    own = [
+        Group("force_x", phase, 0, rows, GRID[rows])
+        for phase, rows in (("taut", np.arange(COUNT - 1)), ("swing", np.array([COUNT - 1])))
+    ]
+    monkeypatch.setattr(ToyResiduals, "groups", own)
+    toy = Toy(seed=8)
+    toy.noise[-1] = 0.003  # by chance nearly nothing
+    toy.optimum = toy.truth + np.linalg.lstsq(toy.columns, toy.noise, rcond=None)[0]
+    posterior = fitted(monkeypatch, toy, episode())
+    even = toy.axes.even(posterior.samples)
+    assert posterior.moved < 0.7
+    np.testing.assert_array_less(np.abs(even.mean(axis=0) - toy.optimum), 0.25 * SCALE)
+    assert posterior.last.groups[1]["sigma"] == pytest.approx(0.2, rel=0.25)
 
 
 def test_the_same_seed_gives_the_same_samples(monkeypatch) -> None:

@@ -10,6 +10,7 @@ from pipeline.confidence.ensemble import sample
 from pipeline.confidence.intervals import correlation, identifiable, interval
 from pipeline.confidence.surrogate import Surrogate, monomials
 from pipeline.params import load
+from pipeline.params.identification import Prior
 from tests.confidence.toy import SPACE, TRUTH
 from tests.project import ROOT
 
@@ -104,15 +105,6 @@ def test_an_interval_that_fills_the_box_identifies_nothing() -> None:
         assert identifiable(name, np.sqrt(low * high), 1.2 * np.sqrt(low * high), axes)
 
 
-def test_a_prior_that_data_do_not_improve_identifies_nothing() -> None:
-    """0.45 +- 0.01: its own 90 % interval is 0.033 wide, clearly less than the box."""
-    axes = Axes(SPACE, TRUTH)
-    prior = (0.45, 0.01)
-    assert not identifiable("poissons_ratio", 0.4345, 0.4655, axes, prior)
-    assert identifiable("poissons_ratio", 0.4345, 0.4655, axes)
-    assert identifiable("poissons_ratio", 0.449, 0.459, axes, prior)
-
-
 def test_correlations() -> None:
     rng = np.random.default_rng(6)
     a, b = rng.normal(size=(2, 50_000))
@@ -157,12 +149,13 @@ def test_the_prior_is_that_of_the_box() -> None:
 
 
 def test_a_searched_drag_is_an_axis_and_other_nuisances_are_none() -> None:
-    """Its values are the coordinate itself; the method's bounds are the box."""
+    """Its values are the coordinate itself; the method's bounds are the box, its prior counts."""
     params = load(ROOT / "params.yaml")
     about = params.methods["sling2sim2real_taut"]
     nuisances = {"air_drag": (0.0, 8.0), "force_bias_x": (-1.0, 1.0)}
+    priors = dict.fromkeys(nuisances, Prior(mean=4.0, weight=1.0))
     about = about.model_copy(
-        update={"nuisances": nuisances, "bounds": {"poissons_ratio": (0.4, 0.45)}}
+        update={"nuisances": nuisances, "priors": priors, "bounds": {"poissons_ratio": (0.4, 0.45)}}
     )
     params = params.model_copy(update={"methods": {"own": about}})
     content = {
@@ -177,5 +170,6 @@ def test_a_searched_drag_is_an_axis_and_other_nuisances_are_none() -> None:
     even = axes.even(points)
     np.testing.assert_array_equal(even[:, 5], [0.0, 2.0, 7.5])
     np.testing.assert_allclose(axes.physical(even), points)
+    np.testing.assert_allclose(axes.space.log_prior(points), [0.0, -0.5, -1.875])
     assert axes.inside(points).all() and not axes.inside(points + [0, 0, 0, 0, 0, 9.0]).any()
     assert identifiable("air_drag", 1.0, 2.0, axes) and not identifiable("air_drag", 0.5, 7.5, axes)

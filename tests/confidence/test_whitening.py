@@ -108,6 +108,15 @@ def test_the_recoil_leans_on_the_held_band() -> None:
     assert weight[1] < 6 * weight[0]
 
 
+def test_what_fits_exactly_counts_for_no_more_than_the_noise() -> None:
+    """A residual that parameters can bring to nothing says nothing of its own variance."""
+    rng = np.random.default_rng(12)
+    groups = [group(400), group(1, phase="swing", first=400)]
+    weight, table = weights(groups, np.append(rng.normal(0, 0.1, 400), 1e-9))
+    assert table[1]["sigma"] == pytest.approx(0.1, rel=0.1)
+    assert weight[1] == pytest.approx(weight[0], rel=0.2)
+
+
 def test_a_group_that_is_given_up_weighs_no_less() -> None:
     residual = np.random.default_rng(6).normal(0, 1, 100)
     once, _ = weights([group(100)], residual)

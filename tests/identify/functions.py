@@ -15,6 +15,7 @@ from pipeline.identify.optimizers.multistart import Multistart
 from pipeline.identify.regions import Region, find_regions
 from pipeline.identify.search import budget, search
 from pipeline.identify.space import Space
+from pipeline.params.identification import Prior
 
 NAMES = ("a", "b", "c", "d", "e")
 CENTRE = np.array([0.3, 0.62, 0.45, 0.8, 0.55])
@@ -41,12 +42,12 @@ class Evaluate:
         names: tuple[str, ...] = NAMES,
         fails: Callable[[np.ndarray], np.ndarray] = lambda unit: unit[:, 0] < 0,
         weights: dict[str, float] | None = None,
-        costs: dict[str, float] | None = None,
+        priors: dict[str, Prior] | None = None,
     ) -> None:
         self.function, self.fails, self.count = function, fails, 0
         size = len(names)
         low, high, linear = np.zeros(size), np.full(size, 10.0), np.zeros(size, bool)
-        self.space = Space(names, low, high, linear, costs or {})
+        self.space = Space(names, low, high, linear, priors or {})
         weights = dict.fromkeys(TERMS, 0.0) | (weights or {"geom": 1.0})
         self.loss = SimpleNamespace(
             weights=weights,

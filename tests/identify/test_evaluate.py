@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from threading import Barrier
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,6 +16,7 @@ from pipeline.identify.evaluate import Evaluator, Penalty
 from pipeline.identify.loss import TERMS, EpisodeLoss
 from pipeline.identify.space import Space
 from pipeline.params import load
+from pipeline.params.identification import Prior
 from tests.identify import toy
 
 PARAMS = load("params.yaml")
@@ -35,7 +37,7 @@ def simulate(sling, episode, thetas, device):
     return result
 
 
-def evaluator(workers: int) -> Evaluator:
+def evaluator(workers: int = 1, **options) -> Evaluator:
     loss = EpisodeLoss(
         EPISODE,
         radius=toy.RADIUS,
@@ -43,7 +45,8 @@ def evaluator(workers: int) -> Evaluator:
         weights={"geom": 1.0, "force": 0.5, "work": 1.0, "taut": 0.0},
         cutoff=toy.CUTOFF,
     )
-    return Evaluator(EPISODE, toy.SLING, loss, SPACE, workers=workers, simulate=simulate)
+    options = {"simulate": simulate, **options}
+    return Evaluator(EPISODE, toy.SLING, loss, SPACE, workers=workers, **options)
 
 
 def test_losses_of_a_batch() -> None:
@@ -58,16 +61,16 @@ def test_losses_of_a_batch() -> None:
     assert found.failure == [None, None]
 
 
-def test_costs_of_the_space_are_in_the_total() -> None:
+def test_priors_of_the_space_are_in_the_total() -> None:
     unit = np.random.default_rng(1).random((20, 2))
     plain, dear = evaluator(1), evaluator(1)
-    dear.space = replace(SPACE, costs={"offset": 100.0})
-    found, with_cost = plain(unit), dear(unit)
+    dear.space = replace(SPACE, priors={"offset": Prior(mean=0.005, weight=0.5)})
+    found, with_prior = plain(unit), dear(unit)
     good = np.isfinite(found.total)
-    added = with_cost.total[good] - found.total[good]
-    assert good.sum() > 5 and np.array_equal(good, np.isfinite(with_cost.total))
+    added = with_prior.total[good] - found.total[good]
+    assert good.sum() > 5 and np.array_equal(good, np.isfinite(with_prior.total))
     np.testing.assert_allclose(added, 100 * found.theta[good, 0])
-    np.testing.assert_array_equal(with_cost.terms["geom"], found.terms["geom"])
+    np.testing.assert_array_equal(with_prior.terms["geom"], found.terms["geom"])
 
 
 def test_the_number_of_workers_changes_nothing() -> None:
@@ -79,7 +82,42 @@ def test_the_number_of_workers_changes_nothing() -> None:
         np.testing.assert_array_equal(one.terms[name], three.terms[name])
 
 
-def test_nor_does_it_where_nuisances_are_searched() -> None:
+@pytest.mark.parametrize(("devices", "count"), [(2, 67), (2, 17), (3, 2), (3, 1)])
+def test_nor_does_the_number_of_devices(devices: int, count: int) -> None:
+    """Rows in their order, failures too; some devices may find nothing to do."""
+    unit = np.random.default_rng(1).random((count, 2))
+    one, several = evaluator()(unit), evaluator(devices=["cpu"] * devices)(unit)
+    np.testing.assert_array_equal(one.theta, several.theta)
+    np.testing.assert_array_equal(one.total, several.total)
+    assert one.failure == several.failure
+    for name in TERMS:
+        np.testing.assert_array_equal(one.terms[name], several.terms[name])
+    if count == 67:
+        assert 0 < sum(reason is not None for reason in one.failure) < count
+
+
+def test_devices_share_a_batch_evenly_and_at_once() -> None:
+    """Each of two waits for the other, and would do so forever if they took turns."""
+    both, asked = Barrier(2, timeout=60), {}
+
+    def simulate_on(sling, episode, thetas, device):
+        asked[device] = len(thetas)
+        both.wait()
+        return simulate(sling, episode, thetas, "cpu")
+
+    found = evaluator(devices=("cpu", "cpu:1"), simulate=simulate_on)(np.full((11, 2), 0.5))
+    assert asked == {"cpu": 6, "cpu:1": 5} and np.isfinite(found.total).all()
+
+
+def test_what_a_device_raises_is_raised() -> None:
+    def broken(sling, episode, thetas, device):
+        raise UserError(f"{device}: out of memory")
+
+    with pytest.raises(UserError, match="out of memory"):
+        evaluator(devices=["cpu", "cpu"], simulate=broken)(np.full((3, 2), 0.5))
+
+
+def test_nor_does_either_where_nuisances_are_searched() -> None:
     """Those of the simulator and those of the loss, in the real ones."""
     sling, recorded = recorded_yardstick(PARAMS)
     bounds = {
@@ -97,13 +135,15 @@ def test_nor_does_it_where_nuisances_are_searched() -> None:
     unit[2, space.names.index("cloud_shift_z")] += 0.1
     unit[:3] %= 1
     found = []
-    for workers in (1, 2):
-        loss = EpisodeLoss.of(params, "toy", recorded, sling)
-        found.append(Evaluator(recorded, sling, loss, space, workers=workers)(unit))
-    assert found[0].failure == found[1].failure
+    loss = EpisodeLoss.of(params, "toy", recorded, sling)
+    for workers, devices in ((1, ["cpu"]), (2, ["cpu"]), (1, ["cpu", "cpu"])):
+        evaluate = Evaluator(recorded, sling, loss, space, workers=workers, devices=devices)
+        found.append(evaluate(unit))
+    assert found[0].failure == found[1].failure == found[2].failure
     assert np.isfinite(found[0].total[:3]).all() and len(set(found[0].total[:3])) == 3
     for name in TERMS:
-        np.testing.assert_array_equal(found[0].terms[name], found[1].terms[name])
+        for other in found[1:]:
+            np.testing.assert_array_equal(found[0].terms[name], other.terms[name])
 
 
 def test_failures_are_infinite_and_have_a_reason() -> None:

@@ -188,6 +188,21 @@ def test_samples_and_frames_are_fitted_or_held_out_or_guards() -> None:
         assert np.abs(np.abs(time[guard] - 0.6) - 0.15).max() < 0.1
 
 
+def test_terms_of_a_rollout_hang_on_no_other_of_its_batch() -> None:
+    """To the bit: batches are cut as devices and threads come."""
+    rng = np.random.default_rng(3)
+    episode = toy.episode(**recoil([-0.4, -0.3, -0.1, 0.02, *50 * [0.1]]))
+    loss, lines = loss_of(episode, weights=ONES, frame_cap=0.011), toy.rollouts(episode, count=5)
+    lines.center_line[:] += rng.normal(0, 0.01, lines.center_line.shape)
+    lines.force[:] += rng.normal(0, 1, lines.force.shape)
+    together = loss.terms(lines)
+    for first, last in ((0, 1), (1, 3), (3, 5), (4, 5)):
+        part = toy.rollouts(episode, count=last - first)
+        part.center_line, part.force = lines.center_line[first:last], lines.force[first:last]
+        for name, value in loss.terms(part).items():
+            np.testing.assert_array_equal(value, together[name][first:last])
+
+
 def test_without_blocks_nothing_is_held_out() -> None:
     episode = toy.episode()
     lines = toy.rollouts(episode, shift=(0.001, 0, -0.01), force=(0.1, 1, 0))

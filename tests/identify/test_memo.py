@@ -19,6 +19,7 @@ from pipeline.fingerprint import fingerprint
 from pipeline.identify.evaluate import Evaluation, Evaluator
 from pipeline.identify.memo import NOT_FINITE, Memo
 from pipeline.identify.session import SOURCES
+from pipeline.params.identification import Prior
 from tests.identify import toy
 from tests.identify.functions import NAMES, Evaluate, quadratic
 from tests.identify.killed import ROLLOUTS, VALLEY, searched
@@ -117,9 +118,9 @@ def test_totals_are_recomputed_by_the_weights(remembered) -> None:
     assert heavy.failure == [None, "no"]
 
 
-def test_totals_are_recomputed_by_the_costs(remembered) -> None:
+def test_totals_are_recomputed_by_the_priors(remembered) -> None:
     _, (plain,) = remembered(batches(0.1))
-    count, (dear,) = remembered(batches(0.1), costs={"a": 0.5})
+    count, (dear,) = remembered(batches(0.1), priors={"a": Prior(mean=4.0, weight=2.0)})
     assert count == 0
     np.testing.assert_allclose(dear.total, plain.total + 0.5 * plain.theta[:, 0])
 

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline import machine
 from pipeline.files import write_json
 from pipeline.identify import session
 from pipeline.params import load
+from pipeline.progress import parse
 from pipeline.sling.model import mounting_path
 from tests.identify import toy
 from tests.identify.functions import Evaluate, rosenbrock
@@ -71,6 +73,15 @@ def test_another_budget_or_weight_does_not(evaluators: list[Evaluate]) -> None:
     assert [one.count for one in evaluators] == [1, 0]
 
 
+def test_another_number_of_gpus_does_not(evaluators: list[Evaluate], monkeypatch) -> None:
+    """But a GPU instead of the CPU does: it rounds differently."""
+    monkeypatch.setattr(machine, "gpus", lambda: ("cuda:0", "cuda:1"))
+    for device in ("cpu", "cuda:0", "cuda", "cuda:1,cuda:0"):
+        monkeypatch.setenv("SLING_DEVICE", device)
+        serve("sling2sim2real")
+    assert [one.count for one in evaluators] == [1, 1, 0, 0]
+
+
 def test_another_episode_starts_over(evaluators: list[Evaluate]) -> None:
     serve("sling2sim2real")
     toy.episode(release_time=1.3).save(Path("data/episodes/band1"))
@@ -83,12 +94,17 @@ def test_another_episode_starts_over(evaluators: list[Evaluate]) -> None:
 def test_progress_says_how_far_it_is_and_what_was_recalled(
     evaluators: list[Evaluate], capsys: pytest.CaptureFixture
 ) -> None:
-    service = session.service("history", "band1", "de", PARAMS, 8)
-    service(UNIT), service(UNIT)
-    first, second = capsys.readouterr().err.splitlines()
-    best = f"best {rosenbrock(UNIT).min() * 3:.5g}"
-    assert first == f"history-band1-de 4/8  {best}  failed 0/4  4.0 rollouts/s"
-    assert second == f"history-band1-de 8/8  {best}  failed 0/4  recalled"
+    service = session.service("history", "band1", "de", PARAMS, 12)
+    service(UNIT), service(UNIT), service(1 - UNIT)
+    told = [parse(line) for line in capsys.readouterr().err.splitlines()]
+    least = [
+        f"best {3 * min(rosenbrock(x).min() for x in some):.5g}"
+        for some in ([UNIT], [UNIT, 1 - UNIT])
+    ]
+    assert [step.done for step in told] == [4, 8, 12] and {step.total for step in told} == {12}
+    assert told[0].facts == ("generation 0", least[0], "failed 0/4", "4.0 rollouts/s", "0:02 left")
+    assert told[1].facts == ("generation 1", least[0], "failed 0/4", "recalled", "0:01 left")
+    assert told[2].facts == ("generation 2", least[1], "failed 0/4", "4.0 rollouts/s")
     log = Path("logs/history-band1-de.log").read_text().splitlines()
-    assert log[0].endswith("history-band1-de: 8 rollouts")
-    assert [f"history-band1-de {line}" for line in log[1:]] == [first, second]
+    assert log[0].endswith("history-band1-de: 12 rollouts")
+    assert [parse(f"history-band1-de {line}") for line in log[1:]] == told

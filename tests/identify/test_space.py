@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.stats import laplace
 
 from pipeline.identify.space import Space, reflect
 from pipeline.params import load
+from pipeline.params.identification import Prior
 from pipeline.sling.model import THETA
 
 SPACE = Space.of(load().parameters)
@@ -64,12 +66,30 @@ def test_reflection_is_a_mirror_at_the_faces() -> None:
     np.testing.assert_allclose(reflect(outside), [0.2, 0.8, 0.1, 0.7, 0.0], atol=1e-12)
 
 
-def test_a_cost_grows_with_the_size_of_its_nuisance() -> None:
+def test_priors_count_in_the_loss_and_in_the_density() -> None:
+    """By the size of their nuisances; the density is SciPy's two-sided exponential."""
     bounds = {"air_drag": (0.0, 8.0), "camera_delay": (-0.01, 0.01)}
+    means = {"air_drag": 2.0, "camera_delay": 0.005}
+    priors = {
+        "air_drag": Prior(mean=2.0, weight=1.0),
+        "camera_delay": Prior(mean=0.005, weight=0.5),
+        "force_bias_x": Prior(mean=1.0, weight=1.0),  # of no axis of this box
+    }
     parameters = load().parameters
-    space = Space.of(parameters, bounds, costs={"air_drag": 0.5, "camera_delay": 100.0})
+    space = Space.of(parameters, bounds, priors=priors)
     theta = np.tile(space.low, (3, 1))
     columns = [space.names.index(name) for name in bounds]
     theta[:, columns] = [[0.0, 0.0], [2.0, -0.01], [4.0, 0.01]]
     np.testing.assert_allclose(space.cost(theta), [0.0, 2.0, 3.0])
-    assert not Space.of(parameters, bounds).cost(theta).any()
+    density = laplace(scale=[*means.values()]).logpdf(theta[:, columns]).sum(axis=1)
+    np.testing.assert_allclose(space.log_prior(theta), density - density[0], atol=1e-14)
+    for nothing in (Space.of(parameters, bounds).cost, Space.of(parameters, bounds).log_prior):
+        assert not nothing(theta).any()
+
+
+def test_the_drag_of_ours_adds_two_hundredths_of_its_value_to_the_bit() -> None:
+    """So searches of before and after the prior had a mean are the same ones."""
+    space = Space.of_method(load(), "sling2sim2real_taut")
+    theta = space.to_physical(np.random.default_rng(1).random((1000, space.dimension)))
+    drag = theta[:, space.names.index("air_drag")]
+    np.testing.assert_array_equal(space.cost(theta), 0.02 * drag)

@@ -48,14 +48,14 @@ def main() -> None:
     band, method = sys.argv[1:]
     params, folder = load(), Path("data/policies", band, method)
     launcher = simulator(params, band, load_theta(Path(f"data/theta/{band}/{method}.json"), band))
-    samples = load_samples(Path(f"data/confidence/{band}/{method}.json"), band, method)
+    samples = load_samples(params.run, Path(f"data/confidence/{band}/{method}.json"), band, method)
     targets = np.linspace(*params.policy.targets, 64)
-    middle = policy_draws(folder, np.mean(params.policy.targets, keepdims=True))[0]
+    middle = policy_draws(params.run, folder, np.mean(params.policy.targets, keepdims=True))[0]
     maps = robust_maps(launcher, samples, middle, params)
     landscape = Landscape(maps, params.trials.actuation_error)
     draws = {
-        "plain": policy_draws(folder, targets),
-        "robust": policy_draws(folder / "robust", targets),
+        "plain": policy_draws(params.run, folder, targets),
+        "robust": policy_draws(params.run, folder / "robust", targets),
         "best": best_draws(landscape, targets),
     }
     for name, drawn in draws.items():

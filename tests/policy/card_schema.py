@@ -72,9 +72,7 @@ SCHEMA = {
         setup=all_in(SETUP, POSITIVE),
         training={"type": "object"},
         landing_map=exactly(box=READ_BETWEEN, target_range=READ_BETWEEN),
-        trained_on=exactly(
-            device={"type": "string", "pattern": "^(cpu|cuda:[0-9]+)$"}, machine=TEXT
-        ),
+        trained_on=exactly(device={"type": "string", "pattern": "^(cpu|cuda)$"}, machine=TEXT),
         versions=all_in("python sling2sim2real torch rsl-rl-lib onnx numpy", TEXT),
     ),
     "if": {"properties": {"kind": {"const": "robust"}}},

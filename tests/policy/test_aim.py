@@ -19,7 +19,8 @@ from tests.project import ROOT
 
 PARAMS = SimpleNamespace(
     bands={"toy": None},
-    methods={"none": None, "other": None},
+    methods={"none": None, "other": None, "without": None, "idle": None},
+    run=toy.RUN,
     policy=SimpleNamespace(targets=(1.425, 2.425)),
     trials=SimpleNamespace(actuation_error=0.001),
     setup=SimpleNamespace(max_force=15.0),
@@ -56,7 +57,8 @@ def test_the_draw_lands_on_the_target(root) -> None:
     assert answer["hold_force_n"] == pytest.approx(truth.hold_force[0], abs=1e-6)
     assert answer["max_force_n"] == 15.0
     assert answer["warnings"] == [LEFT_OUT]
-    np.testing.assert_allclose(policy_draws(root / "data/policies/toy/none", [1.925]), draw)
+    again = policy_draws(toy.RUN, root / "data/policies/toy/none", [1.925])
+    np.testing.assert_allclose(again, draw)
 
 
 def test_the_robust_policy_is_another_one_with_an_interval_of_its_own(root) -> None:
@@ -169,7 +171,9 @@ def test_says_why_there_is_no_interval(root) -> None:
     [
         ("none", "none", "band none: not in params.yaml, which has toy"),
         ("toy", "missing", "method missing: not in params.yaml"),
-        ("toy", "other", "dvc repro theta@toy"),
+        ("toy", "other", "other.json: missing; `dvc repro theta@toy-other` makes it"),
+        ("toy", "without", "missing; `dvc repro ablation_theta@toy-without` makes it"),
+        ("toy", "idle", "missing; name idle under run.methods or run.ablations"),
     ],
 )
 def test_says_what_is_missing(root, band: str, method: str, message: str) -> None:
@@ -184,17 +188,25 @@ def test_a_damaged_policy_is_one_line(root, tmp_path) -> None:
     for damaged in (whole[: len(whole) // 2], b"not a network" * 20, b""):
         file.write_bytes(damaged)
         with pytest.raises(UserError, match="damaged; `dvc repro --force policy@toy-") as error:
-            policy_draws(file.parent, np.array([1.9]))
+            policy_draws(toy.RUN, file.parent, np.array([1.9]))
         assert "\n" not in str(error.value)
 
 
-def test_says_which_stage_trains_the_policy(root, tmp_path) -> None:
-    folder = tmp_path / "data/policies/toy/none"
-    with pytest.raises(UserError, match="`dvc repro policy@toy-none` trains it$"):
-        policy_draws(folder, np.array([1.9]))
-    with pytest.raises(UserError, match="policy@toy-none` trains it where policy.robust.methods"):
-        policy_draws(folder / "robust", np.array([1.9]))
+@pytest.mark.parametrize(
+    ("method", "stage"), [("none", "policy@toy-none"), ("without", "ablation_policy@toy-without")]
+)
+def test_says_which_stage_trains_the_policy(tmp_path, method: str, stage: str) -> None:
+    folder = tmp_path / "data/policies/toy" / method
+
+    def refusal(folder) -> str:
+        with pytest.raises(UserError) as error:
+            policy_draws(toy.RUN, folder, np.array([1.9]))
+        return str(error.value)
+
+    assert refusal(folder).endswith(f"no such file; `dvc repro {stage}` makes it")
+    assert f"`dvc repro {stage}` makes it where policy.robust.methods" in refusal(folder / "robust")
     (folder / "robust").mkdir(parents=True)
     (folder / "robust" / "policy.onnx").write_bytes(b"not a network")
-    with pytest.raises(UserError, match="damaged; `dvc repro --force policy@toy-none`"):
-        policy_draws(folder / "robust", np.array([1.9]))
+    assert refusal(folder / "robust").endswith(
+        f"damaged; `dvc repro --force {stage}` makes it anew"
+    )

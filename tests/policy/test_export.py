@@ -65,7 +65,7 @@ def test_onnx_and_torchscript_agree_with_the_network(trained, folder) -> None:
     assert network.shape == script.shape == graph.shape == (1000, 2)
     np.testing.assert_allclose(script, network, rtol=0, atol=1e-5)
     np.testing.assert_allclose(graph, network, rtol=0, atol=1e-5)
-    np.testing.assert_array_equal(policy_draws(folder, TARGETS[:, 0]), graph.astype(float))
+    np.testing.assert_array_equal(policy_draws(toy.RUN, folder, TARGETS[:, 0]), graph.astype(float))
     landing = toy.launch(graph.astype(float)).landing_y
     assert np.abs(landing - TARGETS[:, 0]).mean() < 0.02
 
@@ -92,7 +92,7 @@ def test_the_files_need_nothing_of_ours(folder, tmp_path) -> None:
     """Copied elsewhere: ONNX with onnxruntime alone, TorchScript with torch alone."""
     for name in ("policy.onnx", "policy.pt"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
-    expected = policy_draws(folder, np.array([1.9, 2.1]))
+    expected = policy_draws(toy.RUN, folder, np.array([1.9, 2.1]))
     by_onnx = """
 import sys, numpy, onnxruntime
 session = onnxruntime.InferenceSession("policy.onnx")

@@ -17,6 +17,8 @@ from pipeline.policy.pose import posed
 from tests.project import ROOT
 from tests.recording.bag import write_bag
 
+pytestmark = pytest.mark.usefixtures("nowhere")
+
 PARAMS = load(ROOT / "params.yaml")
 FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target along the base's x
 TIPS = np.array([[-0.1375, 0, 0], [0.1375, 0, 0]])

@@ -14,7 +14,9 @@ from pipeline.policy.check import check_expected
 from pipeline.policy.landing_map import LandingMap
 from pipeline.policy.landscape import Landscape
 from pipeline.policy.robust import refine, representative, robust_maps
+from pipeline.policy.train import told as said
 from pipeline.policy.train import train
+from pipeline.progress import Progress, parse
 from tests.policy import toy
 from tests.policy.best import best_draws, expected_error
 from tests.project import ROOT
@@ -161,3 +163,11 @@ def test_the_expected_error_is_that_of_launches_with_both_errors() -> None:
         assert found.mean_error == pytest.approx(truth, rel=0.01)
     shaken = check_expected(Fixed(safe), tilted, THETAS, params_with(error=0.02))
     assert shaken.max_error > check_expected(Fixed(safe), tilted, THETAS, params).max_error + 0.1
+
+
+def test_each_step_is_told(plain, settings, tmp_path) -> None:
+    told = Progress("x", robust.STEPS, "steps", tmp_path / "log")
+    found = refine(plain, Landscape(maps()), settings, told)
+    steps = [parse(f"x {line}") for line in (tmp_path / "log").read_text().splitlines()[1:]]
+    assert [step.done for step in steps] == list(range(1, robust.STEPS + 1))
+    assert [step.facts[0] for step in steps] == list(map(said, found.curve["mean_error"]))

@@ -107,18 +107,20 @@ def test_an_answer_takes_few_launches() -> None:
 
 
 def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:
-    path = tmp_path / "ours.json"
-    assert load_samples(path, "toy", "ours") is None
+    path = tmp_path / "none.json"
+    assert load_samples(toy.RUN, path, "toy", "none") is None
     content = {"names": list(THETA), "samples": samples(3).tolist()}
     path.write_text(json.dumps(content))
-    np.testing.assert_array_equal(load_samples(path, "toy", "ours"), samples(3))
+    np.testing.assert_array_equal(load_samples(toy.RUN, path, "toy", "none"), samples(3))
     with_drag = {"names": [*THETA, "air_drag"], "samples": [[0.5] * 6] * 4}
     path.write_text(json.dumps(with_drag))
-    assert load_samples(path, "toy", "ours").shape == (4, 6)
+    assert load_samples(toy.RUN, path, "toy", "none").shape == (4, 6)
     path.write_text(json.dumps(content | {"names": with_drag["names"]}))
     with pytest.raises(UserError, match="damaged"):
-        load_samples(path, "toy", "ours")
+        load_samples(toy.RUN, path, "toy", "none")
     for damaged in ("{", "[]", json.dumps(content | {"names": ["a"]}), '{"names": []}'):
         path.write_text(damaged)
-        with pytest.raises(UserError, match="damaged; `dvc repro --force theta@toy-ours`"):
-            load_samples(path, "toy", "ours")
+        with pytest.raises(UserError, match="damaged; `dvc repro --force theta@toy-none`"):
+            load_samples(toy.RUN, path, "toy", "none")
+    with pytest.raises(UserError, match="damaged; `dvc repro --force ablation_theta@toy-without`"):
+        load_samples(toy.RUN, path, "toy", "without")

@@ -70,13 +70,15 @@ def test_both_policies_are_written_with_their_cards(project, capsys) -> None:
     assert {file.name for file in (FOLDER / "robust").iterdir()} == FILES
     assert (plain["kind"], second["kind"]) == ("plain", "robust")
     targets = np.linspace(1.425, 2.425, 256)
-    landing = toy.launch(policy_draws(FOLDER, targets)).landing_y
+    landing = toy.launch(policy_draws(toy.RUN, FOLDER, targets)).landing_y
     assert plain["training"]["mean_error_m"] == pytest.approx(
         np.abs(landing - targets).mean(), 1e-3
     )
     about = second["training"]
     assert about["expected_error_m"] < about["plain_expected_error_m"] and about["samples"] == 3
-    assert not (policy_draws(FOLDER, targets) == policy_draws(FOLDER / "robust", targets)).all()
+    assert not (
+        policy_draws(toy.RUN, FOLDER, targets) == policy_draws(toy.RUN, FOLDER / "robust", targets)
+    ).all()
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 2 and "robust" in lines[1]
     assert len(pq.read_table(FOLDER / "training.parquet")) == 12
@@ -119,7 +121,7 @@ def test_a_theta_whose_launches_all_fail_is_said_not_to_converge(project, capsys
     for folder in (FOLDER, FOLDER / "robust"):
         told = json.loads((folder / "card.json").read_text())["training"]
         assert told["converged"] is False and told["mean_error_m"] is None
-        assert np.isfinite(policy_draws(folder, np.array([1.9]))).all()
+        assert np.isfinite(policy_draws(toy.RUN, folder, np.array([1.9]))).all()
 
 
 def test_targets_out_of_reach_are_said_not_to_converge(project, capsys) -> None:

@@ -18,6 +18,7 @@ from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.landing_map import LandingMap
 from pipeline.policy.landscape import Landscape
 from pipeline.policy.train import Trained, train
+from pipeline.progress import Progress, parse
 from tests.policy import killed, toy
 
 ROOT = Path(__file__).parents[2]
@@ -90,6 +91,32 @@ def test_without_a_launch_that_lands_it_says_so(settings) -> None:
     assert trained.failures == {"the simulation did not converge": 2 * 4 * 64}
     assert trained.curve["failed_targets"] == [256.0, 256.0]
     assert np.isfinite(trained.policy.draws(np.array([1.9]))).all()
+
+
+def test_each_iteration_is_told_and_those_of_an_earlier_run_are_counted(
+    toy_map, settings, tmp_path
+) -> None:
+    def train_and_tell(told: Progress) -> Trained:
+        some = short(settings, iterations=7)
+        return train(Landscape([toy_map]), some, tmp_path / "kept.pt", told)
+
+    class Ended(Progress):
+        def advance(self, count: int, *facts: str, seconds: float | None = None) -> None:
+            super().advance(count, *facts, seconds=seconds)
+            if self.done == 6:  # the checkpoint is that of the fifth
+                raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        train_and_tell(Ended("x", 7, "iterations", tmp_path / "first.log"))
+    trained = train_and_tell(Progress("x", 7, "iterations", tmp_path / "second.log"))
+    first, second = (
+        [parse(f"x {line}") for line in (tmp_path / name).read_text().splitlines()[1:]]
+        for name in ("first.log", "second.log")
+    )
+    assert [step.done for step in first] == [1, 2, 3, 4, 5, 6]
+    assert [step.done for step in second] == [6, 7]
+    errors = [f"mean error {100 * error:.2f} cm" for error in trained.curve["mean_error"]]
+    assert [step.facts[0] for step in [*first[:5], *second]] == errors
 
 
 def test_sigkill_and_on_to_the_same_training(tmp_path) -> None:

@@ -15,6 +15,9 @@ from pipeline.report.replay import replay, work
 from pipeline.sling.interaction import interact
 from pipeline.sling.model import THETA as NAMES
 from pipeline.sling.model import Sling
+from tests.project import ROOT
+
+pytestmark = pytest.mark.usefixtures("nowhere")
 
 METHOD = "sling2sim2real"
 THETA = dict(zip(NAMES, (3e5, 0.46, 4e-3, 0.5, 0.6), strict=True))
@@ -23,7 +26,7 @@ SHIFT = np.array([0, 0.05, 0])  # of the clouds from where the band is
 
 @pytest.fixture(scope="module")
 def params():
-    return load()
+    return load(ROOT / "params.yaml")
 
 
 @pytest.fixture(scope="module")

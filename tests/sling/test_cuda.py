@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from importlib import import_module
+
 import numpy as np
 import pytest
 import warp as wp
 
+from pipeline.identify.evaluate import Evaluator
+from pipeline.identify.loss import EpisodeLoss
+from pipeline.identify.space import Space
+from pipeline.params import load
 from pipeline.sling import interact, launch
 
 from .test_interaction import random_thetas
@@ -47,6 +54,33 @@ def test_what_stays_on_the_gpu_is_what_is_fetched(strong_grip, episode):
     assert not isinstance(stays.center_line, np.ndarray)
     assert np.array_equal(stays.center_line.numpy(), fetched.center_line)
     assert np.array_equal(stays.force.numpy(), fetched.force)
+
+
+@pytest.mark.skipif(wp.get_cuda_device_count() < 2, reason="fewer than two GPUs on this machine")
+def test_gpus_share_a_batch_and_change_nothing(strong_grip, sling, episode, monkeypatch):
+    """Rollouts with their loss in shares of 34 and 33, and launches."""
+    time = episode.cloud_time
+    clouds = [np.random.default_rng(frame).normal(0, 0.1, (200, 3)) for frame in range(len(time))]
+    seen = replace(episode, clouds=[cloud.astype(np.float32) for cloud in clouds])
+    weights = {"geom": 1.0, "force": 1.0, "work": 1.0, "taut": 0.0}
+    shape = {"radius": sling.radius, "rest_length": sling.edge_lengths}
+    loss = EpisodeLoss(seen, **shape, weights=weights, cutoff=30.0)
+    space = Space.of(load("params.yaml").parameters)
+    unit = np.random.default_rng(8).random((67, space.dimension))
+    teams = ("cuda:0",), ("cuda:1",), ("cuda:0", "cuda:1")
+    one, *others = (Evaluator(seen, strong_grip, loss, space, devices=team)(unit) for team in teams)
+    for other in others:
+        assert other.failure == one.failure
+        np.testing.assert_array_equal(other.total, one.total)
+        for name, values in one.terms.items():
+            np.testing.assert_array_equal(other.terms[name], values)
+
+    monkeypatch.setattr(import_module("pipeline.sling.launch"), "SHARE", 1)
+    thetas = space.to_physical(unit)
+    one, *others = (launch(sling, thetas, [-0.4, -0.2], device=team) for team in teams)
+    for other in others:
+        assert other.failure == one.failure
+        np.testing.assert_array_equal(other.landing_y, one.landing_y)
 
 
 def test_result_depends_on_no_neighbour_on_the_gpu(strong_grip, episode):

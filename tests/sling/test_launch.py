@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 
-from pipeline.sling import launch
+from pipeline.sling import launch, solver
 from pipeline.sling.launch import ballistic_landing
 from pipeline.sling.model import GRAVITY, drawn_guess
 from pipeline.verify.twin import Twin
@@ -62,6 +64,33 @@ def test_projectile_gets_no_more_than_the_stored_energy(sling):
         assert sling.projectile_mass / 2 * shot.speed[0] ** 2 + lifted < stored
         speeds.append(shot.speed[0])
     assert speeds[0] > speeds[1] > speeds[2]
+
+
+def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch):
+    """Small batches stay on the first, and each launch gets its own theta."""
+    rng = np.random.default_rng(6)
+    draws = np.column_stack([rng.uniform(-0.45, -0.2, 9), rng.uniform(-0.3, -0.1, 9)])
+    thetas = np.column_stack([10 ** rng.uniform(5, 6.2, 9), np.tile(THETA[1:], (9, 1))])
+    one, asked = launch(sling, thetas, draws), []
+
+    def run(*rows, device, **options):
+        asked.append((device, len(rows[2])))
+        return solver.run(*rows, device="cpu", **options)
+
+    module = import_module("pipeline.sling.launch")
+    monkeypatch.setattr(module, "run", run)
+    for share, expected in (
+        (5, {("a", 9)}),
+        (4, {("a", 5), ("b", 4)}),
+        (1, {("a", 3), ("b", 3), ("c", 3)}),
+    ):
+        monkeypatch.setattr(module, "SHARE", share)
+        asked.clear()
+        several = launch(sling, thetas, draws, device=("a", "b", "c"))
+        assert set(asked) == expected and several.failure == one.failure
+        for name in ("landing_y", "speed", "angle", "hold_force", "leave_time"):
+            np.testing.assert_array_equal(getattr(several, name), getattr(one, name))
+    assert 0 < sum(reason is None for reason in one.failure) < 9
 
 
 def test_failures_have_names(sling):

@@ -29,6 +29,7 @@ from pipeline.identify.space import Space
 from pipeline.signal import cutoff_hz
 from pipeline.sling.interaction import interact
 from pipeline.sling.model import THETA, Sling
+from pipeline.theta import in_air
 from tests.identify.own_law import disturbed, own_law_episode
 
 pytestmark = pytest.mark.validation
@@ -42,6 +43,7 @@ TRUTH = {  # drawn evenly between these, E and s d on a logarithmic scale
     "dynamic_friction": (0.6, 1.0),
     "damping_scale": (0.3, 1.0),
 }
+DRAG = 1.0  # 1/s, its mean
 NOISE = {"force_noise": 0.05, "depth_noise": 0.0006}
 ERRORS = {"release": 3e-4, "camera": 5e-4, "shift": 1e-3, "turn": 1e-3, "bias": 0.01}
 FIRST_PICTURE = (0.004, 0.02)  # after the release [s]
@@ -50,7 +52,7 @@ E_LIMIT, PRODUCT_LIMIT, FORCE_LIMIT = 0.01, 0.1, 0.01
 
 
 def truth(rng: np.random.Generator) -> np.ndarray:
-    """A θ in the order of THETA."""
+    """A θ in the order of THETA, and the air's drag [1/s]."""
     drawn = {
         name: np.exp(rng.uniform(*np.log(ends)))
         if name in ("youngs_modulus", "damping_product")
@@ -59,7 +61,7 @@ def truth(rng: np.random.Generator) -> np.ndarray:
     }
     product = drawn.pop("damping_product")
     drawn["elasticity_damping"] = product / drawn["damping_scale"]
-    return np.array([drawn[name] for name in THETA])
+    return np.array([*(drawn[name] for name in THETA), rng.exponential(DRAG)])
 
 
 def searched(params, episode, sling) -> dict:
@@ -80,7 +82,8 @@ def one(params, number: int) -> dict:
     # a picture is taken at the release: one must show the recoil, or the method refuses the episode
     plan = replace(plan, cloud_time=plan.cloud_time + rng.uniform(*FIRST_PICTURE))
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
-    exact = own_law_episode(sling, plan, true, cutoff=cutoff, seed=number, **NOISE)
+    windy, theta = in_air(sling, true[None])
+    exact = own_law_episode(windy, plan, theta[0], cutoff=cutoff, seed=number, **NOISE)
     episode = disturbed(exact, rng, **ERRORS)
 
     start = time.perf_counter()
@@ -94,13 +97,15 @@ def one(params, number: int) -> dict:
     seconds = time.perf_counter() - start - found_after
 
     # held in full: the force while the band is drawn
-    three = interact(sling, plan, np.array([true, best, posterior.mean]))
+    windy, thetas = in_air(sling, np.array([true, best, posterior.mean]))
+    three = interact(windy, plan, thetas)
     held = np.linalg.norm(EpisodeLoss.plain(params, episode, sling).filtered(three), axis=2)
     curve = np.abs(held[1:] - held[0]).mean(axis=1) / held[0].max()
     late = episode.release_time - episode.time
     hold = held[0, (late > 0.05) & (late < 0.5)].mean()
     product = true[2] * true[4]
-    values = dict(zip(THETA, zip(true, posterior.samples.T, strict=True), strict=True))
+    names = axes.space.names
+    values = dict(zip(names, zip(true, posterior.samples.T, strict=True), strict=True))
     values["damping_product"] = product, posterior.derived["damping_product"]
     values["hold_force"] = hold, posterior.derived["hold_force"]
     values["release_time"] = plan.release_time, posterior.derived["release_time"]
@@ -114,10 +119,10 @@ def one(params, number: int) -> dict:
             "low": low,
             "high": high,
             "error": float(np.median(samples)) - value,
-            "identifiable": name not in THETA or identifiable(name, low, high, axes),
+            "identifiable": name not in names or identifiable(name, low, high, axes),
         }
-        if name in THETA:
-            quantities[name]["theta_error"] = float(best[THETA.index(name)] - value)
+        if name in names:
+            quantities[name]["theta_error"] = float(best[names.index(name)] - value)
             quantities[name]["profile"] = [curves[name]["low"], curves[name]["high"]]
     quantities["damping_product"]["theta_error"] = float(best[2] * best[4] - product)
     return {

@@ -46,7 +46,8 @@ def launched(params, band: str) -> tuple[np.ndarray, np.ndarray]:
 def scored(params, root: Path, band: str, method: str, draws, landing) -> dict:
     """Coverage, width and errors of one method's intervals, as shares of the measured distance."""
     content = load_theta(root / "data/theta" / band / f"{method}.json", band)
-    samples = load_samples(root / "data/confidence" / band / f"{method}.json", band, method)
+    kept = root / "data/confidence" / band / f"{method}.json"
+    samples = load_samples(params.run, kept, band, method)
     launcher, share = simulator(params, band, content, root=root), law_discrepancy(content)
     error = params.trials.actuation_error
     predicted = launcher(draws).landing_y

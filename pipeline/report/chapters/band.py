@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
-from pipeline.policy.aim import ROBUST, policy_draws
-from pipeline.report.looks import Look, drawn
-from pipeline.report.replay import Replay
+from pipeline.report.looks import drawn
+from pipeline.report.report import Report
 from pipeline.report.results import Results
 from pipeline.report.tables import identified, landings, policies
 from pipeline.report.tables.cells import markdown
@@ -27,24 +24,15 @@ predicted* are launches whose simulation fails, which the means leave out; *beyo
 stretch the band further than the recording did."""
 
 
-def band_chapter(
-    params,
-    results: Results,
-    band: str,
-    replays: dict[str, Replay],
-    looks: dict[str, Look],
-    root: Path,
-) -> str:
-    about = params.bands[band]
+def band_chapter(report: Report, band: str) -> str:
+    about = report.params.bands[band]
     text = [
         f"## {band}\n",
         f"{about.mass * 1e3:g} g, {about.rest_length * 100:g} cm between the clamps,"
         f" {about.diameter * 1e3:g} mm thick; {SOURCE[about.source]}.\n",
     ]
-    text += _predictions(results, band, looks)
-    text += _recording(results, band, replays, looks)
-    text += _search(results, band, looks)
-    text += _policy(params, results, band, looks, root)
+    for part in (_predictions, _recording, _search, _policy):
+        text += part(report, band)
     return "\n".join(text)
 
 
@@ -54,12 +42,12 @@ def compared(results: Results, band: str) -> bool:
     return bool((trials.landing_y.notna() & (trials.band == band)).any())
 
 
-def _names(results: Results, band: str, looks: dict[str, Look]) -> str:
-    return " and ".join(looks[method].name for method in drawn(results.methods[band]))
+def _names(report: Report, band: str) -> str:
+    return " and ".join(report.looks[method].name for method in drawn(report.results.methods[band]))
 
 
-def _predictions(results: Results, band: str, looks: dict[str, Look]) -> list[str]:
-    text = []
+def _predictions(report: Report, band: str) -> list[str]:
+    results, looks, text = report.results, report.looks, []
     for kind, words in PREDICTED.items():
         table = landings.prediction_summary(results, band, kind, looks)
         if table:
@@ -67,7 +55,7 @@ def _predictions(results: Results, band: str, looks: dict[str, Look]) -> list[st
             text.append(markdown(table))
     if compared(results, band):
         text.append(
-            f"Left: {_names(results, band, looks)}. Right: every method, a dot a launch.\n\n"
+            f"Left: {_names(report, band)}. Right: every method, a dot a launch.\n\n"
             f"![predicted and actual landings](figures/{band}-landings.png)\n"
         )
     for method in drawn(results.methods[band]):
@@ -85,12 +73,10 @@ def _predictions(results: Results, band: str, looks: dict[str, Look]) -> list[st
     return text
 
 
-def _recording(
-    results: Results, band: str, replays: dict[str, Replay], looks: dict[str, Look]
-) -> list[str]:
+def _recording(report: Report, band: str) -> list[str]:
     text = [
         "### Recording and calibrated simulation\n\n"
-        f"Drawn: {_names(results, band, looks)}. Force of the band on the hand, both through the"
+        f"Drawn: {_names(report, band)}. Force of the band on the hand, both through the"
         " same filter; the size of their difference, x included; and the distance of each frame's"
         " cloud from the simulated band.\n\n"
         f"![force over time](figures/{band}-force.png)\n\n"
@@ -101,7 +87,7 @@ def _recording(
         " middle, shade: its thickness), with the mean distance of the frame.\n\n"
         f"![point clouds](figures/{band}-clouds.png)\n"
     ]
-    table = identified.held_out(replays, looks)
+    table = identified.held_out(report.replays[band], report.looks)
     if table:
         text.append(
             "### Held-out data\n\nBlocks of the pull that no search has seen, and the rest of the"
@@ -113,7 +99,8 @@ def _recording(
     return text
 
 
-def _search(results: Results, band: str, looks: dict[str, Look]) -> list[str]:
+def _search(report: Report, band: str) -> list[str]:
+    methods, looks = report.results.methods[band], report.looks
     text = [
         "### Search\n\n"
         "The printed loss (geom + force + work) of the best θ so far, *best* by each method's own"
@@ -122,12 +109,12 @@ def _search(results: Results, band: str, looks: dict[str, Look]) -> list[str]:
         "Everything that was evaluated, in the unit cube of the search; diagonal: the loss against"
         " one parameter.\n"
     ]
-    chosen = drawn(results.methods[band])
+    chosen = drawn(methods)
     text += [
         f"![every point that {looks[method].name} evaluated](figures/{band}-{method}-corner.png)\n"
         for method in chosen
     ]
-    if any(results.methods[band][method].confidence for method in chosen):
+    if any(methods[method].confidence for method in chosen):
         text.append(
             "### Confidence\n\n"
             "Least misfit (−2 log likelihood of whitened residuals) with one parameter held, all"
@@ -138,15 +125,16 @@ def _search(results: Results, band: str, looks: dict[str, Look]) -> list[str]:
     return text
 
 
-def _policy(params, results: Results, band: str, looks: dict[str, Look], root: Path) -> list[str]:
-    methods = drawn(results.methods[band])
-    targets, named = np.array(params.trials.targets), {}
+def _policy(report: Report, band: str) -> list[str]:
+    results, looks = report.results.methods[band], report.looks
+    methods, targets = drawn(results), np.array(report.params.trials.targets)
+    named = {}
     for method in methods:
-        result, name = results.methods[band][method], looks[method].name
-        folder = root / "data" / "policies" / band / method
-        named[name] = result.landing_map, policy_draws(folder, targets)
+        result, name = results[method], looks[method].name
+        named[name] = result.landing_map, report.draws(band, method, targets)
         if result.robust_card:
-            named[f"{name}, robust"] = result.landing_map, policy_draws(folder / ROBUST, targets)
+            robust = report.draws(band, method, targets, robust=True)
+            named[f"{name}, robust"] = result.landing_map, robust
     text = [
         f"### Policy\n\n![training](figures/{band}-training.png)\n",
         "Draws for the targets of the trials, each in the method's own simulator:\n",

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.policy.trials import stretch_of
-from pipeline.report.replay import LOAD, Replay
-from pipeline.report.results import Results
+from pipeline.report.replay import LOAD
+from pipeline.report.report import Report
 
 
-def pictures(params, results: Results, replays: dict[str, dict[str, Replay]]) -> str:
+def pictures(report: Report) -> str:
     """The chapter; its pictures are those of write.py's `common_figures`."""
     flights = "Flights of the projectile from the pouch to the floor, to scale"
-    if "virtual" in set(results.trials.kind):
+    if "virtual" in set(report.results.trials.kind):
         flights += "; those of the **virtual rig** meet a drag of the air that the predictions lack"
-    beyond = _beyond(params, results, replays)
+    beyond = _beyond(report)
     return f"""\
 ## All bands
 
@@ -35,13 +35,14 @@ from grasp to release, as recorded and as the calibrated simulators answer the s
 """
 
 
-def _beyond(params, results: Results, replays: dict[str, dict[str, Replay]]) -> str:
+def _beyond(report: Report) -> str:
     """Bands that the load stretches further than their recording did, in words."""
-    bands = []
-    for band, of_band in replays.items():
+    params, bands = report.params, []
+    for band, of_band in report.replays.items():
         length, width = params.bands[band].rest_length, params.setup.fork_width
         lowest = np.array([one.loaded[len(one.loaded) // 2] for one in of_band.values()])
-        recorded = max(one.trials.recorded_stretch.max() for one in results.methods[band].values())
+        methods = report.results.methods[band].values()
+        recorded = max(one.trials.recorded_stretch.max() for one in methods)
         if np.nanmax(stretch_of(lowest, width, length), initial=0) > recorded:
             bands.append(band)
     return f", and it stretches {' and '.join(bands)} beyond the recording" if bands else ""

@@ -14,37 +14,27 @@ from string import Template
 
 from pipeline.errors import UserError
 from pipeline.files import write_text
-from pipeline.report.looks import Look
 from pipeline.report.page.replays import content
-from pipeline.report.replay import Replay
-from pipeline.report.results import Results
+from pipeline.report.report import Report
 
 HERE = Path(__file__).parent
 
 
-def write_page(
-    params,
-    results: Results,
-    replays: dict[str, dict[str, Replay]],
-    named: dict[str, Look],
-    markdown: str,
-    folder: Path,
-) -> None:
-    """Write `folder`/index.html.
+def write_page(report: Report, markdown: str) -> None:
+    """Write reports/index.html.
 
     Args:
-        replays: By band and method.
-        markdown: The report; its pictures lie in `folder`.
+        markdown: The report as text; its pictures lie in reports/.
 
     Raises:
         UserError: A picture of the report is missing.
     """
     from plotly.offline import get_plotlyjs
 
-    body, chapters = _rendered(markdown, Path(folder))
+    body, chapters = _rendered(markdown, report.folder)
     first, _, rest = body.partition(chapters[1][2]) if len(chapters) > 1 else (body, "", "")
     links = [("replay", "The replay"), *(chapter[:2] for chapter in chapters)]
-    data = json.dumps(content(params, results, replays, named), separators=(",", ":"))
+    data = json.dumps(content(report), separators=(",", ":"))
     page = Template((HERE / "page.html").read_text("utf-8")).substitute(
         style=(HERE / "page.css").read_text("utf-8"),
         navigation="\n".join(f'<a href="#{name}">{title}</a>' for name, title in links),
@@ -54,7 +44,7 @@ def write_page(
         plotly=get_plotlyjs(),
         script=(HERE / "replay.js").read_text("utf-8"),
     )
-    write_text(Path(folder) / "index.html", page)
+    write_text(report.folder / "index.html", page)
 
 
 def _rendered(markdown: str, folder: Path) -> tuple[str, list[tuple[str, str, str]]]:

@@ -6,36 +6,28 @@ import base64
 
 import numpy as np
 
-from pipeline.report.looks import SIDE_BY_SIDE, Look, drawn
-from pipeline.report.replay import Replay
-from pipeline.report.results import Results
+from pipeline.report.looks import SIDE_BY_SIDE, drawn
+from pipeline.report.report import Report
 
 POINTS = 350  # of a cloud
 
 
-def content(
-    params,
-    results: Results,
-    replays: dict[str, dict[str, Replay]],
-    named: dict[str, Look],
-) -> dict:
+def content(report: Report) -> dict:
     """The fork, and of each band its frames; what replay.js reads.
 
     Arrays are little-endian int16 in millimetres: `cloud` (points of all frames, 3), of which
     `counts` says how many each frame has, and of a method `line` (frames, nodes, 3). `distance`
     is of each frame [mm], null without points.
     """
-    setup = params.setup
+    setup = report.params.setup
     return {
         "fork": {"width": setup.fork_width, "height": setup.fork_height},
-        "bands": [
-            _band(band, results, of_band, named) for band, of_band in replays.items() if of_band
-        ],
+        "bands": [_band(report, band) for band, methods in report.replays.items() if methods],
     }
 
 
-def _band(band: str, results: Results, replays: dict[str, Replay], named) -> dict:
-    episode = results.episodes[band]
+def _band(report: Report, band: str) -> dict:
+    episode, replays, named = report.results.episodes[band], report.replays[band], report.looks
     clouds = [thinned(cloud) for cloud in episode.clouds]
     chosen = drawn(replays, SIDE_BY_SIDE)
     everything = np.concatenate(

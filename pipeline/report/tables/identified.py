@@ -10,15 +10,8 @@ from pipeline.report.looks import Look
 from pipeline.report.replay import Replay
 from pipeline.report.results import Results
 from pipeline.report.tables.cells import NONE, Table, centimetres, number, percent
-from pipeline.report.tables.parameters import printed_loss
+from pipeline.report.tables.parameters import HEADS, exactly, printed_loss
 
-NAMES = {
-    "youngs_modulus": "E [Pa]",
-    "poissons_ratio": "ν",
-    "elasticity_damping": "d [ms]",
-    "dynamic_friction": "friction",
-    "damping_scale": "s",
-}
 DERIVED = {  # heading and factor from SI; others keep their name and unit
     "damping_product": ("s·d [ms]", 1e3),
     "hold_force": ("held force [N]", 1.0),
@@ -51,8 +44,8 @@ def methods(params, looks: dict[str, Look]) -> Table:
             search = f"DE, then CMA-ES in {'1 region' if regions == 1 else f'{regions} regions'}"
             search += "" if about.covariance else ", isotropic starts"
         fixed = [_held(name, value) for name, value in about.fixed.items()]
-        costs = about.costs
-        more = [f"{n} ({costs[n]:g} a unit)" if n in costs else n for n in about.nuisances]
+        known = {name: f" (prior: mean {one.mean:g})" for name, one in about.priors.items()}
+        more = [name + known.get(name, "") for name in about.nuisances]
         shown = [look.name, f"`{method}`", search, " + ".join(terms), ", ".join(fixed) or NONE]
         rows.append([*shown, ", ".join(more) or NONE])
     heads = ["method", "in params.yaml", "search", "minimises", "held fixed", "nuisances besides"]
@@ -60,9 +53,9 @@ def methods(params, looks: dict[str, Look]) -> Table:
 
 
 def _held(name: str, value: float) -> str:
-    """As in "d 5 ms"."""
-    symbol, _, unit = NAMES.get(name, name).partition(" [")
-    return f"{symbol} {physical(name, value)} {unit.rstrip(']')}".rstrip()
+    """As in "d 5.00E-3 s"."""
+    symbol, _, unit = HEADS.get(name, name).partition(" [")
+    return f"{symbol} {exactly(name, value)} {unit.rstrip(']')}".rstrip()
 
 
 def derived(results: Results, looks: dict[str, Look]) -> Table | None:
@@ -143,12 +136,3 @@ def held_out(replays: dict[str, Replay], looks: dict[str, Look]) -> Table | None
         rows.append([looks[method].name, *cells])
     heads = [f"{what}, {part}" for what in ("force [N]", "cloud [cm]") for part in PARTS]
     return ["method", *heads], rows
-
-
-def physical(name: str, value: float, digits: int = 3) -> str:
-    """A parameter as the tables print it."""
-    if name == "youngs_modulus":
-        return f"{value:.{digits - 1}e}".replace("e+0", "e")
-    if name == "elasticity_damping":
-        return f"{1e3 * value:.{digits}g}"
-    return f"{value:.{digits}g}"

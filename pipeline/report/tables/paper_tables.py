@@ -66,9 +66,8 @@ least sensitive to them, launched with errors as in the trials. No method has se
 DOUBT = """\
 In brackets: 90 % intervals of the posterior; *not identifiable* where it says hardly more than the
 box; *fixed* where the method does not search; † where θ*, the least loss, lies outside: the loss is
-no likelihood, nor does the posterior know what a method lets a nuisance cost, so the two may
-disagree. [docs/identification.md](../docs/identification.md) says what such an interval is and is
-not.
+no likelihood, so the two may disagree. [docs/identification.md](../docs/identification.md) says
+what such an interval is and is not.
 """
 EDGE = "⚠ the search ended at a side of its box: the optimum may lie outside.\n"
 NO_CONFIDENCE = "No θ of this run comes with a confidence.\n"

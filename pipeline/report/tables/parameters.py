@@ -138,6 +138,12 @@ def _between(name: str, low: float, high: float) -> str:
     return " – ".join(ends)
 
 
+def exactly(name: str, value: float) -> str:
+    """A setting as the tables print parameters, with more digits where it has more."""
+    shown = (_physical(name, value, digits) for digits in (2, 3, 4, 5))
+    return next((text for text in shown if float(text) == value), f"{value:g}")
+
+
 def _physical(name: str, value: float, digits: int = 2) -> str:
     """As the paper prints it: 9.29E+5, 0.46."""
     if name in UNITS:

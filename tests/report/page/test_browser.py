@@ -20,6 +20,7 @@ from PIL import Image
 
 from pipeline.report.looks import looks
 from pipeline.report.page import write_page
+from pipeline.report.report import Report
 from pipeline.report.results import gather
 from tests.report.conftest import BAND, METHOD
 from tests.report.toy_replay import toy_replay
@@ -109,9 +110,9 @@ def pages(root, params):
         ],
     )
     replays = {BAND: {METHOD: one, "de": one}, "far": {METHOD: far}}
-    folder = root / "reports"
-    write_page(params, results, replays, looks([METHOD, "de"]), "# Report\n\n## In short\n", folder)
-    return folder / "index.html", one, far
+    report = Report(params, results, replays, looks([METHOD, "de"]), root)
+    write_page(report, "# Report\n\n## In short\n")
+    return report.folder / "index.html", one, far
 
 
 def visited(page, tmp_path) -> dict:

@@ -13,6 +13,7 @@ from pipeline.errors import UserError
 from pipeline.report.looks import looks
 from pipeline.report.page import replays as packing
 from pipeline.report.page import write_page
+from pipeline.report.report import Report
 from pipeline.report.results import gather
 from tests.report.conftest import BAND, METHOD
 from tests.report.toy_replay import toy_replay
@@ -50,11 +51,16 @@ def replays(results):
 
 
 @pytest.fixture
-def page(tmp_path, params, results, replays) -> str:
-    folder = tmp_path / "page"
+def report(tmp_path, params, results, replays) -> Report:
+    return Report(params, results, replays, looks([METHOD]), tmp_path / "shown")
+
+
+@pytest.fixture
+def page(report: Report) -> str:
+    folder = report.folder
     (folder / "figures").mkdir(parents=True)
     (folder / "figures" / "one.png").write_bytes(PICTURE)
-    write_page(params, results, replays, looks([METHOD]), MARKDOWN, folder)
+    write_page(report, MARKDOWN)
     return (folder / "index.html").read_text("utf-8")
 
 
@@ -82,10 +88,9 @@ def test_the_page_asks_for_nothing(page: str) -> None:
     assert "<script src" not in page and "@import" not in outside
 
 
-def test_equal_inputs_give_equal_bytes(page: str, tmp_path, params, results, replays) -> None:
-    folder = tmp_path / "page"
-    write_page(params, results, replays, looks([METHOD]), MARKDOWN, folder)
-    assert (folder / "index.html").read_text("utf-8") == page
+def test_equal_inputs_give_equal_bytes(page: str, report: Report) -> None:
+    write_page(report, MARKDOWN)
+    assert (report.folder / "index.html").read_text("utf-8") == page
 
 
 def test_the_replays_numbers_are_whole_millimetres(page: str, results, replays) -> None:
@@ -113,6 +118,6 @@ def test_a_thinned_cloud_keeps_points_of_the_cloud() -> None:
     assert packing.thinned(cloud[:0]).shape == (0, 3)
 
 
-def test_a_missing_picture_is_named(tmp_path, params, results, replays) -> None:
+def test_a_missing_picture_is_named(report: Report) -> None:
     with pytest.raises(UserError, match="figures/one.png: cannot be read.*dvc repro"):
-        write_page(params, results, replays, looks([METHOD]), MARKDOWN, tmp_path / "none")
+        write_page(report, MARKDOWN)

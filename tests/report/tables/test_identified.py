@@ -33,11 +33,17 @@ def column(table, heading: str) -> list[str]:
 
 
 def test_what_a_method_holds_fixed(params, named) -> None:
-    method = params.methods[METHOD].model_copy(
-        update={"fixed": {"poissons_ratio": 0.45, "elasticity_damping": 5e-3}}
-    )
+    """In the notation of table 2, with the digits that a setting has."""
+    fixed = {"poissons_ratio": 0.45, "elasticity_damping": 5e-3, "dynamic_friction": 0.125}
+    method = params.methods[METHOD].model_copy(update={"fixed": fixed})
     params = params.model_copy(update={"methods": {METHOD: method}})
-    assert column(methods(params, named), "held fixed") == ["ν 0.45, d 5 ms"]
+    assert column(methods(params, named), "held fixed") == ["ν 0.45, d 5.00E-3 s, friction 0.125"]
+
+
+def test_what_a_method_searches_besides(params) -> None:
+    table = methods(params, looks(params.methods))
+    besides = dict(zip(column(table, "method"), column(table, "nuisances besides"), strict=True))
+    assert besides["ours (taut)"] == "air_drag (prior: mean 1)" and besides["DE_L"] == "–"
 
 
 def test_what_a_method_minimises_and_by_what_search(params) -> None:

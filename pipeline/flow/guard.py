@@ -1,0 +1,55 @@
+"""Runs a command whose processes all end with us, even where we are killed.
+
+    python guard.py COMMAND...
+
+Whoever starts it holds the other end of its stdin: once that is closed, on purpose or because its
+holder died, the command's process group is interrupted as by Ctrl-C and, after a grace, killed. So
+too with what the command leaves behind when it ends. The first line on stdout is the group's
+number; the rest is the command's. It imports the standard library alone, to start in no time.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+GRACE = 8.0  # s from the interrupt to the kill
+
+
+def end_group(group: int, grace: float = GRACE, first: int = signal.SIGINT) -> None:
+    """Interrupt the process group, wait until it is empty, and kill what is left after `grace`."""
+    deadline = time.monotonic() + grace
+    try:
+        os.killpg(group, first)  # DVC gives its locks back, a stage its temporary files
+        while time.monotonic() < deadline:
+            os.killpg(group, 0)  # asks only
+            time.sleep(0.02)
+        os.killpg(group, signal.SIGKILL)
+    except ProcessLookupError:
+        return
+
+
+def main(command: list[str]) -> int:
+    """Run `command`; returns its exit status, as a shell has it."""
+    for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(one, lambda *_: None)  # ours ends by stdin; the command gets the default
+    child = subprocess.Popen(command, stdin=subprocess.DEVNULL, process_group=0)
+    print(child.pid, flush=True)
+
+    def ended_from_above() -> None:
+        while os.read(0, 1):  # not sys.stdin, whose lock a daemon thread would take to its grave
+            pass
+        end_group(child.pid)
+
+    threading.Thread(target=ended_from_above, daemon=True).start()
+    status = child.wait()
+    end_group(child.pid, first=signal.SIGTERM)  # without the words of an interrupt
+    return status if status >= 0 else 128 - status
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,184 @@
+"""A toy project in several working copies, a DVC remote beside them, Dask processes in them."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.project import ROOT
+
+STEP = """\
+import os, pathlib, sys, time
+out, *inputs = sys.argv[1:]
+print("makes", out, flush=True)
+with open("ran.log", "a") as log:
+    print(out, os.getpid(), os.environ.get("SLING_DEVICE"), file=log)
+begin = time.monotonic()
+while pathlib.Path("wait").exists() and time.monotonic() < begin + 120:
+    time.sleep(0.05)
+if os.environ.get("FAIL"):
+    sys.exit("error: it fails")
+path = pathlib.Path(out)
+path.parent.mkdir(parents=True, exist_ok=True)
+path.write_text("".join(pathlib.Path(one).read_text() for one in inputs) + out + "\\n")
+"""
+STAGES = """\
+stages:
+  search:
+    matrix: {band: [a, b]}
+    cmd: python step.py data/search/${item.band} params.yaml
+    deps: [step.py, recordings]
+    params: [seed]
+    outs: ['data/search/${item.band}']
+  train:
+    matrix: {band: [a, b]}
+    cmd: python step.py data/train/${item.band} data/search/${item.band}
+    deps: [step.py, 'data/search/${item.band}']
+    outs: ['data/train/${item.band}']
+    meta: {gpu: true}
+  report:
+    cmd: python step.py report.md data/train/a data/train/b
+    deps: [step.py, data/train]
+    outs:
+      - report.md: {cache: false}
+"""
+CONFIG = """\
+[core]
+    analytics = false
+    check_update = false
+    autostage = false
+    remote = shared
+['remote "shared"']
+    url = {remote}
+"""
+
+
+class Copy:
+    """A working copy of the toy project."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.environment = {
+            **os.environ,
+            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+            "OMP_NUM_THREADS": "1",
+            "DVC_SITE_CACHE_DIR": str(folder.parent / f"site-{folder.name}"),
+            "PYTHONPATH": str(ROOT),
+        }
+
+    def __call__(self, *command: str) -> str:
+        """What a command prints; the test fails where that fails."""
+        done = subprocess.run(
+            command,
+            cwd=self.folder,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=240,
+        )
+        assert done.returncode == 0, f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}"
+        self.errors = done.stderr
+        return done.stdout
+
+    def clone(self, name: str) -> Copy:
+        self("git", "clone", "-q", ".", str(self.folder.parent / name))
+        return Copy(self.folder.parent / name)
+
+    @property
+    def ran(self) -> list[list[str]]:
+        """Output, process and device of each stage that ran here."""
+        log = self.folder / "ran.log"
+        return [line.split() for line in log.read_text().splitlines()] if log.exists() else []
+
+
+def toy(folder: Path) -> Copy:
+    """The toy project in a Git repository, with a folder beside it as its DVC remote."""
+    files = {
+        ".dvc/config": CONFIG.format(remote=folder.parent / "remote"),
+        ".dvc/.gitignore": "/config.local\n/tmp\n/cache\n",
+        ".gitignore": "/data/\n/ran.log\n/wait\n/.checkpoints/\n",
+        "step.py": STEP,
+        "dvc.yaml": STAGES,
+        "params.yaml": "seed: 1\n",
+        "recordings/a": "a recording\n",
+    }
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    copy = Copy(folder)
+    copy("git", "init", "-q")
+    copy("git", "config", "user.name", "Test")
+    copy("git", "config", "user.email", "test@example.org")
+    copy("git", "add", "--all")
+    copy("git", "commit", "-q", "-m", "toy")
+    return copy
+
+
+def until(true: Callable[[], object], seconds: float = 30.0):
+    """What `true` returns, once it is; the test fails where that takes longer."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        if answer := true():
+            return answer
+        time.sleep(0.05)
+    raise AssertionError(f"not true within {seconds} s")
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return "zombie" not in Path(f"/proc/{pid}/status").read_text()
+
+
+class Dask:
+    """A scheduler and workers, each a process of its own."""
+
+    def __init__(self, logs: Path) -> None:
+        self.logs, self.processes = logs, {}
+
+    def start(self, name: str, copy: Copy, *command: str, **environment: str) -> str:
+        """Start one; what its log says of its address."""
+        log = self.logs / f"{name}.log"
+        with log.open("w") as file:
+            self.processes[name] = subprocess.Popen(
+                [sys.executable, "-m", *command, "--host", "127.0.0.1", "--no-dashboard"],
+                cwd=copy.folder,
+                env={**copy.environment, **environment},
+                stdout=file,
+                stderr=subprocess.STDOUT,
+            )
+        found = until(
+            lambda: re.search(r"(?:Scheduler at|Start worker at): +(tcp://\S+)", log.read_text())
+        )
+        return found[1]
+
+    def stop(self) -> None:
+        for process in reversed(self.processes.values()):
+            process.terminate()
+        for process in self.processes.values():
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+class Several:
+    """A head, and two workers with working copies of their own; one has a GPU, so it says."""
+
+    def __init__(self, folder: Path) -> None:
+        self.head = toy(folder / "head")
+        self.plain, self.gpu = self.head.clone("plain"), self.head.clone("gpu")
+        self.dask = Dask(folder)
+        self.address = self.dask.start(
+            "scheduler", self.head, "distributed.cli.dask_scheduler", "--port", "0"
+        )
+        start = ("distributed.cli.dask_worker", self.address, "--nthreads", "1", "--no-nanny")
+        self.dask.start("plain", self.plain, *start)
+        self.dask.start("gpu", self.gpu, *start, "--resources", "GPU=1", SLING_DEVICE="cuda:7")

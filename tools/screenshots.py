@@ -1,0 +1,155 @@
+"""The pictures of docs/flow.md: a flow of a tiny project, as Prefect's UI shows it.
+
+    python tools/screenshots.py [FOLDER]        # default docs/flow; some seven minutes on two cores
+
+Needs a Chromium. The UI is opened without a network: a page that asks for anything that is not on
+this machine is an error.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from pipeline import errors  # noqa: E402
+from pipeline.errors import UserError  # noqa: E402
+from tests.test_pipeline import Copy  # noqa: E402
+from tools.browser import Browser  # noqa: E402
+
+BUDGET = {  # long enough to be looked at, and to converge
+    "sling.edges": 24,
+    "optimizer.population": 24,
+    "optimizer.generations": 24,
+    "optimizer.k_nn": 10,
+    "optimizer.cma_population": 8,
+    "optimizer.cma_rollouts": 192,
+    "policy.map_size": [15, 15],
+    "policy.envs": 256,
+    "policy.iterations": 60,
+    "trials.targets": [1.725, 1.925, 2.125],
+    "trials.repeats": 3,
+}
+SLING = [sys.executable, "-c", "from pipeline.cli import main; main()"]
+SECONDS = 600.0  # that any wait may last
+STEM, BARS = "band1-sling2sim2real", (30, 95)  # whose pictures; % at which a bar is looked at
+
+
+class Server:
+    """The project's Prefect server, by its API."""
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+
+    def __call__(self, path: str, content: dict) -> list[dict]:
+        request = urllib.request.Request(
+            f"{self.url}/api/{path}",
+            json.dumps(content).encode(),
+            {"Content-Type": "application/json"},
+        )
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            return json.load(answer)
+
+    def artifact(self, key: str) -> dict | None:
+        """The newest of its key."""
+        found = self("artifacts/latest/filter", {"artifacts": {"key": {"any_": [key]}}})
+        return found[0] if found else None
+
+    def run(self) -> dict | None:
+        """The newest flow run."""
+        found = self("flow_runs/filter", {"sort": "START_TIME_DESC", "limit": 1})
+        return found[0] if found else None
+
+
+def until(happens, what: str):
+    deadline = time.monotonic() + SECONDS
+    while time.monotonic() < deadline:
+        with contextlib.suppress(OSError):
+            if found := happens():
+                return found
+        time.sleep(0.3)
+    raise UserError(f"in {SECONDS:g} s there was no {what}")
+
+
+@contextlib.contextmanager
+def serving(copy: Copy) -> Iterator[Server]:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        port = one.getsockname()[1]
+    command = [*SLING, "ui", "--port", str(port)]
+    process = subprocess.Popen(command, cwd=copy.folder, env=copy.environment)
+    server = Server(f"http://127.0.0.1:{port}")
+    try:
+        until(lambda: server("flow_runs/filter", {}) is not None, "server")
+        yield server
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(60)
+
+
+def flow(copy: Copy) -> subprocess.Popen:
+    log = (copy.folder.parent / "flow.log").open("a")
+    command = [*SLING, "flow", "--workers", "2"]
+    return subprocess.Popen(command, cwd=copy.folder, env=copy.environment, stdout=log, stderr=log)
+
+
+def shoot(copy: Copy, server: Server, page: Browser, folder: Path) -> None:
+    """Take all pictures."""
+
+    def artifact(name: str, key: str, *texts: str, height: int | None = None) -> None:
+        one = until(lambda: server.artifact(key), f"artifact {key}")
+        page.open(f"{server.url}/artifacts/artifact/{one['latest_id']}", *texts)
+        page.shoot(folder / f"{name}.png", height)
+
+    def run(name: str, *texts: str) -> None:
+        page.open(f"{server.url}/runs/flow-run/{server.run()['id']}", *texts, settling=8.0)
+        page.shoot(folder / f"{name}.png", 800)
+
+    light = "localStorage.setItem('color-scheme', '\"light\"')"
+    page("Page.addScriptToEvaluateOnNewDocument", source=light)
+    running = flow(copy)
+
+    def searching() -> bool:
+        bar = server.artifact(f"history-{STEM}")
+        return running.poll() is not None or bar and BARS[0] <= bar["data"] <= BARS[1]
+
+    until(searching, "search half done")
+    artifact("progress", f"history-{STEM}", "rollouts", height=440)
+    if running.wait(SECONDS):
+        raise UserError(f"the flow failed; {copy.folder.parent / 'flow.log'} says why")
+    run("run", "Completed", f"record@{STEM[:5]}")
+    artifact("convergence", f"theta-{STEM}", "identified")
+    artifact("trials", f"trials-{STEM}", "launches")
+
+    measured = copy.folder / "data" / "trials" / "measured" / "band1.csv"
+    measured.write_text("draw_y_m,draw_z_m,landing_y_m\n-0.30,-0.17,here\n")
+    if flow(copy).wait(SECONDS) == 0:
+        raise UserError("a flow with a damaged file of landings did not fail")
+    run("failed", "Failed", "got 'here'")
+    if elsewhere := page.elsewhere:
+        raise UserError(f"the UI asked for {', '.join(elsewhere)}")
+
+
+def main() -> None:
+    folder = Path(sys.argv[1] if sys.argv[1:] else ROOT / "docs" / "flow")
+    with tempfile.TemporaryDirectory() as place, Browser() as page:
+        copy = Copy(Path(place, "copy"))
+        copy.set(BUDGET)
+        with serving(copy) as server:
+            shoot(copy, server, page, folder)
+    print(f"wrote {', '.join(sorted(str(one) for one in folder.glob('*.png')))}")
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -102,8 +102,8 @@ def weights(
 
     The recoil shows itself in so few frames and samples that its own fitted residuals say little
     of its variance: that of the held band counts for RECOIL_PRIOR independent ones beside them.
-    And no variance is below the noise of the held band: a few residuals that parameters can fit
-    exactly would else weigh ever more, from round to round, until nothing else counted.
+    Elsewhere the noise of the held band counts for one beside them: a few residuals that parameters
+    can fit exactly would else weigh ever more, from round to round, until nothing else counted.
 
     Args:
         residual: At the optimum, shape (R,).
@@ -129,7 +129,7 @@ def weights(
         count, variance = len(group.rows), square
         drawn, noise = held.get(group.channel, (square, np.nan))
         if np.isfinite(noise):
-            variance = max(variance, min(noise, drawn))
+            variance = (count * square + min(noise, drawn)) / (count + 1)
         else:  # unknown: none is seen above it
             noise = np.inf
         tau = correlated(group, residual)

@@ -113,7 +113,7 @@ def test_a_residual_in_a_group_of_its_own_does_not_take_over(monkeypatch) -> Non
     even = toy.axes.even(posterior.samples)
     assert posterior.moved < 0.7
     np.testing.assert_array_less(np.abs(even.mean(axis=0) - toy.optimum), 0.25 * SCALE)
-    assert posterior.last.groups[1]["sigma"] == pytest.approx(0.2, rel=0.25)
+    assert posterior.last.groups[1]["sigma"] == pytest.approx(0.2 / np.sqrt(2), rel=0.25)
 
 
 def test_the_same_seed_gives_the_same_samples(monkeypatch) -> None:

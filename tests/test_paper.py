@@ -1,4 +1,4 @@
-"""How long the run with the paper's budget took, though it was killed."""
+"""The paper's budget in params.yaml; how long the run took, though it was killed."""
 
 from __future__ import annotations
 
@@ -10,8 +10,13 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
+from pipeline.bench_methods import PAPER
+from pipeline.errors import UserError
+from pipeline.params import load
 from tests.project import ROOT
-from tools.paper import KEPT, timed
+from tools.paper import KEPT, timed, with_budget
 
 RUN = ["sh", "-c", "test -e finish || exec sleep 60"]
 TOLD = "import sys; from pathlib import Path; from tools.paper import timed;"
@@ -41,3 +46,28 @@ def test_a_run_that_fails_keeps_its_time_and_another_command_begins_anew(tmp_pat
     fails = ["sh", "-c", "exit 3"]
     assert [timed(fails, tmp_path) for _ in range(2)][1] == (3, [0.0, 0.0])
     assert len(timed(["true"], tmp_path)[1]) == 1
+
+
+def test_the_budget_is_all_that_changes_in_params(tmp_path: Path) -> None:
+    before, path = (ROOT / "params.yaml").read_text(encoding="utf-8"), tmp_path / "params.yaml"
+    path.write_text(before, encoding="utf-8")
+    with_budget(path)
+    after = path.read_text(encoding="utf-8")
+    assert {name: getattr(load(path).optimizer, name) for name in PAPER} == PAPER
+    changed = [
+        (old, new)
+        for old, new in zip(before.splitlines(), after.splitlines(), strict=True)
+        if old != new
+    ]
+    assert len(changed) == len(PAPER)
+    assert all(old.partition("#")[1:] == new.partition("#")[1:] for old, new in changed)
+
+
+def test_a_budget_that_stands_otherwise_is_refused_and_nothing_changes(tmp_path: Path) -> None:
+    path = tmp_path / "params.yaml"
+    text = (ROOT / "params.yaml").read_text(encoding="utf-8")
+    text = text.replace("  generations: 8", "  'generations': 8")
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(UserError, match="optimizer.generations: 39 on a line of its own"):
+        with_budget(path)
+    assert path.read_text(encoding="utf-8") == text

@@ -1,15 +1,16 @@
 """Run everything with the paper's budget, and say where and how in reports/run.json.
 
-    python tools/paper.py        # as `make paper`
+    python tools/paper.py        # as `make paper`; arguments go to `sling flow`
 
-`dvc exp run` with the budget of pipeline/bench_methods.py: params.yaml keeps it afterwards, for
-`git diff` to show and `git checkout params.yaml` to take back. Killed, it goes on where it was, and
+The budget of pipeline/bench_methods.py is written into params.yaml, for `git diff` to show and `git
+checkout params.yaml` to take back; then `sling flow`. Killed, it goes on where it was, and
 `seconds` adds up its stretches.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 import time
@@ -22,15 +23,27 @@ sys.path.insert(0, str(ROOT))
 from pipeline import errors  # noqa: E402
 from pipeline.bench import environment  # noqa: E402
 from pipeline.bench_methods import PAPER  # noqa: E402
-from pipeline.files import write_json  # noqa: E402
+from pipeline.errors import UserError  # noqa: E402
+from pipeline.files import replacing, write_json  # noqa: E402
+from pipeline.params import load  # noqa: E402
 
 KEPT = Path(".checkpoints", "paper.json")  # "runs" and the "stretches" [s] of a run without an end
 TICK = 10.0  # s, that a kill may lose of its stretch
 
 
-def command(arguments: list[str]) -> list[str]:
-    settings = [f"optimizer.{name}={value}" for name, value in PAPER.items()]
-    return ["dvc", "exp", "run", *(part for one in settings for part in ("-S", one)), *arguments]
+def with_budget(path: Path) -> None:
+    """Write the paper's budget into params.yaml, whose comments stay. Raises UserError."""
+    text = path.read_text(encoding="utf-8")
+    for name, value in PAPER.items():
+        text = re.sub(rf"(?m)^(  {name}: *)[0-9_]+", rf"\g<1>{value}", text)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+        optimizer = load(temporary).optimizer
+        off = [name for name, value in PAPER.items() if getattr(optimizer, name) != value]
+        if off:
+            raise UserError(
+                f"{path}: write optimizer.{off[0]}: {PAPER[off[0]]} on a line of its own"
+            )
 
 
 def timed(run: list[str], root: Path = ROOT, tick: float = TICK) -> tuple[int, list[float]]:
@@ -47,7 +60,7 @@ def timed(run: list[str], root: Path = ROOT, tick: float = TICK) -> tuple[int, l
     start, status = time.monotonic(), None
     process = subprocess.Popen(run, cwd=root)
     while status is None:
-        with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):  # Ctrl-C ends DVC as well
+        with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):  # Ctrl-C ends the flow as well
             status = process.wait(tick)
         stretches = [*before, round(time.monotonic() - start, 1)]
         write_json(kept, {"runs": run, "stretches": stretches})
@@ -57,7 +70,8 @@ def timed(run: list[str], root: Path = ROOT, tick: float = TICK) -> tuple[int, l
 
 
 def main() -> int:
-    run = command(sys.argv[1:])
+    with_budget(ROOT / "params.yaml")
+    run = ["sling", "flow", *sys.argv[1:]]
     about = environment("cpu", "make paper")
     status, stretches = timed(run)
     if status == 0:

@@ -1,11 +1,11 @@
-"""DVC's command line, which leaves dvc.lock whole whatever ends it, and writes it at once.
+"""DVC's command line, which leaves dvc.lock and its own locks whole whatever ends it.
 
     python -P whole.py repro ...
 
 DVC reads and writes all of dvc.lock for each stage that ran, in Python, and in place: with a
 hundred stages for ten seconds, while every other DVC waits; Ctrl-C, a kill or a full disk would cut
 it off, and no DVC command reads it then. Here the one entry is exchanged, by DVC's own writer, in a
-file beside, which is then renamed.
+file beside, which is then renamed. So is the file of its read and write locks.
 """
 
 from __future__ import annotations
@@ -13,18 +13,49 @@ from __future__ import annotations
 import os
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 HEAD = "schema: '2.0'\nstages:\n"
 
 
+class Renaming:
+    """A file system of DVC's that writes files beside, and renames them when they are whole."""
+
+    def __init__(self, fs) -> None:
+        self._fs = fs
+
+    def __getattr__(self, name: str):
+        return getattr(self._fs, name)
+
+    @contextmanager
+    def open(self, path: str, mode: str = "r", **more) -> Iterator:
+        if mode != "w":
+            with self._fs.open(path, mode, **more) as file:
+                yield file
+            return
+        temporary = f"{path}.tmp"
+        try:
+            with self._fs.open(temporary, mode, **more) as file:
+                yield file
+            os.replace(temporary, path)
+        except BaseException:
+            with suppress(OSError):
+                os.remove(temporary)
+            raise
+
+
 def main() -> int:
     """Run DVC with the arguments of this process; returns its exit status."""
+    from dvc import rwlock
     from dvc.cli import main as dvc
     from dvc.dvcfile import Lockfile
     from dvc.stage.serialize import to_lockfile
     from dvc.utils.serialize import _common
 
+    edit = rwlock._edit_rwlock
+    rwlock._edit_rwlock = lambda folder, fs, hardlink: edit(folder, Renaming(fs), hardlink)
     in_place, of_all = _common._dump_data, Lockfile.dump_stages
 
     def replacing(path, data, dumper, fs=None, **more) -> None:

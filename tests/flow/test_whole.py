@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from pipeline.flow import whole
 from tests.flow.toy import Toy, stage
 
@@ -30,6 +32,20 @@ def test_the_lock_is_dvcs_own_to_the_byte(tmp_path: Path) -> None:
             locks.append((one.folder / "dvc.lock").read_text())
         assert locks[0] == locks[1]
         assert "1e-06" in locks[0] and "1e5" in locks[0]
+
+
+def test_a_file_that_is_cut_off_stays_as_it_was(tmp_path: Path) -> None:
+    from dvc.fs import localfs
+
+    ours, path = whole.Renaming(localfs), str(tmp_path / "rwlock")
+    with ours.open(path, "w", encoding="utf-8") as file:
+        file.write("whole")
+    with pytest.raises(KeyboardInterrupt), ours.open(path, "w", encoding="utf-8") as file:
+        file.write("ha")
+        raise KeyboardInterrupt
+    with ours.open(path, encoding="utf-8") as file:
+        assert file.read() == "whole"
+    assert [one.name for one in tmp_path.iterdir()] == ["rwlock"]
 
 
 def test_a_file_that_is_not_of_stages_alone_is_left_to_dvc() -> None:

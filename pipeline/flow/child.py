@@ -124,8 +124,10 @@ def _guarded(
 
 def _reason(said: list[str], status: int) -> str:
     """Why a stage failed: its own line of error, else its last line, else what DVC says."""
+    if status < 0:
+        return f"its guard was killed by signal {-status}"  # whatever its stage said of that
     own = [line for line in said if not CHATTER.match(line)]
-    exits = [found[1] for line in said if (found := COMMAND_FAILED.match(line))]
+    exits = [int(found[1]) for line in said if (found := COMMAND_FAILED.match(line))]
     if not exits:  # DVC failed before or after the stage's command
         own += [found[1] for line in said if (found := DVC_FAILED.match(line))]
     if 128 < status < 192:  # as the guard says it; DVC's own is 255
@@ -133,8 +135,7 @@ def _reason(said: list[str], status: int) -> str:
     errors = [found[1] for line in own if (found := OWN_ERROR.match(line))]
     if errors:
         return errors[-1]
-    if exits and exits[-1].startswith("-"):
-        return f"was killed by signal {exits[-1][1:]}"
-    if status < 0:
-        return f"its guard was killed by signal {-status}"
-    return own[-1] if own else f"ended with exit status {exits[-1] if exits else status}"
+    code = exits[-1] if exits else status
+    if code < 0 or 128 < code < 192:  # of the stage itself, or as the shell around it says it
+        return f"was killed by signal {-code if code < 0 else code - 128}"
+    return own[-1] if own else f"ended with exit status {code}"

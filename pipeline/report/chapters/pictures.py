@@ -45,4 +45,4 @@ def _beyond(report: Report) -> str:
         recorded = max(one.trials.recorded_stretch.max() for one in methods)
         if np.nanmax(stretch_of(lowest, width, length), initial=0) > recorded:
             bands.append(band)
-    return f", and it stretches {' and '.join(bands)} beyond the recording" if bands else ""
+    return f", and some stretch {' and '.join(bands)} beyond the recording" if bands else ""

@@ -90,7 +90,7 @@ def claims(rows: list[Compared], looks: dict[str, Look]) -> list[str]:
     return [
         f"- {band_name(band)}, {kind}, beside **{looks[reference].name}**: "
         + "; ".join(
-            f"{verdict}: {', '.join(parts[verdict])}" for verdict in VERDICTS if verdict in parts
+            f"{verdict}: {' · '.join(parts[verdict])}" for verdict in VERDICTS if verdict in parts
         )
         + "."
         for (band, kind, reference), parts in said.items()

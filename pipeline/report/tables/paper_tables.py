@@ -17,11 +17,11 @@ from pipeline.report.tables.cells import markdown, percent
 from pipeline.report.tables.latex import latex
 
 CAPTIONS = {
-    1: "Landing error by band and method: mean ± deviation of |landing − target|.",
+    1: "Landing error [cm] by band and method: mean ± deviation of |landing − target|; g in cm.",
     2: "Identified parameters, and the paper's loss of each calibrated simulator.",
-    3: "Ablation of the optimiser: landing error as in table 1.",
-    4: "Ablation of covariance (c), several starts (m) and the work term: landing error as in"
-    " table 1.",
+    3: "Ablation of the optimiser: landing error [cm] as in table 1.",
+    4: "Ablation of covariance (c), several starts (m) and the work term: landing error [cm] as"
+    " in table 1.",
 }
 SETTLED = 1.0  # deviations that a posterior's mean may move in its last round
 OVER = ("landing error [cm], g in cm", 4)  # above tables 1, 3 and 4, from that column on

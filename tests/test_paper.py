@@ -71,3 +71,20 @@ def test_a_budget_that_stands_otherwise_is_refused_and_nothing_changes(tmp_path:
     with pytest.raises(UserError, match="optimizer.generations: 39 on a line of its own"):
         with_budget(path)
     assert path.read_text(encoding="utf-8") == text
+
+
+def test_a_termination_ends_the_run_as_well(tmp_path: Path) -> None:
+    code = f"import sys; {TOLD} sys.exit(timed({RUN}, Path({str(tmp_path)!r}), tick=0.05)[0] != 0)"
+    process = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, start_new_session=True)
+    try:
+        latest = time.monotonic() + 60
+        while not (tmp_path / KEPT).is_file():
+            assert time.monotonic() < latest and process.poll() is None
+            time.sleep(0.02)
+        process.terminate()
+        assert process.wait(20) == 1
+        with pytest.raises(ProcessLookupError):
+            os.killpg(process.pid, 0)  # nobody is left
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)

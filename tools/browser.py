@@ -20,7 +20,8 @@ from websockets.sync.client import connect
 from pipeline.errors import UserError
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-LISTENING = re.compile(r"DevTools listening on (ws://\S+)")
+LISTENING = re.compile(r"DevTools listening on (ws://\S+)\s")
+STARTED = 60.0  # s that it may take to listen
 LOCAL = re.compile(r"(https?|wss?)://(127\.0\.0\.1|localhost)[:/]|data:|blob:|about:")
 
 
@@ -35,7 +36,13 @@ class Browser:
         program = next(filter(None, map(shutil.which, NAMES)), None)
         if program is None:
             raise UserError(f"no Chromium ({', '.join(NAMES)}); install one: apt install chromium")
-        folder = self._stack.enter_context(tempfile.TemporaryDirectory(ignore_cleanup_errors=True))
+        with ExitStack() as stack:  # a start that fails leaves nothing
+            self._start(program, stack)
+            self._stack = stack.pop_all()
+        return self
+
+    def _start(self, program: str, stack: ExitStack) -> None:
+        folder = stack.enter_context(tempfile.TemporaryDirectory(ignore_cleanup_errors=True))
         width, height = self.size
         options = [
             "--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
@@ -44,15 +51,17 @@ class Browser:
             "--remote-debugging-port=0", f"--window-size={width},{height}",
             f"--user-data-dir={folder}",
         ]  # fmt: skip
-        process = subprocess.Popen(
-            [program, *options, "about:blank"], stderr=subprocess.PIPE, text=True
-        )
-        self._stack.callback(process.wait, 20)
-        self._stack.callback(process.terminate)
-        match = next(filter(None, map(LISTENING.match, process.stderr)), None)
-        if match is None:
-            raise UserError(f"{program} does not start")
-        self._socket = self._stack.enter_context(
+        log = Path(folder, "log")  # not a pipe, which fills where nobody reads on
+        with log.open("w") as written:
+            process = subprocess.Popen([program, *options, "about:blank"], stderr=written)
+        stack.callback(process.wait, 20)
+        stack.callback(process.terminate)
+        deadline = time.monotonic() + STARTED
+        while not (match := LISTENING.search(log.read_text(errors="replace"))):
+            if process.poll() is not None or time.monotonic() > deadline:
+                raise UserError(f"{program} does not start")
+            time.sleep(0.05)
+        self._socket = stack.enter_context(
             connect(match[1], max_size=None, compression=None, proxy=None)
         )
         self._session = None
@@ -61,7 +70,6 @@ class Browser:
         self("Page.enable"), self("Network.enable")
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self("Emulation.setDeviceMetricsOverride", **metrics)
-        return self
 
     def __exit__(self, *error) -> None:
         self._stack.close()

@@ -10,7 +10,9 @@ checkout params.yaml` to take back; then `sling flow`. Killed, it goes on where 
 from __future__ import annotations
 
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -59,20 +61,23 @@ def timed(run: list[str], root: Path = ROOT, tick: float = TICK) -> tuple[int, l
         before = []
     start, status = time.monotonic(), None
     process = subprocess.Popen(run, cwd=root)
+    earlier = signal.signal(signal.SIGTERM, lambda *_: process.terminate())
     while status is None:
         with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):  # Ctrl-C ends the flow as well
             status = process.wait(tick)
         stretches = [*before, round(time.monotonic() - start, 1)]
-        write_json(kept, {"runs": run, "stretches": stretches})
+        with suppress(UserError):  # a full disk, of which the flow itself will tell
+            write_json(kept, {"runs": run, "stretches": stretches})
+    signal.signal(signal.SIGTERM, earlier)
     if status == 0:
-        kept.unlink()
+        kept.unlink(missing_ok=True)
     return status, stretches
 
 
 def main() -> int:
-    with_budget(ROOT / "params.yaml")
     run = ["sling", "flow", *sys.argv[1:]]
-    about = environment("cpu", "make paper")
+    about = environment(os.environ.get("SLING_DEVICE", "cpu"), "make paper")
+    with_budget(ROOT / "params.yaml")
     status, stretches = timed(run)
     if status == 0:
         about |= {"runs": " ".join(run), "seconds": round(sum(stretches))}

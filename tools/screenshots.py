@@ -98,10 +98,19 @@ def serving(copy: Copy) -> Iterator[Server]:
         process.wait(60)
 
 
-def flow(copy: Copy) -> subprocess.Popen:
-    log = (copy.folder.parent / "flow.log").open("a")
+@contextlib.contextmanager
+def flow(copy: Copy) -> Iterator[subprocess.Popen]:
+    """A flow, which ends with the block."""
     command = [*SLING, "flow", "--workers", "2"]
-    return subprocess.Popen(command, cwd=copy.folder, env=copy.environment, stdout=log, stderr=log)
+    with (copy.folder.parent / "flow.log").open("a") as log:
+        process = subprocess.Popen(
+            command, cwd=copy.folder, env=copy.environment, stdout=log, stderr=log
+        )
+        try:
+            yield process
+        finally:
+            process.terminate()
+            process.wait(60)
 
 
 def shoot(copy: Copy, server: Server, page: Browser, folder: Path) -> None:
@@ -118,24 +127,25 @@ def shoot(copy: Copy, server: Server, page: Browser, folder: Path) -> None:
 
     light = "localStorage.setItem('color-scheme', '\"light\"')"
     page("Page.addScriptToEvaluateOnNewDocument", source=light)
-    running = flow(copy)
+    with flow(copy) as running:
 
-    def searching() -> bool:
-        bar = server.artifact(f"history-{STEM}")
-        return running.poll() is not None or bar and BARS[0] <= bar["data"] <= BARS[1]
+        def searching() -> bool:
+            bar = server.artifact(f"history-{STEM}")
+            return running.poll() is not None or bar and BARS[0] <= bar["data"] <= BARS[1]
 
-    until(searching, "search half done")
-    artifact("progress", f"history-{STEM}", "rollouts", height=440)
-    if running.wait(SECONDS):
-        raise UserError(f"the flow failed; {copy.folder.parent / 'flow.log'} says why")
+        until(searching, "search half done")
+        artifact("progress", f"history-{STEM}", "rollouts", height=440)
+        if running.wait(SECONDS):
+            raise UserError(f"the flow failed; {copy.folder.parent / 'flow.log'} says why")
     run("run", "Completed", f"record@{STEM[:5]}")
     artifact("convergence", f"theta-{STEM}", "identified")
     artifact("trials", f"trials-{STEM}", "launches")
 
     measured = copy.folder / "data" / "trials" / "measured" / "band1.csv"
     measured.write_text("draw_y_m,draw_z_m,landing_y_m\n-0.30,-0.17,here\n")
-    if flow(copy).wait(SECONDS) == 0:
-        raise UserError("a flow with a damaged file of landings did not fail")
+    with flow(copy) as failing:
+        if failing.wait(SECONDS) == 0:
+            raise UserError("a flow with a damaged file of landings did not fail")
     run("failed", "Failed", "got 'here'")
     if elsewhere := page.elsewhere:
         raise UserError(f"the UI asked for {', '.join(elsewhere)}")

@@ -13,8 +13,6 @@ import signal
 from contextlib import suppress
 from pathlib import Path
 
-import dask
-
 CONFIG = Path("docs/cluster/jobqueue.yaml")
 
 
@@ -28,7 +26,11 @@ def main() -> None:
     if not arguments.config.is_file():
         parser.error(f"{arguments.config}: missing; start this in the project's folder")
 
-    from dask_jobqueue import SLURMCluster
+    try:
+        import dask
+        from dask_jobqueue import SLURMCluster
+    except ModuleNotFoundError:
+        parser.error("dask-jobqueue is missing; install it: pip install -e '.[cluster]'")
 
     jobs = dask.config.collect(paths=[str(arguments.config)], env={})
     dask.config.update(dask.config.config, jobs)

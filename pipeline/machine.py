@@ -2,15 +2,18 @@
 
 SLING_DEVICE: cpu (default), cuda (all GPUs; CUDA_VISIBLE_DEVICES hides some), one such as cuda:0,
 or several such as cuda:0,cuda:2. Several share every batch; how many they are changes no result.
-SLING_WORKERS: threads on the CPU (default: all cores).
+SLING_WORKERS: threads on the CPU (default: all cores that this process may use).
 """
 
 from __future__ import annotations
 
 import os
 import re
+from pathlib import Path
 
 from pipeline.errors import UserError
+
+LIMIT = Path("/sys/fs/cgroup/cpu.max")
 
 
 def devices() -> tuple[str, ...]:
@@ -66,5 +69,16 @@ def workers() -> int | None:
 
 
 def cores() -> int:
-    """How many threads or processes a stage may keep busy. Raises UserError."""
-    return workers() or os.cpu_count() or 1
+    """How many threads or processes may be kept busy here. Raises UserError.
+
+    SLING_WORKERS; else the cores that this process may run on, as far as its container's limit of
+    CPU time allows.
+    """
+    if said := workers():
+        return said
+    ours = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    try:
+        time, period = map(int, LIMIT.read_text().split())  # "max 100000" where there is none
+    except (OSError, ValueError):
+        return ours or 1
+    return min(ours or 1, -(-time // period))

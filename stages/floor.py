@@ -3,19 +3,19 @@
     python -m stages.floor band1
 
 Reads params.yaml alone and writes data/floor/<band>.json. A coarse map of launches without errors
-says where in the box a target is met, and a root search on the rig ends on it. `targets` holds the
-least sensitive draws: the floor. `ordinary` holds draws on the line through the middle of the box.
-Only the report may read them.
+says where in the box a target is met, and least sensitively; a root search on the rig ends on it. A
+target that is out of reach has no draw, and no launch at it lands. Only the report may read them.
 """
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from pipeline import errors
 from pipeline.errors import UserError
 from pipeline.files import write_json
-from pipeline.oracle.aim import least_sensitive_draw, ordinary_draw
+from pipeline.oracle.aim import least_sensitive_draw
 from pipeline.oracle.floor import errors_of, trial_seeds
 from pipeline.oracle.world import World
 from pipeline.stage import started
@@ -25,27 +25,31 @@ def main() -> None:
     params, band = started("band")
     if params.bands[band].source != "rig":
         raise UserError(f"band {band}: was recorded; only a band of the rig has a floor")
-    targets, floors = params.trials.targets, []
+    targets = params.trials.targets
     with World(band) as world:
         landing_map = world.landing_map(params.setup, params.floor.map_size)
-        for find in (least_sensitive_draw, ordinary_draw):
-            draws = world.hits(targets, [find(landing_map, target) for target in targets])
-            floors.append(errors_of(draws, world.landings(draws, trial_seeds(params)), params))
-    least, ordinary = floors
-    for target, one in least["targets"].items():
+        starts = [least_sensitive_draw(landing_map, target) for target in targets]
+        draws = world.hits(targets, starts)
+        floor = errors_of(draws, world.landings(draws, trial_seeds(params)), params)
+    for target, one in floor["targets"].items():
         if one["mean_error_m"] is None:
-            raise UserError(f"{band}: no launch at {target} m lands; move trials.targets inwards")
+            print(
+                f"warning: {band}: no launch lands at {target} m, which has no floor; raise"
+                " setup.max_force, widen setup.draw_y and setup.draw_z, or move trials.targets",
+                file=sys.stderr,
+            )
     content = {
         "band": band,
         "kind": "virtual",
-        **least,
-        "ordinary": ordinary,
+        **floor,
         "actuation_error_m": params.trials.actuation_error,
         "release_jitter": params.rig.release_jitter,
         "seed": params.trials.seed,
     }
     write_json(Path("data/floor", f"{band}.json"), content)
-    print(f"{band}: floor {100 * least['mean_error_m']:.2f} cm over {least['launches']} launches")
+    mean, landed = floor["mean_error_m"], floor["launches"] - floor["failed"]
+    said = "no launch lands" if mean is None else f"{100 * mean:.2f} cm over {landed} launches"
+    print(f"{band}: floor {said}")
 
 
 if __name__ == "__main__":

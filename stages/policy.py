@@ -15,20 +15,17 @@ import shutil
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from pipeline import errors
-from pipeline.files import replacing, write_json
 from pipeline.machine import devices, kind
 from pipeline.policy import robust
-from pipeline.policy.aim import ROBUST, simulator
+from pipeline.policy.aim import simulator
 from pipeline.policy.check import check, check_expected, figures, robust_figures, verdict
-from pipeline.policy.export import PLAIN, card, write_onnx, write_torchscript
-from pipeline.policy.landing_map import LandingMap, validation
-from pipeline.policy.landscape import Landscape
+from pipeline.policy.export import export
+from pipeline.policy.landing_map import LandingMap, landscape_of, validation
 from pipeline.policy.spread import load_samples
-from pipeline.policy.train import Policy, Trained, train
+from pipeline.policy.stored import PLAIN, ROBUST, Stored
+from pipeline.policy.train import Policy, train
 from pipeline.progress import Progress
 from pipeline.stage import expect_from, started
 from pipeline.theta import load_theta
@@ -38,10 +35,8 @@ EVERY = 1.0  # s, between two lines of a training
 
 def main() -> None:
     params, band, method = started("band", "method")
-    source = expect_from(
-        params.run, "theta", band, method, Path("data/theta", band, f"{method}.json")
-    )
-    theta = load_theta(source, band)
+    source = Path("data/theta", band, f"{method}.json")
+    theta = load_theta(expect_from(params.run, "theta", band, method, source), band)
     launcher = simulator(params, band, theta, device=devices())
     landing_map = LandingMap.simulate(
         launcher,
@@ -53,25 +48,25 @@ def main() -> None:
     )
     kept = Path(".checkpoints/policy", f"{band}-{method}.pt")
     told = Progress(f"policy-{band}-{method}", params.policy.iterations, "iterations", every=EVERY)
-    plain = train(Landscape([landing_map]), params.policy, kept, told)
+    plain = train(landscape_of([landing_map]), params.policy, kept, told)
     checked = check(plain.policy, launcher, params)
     training = figures(plain, checked)
 
-    folder = Path("data/policies", band, method)
-    landing_map.save(folder / "map.parquet", {"band": band, "method": method})
+    stored = Stored(params.run, band, method)
+    landing_map.save(stored.folder() / "map.parquet", {"band": band, "method": method})
     about = {"params": params, "band": band, "method": method, "theta": theta, "device": kind()}
     validated = landing_map.validation(params.policy.targets)
-    _write(folder, plain, about, kind=PLAIN, training=training, landing_map=validated)
+    export(plain, stored.folder(), kind=PLAIN, training=training, landing_map=validated, **about)
     print(f"{band} {method}: {verdict(training, checked.failures)}", flush=True)
 
-    shutil.rmtree(folder / ROBUST, ignore_errors=True)  # of an earlier run by other parameters
+    shutil.rmtree(stored.folder(ROBUST), ignore_errors=True)  # of an earlier run
     if method in params.policy.robust.methods:
         source = Path("data/confidence", band, f"{method}.json")
         samples = load_samples(params.run, source, band, method)
         if samples is None:
-            print(f"{band} {method}: no robust policy, for there is no {source}")
+            print(f"{band} {method}: no robust policy, for there are no samples in {source}")
         else:
-            _robust(folder / ROBUST, plain.policy, samples, launcher, about)
+            _robust(stored.folder(ROBUST), plain.policy, samples, launcher, about)
     kept.unlink(missing_ok=True)
 
 
@@ -82,25 +77,17 @@ def _robust(folder: Path, plain: Policy, samples: np.ndarray, launcher, about) -
     maps = robust.robust_maps(launcher, samples, middle, params)
     title = f"policy-{about['band']}-{about['method']}-robust"
     told = Progress(title, robust.STEPS, "steps", every=EVERY)
-    trained = robust.refine(plain, Landscape(maps, error), params.policy, told)
+    trained = robust.refine(plain, landscape_of(maps, error), params.policy, told)
     checked = check(trained.policy, launcher, params)
     expected = [check_expected(one, launcher, samples, params) for one in (trained.policy, plain)]
     training = robust_figures(trained, checked, *expected, len(maps), error)
     validated = validation(maps, params.policy.targets)
-    _write(folder, trained, about, kind=ROBUST, training=training, landing_map=validated)
+    export(trained, folder, kind=ROBUST, training=training, landing_map=validated, **about)
     ours, theirs = (100 * one.mean_error for one in expected)
     print(
         f"{about['band']} {about['method']}, robust: {verdict(training, checked.failures)};"
         f" expected over samples of θ and errors of the draw {ours:.2f} cm, plain {theirs:.2f} cm"
     )
-
-
-def _write(folder: Path, trained: Trained, about: dict, **figures) -> None:
-    with replacing(folder / "training.parquet") as temporary:
-        pq.write_table(pa.table(trained.curve), temporary)
-    write_onnx(trained.policy, folder / "policy.onnx")
-    write_torchscript(trained.policy, folder / "policy.pt")
-    write_json(folder / "card.json", card(trained.policy, **about, **figures))
 
 
 if __name__ == "__main__":

@@ -4,14 +4,18 @@
 
 Reads data/history/ and data/refined/<band>/<method>.parquet, data/episodes/<band>/ and
 data/mounting/<band>.json; writes data/theta/<band>/<method>.json, and samples of the posterior
-with profile curves to data/confidence/<band>/<method>.json. SLING_WORKERS says on how many threads.
+with profile curves to data/confidence/<band>/<method>.json. Where too many simulations around θ*
+fail to tell how sure it is, "confidence" is null and there are no samples. SLING_WORKERS says on
+how many threads.
 """
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from pipeline import errors
+from pipeline.confidence.rounds import NoConfidence
 from pipeline.confidence.summary import confidence
 from pipeline.files import write_json
 from pipeline.identify.history import History, theta_content
@@ -29,16 +33,24 @@ def main() -> None:
     ]
     content = theta_content(History.load(method, THETA, *sources), band)
     episode, sling = load_episode(band), load_sling(params, band)
-    known, kept = confidence(params, method, episode, sling, content, workers=workers())
+    try:
+        known, kept = confidence(params, method, episode, sling, content, workers=workers())
+    except NoConfidence as error:  # θ* is what it is, and all that follows does without
+        print(f"warning: {method}: {error}", file=sys.stderr)
+        known, kept = None, {"samples": []}
     content["confidence"] = known
     write_json(Path("data/confidence", band, f"{method}.json"), kept | {"band": band})
     write_json(Path("data/theta", band, f"{method}.json"), content)
     print(f"{band} {method}: loss {content['loss']['total']:.5g}")
     for name, value in content["theta"].items():
-        about = known["parameters"][name]
-        what = "fixed" if about.get("fixed") else f"{about['low']:.4g} to {about['high']:.4g}"
-        word = "" if about["identifiable"] or about.get("fixed") else ", not identifiable"
-        print(f"  {name} {value:.4g} ({what}{word})")
+        print(f"  {name} {value:.4g}{_trust(known['parameters'][name]) if known else ''}")
+
+
+def _trust(about: dict) -> str:
+    if about.get("fixed"):
+        return " (fixed)"
+    word = "" if about["identifiable"] else ", not identifiable"
+    return f" ({about['low']:.4g} to {about['high']:.4g}{word})"
 
 
 if __name__ == "__main__":

@@ -180,7 +180,7 @@ def test_aim_by_a_robust_policy_that_is_not_there(tmp_path: Path) -> None:
     line = refused(
         sling("aim", "--band", "band1", "--target", "1.9", "--robust", folder=tmp_path), 1
     )
-    assert "robust/policy.onnx: no such file" in line
+    assert "robust/policy.onnx: missing" in line
     assert "dvc repro policy@band1-sling2sim2real_taut" in line
 
 
@@ -193,7 +193,7 @@ def test_aim_by_an_ablation_names_its_own_stages(tmp_path: Path) -> None:
     theta = tmp_path / "data/theta/band1"
     shutil.copy(theta / "sling2sim2real_taut.json", theta / "de.json")
     assert refused(sling(*aim, folder=tmp_path), 1).endswith(
-        "policy.onnx: no such file; `dvc repro ablation_policy@band1-de` makes it"
+        "policy.onnx: missing; `dvc repro ablation_policy@band1-de` makes it"
     )
 
 

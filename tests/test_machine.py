@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import pytest
 
 from pipeline import machine
@@ -68,3 +71,27 @@ def test_anything_else_is_refused(monkeypatch, name: str, value: str) -> None:
     monkeypatch.setenv(f"SLING_{name}", value)
     with pytest.raises(UserError, match=f"SLING_{name} must be"):
         {"DEVICE": machine.devices, "WORKERS": machine.workers}[name]()
+
+
+@pytest.mark.parametrize(
+    ("limit", "expected"),
+    [
+        (None, 8),
+        ("max 100000\n", 8),
+        ("250000 100000\n", 3),
+        ("50000 100000\n", 1),
+        ("9900000 100000\n", 8),
+    ],
+)
+def test_cores_are_those_that_this_process_may_use(
+    monkeypatch, tmp_path: Path, limit: str | None, expected: int
+) -> None:
+    """As its container's limit has it; SLING_WORKERS comes first."""
+    monkeypatch.delenv("SLING_WORKERS", raising=False)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(8)), raising=False)
+    monkeypatch.setattr(machine, "LIMIT", tmp_path / "cpu.max")
+    if limit:
+        machine.LIMIT.write_text(limit)
+    assert machine.cores() == expected
+    monkeypatch.setenv("SLING_WORKERS", "20")
+    assert machine.cores() == 20

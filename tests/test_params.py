@@ -17,6 +17,10 @@ from pipeline.params import Params, load, pairs, parse
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "params.yaml").read_text(encoding="utf-8")
 CONTENT = YAML(typ="safe").load(TEXT)
+INSTRUMENTS_ALONE = {
+    "fixed": {name: box["low"] for name, box in CONTENT["parameters"].items()},
+    "nuisances": {"camera_delay": [-0.003, 0.003]},
+}
 
 
 def leaves(node: object, path: tuple = ()) -> list[tuple[tuple, object]]:
@@ -224,10 +228,11 @@ def test_exact_lines() -> None:
             {"poissons_ratio": 0.2},
             "methods.de.fixed.poissons_ratio: must be between 0.3 and 0.49, got 0.2",
         ),
+        ("methods.de.fixed", INSTRUMENTS_ALONE["fixed"], "methods.de.fixed: names every parameter"),
         (
-            "methods.de.fixed",
-            {name: box["low"] for name, box in CONTENT["parameters"].items()},
-            "methods.de.fixed: names every parameter",
+            "methods.de",
+            CONTENT["methods"]["de"] | INSTRUMENTS_ALONE,
+            "methods.de.fixed: names every parameter, so neither one of them nor air_drag",
         ),
         (
             "methods.de.nuisances",
@@ -293,6 +298,8 @@ def test_what_a_method_may_ask_for() -> None:
     }
     held = {"nuisances": {"camera_delay": [0, 0.01]}, "fixed": {"camera_delay": 0.005}}
     assert parse(changed(("methods", "de"), base | held)).methods["de"].fixed["camera_delay"]
+    drag = INSTRUMENTS_ALONE | {"nuisances": {"air_drag": [0, 8]}}
+    assert len(parse(changed(("methods", "de"), base | drag)).methods["de"].fixed) == 5
 
 
 def test_targets_beyond_the_paper_area_are_refused_though_trained() -> None:

@@ -24,6 +24,10 @@ FAST = 0.25  # s after the release in which a stamp's jitter moves the picture
 STAR = np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])  # release and camera of the batches, in steps
 
 
+class NoConfidence(UserError):
+    """Too few simulations around θ* succeed to tell how sure it is."""
+
+
 @dataclass(frozen=True)
 class Tolerances:
     """Standard deviations of what the recording leaves open.
@@ -151,13 +155,16 @@ class Rounds:
 
         Args:
             heat: Weights are divided by it.
+
+        Raises:
+            NoConfidence: Too many of the simulations fail.
         """
         star = STAR[np.arange(len(even) // LANES) % len(STAR)]
         rollouts = self.simulate(self.axes.physical(even), place.times + star * place.steps)
         z = place.standardised(even)
         good = np.concatenate([[why is None for why in one.failure] for one in rollouts])
         if good.sum() < 2 * monomials(z).shape[1]:
-            raise UserError(
+            raise NoConfidence(
                 f"episode of {self.episode.band}: {(~good).sum()} of {len(good)} simulations near"
                 " the best parameters fail; how sure they are cannot be told"
             )

@@ -40,7 +40,7 @@ def confidence(
         content: Of the θ file: "theta" and "nuisances".
 
     Raises:
-        UserError: Too many simulations around θ* fail.
+        NoConfidence: Too many simulations around θ* fail.
     """
     episode = corrected(episode, content["nuisances"])
     peak = np.linalg.norm(episode.force, axis=1).max()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 import re
 import tempfile
 import threading
@@ -84,20 +83,21 @@ def _theta(root: Path, band: str, method: str) -> Iterator[str]:
 def _policy(root: Path, band: str, method: str) -> Iterator[str]:
     import pandas as pd
 
-    from pipeline.policy.aim import ROBUST
+    from pipeline.params import load
+    from pipeline.policy.stored import ROBUST, Stored
     from pipeline.report.figures import policy
     from pipeline.report.looks import looks
     from pipeline.report.tables.cells import markdown
     from pipeline.report.tables.policies import policies
 
-    folder, named = _file(root, "policies", band, method), looks([method])
-    second = folder / ROBUST / "card.json"
+    stored = Stored(load(root / "params.yaml").run, band, method, root)
+    named = looks([method])
     result = SimpleNamespace(
         band=band,
         method=method,
-        training=pd.read_parquet(folder / "training.parquet"),
-        card=json.loads((folder / "card.json").read_text("utf-8")),
-        robust_card=json.loads(second.read_text("utf-8")) if second.is_file() else None,
+        training=pd.read_parquet(stored.folder() / "training.parquet"),
+        card=stored.card(),
+        robust_card=stored.card(ROBUST) if ROBUST in stored.kinds() else None,
     )
     yield _drawn("training", lambda path: policy.training(path, {method: result}, named))
     yield markdown(policies([result], named))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from itertools import zip_longest
 from pathlib import Path
 from threading import Event, Thread
 
@@ -60,8 +61,38 @@ def run_stage(
         StageFailed: With the stage's clear line.
         Cancelled: All its processes have ended.
     """
-    command = [sys.executable, "-P", whole.__file__, "--wait-for-lock", "repro", "-s", name]
+    status, said = dvc(
+        root,
+        ("repro", "-s", name),
+        environment=environment,
+        on_line=on_line,
+        cancelled=cancelled,
+    )
+    if status == 0:
+        return any(line == f"Running stage '{name}':" for line in said)
+    raise StageFailed(f"{name}: {_reason(said, status)}")
+
+
+def dvc(
+    root: Path,
+    arguments: Sequence[str],
+    *,
+    environment: Mapping[str, str],
+    on_line: Callable[[str], None] = lambda line: None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> tuple[int, list[str]]:
+    """A DVC command in `root`, which waits for DVC's lock; see `run_stage`.
+
+    Returns:
+        Its exit status, and all lines that it said.
+
+    Raises:
+        Cancelled: All its processes have ended.
+    """
+    command = [sys.executable, "-P", whole.__file__, "--wait-for-lock", *arguments]
     said: list[str] = []
+    if cancelled():
+        raise Cancelled
     with _guarded(command, root, environment, cancelled) as process:
         for line in process.stdout:
             line = line.rstrip("\n")
@@ -69,11 +100,9 @@ def run_stage(
             ending = cancelled() or (process.poll() or 0) < 0  # what an interrupt makes it say
             if not (ending or CHATTER.match(line)):
                 on_line(line)
-    if process.returncode == 0:
-        return any(line == f"Running stage '{name}':" for line in said)
-    if cancelled():
-        raise Cancelled(name)
-    raise StageFailed(f"{name}: {_reason(said, process.returncode)}")
+    if process.returncode and cancelled():
+        raise Cancelled
+    return process.returncode, said
 
 
 @contextmanager
@@ -95,8 +124,7 @@ def _guarded(
         start_new_session=True,  # a terminal's Ctrl-C is for us alone
         close_fds=False,  # the flow's lock is held until its stages have ended, see run.py
     )
-    group = int(process.stdout.readline() or 0)
-    ended = Event()
+    group, ended = 0, Event()
 
     def watch() -> None:
         while not (ended.wait(0.1) or cancelled() or process.poll() is not None):
@@ -109,6 +137,10 @@ def _guarded(
     watcher = Thread(target=watch, daemon=True)
     watcher.start()
     try:
+        for line in process.stdout:  # the loader's own come first, such as on LD_PRELOAD
+            if line.strip().isdecimal():
+                group = int(line)
+                break
         yield process
     finally:
         ended.set()
@@ -129,7 +161,9 @@ def _reason(said: list[str], status: int) -> str:
     own = [line for line in said if not CHATTER.match(line)]
     exits = [int(found[1]) for line in said if (found := COMMAND_FAILED.match(line))]
     if not exits:  # DVC failed before or after the stage's command
-        own += [found[1] for line in said if (found := DVC_FAILED.match(line))]
+        for line, following in zip_longest(said, said[1:], fillvalue=""):
+            if found := DVC_FAILED.match(line):  # "... blocked by:", and by whom
+                own.append(f"{found[1]} {following.strip()}" if line.endswith(":") else found[1])
     if 128 < status < 192:  # as the guard says it; DVC's own is 255
         return f"DVC was killed by signal {status - 128}"
     errors = [found[1] for line in own if (found := OWN_ERROR.match(line))]

@@ -26,6 +26,7 @@ from pipeline.flow.worker import Order, introduce, versions, work
 ANSWER = 10.0  # seconds that a scheduler has to answer
 END = 20.0  # seconds that a cancelled stage has to end its processes
 LOOK = 5.0  # seconds between looks at which workers are there
+TOKEN = ".checkpoints/cluster-"
 GPU = "GPU"  # Dask's resource, as in `dask worker --resources GPU=1`
 
 
@@ -49,9 +50,7 @@ class Cluster:
         self._shares: dict[str, bool] = {}  # whether a worker works in the head's copy, by address
         self._sent: set[str] = set()  # stages whose outputs the remote has
         self._lock = threading.Lock()
-        self.token = f".checkpoints/cluster-{uuid.uuid4().hex}"
-        (root / self.token).parent.mkdir(exist_ok=True)
-        (root / self.token).touch()
+        self.token = f"{TOKEN}{uuid.uuid4().hex}"
 
     def __enter__(self) -> Cluster:
         return self
@@ -86,7 +85,9 @@ class Cluster:
             StageFailed, Cancelled: As `child.run_stage`.
         """
         with self._lock:
-            self._needs = self._needs or exchange.needs(root)
+            if not self._needs:
+                self._needs = exchange.needs(root)
+                self._begin()
         needs = self._needs[name]
         if not needs.travels:
             on_line("runs on the head: what it makes is Git's, not DVC's")
@@ -96,7 +97,7 @@ class Cluster:
         workers = self._some(on_line, cancelled)
         if not all(self._shares[address] for address in workers):
             exchange.expect_remote(root)
-            self._send(needs.producers)
+            self._send(needs.producers, cancelled)
         resources = {}
         if needs.gpu and any(one["resources"].get(GPU) for one in workers.values()):
             resources = {GPU: 1}
@@ -112,10 +113,18 @@ class Cluster:
         ran, entry = self._result(order, resources, on_line, cancelled)
         if entry:
             exchange.merge(root, {name: entry})
-            exchange.transfer(root, "pull", (name,))
+            exchange.transfer(root, "pull", (name,), cancelled)
             with self._lock:
                 self._sent.add(name)
         return ran
+
+    def _begin(self) -> None:
+        """Leave the token, by which workers know the head's folder; those of killed flows go."""
+        token = self.root / self.token
+        token.parent.mkdir(exist_ok=True)
+        for old in self.root.glob(f"{TOKEN}*"):
+            old.unlink()
+        token.touch()
 
     def _some(self, on_line, cancelled) -> dict[str, dict]:
         """The workers, once there are some. Raises UserError, Cancelled."""
@@ -160,11 +169,11 @@ class Cluster:
     def _gone(self) -> UserError:
         return UserError(f"the Dask scheduler at {self.address} is gone")
 
-    def _send(self, producers: tuple[str, ...]) -> None:
-        """Push what the remote may lack of what these stages made."""
+    def _send(self, producers: tuple[str, ...], cancelled: Callable[[], bool]) -> None:
+        """Push what the remote may lack of what these stages made. Raises as `transfer`."""
         with self._lock:
             new = tuple(one for one in producers if one not in self._sent)
-            exchange.transfer(self.root, "push", new)
+            exchange.transfer(self.root, "push", new, cancelled)
             self._sent.update(new)
 
     def _result(self, order, resources, on_line, cancelled) -> tuple[bool, dict | None]:

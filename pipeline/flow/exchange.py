@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import os
-import subprocess
-import sys
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import UserError
-from pipeline.files import write_text
-from pipeline.flow import whole
+from pipeline.files import replacing
+from pipeline.flow import child, whole
 
 ALWAYS = ("dvc.yaml", "params.yaml")  # what DVC itself reads, whatever the stage
 
@@ -116,13 +114,15 @@ def merge(root: Path, new: Mapping[str, dict]) -> None:
     with locked(root):
         before = text = path.read_text(encoding="utf-8") if path.is_file() else whole.HEAD
         for name, entry in new.items():
-            text = text and whole.put(text, name, entry)
+            text = None if text is None else whole.put(text, name, entry)
         if text is None:  # with more in it than stages
             content = _read(path)
             content.setdefault("stages", {}).update(new)
             text = dumps_yaml(content)
         if text != before:
-            write_text(path, text)
+            with replacing(path) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+                whole.sync(temporary)
 
 
 def _read(path: Path) -> dict:
@@ -136,6 +136,7 @@ def locked(root: Path) -> Iterator[None]:
     """Hold DVC's lock of a working copy; wait for it."""
     from dvc.repo import Repo
 
+    whole.sign_locks()
     with Repo(str(root), _wait_for_lock=True) as repo, repo.lock:
         yield
 
@@ -151,22 +152,26 @@ def expect_remote(root: Path) -> None:
         )
 
 
-def transfer(root: Path, command: str, stages: tuple[str, ...]) -> None:
-    """`dvc push` or `dvc pull` what these stages made, by the default remote. Raises UserError.
+def transfer(
+    root: Path, command: str, stages: tuple[str, ...], cancelled: Callable[[], bool]
+) -> None:
+    """`dvc push` or `dvc pull` what these stages made, by the default remote.
 
     What lies where a pulled file belongs gives way, as it does when DVC runs a stage.
+
+    Raises:
+        UserError: It failed.
+        child.Cancelled: `cancelled`, asked several times a second, became true.
     """
     if not stages:
         return
-    done = subprocess.run(
-        [sys.executable, "-m", "dvc", "--wait-for-lock", command]
-        + (["--force"] if command == "pull" else [])
-        + list(stages),
-        cwd=root,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
+    force = ("--force",) if command == "pull" else ()
+    status, said = child.dvc(
+        root, (command, *force, *stages), environment=os.environ, cancelled=cancelled
     )
-    if done.returncode:
-        said = " ".join((done.stdout + done.stderr).partition("ERROR: ")[2].split())
-        raise UserError(f"{root}: dvc {command} {' '.join(stages)}: {said or done.stderr.strip()}")
+    if status:
+        text = "\n".join(said)
+        why = " ".join((text.partition("ERROR: ")[2] or text).split())
+        raise UserError(
+            f"{root}: dvc {command} {' '.join(stages)}: {why or f'exit status {status}'}"
+        )

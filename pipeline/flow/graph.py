@@ -130,21 +130,6 @@ class Seen:
             return False
 
 
-def stages(root: Path) -> dict[str, Stage]:
-    """All stages by name, producers before consumers, always in the same order. UserError."""
-    return Graph(root).stages
-
-
-def stale(root: Path) -> list[str]:
-    """Stages that DVC would run as things are, and all their consumers, in that order."""
-    return Graph(root).stale()
-
-
-def is_fresh(root: Path, name: str) -> bool:
-    """Whether DVC would skip this stage as things are; `Graph.is_fresh` where many are asked."""
-    return Graph(root).is_fresh(name)
-
-
 def _stage(stage, producers: list[str]) -> Stage:
     step, _, item = stage.name.partition("@")
     gpu = bool((stage.meta or {}).get("gpu"))
@@ -162,6 +147,7 @@ def _clear() -> Iterator[None]:
     except LockError as error:
         raise UserError(
             "another DVC command is at work in this project; wait for its end, then try again"
+            " (if there is none on any machine: rm .dvc/tmp/lock)"
         ) from error
     except DvcException as error:
         raise UserError(f"DVC: {' '.join(str(error).split())}") from error

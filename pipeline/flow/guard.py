@@ -6,37 +6,53 @@ Whoever starts it holds the other end of its stdin: once that is closed, on purp
 holder died, the command's process group is interrupted as by Ctrl-C and, after a grace, killed. So
 too with what the command leaves behind when it ends. The first line on stdout is the group's
 number; the rest is the command's. It imports the standard library alone, to start in no time.
+Orphans of the command become its own (on Linux), for not every process 1 looks at its dead.
 """
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 
 GRACE = 8.0  # s from the interrupt to the kill
+PR_SET_CHILD_SUBREAPER = 36
 
 
-def end_group(group: int, grace: float = GRACE, first: int = signal.SIGINT) -> None:
-    """Interrupt the process group, wait until it is empty, and kill what is left after `grace`."""
+def end_group(
+    group: int, grace: float = GRACE, first: int = signal.SIGINT, reap: bool = False
+) -> None:
+    """Interrupt the process group, wait until it is empty, and kill what is left after `grace`.
+
+    Args:
+        group: Its number.
+        grace: In seconds.
+        first: The signal that interrupts.
+        reap: Whether its dead are ours, and nobody else waits for them: they count as members.
+    """
     deadline = time.monotonic() + grace
-    try:
+    with suppress(ProcessLookupError, PermissionError):  # nobody, or nobody of ours
         os.killpg(group, first)  # DVC gives its locks back, a stage its temporary files
         while time.monotonic() < deadline:
+            with suppress(ChildProcessError):
+                while reap and os.waitpid(-group, os.WNOHANG)[0]:
+                    pass
             os.killpg(group, 0)  # asks only
             time.sleep(0.02)
         os.killpg(group, signal.SIGKILL)
-    except ProcessLookupError:
-        return
 
 
 def main(command: list[str]) -> int:
     """Run `command`; returns its exit status, as a shell has it."""
     for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(one, lambda *_: None)  # ours ends by stdin; the command gets the default
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     child = subprocess.Popen(command, stdin=subprocess.DEVNULL, process_group=0)
     print(child.pid, flush=True)
 
@@ -47,7 +63,7 @@ def main(command: list[str]) -> int:
 
     threading.Thread(target=ended_from_above, daemon=True).start()
     status = child.wait()
-    end_group(child.pid, first=signal.SIGTERM)  # without the words of an interrupt
+    end_group(child.pid, first=signal.SIGTERM, reap=True)  # without the words of an interrupt
     return status if status >= 0 else 128 - status
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+import socket
 from pathlib import Path
 
 from pipeline.files import write_json
+from pipeline.flow import whole
 
 COPIES = (".dvc/cache", "data", "reports")  # where DVC copies to
 HALF = re.compile(r"\.[\w-]{22}\.tmp")  # its names of what it has not copied to the end
@@ -14,18 +16,52 @@ HALF = re.compile(r"\.[\w-]{22}\.tmp")  # its names of what it has not copied to
 
 def mend(root: Path) -> None:
     """Clear up in a working copy. Call it while no other flow runs there."""
-    from dvc.lock import Lock, LockError
+    from dvc.config import Config
+    from dvc.exceptions import DvcException
+    from dvc.lock import make_lock
 
     folder = Path(root, ".dvc", "tmp")
+
+    def lock(name: str):
+        if hardlink:
+            _free(folder / name)
+        return make_lock(str(folder / name), tmp_dir=str(folder), hardlink_lock=hardlink)
+
+    whole.sign_locks()
     try:
-        with Lock(str(folder / "lock")):  # whoever copies holds it
+        hardlink = Config(str(folder.parent))["core"].get("hardlink_lock", False)
+        with lock("lock"):  # whoever copies holds it
             for file in (file for top in COPIES for file in Path(root, top).rglob(".*.tmp")):
                 if HALF.fullmatch(file.name):
                     file.unlink(missing_ok=True)
-        with Lock(str(folder / "rwlock.lock")):
+        with lock("rwlock.lock"):
             _release(folder / "rwlock")
-    except LockError:  # a DVC is at work: it is for the graph to say so
+    except DvcException:  # such as that a DVC is at work: it is for the graph to say so
         return
+
+
+def _free(path: Path) -> None:
+    """Make room for a hardlink lock, whose name must not be there. Raises DVC's LockError.
+
+    DVC's other kind of lock leaves its file behind; a hardlink lock is left by who was killed. Who
+    holds one on another machine, or did not sign it (whole.sign_locks), is not known here.
+    """
+    import psutil
+    from dvc.lock import Lock
+
+    try:
+        said = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return
+    _, *holder = said.rsplit("|", 3)
+    if len(holder) == 3:
+        host, pid, _ = holder
+        if host == socket.gethostname() and not psutil.pid_exists(int(pid)):
+            path.unlink()
+            path.with_name(Path(said).name).unlink(missing_ok=True)
+    elif not said or said.strip().isdecimal():
+        with Lock(str(path)):  # unless it is held
+            path.unlink()
 
 
 def _release(path: Path) -> None:

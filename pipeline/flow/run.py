@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from pipeline import machine
 from pipeline.errors import UserError
 from pipeline.flow import child, guard, locks
 from pipeline.flow.board import Board, width
@@ -28,8 +29,8 @@ def run(
 
     Args:
         root: The working copy, with dvc.yaml.
-        workers: Stages at a time, among which the cores are shared out; default as many as there
-            are cores, at most as many as can run at once.
+        workers: Stages at a time, among which the cores of `machine.cores` are shared out where
+            they run here; default as many as there are cores, at most as many as can run at once.
         gpus: Stages with `gpu` at a time, among which SLING_DEVICE is shared out; default 1 where
             that is CUDA, else no limit.
         place: Runs one stage somewhere, called and answering as `child.run_stage`.
@@ -41,17 +42,17 @@ def run(
         UserError: The line of the first stage that failed, or why nothing could run.
         KeyboardInterrupt: After all children have ended.
     """
-    start = time.monotonic()
+    start, here = time.monotonic(), place is child.run_stage
     with alone(root):
         locks.mend(root)
         graph = Graph(root)
         stale = [graph.stages[name] for name in graph.stale()]
         if not stale:
             return f"all {len(graph.stages)} stages are fresh ({lasted(start)})"
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        cores = machine.cores()
         workers = workers or min(cores, width(stale))
-        environment = stage_environment(max(1, cores // workers))
-        shares = gpu_shares(environment, gpus, here=place is child.run_stage)
+        environment = stage_environment(max(1, cores // workers) if here else cores)
+        shares = gpu_shares(environment, gpus, here)
         board = Board(stale, workers, shares)
         say(
             f"{len(stale)} of {len(graph.stages)} stages are stale or follow from such;"
@@ -67,11 +68,15 @@ def run(
 
 
 def stage_environment(cores: int) -> dict[str, str]:
-    """What a stage gets: all that is exported here, `cores` threads, and this Python first."""
+    """What a stage gets: all that is exported here, `cores` threads, and this Python first.
+
+    DVC starts stages by $SHELL: a C shell would read its settings, and nologin is none.
+    """
     path = [str(Path(sys.executable).parent), *filter(None, [os.environ.get("PATH")])]
     return {
         **os.environ,
         "PATH": os.pathsep.join(path),
+        "SHELL": "/bin/sh",
         "PYTHONUNBUFFERED": "1",  # its lines as they come
         "SLING_WORKERS": str(cores),
         "OMP_NUM_THREADS": str(cores),
@@ -93,9 +98,7 @@ def gpu_shares(
         return [{}] if cuda else None
     if gpus == 1 or not (cuda and here):
         return [{} for _ in range(gpus)]
-    from pipeline.machine import devices
-
-    names = devices()
+    names = machine.devices()
     return [
         {"SLING_DEVICE": ",".join(names[n::gpus]) or names[n % len(names)]} for n in range(gpus)
     ]

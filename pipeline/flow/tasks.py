@@ -18,6 +18,7 @@ from pipeline.flow.board import Board
 from pipeline.flow.graph import Graph, Stage
 
 GPU_LIMIT = "sling-gpu"  # a Prefect concurrency limit
+SLOT = 20.0  # s that it may take to give a slot
 Place = Callable[..., bool]
 
 
@@ -71,7 +72,12 @@ class Tasks:
         slot = ExitStack()
         with suppress(Exception):  # the board keeps the limit within this flow anyway
             slot.enter_context(
-                concurrency(GPU_LIMIT, strict=True, raise_on_lease_renewal_failure=False)
+                concurrency(
+                    GPU_LIMIT,
+                    strict=True,
+                    timeout_seconds=SLOT,  # deaf to Ctrl-C meanwhile
+                    raise_on_lease_renewal_failure=False,
+                )
             )
         try:
             yield
@@ -89,7 +95,10 @@ def perform(root: Path, board: Board, tasks: Tasks) -> None:
             say(f"seen at {url}")
             try:
                 _prepare(board)
-                _flow(board, tasks)(return_state=True)
+                state = _flow(board, tasks)(return_state=True)
+                if not tasks.interrupted and (board.waiting or board.running):
+                    ended = " ".join((state.message or state.name).split())
+                    raise UserError(f"Prefect ended the flow early ({ended}); run it again")
             finally:
                 _flush()
     except UserError:
@@ -99,8 +108,8 @@ def perform(root: Path, board: Board, tasks: Tasks) -> None:
             say("Prefect's server went away before the end; its history lacks some of it")
         elif not tasks.interrupted:
             raise UserError(
-                f"Prefect failed ({type(error).__name__}: {error}); `dvc repro` does the same"
-                " without it, one stage at a time"
+                f"Prefect failed ({type(error).__name__}: {' '.join(str(error).split())});"
+                " `dvc repro` does the same without it, one stage at a time"
             ) from error
     if tasks.interrupted:
         raise KeyboardInterrupt
@@ -138,10 +147,6 @@ def _flow(board: Board, tasks: Tasks):
         futures[stage.name] = future = task.submit(stage, share, wait_for=producers)
         future.add_done_callback(lambda _: ended.put(stage))
 
-    def wait(timeout: float | None = None) -> None:
-        stage = ended.get(timeout=timeout)
-        board.done(stage, _outcome(futures[stage.name], stage))
-
     def flow():
         try:
             while True:
@@ -149,14 +154,16 @@ def _flow(board: Board, tasks: Tasks):
                     submit(*found)
                 if not board.running:
                     break
-                wait()
+                stage = ended.get()
+                board.done(stage, _outcome(futures[stage.name], stage))
         except (KeyboardInterrupt, TerminationSignal):
             tasks.interrupted = True
             tasks.cancelled.set()
             say("ending the stages that run")
             board.stop()
-            while not futures.keys().isdisjoint(board.running):
-                wait(guard.GRACE + 15)
+            stages = tasks.graph.stages
+            for name in futures.keys() & board.running:  # who ended as it came may be in no queue
+                board.done(stages[name], _outcome(futures[name], stages[name], guard.GRACE + 15))
             return Cancelled(message=board.summary())
         except BaseException:
             tasks.cancelled.set()  # Prefect waits for the threads
@@ -177,19 +184,20 @@ def _flow(board: Board, tasks: Tasks):
     return tagged
 
 
-def _outcome(future, stage: Stage) -> bool | UserError:
-    """What a task ended with; a fault of ours is a failed stage too."""
+def _outcome(future, stage: Stage, timeout: float | None = None) -> bool | UserError:
+    """What a task ends with, within so many seconds; a fault of ours is a failed stage too."""
     from prefect.exceptions import CancelledRun
 
     try:
-        return future.result()
+        return future.result(timeout=timeout)
     except UserError as error:
         return error
     except CancelledRun:
         return child.StageFailed(f"{stage.name}: interrupted")
     except Exception as error:
         logging.getLogger(__name__).debug("%s", stage.name, exc_info=error)
-        return child.StageFailed(f"{stage.name}: {type(error).__name__}: {error}")
+        said = " ".join(str(error).split())
+        return child.StageFailed(f"{stage.name}: {type(error).__name__}: {said}")
 
 
 def _flush() -> None:

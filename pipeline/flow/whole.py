@@ -54,6 +54,7 @@ def main() -> int:
     from dvc.stage.serialize import to_lockfile
     from dvc.utils.serialize import _common
 
+    sign_locks()
     edit = rwlock._edit_rwlock
     rwlock._edit_rwlock = lambda folder, fs, hardlink: edit(folder, Renaming(fs), hardlink)
     in_place, of_all = _common._dump_data, Lockfile.dump_stages
@@ -61,6 +62,7 @@ def main() -> int:
     def replacing(path, data, dumper, fs=None, **more) -> None:
         temporary = f"{path}.tmp"  # DVC's own lock keeps others away; the next one writes over it
         in_place(temporary, data, dumper, fs, **more)
+        sync(temporary)
         os.replace(temporary, path)
 
     def of_one(self, stages, **more) -> None:
@@ -68,7 +70,7 @@ def main() -> int:
         text = path.read_text(encoding="utf-8") if path.exists() else HEAD
         for stage in stages:
             for name, entry in to_lockfile(stage, **more).items():
-                text = text and put(text, name, entry)
+                text = None if text is None else put(text, name, entry)
         if text is None:
             return of_all(self, stages, **more)
         replacing(path, text, lambda data, file: file.write(data))
@@ -76,6 +78,23 @@ def main() -> int:
 
     _common._dump_data, Lockfile.dump_stages = replacing, of_one
     return dvc()
+
+
+def sync(path: str | Path) -> None:
+    """Have a file on the disk: renamed before that, it may be empty after a power cut."""
+    with open(path, "r+b") as file:
+        os.fsync(file.fileno())
+
+
+def sign_locks() -> None:
+    """Have DVC's hardlink locks say who holds them, which it hashes away: host and process.
+
+    So `locks.mend` knows those of the dead. For this process.
+    """
+    import flufl.lock
+    from dvc.lock import HardlinkLock
+
+    HardlinkLock._set_claimfile = flufl.lock.Lock._set_claimfile
 
 
 def put(text: str, name: str, entry: dict) -> str | None:

@@ -94,9 +94,9 @@ def work(order: Order, topic: str) -> tuple[bool, dict | None]:
             raise UserError(f"{order.name}: refused by worker {worker.address}: {copy}: {differs}")
         exchange.expect_remote(copy)
         exchange.merge(copy, order.entries)
-        exchange.transfer(copy, "pull", order.producers)
+        exchange.transfer(copy, "pull", order.producers, cancelled)
         ran = run()
-        exchange.transfer(copy, "push", (order.name,))
+        exchange.transfer(copy, "push", (order.name,), cancelled)
         return ran, exchange.entries(copy, (order.name,))[order.name]
     except child.Cancelled:
         raise Reschedule from None  # if anyone still wants it
@@ -110,8 +110,6 @@ def environment(threads: int) -> dict[str, str]:
     Args:
         threads: Stages that the worker runs at a time. SLING_WORKERS, where set, is the share.
     """
-    from dask.system import CPU_COUNT  # as the job's limits have it, not the machine
-
-    share = machine.workers() or max(1, CPU_COUNT // threads)
+    share = machine.workers() or max(1, machine.cores() // threads)
     blas = ("MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")  # Dask sets them for its own threads
     return {key: value for key, value in stage_environment(share).items() if key not in blas}

@@ -16,6 +16,7 @@ from pipeline.identify.loss import TERMS, EpisodeLoss
 from pipeline.identify.space import Space
 from pipeline.sling.interaction import Rollouts, interact
 
+NOT_FINITE = "the loss is not finite"  # the one failure that depends on the weights
 SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
 
 simulated = partial(interact, fetch=False)  # the loss is computed where the rollouts are
@@ -128,7 +129,7 @@ class Evaluator:
             terms = self.loss.terms(rollouts, nuisances)
             finite = np.isfinite(self.loss.total(terms))
         failure = [
-            reason or (None if good else "the loss is not finite")
+            reason or (None if good else NOT_FINITE)
             for reason, good in zip(rollouts.failure, finite, strict=True)
         ]
         return terms, failure

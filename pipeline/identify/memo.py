@@ -15,10 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.files import replacing
-from pipeline.identify.evaluate import Evaluation, Evaluator
+from pipeline.identify.evaluate import NOT_FINITE, Evaluation, Evaluator
 from pipeline.identify.loss import TERMS
-
-NOT_FINITE = "the loss is not finite"  # the one failure that depends on the weights
 
 
 class Memo:

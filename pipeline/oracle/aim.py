@@ -2,7 +2,7 @@
 
 A target is met by a whole curve of draws. The oracle takes the one whose landing depends least on
 where exactly the band is drawn: whatever a policy knows, it has no less error from a draw that is
-off. `ordinary_draw` has no such foresight.
+off. The draw for a target that is out of reach is NaN.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.errors import UserError
 from pipeline.policy.landing_map import LandingMap
 
 Land = Callable[[np.ndarray], float]
@@ -21,7 +20,6 @@ FINE = 401  # nodes along y and z between which the map is searched
 INSET = 2e-3  # m from the edge of the box, which leaves room for the root search
 NEAR = 2e-4  # m of landing that count as a hit
 FIRST_STEP, LAUNCHES = 2e-3, 12  # of the root search: share of the draw's length, and how many
-REACH = "widen setup.draw_y and setup.draw_z, or move trials.targets"
 
 
 def sensitivity(landing_map: LandingMap, draws: np.ndarray, step: float = 1e-3) -> np.ndarray:
@@ -34,7 +32,7 @@ def sensitivity(landing_map: LandingMap, draws: np.ndarray, step: float = 1e-3) 
 def least_sensitive_draw(landing_map: LandingMap, target: float) -> np.ndarray:
     """Of the draws that the map lands on `target` [m], the least sensitive one, shape (2,).
 
-    Raises UserError where the box, within the force limit, has none.
+    NaN where the box, within the force limit, has none.
     """
     axes = [
         np.linspace(edges[0] + INSET, edges[-1] - INSET, FINE)
@@ -45,31 +43,13 @@ def least_sensitive_draw(landing_map: LandingMap, target: float) -> np.ndarray:
     here = off[:-1, :-1]
     hits = grid[:-1, :-1][(here * off[1:, :-1] <= 0) | (here * off[:-1, 1:] <= 0)]
     found = sensitivity(landing_map, hits)
-    if not np.isfinite(found).any():
-        raise UserError(f"target {target:g} m: no draw of the box lands there; {REACH}")
-    return hits[np.nanargmin(found)]
-
-
-def ordinary_draw(landing_map: LandingMap, target: float) -> np.ndarray:
-    """The draw from the fork through the middle of the box that the map lands on `target` [m].
-
-    Raises UserError where that line, within the box and the force limit, has none.
-    """
-    middle = np.array([np.mean(axis[[0, -1]]) for axis in (landing_map.draw_y, landing_map.draw_z)])
-    line = np.linspace(0, 2, 10 * FINE)[:, None] * middle
-    off = landing_map(line).landing_y - target
-    crossed = np.flatnonzero(off[:-1] * off[1:] <= 0)
-    if not len(crossed):
-        raise UserError(
-            f"target {target:g} m: no draw through the box's middle lands there; {REACH}"
-        )
-    return line[crossed[0]]
+    return hits[np.nanargmin(found)] if np.isfinite(found).any() else np.full(2, np.nan)
 
 
 def hit(land: Land, target: float, start: np.ndarray) -> np.ndarray:
     """The draw (2,) on the line from the fork through `start` (2,) that lands on `target` [m].
 
-    Within NEAR, by secants. Raises UserError where they do not come there.
+    Within NEAR, by secants. NaN where they do not come there.
     """
     start = np.asarray(start, float)
     length, off = 1.0, land(start) - target
@@ -82,4 +62,4 @@ def hit(land: Land, target: float, start: np.ndarray) -> np.ndarray:
         before, length = (length, off), length - off / slope
         off = land(length * start) - target
         slope = (off - before[1]) / (length - before[0])
-    raise UserError(f"target {target:g} m: the search for a draw does not come there; {REACH}")
+    return np.full(2, np.nan)

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.errors import UserError
 from pipeline.policy.trials import trial_seed
 
-NUMBERS = ("mean_error_m", "launches", "actuation_error_m", "release_jitter")
+NUMBERS = ("launches", "actuation_error_m", "release_jitter")
 
 
 def trial_seeds(params) -> np.ndarray:
@@ -31,7 +31,7 @@ def errors_of(draws: np.ndarray, landings: np.ndarray, params) -> dict:
     """How far launches land from the targets of the trials.
 
     Args:
-        draws: One a target (y, z) [m], shape (T, 2).
+        draws: One a target (y, z) [m], shape (T, 2); NaN where it is out of reach.
         landings: Of launches from them [m], NaN where one failed, shape (T, N), their seeds those
             of `trial_seeds`.
 
@@ -39,14 +39,17 @@ def errors_of(draws: np.ndarray, landings: np.ndarray, params) -> dict:
         For all launches, and under "targets" for each target with its "draw": mean_error_m and
         std_m (of a sample) of |y - g|, bias_m, the mean of y - g, launches, failed ones, and
         trials_mean_error_m, the mean over launches with the errors of the trials. None where
-        nothing landed.
+        nothing landed, and for the draw where there is none.
     """
     targets = params.trials.targets
     missed = landings - np.array(targets)[:, None]
     own = missed[:, : params.trials.repeats]
     return {
         "targets": {
-            repr(target): {"draw": list(map(float, draw)), **_error(miss, mine)}
+            repr(target): {
+                "draw": None if np.isnan(draw).any() else list(map(float, draw)),
+                **_error(miss, mine),
+            }
             for target, draw, miss, mine in zip(targets, draws, missed, own, strict=True)
         },
         **_error(missed, own),
@@ -76,7 +79,8 @@ def load_floor(path: Path) -> dict:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         [float(content[name]) for name in NUMBERS]
-        [float(one["mean_error_m"]) for one in content["targets"].values()]
+        means = [one["mean_error_m"] for one in (content, *content["targets"].values())]
+        [float(mean) for mean in means if mean is not None]
     except FileNotFoundError as error:
         raise UserError(f"{path}: no such file; `dvc repro floor@{path.stem}` makes it") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:

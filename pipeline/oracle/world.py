@@ -34,7 +34,10 @@ class World:
         self._pool.shutdown(cancel_futures=True)
 
     def trials(self, draws: np.ndarray, seeds: Sequence[int | None]) -> list[Trial]:
-        """Launches from draws (N, 2) [m] with the errors of N trials; None: without errors."""
+        """Launches from draws (N, 2) [m] with the errors of N trials; None: without errors.
+
+        A draw of NaN is not launched: its target is out of reach.
+        """
         return list(self._pool.map(_trial, draws, seeds))
 
     def landings(self, draws: np.ndarray, seeds: np.ndarray) -> np.ndarray:
@@ -61,7 +64,7 @@ class World:
     def hits(self, targets: Sequence[float], starts: Sequence[np.ndarray]) -> np.ndarray:
         """Draws (T, 2) that land on T targets [m] without errors, each on the line of its start.
 
-        Raises UserError where a search does not come there.
+        NaN where a search does not come there.
         """
         return np.array(list(self._pool.map(_hit, targets, starts)))
 
@@ -75,8 +78,10 @@ def _begin(band: str, path: Path) -> None:
 
 
 def _trial(draw: np.ndarray, seed: int | None) -> Trial:
+    if np.isnan(draw).any():
+        return Trial(np.nan, "out of reach", np.nan)
     return _launch(draw, seed)
 
 
 def _hit(target: float, start: np.ndarray) -> np.ndarray:
-    return hit(lambda draw: _launch(draw, None).landing_y, target, start)
+    return hit(lambda draw: _trial(draw, None).landing_y, target, start)

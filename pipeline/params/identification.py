@@ -228,8 +228,12 @@ def check_method(method: Method, path: str, parameters: Parameters, optimizer: O
             raise refusal(
                 f"{path}fixed.{name}: must be between {low:g} and {high:g}, got {value:g}"
             )
-    if len(method.fixed) == len(boxes):
-        raise refusal(f"{path}fixed: names every parameter, so nothing is left to search")
+    instruments = {*NUISANCES} - {"air_drag"}
+    if not {*boxes} - instruments - {*method.fixed}:
+        raise refusal(
+            f"{path}fixed: names every parameter, so neither one of them nor air_drag is left to"
+            " search"
+        )
     iteration = (method.k_top or 1) * optimizer.cma_population
     if optimizer.cma_rollouts < iteration:
         raise refusal(

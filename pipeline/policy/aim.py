@@ -7,50 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.errors import UserError
 from pipeline.machine import cores
 from pipeline.params import expect_known
 from pipeline.policy.spread import landing_intervals, law_discrepancy, load_samples
-from pipeline.stage import expect_from, remedy
+from pipeline.policy.stored import PLAIN, ROBUST, Stored
+from pipeline.stage import expect_from
 from pipeline.theta import calibrated, in_air, load_theta, vector
-
-ROBUST = "robust"  # folder of a method's second policy
-
-
-def policy_draws(run, folder: Path, targets: np.ndarray) -> np.ndarray:
-    """Draws (y, z) [m], shape (N, 2), of the exported policy in `folder` for targets [m], (N,).
-
-    Args:
-        run: params.yaml's `run`, which says what stage trains the policy.
-        folder: data/policies/<band>/<method>, or its folder ROBUST.
-
-    Raises:
-        UserError: The policy is not there, or damaged.
-    """
-    import onnxruntime
-
-    path = Path(folder, "policy.onnx")
-    robust = path.parent.name == ROBUST
-    band, method = path.parent.parts[-3:-1] if robust else path.parent.parts[-2:]
-    if not path.is_file():
-        where = (
-            f" where policy.robust.methods in params.yaml names {method} and its θ file tells its"
-            " confidence"
-        )
-        trains = remedy(run, "policy", band, method)
-        raise UserError(f"{path}: no such file; {trains}{where * robust}")
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    options.log_severity_level = 4  # what is wrong is said below
-    targets = np.asarray(targets, np.float32)[:, None]
-    try:
-        session = onnxruntime.InferenceSession(
-            path.read_bytes(), options, providers=["CPUExecutionProvider"]
-        )
-        return session.run(["draw"], {"target": targets})[0].astype(float)
-    except Exception as error:  # onnxruntime has an error of its own for each kind of damage
-        trains = remedy(run, "policy", band, method, damaged=True)
-        raise UserError(f"{path}: damaged; {trains}") from error
 
 
 def aim(
@@ -85,8 +47,8 @@ def aim(
     root = Path(root)
     source = root / "data" / "theta" / band / f"{method}.json"
     content = load_theta(expect_from(params.run, "theta", band, method, source), band)
-    folder = root / "data" / "policies" / band / method
-    draw = policy_draws(params.run, folder / ROBUST if robust else folder, np.array([target]))[0]
+    stored = Stored(params.run, band, method, root)
+    draw = stored.draws(np.array([target]), ROBUST if robust else PLAIN)[0]
     launcher = launcher or simulator(params, band, content, root=root)
     launched = launcher(draw[None])
     warnings = []

@@ -14,16 +14,17 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import torch
 from torch import nn
 
-from pipeline.files import replacing
-from pipeline.policy.aim import ROBUST
-from pipeline.policy.train import Policy
+from pipeline.files import replacing, write_json
+from pipeline.policy.stored import PLAIN, ROBUST
+from pipeline.policy.train import Policy, Trained
 
 OPSET, IR_VERSION = 18, 10  # any onnxruntime from 1.18 (2024) on reads these
 INPUT, OUTPUT = "target", "draw"
-PLAIN = "plain"
 USED = ("sling2sim2real", "torch", "rsl-rl-lib", "onnx", "numpy")
 
 # What a card tells of the training; errors are |y_p - g| of the deterministic policy's launches.
@@ -44,6 +45,22 @@ ROBUST_TRAINING = (
     "samples",  # of theta, how many
     "actuation_error_m",  # of each axis of the draw, standard deviation
 )
+
+
+def export(
+    trained: Trained, folder: Path, params, band: str, method: str, theta: dict, **about
+) -> None:
+    """Write a policy's files into `folder`: networks and curve, and last its card.
+
+    Args:
+        params, band, method, theta, about: As `card` has them.
+    """
+    with replacing(folder / "training.parquet") as temporary:
+        pq.write_table(pa.table(trained.curve), temporary)
+    write_onnx(trained.policy, folder / "policy.onnx")
+    write_torchscript(trained.policy, folder / "policy.pt")
+    content = card(trained.policy, params, band, method, theta, **about)
+    write_json(folder / "card.json", content)
 
 
 def write_onnx(policy: Policy, path: Path) -> None:

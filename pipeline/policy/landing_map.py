@@ -8,7 +8,7 @@ launches in seconds, and the error of reading between is itself measured on rand
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -125,7 +125,7 @@ class LandingMap:
 
     @cached_property
     def _landscape(self) -> Landscape:
-        return Landscape([self])
+        return landscape_of([self])
 
     def validation(self, targets: tuple[float, float]) -> dict:
         """Interpolation error [m] on the random draws: over the box, and where targets lie."""
@@ -173,6 +173,17 @@ class LandingMap:
             max_force=header["max_force"],
             checks=np.column_stack([values[check] for values in column.values()]),
         )
+
+
+def landscape_of(maps: Sequence[LandingMap], error: float = 0.0) -> Landscape:
+    """What is read between the launches of maps that share grid and force limit, a θ each.
+
+    Args:
+        error: Standard deviation of the drawn position along each axis [m].
+    """
+    names = ("landing_y", "hold_force", "failure")
+    values = (np.stack([getattr(one, name) for one in maps], -1) for name in names)
+    return Landscape((maps[0].draw_y, maps[0].draw_z), *values, maps[0].max_force, error)
 
 
 def validation(maps: list[LandingMap], targets: tuple[float, float]) -> dict:

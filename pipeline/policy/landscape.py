@@ -1,4 +1,4 @@
-"""Where a draw lands under one θ or several, read off landing maps by cubic splines.
+"""Where a draw lands under one θ or several, read between launches of a grid by cubic splines.
 
 Under each θ the landing is a smooth function of the draw. A normal error of the drawn position,
 small against the grid, spreads it in proportion to its gradient: so expectations over that error
@@ -8,15 +8,10 @@ have a closed form (expected.py), and none is drawn at random.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import NdBSpline, RBFInterpolator, make_interp_spline
-
-if TYPE_CHECKING:
-    from pipeline.policy.landing_map import LandingMap
 
 TOO_MUCH_FORCE = "holding force above the limit"
 OUTSIDE = "draw outside the box"
@@ -51,23 +46,32 @@ class Landscape:
         low, high: Corners of the box of draws [m], shape (2,).
     """
 
-    def __init__(self, maps: Sequence[LandingMap], error: float = 0.0):
-        """Read `maps`, which share grid and force limit.
+    def __init__(
+        self,
+        grid: tuple[np.ndarray, np.ndarray],
+        landing_y: np.ndarray,
+        hold_force: np.ndarray,
+        failure: np.ndarray,
+        max_force: float,
+        error: float = 0.0,
+    ):
+        """Read between launches of a grid.
 
         Args:
+            grid: Draws along y (Y,) and along z (Z,) [m], ascending.
+            landing_y: Landings [m], NaN where failed, shape (Y, Z, S).
+            hold_force: Of the drawn band [N], NaN where the simulation failed, shape (Y, Z, S).
+            failure: Reasons, NO_FAILURE where none, shape (Y, Z, S).
+            max_force: The arm may hold no more [N].
             error: Standard deviation of the drawn position along each axis [m].
         """
-        first = maps[0]
-        self.grid = (first.draw_y, first.draw_z)
-        self.max_force, self.error = first.max_force, error
-        self.low, self.high = (np.array([axis[end] for axis in self.grid]) for end in (0, -1))
-        known = {reason for one in maps for reason in one.failure.flat} - {NO_FAILURE}
-        self.reasons = [NO_FAILURE, TOO_MUCH_FORCE, OUTSIDE, *sorted(known)]
-        failure = np.stack([one.failure for one in maps], -1)
+        self.grid, self.max_force, self.error = grid, max_force, error
+        self.low, self.high = (np.array([axis[end] for axis in grid]) for end in (0, -1))
+        known = sorted(set(failure.flat) - {NO_FAILURE})
+        self.reasons = [NO_FAILURE, TOO_MUCH_FORCE, OUTSIDE, *known]
         code = np.vectorize(self.reasons.index, otypes=[int])(failure)
         self._cell = np.max([code[:-1, :-1], code[1:, :-1], code[:-1, 1:], code[1:, 1:]], axis=0)
-        self._landing = self._spline([one.landing_y for one in maps])
-        self._force = self._spline([one.hold_force for one in maps])
+        self._landing, self._force = self._spline(landing_y), self._spline(hold_force)
 
     def fingerprint(self) -> str:
         """Of all that landings hang on."""
@@ -95,9 +99,9 @@ class Landscape:
             spread = self.error * np.hypot(*slopes)
         return Landings(np.where(failure > 0, np.nan, landing), spread, force, failure)
 
-    def _spline(self, values: list[np.ndarray]) -> NdBSpline:
-        """Interpolating bicubic splines through values (Y, Z) of each θ."""
-        whole = np.stack([_continued(one) for one in values], -1)
+    def _spline(self, values: np.ndarray) -> NdBSpline:
+        """Interpolating bicubic splines through values (Y, Z, S)."""
+        whole = np.stack([_continued(one) for one in np.moveaxis(values, -1, 0)], -1)
         along_y = make_interp_spline(self.grid[0], whole)
         along_z = make_interp_spline(self.grid[1], np.moveaxis(along_y.c, 1, 0))
         coefficients = np.ascontiguousarray(np.moveaxis(along_z.c, 0, 1))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import math
+from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import UserError
+from pipeline.params import TARGET_AREA
 
 REQUIRED = ("draw_y_m", "draw_z_m", "landing_y_m")
 OPTIONAL = ("target_m", "method")
@@ -27,6 +29,34 @@ class Measured:
     draw: tuple[float, float]
     landing: float | None
     target: float | None
+
+
+def file_of(folder: Path, band: str, bands: Collection[str]) -> Path | None:
+    """The band's CSV in `folder`; None where there is none.
+
+    Args:
+        bands: Of params.yaml.
+
+    Raises:
+        UserError: There is a CSV of no band, which nobody would ever read.
+    """
+    files = [f"{one}.csv" for one in bands]
+    for path in sorted(folder.glob("[!.]*")):
+        if path.suffix.lower() == ".csv" and path.name not in files:
+            raise UserError(
+                f"{path}: no band of params.yaml goes by that name; call it {' or '.join(files)}"
+            )
+    path = folder / f"{band}.csv"
+    return path if path.is_file() else None
+
+
+def named(path: Path) -> Counter[str]:
+    """How many launches of a measured CSV name each method; "" stands for none.
+
+    Raises:
+        UserError: The file cannot be read.
+    """
+    return Counter(row["method"] for _, row in _rows(path))
 
 
 def read_measured(path: Path, method: str, known: Collection[str]) -> list[Measured]:
@@ -52,8 +82,14 @@ def read_measured(path: Path, method: str, known: Collection[str]) -> list[Measu
         y, z, landing, target = (_metres(where, name, row[name]) for name in LIMITS)
         if y is None or z is None:
             raise UserError(f"{where}: a draw needs draw_y_m and draw_z_m")
+        target = target if row["method"] else None
+        if target is not None and not TARGET_AREA[0] <= target <= TARGET_AREA[1]:
+            raise UserError(
+                f"{where}: target_m {target} lies outside the target on the floor,"
+                f" {list(TARGET_AREA)}, where every landing counts as failed"
+            )
         if row["method"] in ("", method):
-            launches.append(Measured((y, z), landing, target if row["method"] else None))
+            launches.append(Measured((y, z), landing, target))
     return launches
 
 

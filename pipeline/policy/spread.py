@@ -30,6 +30,8 @@ def load_samples(run, path: Path, band: str, method: str) -> np.ndarray | None:
         return None
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
+        if content["samples"] == []:
+            return None
         samples = np.array(content["samples"], float)
         known = content["names"] in (list(THETA), [*THETA, "air_drag"])
         if not known or samples.ndim != 2 or samples.shape[1] != len(content["names"]):

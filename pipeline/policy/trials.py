@@ -35,7 +35,8 @@ SCHEMA = pa.schema(
         ("predicted_leave_z", pa.float64()),
         ("predicted_speed", pa.float64()),  # m/s, there
         ("predicted_angle", pa.float64()),  # rad above the horizon, there
-        ("landing_y", pa.float64()),  # m; null where failed, and for predictions
+        ("landing_y", pa.float64()),  # m, also outside the area; null where it did not land, and
+        # for predictions
         ("flight_y", pa.list_(pa.float64())),  # m, from the pouch to the floor; null where none,
         ("flight_z", pa.list_(pa.float64())),  # and where not virtual
         ("hold_force", pa.float64()),  # N, of the rig where kind is virtual, else as predicted
@@ -53,8 +54,8 @@ class Batch:
     Attributes:
         draws: As commanded (y, z) [m], shape (N, 2).
         targets: Aimed at [m].
-        landing: Where they landed [m].
-        failure: Why they did not.
+        landing: Where they landed [m], also where that counts as a failure.
+        failure: Why they count for nothing.
         hold_force: Of the drawn band on the hand [N]; None: as predicted.
         flight: Way of the projectile (y, z) [m], shape (K, 2) each.
     """

@@ -31,6 +31,7 @@ class Difference:
 
     Attributes:
         launches: Compared, of each policy: pairs where virtual launches share their errors.
+        failed: Share of each policy's launches that failed.
         left_out: Launches of either that failed, and with a pair its other half.
         low, high: NaN where a target has but one launch.
     """
@@ -39,6 +40,7 @@ class Difference:
     low: float
     high: float
     launches: tuple[int, int]
+    failed: tuple[float, float]
     left_out: int
 
     @property
@@ -65,6 +67,7 @@ def difference(first: pd.DataFrame, second: pd.DataFrame, seed: int) -> Differen
     """
     first, second = (t[t.target.notna()] for t in (first, second))
     tried = len(first) + len(second)
+    failed = tuple(float((~landed(t)).mean()) for t in (first, second))
     first, second = first[landed(first)], second[landed(second)]
     if {*first.kind, *second.kind} == {"virtual"}:
         keys = ["target", "trial"]
@@ -83,7 +86,8 @@ def difference(first: pd.DataFrame, second: pd.DataFrame, seed: int) -> Differen
     tail = ndtr(stdtrit(_freedom(change), (1 - LEVEL) / 2))
     low, high = np.quantile(resampled, [tail, 1 - tail])
     launches = len(first), len(second)
-    return Difference(float(mean), float(low), float(high), launches, tried - sum(launches))
+    left_out = tried - sum(launches)
+    return Difference(float(mean), float(low), float(high), launches, failed, left_out)
 
 
 def _freedom(change: list[tuple]) -> float:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.params import Params
-from pipeline.policy.aim import ROBUST, policy_draws
-from pipeline.report.looks import Look
-from pipeline.report.replay import Replay
-from pipeline.report.results import Results
+from pipeline.policy.stored import PLAIN, ROBUST, Stored
+from pipeline.report.looks import SIDE_BY_SIDE, Look, drawn, looks
+from pipeline.report.replay import Replay, replay
+from pipeline.report.results import Result, Results, gather
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,7 @@ class Report:
     """All that ran, as it is shown.
 
     Attributes:
-        replays: By band and method; of the methods that are drawn.
+        replays: By band and method; of the methods that are drawn, of all where data are held out.
         looks: By method.
         root: Of the project, with data/ and reports/.
     """
@@ -30,13 +31,41 @@ class Report:
     looks: dict[str, Look]
     root: Path
 
+    @classmethod
+    def of(cls, params: Params, root: Path) -> Report:
+        """Of everything in params.run. Raises UserError where an input is missing."""
+        results = gather(params, root)
+        named = looks(dict.fromkeys(result.method for result in results))
+        replays = {band: _replays(params, results, band) for band in params.run.bands}
+        return cls(params, results, replays, named, root)
+
     @property
     def folder(self) -> Path:
         return self.root / "reports"
 
-    def draws(
-        self, band: str, method: str, targets: np.ndarray, *, robust: bool = False
-    ) -> np.ndarray:
-        """Draws (N, 2) [m] for targets (N,) [m] of a method's plain or robust policy."""
-        folder = self.root / "data" / "policies" / band / method
-        return policy_draws(self.params.run, folder / ROBUST if robust else folder, targets)
+    def picture(self, name: str, alt: str, draw: Callable[[Path], None]) -> str:
+        """Have `draw` write reports/figures/<name>.png; return the line that shows it."""
+        draw(self.folder / "figures" / f"{name}.png")
+        return f"![{alt}](figures/{name}.png)\n"
+
+    def draws(self, result: Result, targets: np.ndarray) -> dict[str, np.ndarray]:
+        """Draws (N, 2) [m] for targets (N,) [m] of a plain policy, and of a robust one if any."""
+        stored = Stored(self.params.run, result.band, result.method, self.root)
+        kinds = [PLAIN, ROBUST] if result.robust_card else [PLAIN]
+        return {kind: stored.draws(targets, kind) for kind in kinds}
+
+
+def side_by_side(params: Params) -> list[str]:
+    """Methods in pictures of all bands: those that ran on every one, as far as there is room."""
+    return drawn(params.run.methods, SIDE_BY_SIDE)
+
+
+def _replays(params: Params, results: Results, band: str) -> dict[str, Replay]:
+    """Of the methods that are drawn; of all where held-out data are to be compared."""
+    recorded, methods = results.episodes[band], results.methods[band]
+    some = {*drawn(methods, SIDE_BY_SIDE), *side_by_side(params)}
+    return {
+        method: replay(params, band, method, recorded, methods[method].theta)
+        for method in methods
+        if method in some or params.loss.held_out.blocks
+    }

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pandas as pd
@@ -12,8 +13,9 @@ from pipeline.episode import Episode
 from pipeline.identify.regions import Region, load_regions
 from pipeline.oracle.floor import load_floor
 from pipeline.params import pairs
-from pipeline.policy.aim import ROBUST
 from pipeline.policy.landing_map import LandingMap
+from pipeline.policy.measured import file_of, named
+from pipeline.policy.stored import ROBUST, Stored
 from pipeline.stage import expect, expect_from
 from pipeline.theta import load_theta
 
@@ -59,12 +61,14 @@ class Result:
 class Results:
     """All that ran: `episodes` by band, `methods` by band and then method, in the order of run.
 
-    `floors` is the actuation floor of each band that the rig launches (pipeline/oracle/floor.py).
+    `floors` is the actuation floor of each band that the rig launches (pipeline/oracle/floor.py);
+    `unused` counts a band's measured launches of methods that do not run on it, where there are.
     """
 
     episodes: dict[str, Episode]
     methods: dict[str, dict[str, Result]]
     floors: dict[str, dict]
+    unused: dict[str, int] = field(default_factory=dict)
 
     @property
     def trials(self) -> pd.DataFrame:
@@ -89,7 +93,15 @@ def gather(params, root: str | Path = ".") -> Results:
         band: load_floor(expect(data / "floor" / f"{band}.json", f"floor@{band}"))
         for band in params.run.rig
     }
-    return Results(episodes, methods, floors)
+    unused = {band: _unused(params, data, band, methods[band]) for band in methods}
+    return Results(episodes, methods, floors, {band: n for band, n in unused.items() if n})
+
+
+def _unused(params, data: Path, band: str, methods: Collection[str]) -> int:
+    """How many measured launches name a method that does not run on the band."""
+    path = file_of(data / "trials" / "measured", band, params.bands)
+    launches = named(path) if path else {}
+    return sum(n for method, n in launches.items() if method not in ("", *methods))
 
 
 def _result(run, data: Path, band: str, method: str) -> Result:
@@ -106,8 +118,8 @@ def _result(run, data: Path, band: str, method: str) -> Result:
     if theta.get("confidence"):
         posterior = json.loads(path("confidence", f"{method}.json", "theta").read_text("utf-8"))
     trials = pd.read_parquet(path("trials", f"{method}.parquet", "trials"))
-    robust = trials.policy == "robust"
-    robust_card = data / "policies" / band / method / ROBUST / "card.json"
+    robust = trials.policy == ROBUST
+    stored = Stored(run, band, method, data.parent)
     return Result(
         band=band,
         method=method,
@@ -116,8 +128,8 @@ def _result(run, data: Path, band: str, method: str) -> Result:
         regions=load_regions(clusters),
         axes=json.loads(clusters.read_text("utf-8"))["names"],
         posterior=posterior,
-        card=json.loads(path("policies", policy + "card.json", "policy").read_text("utf-8")),
-        robust_card=json.loads(robust_card.read_text("utf-8")) if robust_card.is_file() else None,
+        card=stored.card(),
+        robust_card=stored.card(ROBUST) if ROBUST in stored.kinds() else None,
         training=pd.read_parquet(path("policies", policy + "training.parquet", "policy")),
         landing_map=LandingMap.load(path("policies", policy + "map.parquet", "policy")),
         trials=trials[~robust].reset_index(drop=True),

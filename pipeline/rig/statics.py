@@ -2,45 +2,43 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 from scipy.linalg import solve_banded
-
-if TYPE_CHECKING:
-    from pipeline.rig.string import ElasticString
 
 REACH = 8  # from the first of a node's x to the last of the node after next, which it feels
 NUDGE = 1e-7  # m, of the difference quotients
 STEPS, SHORTEST = 40, 1e-3  # of Newton's method, and the least part of one
 
 
-def balanced(string: ElasticString, y: np.ndarray, tolerance: float) -> np.ndarray | None:
-    """Nodes (nodes, 3) that no force moves, the clamps and the middle as they are.
+def balanced(
+    forces: Callable[[np.ndarray], np.ndarray], x: np.ndarray, held: list[int], tolerance: float
+) -> np.ndarray | None:
+    """Nodes (nodes, 3) that no force moves, those that are held as they are.
 
     Args:
-        y: A state (nodes, 6 + K) at rest near there, whose memories stay.
+        forces: Of nodes at several places (nodes, 3, M) [N], of the same shape.
+        x: Places near there, shape (nodes, 3).
+        held: Numbers of the nodes that stay.
         tolerance: Of the nodes [m].
 
     Returns:
         None where Newton's method does not come there, as for a slack band.
     """
-    size = 3 * string.nodes
-    fixed = np.zeros((string.nodes, 3, 1), bool)
-    fixed[[0, string.middle, -1]] = True
+    size = x.size
+    fixed = np.zeros((len(x), 3, 1), bool)
+    fixed[held] = True
     columns = np.arange(size)
     colours = columns % (2 * REACH + 1)  # columns of one colour share no row
-    tint = np.equal.outer(colours, np.arange(2 * REACH + 1)).reshape(string.nodes, 3, -1)
+    tint = np.equal.outer(colours, np.arange(2 * REACH + 1)).reshape(len(x), 3, -1)
     rows = columns + np.arange(-REACH, REACH + 1)[:, None]
     inside = (rows >= 0) & (rows < size)
 
     def pull(x: np.ndarray) -> np.ndarray:
-        """Forces at several x (nodes, 3, M)."""
-        state = np.repeat(y[..., None], x.shape[-1], axis=-1)
-        state[:, :3] = x
-        return np.where(fixed, 0.0, string.forces(state)[0])
+        return np.where(fixed, 0.0, forces(x))
 
-    x = y[:, :3, None]
+    x = x[..., None]
     force = pull(x)
     for _ in range(STEPS):
         change = ((pull(x + NUDGE * tint) - force) / NUDGE).reshape(size, -1)

@@ -247,10 +247,23 @@ class ElasticString:
         frozen = replace(rubber, relaxation=np.array([[excess, FOREVER]]))
         sticky = replace(self, rubber=frozen, damping=2 * np.sqrt(-GRAVITY[2] / (self.length / 2)))
         start, hand = sticky.state(x, np.zeros(1)), still if held else None
-        if held and (nodes := balanced(sticky, start, tolerance / 100)) is not None:
+        if held and (nodes := sticky.balanced(start, tolerance / 100)) is not None:
             return self.state(nodes, memory)
         end = sticky.integrate(start, np.array([0.0, SETTLING_TIME]), tolerance, hand=hand)[1][-1]
         return self.state(end[:, :3], memory)
+
+    def balanced(self, y: np.ndarray, tolerance: float) -> np.ndarray | None:
+        """Nodes (nodes, 3) near those of y (nodes, 6 + K) that no force moves; see statics.py.
+
+        Clamps, middle and memories stay.
+        """
+
+        def forces(x: np.ndarray) -> np.ndarray:
+            state = np.repeat(y[..., None], x.shape[-1], axis=-1)
+            state[:, :3] = x
+            return self.forces(state)[0]
+
+        return balanced(forces, y[:, :3], [0, self.middle, -1], tolerance)
 
     def energy(self, y: np.ndarray) -> float:
         """Motion, height, strain and bending of one state [J]; not what the memories hold."""

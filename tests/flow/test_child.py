@@ -16,10 +16,7 @@ from pipeline.flow import child, guard
 from tests.flow.toy import Toy, stage
 
 SHELLS = {
-    "killed": "kill -9 $$",
-    "status": "exit 3",
     "nothing": "true",
-    "faulty": "python -c 'print(1); 1 / 0'",
     "sleeper": "python -c 'print(\"sleeps\", flush=True); import time; time.sleep(600)'",
 }
 
@@ -31,7 +28,6 @@ def toy(tmp_path_factory: pytest.TempPathFactory) -> Toy:
         for name, command in SHELLS.items()
     }
     stages = {"good": stage("good", "word"), "bad": stage("bad", "wrong"), **shells}
-    stages["lone"] = stage("lone", "missing")
     return Toy(tmp_path_factory.mktemp("child") / "toy", stages, word="one\n", wrong="bad\n")
 
 
@@ -66,17 +62,41 @@ def test_a_stage_runs_once_and_only_its_own_lines_are_heard(toy: Toy) -> None:
     ("name", "reason"),
     [
         ("bad", "wrong: says bad; write something else"),
-        ("killed", "was killed by signal 9"),
-        ("status", "ended with exit status 3"),
-        ("faulty", "ZeroDivisionError: division by zero"),
         ("nothing", "output 'nothing.out' does not exist"),
-        ("lone", "[Errno 2] No such file or directory: '{folder}/missing'"),
     ],
 )
 def test_a_failure_says_why_in_one_line(toy: Toy, name: str, reason: str) -> None:
     with pytest.raises(child.StageFailed) as failure:
         run(toy, name)
-    assert str(failure.value) == f"{name}: {reason.format(folder=toy.folder)}"
+    assert str(failure.value) == f"{name}: {reason}"
+
+
+def failed(*own: str, why: str) -> list[str]:
+    """What DVC said of a stage that failed, around the stage's own lines."""
+    return ["Running stage 'x':", "> x.py", *own, f"ERROR: failed to reproduce 'x': {why}"]
+
+
+RUN = "failed to run: x.py, exited with"
+FAULT = ["1", "Traceback (most recent call last):", '  File "x"', "ZeroDivisionError: division"]
+MISSING = "[Errno 2] No such file or directory: 'missing'"
+
+
+@pytest.mark.parametrize(
+    ("said", "status", "reason"),
+    [
+        (failed("1", why=f"{RUN} -9"), 255, "was killed by signal 9"),
+        (failed("Killed", why=f"{RUN} 137"), 255, "was killed by signal 9"),  # a shell around it
+        (failed("Aborted", why=f"{RUN} 134"), 255, "was killed by signal 6"),
+        (failed("error: it is", why=f"{RUN} 1"), 255, "it is"),
+        (failed(why=f"{RUN} 3"), 255, "ended with exit status 3"),
+        (failed(*FAULT, why=f"{RUN} 1"), 255, FAULT[-1]),
+        ([f"ERROR: failed to reproduce 'x': {MISSING}"], 255, MISSING),  # before it ran
+        (["Running stage 'x':", "> x.py", "1"], 128 + 9, "DVC was killed by signal 9"),
+        (failed("1", why=f"{RUN} -2"), -9, "its guard was killed by signal 9"),
+    ],
+)
+def test_why_a_stage_failed_by_lines_of_dvc(said: list[str], status: int, reason: str) -> None:
+    assert child._reason(said, status) == reason
 
 
 def test_lines_come_as_they_are_printed_and_a_cancelled_stage_leaves_nothing(toy: Toy) -> None:
@@ -100,24 +120,6 @@ def test_lines_come_as_they_are_printed_and_a_cancelled_stage_leaves_nothing(toy
     rwlock = (toy.folder / ".dvc" / "tmp" / "rwlock").read_text()
     assert "sleeper" not in rwlock  # DVC gave its locks back
     assert toy.dvc("status", "good") == set()
-
-
-def test_a_stage_ends_with_a_caller_that_is_killed(toy: Toy) -> None:
-    script = (
-        "import os; from pathlib import Path; from pipeline.flow.child import run_stage\n"
-        "run_stage(Path.cwd(), 'sleeper', environment=os.environ, on_line=print)"
-    )
-    caller = subprocess.Popen(
-        [sys.executable, "-u", "-c", script],
-        cwd=toy.folder,
-        env=toy.environment,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    assert caller.stdout.readline() == "sleeps\n"
-    caller.kill()
-    caller.wait()
-    until(lambda: not alive("time.sleep(600)"), guard.GRACE + 5)
 
 
 def test_a_group_that_does_not_listen_is_killed_after_the_grace() -> None:

@@ -135,7 +135,12 @@ def run(place: cluster.Cluster, name: str, **options) -> tuple[bool, list[str]]:
 
 def test_in_a_shared_folder_nothing_travels(copies, place, tmp_path: Path) -> None:
     head = copies[0]
-    ran, lines = run(place(head.folder), "search@a")
+    tokens, place = head.folder / ".checkpoints", place(head.folder)
+    assert not tokens.exists()  # before the flow knows that this is a project, and its own
+    tokens.mkdir()
+    (tokens / "cluster-killed").touch()
+    ran, lines = run(place, "search@a")
+    assert [one.name for one in tokens.iterdir()] == [Path(place.token).name]
     assert ran and "makes data/search/a" in lines
     assert "search@a" in exchange.entries(head.folder, ("search@a",))
     assert not (tmp_path / "remote").exists()

@@ -12,12 +12,12 @@ from tests.project import ROOT
 
 
 def test_threads_of_a_worker_share_its_cores(monkeypatch) -> None:
-    import dask.system
-
-    monkeypatch.setattr(dask.system, "CPU_COUNT", 8)
     monkeypatch.delenv("SLING_WORKERS", raising=False)
+    monkeypatch.setenv("SHELL", "/usr/sbin/nologin")
+    monkeypatch.setattr(worker.machine, "cores", lambda: 8)
     assert worker.environment(threads=3)["SLING_WORKERS"] == "2"
     assert worker.environment(threads=16)["OMP_NUM_THREADS"] == "1"
+    assert worker.environment(threads=1)["SHELL"] == "/bin/sh"
     monkeypatch.setenv("SLING_WORKERS", "5")
     assert worker.environment(threads=3)["OMP_NUM_THREADS"] == "5"
     assert worker.environment(threads=3)["PATH"].startswith(str(Path(sys.executable).parent))

@@ -16,8 +16,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.fingerprint import fingerprint
-from pipeline.identify.evaluate import Evaluation, Evaluator
-from pipeline.identify.memo import NOT_FINITE, Memo
+from pipeline.identify.evaluate import NOT_FINITE, Evaluation, Evaluator
+from pipeline.identify.memo import Memo
 from pipeline.identify.session import SOURCES
 from pipeline.params.identification import Prior
 from tests.identify import toy

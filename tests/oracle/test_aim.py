@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from pipeline.errors import UserError
-from pipeline.oracle.aim import INSET, NEAR, hit, least_sensitive_draw, ordinary_draw, sensitivity
+from pipeline.oracle.aim import INSET, NEAR, hit, least_sensitive_draw, sensitivity
 from pipeline.policy.landing_map import LandingMap
 from tests.policy import toy
 
@@ -61,12 +60,6 @@ def test_no_draw_of_the_box_that_hits_is_less_sensitive(landing_map, target: flo
     assert toy.launch(draw[None]).hold_force[0] <= landing_map.max_force * 1.001
 
 
-def test_an_ordinary_draw_lies_on_the_line_through_the_middle(landing_map) -> None:
-    draw = ordinary_draw(landing_map, 1.925)
-    assert np.isclose(draw[1] / draw[0], np.mean(toy.DRAW_Z) / np.mean(toy.DRAW_Y))
-    assert abs(land(draw) - 1.925) < 0.02
-
-
 @pytest.mark.parametrize("target", TARGETS)
 def test_the_root_search_hits(target: float) -> None:
     """In a few launches, from a start that is 10 cm off, along its line."""
@@ -84,13 +77,10 @@ def test_the_root_search_hits(target: float) -> None:
     assert len(launched) <= 5
 
 
-def test_what_cannot_be_hit_is_refused(landing_map) -> None:
-    for find in (least_sensitive_draw, ordinary_draw):
-        with pytest.raises(UserError, match=r"target 99 m: no draw .*widen setup\.draw_y"):
-            find(landing_map, 99.0)
-    with pytest.raises(UserError, match="does not come there"):
-        hit(lambda draw: float("nan"), 1.9, np.array([-0.3, -0.2]))
+def test_what_cannot_be_hit_has_no_draw(landing_map) -> None:
+    assert np.isnan(least_sensitive_draw(landing_map, 99.0)).all()
+    start = np.array([-0.3, -0.2])
+    assert np.isnan(hit(lambda draw: float("nan"), 1.9, start)).all()
     launches = []
-    with pytest.raises(UserError, match="does not come there"):  # it never lands further
-        hit(lambda draw: launches.append(draw) or 1.0, 1.9, np.array([-0.3, -0.2]))
-    assert len(launches) < 20
+    stuck = hit(lambda draw: launches.append(draw) or 1.0, 1.9, start)  # it never lands further
+    assert np.isnan(stuck).all() and 0 < len(launches) < 20

@@ -44,8 +44,9 @@ def test_a_floor_counts_what_failed_and_averages_the_rest(params) -> None:
     assert (second["launches"], second["failed"]) == (6, 1)
     assert (floor["launches"], floor["failed"]) == (6 * len(targets), 1)
     assert np.isclose(floor["mean_error_m"], np.nanmean(np.abs(misses)))
-    none = errors_of(draws, np.full(misses.shape, np.nan), params)
+    none = errors_of(draws * np.nan, np.full(misses.shape, np.nan), params)
     assert none["mean_error_m"] is None and none["failed"] == none["launches"]
+    assert [one["draw"] for one in none["targets"].values()] == [None] * len(targets)
 
 
 def test_a_floor_is_read_or_refused_by_its_name(tmp_path, params) -> None:
@@ -57,6 +58,10 @@ def test_a_floor_is_read_or_refused_by_its_name(tmp_path, params) -> None:
     content = {**floor, "band": "band1", "actuation_error_m": 1e-3, "release_jitter": 0.02}
     path.write_text(json.dumps(content))
     assert load_floor(path) == content
+    out_of_reach = misses[:, :2] * np.nan
+    none = errors_of(out_of_reach, misses * np.nan, params)
+    path.write_text(json.dumps(content | none, allow_nan=False))
+    assert load_floor(path)["targets"]["1.725"]["mean_error_m"] is None
     for broken in ("", "[]", "{}", json.dumps(content | {"targets": {"1.725": {}}})):
         path.write_text(broken)
         with pytest.raises(UserError, match="damaged; `dvc repro --force floor@band1`"):

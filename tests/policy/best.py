@@ -13,11 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.params import load
-from pipeline.policy.aim import policy_draws, simulator
+from pipeline.policy.aim import simulator
 from pipeline.policy.expected import distance
+from pipeline.policy.landing_map import landscape_of
 from pipeline.policy.landscape import Landscape
 from pipeline.policy.robust import robust_maps
 from pipeline.policy.spread import load_samples
+from pipeline.policy.stored import Stored
 from pipeline.theta import load_theta
 
 NEAR = 0.06  # m: draws whose median landing is further from the target are not looked at
@@ -46,16 +48,16 @@ def expected_error(landscape: Landscape, draws: np.ndarray, targets: np.ndarray)
 
 def main() -> None:
     band, method = sys.argv[1:]
-    params, folder = load(), Path("data/policies", band, method)
+    params = load()
+    stored = Stored(params.run, band, method)
     launcher = simulator(params, band, load_theta(Path(f"data/theta/{band}/{method}.json"), band))
     samples = load_samples(params.run, Path(f"data/confidence/{band}/{method}.json"), band, method)
     targets = np.linspace(*params.policy.targets, 64)
-    middle = policy_draws(params.run, folder, np.mean(params.policy.targets, keepdims=True))[0]
+    middle = stored.draws(np.mean(params.policy.targets, keepdims=True))[0]
     maps = robust_maps(launcher, samples, middle, params)
-    landscape = Landscape(maps, params.trials.actuation_error)
+    landscape = landscape_of(maps, params.trials.actuation_error)
     draws = {
-        "plain": policy_draws(params.run, folder, targets),
-        "robust": policy_draws(params.run, folder / "robust", targets),
+        **{kind: stored.draws(targets, kind) for kind in stored.kinds()},
         "best": best_draws(landscape, targets),
     }
     for name, drawn in draws.items():

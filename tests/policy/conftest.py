@@ -4,8 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipeline.policy.landing_map import LandingMap
-from pipeline.policy.landscape import Landscape
+from pipeline.policy.landing_map import LandingMap, landscape_of
 from tests.policy import toy
 
 SETTINGS = SimpleNamespace(
@@ -39,4 +38,4 @@ def toy_map() -> LandingMap:
 def trained(toy_map):
     from pipeline.policy.train import train
 
-    return train(Landscape([toy_map]), SETTINGS)
+    return train(landscape_of([toy_map]), SETTINGS)

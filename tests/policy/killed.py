@@ -13,8 +13,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from pipeline.policy import train as module
-from pipeline.policy.landing_map import LandingMap
-from pipeline.policy.landscape import Landscape
+from pipeline.policy.landing_map import LandingMap, landscape_of
 from tests.policy import toy
 from tests.policy.conftest import SETTINGS
 
@@ -38,7 +37,7 @@ def training(
 
     module._Training.log = log
     try:
-        return module.train(Landscape([chart], error), SimpleNamespace(**settings), kept)
+        return module.train(landscape_of([chart], error), SimpleNamespace(**settings), kept)
     finally:
         module._Training.log = inner
 

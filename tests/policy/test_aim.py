@@ -10,8 +10,9 @@ import pytest
 
 from pipeline.errors import UserError
 from pipeline.params import load
-from pipeline.policy.aim import aim, policy_draws, simulator
+from pipeline.policy.aim import aim, simulator
 from pipeline.policy.export import write_onnx
+from pipeline.policy.stored import Stored
 from pipeline.sling.model import THETA
 from tests.policy import toy
 from tests.policy.linear import write_policy
@@ -57,7 +58,7 @@ def test_the_draw_lands_on_the_target(root) -> None:
     assert answer["hold_force_n"] == pytest.approx(truth.hold_force[0], abs=1e-6)
     assert answer["max_force_n"] == 15.0
     assert answer["warnings"] == [LEFT_OUT]
-    again = policy_draws(toy.RUN, root / "data/policies/toy/none", [1.925])
+    again = Stored(toy.RUN, "toy", "none", root).draws([1.925])
     np.testing.assert_allclose(again, draw)
 
 
@@ -179,34 +180,3 @@ def test_says_why_there_is_no_interval(root) -> None:
 def test_says_what_is_missing(root, band: str, method: str, message: str) -> None:
     with pytest.raises(UserError, match=message):
         aim(PARAMS, band, method, 1.925, root, launcher=toy.launch)
-
-
-def test_a_damaged_policy_is_one_line(root, tmp_path) -> None:
-    whole = (root / "data/policies/toy/none/policy.onnx").read_bytes()
-    file = tmp_path / "data/policies/toy/none/policy.onnx"
-    file.parent.mkdir(parents=True)
-    for damaged in (whole[: len(whole) // 2], b"not a network" * 20, b""):
-        file.write_bytes(damaged)
-        with pytest.raises(UserError, match="damaged; `dvc repro --force policy@toy-") as error:
-            policy_draws(toy.RUN, file.parent, np.array([1.9]))
-        assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("method", "stage"), [("none", "policy@toy-none"), ("without", "ablation_policy@toy-without")]
-)
-def test_says_which_stage_trains_the_policy(tmp_path, method: str, stage: str) -> None:
-    folder = tmp_path / "data/policies/toy" / method
-
-    def refusal(folder) -> str:
-        with pytest.raises(UserError) as error:
-            policy_draws(toy.RUN, folder, np.array([1.9]))
-        return str(error.value)
-
-    assert refusal(folder).endswith(f"no such file; `dvc repro {stage}` makes it")
-    assert f"`dvc repro {stage}` makes it where policy.robust.methods" in refusal(folder / "robust")
-    (folder / "robust").mkdir(parents=True)
-    (folder / "robust" / "policy.onnx").write_bytes(b"not a network")
-    assert refusal(folder / "robust").endswith(
-        f"damaged; `dvc repro --force {stage}` makes it anew"
-    )

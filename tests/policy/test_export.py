@@ -16,16 +16,8 @@ import pytest
 import torch
 
 from pipeline.params import load
-from pipeline.policy.aim import policy_draws
-from pipeline.policy.export import (
-    PLAIN,
-    ROBUST,
-    ROBUST_TRAINING,
-    TRAINING,
-    card,
-    write_onnx,
-    write_torchscript,
-)
+from pipeline.policy.export import ROBUST_TRAINING, TRAINING, card, write_onnx, write_torchscript
+from pipeline.policy.stored import PLAIN, ROBUST, Stored
 from pipeline.sling.model import THETA
 from tests.policy import toy
 from tests.policy.card_schema import SCHEMA
@@ -35,11 +27,16 @@ TARGETS = np.random.default_rng(0).uniform(1.425, 2.425, (1000, 1)).astype(np.fl
 
 
 @pytest.fixture(scope="module")
-def folder(trained, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("policy")
-    write_onnx(trained.policy, folder / "policy.onnx")
-    write_torchscript(trained.policy, folder / "policy.pt")
-    return folder
+def stored(trained, tmp_path_factory):
+    stored = Stored(toy.RUN, "toy", "none", tmp_path_factory.mktemp("root"))
+    write_onnx(trained.policy, stored.folder() / "policy.onnx")
+    write_torchscript(trained.policy, stored.folder() / "policy.pt")
+    return stored
+
+
+@pytest.fixture(scope="module")
+def folder(stored):
+    return stored.folder()
 
 
 def apart(code: str, folder: Path, **environment: str) -> str:
@@ -55,7 +52,7 @@ def apart(code: str, folder: Path, **environment: str) -> str:
     return done.stdout
 
 
-def test_onnx_and_torchscript_agree_with_the_network(trained, folder) -> None:
+def test_onnx_and_torchscript_agree_with_the_network(trained, stored, folder) -> None:
     """On 1,000 targets to 1e-5 m; and it is a network that has learned to hit."""
     with torch.inference_mode():
         network = trained.policy(torch.from_numpy(TARGETS)).numpy()
@@ -65,7 +62,7 @@ def test_onnx_and_torchscript_agree_with_the_network(trained, folder) -> None:
     assert network.shape == script.shape == graph.shape == (1000, 2)
     np.testing.assert_allclose(script, network, rtol=0, atol=1e-5)
     np.testing.assert_allclose(graph, network, rtol=0, atol=1e-5)
-    np.testing.assert_array_equal(policy_draws(toy.RUN, folder, TARGETS[:, 0]), graph.astype(float))
+    np.testing.assert_array_equal(stored.draws(TARGETS[:, 0]), graph.astype(float))
     landing = toy.launch(graph.astype(float)).landing_y
     assert np.abs(landing - TARGETS[:, 0]).mean() < 0.02
 
@@ -88,11 +85,11 @@ def test_one_file_each_without_paths(folder) -> None:
             assert path not in file.read_bytes()
 
 
-def test_the_files_need_nothing_of_ours(folder, tmp_path) -> None:
+def test_the_files_need_nothing_of_ours(stored, folder, tmp_path) -> None:
     """Copied elsewhere: ONNX with onnxruntime alone, TorchScript with torch alone."""
     for name in ("policy.onnx", "policy.pt"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
-    expected = policy_draws(toy.RUN, folder, np.array([1.9, 2.1]))
+    expected = stored.draws(np.array([1.9, 2.1]))
     by_onnx = """
 import sys, numpy, onnxruntime
 session = onnxruntime.InferenceSession("policy.onnx")
@@ -110,19 +107,22 @@ assert not {"pipeline", "rsl_rl"} & set(sys.modules)
 
 
 def test_equal_networks_give_equal_bytes(trained, folder, tmp_path) -> None:
-    """In another process too, whose sets are in another order."""
+    """In another process, whose sets are in another order; torch numbers what one has scripted."""
     torch.save(trained.policy, tmp_path / "network.pickle")
     code = """
 import torch
 from pathlib import Path
 from pipeline.policy.export import write_onnx, write_torchscript
-policy = torch.load("network.pickle", weights_only=False)
+policy = torch.load("../network.pickle", weights_only=False)
 write_onnx(policy, Path("policy.onnx"))
 write_torchscript(policy, Path("policy.pt"))
 """
-    apart(code, tmp_path, PYTHONHASHSEED="1", PYTHONPATH=str(ROOT))
+    for seed in "12":
+        (tmp_path / seed).mkdir()
+        apart(code, tmp_path / seed, PYTHONHASHSEED=seed, PYTHONPATH=str(ROOT))
     for name in ("policy.onnx", "policy.pt"):
-        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+    assert (tmp_path / "1/policy.onnx").read_bytes() == (folder / "policy.onnx").read_bytes()
 
 
 FIGURES = {

@@ -7,7 +7,14 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import UserError
-from pipeline.policy.measured import OPTIONAL, REQUIRED, Measured, read_measured
+from pipeline.policy.measured import (
+    OPTIONAL,
+    REQUIRED,
+    Measured,
+    file_of,
+    named,
+    read_measured,
+)
 
 KNOWN = ("ours", "theirs")
 HEAD = "draw_y_m,draw_z_m,landing_y_m"
@@ -39,8 +46,9 @@ def test_a_target_without_a_method_is_nobodys(tmp_path) -> None:
     text = f"{HEAD},target_m,method\n-0.3,-0.1,1.9,1.725,\n-0.3,-0.1,1.9,1.725,ours\n"
     assert [one.target for one in read(tmp_path, text)] == [None, 1.725]
     assert [one.target for one in read(tmp_path, text, "theirs")] == [None]
-    without = f"{HEAD},target_m\n-0.3,-0.1,1.9,1.725\n"
-    assert [one.target for one in read(tmp_path, without)] == [None]
+    for target in (1.725, 3.0):
+        without = f"{HEAD},target_m\n-0.3,-0.1,1.9,{target}\n"
+        assert [one.target for one in read(tmp_path, without)] == [None]
 
 
 def test_a_method_may_launch_without_a_target(tmp_path) -> None:
@@ -69,6 +77,10 @@ def test_a_method_may_launch_without_a_target(tmp_path) -> None:
             f"{HEAD},target_m,method\n-0.3,-0.1,1,1.9,mine\n",
             "line 2: method 'mine' is not in params.yaml, which has ours, theirs",
         ),
+        (
+            f"{HEAD},target_m,method\n-0.3,-0.1,1,2.425,ours\n-0.3,-0.1,1,3.0,theirs\n",
+            r"line 3: target_m 3.0 lies outside the target on the floor, \[1.425, 2.425\], where",
+        ),
         ((f"{HEAD}\n-0.3,-0.1,1\n").encode("utf-16"), "not UTF-8"),
         (f"{HEAD},method\n-0.3,-0.1,1,m".encode() + b"\xfcller\n", "not UTF-8"),
         (f"{HEAD}\n".encode() + b"1" * 200_000, "cannot be read as CSV"),
@@ -79,6 +91,34 @@ def test_refuses_what_no_launch_can_have_done(tmp_path, text: str | bytes, messa
         read(tmp_path, text)
     assert str(refused.value).startswith(str(tmp_path / "toy.csv"))
     assert "\n" not in str(refused.value)
+
+
+def test_launches_are_counted_by_the_method_that_they_name(tmp_path) -> None:
+    file = tmp_path / "toy.csv"
+    file.write_text(f"{HEAD},method\n-0.3,-0.1,1,mine\n-0.3,-0.1,1,ours\n-0.3,-0.1,1,\n,,,\n")
+    assert named(file) == {"mine": 1, "ours": 1, "": 1}
+    file.write_text("speed\n")
+    with pytest.raises(UserError, match="lacks the column"):
+        named(file)
+
+
+def test_the_bands_own_file_is_taken(tmp_path) -> None:
+    for name in ("README.md", "toy.csv", ".~lock.toy.csv#", "._toy.csv"):
+        (tmp_path / name).touch()
+    assert file_of(tmp_path, "toy", ("toy", "other")) == tmp_path / "toy.csv"
+    assert file_of(tmp_path, "other", ("toy", "other")) is None
+    assert file_of(tmp_path / "nowhere", "toy", ("toy",)) is None
+
+
+@pytest.mark.parametrize("name", ["orange.csv", "toy.CSV", "toy .csv"])
+def test_a_file_of_no_band_is_refused(tmp_path, name: str) -> None:
+    """Nobody would read it, and nobody would say so."""
+    (tmp_path / name).write_text(f"{HEAD}\n")
+    with pytest.raises(UserError) as refused:
+        file_of(tmp_path, "other", ("toy", "other"))
+    assert str(refused.value) == (
+        f"{tmp_path / name}: no band of params.yaml goes by that name; call it toy.csv or other.csv"
+    )
 
 
 def test_the_format_is_documented() -> None:

@@ -112,6 +112,8 @@ def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:
     content = {"names": list(THETA), "samples": samples(3).tolist()}
     path.write_text(json.dumps(content))
     np.testing.assert_array_equal(load_samples(toy.RUN, path, "toy", "none"), samples(3))
+    path.write_text('{"samples": []}')  # of a θ without confidence
+    assert load_samples(toy.RUN, path, "toy", "none") is None
     with_drag = {"names": [*THETA, "air_drag"], "samples": [[0.5] * 6] * 4}
     path.write_text(json.dumps(with_drag))
     assert load_samples(toy.RUN, path, "toy", "none").shape == (4, 6)

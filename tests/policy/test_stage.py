@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from pathlib import Path
@@ -15,14 +14,15 @@ from ruamel.yaml import YAML
 
 from pipeline.files import write_json
 from pipeline.policy import robust
-from pipeline.policy.aim import policy_draws
+from pipeline.policy.stored import PLAIN, ROBUST, Stored
 from pipeline.sling.model import THETA
 from stages import policy
 from tests.policy import toy
 from tests.project import ROOT
 
 POINT = (2e5, 0.47, 2e-3, 0.5, 0.6)
-FOLDER = Path("data/policies/band1/sling2sim2real_taut")
+STORED = Stored(toy.RUN, "band1", "sling2sim2real_taut")
+FOLDER = STORED.folder()
 FILES = {"card.json", "policy.onnx", "policy.pt", "training.parquet"}
 
 
@@ -65,20 +65,19 @@ def project(tmp_path, monkeypatch):
 
 def test_both_policies_are_written_with_their_cards(project, capsys) -> None:
     project()
-    plain, second = (json.loads((FOLDER / one / "card.json").read_text()) for one in ("", "robust"))
+    assert STORED.kinds() == [PLAIN, ROBUST]
+    plain, second = (STORED.card(kind) for kind in STORED.kinds())
     assert {file.name for file in FOLDER.iterdir()} == FILES | {"map.parquet", "robust"}
     assert {file.name for file in (FOLDER / "robust").iterdir()} == FILES
     assert (plain["kind"], second["kind"]) == ("plain", "robust")
     targets = np.linspace(1.425, 2.425, 256)
-    landing = toy.launch(policy_draws(toy.RUN, FOLDER, targets)).landing_y
+    landing = toy.launch(STORED.draws(targets)).landing_y
     assert plain["training"]["mean_error_m"] == pytest.approx(
         np.abs(landing - targets).mean(), 1e-3
     )
     about = second["training"]
     assert about["expected_error_m"] < about["plain_expected_error_m"] and about["samples"] == 3
-    assert not (
-        policy_draws(toy.RUN, FOLDER, targets) == policy_draws(toy.RUN, FOLDER / "robust", targets)
-    ).all()
+    assert not (STORED.draws(targets) == STORED.draws(targets, ROBUST)).all()
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 2 and "robust" in lines[1]
     assert len(pq.read_table(FOLDER / "training.parquet")) == 12
@@ -96,11 +95,14 @@ def test_the_same_input_gives_the_same_bytes(project) -> None:
     assert content() == content()
 
 
-def test_without_confidence_there_is_no_robust_policy(project, capsys) -> None:
-    os.remove("data/confidence/band1/sling2sim2real_taut.json")
+@pytest.mark.parametrize("left", [None, {"band": "band1", "samples": []}])
+def test_without_confidence_there_is_no_robust_policy(project, capsys, left) -> None:
+    """A θ file by hand has none beside it; the stage theta may have found none."""
+    path = Path("data/confidence/band1/sling2sim2real_taut.json")
+    os.remove(path) if left is None else write_json(path, left)
     project()
     assert {file.name for file in FOLDER.iterdir()} == FILES | {"map.parquet"}
-    assert "no robust policy, for there is no data/confidence" in capsys.readouterr().out
+    assert "no robust policy, for there are no samples in data/conf" in capsys.readouterr().out
 
 
 def test_a_method_that_is_not_named_gets_a_plain_one_alone(project, capsys) -> None:
@@ -118,10 +120,10 @@ def test_a_theta_whose_launches_all_fail_is_said_not_to_converge(project, capsys
     project(launch=broken)
     for line in capsys.readouterr().out.splitlines():
         assert "NOT converged; 256 of 256 targets fail: the simulation did not converge 256" in line
-    for folder in (FOLDER, FOLDER / "robust"):
-        told = json.loads((folder / "card.json").read_text())["training"]
+    for kind in (PLAIN, ROBUST):
+        told = STORED.card(kind)["training"]
         assert told["converged"] is False and told["mean_error_m"] is None
-        assert np.isfinite(policy_draws(toy.RUN, folder, np.array([1.9]))).all()
+        assert np.isfinite(STORED.draws(np.array([1.9]), kind)).all()
 
 
 def test_targets_out_of_reach_are_said_not_to_converge(project, capsys) -> None:
@@ -134,5 +136,5 @@ def test_targets_out_of_reach_are_said_not_to_converge(project, capsys) -> None:
 
     project(launch=weak)
     assert "NOT converged, mean |y_p - g|" in capsys.readouterr().out.splitlines()[0]
-    told = json.loads((FOLDER / "card.json").read_text())["training"]
+    told = STORED.card()["training"]
     assert told["converged"] is False and told["failed_targets"] == 0

@@ -31,7 +31,8 @@ def tried(root: Path, monkeypatch):
         if robust:
             folder = Path("data/policies", BAND, METHOD)
             (folder / "robust").mkdir()
-            shutil.copy(folder / "policy.onnx", folder / "robust")
+            for name in ("policy.onnx", "card.json"):
+                shutil.copy(folder / name, folder / "robust")
         from stages import trials
 
         trials.main()
@@ -76,6 +77,14 @@ def test_an_unknown_method_stops_the_stage_and_leaves_what_was_there(tried) -> N
     assert Path("data/trials", BAND, f"{METHOD}.parquet").read_bytes() == before
 
 
+def test_a_measured_file_of_no_band_stops_the_stage(tried) -> None:
+    file = Path("data/trials/measured/orange.csv")
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(f"{HEAD}\n")
+    with pytest.raises(UserError, match=r"orange.csv: no band of params.yaml .* call it band1.csv"):
+        tried()
+
+
 def test_a_rig_band_is_launched_with_equal_errors_for_both_policies(tried) -> None:
     """Plain and robust draws are equal here, so their launches are; measured ones stand apart."""
     yaml = YAML()
@@ -96,7 +105,7 @@ def test_a_rig_band_is_launched_with_equal_errors_for_both_policies(tried) -> No
     for one, other in zip(plain.itertuples(), robust.itertuples(), strict=True):
         assert one.flight_y.tolist() == other.flight_y.tolist()
         assert one.flight_z[-1] == pytest.approx(-0.52)
-        landed = one.failure is None
-        assert landed == (1.425 <= one.flight_y[-1] <= 2.425)
-        assert not landed or one.landing_y == one.flight_y[-1]
+        assert (one.failure is None) == (1.425 <= one.flight_y[-1] <= 2.425)
+        assert one.landing_y == one.flight_y[-1]  # where it counts as failed, too
+    assert plain.failure.str.startswith("beyond the area: lands at").all()
     assert rows.flight_y[8] is None and rows.landing_y[8] == 2.2

@@ -16,8 +16,7 @@ from pipeline.episode import Episode
 from pipeline.identify.regions import Region, save_regions
 from pipeline.params import load
 from pipeline.policy.export import write_onnx
-from pipeline.policy.landing_map import LandingMap
-from pipeline.policy.landscape import Landscape
+from pipeline.policy.landing_map import LandingMap, landscape_of
 from pipeline.policy.train import Policy
 from pipeline.sling.model import THETA as NAMES
 from tests.policy import toy
@@ -184,7 +183,7 @@ def root(tmp_path: Path) -> Path:
     (folder / "card.json").write_text(json.dumps(card))
     torch.manual_seed(0)
     network = nn.Sequential(nn.Linear(1, 8), nn.ELU(), nn.Linear(8, 2))
-    write_onnx(Policy(network, (1.425, 2.425), Landscape([chart])), folder / "policy.onnx")
+    write_onnx(Policy(network, (1.425, 2.425), landscape_of([chart])), folder / "policy.onnx")
     launches().to_parquet(data / "trials" / BAND / f"{METHOD}.parquet")
     return tmp_path
 

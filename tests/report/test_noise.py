@@ -81,6 +81,7 @@ def test_failures_are_left_out_with_their_pairs() -> None:
     inside = second.landing_y <= 2.425
     assert found.launches == (int(inside.sum()),) * 2
     assert found.left_out == 2 * int((~inside).sum())
+    assert found.failed == (0.0, pytest.approx((~inside).mean()))
     assert difference(first, launches([[0.1] * 5] * 3, failed=15), 1) is None
     assert difference(first.iloc[:0], first, 1) is None
 

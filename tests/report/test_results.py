@@ -75,3 +75,14 @@ def test_a_band_of_the_rig_has_a_floor(root, params) -> None:
     }  # fmt: skip
     (root / "data" / "floor" / f"{BAND}.json").write_text(json.dumps(floor))
     assert gather(virtual, root).floors == {BAND: floor}
+
+
+def test_measured_launches_of_a_method_that_does_not_run_are_counted(root, params) -> None:
+    folder = root / "data" / "trials" / "measured"
+    folder.mkdir()
+    assert gather(params, root).unused == {}
+    rows = [METHOD, "", "de", "de", "bo"]
+    lines = [f"-0.3,-0.2,1.9,1.9,{method}" for method in rows]
+    text = "\n".join(["draw_y_m,draw_z_m,landing_y_m,target_m,method", *lines])
+    (folder / f"{BAND}.csv").write_text(text + "\n")
+    assert gather(params, root).unused == {BAND: 3}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 
 from pipeline.report.chapters.summary import summary
 from pipeline.report.looks import looks
@@ -12,8 +14,9 @@ NAMED = looks(["sling2sim2real", "package_si", "real2sim2real", "de"])
 CLOSE = launches([[0.03, -0.01]] * 3)
 
 
-def said(*some, floors=None) -> list[str]:
-    text = summary(results(*some, floors=floors), NAMED)
+def said(*some, floors=None, unused=None) -> list[str]:
+    ran = replace(results(*some, floors=floors), unused=unused or {})
+    text = summary(SimpleNamespace(results=ran, looks=NAMED))
     return [line for line in text.splitlines() if line.startswith("- ")]
 
 
@@ -44,6 +47,13 @@ def test_what_went_wrong_is_said() -> None:
 def test_predictions_alone_say_so() -> None:
     lines = said(result("mine", "package_si", launches([[math.nan]] * 3, "predicted")))
     assert lines == ["- mine, Package SI: no launch to compare its predictions with."]
+
+
+def test_measured_launches_of_a_method_that_does_not_run_are_named() -> None:
+    lines = said(result("mine", "package_si", CLOSE), unused={"mine": 3})
+    assert lines[-1] == (
+        "- mine: 3 measured launches name a method that does not run on this band."
+    )
 
 
 def test_measured_launches_are_judged_by_method() -> None:

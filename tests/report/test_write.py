@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from pipeline.errors import UserError
+from pipeline.report import report as reporting
 from pipeline.report import write as writing
 from pipeline.report.metrics import metrics
 from pipeline.report.results import gather
@@ -22,14 +23,14 @@ THETA_FILE = f"data/theta/{BAND}/{METHOD}.json"
 
 @pytest.fixture(autouse=True)
 def no_simulation(monkeypatch) -> None:
-    monkeypatch.setattr(writing, "replay", toy_replay)
+    monkeypatch.setattr(reporting, "replay", toy_replay)
 
 
 @pytest.fixture
 def text_alone(monkeypatch) -> None:
     """Pictures and the page take seconds, and tell a test of the text nothing."""
-    for name in ("common_figures", "draw_figures", "write_page"):
-        monkeypatch.setattr(writing, name, lambda *_: None)
+    monkeypatch.setattr(reporting.Report, "picture", lambda *_: "")
+    monkeypatch.setattr(writing, "write_page", lambda *_: None)
 
 
 def written(root, params) -> str:
@@ -109,6 +110,15 @@ def test_a_failed_prediction_is_named(root, params, text_alone) -> None:
     assert "stretch, is **not** met" in written(root, params)
 
 
+def test_held_out_data_have_a_table_where_params_hold_some_out(root, params, text_alone) -> None:
+    """Though nothing is known of them: the toy's replay has none."""
+    assert "Held-out data" not in written(root, params)
+    held_out = params.loss.held_out.model_copy(update={"blocks": 2})
+    loss = params.loss.model_copy(update={"held_out": held_out})
+    text = written(root, params.model_copy(update={"loss": loss}))
+    assert "### Held-out data" in text and "| Sling2Sim2Real | 0.200 | – | – |" in text
+
+
 def test_metrics_are_those_of_the_results(root, params, text_alone) -> None:
     writing.write(params, root)
     folder = root / "reports" / "metrics"
@@ -139,10 +149,10 @@ def test_names_the_input_that_is_missing(root, params, name: str, stage: str) ->
 
 def test_methods_beside_each_other_are_replayed_on_every_band(params, monkeypatch) -> None:
     """Those of run.methods, though a band's ablations come before them in its own pictures."""
-    monkeypatch.setattr(writing, "replay", lambda params, band, method, *_: method)
+    monkeypatch.setattr(reporting, "replay", lambda params, band, method, *_: method)
     always = ["mine", "de", "bo", "sling2sim2real"]
     methods = {m: SimpleNamespace(theta=None) for m in (*always, "package_si", "real2sim2real")}
     results = SimpleNamespace(episodes={BAND: None}, methods={BAND: methods})
     run = params.run.model_copy(update={"methods": tuple(always)})
-    found = writing._replays(params.model_copy(update={"run": run}), results, BAND)
+    found = reporting._replays(params.model_copy(update={"run": run}), results, BAND)
     assert {*always, "package_si", "real2sim2real"} == {*found}

@@ -130,6 +130,7 @@ class Laboratory:
         return topics
 
 
+@pytest.mark.slow
 def test_each_number_changes_what_it_should(
     params: Params, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,7 +8,6 @@ import pytest
 from pipeline.params import Params
 from pipeline.rig import string as dynamics
 from pipeline.rig.launch import launch_from
-from pipeline.rig.statics import balanced
 from pipeline.rig.world import bent_at, string_of
 
 DRAW = np.array([0.0, -0.30, -0.15])
@@ -31,7 +30,7 @@ def test_a_held_band_rests_where_damped_motion_brings_it(
 def test_nothing_moves_it_any_more(params: Params) -> None:
     string = string_of(params, "band3")
     elastic = replace(string, rubber=replace(string.rubber, relaxation=np.empty((0, 2))))
-    nodes = balanced(elastic, elastic.state(bent_at(elastic, DRAW)), 1e-9)
+    nodes = elastic.balanced(elastic.state(bent_at(elastic, DRAW)), 1e-9)
     state = elastic.state(nodes)
     force = elastic.forces(state)[0]
     force[[0, elastic.middle, -1]] = 0.0

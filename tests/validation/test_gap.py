@@ -20,7 +20,8 @@ from pipeline.oracle.aim import hit, least_sensitive_draw
 from pipeline.oracle.floor import errors_of, trial_seeds
 from pipeline.oracle.world import World
 from pipeline.params import load
-from pipeline.policy.aim import policy_draws, simulator
+from pipeline.policy.aim import simulator
+from pipeline.policy.stored import Stored
 from pipeline.sling.model import THETA
 from pipeline.style import COLORS, INK, STYLE
 from pipeline.theta import load_theta
@@ -99,11 +100,11 @@ def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
     band, targets = world.band, np.array(params.trials.targets)
     seeds = trial_seeds(params)
     path = root / "data/theta" / band / f"{method}.json"
-    policy = root / "data/policies" / band / method
+    stored = Stored(params.run, band, method, root)
     content = load_theta(path, band)
     values = content["theta"] | content.get("nuisances", {})
     launcher = simulator(params, band, content, root=root)
-    draws = {AS_IT_IS: policy_draws(params.run, policy, targets)}
+    draws = {AS_IT_IS: stored.draws(targets)}
     own = draws[AS_IT_IS]
     land = lambda draw: float(launcher(draw[None]).landing_y[0])  # noqa: E731
     draws[AIMED] = np.array([hit(land, g, draw) for g, draw in zip(targets, own, strict=True)])
@@ -115,7 +116,7 @@ def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
     write_json(path, fitted)
     (root / "data/confidence" / band / f"{method}.json").unlink(missing_ok=True)  # nor robust ones
     run(root, "python", "-m", "stages.policy", band, method)
-    draws[THETA_] = policy_draws(params.run, policy, targets)
+    draws[THETA_] = stored.draws(targets)
 
     variants = {}
     for name, each in draws.items():

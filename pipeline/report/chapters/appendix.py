@@ -5,16 +5,15 @@ from __future__ import annotations
 import platform
 from importlib.metadata import version
 
-from pipeline.report.looks import Look
-from pipeline.report.results import Results
+from pipeline.report.report import Report
 from pipeline.report.tables import policies as tables
 from pipeline.report.tables.cells import markdown
 
 PACKAGES = ("numpy", "scipy", "warp-lang", "cma", "torch", "rsl-rl-lib", "pyarrow", "dvc")
 
 
-def policies(params, results: Results, looks: dict[str, Look]) -> str:
-    low, high = params.policy.targets
+def policies(report: Report) -> str:
+    low, high = report.params.policy.targets
     return f"""\
 ## Policies
 
@@ -25,10 +24,11 @@ criterion in full). Training reads landings off maps of simulated launches; thei
 the range of targets, comes next. *Expected*: the mean error over samples of the posterior and
 errors of the draw, of a robust policy and of the plain one beside it.
 
-{markdown(tables.policies(results, looks))}"""
+{markdown(tables.policies(report.results, report.looks))}"""
 
 
-def budget(params) -> str:
+def budget(report: Report) -> str:
+    params = report.params
     optimizer, policy, trials = params.optimizer, params.policy, params.trials
     versions = [f"python {platform.python_version()}", *(f"{n} {version(n)}" for n in PACKAGES)]
     explored = optimizer.population * (optimizer.generations + 1)

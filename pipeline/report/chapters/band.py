@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
 import numpy as np
 
-from pipeline.report.looks import drawn
+from pipeline.policy.stored import PLAIN, ROBUST
+from pipeline.report.figures import confidence, episode, policy, search
+from pipeline.report.looks import Look, drawn
+from pipeline.report.losses import has_another_loss
 from pipeline.report.report import Report
-from pipeline.report.results import Results
+from pipeline.report.results import Result
 from pipeline.report.tables import identified, landings, policies
 from pipeline.report.tables.cells import markdown
 
@@ -19,129 +26,205 @@ PREDICTED = {
     "virtual": "The launches of the rig took no part in the identification.",
 }
 ERRORS = """\
-Error in per cent of the landing distance; bias is its signed mean, predicted less landed; *not
-predicted* are launches whose simulation fails, which the means leave out; *beyond* marks draws that
-stretch the band further than the recording did."""
+Error in per cent of the landing distance, of every launch that came down, outside the target area
+too; bias is its signed mean, predicted less landed; *not predicted* are launches whose simulation
+fails, which the means leave out; *beyond* marks draws that stretch the band further than the
+recording did."""
+WHOSE = {PLAIN: "the policy's", ROBUST: "the robust policy's"}
 
 
-def band_chapter(report: Report, band: str) -> str:
-    about = report.params.bands[band]
+@dataclass(frozen=True)
+class Band:
+    """What ran on a band; `near`: the methods that its own pictures have room for."""
+
+    report: Report
+    name: str
+    methods: dict[str, Result]
+    near: dict[str, Result]
+    looks: dict[str, Look]
+
+    @classmethod
+    def of(cls, report: Report, name: str) -> Band:
+        methods = report.results.methods[name]
+        near = {method: methods[method] for method in drawn(methods)}
+        return cls(
+            report, name, methods, near, {method: report.looks[method] for method in methods}
+        )
+
+    @property
+    def near_names(self) -> str:
+        return " and ".join(self.looks[method].name for method in self.near)
+
+    def picture(self, name: str, alt: str, draw: Callable[[Path], None]) -> str:
+        return self.report.picture(f"{self.name}-{name}", alt, draw)
+
+
+def bands(report: Report) -> str:
+    """A chapter a band."""
+    return "\n".join(_chapter(Band.of(report, name)) for name in report.params.run.bands)
+
+
+def _chapter(band: Band) -> str:
+    about = band.report.params.bands[band.name]
     text = [
-        f"## {band}\n",
+        f"## {band.name}\n",
         f"{about.mass * 1e3:g} g, {about.rest_length * 100:g} cm between the clamps,"
         f" {about.diameter * 1e3:g} mm thick; {SOURCE[about.source]}.\n",
     ]
-    for part in (_predictions, _recording, _search, _policy):
-        text += part(report, band)
+    for part in (_predictions, _recording, _search, _confidence, _policy):
+        text += part(band)
     return "\n".join(text)
 
 
-def compared(results: Results, band: str) -> bool:
-    """Whether any launch of the band landed, so that a prediction can be held against it."""
-    trials = results.trials
-    return bool((trials.landing_y.notna() & (trials.band == band)).any())
-
-
-def _names(report: Report, band: str) -> str:
-    return " and ".join(report.looks[method].name for method in drawn(report.results.methods[band]))
-
-
-def _predictions(report: Report, band: str) -> list[str]:
-    results, looks, text = report.results, report.looks, []
+def _predictions(band: Band) -> list[str]:
+    text, trials = [], band.report.results.trials
+    trials = trials[trials.band == band.name]
     for kind, words in PREDICTED.items():
-        table = landings.prediction_summary(results, band, kind, looks)
+        table = landings.prediction_summary(band.report.results, band.name, kind, band.looks)
         if table:
             text.append(f"### Predicted and {kind} landings\n\n{words} {ERRORS}\n")
             text.append(markdown(table))
-    if compared(results, band):
-        text.append(
-            f"Left: {_names(report, band)}. Right: every method, a dot a launch.\n\n"
-            f"![predicted and actual landings](figures/{band}-landings.png)\n"
+    if trials.landing_y.notna().any():
+        shown = band.picture(
+            "landings",
+            "predicted and actual landings",
+            lambda path: policy.landings(path, trials, band.looks, list(band.near)),
         )
-    for method in drawn(results.methods[band]):
-        result = results.methods[band][method]
+        text.append(f"Left: {band.near_names}. Right: every method, a dot a launch.\n\n{shown}")
+    for method, result in band.near.items():
         for kind, title in (("measured", "launch by launch"), ("predicted", "predictions")):
-            trials = result.trials[result.trials.kind == kind]
-            if not trials.empty:
-                table = markdown(landings.predictions(trials))
-                text.append(f"{looks[method].name}, {title}:\n\n{table}")
+            launches = result.trials[result.trials.kind == kind]
+            if not launches.empty:
+                table = markdown(landings.predictions(launches))
+                text.append(f"{band.looks[method].name}, {title}:\n\n{table}")
                 if kind == "predicted":
                     text.append(
                         "No landing of this policy has been measured. Launch from these draws and"
-                        f" put the landings into `data/trials/measured/{band}.csv` to compare.\n"
+                        f" put the landings into `data/trials/measured/{band.name}.csv` to"
+                        " compare.\n"
                     )
     return text
 
 
-def _recording(report: Report, band: str) -> list[str]:
+def _recording(band: Band) -> list[str]:
+    report, looks = band.report, band.looks
+    recorded, replays = report.results.episodes[band.name], report.replays[band.name]
+    shown = {method: replays[method] for method in band.near}
+    frames, diameter = episode.moments(recorded), report.params.bands[band.name].diameter
+    force = band.picture(
+        "force", "force over time", lambda path: episode.force(path, recorded, shown, looks)
+    )
+    work = band.picture(
+        "work", "work over time", lambda path: episode.work(path, recorded, shown, looks)
+    )
+    clouds = band.picture(
+        "clouds",
+        "point clouds",
+        lambda path: episode.clouds(path, recorded, shown, looks, frames, diameter),
+    )
     text = [
         "### Recording and calibrated simulation\n\n"
-        f"Drawn: {_names(report, band)}. Force of the band on the hand, both through the"
+        f"Drawn: {band.near_names}. Force of the band on the hand, both through the"
         " same filter; the size of their difference, x included; and the distance of each frame's"
-        " cloud from the simulated band.\n\n"
-        f"![force over time](figures/{band}-force.png)\n\n"
+        f" cloud from the simulated band.\n\n{force}",
         "Work of the band on the hand since the start. Where the curves end apart is the term of"
-        " work in the loss.\n\n"
-        f"![work over time](figures/{band}-work.png)\n\n"
+        f" work in the loss.\n\n{work}",
         "Points that the camera saw (one side of the band) and the simulated band (line: its"
-        " middle, shade: its thickness), with the mean distance of the frame.\n\n"
-        f"![point clouds](figures/{band}-clouds.png)\n"
+        f" middle, shade: its thickness), with the mean distance of the frame.\n\n{clouds}",
     ]
-    table = identified.held_out(report.replays[band], report.looks)
-    if table:
+    if report.params.loss.held_out.blocks:
         text.append(
             "### Held-out data\n\nBlocks of the pull that no search has seen, and the rest of the"
             " pull: mean force error, and mean distance of the clouds. Blocks lie at moments of"
             " their own, harder or easier than the rest, so a ratio says less than methods beside"
             " each other: one that over-fits has the less fitted and the greater held-out"
-            f" residual.\n\n{markdown(table)}"
+            f" residual.\n\n{markdown(identified.held_out(replays, looks))}"
         )
     return text
 
 
-def _search(report: Report, band: str) -> list[str]:
-    methods, looks = report.results.methods[band], report.looks
+def _search(band: Band) -> list[str]:
+    params, looks = band.report.params, band.looks
+    own = {m for m in band.methods if has_another_loss(dict(params.methods[m].weights))}
+    convergence = band.picture(
+        "convergence",
+        "convergence",
+        lambda path: search.convergence(path, band.methods, looks, own),
+    )
     text = [
         "### Search\n\n"
         "The printed loss (geom + force + work) of the best θ so far, *best* by each method's own"
-        " loss: the curve of a method with another loss may rise.\n\n"
-        f"![convergence](figures/{band}-convergence.png)\n\n"
+        f" loss: the curve of a method with another loss may rise.\n\n{convergence}",
         "Everything that was evaluated, in the unit cube of the search; diagonal: the loss against"
-        " one parameter.\n"
+        " one parameter.\n",
     ]
-    chosen = drawn(methods)
-    text += [
-        f"![every point that {looks[method].name} evaluated](figures/{band}-{method}-corner.png)\n"
-        for method in chosen
-    ]
-    if any(methods[method].confidence for method in chosen):
-        text.append(
-            "### Confidence\n\n"
-            "Least misfit (−2 log likelihood of whitened residuals) with one parameter held, all"
-            " others free; the posterior's marginals; its 90 % intervals.\n\n"
-            f"![profile curves](figures/{band}-profiles.png)\n\n"
-            f"![correlation of the parameters](figures/{band}-correlation.png)\n"
-        )
+    for method, result in band.near.items():
+        name = looks[method].name
+
+        def draw(path: Path, result=result, name=name) -> None:
+            search.corner(path, result, params.parameters, name)
+
+        text.append(band.picture(f"{method}-corner", f"every point that {name} evaluated", draw))
     return text
 
 
-def _policy(report: Report, band: str) -> list[str]:
-    results, looks = report.results.methods[band], report.looks
-    methods, targets = drawn(results), np.array(report.params.trials.targets)
-    named = {}
-    for method in methods:
-        result, name = results[method], looks[method].name
-        named[name] = result.landing_map, report.draws(band, method, targets)
-        if result.robust_card:
-            robust = report.draws(band, method, targets, robust=True)
-            named[f"{name}, robust"] = result.landing_map, robust
-    text = [
-        f"### Policy\n\n![training](figures/{band}-training.png)\n",
+def _confidence(band: Band) -> list[str]:
+    """What the posteriors say; nothing where no method in the pictures has one."""
+    trusted = {method: result for method, result in band.near.items() if result.confidence}
+    if not trusted:
+        return []
+    boxes, looks = band.report.params.parameters, band.looks
+    profiles = band.picture(
+        "profiles",
+        "profile curves",
+        lambda path: confidence.profiles(path, trusted, looks, boxes),
+    )
+    correlation = band.picture(
+        "correlation",
+        "correlation of the parameters",
+        lambda path: confidence.correlation(path, trusted, looks),
+    )
+    return [
+        "### Confidence\n\n"
+        "Least misfit (−2 log likelihood of whitened residuals) with one parameter held, all"
+        f" others free; the posterior's marginals; its 90 % intervals.\n\n{profiles}",
+        correlation,
+    ]
+
+
+def _policy(band: Band) -> list[str]:
+    report, looks = band.report, band.looks
+    targets, aims = np.array(report.params.trials.targets), {}
+    for method, result in band.near.items():
+        for kind, draws in report.draws(result, targets).items():
+            name = looks[method].name + (", robust" if kind == ROBUST else "")
+            aims[name] = result.landing_map, draws
+    training = band.picture(
+        "training", "training", lambda path: policy.training(path, band.methods, looks)
+    )
+    return [
+        f"### Policy\n\n{training}",
         "Draws for the targets of the trials, each in the method's own simulator:\n",
-        markdown(policies.aims(named, targets)),
+        markdown(policies.aims(aims, targets)),
         "Where each draw of the box lands there, and the policy's path over it:\n",
+        *(_map(band, result, targets) for result in band.near.values()),
     ]
-    return text + [
-        f"![landing map of {looks[method].name}](figures/{band}-{method}-map.png)\n"
-        for method in methods
-    ]
+
+
+def _map(band: Band, result: Result, targets: np.ndarray) -> str:
+    """The picture of where each draw lands, and of the policies' draws from near to far target."""
+    params = band.report.params
+    path_of = band.report.draws(result, np.linspace(*params.policy.targets, 101))
+    return band.picture(
+        f"{result.method}-map",
+        f"landing map of {band.looks[result.method].name}",
+        lambda path: policy.landing_map(
+            path,
+            result,
+            {WHOSE[kind]: draws for kind, draws in path_of.items()},
+            targets,
+            float(result.trials.recorded_stretch.max()),
+            params.setup.fork_width,
+            params.bands[band.name].rest_length,
+        ),
+    )

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from pipeline.report.looks import Look
+from pipeline.report.report import Report
 from pipeline.report.results import Results
 from pipeline.report.tables import identified
 from pipeline.report.tables.cells import markdown
 
 
-def identification(params, results: Results, looks: dict[str, Look]) -> str:
+def identification(report: Report) -> str:
+    params, results, looks = report.params, report.results, report.looks
     return f"""\
 ## Methods and losses
 
 All methods spend the same number of rollouts. Names are the paper's where the method is; −c leaves
 out the covariance, −m the several starts, −L_work the term of work.
 
-{markdown(identified.methods(params, looks))}
+{markdown(identified.methods(results, params, looks))}
 {_trust(results, looks)}
 ### Loss
 

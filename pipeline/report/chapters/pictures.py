@@ -5,14 +5,36 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.policy.trials import stretch_of
+from pipeline.report.figures import launches, loaded
 from pipeline.report.replay import LOAD
-from pipeline.report.report import Report
+from pipeline.report.report import Report, side_by_side
 
 
 def pictures(report: Report) -> str:
-    """The chapter; its pictures are those of write.py's `common_figures`."""
+    results, looks, setup = report.results, report.looks, report.params.setup
+    methods = side_by_side(report.params)
+    trajectories = report.picture(
+        "trajectories",
+        "flights of every band and method",
+        lambda path: launches.trajectories(path, results, methods, looks, setup.fork_height),
+    )
+    scatter = report.picture(
+        "scatter",
+        "landings on the target",
+        lambda path: launches.scatter(path, results, methods, looks),
+    )
+    shown = {band: {m: of_band[m] for m in methods} for band, of_band in report.replays.items()}
+    under_load = report.picture(
+        "loaded",
+        "bands under load",
+        lambda path: loaded.loaded(
+            path, results.episodes, shown, looks, setup.fork_width, setup.fork_height
+        ),
+    )
     flights = "Flights of the projectile from the pouch to the floor, to scale"
-    if "virtual" in set(report.results.trials.kind):
+    kinds = set(results.trials.kind)
+    marks = "rings of its own" + "; measured landings are hollow" * ("measured" in kinds)
+    if "virtual" in kinds:
         flights += "; those of the **virtual rig** meet a drag of the air that the predictions lack"
     beyond = _beyond(report)
     return f"""\
@@ -20,19 +42,16 @@ def pictures(report: Report) -> str:
 
 {flights}.
 
-![flights of every band and method](figures/trajectories.png)
-
+{trajectories}
 Landings on the target of 1 m × 1 m, seen from above, to scale. Launches go in the plane of the
-band: nothing is known across it, so each method has a strip of its own, with rings of its own.
+band: nothing is known across it, so each method has a strip of its own, with {marks}.
 
-![landings on the target](figures/scatter.png)
-
+{scatter}
 Above: each calibrated simulator's band with {LOAD:g} kg at its middle, at rest and to scale, as if
 there were no floor. This is simulated; no recording shows it{beyond}. Below: force against draw,
 from grasp to release, as recorded and as the calibrated simulators answer the same hand.
 
-![bands under load](figures/loaded.png)
-"""
+{under_load}"""
 
 
 def _beyond(report: Report) -> str:

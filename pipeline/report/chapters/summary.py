@@ -5,6 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from pipeline.report.looks import Look
+from pipeline.report.report import Report
 from pipeline.report.results import Result, Results
 from pipeline.report.tables.benchmark import APART
 from pipeline.report.tables.landings import AIM, intervals, landing_errors, prediction_error
@@ -22,8 +23,9 @@ position (y, z) of the projectile, y < 0; a *target* g is a distance along y on 
 """
 
 
-def summary(results: Results, looks: dict[str, Look]) -> str:
+def summary(report: Report) -> str:
     """A line a band of the rig, one a method where launches were measured, and what went wrong."""
+    results, looks = report.results, report.looks
     lines = [INTRODUCTION, "## In short\n"]
     lines += [line for band in results.methods for line in _virtual(results, band, looks)]
     for one in results:
@@ -31,6 +33,10 @@ def summary(results: Results, looks: dict[str, Look]) -> str:
         if said:
             lines.append(f"- **{_name(one, looks)}**: {'; '.join(said)}.")
     lines += [f"- {line}" for one in results for line in _doubts(one, _name(one, looks))]
+    lines += [
+        f"- {band}: {count} measured launches name a method that does not run on this band."
+        for band, count in results.unused.items()
+    ]
     return "\n".join(lines) + "\n"
 
 

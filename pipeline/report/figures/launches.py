@@ -123,14 +123,24 @@ def _flights(
             ax.plot(one.landing_y, -fork_height, "x", color=shades[one.target], ms=5, zorder=3)
     for points in predicted:
         ax.plot(*points.T, color=INK, lw=0.6, ls=(0, (5, 3)), zorder=5)
-    launched = trials[trials.kind != "predicted"]
-    failed = int((~landed(launched)).sum())
-    said = f"{failed} of {len(launched)} failed" if failed else ""
+    failed = _failed(trials)
+    said = ",\n".join(failed) + " failed" if failed else ""
     behind = {"facecolor": "w", "edgecolor": "none", "alpha": 0.8, "pad": 1}
     ax.text(
         0.99, 0.97, said, transform=ax.transAxes, ha="right", va="top", fontsize=8, zorder=6,
         bbox=behind if said else None,
     )  # fmt: skip
+
+
+def _failed(trials: pd.DataFrame) -> list[str]:
+    """As in "3 of 15", of each kind some of which failed; the kind is named where there are two."""
+    launched = trials[trials.kind != "predicted"]
+    several = launched.kind.nunique() > 1
+    return [
+        f"{int(failed.sum())} of {len(failed)}" + f" {kind}" * several
+        for kind, failed in (~landed(launched)).groupby(launched.kind)
+        if failed.any()
+    ]
 
 
 def _key(figure: plt.Figure, kinds: list[str]) -> None:
@@ -163,14 +173,15 @@ def scatter(path: Path, results: Results, methods: list[str], looks: dict[str, L
     Args:
         methods: Those that ran on every band and are drawn.
     """
-    bands, (near, far) = list(results.methods), TARGET_AREA
+    near, far = TARGET_AREA
+    strips_of = {band: _strips(results, band, methods, looks) for band in results.methods}
+    launched = [trials for strips in strips_of.values() for *_, trials in strips]
+    kinds = sorted({kind for trials in launched for kind in trials.kind[landed(trials)]})
+    more = 0.04 * max([0, *(len(_failed(trials)) - 1 for trials in launched)])  # for words [m]
+    inches = min(4.5 * len(strips_of) + 0.6, 13.5), 5.6 + 6 * more
     with plt.rc_context({**STYLE, "axes.grid": False}):
-        figure, axes = plt.subplots(
-            1, len(bands), figsize=(min(4.5 * len(bands) + 0.6, 13.5), 5.6), sharey=True,
-            squeeze=False,
-        )  # fmt: skip
-        for ax, band in zip(axes.flat, bands, strict=True):
-            strips = _strips(results, band, methods, looks)
+        figure, axes = plt.subplots(1, len(strips_of), figsize=inches, sharey=True, squeeze=False)
+        for ax, (band, strips) in zip(axes.flat, strips_of.items(), strict=True):
             width = (far - near) / max(len(strips), 1)
             ax.add_patch(Rectangle((0, near), far - near, far - near, color=AREA, lw=0, alpha=0.6))
             for number, (_, color, trials) in enumerate(strips):
@@ -182,12 +193,12 @@ def scatter(path: Path, results: Results, methods: list[str], looks: dict[str, L
             names = [name.replace(", ", ",\n") for name, _, _ in strips]
             ax.set_xticks(places, names, fontsize=8 if len(strips) <= SIDE_BY_SIDE else 6.8)
             ax.tick_params(axis="x", length=0)
-            ax.set(xlim=(-0.03, 1.03), ylim=(near - 0.02, far + 0.08), aspect="equal")
+            ax.set(xlim=(-0.03, 1.03), ylim=(near - 0.02, far + 0.08 + more), aspect="equal")
             ax.set_title(band, fontsize=10)
             for label, (_, color, _) in zip(ax.get_xticklabels(), strips, strict=True):
                 label.set_color(color)
-        axes[0, 0].set_ylabel("landing, y [m]")
-        _key_of_targets(figure, results)
+        axes[0, 0].set_ylabel(f"{' and '.join(kinds) or 'no'} landing, y [m]")
+        _key_of_targets(figure, results, kinds)
         save(figure, path)
 
 
@@ -211,28 +222,33 @@ def _landings(ax: plt.Axes, trials: pd.DataFrame, middle: float, width: float, c
             if radius <= 0.501 * width:
                 ax.add_patch(Circle((middle, target), radius, fill=False, color="w", lw=1.2))
         ax.plot([middle - 0.015, middle + 0.015], [target] * 2, color=INK, lw=0.8)
-        seen = trials[(trials.target == target) & trials.landing_y.notna()]
-        ax.scatter(
-            np.full(len(seen), middle), seen.landing_y, s=20, marker=mark, facecolors=color,
-            edgecolors="w", linewidths=0.4, alpha=0.85, zorder=3,
-        )  # fmt: skip
-    launched = trials[trials.kind != "predicted"]
-    failed = int((~landed(launched)).sum())
+        seen = trials[(trials.target == target) & landed(trials)]
+        for kind, some in seen.groupby("kind"):
+            hollow = kind == "measured"
+            ax.scatter(
+                np.full(len(some), middle), some.landing_y, s=20, marker=mark,
+                facecolors="none" if hollow else color, edgecolors=color if hollow else "w",
+                linewidths=1.0 if hollow else 0.4, alpha=0.85, zorder=3,
+            )  # fmt: skip
+    failed = _failed(trials)
     if failed:
-        text = f"{failed} of {len(launched)}\nfailed"
-        ax.text(middle, TARGET_AREA[1] + 0.01, text, ha="center", va="bottom", fontsize=7)
+        text = "\n".join([*failed, "failed"])
+        ax.text(middle, TARGET_AREA[1] + 0.01, text, ha="center", va="bottom", fontsize=6)
 
 
 def _marks(targets: list[float]) -> list[str]:
     return [MARKS[number % len(MARKS)] for number in range(len(targets))]
 
 
-def _key_of_targets(figure: plt.Figure, results: Results) -> None:
+def _key_of_targets(figure: plt.Figure, results: Results, kinds: list[str]) -> None:
     targets = sorted(set(results.trials.target.dropna()))
     entries = [
         (f"aimed at {target:g} m", plt.Line2D([], [], ls="", marker=mark, color="0.4", mec="w"))
         for target, mark in zip(targets, _marks(targets), strict=True)
     ]
+    if "measured" in kinds:
+        hollow = plt.Line2D([], [], ls="", marker="o", mfc="none", color="0.4")
+        entries.append(("measured (filled: virtual)", hollow))
     ring = plt.Line2D([], [], ls="", marker="o", ms=11, mfc=AREA, mec="w", mew=1.2)
     words = " and ".join(f"{100 * radius:g}" for radius in RINGS)
     entries.append((f"rings of {words} cm around the targets", ring))

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.report.looks import Look
-from pipeline.report.noise import Difference, difference
+from pipeline.report.noise import Difference, difference, landed
 from pipeline.report.results import Results
 from pipeline.report.tables.benchmark import LAUNCHED, band_name, spread
 from pipeline.report.tables.cells import NONE, Table, number
@@ -17,7 +17,14 @@ from pipeline.report.tables.landings import landing_errors
 
 REFERENCES = ("sling2sim2real_taut", "sling2sim2real")  # ours and the paper's
 
-VERDICTS = ("more error", "less error", "cannot be told apart", "cannot be compared")
+VERDICTS = (
+    "more error",
+    "more error where both land, but fewer launches fail",
+    "less error",
+    "less error where it lands, but more launches fail",
+    "cannot be told apart",
+    "cannot be compared",
+)
 
 
 class Compared(NamedTuple):
@@ -85,7 +92,7 @@ def claims(rows: list[Compared], looks: dict[str, Look]) -> list[str]:
     for band, method, kind, found in rows:
         for reference, one in found.items():
             parts = said.setdefault((band, kind, reference), {})
-            few = f" ({one.launches[0]} launches count)" if one and one.left_out else ""
+            few = f" ({one.launches[1]} launches count)" if one and one.left_out else ""
             parts.setdefault(_verdict(one), []).append(looks[method].name + few)
     return [
         f"- {band_name(band)}, {kind}, beside **{looks[reference].name}**: "
@@ -98,12 +105,15 @@ def claims(rows: list[Compared], looks: dict[str, Look]) -> list[str]:
 
 
 def _verdict(one: Difference | None) -> str:
-    more, less, open_, none = VERDICTS
+    more, more_of_more, less, less_of_fewer, open_, none = VERDICTS
     if one is None or not np.isfinite(one.low):
         return none
     if not one.real:
         return open_
-    return more if one.mean > 0 else less
+    beside, own = one.failed
+    if one.mean > 0:
+        return more_of_more if own < beside else more
+    return less_of_fewer if own > beside else less
 
 
 def records(rows: list[Compared]) -> pd.DataFrame:
@@ -117,7 +127,10 @@ def records(rows: list[Compared]) -> pd.DataFrame:
             "difference_cm": 100 * one.mean,
             "low_95_cm": 100 * one.low,
             "high_95_cm": 100 * one.high,
-            "launches": one.launches[0],
+            "launches": one.launches[1],
+            "launches_beside": one.launches[0],
+            "failed_share": one.failed[1],
+            "failed_share_beside": one.failed[0],
             "left_out": one.left_out,
         }
         for band, method, kind, found in rows
@@ -151,5 +164,5 @@ def robust(results: Results, looks: dict[str, Look], seed: int) -> Table | None:
 
 def _scatter(trials: pd.DataFrame) -> float:
     """Deviation of landings around the mean of their target [m], within targets."""
-    variances = trials[trials.landing_y.notna()].groupby("target").landing_y.var(ddof=1)
+    variances = trials[landed(trials)].groupby("target").landing_y.var(ddof=1)
     return math.sqrt(variances.mean())

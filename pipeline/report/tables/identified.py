@@ -28,8 +28,8 @@ SEARCHES = {
 TERMS = {"geom": "geom [cm]", "force": "force [N]", "work": "work [J]", "taut": "taut [cm]"}
 
 
-def methods(params, looks: dict[str, Look]) -> Table:
-    """What each method searches, what it minimises, and what it holds fixed."""
+def methods(results: Results, params, looks: dict[str, Look]) -> Table:
+    """What each method searched, what it minimises, and what it holds fixed."""
     rows = []
     for method, look in looks.items():
         about = params.methods[method]
@@ -40,8 +40,9 @@ def methods(params, looks: dict[str, Look]) -> Table:
         ]
         search = SEARCHES.get(about.search, f"`{about.search}`")
         if about.search == "multistart":
-            regions = about.k_top or params.optimizer.k_top
-            search = f"DE, then CMA-ES in {'1 region' if regions == 1 else f'{regions} regions'}"
+            found = {len(one.regions) for one in results if one.method == method}
+            regions = " to ".join(str(count) for count in sorted({min(found), max(found)}))
+            search = f"DE, then CMA-ES in {regions} region{'s' if max(found) > 1 else ''}"
             search += "" if about.covariance else ", isotropic starts"
         fixed = [_held(name, value) for name, value in about.fixed.items()]
         known = {name: f" (prior: mean {one.mean:g})" for name, one in about.priors.items()}
@@ -123,15 +124,13 @@ def losses(results: Results, params, looks: dict[str, Look]) -> Table:
     return heads, rows
 
 
-def held_out(replays: dict[str, Replay], looks: dict[str, Look]) -> Table | None:
-    """Residuals of fitted and of held-out data of a band's pull; None where nothing is held out."""
+def held_out(replays: dict[str, Replay], looks: dict[str, Look]) -> Table:
+    """Residuals of fitted and of held-out data of a band's pull."""
     rows = []
     for method, replay in replays.items():
         cells = []
         for kind, form in (("force", ".3f"), ("cloud", ".2f")):
             fitted, held = (replay.residuals[kind][part] for part in ("fitted", "held_out"))
-            if not np.isfinite(held):
-                return None
             cells += [number(fitted, form), number(held, form), number(held / fitted, ".2f")]
         rows.append([looks[method].name, *cells])
     heads = [f"{what}, {part}" for what in ("force [N]", "cloud [cm]") for part in PARTS]

@@ -11,6 +11,7 @@ from pipeline.params import TARGET_AREA
 from pipeline.report import paper
 from pipeline.report.looks import Look
 from pipeline.report.noise import LEVEL, RESAMPLES
+from pipeline.report.report import Report
 from pipeline.report.results import Results
 from pipeline.report.tables import benchmark, differences, parameters
 from pipeline.report.tables.cells import markdown, percent
@@ -78,8 +79,9 @@ By how much a method misses more (+) or less (−) than another: difference of t
 target| in cm, averaged over the targets that both reach, with its {percent(LEVEL)} interval by a
 bootstrap over launches ({RESAMPLES:,} resamples within each target). Virtual launches of equal
 number share their errors and are compared in pairs; measured ones are not. Bold: the interval
-leaves out zero. Failed launches are left out, with their pairs. Each interval stands alone: of
-twenty true ties, one is expected to look like a difference.
+leaves out zero. Failed launches are left out, with their pairs, so that a policy that fails more is
+compared where it lands; the lines below say so. Each interval stands alone: of twenty true ties,
+one is expected to look like a difference.
 
 The intervals hold for **launches of these policies**, not for the methods at large: each method
 identified each band once, from one recording and with one seed, and what another recording or seed
@@ -95,15 +97,10 @@ interval as above, which again holds for launches and not for another identifica
 """
 
 
-def write_tables(
-    params, results: Results, named: dict[str, Look], floors: dict[str, dict], folder: Path
-) -> str:
-    """Write table1.csv, table1.tex, ... table4.tex and differences.csv; return the chapter.
-
-    Args:
-        floors: The actuation floor of each rig band (pipeline/oracle/floor.py).
-        folder: Where the files go: reports/tables.
-    """
+def paper_tables(report: Report) -> str:
+    """The chapter; writes table1.csv, table1.tex, ... table4.tex and differences.csv."""
+    params, results, named = report.params, report.results, report.looks
+    folder, floors = report.folder / "tables", results.floors
     found = parameters.identified(results, params)
     tables = {2: (parameters.as_table(found, named), parameters.records(found))}
     for count, rows in (

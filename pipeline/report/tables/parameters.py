@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from pipeline.identify.space import Space
 from pipeline.report import paper
 from pipeline.report.looks import Look
 from pipeline.report.losses import PRINTED
@@ -86,7 +87,7 @@ def _value(params, result: Result, name: str) -> Value:
     value = result.theta["theta"][name]
     if name in params.methods[result.method].fixed:
         return Value(value, "fixed")
-    edge = at_edge(value, getattr(params.parameters, name))
+    edge = at_edge(value, name, Space.of_method(params, result.method))
     about = result.confidence.get("parameters", {}).get(name)
     if about is None:
         return Value(value, at_edge=edge)
@@ -94,10 +95,11 @@ def _value(params, result: Result, name: str) -> Value:
     return Value(value, state, about["low"], about["high"], edge)
 
 
-def at_edge(value: float, box) -> bool:
+def at_edge(value: float, name: str, box: Space) -> bool:
     """Whether the search ended within 1 % of a side of its box: the optimum may lie outside."""
-    low, high = box.low, box.high
-    if box.scale == "log":
+    axis = box.names.index(name)
+    low, high = box.low[axis], box.high[axis]
+    if box.log[axis]:
         value, low, high = math.log(value), math.log(low), math.log(high)
     return not 0.01 <= (value - low) / (high - low) <= 0.99
 

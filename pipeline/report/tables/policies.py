@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.policy.landing_map import LandingMap
+from pipeline.policy.stored import PLAIN, ROBUST
 from pipeline.report.looks import Look
 from pipeline.report.results import Result, Results
 from pipeline.report.tables.cells import NONE, Table, centimetres, number
@@ -49,7 +50,7 @@ def policies(results: Results, looks: dict[str, Look]) -> Table:
     heads += ["map error", "largest", "expected [cm]"]
     rows = []
     for one in results:
-        for name, card in (("plain", one.card), ("robust", one.robust_card)):
+        for name, card in ((PLAIN, one.card), (ROBUST, one.robust_card)):
             if card is not None:
                 names = one.band, looks[one.method].name, name
                 rows.append([*names, *_converged(card), _expected(one, name)])
@@ -70,5 +71,5 @@ def _converged(card: dict) -> list[str]:
 def _expected(result: Result, policy: str) -> str:
     """Of either policy, where there is a robust one that both were compared with."""
     known = (result.robust_card or {}).get("training", {})
-    prefix = "" if policy == "robust" else "plain_"
+    prefix = "" if policy == ROBUST else "plain_"
     return centimetres(known.get(f"{prefix}expected_error_m"))

@@ -1,8 +1,8 @@
 """A small recording, damaged in thousands of seeded ways, each run from file to episode.
 
-    python -m tests.recording.input.mutations FOLDER KIND FIRST COUNT
+    python -m tests.recording.input.mutations FOLDER FIRST COUNT KIND...
 
-prints one line of JSON a mutation: its recipe before it runs, what came of it after. A timer ends
+prints two lines of JSON a mutation: its recipe before it runs, what came of it after. A timer ends
 the process where one hangs; the last line then names the culprit.
 """
 
@@ -306,18 +306,24 @@ def _compile_once() -> None:
     decode._store = store
 
 
-def main(folder: Path, kind: str, first: int, count: int) -> None:
+def main(folder: Path, first: int, count: int, kinds: list[str]) -> None:
     params = small_params()
+    _compile_once()
+    for kind in kinds:
+        _mutate(folder, kind, range(first, first + count), params)
+
+
+def _mutate(folder: Path, kind: str, seeds: range, params: Params) -> None:
     original = folder / f"{kind}.mcap"
     content = original.read_bytes()
-    _compile_once()
     done = process(original, params.bands["band1"], params)
     whole, usual = episode_of(done, "band1", params), said(done)
-    path = folder / f"{kind}-{first}-mutated.mcap"
-    for seed in range(first, first + count):
+    path = folder / f"{kind}-{seeds.start}-mutated.mcap"
+    for seed in seeds:
         data, recipe = mutated(content, kind, seed)
         path.write_bytes(data)
-        print(json.dumps({"seed": seed, "kind": kind, "recipe": recipe}), flush=True)
+        about = {"seed": seed, "kind": kind}
+        print(json.dumps({**about, "recipe": recipe}), flush=True)
         signal.setitimer(signal.ITIMER_PROF, HANGS)
         faulthandler.dump_traceback_later(BLOCKS, exit=True)
         start = time.process_time()
@@ -326,10 +332,10 @@ def main(folder: Path, kind: str, first: int, count: int) -> None:
         faulthandler.cancel_dump_traceback_later()
         signal.setitimer(signal.ITIMER_PROF, 0)
         bytes_held = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        line = {"seed": seed, "outcome": came, "words": words, "s": seconds, "bytes": bytes_held}
+        line = {**about, "outcome": came, "words": words, "s": seconds, "bytes": bytes_held}
         print(json.dumps(line), flush=True)
     path.unlink(missing_ok=True)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), int(sys.argv[4]))
+    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4:])

@@ -115,3 +115,26 @@ def test_every_landing_lies_in_its_strip_at_its_distance(kept, results) -> None:
     assert {y for x, y, _ in rings if 1 / 3 < x} == {1.725}  # the others aim there alone
     assert ax.get_aspect() == 1
     assert [text.get_text() for text in ax.texts] == ["1 of 4\nfailed"]
+    assert ax.get_ylabel() == "virtual landing, y [m]"
+
+
+def test_measured_marks_are_hollow_and_failures_counted_by_kind(kept, results) -> None:
+    """A launch that came down outside the area is one of the failures, and no mark."""
+    result = results.methods[BAND][METHOD]
+    outside = result.trials.assign(landing_y=[1.70, 1.76, 1.93, 2.6])
+    outside.loc[3, "failure"] = "beyond the area: lands at 2.600 m"
+    measured = outside.assign(kind="measured", landing_y=[1.71, None, 1.95, 2.7], failure=None)
+    both = pd.concat([outside, measured], ignore_index=True)
+    results.methods[BAND][METHOD] = replace(result, trials=both)
+    drawing.scatter("", results, METHODS, looks(METHODS))
+    (ax,) = kept[0].axes
+    marks = {True: [], False: []}
+    for dots in ax.collections:
+        hollow = dots.get_facecolor().size == 0
+        marks[hollow] += [y for x, y in dots.get_offsets() if x < 0.5]
+    assert sorted(marks[False]) == [1.70, 1.76, 1.93] and sorted(marks[True]) == [1.71, 1.95]
+    assert ax.get_ylabel() == "measured and virtual landing, y [m]"
+    assert [text.get_text() for text in ax.texts] == ["2 of 4 measured\n1 of 4 virtual\nfailed"]
+    assert "measured (filled: virtual)" in [t.get_text() for t in kept[0].legends[0].get_texts()]
+    drawing.trajectories("", results, METHODS, looks(METHODS), -FLOOR)
+    assert kept[1].axes[0].texts[0].get_text() == "2 of 4 measured,\n1 of 4 virtual failed"

@@ -41,11 +41,30 @@ def test_no_more_is_said_than_the_intervals_allow() -> None:
 
 
 def test_how_few_launches_count_is_said() -> None:
+    """Of the method that is named: a measured reference has another number of its own."""
     ran = results(
-        result("band1", "sling2sim2real", launches(NOISE)),
-        result("band1", "package_si", launches(0.2 + NOISE, failed=12)),
+        result("band1", "sling2sim2real", launches(NOISE, "measured", failed=1)),
+        result("band1", "package_si", launches(0.2 + NOISE, "measured", failed=8)),
     )
-    assert claims(compared(ran, 1), NAMED)[0].endswith("more error: Package SI (3 launches count).")
+    assert claims(compared(ran, 1), NAMED)[0].endswith("more error: Package SI (7 launches count).")
+
+
+def test_who_fails_more_is_never_just_better() -> None:
+    """13 of 15 fail, and the two that land are near."""
+    ran = results(
+        result("band1", "sling2sim2real", launches(0.2 + NOISE)),
+        result("band1", "package_si", launches(0.1 + NOISE, failed=13)),
+    )
+    (line,) = claims(compared(ran, 1), NAMED)
+    assert line.endswith(
+        "less error where it lands, but more launches fail: Package SI (2 launches count)."
+    )
+    turned = results(
+        result("band1", "package_si", launches(0.2 + NOISE)),
+        result("band1", "sling2sim2real", launches(0.1 + NOISE, failed=13)),
+    )
+    (line,) = claims(compared(turned, 1), NAMED)
+    assert "more error where both land, but fewer launches fail: Package SI" in line
 
 
 def test_less_error_is_said_too() -> None:
@@ -62,8 +81,14 @@ def test_machines_read_the_same(tmp_path) -> None:
     read = records(compared(RAN, 1)).set_index(["method", "beside"])
     one = read.loc["package_si", "sling2sim2real_taut"]
     assert one.difference_cm == pytest.approx(15) and one.launches == 15 and one.left_out == 0
+    assert (one.launches_beside, one.failed_share, one.failed_share_beside) == (15, 0, 0)
     assert one.low_95_cm <= 15.001 and one.high_95_cm >= 14.999
     assert ("real2sim2real", "sling2sim2real_taut") not in read.index
+    some = launches(NOISE, "measured", failed=3), launches(NOISE, "measured", failed=6)
+    ran = results(result("band1", "sling2sim2real", some[0]), result("band1", "bo", some[1]))
+    (few,) = records(compared(ran, 1)).itertuples()
+    assert (few.launches, few.launches_beside) == (9, 10)  # of the two targets that both reach
+    assert few.failed_share == pytest.approx(0.4) and few.failed_share_beside == pytest.approx(0.2)
 
 
 def test_robust_policies_stand_beside_the_plain_ones() -> None:
@@ -74,5 +99,15 @@ def test_robust_policies_stand_beside_the_plain_ones() -> None:
     (row,) = robust(ran, NAMED, 1)[1]
     scatter = 100 * np.sqrt(np.mean(np.var(NOISE, axis=1, ddof=1)))
     assert row[5:7] == [f"{scatter:.2f}", f"{scatter / 2:.2f}"]
+    far = second.assign(
+        landing_y=np.where(second.trial == 1, 2.6, second.landing_y),
+        failure=np.where(second.trial == 1, "beyond the area: lands at 2.600 m", None),
+    )  # counts for no scatter, as if it had come down nowhere
+    nowhere = far.assign(landing_y=far.landing_y.where(far.failure.isna()))
+    one, other = (
+        robust(results(result("band1", "bo", plain, robust_trials=t)), looks(["bo"]), 1)[1]
+        for t in (far, nowhere)
+    )
+    assert one == other
     change = -50 * NOISE.mean()
     assert row[7].lstrip("*").startswith(f"{change:+.2f}".replace("-", "−"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from pipeline.report.looks import looks
@@ -27,31 +29,45 @@ def named(params):
     return looks(params.run.methods)
 
 
+def ran(regions: dict[str, list[int]]) -> list[SimpleNamespace]:
+    """Results, as far as the table of methods looks: how many regions a method found on bands."""
+    return [
+        SimpleNamespace(method=method, regions=[None] * count)
+        for method, counts in regions.items()
+        for count in counts
+    ]
+
+
 def column(table, heading: str) -> list[str]:
     heads, rows = table
     return [row[heads.index(heading)] for row in rows]
 
 
-def test_what_a_method_holds_fixed(params, named) -> None:
+def test_what_a_method_holds_fixed(results, params, named) -> None:
     """In the notation of table 2, with the digits that a setting has."""
     fixed = {"poissons_ratio": 0.45, "elasticity_damping": 5e-3, "dynamic_friction": 0.125}
     method = params.methods[METHOD].model_copy(update={"fixed": fixed})
     params = params.model_copy(update={"methods": {METHOD: method}})
-    assert column(methods(params, named), "held fixed") == ["ν 0.45, d 5.00E-3 s, friction 0.125"]
+    assert column(methods(results, params, named), "held fixed") == [
+        "ν 0.45, d 5.00E-3 s, friction 0.125"
+    ]
 
 
 def test_what_a_method_searches_besides(params) -> None:
-    table = methods(params, looks(params.methods))
+    table = methods(ran({m: [1] for m in params.methods}), params, looks(params.methods))
     besides = dict(zip(column(table, "method"), column(table, "nuisances besides"), strict=True))
     assert besides["ours (taut)"] == "air_drag (prior: mean 1)" and besides["DE_L"] == "–"
 
 
 def test_what_a_method_minimises_and_by_what_search(params) -> None:
-    table = methods(params, looks(params.methods))
+    counts = {m: [1] for m in params.methods} | {"sling2sim2real": [4, 3, 4], "no_work": [2]}
+    table = methods(ran(counts), params, looks(params.methods))
     minimises = dict(zip(column(table, "method"), column(table, "minimises"), strict=True))
     search = dict(zip(column(table, "method"), column(table, "search"), strict=True))
     assert minimises["Sling2Sim2Real"] == "geom + force + work"
     assert minimises["−L_work"] == "geom + force" and minimises["Package SI"] == "geom"
+    assert search["Sling2Sim2Real"] == "DE, then CMA-ES in 3 to 4 regions"  # as found, not asked
+    assert search["−L_work"] == "DE, then CMA-ES in 2 regions"
     assert search["−c, −m"] == "DE, then CMA-ES in 1 region, isotropic starts"
     assert search["DE_L"] == "differential evolution"
 
@@ -84,11 +100,14 @@ def test_a_term_of_another_name_has_a_column_too(results, params, named) -> None
 
 def test_held_out_residuals_stand_beside_the_fitted(params, named) -> None:
     inputs = params, BAND, METHOD, episode(), {}
-    assert held_out({METHOD: toy_replay(*inputs)}, named) is None
     residuals = {
         "force": {"fitted": 0.2, "held_out": 0.3},
         "cloud": {"fitted": 0.5, "held_out": 0.25},
     }
     heads, rows = held_out({METHOD: toy_replay(*inputs, residuals=residuals)}, named)
     assert rows == [["Sling2Sim2Real", "0.200", "0.300", "1.50", "0.50", "0.25", "0.50"]]
+    named = looks(["de", METHOD])  # one that knows nothing takes nothing from the other
+    replays = {"de": toy_replay(*inputs), METHOD: toy_replay(*inputs, residuals=residuals)}
+    unknown = ["DE_L", "0.200", "–", "–", "0.20", "–", "–"]
+    assert held_out(replays, named)[1] == [unknown, *rows]
     assert heads[1:4] == ["force [N], fitted", "force [N], held out", "force [N], ratio"]

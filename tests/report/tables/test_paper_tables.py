@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ import pytest
 
 from pipeline.params import load
 from pipeline.report.looks import looks
-from pipeline.report.tables.paper_tables import write_tables
+from pipeline.report.tables.paper_tables import paper_tables
 from tests.report.conftest import confidence
 from tests.report.tables.toy_results import floor, launches, result, results
 
@@ -23,7 +24,9 @@ NAMED = looks(["sling2sim2real_taut", "package_si", "de"])
 def written(tmp_path):
     def run(*some, floors=None) -> str:
         ran = results(*some, floors=floors)
-        return write_tables(PARAMS, ran, NAMED, ran.floors, tmp_path / "tables")
+        return paper_tables(
+            SimpleNamespace(params=PARAMS, results=ran, looks=NAMED, folder=tmp_path)
+        )
 
     return run
 
@@ -46,7 +49,7 @@ def test_every_table_is_there_in_each_form(written, tmp_path) -> None:
     files = {file.relative_to(tmp_path).as_posix() for file in (tmp_path / "tables").iterdir()}
     assert {*links, "tables/differences.csv"} == files and len(links) == 8
     assert all(len(pd.read_csv(tmp_path / name)) for name in files if name.endswith("csv"))
-    assert "*Actuation floor*" in text and "more error: Package SI, DE_L" in text
+    assert "*Actuation floor*" in text and "more error: Package SI · DE_L" in text
     first = {name: (tmp_path / name).read_bytes() for name in files}
     assert written(*ran, floors=floors) == text
     assert {name: (tmp_path / name).read_bytes() for name in files} == first

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from types import SimpleNamespace
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from pipeline.identify.space import Space
 from pipeline.params import load
 from pipeline.report.looks import looks
 from pipeline.report.tables.parameters import as_table, at_edge, identified, records
@@ -26,10 +28,20 @@ def table_of(**more) -> list[list[str]]:
 
 
 def test_edge_of_the_box_on_both_scales() -> None:
-    log = SimpleNamespace(low=1e-4, high=1e-2, scale="log")
-    line = SimpleNamespace(low=0.0, high=1.0, scale="linear")
-    assert at_edge(1.01e-4, log) and not at_edge(1.2e-4, log) and at_edge(1e-2, log)
-    assert at_edge(0.995, line) and not at_edge(0.98, line)
+    box = Space(("d", "s"), np.array([1e-4, 0.0]), np.array([1e-2, 1.0]), np.array([True, False]))
+    assert at_edge(1.01e-4, "d", box) and not at_edge(1.2e-4, "d", box) and at_edge(1e-2, "d", box)
+    assert at_edge(0.995, "s", box) and not at_edge(0.98, "s", box)
+
+
+def test_the_edge_is_that_of_the_methods_own_bounds() -> None:
+    """A method that searches ν within 0.44 to 0.45005 ended at its side at 0.45; others did not."""
+    method = PARAMS.methods["sling2sim2real"]
+    close = method.model_copy(update={"bounds": {"poissons_ratio": (0.44, 0.45005)}})
+    ran = results(result("band1", "sling2sim2real", TRIALS))
+    for about, expected in ((method, False), (close, True)):
+        params = PARAMS.model_copy(update={"methods": {"sling2sim2real": about}})
+        (ours,) = [row for row in identified(ran, params) if row.source == "virtual"]
+        assert ours.values[1].at_edge == expected
 
 
 def test_the_papers_numbers_stand_below_ours_in_its_format() -> None:

@@ -1,0 +1,64 @@
+"""The stage theta where simulations around θ* fail: θ* all the same, without a confidence."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.confidence import rounds
+from pipeline.identify.evaluate import Evaluation
+from pipeline.identify.history import History
+from pipeline.identify.loss import TERMS
+from pipeline.identify.space import Space
+from pipeline.params import load
+from pipeline.policy.spread import law_discrepancy, load_samples
+from pipeline.theta import load_theta
+from stages import theta
+from tests.identify.toy import episode
+from tests.project import ROOT
+
+METHOD = "sling2sim2real"
+
+
+@pytest.fixture
+def searched(tmp_path: Path, monkeypatch) -> Space:
+    """A folder in which a search of three rows is done, and the arguments of the stage."""
+    (tmp_path / "params.yaml").write_bytes((ROOT / "params.yaml").read_bytes())
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["", "band1", METHOD])
+    space = Space.of(load().parameters)
+    unit, total = np.full((3, 5), 0.5), np.array([3.0, 1.0, 2.0])
+    unit[:, 0] = [0.4, 0.45, 0.5]
+    terms = dict.fromkeys(TERMS, total / 4)
+    history = History(METHOD, space.names)
+    history.save(Path(f"data/refined/band1/{METHOD}.parquet"))
+    found = Evaluation(unit, space.to_physical(unit), terms, total, [None] * 3)
+    history.add(found, phase="de", generation=0)
+    history.save(Path(f"data/history/band1/{METHOD}.parquet"))
+    episode(band="band1").save(Path("data/episodes/band1"))
+    return space
+
+
+def test_a_theta_whose_neighbours_fail_has_no_confidence(searched, monkeypatch, capsys) -> None:
+    """One method less to trust; what follows from it and the other methods goes on."""
+
+    def slips(sling, episode, thetas):
+        return SimpleNamespace(failure=["the band slips out of the fingers"] * len(thetas))
+
+    monkeypatch.setattr(rounds, "interact", slips)
+    theta.main()
+    content = load_theta(Path(f"data/theta/band1/{METHOD}.json"), "band1")
+    best = searched.to_physical(np.array([[0.45, 0.5, 0.5, 0.5, 0.5]]))[0]
+    assert content["theta"] == pytest.approx(dict(zip(searched.names, best, strict=True)))
+    assert content["confidence"] is None and law_discrepancy(content) == 0.0
+    kept = Path(f"data/confidence/band1/{METHOD}.json")
+    assert json.loads(kept.read_text()) == {"band": "band1", "samples": []}
+    assert load_samples(load().run, kept, "band1", METHOD) is None
+    said = capsys.readouterr()
+    assert f"warning: {METHOD}: episode of band1: 80 of 80 simulations near the best" in said.err
+    assert "loss 1" in said.out and "(" not in said.out  # no interval beside a value

@@ -179,7 +179,7 @@ def draw_figure(figures: dict, path: Path) -> None:
     """Errors with one thing perfect beside the floor, and what each landing's bias is made of."""
     kinds = (AS_IT_IS, THETA_, AIMED, HIT)
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(2, len(figures), figsize=(3.6 * len(figures), 5), squeeze=False)
+        figure, axes = plt.subplots(2, len(figures), figsize=(3.6 * len(figures), 5.6), squeeze=False)
         for (band, one), (above, below) in zip(figures.items(), axes.T, strict=True):
             for number, (method, found) in enumerate(one["methods"].items()):
                 place = np.arange(len(kinds)) + 0.38 * (number - 0.5)
@@ -198,8 +198,8 @@ def draw_figure(figures: dict, path: Path) -> None:
             above.set_xticks(range(len(kinds)), kinds, fontsize=7)
             below.axhline(0, color=INK, lw=0.8)
             below.set(xlabel="target [m]", ylabel="part of the bias [cm]")
-        axes[0, 0].legend(fontsize=6)
-        axes[1, 0].legend(fontsize=6)
+        handles, labels = axes[1, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=7)
         figure.savefig(path, dpi=130)
         plt.close(figure)
 

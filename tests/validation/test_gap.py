@@ -179,13 +179,14 @@ def draw_figure(figures: dict, path: Path) -> None:
     """Errors with one thing perfect beside the floor, and what each landing's bias is made of."""
     kinds = (AS_IT_IS, THETA_, AIMED, HIT)
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(2, len(figures), figsize=(3.6 * len(figures), 5.6), squeeze=False)
+        size = 3.6 * len(figures), 5.6
+        figure, axes = plt.subplots(2, len(figures), figsize=size, squeeze=False)
         for (band, one), (above, below) in zip(figures.items(), axes.T, strict=True):
             for number, (method, found) in enumerate(one["methods"].items()):
                 place = np.arange(len(kinds)) + 0.38 * (number - 0.5)
-                size = [100 * found["variants"][kind]["mean_error_m"] for kind in kinds]
+                error = [100 * found["variants"][kind]["mean_error_m"] for kind in kinds]
                 clean = [100 * found["variants"][kind]["without_noise_m"] for kind in kinds]
-                above.bar(place, size, 0.36, color=COLORS[number], label=method)
+                above.bar(place, error, 0.36, color=COLORS[number], label=method)
                 above.plot(place, clean, "_", color=INK, ms=12)
                 targets = [float(target) for target in found["variants"][AS_IT_IS]["targets"]]
                 for mark, (name, part) in zip("os^", found["bias_parts_m"].items(), strict=True):

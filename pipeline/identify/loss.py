@@ -67,8 +67,8 @@ class EpisodeLoss:
             symmetric: Chamfer distance both ways, or measured to simulated alone.
             frame_cap: No frame counts for more than this [m].
             nuisances: Bounds of those that rollouts will come with.
-            held_out: Begin and end [s] of blocks that are not fitted, shape (B, 2). Samples and
-                frames nearer to them than the force's filters reach count nowhere.
+            held_out: Begin and end [s] of blocks that are not fitted, shape (B, 2). Samples nearer
+                to them than the force's filters reach count nowhere; clouds pass no filter.
 
         Raises:
             UserError: No cloud has points, or `taut` has weight and no frame is in the recoil.
@@ -96,7 +96,7 @@ class EpisodeLoss:
         seen = np.array([len(cloud) > 0 for cloud in episode.clouds])
         self.fitted_samples = ~within(self.time, blocks, guard)
         self.held_samples = within(self.time, blocks)
-        self.fitted_frames = ~within(episode.cloud_time, blocks, guard) & seen
+        self.fitted_frames = ~within(episode.cloud_time, blocks) & seen
         self.held_frames = within(episode.cloud_time, blocks) & seen
         self.taut = taut_frames(episode) & self.fitted_frames
         pull = np.array([[episode.grasp_time, episode.release_time - guard]])

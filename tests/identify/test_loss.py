@@ -175,7 +175,7 @@ def test_a_held_out_block_counts_in_its_own_terms_alone() -> None:
     assert residuals["cloud"]["held_out"][0] == held["geom"][0]
 
 
-def test_samples_and_frames_are_fitted_or_held_out_or_guards() -> None:
+def test_samples_and_frames_are_fitted_or_held_out_and_samples_may_be_guards() -> None:
     loss = loss_of(toy.episode(), held_out=BLOCKS, median_window=1)
     for time, fitted, held in (
         (loss.time, loss.fitted_samples, loss.held_samples),
@@ -183,9 +183,10 @@ def test_samples_and_frames_are_fitted_or_held_out_or_guards() -> None:
     ):
         assert not (fitted & held).any()
         np.testing.assert_array_equal(held, (time > 0.45) & (time < 0.75))
-        guard = ~(fitted | held)
-        assert guard.any()
-        assert np.abs(np.abs(time[guard] - 0.6) - 0.15).max() < 0.1
+    guard = ~(loss.fitted_samples | loss.held_samples)
+    assert guard.any()
+    assert np.abs(np.abs(loss.time[guard] - 0.6) - 0.15).max() < 0.1
+    assert (loss.fitted_frames | loss.held_frames).all()  # clouds pass no filter
 
 
 def test_terms_of_a_rollout_hang_on_no_other_of_its_batch() -> None:

@@ -17,6 +17,7 @@ from pipeline.params import Params, load, pairs, parse
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "params.yaml").read_text(encoding="utf-8")
 CONTENT = YAML(typ="safe").load(TEXT)
+WINDY = CONTENT["methods"]["bo"] | {"nuisances": {"air_drag": [0, 8]}}
 INSTRUMENTS_ALONE = {
     "fixed": {name: box["low"] for name, box in CONTENT["parameters"].items()},
     "nuisances": {"camera_delay": [-0.003, 0.003]},
@@ -165,8 +166,7 @@ def test_exact_lines() -> None:
         ),
         (
             "methods.bo",
-            CONTENT["methods"]["bo"]
-            | {"nuisances": {"air_drag": [0, 8]}, "fixed": {"air_drag": 9}},
+            WINDY | {"fixed": {"air_drag": 9}},
             "methods.bo.fixed.air_drag: must be between 0 and 8, got 9",
         ),
         (
@@ -182,24 +182,24 @@ def test_exact_lines() -> None:
             "methods.bo: priors: force_gain is about 1 and a prior about 0, so it has none",
         ),
         (
-            "methods.sling2sim2real_taut.priors.air_drag.mean",
-            0,
-            "methods.sling2sim2real_taut.priors.air_drag.mean: must be between 1e-06 and 1000000",
+            "methods.bo",
+            WINDY | {"priors": {"air_drag": {"mean": 0, "weight": 0.02}}},
+            "methods.bo.priors.air_drag.mean: must be between 1e-06 and 1000000",
         ),
         (
-            "methods.sling2sim2real_taut.priors.air_drag.weight",
-            -1,
-            "methods.sling2sim2real_taut.priors.air_drag.weight: must be between 0 and 1000000",
+            "methods.bo",
+            WINDY | {"priors": {"air_drag": {"mean": 1.0, "weight": -1}}},
+            "methods.bo.priors.air_drag.weight: must be between 0 and 1000000",
         ),
         (
-            "methods.sling2sim2real_taut.priors.air_drag",
-            {"mean": 1.0},
-            "methods.sling2sim2real_taut.priors.air_drag.weight: is missing",
+            "methods.bo",
+            WINDY | {"priors": {"air_drag": {"mean": 1.0}}},
+            "methods.bo.priors.air_drag.weight: is missing",
         ),
         (
-            "methods.sling2sim2real_taut.priors",
-            {"air_drag": 0.02},
-            "methods.sling2sim2real_taut.priors.air_drag: must be a mapping",
+            "methods.bo",
+            WINDY | {"priors": {"air_drag": 0.02}},
+            "methods.bo.priors.air_drag: must be a mapping",
         ),
         (
             "methods.de.fixed",

@@ -29,7 +29,6 @@ from pipeline.identify.space import Space
 from pipeline.signal import cutoff_hz
 from pipeline.sling.interaction import interact
 from pipeline.sling.model import THETA, Sling
-from pipeline.theta import in_air
 from tests.identify.own_law import disturbed, own_law_episode
 
 pytestmark = pytest.mark.validation
@@ -43,7 +42,6 @@ TRUTH = {  # drawn evenly between these, E and s d on a logarithmic scale
     "dynamic_friction": (0.6, 1.0),
     "damping_scale": (0.3, 1.0),
 }
-DRAG = 1.0  # 1/s, its mean
 NOISE = {"force_noise": 0.05, "depth_noise": 0.0006}
 ERRORS = {"release": 3e-4, "camera": 5e-4, "shift": 1e-3, "turn": 1e-3, "bias": 0.01}
 FIRST_PICTURE = (0.004, 0.02)  # after the release [s]
@@ -52,7 +50,7 @@ E_LIMIT, PRODUCT_LIMIT, FORCE_LIMIT = 0.01, 0.1, 0.01
 
 
 def truth(rng: np.random.Generator) -> np.ndarray:
-    """A θ in the order of THETA, and the air's drag [1/s]."""
+    """A θ in the order of THETA."""
     drawn = {
         name: np.exp(rng.uniform(*np.log(ends)))
         if name in ("youngs_modulus", "damping_product")
@@ -61,7 +59,7 @@ def truth(rng: np.random.Generator) -> np.ndarray:
     }
     product = drawn.pop("damping_product")
     drawn["elasticity_damping"] = product / drawn["damping_scale"]
-    return np.array([*(drawn[name] for name in THETA), rng.exponential(DRAG)])
+    return np.array([drawn[name] for name in THETA])
 
 
 def searched(params, episode, sling) -> dict:
@@ -82,8 +80,7 @@ def one(params, number: int) -> dict:
     # a picture is taken at the release: one must show the recoil, or the method refuses the episode
     plan = replace(plan, cloud_time=plan.cloud_time + rng.uniform(*FIRST_PICTURE))
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
-    windy, theta = in_air(sling, true[None])
-    exact = own_law_episode(windy, plan, theta[0], cutoff=cutoff, seed=number, **NOISE)
+    exact = own_law_episode(sling, plan, true, cutoff=cutoff, seed=number, **NOISE)
     episode = disturbed(exact, rng, **ERRORS)
 
     start = time.perf_counter()
@@ -97,8 +94,7 @@ def one(params, number: int) -> dict:
     seconds = time.perf_counter() - start - found_after
 
     # held in full: the force while the band is drawn
-    windy, thetas = in_air(sling, np.array([true, best, posterior.mean]))
-    three = interact(windy, plan, thetas)
+    three = interact(sling, plan, np.array([true, best, posterior.mean]))
     held = np.linalg.norm(EpisodeLoss.plain(params, episode, sling).filtered(three), axis=2)
     curve = np.abs(held[1:] - held[0]).mean(axis=1) / held[0].max()
     late = episode.release_time - episode.time

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from pipeline.params.identification import Prior
 from pipeline.report.looks import looks
 from pipeline.report.results import gather
 from pipeline.report.tables.identified import (
@@ -54,6 +55,13 @@ def test_what_a_method_holds_fixed(results, params, named) -> None:
 
 
 def test_what_a_method_searches_besides(params) -> None:
+    windy = params.methods["sling2sim2real_taut"].model_copy(
+        update={
+            "nuisances": {"air_drag": (0.0, 8.0)},
+            "priors": {"air_drag": Prior(mean=1.0, weight=0.02)},
+        }
+    )
+    params = params.model_copy(update={"methods": params.methods | {"sling2sim2real_taut": windy}})
     table = methods(ran({m: [1] for m in params.methods}), params, looks(params.methods))
     besides = dict(zip(column(table, "method"), column(table, "nuisances besides"), strict=True))
     assert besides["ours (taut)"] == "air_drag (prior: mean 1)" and besides["DE_L"] == "–"

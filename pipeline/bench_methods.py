@@ -57,8 +57,9 @@ def bench_methods(
 
     Returns:
         `budget`: its name and settings; `batch`: seconds of one generation, simulated alone and
-        with the loss; `methods`, by name: rollouts, failures, seconds of the whole, CPU seconds of
-        all threads, seconds of evaluations and of the optimiser, rollouts/s, best loss.
+        with the loss; `methods`, by name: regions (0: it has none), rollouts, failures, seconds of
+        the whole, CPU seconds of all threads, seconds of evaluations and of the optimiser,
+        rollouts/s, best loss.
 
     Raises:
         UserError: There is no such device or method.
@@ -71,7 +72,7 @@ def bench_methods(
     first = next(iter(params.methods))
     _import_and_compile(params, sling, episode, first, devices)
     return {
-        "budget": {"name": size} | {name: getattr(optimizer, name) for name in ("k_top", *PAPER)},
+        "budget": {"name": size} | {name: getattr(optimizer, name) for name in PAPER},
         "batch": _generation(params, sling, episode, first, devices, optimizer.population),
         "methods": {
             method: time_search(params, method, optimizer, sling, episode, devices)[0]
@@ -88,8 +89,9 @@ def time_search(
         memo = Memo(evaluator(params, method, sling, episode, devices), Path(folder), "bench")
         evaluate = Clocked(memo)
         history, cpu, wall = timed(partial(complete, params, method, optimizer, evaluate))
-    count = len(history.total)
+    count, about = len(history.total), params.methods[method]
     row = {
+        "regions": (about.k_top or optimizer.k_top) if about.search == "multistart" else 0,
         "rollouts": count,
         "failed": int(np.isinf(history.total).sum()),
         "seconds": wall,

@@ -39,8 +39,9 @@ def test_every_search_spends_its_budget_and_says_what_it_took(monkeypatch) -> No
     params = PARAMS.model_copy(update={"methods": {name: PARAMS.methods[name] for name in names}})
     result = bench.bench_methods(params)
     assert list(result["methods"]) == list(names)
-    for row in result["methods"].values():
+    for name, row in result["methods"].items():
         assert row["rollouts"] == 34
+        assert row["regions"] == (2 if name == "sling2sim2real" else 0)
         assert row["seconds"] == pytest.approx(row["evaluation_s"] + row["optimizer_s"])
         assert min(row["evaluation_s"], row["optimizer_s"]) > 0
         assert np.isfinite(row["best_loss"])

@@ -61,7 +61,7 @@ def recoil_gap(
 ) -> float | None:
     """Root mean square distance beyond noise over that of the way; None where no picture shows it.
 
-    The noise is that of the held band, fully drawn.
+    The noise is that of the held band, fully drawn; none where no picture shows it.
 
     Args:
         residual: Of all channels, shape (R,).
@@ -79,7 +79,7 @@ def recoil_gap(
     }
     for group in residuals.groups:
         if group.phase == "recoil" and group.channel.startswith("cloud"):
-            beyond = residual[group.rows] ** 2 - np.nan_to_num(noise[group.channel])
+            beyond = residual[group.rows] ** 2 - np.nan_to_num(noise.get(group.channel, 0.0))
             square += np.sum(beyond)
             travelled = np.linalg.norm(middle[group.grid[:, 0]] - start, axis=1)
             way += np.sum(travelled**2) / 2  # a point has two channels

@@ -29,6 +29,7 @@ SHRINK, GROW = 0.3, 2.0  # of a design's spread against the one before
 HEAT = (100.0, 30.0, 9.0, 2.7)  # of the first rounds
 ROUNDS = 11  # at most
 STILL = 0.7  # standard deviations that the mean may move before the last round
+SETTLED = 1.0  # and in it, if its intervals are to be relied on
 BATCHES, LAST = 5, 10  # of a round and of the last one
 SHORT, LONG = 180, 900  # steps of the sampler in a round and in the last one
 DRAWS = 4000  # that intervals are quantiles of
@@ -55,6 +56,11 @@ class Posterior:
     last: Round
     moved: float
     course: np.ndarray
+
+    @property
+    def settled(self) -> bool:
+        """Whether its intervals are to be relied on."""
+        return self.moved <= SETTLED
 
 
 def fit(

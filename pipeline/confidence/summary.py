@@ -97,6 +97,7 @@ def summary(posterior: Posterior, curves: dict) -> dict:
         "phases": by_phase(posterior.last.groups),
         "rollouts": posterior.rounds.rollouts,
         "moved": posterior.moved,
+        "settled": posterior.settled,
     }
 
 

@@ -114,15 +114,10 @@ def search(
     generation = 0
     while rollouts > 0:
         asked = _checked(optimizer, dimension)
+        owner = _owner(optimizer, len(asked))
         unit = asked[:rollouts]
         rollouts -= len(unit)
         evaluation = evaluate(unit if free is None else free.fill(unit))
-        owner = getattr(optimizer, "owner", None)
-        if owner is not None and np.shape(owner) != (len(asked),):
-            raise UserError(
-                f"{type(optimizer).__name__}: owner must say for each of {len(asked)} points who"
-                f" asked, and has shape {np.shape(owner)}"
-            )
         history.add(
             evaluation,
             phase=optimizer.phase,
@@ -132,6 +127,24 @@ def search(
         generation += 1
         if len(unit) == len(asked):
             optimizer.tell(penalty(evaluation.total))
+
+
+def _owner(optimizer: Optimizer, count: int) -> np.ndarray | None:
+    """Which of its solvers asked for each point, shape (count,), where it says so."""
+    said = getattr(optimizer, "owner", None)
+    if said is None:
+        return None
+    try:
+        owner = np.asarray(said)
+        fine = owner.shape == (count,) and (owner == owner.astype(np.int32)).all()
+    except (TypeError, ValueError):
+        fine = False
+    if not fine:
+        raise UserError(
+            f"{type(optimizer).__name__}: owner must say by a number for each of {count} points who"
+            f" asked, and is {said!r:.40}"
+        )
+    return owner.astype(np.int32)
 
 
 def _checked(optimizer: Optimizer, dimension: int) -> np.ndarray:

@@ -61,6 +61,13 @@ def test_without_a_picture_of_the_recoil_there_is_no_gap() -> None:
     assert recoil_gap(SimpleNamespace(groups=held), residual, plan, line) is None
 
 
+def test_without_a_picture_of_the_held_band_noise_counts_as_gap() -> None:
+    residuals, residual, plan, line = recoil(0.01, 0.005)
+    seen = [group for group in residuals.groups if group.phase == "recoil"]
+    gap = recoil_gap(SimpleNamespace(groups=seen), residual, plan, line)
+    assert gap == pytest.approx(np.hypot(0.01, 0.005 * np.sqrt(2)) / 0.2, rel=0.1)
+
+
 def test_what_instruments_add_is_taken_off() -> None:
     """The forward model of the nuisances, applied to what is left, gives the recording back."""
     plan = pulled()

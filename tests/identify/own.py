@@ -46,6 +46,29 @@ class Crowd(RandomSearch):
     owner = (0,)
 
 
+class Strangers(RandomSearch):
+    """Says by names who asked."""
+
+    @property
+    def owner(self):
+        return ["a"] * 7
+
+
+class Halves(RandomSearch):
+    """Says by halves who asked."""
+
+    @property
+    def owner(self):
+        return np.full(7, 0.5)
+
+
+class Lost(RandomSearch):
+    """Looks for what it was not given."""
+
+    def __init__(self, dimension: int, **settings):
+        settings["name"]
+
+
 class Choosy(RandomSearch):
     """Does not like what it is given."""
 

@@ -71,7 +71,7 @@ def test_intervals_stand_beside_what_was_identified(root, params, text_alone) ->
 def test_a_posterior_that_has_not_settled_is_named(root, params, text_alone) -> None:
     assert "not settled" not in written(root, params)
     theta = json.loads((root / THETA_FILE).read_text())
-    theta["confidence"]["moved"] = 4.37
+    theta["confidence"] |= {"moved": 4.37, "settled": False}
     (root / THETA_FILE).write_text(json.dumps(theta))
     text = written(root, params)
     assert f"posterior of {BAND}, Sling2Sim2Real had **not settled**" in text and "4.4" in text

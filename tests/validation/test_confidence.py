@@ -25,6 +25,7 @@ from pipeline.confidence.summary import SLIP
 from pipeline.identify.evaluate import Evaluator
 from pipeline.identify.history import History, theta_content
 from pipeline.identify.loss import EpisodeLoss
+from pipeline.identify.phases import taut_frames
 from pipeline.identify.space import Space
 from pipeline.signal import cutoff_hz
 from pipeline.sling.interaction import interact
@@ -44,7 +45,7 @@ TRUTH = {  # drawn evenly between these, E and s d on a logarithmic scale
 }
 NOISE = {"force_noise": 0.05, "depth_noise": 0.0006}
 ERRORS = {"release": 3e-4, "camera": 5e-4, "shift": 1e-3, "turn": 1e-3, "bias": 0.01}
-FIRST_PICTURE = (0.004, 0.02)  # after the release [s]
+CAMERA = 30.0  # pictures a second
 COVERAGE, WIDTH = 0.8, 2.0  # at least, and at most
 E_LIMIT, PRODUCT_LIMIT, FORCE_LIMIT = 0.01, 0.1, 0.01
 
@@ -76,12 +77,14 @@ def one(params, number: int) -> dict:
     band = next(iter(params.bands))
     sling = Sling.of(params.bands[band], params.setup, params.sling)
     true = truth(rng)
-    plan = pull_and_release(band, params.episode, sling)
-    # a picture is taken at the release: one must show the recoil, or the method refuses the episode
-    plan = replace(plan, cloud_time=plan.cloud_time + rng.uniform(*FIRST_PICTURE))
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
-    exact = own_law_episode(sling, plan, true, cutoff=cutoff, seed=number, **NOISE)
-    episode = disturbed(exact, rng, **ERRORS)
+    episode, seen = None, np.zeros(1, bool)
+    while not seen.any():  # a picture must show the recoil, or the method refuses the episode
+        plan = pull_and_release(band, params.episode, sling)
+        plan = replace(plan, cloud_time=plan.cloud_time + rng.uniform(0, 1 / CAMERA))
+        exact = own_law_episode(sling, plan, true, cutoff=cutoff, seed=number, **NOISE)
+        episode = disturbed(exact, rng, **ERRORS)
+        seen = taut_frames(episode)
 
     start = time.perf_counter()
     content = searched(params, episode, sling)
@@ -104,7 +107,8 @@ def one(params, number: int) -> dict:
     values = dict(zip(names, zip(true, posterior.samples.T, strict=True), strict=True))
     values["damping_product"] = product, posterior.derived["damping_product"]
     values["hold_force"] = hold, posterior.derived["hold_force"]
-    values["release_time"] = plan.release_time, posterior.derived["release_time"]
+    # against the truth, or what is rounded in the record would be as wide as the interval
+    values["release_time"] = 0.0, posterior.derived["release_time"] - plan.release_time
     late = float(episode.cloud_time[0] - plan.cloud_time[0])
     values["camera_delay"] = late, posterior.derived["camera_delay"]
     quantities = {}
@@ -126,6 +130,7 @@ def one(params, number: int) -> dict:
         "discrepancy": discrepancy(episode, sling, cutoff, best),
         "force_curve": {"theta": curve[0], "posterior": curve[1]},
         "moved": posterior.moved,
+        "settled": posterior.settled,
         "rollouts": posterior.rounds.rollouts,
         "seconds": {"search": found_after, "posterior": seconds},
     }
@@ -145,11 +150,9 @@ def calibration(episodes: list[dict]) -> dict:
             scale = np.abs([row["truth"] for row in good])
             if name in ("release_time", "camera_delay"):
                 scale = np.ones(len(good))
-            # an interval reaches to both sides, an error lies on one
             entry |= {
                 "coverage": float(np.mean(inside)),
                 "width_over_error": float(np.median(width) / np.quantile(error, LEVEL)),
-                "half_width_over_error": float(np.median(width) / np.quantile(error, LEVEL) / 2),
                 "median_error": float(np.median(error / scale)),
                 "median_width": float(np.median(width / scale)),
             }
@@ -181,16 +184,20 @@ def test_intervals_cover_the_truth_and_are_no_wider_than_they_must(
     table = calibration(episodes)
     for name, entry in table.items():
         progress(f"  {name}: {entry}")
-    rows = [one for name, one in table.items() if one["identifiable"] >= EPISODES / 2]
+    rows = {name: one for name, one in table.items() if one["identifiable"] >= EPISODES / 2}
     force = {
         who: float(np.median([one["force_curve"][who] for one in episodes]))
         for who in ("theta", "posterior")
     }
     count = sum(one["identifiable"] for one in table.values())
     covered = sum(one["identifiable"] * one.get("coverage", 0) for one in table.values()) / count
+    missed = {
+        "coverage": [name for name, row in rows.items() if row["coverage"] < COVERAGE],
+        "width": [name for name, row in rows.items() if row["width_over_error"] > WIDTH],
+    }
     met = {
         "coverage": covered >= COVERAGE,
-        "width": all(row["half_width_over_error"] <= WIDTH for row in rows),
+        "width": float(np.median([row["width_over_error"] for row in rows.values()])) <= WIDTH,
         "posterior": table["youngs_modulus"]["median_error"] <= E_LIMIT
         and table["damping_product"]["median_error"] <= PRODUCT_LIMIT
         and force["posterior"] <= FORCE_LIMIT,
@@ -202,16 +209,18 @@ def test_intervals_cover_the_truth_and_are_no_wider_than_they_must(
         "confidence",
         asked=f"Over {EPISODES} episodes of the simulator's own law with a recorder's noise and"
         f" errors, {100 * LEVEL:g} % intervals of identifiable quantities cover the truth in at"
-        f" least {100 * COVERAGE:g} %; half their median width is at most {WIDTH:g} times the 90 %"
-        " error; in the median E is within 1 %, s d within 10 %, the force curve within 1 % of its"
-        " peak.",
+        f" least {100 * COVERAGE:g} %; their median width is at most {WIDTH:g} times the 90 %"
+        " error (which a calibrated interval's is exactly); in the median E is within 1 %, s d"
+        " within 10 %, the force curve within 1 % of its peak.",
         met=all(met.values()),
         settings={"truth": TRUTH, "noise": NOISE, "errors": ERRORS, "method": METHOD}
-        | {"first_picture": FIRST_PICTURE}
+        | {"first_picture": "0 to 1/30 s after the release, again until one shows the recoil"}
         | {"optimizer": params.optimizer.model_dump()},
         figures={
             "met": met,
             "coverage": covered,
+            "missed_by_quantity": missed,
+            "settled": sum(one["settled"] for one in episodes),
             "quantities": table,
             "median_force_curve_error": force,
             "episodes": episodes,

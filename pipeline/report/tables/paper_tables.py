@@ -24,7 +24,6 @@ CAPTIONS = {
     4: "Ablation of covariance (c), several starts (m) and the work term: landing error [cm] as"
     " in table 1.",
 }
-SETTLED = 1.0  # deviations that a posterior's mean may move in its last round
 OVER = ("landing error [cm], g in cm", 4)  # above tables 1, 3 and 4, from that column on
 
 INTRODUCTION = f"""\
@@ -135,9 +134,16 @@ def _doubt(results: Results, found: list[parameters.Row], named: dict[str, Look]
         f" moved by {one.confidence['moved']:.1f} of its own deviations in the last round. Its"
         " intervals are not to be relied on.\n"
         for one in results
-        if one.confidence.get("moved", 0.0) > SETTLED
+        if not one.confidence.get("settled", True)
     ]
-    return [DOUBT if trusted else NO_CONFIDENCE, *([EDGE] if edges else []), *unsettled]
+    unseen = [
+        f"⚠ No picture shows the recoil of {one.band}, so {named[one.method].name} has its damping"
+        " from the slack swing alone: intervals of d, s, s·d and of landings are **too narrow**.\n"
+        for one in results
+        if "discrepancy" in one.confidence and one.confidence["discrepancy"]["recoil"] is None
+    ]
+    notes = [*([EDGE] if edges else []), *unsettled, *unseen]
+    return [DOUBT if trusted else NO_CONFIDENCE, *notes]
 
 
 def _noise(params, results: Results, named: dict[str, Look], folder: Path) -> list[str]:

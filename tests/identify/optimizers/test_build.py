@@ -74,6 +74,7 @@ def test_a_class_beside_params_is_found(tmp_path: Path, monkeypatch: pytest.Monk
             {"name": "y"},
             "does not take its settings: no such name, sorry: y",
         ),
+        ("tests.identify.own:Lost", {}, "does not take its settings: KeyError('name')"),
         ("math:hypot", {}, "cannot be called as Class(dimension, rollouts, seed, population)"),
         (OWN, {"rate": 1.0}, "got an unexpected keyword argument 'rate'"),
         ("de", {"rate": 1.0}, "got an unexpected keyword argument 'rate'"),
@@ -103,5 +104,6 @@ def test_points_outside_the_cube_are_refused() -> None:
         alone("tests.identify.own:Flat", Evaluate(rosenbrock), 50, names=tuple("abcd"))
     with pytest.raises(UserError, match=r"shape \(N, 5\), and gave no array of numbers"):
         alone("tests.identify.own:Words", Evaluate(rosenbrock), 50)
-    with pytest.raises(UserError, match="Crowd: owner must say for each of 7 points"):
-        alone("tests.identify.own:Crowd", Evaluate(rosenbrock), 50)
+    for name in ("Crowd", "Strangers", "Halves"):
+        with pytest.raises(UserError, match=f"{name}: owner must say by a number for each of 7"):
+            alone(f"tests.identify.own:{name}", Evaluate(rosenbrock), 50)

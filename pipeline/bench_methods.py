@@ -144,7 +144,7 @@ def _import_and_compile(
     params, sling: Sling, episode: Episode, method: str, devices: Sequence[str]
 ) -> None:
     """What a machine does once, and a method should not pay for."""
-    import botorch  # noqa: F401
+    import torch  # noqa: F401
 
     evaluate = evaluator(params, method, sling, episode, devices)
     evaluate(np.full((len(devices), evaluate.space.dimension), 0.5))

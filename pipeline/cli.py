@@ -276,9 +276,9 @@ def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
 
 
 def run_aim(arguments: argparse.Namespace) -> tuple[str, int]:
+    from pipeline.launches.aim import aim
+    from pipeline.launches.pose import posed
     from pipeline.params import load
-    from pipeline.policy.aim import aim
-    from pipeline.policy.pose import posed
 
     params, band = load(), arguments.band
     answer = aim(params, band, arguments.method, arguments.target, robust=arguments.robust)
@@ -296,7 +296,7 @@ def run_flow(arguments: argparse.Namespace) -> tuple[str, int]:
     root, workers, gpus = Path.cwd(), arguments.workers, arguments.gpus
     if arguments.cluster is None:
         return run(root, workers=workers, gpus=gpus), 0
-    from pipeline.flow.cluster import Cluster
+    from pipeline.cluster.cluster import Cluster
 
     with Cluster(root, arguments.cluster) as cluster:
         done = run(

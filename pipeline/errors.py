@@ -11,6 +11,11 @@ class UserError(Exception):
     """Bad input. The message says what is wrong, where, and how to mend it, in one line."""
 
 
+def one_line(said: object) -> str:
+    """What somebody else said, such as a library's error, as one line."""
+    return " ".join(str(said).split())
+
+
 def run(main: Callable[[], int | None]) -> None:
     """Run a command: a UserError becomes one line on stderr and exit status 1."""
     try:

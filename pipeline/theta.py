@@ -3,6 +3,8 @@
 {"band": "...", "theta": {"youngs_modulus": ..., ... all five}}  and, where a stage wrote it,
 "method", "nuisances": {"air_drag": ...}, "loss": {"geom", "force", "work", "total"}, "rollouts",
 "confidence"
+
+What its confidence rests on, samples of θ, lies beside in data/confidence/.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from pipeline.params import Parameters
 from pipeline.params.identification import NUISANCES
 from pipeline.schema import Range
 from pipeline.sling.model import THETA, Sling, load_sling
+from pipeline.stage import remedy
 
 
 def _limits(name: str) -> Range:
@@ -60,6 +63,34 @@ def _expect_number(path: Path, key: str, value: object, low: float, high: float)
         raise UserError(
             f"{path}: {key} must be a number between {low:g} and {high:g}, got {repr(value)[:60]}"
         )
+
+
+def load_samples(run, path: Path, band: str, method: str) -> np.ndarray | None:
+    """Samples of θ, and of the air's drag if searched, (M, 5) or (M, 6); None where there are none.
+
+    `run` is params.yaml's, which says what stage makes them. Raises UserError where the file is
+    damaged.
+    """
+    if not path.is_file():
+        return None
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content["samples"] == []:
+            return None
+        samples = np.array(content["samples"], float)
+        known = content["names"] in (list(THETA), [*THETA, "air_drag"])
+        if not known or samples.ndim != 2 or samples.shape[1] != len(content["names"]):
+            raise ValueError
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        makes = remedy(run, "theta", band, method, damaged=True)
+        raise UserError(f"{path}: damaged; {makes}") from error
+    return samples
+
+
+def law_discrepancy(content: dict) -> float:
+    """Share of a landing by which the law errs, as a θ file says it; 0 where it says nothing."""
+    known = content.get("confidence") or {}
+    return float(known.get("discrepancy", {}).get("landing", 0.0))
 
 
 def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Sling:

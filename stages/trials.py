@@ -17,15 +17,14 @@ import numpy as np
 
 from pipeline import errors
 from pipeline.episode import Episode
+from pipeline.launches import trials
+from pipeline.launches.stretch import recorded_stretch, stretch_of
 from pipeline.params import load
-from pipeline.policy import trials
-from pipeline.policy.aim import simulator
-from pipeline.policy.batches import aimed, launched, measured, predicted
-from pipeline.policy.spread import law_discrepancy, load_samples
+from pipeline.policy.simulator import simulator
 from pipeline.policy.stored import Stored
 from pipeline.rig.launch import Trial, launch
 from pipeline.stage import expect_episode, expect_from, started
-from pipeline.theta import load_theta
+from pipeline.theta import law_discrepancy, load_samples, load_theta
 
 
 def main() -> None:
@@ -38,14 +37,15 @@ def main() -> None:
     episode = Episode.load(expect_episode(band))
 
     stored, targets = Stored(params.run, band, method), params.trials.targets
-    batches = measured(params, band, method, Path("data/trials/measured"))
+    batches = trials.measured(params, band, method, Path("data/trials/measured"))
     if about.source == "rig":
-        own = aimed(stored, np.repeat(targets, params.trials.repeats).tolist())
-        batches = launched(own, partial(_launch, band), params.trials) + batches
-    batches = batches or aimed(stored, list(targets))
+        own = trials.aimed(stored, np.repeat(targets, params.trials.repeats).tolist())
+        batches = trials.launched(own, partial(_launch, band), params.trials) + batches
+    batches = batches or trials.aimed(stored, list(targets))
 
     launcher = simulator(params, band, theta)
-    launches, intervals = predicted(batches, launcher, samples, params, law_discrepancy(theta))
+    share = law_discrepancy(theta)
+    launches, intervals = trials.predict(batches, launcher, samples, params, share)
     draws = np.concatenate([batch.draws for batch in batches])
     table = trials.table(
         band,
@@ -53,8 +53,8 @@ def main() -> None:
         batches,
         predicted=launches,
         intervals=intervals,
-        stretch=trials.stretch_of(np.insert(draws, 0, 0, axis=1), fork_width, about.rest_length),
-        recorded=trials.recorded_stretch(episode, fork_width, about.rest_length),
+        stretch=stretch_of(np.insert(draws, 0, 0, axis=1), fork_width, about.rest_length),
+        recorded=recorded_stretch(episode, fork_width, about.rest_length),
     )
     trials.save(table, Path("data/trials", band, f"{method}.parquet"))
     said = [" ".join(filter(None, (g.kind, g.policy, str(len(g.draws))))) for g in batches]

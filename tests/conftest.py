@@ -2,15 +2,37 @@
 
 from __future__ import annotations
 
+import gc
+import shutil
 import signal
+from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+from tests import once
+
+
+def pytest_collection() -> None:
+    """Python looks for garbage the longer the more there is; what is imported is none."""
+    gc.disable()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_configure() -> None:
-    """What a script starts in its background ignores Ctrl-C, and so would all that tests start."""
+    """What a script starts in its background ignores Ctrl-C, and so would all that tests start.
+
+    Hypothesis measures no time: other programs have their share of it.
+    """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    settings.register_profile("untimed", deadline=None)
+    settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="module")
@@ -19,6 +41,23 @@ def nowhere(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("nowhere"))
         yield
+
+
+@pytest.fixture(scope="session")
+def history(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Prefect's empty history, to be copied as a project's .prefect/: a new one takes it seconds.
+
+    tests/flow/test_server.py has Prefect make one.
+    """
+
+    def make(folder: Path) -> None:
+        from pipeline.flow import server
+
+        with server.served(folder):
+            pass
+        shutil.rmtree(server.home(folder) / "ui")
+
+    return once.folder(tmp_path_factory, "prefect", make) / ".prefect"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -21,6 +21,19 @@ def test_a_failure_leaves_what_was_there(tmp_path: Path) -> None:
     assert [one.name for one in tmp_path.iterdir()] == ["a.txt"] and file.read_text() == "old"
 
 
+def test_a_file_is_on_the_disk_before_it_bears_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, synced = tmp_path / "a.txt", []
+
+    def sync(number: int) -> None:
+        synced.append((os.fstat(number).st_ino, os.fstat(number).st_size, file.exists()))
+
+    monkeypatch.setattr(os, "fsync", sync)
+    write_text(file, "new")
+    assert synced == [(file.stat().st_ino, 3, False)]
+
+
 def test_only_what_the_dead_left_is_removed(tmp_path: Path) -> None:
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()

@@ -39,9 +39,9 @@ TINY = {
     "trials.repeats": 1,
     "floor.map_size": [4, 4],
     "floor.launches": 1,
-    "rig.edges": 40,
-    "rig.tolerance": 1e-4,
-    "rig.camera.drop_rate": 0.6,
+    "rig.edges": 16,
+    "rig.tolerance": 1e-3,
+    "rig.camera.drop_rate": 0.8,
 }
 SEARCHED = ("history", "clusters", "refined", "theta", "policy", "trials")
 METHODS = [f"{step}@band1-sling2sim2real" for step in SEARCHED]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -34,6 +35,22 @@ class StageFailed(UserError):
 
 class Cancelled(Exception):
     """`cancelled` became true: the stage was ended."""
+
+
+def stage_environment(cores: int) -> dict[str, str]:
+    """What a stage gets: all that is exported here, `cores` threads, and this Python first.
+
+    DVC starts stages by $SHELL: a C shell would read its settings, and nologin is none.
+    """
+    path = [str(Path(sys.executable).parent), *filter(None, [os.environ.get("PATH")])]
+    return {
+        **os.environ,
+        "PATH": os.pathsep.join(path),
+        "SHELL": "/bin/sh",
+        "PYTHONUNBUFFERED": "1",  # its lines as they come
+        "SLING_WORKERS": str(cores),
+        "OMP_NUM_THREADS": str(cores),
+    }
 
 
 def run_stage(
@@ -156,20 +173,26 @@ def _guarded(
 
 def _reason(said: list[str], status: int) -> str:
     """Why a stage failed: its own line of error, else its last line, else what DVC says."""
-    if status < 0:
-        return f"its guard was killed by signal {-status}"  # whatever its stage said of that
+    if signal := _signal(status):  # whatever the stage said of that; DVC's comes by the guard
+        return f"{'its guard' if status < 0 else 'DVC'} was killed by signal {signal}"
     own = [line for line in said if not CHATTER.match(line)]
     exits = [int(found[1]) for line in said if (found := COMMAND_FAILED.match(line))]
     if not exits:  # DVC failed before or after the stage's command
         for line, following in zip_longest(said, said[1:], fillvalue=""):
             if found := DVC_FAILED.match(line):  # "... blocked by:", and by whom
                 own.append(f"{found[1]} {following.strip()}" if line.endswith(":") else found[1])
-    if 128 < status < 192:  # as the guard says it; DVC's own is 255
-        return f"DVC was killed by signal {status - 128}"
     errors = [found[1] for line in own if (found := OWN_ERROR.match(line))]
     if errors:
         return errors[-1]
     code = exits[-1] if exits else status
-    if code < 0 or 128 < code < 192:  # of the stage itself, or as the shell around it says it
-        return f"was killed by signal {-code if code < 0 else code - 128}"
+    if signal := _signal(code):
+        return f"was killed by signal {signal}"
     return own[-1] if own else f"ended with exit status {code}"
+
+
+def _signal(status: int) -> int:
+    """The signal that ended a process: 9 of -9, as Python has it, and of 137, as a shell; else 0.
+
+    A stage's comes as either: some shells stay around it, others become it.
+    """
+    return abs(status) % 128 if status < 0 or 128 < status < 192 else 0

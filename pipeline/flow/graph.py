@@ -1,4 +1,4 @@
-"""DVC's graph of stages, and what of it DVC would run. All that knows DVC's Python API is here."""
+"""DVC's graph of stages, and what of it DVC would run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from operator import getitem
 from pathlib import Path
 from threading import Lock
 
-from pipeline.errors import UserError
+from pipeline.errors import UserError, one_line
 
 
 @dataclass(frozen=True)
@@ -150,4 +150,4 @@ def _clear() -> Iterator[None]:
             " (if there is none on any machine: rm .dvc/tmp/lock)"
         ) from error
     except DvcException as error:
-        raise UserError(f"DVC: {' '.join(str(error).split())}") from error
+        raise UserError(f"DVC: {one_line(error)}") from error

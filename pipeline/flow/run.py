@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import fcntl
 import os
-import sys
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -51,7 +50,7 @@ def run(
             return f"all {len(graph.stages)} stages are fresh ({lasted(start)})"
         cores = machine.cores()
         workers = workers or min(cores, width(stale))
-        environment = stage_environment(max(1, cores // workers) if here else cores)
+        environment = child.stage_environment(max(1, cores // workers) if here else cores)
         shares = gpu_shares(environment, gpus, here)
         board = Board(stale, workers, shares)
         say(
@@ -65,22 +64,6 @@ def run(
         say(summary)
         raise next(iter(board.failed.values()))
     return summary
-
-
-def stage_environment(cores: int) -> dict[str, str]:
-    """What a stage gets: all that is exported here, `cores` threads, and this Python first.
-
-    DVC starts stages by $SHELL: a C shell would read its settings, and nologin is none.
-    """
-    path = [str(Path(sys.executable).parent), *filter(None, [os.environ.get("PATH")])]
-    return {
-        **os.environ,
-        "PATH": os.pathsep.join(path),
-        "SHELL": "/bin/sh",
-        "PYTHONUNBUFFERED": "1",  # its lines as they come
-        "SLING_WORKERS": str(cores),
-        "OMP_NUM_THREADS": str(cores),
-    }
 
 
 def gpu_shares(

@@ -12,7 +12,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from threading import Event
 
-from pipeline.errors import UserError
+from pipeline.errors import UserError, one_line
 from pipeline.flow import child, guard
 from pipeline.flow.board import Board
 from pipeline.flow.graph import Graph, Stage
@@ -97,7 +97,7 @@ def perform(root: Path, board: Board, tasks: Tasks) -> None:
                 _prepare(board)
                 state = _flow(board, tasks)(return_state=True)
                 if not tasks.interrupted and (board.waiting or board.running):
-                    ended = " ".join((state.message or state.name).split())
+                    ended = one_line(state.message or state.name)
                     raise UserError(f"Prefect ended the flow early ({ended}); run it again")
             finally:
                 _flush()
@@ -108,7 +108,7 @@ def perform(root: Path, board: Board, tasks: Tasks) -> None:
             say("Prefect's server went away before the end; its history lacks some of it")
         elif not tasks.interrupted:
             raise UserError(
-                f"Prefect failed ({type(error).__name__}: {' '.join(str(error).split())});"
+                f"Prefect failed ({type(error).__name__}: {one_line(error)});"
                 " `dvc repro` does the same without it, one stage at a time"
             ) from error
     if tasks.interrupted:
@@ -196,8 +196,7 @@ def _outcome(future, stage: Stage, timeout: float | None = None) -> bool | UserE
         return child.StageFailed(f"{stage.name}: interrupted")
     except Exception as error:
         logging.getLogger(__name__).debug("%s", stage.name, exc_info=error)
-        said = " ".join(str(error).split())
-        return child.StageFailed(f"{stage.name}: {type(error).__name__}: {said}")
+        return child.StageFailed(f"{stage.name}: {type(error).__name__}: {one_line(error)}")
 
 
 def _flush() -> None:

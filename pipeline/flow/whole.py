@@ -10,12 +10,13 @@ file beside, which is then renamed. So is the file of its read and write locks.
 
 from __future__ import annotations
 
-import os
 import re
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+
+from pipeline.files import replacing, write_text
 
 HEAD = "schema: '2.0'\nstages:\n"
 
@@ -35,15 +36,8 @@ class Renaming:
             with self._fs.open(path, mode, **more) as file:
                 yield file
             return
-        temporary = f"{path}.tmp"
-        try:
-            with self._fs.open(temporary, mode, **more) as file:
-                yield file
-            os.replace(temporary, path)
-        except BaseException:
-            with suppress(OSError):
-                os.remove(temporary)
-            raise
+        with replacing(path) as temporary, self._fs.open(str(temporary), mode, **more) as file:
+            yield file
 
 
 def main() -> int:
@@ -59,31 +53,21 @@ def main() -> int:
     rwlock._edit_rwlock = lambda folder, fs, hardlink: edit(folder, Renaming(fs), hardlink)
     in_place, of_all = _common._dump_data, Lockfile.dump_stages
 
-    def replacing(path, data, dumper, fs=None, **more) -> None:
-        temporary = f"{path}.tmp"  # DVC's own lock keeps others away; the next one writes over it
-        in_place(temporary, data, dumper, fs, **more)
-        sync(temporary)
-        os.replace(temporary, path)
+    def beside(path, data, dumper, fs=None, **more) -> None:
+        with replacing(path) as temporary:
+            in_place(str(temporary), data, dumper, fs, **more)
 
     def of_one(self, stages, **more) -> None:
-        path = Path(self.path)
-        text = path.read_text(encoding="utf-8") if path.exists() else HEAD
+        new: dict[str, dict] = {}
         for stage in stages:
-            for name, entry in to_lockfile(stage, **more).items():
-                text = None if text is None else put(text, name, entry)
-        if text is None:
-            return of_all(self, stages, **more)
-        replacing(path, text, lambda data, file: file.write(data))
-        self.repo.scm_context.track_file(self.relpath)
+            new |= to_lockfile(stage, **more)
+        if write(self.path, new):
+            self.repo.scm_context.track_file(self.relpath)
+        else:
+            of_all(self, stages, **more)
 
-    _common._dump_data, Lockfile.dump_stages = replacing, of_one
+    _common._dump_data, Lockfile.dump_stages = beside, of_one
     return dvc()
-
-
-def sync(path: str | Path) -> None:
-    """Have a file on the disk: renamed before that, it may be empty after a power cut."""
-    with open(path, "r+b") as file:
-        os.fsync(file.fileno())
 
 
 def sign_locks() -> None:
@@ -95,6 +79,20 @@ def sign_locks() -> None:
     from dvc.lock import HardlinkLock
 
     HardlinkLock._set_claimfile = flufl.lock.Lock._set_claimfile
+
+
+def write(lock: str | Path, new: Mapping[str, dict]) -> bool:
+    """Put stages' entries into dvc.lock, by a caller that holds DVC's own lock.
+
+    False, and nothing is written, where it is not as DVC writes it for stages alone.
+    """
+    lock = Path(lock)
+    before = text = lock.read_text(encoding="utf-8") if lock.is_file() else HEAD
+    for name, entry in new.items():
+        text = None if text is None else put(text, name, entry)
+    if text not in (before, None):
+        write_text(lock, text)
+    return text is not None
 
 
 def put(text: str, name: str, entry: dict) -> str | None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import UserError
-from pipeline.policy.trials import trial_seed
+from pipeline.params.launches import trial_seed
 
 NUMBERS = ("launches", "actuation_error_m", "release_jitter")
 

@@ -56,3 +56,8 @@ class Trials(Section):
     targets: Annotated[tuple[Distance, ...], LIST, FILLED, UNIQUE]
     repeats: Annotated[int, Range(1, 10_000)]
     actuation_error: Annotated[float, Range(0, 0.1)]
+
+
+def trial_seed(trials: Trials, number):
+    """Seed of a band's launch by its number, an int or an array; the same for every policy."""
+    return 1_000_000 * trials.seed + number

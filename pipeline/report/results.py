@@ -11,10 +11,10 @@ import pandas as pd
 
 from pipeline.episode import Episode
 from pipeline.identify.regions import Region, load_regions
+from pipeline.launches.measured import file_of, named
 from pipeline.oracle.floor import load_floor
 from pipeline.params import pairs
 from pipeline.policy.landing_map import LandingMap
-from pipeline.policy.measured import file_of, named
 from pipeline.policy.stored import ROBUST, Stored
 from pipeline.stage import expect, expect_from
 from pipeline.theta import load_theta
@@ -33,7 +33,7 @@ class Result:
         card: The policy's card; `robust_card` that of the second policy, None without one.
         training: One row an iteration of the policy's training.
         landing_map: Simulated launches over the box of draws.
-        trials: One row a launch (pipeline/policy/trials.py), those of the robust policy apart.
+        trials: One row a launch (pipeline/launches/trials.py), those of the robust policy apart.
         robust_trials: Its launches; no rows where the method has none.
     """
 

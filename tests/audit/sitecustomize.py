@@ -1,19 +1,30 @@
 """Notes what a stage reads of params.yaml; Python runs this first where it lies on PYTHONPATH.
 
 tests/test_pipeline.py compares the notes, `$AUDIT/<stage>.<process>.json`, with the `params:` of
-dvc.yaml.
+dvc.yaml. What takes long and no parameter sets is made short: `SHORT`.
 """
 
 from __future__ import annotations
 
 import atexit
+import gc
+import importlib
 import json
 import os
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+SHORT = {  # by stage and module
+    "theta": {
+        "pipeline.confidence.posterior": {"HEAT": (100.0,), "ROUNDS": 3, "SHORT": 120, "LONG": 120},
+        "pipeline.confidence.profile": {"POINTS": 3},
+    },
+    "policy": {"pipeline.policy.robust": {"STEPS": 30}},
+    "report": {"pipeline.style": {"STYLE": {}}},  # a layout that is solved for draws all twice
+}
 read: set[str] = set()
+gc.set_threshold(100_000, 50, 50)  # it is looked for garbage while torch is imported
 
 
 class Section:
@@ -61,6 +72,14 @@ def noted(value: object, path: str) -> object:
     return value
 
 
+def shorten(step: str) -> None:
+    """In this process, which is a stage's own."""
+    for name, constants in SHORT.get(step, {}).items():
+        module = importlib.import_module(name)
+        assert constants.keys() <= vars(module).keys(), name
+        vars(module).update(constants)
+
+
 def install(stage: str) -> None:
     os.environ["AUDITED"] = stage
     sys.path.insert(0, os.getcwd())
@@ -74,6 +93,8 @@ def install(stage: str) -> None:
 
 if sys.orig_argv[1:2] == ["-m"] and sys.orig_argv[2].startswith("stages."):
     module, *item = sys.orig_argv[2:]
-    install("@".join(filter(None, (module.removeprefix("stages."), "-".join(item)))))
+    step = module.removeprefix("stages.")
+    install("@".join(filter(None, (step, "-".join(item)))))
+    shorten(step)
 elif "AUDITED" in os.environ:  # a process that a stage started
     install(os.environ["AUDITED"])

@@ -16,8 +16,7 @@ from pipeline.identify.history import History
 from pipeline.identify.loss import TERMS
 from pipeline.identify.space import Space
 from pipeline.params import load
-from pipeline.policy.spread import law_discrepancy, load_samples
-from pipeline.theta import load_theta
+from pipeline.theta import law_discrepancy, load_samples, load_theta
 from stages import theta
 from tests.identify.toy import episode
 from tests.project import ROOT

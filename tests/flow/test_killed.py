@@ -33,6 +33,13 @@ def toy(tmp_path):
     toy.run.left(0)
 
 
+@pytest.fixture
+def flows(toy, history) -> Toy:
+    """The same, in which flows need not make Prefect's history."""
+    shutil.copytree(history, toy.folder / ".prefect")
+    return toy
+
+
 def steps(text: str) -> int:
     return sum("step" in line for line in text.splitlines())
 
@@ -59,8 +66,9 @@ def temporaries(toy: Toy) -> list[Path]:
         (os.kill, signal.SIGTERM, {"count@b"}),
     ],
 )
-def test_an_interrupted_flow_ends_its_stages_and_dvc_goes_on(toy, send_to, number, done) -> None:
+def test_an_interrupted_flow_ends_its_stages_and_dvc_goes_on(flows, send_to, number, done) -> None:
     """While two stages run; while one does, and another is done."""
+    toy = flows
     (toy.folder / ".checkpoints").mkdir()
     for name in done:
         (toy.folder / ".checkpoints" / name[-1]).write_text(str(STEPS))
@@ -106,9 +114,9 @@ def struck(toy: Toy, victim: str, rng: np.random.Generator) -> int:
     return flow.wait(READY)
 
 
-def test_flows_are_killed_at_random_moments_and_the_next_one_goes_on(toy: Toy) -> None:
+def test_flows_are_killed_at_random_moments_and_the_next_one_goes_on(flows: Toy) -> None:
     """Of the real stages, and to the same bytes: tests/validation/test_kills.py."""
-    rng = np.random.default_rng(1)
+    toy, rng = flows, np.random.default_rng(1)
     for victim in ("flow", "process"):
         status = struck(toy, victim, rng)
         assert toy.run.left() == []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -37,9 +38,10 @@ SLING = ["-c", "from pipeline.cli import main; main()"]
 
 
 @pytest.fixture(scope="module")
-def toy(tmp_path_factory: pytest.TempPathFactory) -> Toy:
-    folder = tmp_path_factory.mktemp("run") / "toy"
-    return Toy(folder, STAGES, word="one\n", other="one\n")
+def toy(tmp_path_factory: pytest.TempPathFactory, history: Path) -> Toy:
+    toy = Toy(tmp_path_factory.mktemp("run") / "toy", STAGES, word="one\n", other="one\n")
+    shutil.copytree(history, toy.folder / ".prefect")
+    return toy
 
 
 @pytest.fixture(scope="module")

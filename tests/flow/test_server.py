@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -217,8 +218,9 @@ def test_the_ui_is_this_projects_alone_and_keeps_its_history(tmp_path: Path) -> 
 
 
 @pytest.fixture
-def flow(tmp_path: Path) -> Iterator[subprocess.Popen]:
+def flow(tmp_path: Path, history: Path) -> Iterator[subprocess.Popen]:
     """A flow that has shown a first line and waits; its server is temporary."""
+    shutil.copytree(history, tmp_path / ".prefect")
     process = subprocess.Popen(
         [sys.executable, "-c", FLOW, str(tmp_path)],
         env=environment(CONNECTIONS=str(tmp_path / "connections")),

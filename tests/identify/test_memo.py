@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from pipeline.identify.evaluate import NOT_FINITE, Evaluation, Evaluator
 from pipeline.identify.memo import Memo
 from pipeline.identify.session import SOURCES
 from pipeline.params.identification import Prior
+from tests.forked import Forked
 from tests.identify import toy
 from tests.identify.functions import NAMES, Evaluate, quadratic
 from tests.identify.killed import ROLLOUTS, VALLEY, searched
@@ -28,16 +30,10 @@ from tools.closure import closure
 ROOT = Path(__file__).parents[2]
 
 
-def run(name: str, folder: Path, output: Path, fatal: int) -> subprocess.CompletedProcess:
-    output.mkdir(exist_ok=True)
-    arguments = [name, str(folder), str(output), str(fatal)]
-    return subprocess.run(
-        [sys.executable, "-m", "tests.identify.killed", *arguments],
-        cwd=ROOT,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-    )
+@pytest.fixture(scope="module")
+def run() -> Iterator[Forked]:
+    with Forked("tests.identify.killed", "torch") as run:
+        yield run
 
 
 @pytest.mark.parametrize(
@@ -51,19 +47,21 @@ def run(name: str, folder: Path, output: Path, fatal: int) -> subprocess.Complet
     ],
 )
 def test_sigkill_and_on_to_the_same_bytes(
-    tmp_path: Path, name: str, batches: int, kills: tuple[int, ...]
+    tmp_path: Path, run: Forked, name: str, batches: int, kills: tuple[int, ...]
 ) -> None:
     """Nothing is evaluated twice."""
+    (tmp_path / "parts").mkdir()
+    arguments = name, str(tmp_path / "two"), str(tmp_path / "parts")
     inner = Evaluate(VALLEY)
     whole = searched(name, inner)
     assert inner.count == batches
     for fatal in kills:
-        killed = run(name, tmp_path / "two", tmp_path / "parts", fatal)
-        assert killed.returncode == -signal.SIGKILL, killed.stderr
+        killed = run(*arguments, str(fatal))
+        assert killed.returncode == -signal.SIGKILL, killed.said
         assert not list((tmp_path / "parts").iterdir())
-    last = run(name, tmp_path / "two", tmp_path / "parts", 10**6)
-    assert last.returncode == 0, last.stderr
-    assert int(last.stdout) == batches - sum(kills)
+    last = run(*arguments, str(10**6))
+    assert last.returncode == 0, last.said
+    assert int(last.said.splitlines()[-1]) == batches - sum(kills)
     for number, history in enumerate(whole):
         history.save(tmp_path / "whole.parquet")
         left = tmp_path / "parts" / f"{number}.parquet"

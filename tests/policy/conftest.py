@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from pipeline.policy.landing_map import LandingMap, landscape_of
+from tests import once
 from tests.policy import toy
 
 SETTINGS = SimpleNamespace(
@@ -35,7 +37,10 @@ def toy_map() -> LandingMap:
 
 
 @pytest.fixture(scope="session")
-def trained(toy_map):
+def trained(toy_map, tmp_path_factory: pytest.TempPathFactory):
     from pipeline.policy.train import train
 
-    return train(landscape_of([toy_map]), SETTINGS)
+    def make(_: Path):
+        return train(landscape_of([toy_map]), SETTINGS)
+
+    return once.value(tmp_path_factory, "trained", make)

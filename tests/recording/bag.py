@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace as Message
 
@@ -139,6 +140,8 @@ def write_bag(
         options: For the MCAP writer.
     """
     truth, random = truth or Truth(), np.random.default_rng(1)
+    to_sensor, to_base = (HAND * SENSOR).inv(), BASE[0].inv()
+    turn = dict(zip("xyzw", (to_base * HAND).as_quat(), strict=True))
     definitions = get_typestore(Stores.ROS2_HUMBLE)
     with path.open("wb") as file:
         writer = Writer(file, **{"chunk_size": 200_000, **options})
@@ -167,14 +170,13 @@ def write_bag(
         events += [(0.004 + k / lens.fps, "frame") for k in range(int(truth.end * lens.fps))]
         for t, kind in sorted(events):
             if kind == "wrench":
-                force = (HAND * SENSOR).inv().apply(truth.sign * truth.force(t)) + truth.bias
+                force = to_sensor.apply(truth.sign * truth.force(t)) + truth.bias
                 force = force + random.normal(0, truth.noise, 3)
                 wrench = Message(force=_vector(force), torque=_vector(np.zeros(3)))
                 write(kind, "/ft/wrench", t, 0.0005, {"wrench": wrench}, "ft_sensor")
             elif kind == "pose":
-                position = BASE[0].inv().apply(truth.hand(t) - BASE[1])
-                q = Message(**dict(zip("xyzw", (BASE[0].inv() * HAND).as_quat(), strict=True)))
-                pose = Message(position=_vector(position), orientation=q)
+                position = to_base.apply(truth.hand(t) - BASE[1])
+                pose = Message(position=_vector(position), orientation=Message(**turn))
                 write(kind, "/arm/current_pose", t, 0.0003, {"pose": pose}, "base")
             elif kind == "gripper":
                 finger = 0.008 if truth.grasp <= t < truth.release + 0.03 else 0.04
@@ -202,23 +204,13 @@ def write_bag(
 
 def render(truth: Truth, t: float, lens: Lens = LENS) -> tuple[np.ndarray, np.ndarray]:
     """Colour (BGR) and depth (mm) of floor, fork, arm and band."""
-    width, height = lens.size
-    u, v = np.meshgrid(np.arange(width), np.arange(height))
-    rays = np.stack([u - width / 2, v - height / 2, np.full(u.shape, lens.focal)], -1) / lens.focal
-    downwards = (rays @ CAMERA.as_matrix().T)[..., 2]
-    with np.errstate(divide="ignore"):
-        depth = np.where(downwards < -1e-3, (FLOOR - EYE[2]) / downwards, 3.0).clip(0, 3.0)
-    color = np.full((height, width, 3), truth.floor, np.uint8)
-    color[(u // 16 + v // 16) % 2 == 0] -= 20
-
-    posts = TIPS[:, None] - [[0.0, 0.0, 1.0]] * np.linspace(0.012, 0.5, 60)[:, None]
+    color, depth = (one.copy() for one in _still(lens, truth.floor))
     hand = truth.hand(t)
     palm = hand - np.linspace(0.07, 0.3, 15)[:, None] * [0, 1, 0]
     side = 0.5 * (0.016 if truth.holds(t) else 0.08) + 0.012
     fingers = hand - np.linspace(-0.005, 0.07, 16)[:, None] * [0, 1, 0]
     fingers = np.vstack([fingers + [side, 0, 0], fingers - [side, 0, 0]])
     for points, radius, paint in (
-        (posts.reshape(-1, 3), 0.012, (150, 150, 155)),
         (palm, 0.05, (truth.arm,) * 3),
         (fingers, 0.010, (truth.arm,) * 3),
         (truth.center_line(t), truth.radius, truth.band),
@@ -227,6 +219,22 @@ def render(truth: Truth, t: float, lens: Lens = LENS) -> tuple[np.ndarray, np.nd
     noise = np.random.default_rng(round(t * 1e4)).normal(0, 0.0008, depth.shape)
     millimetres = np.round(1000 * (depth + noise * depth**2)).astype(np.uint16)
     return color, np.where(depth > 2.5, 0, millimetres).astype(np.uint16)
+
+
+@lru_cache
+def _still(lens: Lens, shade: int) -> tuple[np.ndarray, np.ndarray]:
+    """Colour and depth [m] of floor and fork."""
+    width, height = lens.size
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    rays = np.stack([u - width / 2, v - height / 2, np.full(u.shape, lens.focal)], -1) / lens.focal
+    downwards = (rays @ CAMERA.as_matrix().T)[..., 2]
+    with np.errstate(divide="ignore"):
+        depth = np.where(downwards < -1e-3, (FLOOR - EYE[2]) / downwards, 3.0).clip(0, 3.0)
+    color = np.full((height, width, 3), shade, np.uint8)
+    color[(u // 16 + v // 16) % 2 == 0] -= 20
+    posts = TIPS[:, None] - [[0.0, 0.0, 1.0]] * np.linspace(0.012, 0.5, 60)[:, None]
+    _splat(color, depth, posts.reshape(-1, 3), 0.012, (150, 150, 155), lens.focal)
+    return color, depth
 
 
 def _splat(color, depth, points: np.ndarray, radius: float, paint: tuple, focal: float) -> None:

@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from pipeline.params import Params, load
-from tests.recording.bag import write_bag
+from tests import once
+from tests.recording.bag import Truth, write_bag
 
 
 @pytest.fixture(scope="session")
@@ -17,12 +20,19 @@ def params() -> Params:
 @pytest.fixture(scope="session")
 def seen(tmp_path_factory):
     """(path, truth) of a recording with pictures."""
-    path = tmp_path_factory.mktemp("bag") / "seen.mcap"
-    return path, write_bag(path)
+    return written(tmp_path_factory, "seen.mcap")
 
 
 @pytest.fixture(scope="session")
 def blind(tmp_path_factory):
     """(path, truth) of a recording with black pictures, for what needs no band in them."""
-    path = tmp_path_factory.mktemp("bag") / "blind.mcap"
-    return path, write_bag(path, cameras=False, rate=500)
+    return written(tmp_path_factory, "blind.mcap", cameras=False, rate=500)
+
+
+def written(factory: pytest.TempPathFactory, name: str, **options) -> tuple[Path, Truth]:
+    """A recording for all tests of the run."""
+
+    def make(folder: Path) -> tuple[Path, Truth]:
+        return folder / name, write_bag(folder / name, **options)
+
+    return once.value(factory, name, make)

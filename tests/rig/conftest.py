@@ -7,6 +7,7 @@ import pytest
 from pipeline.params import Params, load
 from pipeline.rig.interaction import Interaction
 from pipeline.rig.record import record
+from tests import once
 
 ROOT = Path(__file__).parents[2]
 SCALE = 0.4  # of the pictures
@@ -35,5 +36,9 @@ def shared() -> Path:
 @pytest.fixture(scope="session")
 def recorded(coarse: Params, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Interaction]:
     """One recording of the quick world, and what truly happened."""
-    path = tmp_path_factory.mktemp("raw") / "band1.mcap"
-    return path, record(coarse, "band1", path, picture_scale=SCALE)
+
+    def make(folder: Path) -> tuple[Path, Interaction]:
+        path = folder / "band1.mcap"
+        return path, record(coarse, "band1", path, picture_scale=SCALE)
+
+    return once.value(tmp_path_factory, "rig", make)

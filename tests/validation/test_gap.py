@@ -20,7 +20,7 @@ from pipeline.oracle.aim import hit, least_sensitive_draw
 from pipeline.oracle.floor import errors_of, trial_seeds
 from pipeline.oracle.world import World
 from pipeline.params import load
-from pipeline.policy.aim import simulator
+from pipeline.policy.simulator import simulator
 from pipeline.policy.stored import Stored
 from pipeline.sling.model import THETA
 from pipeline.style import COLORS, INK, STYLE

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 from pipeline.intake.add_band import add_band
+from pipeline.launches.spread import landing_intervals
 from pipeline.params import load
-from pipeline.policy.aim import simulator
-from pipeline.policy.spread import landing_intervals, law_discrepancy, load_samples
+from pipeline.policy.simulator import simulator
 from pipeline.rig.launch import launch
-from pipeline.theta import load_theta
+from pipeline.theta import law_discrepancy, load_samples, load_theta
 from tests.validation.test_orange import BAND, LANDINGS, MASS, RECORDING, copy_of_the_project, run
 
 pytestmark = pytest.mark.validation

@@ -7,7 +7,7 @@ import inspect
 import sys
 from pathlib import Path
 
-from pipeline.errors import UserError
+from pipeline.errors import UserError, one_line
 from pipeline.identify.search import Optimizer
 
 
@@ -78,8 +78,9 @@ def build(
 
 
 def _refusal(name: str, what: str) -> UserError:
-    what = " ".join(what.split())  # one line
-    return UserError(f"optimiser {name}: {what}; see `search` under `methods` in params.yaml")
+    return UserError(
+        f"optimiser {name}: {one_line(what)}; see `search` under `methods` in params.yaml"
+    )
 
 
 def _class(name: str) -> type:

@@ -1,4 +1,4 @@
-"""Bayesian optimisation: batches of greatest expected improvement by a Gaussian process (BoTorch).
+"""Bayesian optimisation: batches of greatest expected improvement by a Gaussian process.
 
 One thread and no global random numbers: the same seed asks for the same points, whatever the
 number of cores.
@@ -6,7 +6,6 @@ number of cores.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -60,7 +59,7 @@ class Bayes:
     def ask(self) -> np.ndarray:
         """The Latin hypercube, then the batch of a round, shape (population, D)."""
         if self._round:
-            with one_quiet_thread():
+            with one_thread():
                 self._asked = self._batch()
         return self._asked
 
@@ -72,30 +71,22 @@ class Bayes:
 
     def _batch(self) -> np.ndarray:
         import torch
-        from botorch.acquisition.logei import qLogExpectedImprovement
-        from botorch.generation import gen_candidates_scipy
-        from botorch.sampling.normal import SobolQMCNormalSampler
 
+        from pipeline.identify.optimizers.improvement import climbed, normal_samples, root
         from pipeline.identify.optimizers.process import Hyperparameters, Process, fitted
 
         rows = training_rows(self._loss, self._points)
         unit, value = self._unit[rows], -standardised(self._loss[rows])
         start = self._hyperparameters or Hyperparameters.usual(unit.shape[1])
         self._hyperparameters = fitted(unit, value, start, FIT_STEPS)
-        model = Process(unit, value, self._hyperparameters)
-        sampler = SobolQMCNormalSampler(torch.Size([SAMPLES]), seed=self._seed + self._round)
-        candidates = torch.from_numpy(self._candidates(unit[np.argsort(-value, kind="stable")]))
-        with torch.no_grad():
-            samples = sampler(model.posterior(candidates))[..., 0].numpy()
-        chosen = greedy(samples, value.max(), self._population)
-        batch, _ = gen_candidates_scipy(
-            candidates[chosen][None],
-            qLogExpectedImprovement(model, best_f=value.max(), sampler=sampler),
-            lower_bounds=0.0,
-            upper_bounds=1.0,
-            options={"maxiter": POLISH_STEPS},
-        )
-        return np.clip(batch[0].detach().numpy(), 0, 1)
+        process, best = Process(unit, value, self._hyperparameters), value.max()
+        candidates = self._candidates(unit[np.argsort(-value, kind="stable")])
+        guess = process.at(torch.from_numpy(candidates))
+        normal = normal_samples(SAMPLES, CANDIDATES, self._seed, self._round)
+        samples = guess.mean + normal @ root(guess.covariance).mT
+        chosen = greedy(samples.numpy(), best, self._population)
+        normal = normal_samples(SAMPLES, self._population, self._seed, self._round)
+        return climbed(process, candidates[chosen], best, normal, POLISH_STEPS)
 
     def _candidates(self, best: np.ndarray) -> np.ndarray:
         """Half from a Sobol sequence, half near the first of `best`, at all scales."""
@@ -131,25 +122,25 @@ def greedy(samples: np.ndarray, best: float, count: int) -> list[int]:
         samples: Of the candidates' values, jointly, shape (S, C).
         best: The value to improve on.
     """
-    reached = np.full((len(samples), 1), best)
+    gain = np.maximum(samples - best, 0)  # over what those chosen reach, sample by sample
     chosen: list[int] = []
     for _ in range(count):
-        gain = np.maximum(samples - reached, 0).mean(axis=0)
-        gain[chosen] = -1
-        chosen.append(int(gain.argmax()))
-        reached = np.maximum(reached, samples[:, chosen[-1:]])
+        total = gain.sum(axis=0)
+        total[chosen] = -1
+        chosen.append(int(total.argmax()))
+        better = np.flatnonzero(gain[:, chosen[-1]])  # the others' gains stay what they are
+        gain[better] = np.maximum(gain[better] - gain[better, chosen[-1:], None], 0)
     return chosen
 
 
 @contextmanager
-def one_quiet_thread() -> Iterator[None]:
-    """Torch on one thread; unconverged L-BFGS and jitter on a diagonal are no news here."""
+def one_thread() -> Iterator[None]:
+    """Torch on one thread: with more, sums are rounded in another order."""
     import torch
 
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        with warnings.catch_warnings(record=True):  # no filter does: BoTorch sets its own
-            yield
+        yield
     finally:
         torch.set_num_threads(threads)

@@ -1,8 +1,8 @@
-"""A Gaussian process with an exponential kernel, a length scale an axis, for BoTorch.
+"""A Gaussian process with an exponential kernel, a length scale an axis: fit, prediction, slopes.
 
-Covariance, priors, bounds and start are those of BoTorch's own SingleTaskGP with a Matern 1/2
-kernel (Hvarfner et al. 2024), which takes twice as long: here the gradient of the likelihood is in
-closed form, and a prediction is a few products of matrices.
+Covariance, priors, bounds and start are those of BoTorch's SingleTaskGP with a Matern 1/2 kernel
+(Hvarfner et al. 2024), the numbers too, for a fraction of its time: all gradients are in closed
+form.
 """
 
 from __future__ import annotations
@@ -11,10 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from botorch.models.model import Model
-from botorch.posteriors.gpytorch import GPyTorchPosterior
-from gpytorch.distributions import MultivariateNormal
-from linear_operator import to_linear_operator
 from scipy.optimize import minimize
 
 LEAST_LENGTH, LEAST_NOISE = 0.025, 1e-4  # edges of the cube; variance
@@ -73,7 +69,6 @@ def fitted(
     return Hyperparameters(best.x[:dimension], float(best.x[-2]), float(best.x[-1]))
 
 
-@torch.no_grad()
 def log_density(
     unit: np.ndarray, value: np.ndarray, vector: np.ndarray
 ) -> tuple[float, np.ndarray]:
@@ -83,33 +78,37 @@ def log_density(
     """
     points = torch.from_numpy(unit)
     lengths, mean, noise = torch.from_numpy(vector[:-2]), vector[-2], vector[-1]
-    count, dimension = unit.shape
     distance = _distance(points / lengths, points / lengths)
-    kernel = torch.exp(-distance)
-    own = torch.eye(count, dtype=kernel.dtype)
-    factor, failed = torch.linalg.cholesky_ex(kernel + noise * own)
+    kernel = torch.neg(distance).exp_()
+    kernel.diagonal().add_(noise)
+    factor, failed = torch.linalg.cholesky_ex(kernel)
     if failed:
         return -np.inf, np.zeros_like(vector)
     inverse = torch.cholesky_inverse(factor)
     residual = torch.from_numpy(value - mean)
     solved = inverse @ residual
-    density = -residual @ solved / 2 - factor.diagonal().log().sum() - count * LOG_TURN / 2
+    density = -residual @ solved / 2 - factor.diagonal().log().sum() - len(unit) * LOG_TURN / 2
 
-    gain = (torch.outer(solved, solved) - inverse) / 2  # slope in the covariance's elements
-    distance[distance < SAME] = np.inf
-    shared = gain * kernel / distance
-    centred = points - points.mean(dim=0)
-    # over all pairs, shared times the squared difference along each axis
-    squares = 2 * (shared.sum(dim=1) @ centred**2 - (centred * (shared @ centred)).sum(dim=0))
-    slope = [squares / lengths**3, solved.sum()[None], gain.trace()[None]]
-    prior, rise = _log_normal(vector[:-2], *length_prior(dimension))
+    gain = inverse.addr_(solved, solved, beta=-1)  # twice the slope in the covariance's elements
+    noise_slope = gain.trace()[None] / 2
+    shared = gain.mul_(kernel).div_(_apart(distance))
+    centred = (points - points.mean(dim=0)).mT.contiguous()
+    # over all pairs, shared times half the squared difference along each axis
+    squares = centred**2 @ shared.sum(dim=1) - (centred * (centred @ shared)).sum(dim=1)
+    slope = torch.cat([squares / lengths**3, solved.sum()[None], noise_slope]).numpy()
+    prior, rise = _log_normal(vector[:-2], *length_prior(unit.shape[1]))
     noise_prior, noise_rise = _log_normal(vector[-1:], *NOISE_PRIOR)
     rises = np.concatenate([rise, [0.0], noise_rise])
-    return float(density) + prior.sum() + noise_prior.sum(), torch.cat(slope).numpy() + rises
+    return float(density) + prior.sum() + noise_prior.sum(), slope + rises
 
 
 def _distance(first: torch.Tensor, second: torch.Tensor) -> torch.Tensor:
     return torch.cdist(first, second, compute_mode="donot_use_mm_for_euclid_dist")
+
+
+def _apart(distance: torch.Tensor) -> torch.Tensor:
+    """Distances, in place, infinite where there is no direction."""
+    return torch.threshold_(distance, SAME, np.inf)
 
 
 def _mode(mean: float, deviation: float) -> float:
@@ -125,27 +124,50 @@ def _log_normal(x: np.ndarray, mean: float, deviation: float) -> tuple[np.ndarra
     return density, -(gap / deviation + 1) / x
 
 
-class Process(Model):
-    """The process of values (N,) at points (N, D), as BoTorch's acquisition functions want it."""
-
-    num_outputs, batch_shape = 1, torch.Size()
+class Process:
+    """The process of values (N,) at points (N, D)."""
 
     def __init__(self, unit: np.ndarray, value: np.ndarray, about: Hyperparameters) -> None:
-        super().__init__()
         self._lengths, self._mean = torch.from_numpy(about.lengths), about.mean
         self._points = torch.from_numpy(unit) / self._lengths
         covariance = torch.exp(-_distance(self._points, self._points))
-        own = torch.eye(len(unit), dtype=covariance.dtype)
-        factor = torch.linalg.cholesky(covariance + about.noise * own)
-        self._whiten = torch.linalg.solve_triangular(factor, own, upper=False).mT.contiguous()
-        self._solved = self._whiten @ (torch.from_numpy(value - about.mean) @ self._whiten)
+        covariance.diagonal().add_(about.noise)
+        self._inverse = torch.cholesky_inverse(torch.linalg.cholesky(covariance))
+        self._solved = self._inverse @ torch.from_numpy(value - about.mean)
 
-    def posterior(self, X, *_, **__) -> GPyTorchPosterior:  # noqa: N803
-        """Of the values without noise at points (..., Q, D), jointly."""
-        scaled = X / self._lengths
-        across = torch.exp(-_distance(scaled, self._points))
-        white = across @ self._whiten
-        mean = self._mean + across @ self._solved
-        covariance = torch.exp(-_distance(scaled, scaled)) - white @ white.mT
-        # an operator of GPyTorch's is factored with jitter, if need be
-        return GPyTorchPosterior(MultivariateNormal(mean, to_linear_operator(covariance)))
+    def at(self, unit: torch.Tensor) -> Prediction:
+        """Of the values without noise at points (Q, D), jointly."""
+        return Prediction(self, unit / self._lengths)
+
+
+class Prediction:
+    """What a process says of Q points.
+
+    Attributes:
+        mean: Shape (Q,).
+        covariance: Shape (Q, Q).
+    """
+
+    def __init__(self, process: Process, scaled: torch.Tensor) -> None:
+        self._process, self._scaled = process, scaled
+        self._others = torch.cat([process._points, scaled])
+        self._distance = _distance(scaled, self._others)
+        self._kernel = torch.neg(self._distance).exp_()
+        across, own = self._kernel.split([len(process._points), len(scaled)], dim=1)
+        self._gain = across @ process._inverse
+        self.mean = across @ process._solved + process._mean
+        self.covariance = torch.addmm(own, self._gain, across.mT, alpha=-1)
+
+    def slope(self, by_mean: torch.Tensor, by_covariance: torch.Tensor) -> torch.Tensor:
+        """A function's slope in the points (Q, D), from its slopes in what is predicted.
+
+        Args:
+            by_mean: Its slope in `mean`, shape (Q,).
+            by_covariance: In `covariance`, symmetric, shape (Q, Q).
+        """
+        process = self._process
+        across = torch.outer(by_mean, process._solved).addmm_(by_covariance, self._gain, alpha=-2)
+        pull = torch.cat([across, 2 * by_covariance], dim=1)  # in the kernel; then a unit of gap
+        pull.mul_(self._kernel).div_(_apart(self._distance))
+        total = pull.sum(dim=1, keepdim=True)
+        return (pull @ self._others).sub_(total * self._scaled).div_(process._lengths)

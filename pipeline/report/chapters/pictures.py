@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.policy.trials import stretch_of
+from pipeline.launches.stretch import stretch_of
 from pipeline.report.figures import launches, loaded
 from pipeline.report.replay import LOAD
 from pipeline.report.report import Report, side_by_side

@@ -8,8 +8,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
+from pipeline.launches.stretch import stretch_of
 from pipeline.policy.landing_map import LandingMap
-from pipeline.policy.trials import stretch_of
 from pipeline.report.figures.canvas import log_y, save
 from pipeline.report.looks import SIDE_BY_SIDE, Look, drawn
 from pipeline.report.results import Result

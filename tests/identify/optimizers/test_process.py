@@ -58,20 +58,29 @@ def test_density_and_gradient_are_botorchs(about: Hyperparameters) -> None:
     np.testing.assert_allclose(slope, torch.cat(slopes), rtol=1e-6)
 
 
-def test_predictions_and_their_gradient_are_botorchs() -> None:
-    """Jointly at points of which one is a training point."""
+def test_predictions_and_slopes_are_botorchs() -> None:
+    """Jointly, at training points too; slopes of any sum of what is predicted."""
     unit, value = data()
-    points = np.random.default_rng(2).random((2, 5, DIMENSION))
-    points[0, 0] = unit[3]
-    found = []
-    for model in (botorchs(unit, value, ABOUT).eval(), Process(unit, value, ABOUT)):
-        at = torch.tensor(points[:, 1:], requires_grad=True)
-        whole = model.posterior(torch.from_numpy(points)).distribution
-        free = model.posterior(at).distribution
-        (free.mean.sum() + free.covariance_matrix.sum()).backward()
-        found.append((whole.mean.detach(), whole.covariance_matrix.detach(), at.grad))
-    for expected, ours in zip(*found, strict=True):
-        np.testing.assert_allclose(ours, expected, rtol=1e-6, atol=1e-7)
+    rng = np.random.default_rng(2)
+    points = rng.random((6, DIMENSION))
+    by_mean, by_covariance = torch.from_numpy(rng.normal(size=6)), rng.normal(size=(6, 6))
+    by_covariance = torch.from_numpy(by_covariance + by_covariance.T)
+    model, process = botorchs(unit, value, ABOUT).eval(), Process(unit, value, ABOUT)
+
+    free = torch.tensor(points, requires_grad=True)
+    expected = model.posterior(free).distribution
+    mean, covariance = expected.mean, expected.covariance_matrix
+    ((mean * by_mean).sum() + (covariance * by_covariance).sum()).backward()
+    guess = process.at(torch.from_numpy(points))
+    np.testing.assert_allclose(guess.mean, mean.detach(), rtol=1e-6)
+    np.testing.assert_allclose(guess.covariance, covariance.detach(), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(guess.slope(by_mean, by_covariance), free.grad, rtol=1e-6)
+
+    points[0] = unit[3]
+    expected = model.posterior(torch.from_numpy(points)).distribution
+    guess = process.at(torch.from_numpy(points))
+    np.testing.assert_allclose(guess.covariance, expected.covariance_matrix.detach(), atol=1e-7)
+    assert torch.isfinite(guess.slope(by_mean, by_covariance)).all()
 
 
 def test_a_fit_climbs_to_where_the_gradient_is_none() -> None:

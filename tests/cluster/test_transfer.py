@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.cluster import exchange
 from pipeline.errors import UserError
-from pipeline.flow import child, exchange
-from tests.flow.several import Copy, alive, toy
+from pipeline.flow import child
+from tests.cluster.several import Copy, alive, toy
 
 # Python reads it at its start: notes its number and waits, as a transfer of many files does.
 WAITS = """\

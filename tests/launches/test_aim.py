@@ -1,4 +1,4 @@
-"""Aiming with an exported toy policy: the closed form says where the draw lands."""
+"""Aiming with a toy policy: the closed form says where the draw lands."""
 
 from __future__ import annotations
 
@@ -9,14 +9,11 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UserError
-from pipeline.params import load
-from pipeline.policy.aim import aim, simulator
-from pipeline.policy.export import write_onnx
+from pipeline.launches.aim import aim
 from pipeline.policy.stored import Stored
 from pipeline.sling.model import THETA
 from tests.policy import toy
 from tests.policy.linear import write_policy
-from tests.project import ROOT
 
 PARAMS = SimpleNamespace(
     bands={"toy": None},
@@ -33,9 +30,15 @@ LEFT_OUT = "the interval leaves out how well the parameters are known"
 
 
 @pytest.fixture(scope="module")
-def root(trained, tmp_path_factory):
+def root(tmp_path_factory):
+    """A plain policy that hits 1.925 m and lands near its other targets, and a robust one."""
     root = tmp_path_factory.mktemp("root")
-    write_onnx(trained.policy, root / "data/policies/toy/none/policy.onnx")
+    along = np.linspace(*toy.DRAW_Y, 1001)
+    landing = toy.launch(np.column_stack([along, np.full(1001, -0.15)])).landing_y
+    short, far = np.interp([1.925, 2.425], landing[::-1], along[::-1])
+    slope = (far - short) / 0.5
+    plain = root / "data/policies/toy/none/policy.onnx"
+    write_policy(plain, (slope, 0), (short - 1.925 * slope, -0.15))
     write_policy(root / "data/policies/toy/none/robust/policy.onnx", (0, 0), ROBUST_DRAW)
     file = root / "data/theta/toy/none.json"
     file.parent.mkdir(parents=True)
@@ -116,25 +119,6 @@ def test_what_the_recording_shows_of_the_law_widens_the_interval(root) -> None:
     file.write_text(before)
     expected = np.hypot(narrow, 2 * 1.645 * 0.1 * answer["predicted_landing_m"])
     assert np.ptp(answer["interval_90_m"]) == pytest.approx(expected, rel=0.03)
-
-
-def test_the_simulator_launches_in_the_air_of_the_theta_file(tmp_path) -> None:
-    """Drag takes speed; a sixth column takes the place of the file's, launch by launch."""
-    params = load(ROOT / "params.yaml")
-    coarse = {"edges": 16, "launch_step": 1e-3}
-    params = params.model_copy(update={"sling": params.sling.model_copy(update=coarse)})
-    band, draw = next(iter(params.bands)), np.array([[-0.33, -0.15]])
-    theta = dict(zip(THETA, (2.5e5, 0.47, 2e-3, 0.8, 0.6), strict=True))
-    point = np.array([*theta.values()])
-    contents = [{"theta": theta, "nuisances": {"air_drag": drag}} for drag in (0.0, 6.0)]
-    still, moving = (simulator(params, band, one, root=tmp_path) for one in contents)
-    calm, windy = (one(draw).landing_y[0] for one in (still, moving))
-    assert windy < 0.99 * calm
-    samples = np.array([[*point, 0.0], [*point, 6.0]])
-    both = moving(np.repeat(draw, 2, axis=0), samples).landing_y
-    np.testing.assert_allclose(both, [calm, windy], rtol=1e-5)
-    alone = moving(draw, point[None]).landing_y
-    np.testing.assert_allclose(alone, [windy], rtol=1e-5)
 
 
 def test_warns_outside_the_trained_range_and_above_the_force(root) -> None:

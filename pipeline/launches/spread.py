@@ -2,50 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from scipy.special import ndtri
-
-from pipeline.errors import UserError
-from pipeline.sling.model import THETA
-from pipeline.stage import remedy
 
 LEVEL = 0.9
 MOST = 60  # samples of θ that are launched
 STEP = 1e-3  # m, small against the box of draws and large against the simulator's rounding
 CROSS = STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
 ERRORS = ndtri((np.arange(401) + 0.5) / 401)  # equally likely; 41 end 6 % too soon
-
-
-def load_samples(run, path: Path, band: str, method: str) -> np.ndarray | None:
-    """Samples of θ, and of the air's drag if searched, (M, 5) or (M, 6); None where there are none.
-
-    `run` is params.yaml's, which says what stage makes them. Raises UserError where the file is
-    damaged.
-    """
-    if not path.is_file():
-        return None
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        if content["samples"] == []:
-            return None
-        samples = np.array(content["samples"], float)
-        known = content["names"] in (list(THETA), [*THETA, "air_drag"])
-        if not known or samples.ndim != 2 or samples.shape[1] != len(content["names"]):
-            raise ValueError
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        makes = remedy(run, "theta", band, method, damaged=True)
-        raise UserError(f"{path}: damaged; {makes}") from error
-    return samples
-
-
-def law_discrepancy(content: dict) -> float:
-    """Share of a landing by which the law errs, as a θ file says it; 0 where it says nothing."""
-    known = content.get("confidence") or {}
-    return float(known.get("discrepancy", {}).get("landing", 0.0))
 
 
 def landing_intervals(

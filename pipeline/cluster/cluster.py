@@ -19,9 +19,10 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from pipeline.cluster import exchange
+from pipeline.cluster.worker import Order, introduce, versions, work
 from pipeline.errors import UserError
-from pipeline.flow import child, exchange
-from pipeline.flow.worker import Order, introduce, versions, work
+from pipeline.flow import child
 
 ANSWER = 10.0  # seconds that a scheduler has to answer
 END = 20.0  # seconds that a cancelled stage has to end its processes

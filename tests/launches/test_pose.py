@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from mcap_ros2.reader import read_ros2_messages
 from scipy.spatial.transform import Rotation
 
+from pipeline.launches.pose import posed
 from pipeline.params import load
 from pipeline.plan.plan import plan_recording
-from pipeline.policy.pose import posed
 from tests.project import ROOT
 from tests.recording.bag import write_bag
 

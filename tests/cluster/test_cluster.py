@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import subprocess
 import sys
@@ -11,16 +12,18 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.cluster import cluster, exchange, worker
 from pipeline.errors import UserError
-from pipeline.flow import child, cluster, exchange, worker
-from tests.flow.several import Copy, Several, alive, toy, until
+from pipeline.flow import child
+from tests.cluster.several import Copy, Several, alive, toy, until
 
 
 @pytest.fixture(scope="module")
-def several(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Several]:
+def several(tmp_path_factory: pytest.TempPathFactory, history: Path) -> Iterator[Several]:
     several = None
     try:
         several = Several(tmp_path_factory.mktemp("several"))
+        shutil.copytree(history, several.head.folder / ".prefect")
         yield several
     finally:
         if several:
@@ -198,7 +201,7 @@ def test_a_stage_ends_when_its_head_is_killed(copies, place) -> None:
     (other.folder / "wait").touch()
     address = place(other.folder).address
     code = (
-        "import sys, pathlib; from pipeline.flow.cluster import Cluster;"
+        "import sys, pathlib; from pipeline.cluster.cluster import Cluster;"
         f"Cluster(pathlib.Path.cwd(), {address!r}).run_stage(pathlib.Path.cwd(), 'search@a',"
         " environment={}, on_line=print)"
     )

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from pipeline.errors import UserError
-from pipeline.policy.spread import (
-    CROSS,
-    MOST,
-    landing_intervals,
-    law_discrepancy,
-    load_samples,
-)
-from pipeline.sling.model import THETA
+from pipeline.launches.spread import CROSS, MOST, landing_intervals
 from tests.policy import toy
 
 DRAWS = np.array([[-0.35, -0.2], [-0.3, -0.15]])
@@ -71,12 +62,6 @@ def test_nine_of_ten_landings_of_another_law_lie_inside() -> None:
         assert 0.87 < ((landing > low) & (landing < high)).mean() < 0.93
 
 
-def test_a_theta_file_that_says_nothing_of_the_law_adds_nothing() -> None:
-    for content in ({}, {"confidence": None}, {"confidence": {"level": 0.9}}):
-        assert law_discrepancy(content) == 0.0
-    assert law_discrepancy({"confidence": {"discrepancy": {"landing": 0.07}}}) == 0.07
-
-
 def test_failures_of_the_few_are_left_out_and_of_the_many_are_none() -> None:
     def fragile(share: float):
         def launch(draws, thetas=None):
@@ -104,25 +89,3 @@ def test_an_answer_takes_few_launches() -> None:
     assert sum(launched) == len(CROSS) + MOST
     many = np.quantile(toy.launch(DRAWS[:1]).landing_y * samples(2000)[:, 0], [0.05, 0.95])
     np.testing.assert_allclose(few[0], many, rtol=0.02)
-
-
-def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:
-    path = tmp_path / "none.json"
-    assert load_samples(toy.RUN, path, "toy", "none") is None
-    content = {"names": list(THETA), "samples": samples(3).tolist()}
-    path.write_text(json.dumps(content))
-    np.testing.assert_array_equal(load_samples(toy.RUN, path, "toy", "none"), samples(3))
-    path.write_text('{"samples": []}')  # of a θ without confidence
-    assert load_samples(toy.RUN, path, "toy", "none") is None
-    with_drag = {"names": [*THETA, "air_drag"], "samples": [[0.5] * 6] * 4}
-    path.write_text(json.dumps(with_drag))
-    assert load_samples(toy.RUN, path, "toy", "none").shape == (4, 6)
-    path.write_text(json.dumps(content | {"names": with_drag["names"]}))
-    with pytest.raises(UserError, match="damaged"):
-        load_samples(toy.RUN, path, "toy", "none")
-    for damaged in ("{", "[]", json.dumps(content | {"names": ["a"]}), '{"names": []}'):
-        path.write_text(damaged)
-        with pytest.raises(UserError, match="damaged; `dvc repro --force theta@toy-none`"):
-            load_samples(toy.RUN, path, "toy", "none")
-    with pytest.raises(UserError, match="damaged; `dvc repro --force ablation_theta@toy-without`"):
-        load_samples(toy.RUN, path, "toy", "without")

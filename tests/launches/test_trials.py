@@ -1,33 +1,15 @@
-"""Trials as a table: what stands in it, the limit of the arm, and the stretch of a draw."""
+"""Trials: what a virtual world leaves in them, their table, and the limit of the arm."""
 
 from __future__ import annotations
 
-import numpy as np
-import pytest
+from types import SimpleNamespace
 
-from pipeline.episode import Episode
+import numpy as np
+
+from pipeline.launches.trials import SCHEMA, Batch, launched, limited, table
 from pipeline.params import load
-from pipeline.policy.trials import SCHEMA, Batch, limited, recorded_stretch, stretch_of, table
 from pipeline.sling.launch import Launches, launch
 from pipeline.sling.model import Sling
-
-
-def test_stretch_of_a_345_triangle() -> None:
-    """Tips 6 apart, drawn 4 back: two sides of length 5, whatever the direction of the draw."""
-    points = np.array([[0, -4, 0], [0, 0, -4], [0, -2.4, -3.2]])
-    np.testing.assert_allclose(stretch_of(points, 6.0, 8.0), 10 / 8)
-    assert stretch_of(np.array([[3.0, 0, 0]]), 6.0, 8.0)[0] == pytest.approx(6 / 8)
-
-
-def test_the_recorded_stretch_counts_only_while_the_band_is_held() -> None:
-    time = np.arange(5.0)
-    position = np.array([[0, -9, 0], [0, 0, 0], [0, -4, 0], [0, -1, 0], [0, -9, 0]], float)
-    nothing = np.zeros((5, 3))
-    episode = Episode(
-        "toy", time, position, nothing, nothing, time, time, [], 1.0, 3.0, np.zeros(3)
-    )
-    assert recorded_stretch(episode, 6.0, 8.0) == pytest.approx(10 / 8)
-
 
 PREDICTED = Launches(
     landing_y=np.array([1.9, np.nan, 2.0]),
@@ -60,7 +42,7 @@ DRAWS = [[-0.3, -0.17], [-0.31, -0.17], [-0.32, -0.18]]
 
 def test_a_table_holds_what_is_known_and_nothing_else() -> None:
     flight = np.array([[-0.05, -0.03], [1.0, 0.2], [1.95, -0.52]])
-    launched = Batch(
+    tried = Batch(
         kind="virtual",
         policy="plain",
         draws=np.array(DRAWS),
@@ -70,7 +52,7 @@ def test_a_table_holds_what_is_known_and_nothing_else() -> None:
         hold_force=[9.1, 9.2, 31.5],
         flight=[flight, flight[:2], None],
     )
-    rows = made([launched])
+    rows = made([tried])
     assert rows["trial"] == [1, 2, 1] and rows["policy"] == ["plain"] * 3
     assert rows["draw_y"] == [-0.3, -0.31, -0.32] and rows["draw_z"] == [-0.17, -0.17, -0.18]
     assert rows["predicted_y"] == [1.9, None, 2.0]
@@ -125,3 +107,32 @@ def test_the_limit_is_the_simulators_own() -> None:
     assert found.failure == expected.failure and found.failure[0] is None
     for name in ("landing_y", "speed", "angle", "leave_y", "leave_z", "hold_force"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+
+
+LANDINGS = (1.9, 3.0, float("nan"))  # within the area, beyond it, nowhere
+
+
+def landed(draw: np.ndarray, seed: int) -> SimpleNamespace:
+    landing = LANDINGS[seed % 1000]
+    return SimpleNamespace(
+        landing_y=landing,
+        failure=None if landing == 1.9 else "failed",
+        hold_force=1e3 * abs(draw[0]) + seed % 1000,
+        flight=None,
+    )
+
+
+def test_landings_outside_the_area_stand_beside_their_failure() -> None:
+    """Equal numbers of two batches have equal seeds; what else is known of a launch stays."""
+    drawn = {"plain": [[-0.3, -0.1]] * 3, "robust": [[-0.4, -0.2]] * 3}
+    aimed = [
+        Batch.without_flight("predicted", policy, draws, [1.9, 1.9, 2.1])
+        for policy, draws in drawn.items()
+    ]
+    plain, robust = launched(aimed, landed, SimpleNamespace(seed=1))
+    for one, policy in ((plain, "plain"), (robust, "robust")):
+        assert (one.kind, one.policy, one.targets) == ("virtual", policy, [1.9, 1.9, 2.1])
+        assert one.draws.tolist() == drawn[policy]
+        assert one.landing == [1.9, 3.0, None]
+        assert one.failure == [None, "failed", "failed"]
+    assert plain.hold_force == [300, 301, 302] and robust.hold_force == [400, 401, 402]

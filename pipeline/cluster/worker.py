@@ -13,9 +13,9 @@ from importlib.metadata import distributions
 from pathlib import Path
 
 from pipeline import machine
+from pipeline.cluster import exchange
 from pipeline.errors import UserError
-from pipeline.flow import child, exchange
-from pipeline.flow.run import stage_environment
+from pipeline.flow import child
 
 
 @dataclass(frozen=True)
@@ -112,4 +112,4 @@ def environment(threads: int) -> dict[str, str]:
     """
     share = machine.workers() or max(1, machine.cores() // threads)
     blas = ("MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")  # Dask sets them for its own threads
-    return {key: value for key, value in stage_environment(share).items() if key not in blas}
+    return {key: value for key, value in child.stage_environment(share).items() if key not in blas}

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from pipeline.flow import worker
+from pipeline.cluster import worker
 from tests.project import ROOT
 
 

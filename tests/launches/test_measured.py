@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import UserError
-from pipeline.policy.measured import (
+from pipeline.launches.measured import (
     OPTIONAL,
     REQUIRED,
     Measured,

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from pipeline.flow import exchange
-from tests.flow.several import Copy, toy
+from pipeline.cluster import exchange
+from tests.cluster.several import Copy, toy
 
 
 @pytest.fixture

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.machine import cores
+from pipeline.launches.spread import landing_intervals
 from pipeline.params import expect_known
-from pipeline.policy.spread import landing_intervals, law_discrepancy, load_samples
+from pipeline.policy.simulator import simulator
 from pipeline.policy.stored import PLAIN, ROBUST, Stored
 from pipeline.stage import expect_from
-from pipeline.theta import calibrated, in_air, load_theta, vector
+from pipeline.theta import law_discrepancy, load_samples, load_theta
 
 
 def aim(
@@ -88,28 +87,3 @@ def aim(
         "max_force_n": params.setup.max_force,
         "warnings": warnings,
     }
-
-
-def simulator(
-    params,
-    band: str,
-    content: dict,
-    max_force: float = np.inf,
-    root: str | Path = ".",
-    device: str | Sequence[str] = "cpu",
-):
-    """Function that launches draws, shape (N, 2) [m], in the simulator calibrated by a θ file.
-
-    A second argument gives each launch a θ of its own, shape (N, 5), or with a sixth column a drag
-    of the air as well.
-    """
-    from pipeline.sling.launch import launch
-
-    sling, best = calibrated(params, band, content, root), vector(content)[None]
-    threads = cores()
-
-    def launcher(draws: np.ndarray, thetas: np.ndarray | None = None):
-        moving, thetas = in_air(sling, best if thetas is None else thetas)
-        return launch(moving, thetas, draws, max_force=max_force, device=device, workers=threads)
-
-    return launcher

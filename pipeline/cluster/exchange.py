@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.errors import UserError
-from pipeline.files import replacing
+from pipeline.errors import UserError, one_line
+from pipeline.files import write_text
 from pipeline.flow import child, whole
 
 ALWAYS = ("dvc.yaml", "params.yaml")  # what DVC itself reads, whatever the stage
@@ -112,17 +112,10 @@ def merge(root: Path, new: Mapping[str, dict]) -> None:
 
     path = root / "dvc.lock"
     with locked(root):
-        before = text = path.read_text(encoding="utf-8") if path.is_file() else whole.HEAD
-        for name, entry in new.items():
-            text = None if text is None else whole.put(text, name, entry)
-        if text is None:  # with more in it than stages
+        if not whole.write(path, new):  # with more in it than stages
             content = _read(path)
             content.setdefault("stages", {}).update(new)
-            text = dumps_yaml(content)
-        if text != before:
-            with replacing(path) as temporary:
-                temporary.write_text(text, encoding="utf-8")
-                whole.sync(temporary)
+            write_text(path, dumps_yaml(content))
 
 
 def _read(path: Path) -> dict:
@@ -171,7 +164,7 @@ def transfer(
     )
     if status:
         text = "\n".join(said)
-        why = " ".join((text.partition("ERROR: ")[2] or text).split())
+        why = one_line(text.partition("ERROR: ")[2] or text)
         raise UserError(
             f"{root}: dvc {command} {' '.join(stages)}: {why or f'exit status {status}'}"
         )

@@ -6,6 +6,7 @@ the simulator's), "measured" (a user's CSV) or "predicted" (nothing but the cali
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -13,8 +14,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.episode import Episode
 from pipeline.files import replacing
+from pipeline.launches.measured import file_of, read_measured
+from pipeline.launches.spread import landing_intervals
+from pipeline.params.launches import trial_seed
+from pipeline.policy.stored import Stored
+from pipeline.pool import Pool
 
 SCHEMA = pa.schema(
     [
@@ -81,25 +86,83 @@ class Batch:
         )  # fmt: skip
 
 
-def trial_seed(trials, number):
-    """Seed of a band's launch by its number, an int or an array; the same for every policy."""
-    return 1_000_000 * trials.seed + number
-
-
-def stretch_of(points: np.ndarray, fork_width: float, rest_length: float) -> np.ndarray:
-    """Length of the straight segments tip - point - tip over the rest length.
+def measured(params, band: str, method: str, folder: Path) -> list[Batch]:
+    """The user's launches of the band that say something about the method, if there are any.
 
     Args:
-        points: Where the band is held, frame O [m], shape (N, 3).
+        params: The whole of params.yaml.
+        folder: Of the users' files, one a band.
+
+    Raises:
+        UserError: A file is no band's, or the band's own cannot be used.
     """
-    tips = np.array([[-fork_width / 2, 0, 0], [fork_width / 2, 0, 0]])
-    return np.linalg.norm(points[:, None] - tips, axis=2).sum(1) / rest_length
+    path = file_of(folder, band, params.bands)
+    launches = read_measured(path, method, params.methods) if path else []
+    if not launches:
+        return []
+    draws, landing, targets = zip(*((o.draw, o.landing, o.target) for o in launches), strict=True)
+    failure = [None if y is not None else "did not land" for y in landing]
+    return [Batch.without_flight("measured", None, draws, targets, list(landing), failure)]
 
 
-def recorded_stretch(episode: Episode, fork_width: float, rest_length: float) -> float:
-    """The largest stretch that the recording shows."""
-    held = (episode.time >= episode.grasp_time) & (episode.time <= episode.release_time)
-    return float(stretch_of(episode.position[held], fork_width, rest_length).max())
+def aimed(stored: Stored, targets: list[float]) -> list[Batch]:
+    """What each of the method's policies would launch at the targets [m]. Raises UserError."""
+    return [
+        Batch.without_flight("predicted", kind, stored.draws(np.array(targets), kind), targets)
+        for kind in stored.kinds()
+    ]
+
+
+def launched(batches: list[Batch], launch: Callable, trials) -> list[Batch]:
+    """The same launched in a virtual world; launches of equal number have equal errors.
+
+    Args:
+        launch: `launch(draw, seed)` gives landing_y [m], NaN where there is none, failure,
+            hold_force [N] and flight. It goes to processes of its own: it keeps one core busy.
+        trials: The `trials:` section of params.yaml.
+    """
+    with Pool() as pool:
+        return [
+            _virtual(batch, list(pool.map(launch, batch.draws, _seeds(batch, trials))))
+            for batch in batches
+        ]
+
+
+def _seeds(batch: Batch, trials) -> list[int]:
+    return trial_seed(trials, np.arange(len(batch.draws))).tolist()
+
+
+def _virtual(batch: Batch, tried: list) -> Batch:
+    return replace(
+        batch,
+        kind="virtual",
+        landing=[one.landing_y if np.isfinite(one.landing_y) else None for one in tried],
+        failure=[one.failure for one in tried],
+        hold_force=[one.hold_force for one in tried],
+        flight=[one.flight for one in tried],
+    )
+
+
+def predict(
+    batches: list[Batch], launcher: Callable, samples: np.ndarray | None, params, discrepancy: float
+):
+    """What the calibrated simulator makes of the draws of all batches, N in all.
+
+    Args:
+        launcher, samples, discrepancy: As `landing_intervals` has them.
+        params: The whole of params.yaml.
+
+    Returns:
+        Its launches, limited by the arm, and where 90 % of them would land [m], shape (N, 2); NaN
+        where that is not known.
+    """
+    draws = np.concatenate([batch.draws for batch in batches])
+    launches = limited(launcher(draws), params.setup.max_force)
+    once, again = np.unique(draws, axis=0, return_inverse=True)
+    error = params.trials.actuation_error
+    intervals = landing_intervals(launcher, once, samples, error, discrepancy)[again]
+    intervals[np.isnan(launches.landing_y)] = np.nan
+    return launches, intervals
 
 
 def limited(launches, max_force: float):

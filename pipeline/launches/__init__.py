@@ -1,0 +1,1 @@
+"""What is done with a policy: aiming, the robot's pose, trials, and where launches may land."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gc
+import os
 import shutil
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,22 +15,25 @@ from hypothesis import settings
 from tests import once
 
 
-def pytest_collection() -> None:
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
     """Python looks for garbage the longer the more there is; what is imported is none."""
     gc.disable()
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_collection_finish() -> None:
-    gc.freeze()
-    gc.enable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_configure() -> None:
     """What a script starts in its background ignores Ctrl-C, and so would all that tests start.
 
-    Hypothesis measures no time: other programs have their share of it.
+    Hypothesis measures no time: other programs have their share of it. Hundreds of processes
+    import the same modules: they are compiled once, whatever the environment says.
     """
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     settings.register_profile("untimed", deadline=None)

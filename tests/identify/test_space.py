@@ -85,11 +85,3 @@ def test_priors_count_in_the_loss_and_in_the_density() -> None:
     np.testing.assert_allclose(space.log_prior(theta), density - density[0], atol=1e-14)
     for nothing in (Space.of(parameters, bounds).cost, Space.of(parameters, bounds).log_prior):
         assert not nothing(theta).any()
-
-
-def test_the_drag_of_ours_adds_two_hundredths_of_its_value_to_the_bit() -> None:
-    """So searches of before and after the prior had a mean are the same ones."""
-    space = Space.of_method(load(), "sling2sim2real_taut")
-    theta = space.to_physical(np.random.default_rng(1).random((1000, space.dimension)))
-    drag = theta[:, space.names.index("air_drag")]
-    np.testing.assert_array_equal(space.cost(theta), 0.02 * drag)

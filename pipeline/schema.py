@@ -138,7 +138,7 @@ def one_line(error: ValidationError, model: type[Section]) -> str:
         message = "must not be empty"
     else:
         message = f"{first['msg'].replace('Input should', 'must')}, got {got}"
-    return one_line(": ".join(filter(None, (".".join(path), message))))
+    return " ".join(": ".join(filter(None, (".".join(path), message))).split())
 
 
 def _shown(value: object) -> str:

@@ -149,6 +149,7 @@ def test_greedy_takes_what_adds_most() -> None:
 )
 def test_an_outlier_counts_no_more_than_a_bad_loss(loss, outlier: float) -> None:
     """However huge it is."""
+    loss = loss.round(9)  # of differences near 1e-160 the squares are no numbers any more
     told = standardised(np.append(loss, outlier))
     np.testing.assert_allclose(told, standardised(np.append(loss, 10 * outlier)), atol=1e-9)
     assert abs(told.mean()) < 1e-9

@@ -22,7 +22,7 @@ from pipeline.identify.loss import EpisodeLoss
 from pipeline.identify.memo import Memo
 from pipeline.identify.optimizers import explorer
 from pipeline.identify.optimizers.multistart import Multistart
-from pipeline.identify.regions import regions_of
+from pipeline.identify.regions import regions_asked, regions_of
 from pipeline.identify.search import Free, budget, latin_hypercube, search
 from pipeline.identify.space import Space
 from pipeline.machine import named
@@ -91,7 +91,7 @@ def time_search(
         history, cpu, wall = timed(partial(complete, params, method, optimizer, evaluate))
     count, about = len(history.total), params.methods[method]
     row = {
-        "regions": (about.k_top or optimizer.k_top) if about.search == "multistart" else 0,
+        "regions": regions_asked(about, optimizer) if about.search == "multistart" else 0,
         "rollouts": count,
         "failed": int(np.isinf(history.total).sum()),
         "seconds": wall,

@@ -20,6 +20,8 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from pipeline.errors import one_line
+
 
 class Section(BaseModel):
     """A mapping of params.yaml. Integers pass for floats; nothing else is converted."""
@@ -120,7 +122,7 @@ Pose = Annotated[  # x, y, z and the quaternion qx, qy, qz, qw
 ]
 
 
-def one_line(error: ValidationError, model: type[Section]) -> str:
+def explained(error: ValidationError, model: type[Section]) -> str:
     """The first violation in words; a misspelt key comes before the key that it leaves missing."""
     errors = error.errors(include_url=False)
     first = min(errors, key=lambda one: one["type"] != "extra_forbidden")
@@ -138,7 +140,7 @@ def one_line(error: ValidationError, model: type[Section]) -> str:
         message = "must not be empty"
     else:
         message = f"{first['msg'].replace('Input should', 'must')}, got {got}"
-    return " ".join(": ".join(filter(None, (".".join(path), message))).split())
+    return one_line(": ".join(filter(None, (".".join(path), message))))
 
 
 def _shown(value: object) -> str:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from ruamel.yaml import YAML
 
+from tests import project
 from tests.project import ROOT, copy_project
 
 TINY = {
@@ -51,19 +49,16 @@ EVERYTHING = {"record@band1", "episode@band1", "mounting@band1", "floor@band1"} 
 HISTORIES = {METHODS[0], ABLATIONS[0]}
 
 
-class Copy:
+class Copy(project.Copy):
     """A copy of the project's files in a Git repository of its own."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.environment = {
-            **os.environ,
-            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-            "OMP_NUM_THREADS": "1",
-            "DVC_SITE_CACHE_DIR": str(folder.parent / "site"),
-            "PYTHONPATH": str(ROOT / "tests" / "audit"),
-            "AUDIT": str(folder.parent / "audit"),
-        }
+        super().__init__(
+            folder,
+            DVC_SITE_CACHE_DIR=str(folder.parent / "site"),
+            PYTHONPATH=str(ROOT / "tests" / "audit"),
+            AUDIT=str(folder.parent / "audit"),
+        )
         (folder.parent / "audit").mkdir()
         copy_project(folder)
         self.set(TINY)
@@ -71,13 +66,6 @@ class Copy:
         self("git", "config", "user.name", "Test")
         self("git", "config", "user.email", "test@example.org")
         self.commit()
-
-    def __call__(self, *command: str) -> str:
-        done = subprocess.run(
-            command, cwd=self.folder, env=self.environment, capture_output=True, text=True
-        )
-        assert done.returncode == 0, f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}"
-        return done.stdout
 
     def set(self, values: dict) -> None:
         yaml, path = YAML(), self.folder / "params.yaml"

@@ -35,6 +35,11 @@ class Region:
     members: list[int]
 
 
+def regions_asked(about, optimizer) -> int:
+    """How many regions params.yaml's `methods.<name>` and `optimizer` ask for."""
+    return about.k_top or optimizer.k_top
+
+
 def regions_of(about, optimizer, history) -> tuple[list[Region], int]:
     """Where a method's refinement begins, and how many regions were asked for.
 
@@ -46,7 +51,7 @@ def regions_of(about, optimizer, history) -> tuple[list[Region], int]:
     Raises:
         UserError: As `find_regions`.
     """
-    asked = about.k_top or optimizer.k_top
+    asked = regions_asked(about, optimizer)
     regions = find_regions(
         history.unit,
         history.total,

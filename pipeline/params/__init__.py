@@ -25,7 +25,7 @@ from pipeline.params.lab import Band, BandName, Plan, Run, Setup
 from pipeline.params.launches import TARGET_AREA, Floor, Policy, Trials
 from pipeline.params.recording import Cloud, Episode, Force
 from pipeline.params.virtual_rig import Rig, RigArm, RigBand, RigCamera, RigClock, RigWrench
-from pipeline.schema import FILLED, Name, Section, one_line, refusal
+from pipeline.schema import FILLED, Name, Section, explained, refusal
 
 __all__ = [
     "TARGET_AREA",
@@ -163,4 +163,4 @@ def parse(text: str, name: str = "params.yaml") -> Params:
     try:
         return Params.model_validate(content)
     except ValidationError as error:
-        raise UserError(f"{name}: {one_line(error, Params)}") from error
+        raise UserError(f"{name}: {explained(error, Params)}") from error

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from tests import project
 from tests.project import ROOT
 
 STEP = """\
@@ -58,32 +59,14 @@ CONFIG = """\
 """
 
 
-class Copy:
+class Copy(project.Copy):
     """A working copy of the toy project."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.environment = {
-            **os.environ,
-            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-            "OMP_NUM_THREADS": "1",
-            "DVC_SITE_CACHE_DIR": str(folder.parent / f"site-{folder.name}"),
-            "PYTHONPATH": str(ROOT),
-        }
+    timeout = 240
 
-    def __call__(self, *command: str) -> str:
-        """What a command prints; the test fails where that fails."""
-        done = subprocess.run(
-            command,
-            cwd=self.folder,
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            timeout=240,
-        )
-        assert done.returncode == 0, f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}"
-        self.errors = done.stderr
-        return done.stdout
+    def __init__(self, folder: Path) -> None:
+        site = str(folder.parent / f"site-{folder.name}")
+        super().__init__(folder, DVC_SITE_CACHE_DIR=site, PYTHONPATH=str(ROOT))
 
     def clone(self, name: str) -> Copy:
         self("git", "clone", "-q", ".", str(self.folder.parent / name))

@@ -25,7 +25,7 @@ lint: setup
 
 validate: setup       # slow campaigns; their results, in reports/, are committed
 	.venv/bin/sling verify
-	.venv/bin/python -m pytest -m validation -n 0
+	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns
 
 clean:                # all but data, checkpoints and DVC's cache
 	rm -rf .venv build *.egg-info .hypothesis .pytest_cache .ruff_cache

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline import errors
-from pipeline.identify.history import History
-from pipeline.identify.regions import regions_of, save_regions
-from pipeline.identify.search import Free
-from pipeline.identify.space import Space
-from pipeline.stage import expect_from, started
+from pipeline.base import errors
+from pipeline.objective.space import Space
+from pipeline.search.history import History
+from pipeline.search.loop import Free
+from pipeline.search.regions import regions_of, save_regions
+from stages.start import expect_from, started
 
 
 def main() -> None:

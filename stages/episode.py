@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline import errors
+from pipeline.base import errors
 from pipeline.recording.build import build_episode
-from pipeline.stage import started
+from stages.start import started
 
 
 def main() -> None:

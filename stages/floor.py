@@ -12,13 +12,13 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from pipeline import errors
-from pipeline.errors import UserError
-from pipeline.files import write_json
+from pipeline.base import errors
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_json
 from pipeline.oracle.aim import least_sensitive_draw
 from pipeline.oracle.floor import errors_of, trial_seeds
 from pipeline.oracle.world import World
-from pipeline.stage import started
+from stages.start import started
 
 
 def main() -> None:

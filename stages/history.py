@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline import errors
-from pipeline.identify.history import History
-from pipeline.identify.optimizers import explorer
-from pipeline.identify.search import Free, budget, search
-from pipeline.identify.session import service
-from pipeline.identify.space import Space
-from pipeline.stage import started
+from pipeline.base import errors
+from pipeline.objective.session import service
+from pipeline.objective.space import Space
+from pipeline.search.history import History
+from pipeline.search.loop import Free, budget, search
+from pipeline.search.optimizers import explorer
+from stages.start import started
 
 
 def main() -> None:

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline import errors
-from pipeline.files import write_json
-from pipeline.identify.loss import EpisodeLoss
-from pipeline.identify.mounting import fit_mounting
-from pipeline.identify.session import load_episode
-from pipeline.machine import cores
+from pipeline.base import errors
+from pipeline.base.files import write_json
+from pipeline.base.machine import cores
+from pipeline.objective.clamps import fit_mounting
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.objective.session import load_episode
 from pipeline.sling.model import Sling
-from pipeline.stage import started
+from stages.start import started
 
 
 def main() -> None:

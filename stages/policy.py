@@ -16,18 +16,18 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline import errors
-from pipeline.machine import devices, kind
+from pipeline.base import errors
+from pipeline.base.machine import devices, kind
+from pipeline.base.progress import Progress
+from pipeline.landing.landing_map import LandingMap, landscape_of, validation
+from pipeline.landing.simulator import simulator
+from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.policy import robust
 from pipeline.policy.check import check, check_expected, figures, robust_figures, verdict
 from pipeline.policy.export import export
-from pipeline.policy.landing_map import LandingMap, landscape_of, validation
-from pipeline.policy.simulator import simulator
-from pipeline.policy.stored import PLAIN, ROBUST, Stored
 from pipeline.policy.train import Policy, train
-from pipeline.progress import Progress
-from pipeline.stage import expect_from, started
-from pipeline.theta import load_samples, load_theta
+from pipeline.sling.theta import load_samples, load_theta
+from stages.start import expect_from, started
 
 EVERY = 1.0  # s, between two lines of a training
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.errors import UserError, run
-from pipeline.rig.record import record
-from pipeline.stage import started
+from pipeline.base.errors import UserError, run
+from pipeline.rig.recorder.record import record
+from stages.start import started
 
 
 def main() -> None:

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline import errors
-from pipeline.identify.history import History
-from pipeline.identify.optimizers.multistart import Multistart
-from pipeline.identify.regions import load_regions
-from pipeline.identify.search import Free, search
-from pipeline.identify.session import service
-from pipeline.identify.space import Space
-from pipeline.stage import expect_from, started
+from pipeline.base import errors
+from pipeline.objective.session import service
+from pipeline.objective.space import Space
+from pipeline.search.history import History
+from pipeline.search.loop import Free, search
+from pipeline.search.optimizers.multistart import Multistart
+from pipeline.search.regions import load_regions
+from stages.start import expect_from, started
 
 
 def main() -> None:

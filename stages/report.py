@@ -7,9 +7,9 @@ Fails, and says which stage is missing, where an expected input is not there.
 
 from __future__ import annotations
 
-from pipeline import errors
+from pipeline.base import errors
 from pipeline.report.write import write
-from pipeline.stage import started
+from stages.start import started
 
 
 def main() -> None:

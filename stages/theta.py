@@ -14,15 +14,15 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from pipeline import errors
+from pipeline.base import errors
+from pipeline.base.files import write_json
+from pipeline.base.machine import workers
 from pipeline.confidence.rounds import NoConfidence
 from pipeline.confidence.summary import confidence
-from pipeline.files import write_json
-from pipeline.identify.history import History, theta_content
-from pipeline.identify.session import load_episode
-from pipeline.machine import workers
+from pipeline.objective.session import load_episode
+from pipeline.search.history import History, theta_content
 from pipeline.sling.model import THETA, load_sling
-from pipeline.stage import expect_from, started
+from stages.start import expect_from, started
 
 
 def main() -> None:

@@ -15,16 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline import errors
-from pipeline.episode import Episode
+from pipeline.base import errors
+from pipeline.episode.episode import Episode
+from pipeline.landing.simulator import simulator
+from pipeline.landing.stored import Stored
 from pipeline.launches import trials
 from pipeline.launches.stretch import recorded_stretch, stretch_of
 from pipeline.params import load
-from pipeline.policy.simulator import simulator
-from pipeline.policy.stored import Stored
-from pipeline.rig.launch import Trial, launch
-from pipeline.stage import expect_episode, expect_from, started
-from pipeline.theta import law_discrepancy, load_samples, load_theta
+from pipeline.rig.physics.launch import Trial, launch
+from pipeline.sling.theta import law_discrepancy, load_samples, load_theta
+from stages.start import expect_episode, expect_from, started
 
 
 def main() -> None:

@@ -52,11 +52,11 @@ def nowhere(tmp_path_factory):
 def history(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Prefect's empty history, to be copied as a project's .prefect/: a new one takes it seconds.
 
-    tests/flow/test_server.py has Prefect make one.
+    tests/app/flow/test_server.py has Prefect make one.
     """
 
     def make(folder: Path) -> None:
-        from pipeline.flow import server
+        from app.flow import server
 
         with server.served(folder):
             pass

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.bench_methods import PAPER
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.params import load
 from tests.project import ROOT
 from tools.paper import KEPT, timed, with_budget
+from validation.benchmarks.methods import PAPER
 
 RUN = ["sh", "-c", "test -e finish || exec sleep 60"]
 TOLD = "import sys; from pathlib import Path; from tools.paper import timed;"

@@ -17,7 +17,7 @@ from pathlib import Path
 from PIL import Image
 from websockets.sync.client import connect
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 LISTENING = re.compile(r"DevTools listening on (ws://\S+)\s")

@@ -1,8 +1,10 @@
-"""Which project files does a stage run? Checks dvc.yaml's code dependencies, or mends them.
+"""Which folders of code does a stage run? Checks dvc.yaml's code dependencies, or mends them.
 
-DVC re-runs a stage when a listed file changes; it cannot see Python's imports. This lists every
-project file that a stage's script imports, at any depth and inside functions too, with the native
-sources beside them.
+DVC re-runs a stage when something listed changes; it cannot see Python's imports. This follows what
+a stage's script imports, at any depth and inside functions too, and lists the folder of each such
+file: one folder a concern. Two things are nobody's dependency, for no result hangs on them but by
+the values in params.yaml, which DVC tracks by themselves: pipeline/params/, which holds no default,
+and stages/start.py, which reads the arguments.
 
     python tools/closure.py          # says what differs; exit status 1 if anything does
     python tools/closure.py --fix    # rewrite the code dependencies, comments kept
@@ -18,7 +20,9 @@ from pathlib import Path
 from ruamel.yaml import YAML
 
 ROOT = Path(__file__).parents[1]
-CODE = ("pipeline/", "stages/")
+CODE = ("pipeline/", "stages/", "app/", "validation/")
+UNTRACKED = ("pipeline/params/", "stages/start.py")
+NESTED = ("pipeline/rig/",)  # folders whose own folders are concerns of their own
 NATIVE = (".h", ".cpp", ".html", ".css", ".js")
 
 
@@ -63,6 +67,17 @@ def closure(script: Path, root: Path = ROOT) -> list[str]:
     return sorted(file.relative_to(root).as_posix() for file in seen | native)
 
 
+def folders(script: Path, root: Path = ROOT) -> list[str]:
+    """The concerns that `script` runs, as dvc.yaml lists them: folders, and the script itself."""
+    found = {script.relative_to(root).as_posix()}
+    for file in closure(script, root):
+        parts = file.split("/")
+        depth = 3 if file.startswith(NESTED) else 2
+        if len(parts) > depth and not file.startswith(UNTRACKED):
+            found.add("/".join(parts[:depth]))
+    return sorted(found)
+
+
 def script_of(stage: dict, root: Path = ROOT) -> Path:
     """The script of `python -m stages.NAME ...`."""
     return root / (stage["cmd"].split()[2].replace(".", "/") + ".py")
@@ -82,10 +97,10 @@ def main() -> int:
         if not script_of(stage).is_file():
             print(f"{name}: there is no {script_of(stage).relative_to(ROOT)}")
             return 1
-        code = closure(script_of(stage))
+        code = folders(script_of(stage))
         listed = [dep for dep in stage["deps"] if dep.startswith(CODE)]
-        for file in sorted(set(listed) ^ set(code)):
-            print(f"{name}: {'-' if file in listed else '+'} {file}")
+        for part in sorted(set(listed) ^ set(code)):
+            print(f"{name}: {'-' if part in listed else '+'} {part}")
         stale |= listed != code
         stage["deps"][:] = [dep for dep in stage["deps"] if dep not in listed] + code
     if fix and stale:

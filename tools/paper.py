@@ -2,8 +2,8 @@
 
     python tools/paper.py        # as `make paper`; arguments go to `sling flow`
 
-The budget of pipeline/bench_methods.py is written into params.yaml, for `git diff` to show and `git
-checkout params.yaml` to take back; then `sling flow`. Killed, it goes on where it was, and
+The budget of validation/benchmarks/methods.py is written into params.yaml, for `git diff` to show
+and `git checkout params.yaml` to take back; then `sling flow`. Killed, it goes on where it was, and
 `seconds` adds up its stretches.
 """
 
@@ -22,12 +22,12 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from pipeline import errors  # noqa: E402
-from pipeline.bench import environment  # noqa: E402
-from pipeline.bench_methods import PAPER  # noqa: E402
-from pipeline.errors import UserError  # noqa: E402
-from pipeline.files import replacing, write_json  # noqa: E402
+from pipeline.base import errors  # noqa: E402
+from pipeline.base.errors import UserError  # noqa: E402
+from pipeline.base.files import replacing, write_json  # noqa: E402
 from pipeline.params import load  # noqa: E402
+from validation.benchmarks.methods import PAPER  # noqa: E402
+from validation.benchmarks.simulator import environment  # noqa: E402
 
 KEPT = Path(".checkpoints", "paper.json")  # "runs" and the "stretches" [s] of a run without an end
 TICK = 10.0  # s, that a kill may lose of its stretch

@@ -15,12 +15,12 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pipeline.errors import run
+from pipeline.base.errors import run
 from pipeline.params import load
 from pipeline.recording.build import process
 from pipeline.recording.input import images
-from pipeline.rig.rubber import nominal_stress
-from pipeline.style import COLORS, INK, STYLE
+from pipeline.report.theme import COLORS, INK, STYLE
+from pipeline.rig.physics.rubber import nominal_stress
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "docs" / "rig"

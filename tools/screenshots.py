@@ -23,8 +23,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from pipeline import errors  # noqa: E402
-from pipeline.errors import UserError  # noqa: E402
+from pipeline.base import errors  # noqa: E402
+from pipeline.base.errors import UserError  # noqa: E402
 from tests.test_pipeline import Copy  # noqa: E402
 from tools.browser import Browser  # noqa: E402
 
@@ -41,7 +41,7 @@ BUDGET = {  # long enough to be looked at, and to converge
     "trials.targets": [1.725, 1.925, 2.125],
     "trials.repeats": 3,
 }
-SLING = [sys.executable, "-c", "from pipeline.cli import main; main()"]
+SLING = [sys.executable, "-c", "from app.cli import main; main()"]
 SECONDS = 600.0  # that any wait may last
 STEM, BARS = "band1-sling2sim2real", (30, 95)  # whose pictures; % at which a bar is looked at
 

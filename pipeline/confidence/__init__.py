@@ -1,0 +1,1 @@
+"""How sure the identified parameters are: posterior, intervals, profile curves."""

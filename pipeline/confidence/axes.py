@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.identify.space import Space
-from pipeline.theta import vector
+from pipeline.objective.space import Space
+from pipeline.sling.theta import vector
 
 YOUNG, POISSON, DAMPING, FRICTION, SCALE, DRAG = range(6)
 LEAST_SCALE = 1e-3  # of damping: below it nothing is damped, and the product has no logarithm

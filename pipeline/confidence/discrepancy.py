@@ -20,9 +20,9 @@ import numpy as np
 
 from pipeline.confidence.residuals import Residuals
 from pipeline.confidence.whitening import noise_variance
-from pipeline.episode import Episode
+from pipeline.episode.episode import Episode
 from pipeline.sling.interaction import interact
-from pipeline.theta import in_air
+from pipeline.sling.theta import in_air
 
 
 def discrepancy(

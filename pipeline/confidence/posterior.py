@@ -21,7 +21,7 @@ from scipy.stats import norm, qmc
 from pipeline.confidence.axes import DAMPING, DRAG, SCALE, Axes
 from pipeline.confidence.ensemble import sample
 from pipeline.confidence.rounds import LANES, Place, Round, Rounds, Tolerances
-from pipeline.episode import Episode
+from pipeline.episode.episode import Episode
 
 START = np.array([0.04, 0.03, 0.4, 0.4, 0.25, 1.0])  # spread of the first design, even coordinates
 SPREAD = 1.25  # of a design against the posterior

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.episode import Episode
-from pipeline.identify.phases import phases, reach
-from pipeline.signal import as_recorded
+from pipeline.episode.episode import Episode
+from pipeline.episode.phases import phases, reach
+from pipeline.episode.signal import as_recorded
 
 BINS = 16  # along the band, equal at rest
 LEAST_POINTS = 4  # of a bin

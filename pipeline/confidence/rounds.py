@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.base.errors import UserError
 from pipeline.confidence.axes import Axes
 from pipeline.confidence.ensemble import sample
 from pipeline.confidence.residuals import Residuals
 from pipeline.confidence.surrogate import Surrogate, monomials
 from pipeline.confidence.whitening import weights
-from pipeline.episode import Episode
-from pipeline.errors import UserError
+from pipeline.episode.episode import Episode
 from pipeline.sling.interaction import Rollouts, interact
-from pipeline.theta import in_air
+from pipeline.sling.theta import in_air
 
 LANES = 16  # rollouts that cost as much as one
 REACH = 3.0  # of the surrogate, in spreads of its design

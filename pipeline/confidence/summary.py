@@ -12,8 +12,8 @@ from pipeline.confidence.intervals import LEVEL, correlation, identifiable, inte
 from pipeline.confidence.posterior import Posterior, fit
 from pipeline.confidence.profile import profiles
 from pipeline.confidence.residuals import PHASES
-from pipeline.episode import Episode
-from pipeline.signal import cutoff_hz
+from pipeline.episode.episode import Episode
+from pipeline.episode.signal import cutoff_hz
 from pipeline.sling.model import THETA
 
 SAMPLES = 200  # that are kept

@@ -9,7 +9,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.params import TARGET_AREA
 
 REQUIRED = ("draw_y_m", "draw_z_m", "landing_y_m")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.episode import Episode
+from pipeline.episode.episode import Episode
 
 
 def stretch_of(points: np.ndarray, fork_width: float, rest_length: float) -> np.ndarray:

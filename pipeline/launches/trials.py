@@ -14,12 +14,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.files import replacing
+from pipeline.base.files import replacing
+from pipeline.base.pool import Pool
+from pipeline.landing.stored import Stored
 from pipeline.launches.measured import file_of, read_measured
 from pipeline.launches.spread import landing_intervals
 from pipeline.params.launches import trial_seed
-from pipeline.policy.stored import Stored
-from pipeline.pool import Pool
 
 SCHEMA = pa.schema(
     [

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.policy.landing_map import LandingMap
+from pipeline.landing.landing_map import LandingMap
 
 Land = Callable[[np.ndarray], float]
 """Landing [m] of a launch from the draw (2,) without errors; NaN where there is none."""

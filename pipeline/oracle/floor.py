@@ -7,15 +7,9 @@ reason.
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
 
-from pipeline.errors import UserError
 from pipeline.params.launches import trial_seed
-
-NUMBERS = ("launches", "actuation_error_m", "release_jitter")
 
 
 def trial_seeds(params) -> np.ndarray:
@@ -71,20 +65,3 @@ def _error(missed: np.ndarray, own: np.ndarray) -> dict:
 
 def _mean(values: np.ndarray) -> float | None:
     return float(values.mean()) if len(values) else None
-
-
-def load_floor(path: Path) -> dict:
-    """Read what stages/floor.py wrote. Raises UserError."""
-    path = Path(path)
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        [float(content[name]) for name in NUMBERS]
-        means = [one["mean_error_m"] for one in (content, *content["targets"].values())]
-        [float(mean) for mean in means if mean is not None]
-    except FileNotFoundError as error:
-        raise UserError(f"{path}: no such file; `dvc repro floor@{path.stem}` makes it") from error
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise UserError(
-            f"{path}: damaged; `dvc repro --force floor@{path.stem}` makes it anew"
-        ) from error
-    return content

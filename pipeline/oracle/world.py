@@ -9,11 +9,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from pipeline.base.pool import Pool
+from pipeline.landing.landing_map import LandingMap
 from pipeline.oracle.aim import hit
 from pipeline.params import load
-from pipeline.policy.landing_map import LandingMap
-from pipeline.pool import Pool
-from pipeline.rig.launch import Trial, launch
+from pipeline.rig.physics.launch import Trial, launch
 
 
 class World:

@@ -12,7 +12,8 @@ from typing import Annotated
 from pydantic import ValidationError, model_validator
 from ruamel.yaml import YAML, YAMLError
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
+from pipeline.base.schema import FILLED, Name, Section, explained, refusal
 from pipeline.params.identification import (
     Loss,
     Method,
@@ -25,7 +26,6 @@ from pipeline.params.lab import Band, BandName, Plan, Run, Setup
 from pipeline.params.launches import TARGET_AREA, Floor, Policy, Trials
 from pipeline.params.recording import Cloud, Episode, Force
 from pipeline.params.virtual_rig import Rig, RigArm, RigBand, RigCamera, RigClock, RigWrench
-from pipeline.schema import FILLED, Name, Section, explained, refusal
 
 __all__ = [
     "TARGET_AREA",

@@ -7,7 +7,7 @@ from typing import Annotated, Generic, Literal, TypeVar
 
 from pydantic import AfterValidator, model_validator
 
-from pipeline.schema import ASCENDING, LIST, Range, Section, Seed, refusal
+from pipeline.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
 
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound")

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, model_validator
 
-from pipeline.schema import (
+from pipeline.base.schema import (
     ASCENDING,
     FILLED,
     LIST,

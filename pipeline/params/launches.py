@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pipeline.schema import ASCENDING, FILLED, LIST, UNIQUE, Name, Range, Section, Seed
+from pipeline.base.schema import ASCENDING, FILLED, LIST, UNIQUE, Name, Range, Section, Seed
 
 # y of the paper's fixed target of 1 m by 1 m: a landing outside is a failure, so trials aim inside.
 TARGET_AREA = (1.425, 2.425)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import model_validator
 
-from pipeline.schema import FILLED, Pattern, Range, Section, refusal
+from pipeline.base.schema import FILLED, Pattern, Range, Section, refusal
 
 Delay = Annotated[float, Range(-0.5, 0.5)]
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import model_validator
 
-from pipeline.schema import LIST, Metres, Name, Pose, Range, Section, Seed, refusal
+from pipeline.base.schema import LIST, Metres, Name, Pose, Range, Section, Seed, refusal
 
 Share = Annotated[float, Range(0, 1)]
 Point = Annotated[tuple[Metres, Metres, Metres], LIST]

@@ -1,0 +1,1 @@
+"""The slingshot policies: environment, training, check, export."""

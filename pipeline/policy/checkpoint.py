@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 
-from pipeline.files import replacing
+from pipeline.base.files import replacing
 
 
 class Checkpoint:

@@ -18,8 +18,8 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
+from pipeline.landing.response_surface import Landings, Landscape
 from pipeline.policy.expected import closeness
-from pipeline.policy.landscape import Landings, Landscape
 
 
 class SlingshotEnv(VecEnv):

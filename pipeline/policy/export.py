@@ -19,8 +19,8 @@ import pyarrow.parquet as pq
 import torch
 from torch import nn
 
-from pipeline.files import replacing, write_json
-from pipeline.policy.stored import PLAIN, ROBUST
+from pipeline.base.files import replacing, write_json
+from pipeline.landing.stored import PLAIN, ROBUST
 from pipeline.policy.train import Policy, Trained
 
 OPSET, IR_VERSION = 18, 10  # any onnxruntime from 1.18 (2024) on reads these

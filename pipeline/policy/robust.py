@@ -14,11 +14,11 @@ import copy
 import numpy as np
 import torch
 
+from pipeline.base.progress import Progress
+from pipeline.landing.landing_map import LandingMap, Launcher
+from pipeline.landing.response_surface import Landscape
 from pipeline.policy.environment import rewarded
-from pipeline.policy.landing_map import LandingMap, Launcher
-from pipeline.policy.landscape import Landscape
 from pipeline.policy.train import CHECKED_TARGETS, Policy, Trained, earned, one_thread, told
-from pipeline.progress import Progress
 
 STEPS = 1000  # of the refinement
 STEP = 2e-4  # m, of the differences along the draw: small against the grid

@@ -19,12 +19,12 @@ import numpy as np
 import torch
 from torch import nn
 
-from pipeline.fingerprint import fingerprint
+from pipeline.base.fingerprint import fingerprint
+from pipeline.base.progress import Progress
+from pipeline.landing.response_surface import Landscape
 from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.environment import SlingshotEnv, draw_box, rewarded
 from pipeline.policy.expected import distance
-from pipeline.policy.landscape import Landscape
-from pipeline.progress import Progress
 
 CHECKED_TARGETS = 256
 KEPT_EVERY = 5  # iterations; a checkpoint takes some 10 ms

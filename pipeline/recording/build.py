@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from pipeline.episode import Episode
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
+from pipeline.episode.episode import Episode
 from pipeline.params import expect_known
 from pipeline.recording.cloud import Clouds, clouds_of
 from pipeline.recording.delays import Delays, delays_of

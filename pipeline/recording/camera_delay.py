@@ -12,11 +12,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.recording.events import events_of
-from pipeline.recording.felt import LONGEST
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.motion import Motion
+from pipeline.recording.tool_inertia import LONGEST
 
 BLOCKS = 8  # of time, for errors by leaving one out
 FRAMES = 48  # pictures looked at

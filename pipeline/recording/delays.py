@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.camera_delay import camera_delay
-from pipeline.recording.felt import Felt, felt_tool
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.input.reader import Recording
+from pipeline.recording.tool_inertia import Felt, felt_tool
 
 SIGMAS = 3.0  # what is less sure than this is not corrected
 MOST_ERROR = 0.003  # s: what is not known better counts as not seen

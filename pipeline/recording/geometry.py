@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from scipy.spatial.transform import Rotation
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input.frames import Transform, TransformTree
 from pipeline.recording.input.reader import Recording
 

@@ -11,8 +11,8 @@ from scipy.interpolate import make_lsq_spline
 from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation, Slerp
 
-from pipeline import signal
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
+from pipeline.episode import signal
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.input.reader import Stream
 

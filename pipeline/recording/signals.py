@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline import signal
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
+from pipeline.episode import signal
 from pipeline.recording.events import (
     LEAD_IN,
     MARGIN,
@@ -16,11 +16,11 @@ from pipeline.recording.events import (
     events_of,
     opening_of,
 )
-from pipeline.recording.felt import Felt
 from pipeline.recording.geometry import Geometry, turned
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.motion import VELOCITY_WINDOW, Motion, expect_dense
 from pipeline.recording.tool import Wrench
+from pipeline.recording.tool_inertia import Felt
 
 MOST_TURN = np.deg2rad(5.0)  # of the hand; beyond it the tool's weight has to be known
 MOST_ASKEW = np.deg2rad(30.0)  # between the held force and the way to the fork

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.episode import Episode
-from pipeline.errors import UserError
-from pipeline.identify.loss import EpisodeLoss
-from pipeline.identify.nuisance import along_axes
-from pipeline.stage import remedy
-from pipeline.theta import calibrated, vector
+from pipeline.base.errors import UserError
+from pipeline.episode.episode import Episode
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.objective.nuisance import along_axes
+from pipeline.sling.theta import calibrated, vector
+from stages.start import remedy
 
 LOAD = 1.5  # kg: the paper's dumbbell
 SEEN_BY_CAMERA = ("camera_delay", "cloud_shift_x", "cloud_shift_y", "cloud_shift_z")

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.params import Params
-from pipeline.policy.stored import PLAIN, ROBUST, Stored
-from pipeline.report.looks import SIDE_BY_SIDE, Look, drawn, looks
 from pipeline.report.replay import Replay, replay
 from pipeline.report.results import Result, Results, gather
+from pipeline.report.styles import SIDE_BY_SIDE, Look, drawn, looks
 
 
 @dataclass(frozen=True)

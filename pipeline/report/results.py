@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pandas as pd
 
-from pipeline.episode import Episode
-from pipeline.identify.regions import Region, load_regions
+from pipeline.episode.episode import Episode
+from pipeline.landing.landing_map import LandingMap
+from pipeline.landing.stored import ROBUST, Stored
 from pipeline.launches.measured import file_of, named
-from pipeline.oracle.floor import load_floor
 from pipeline.params import pairs
-from pipeline.policy.landing_map import LandingMap
-from pipeline.policy.stored import ROBUST, Stored
-from pipeline.stage import expect, expect_from
-from pipeline.theta import load_theta
+from pipeline.report.floors import load_floor
+from pipeline.search.regions import Region, load_regions
+from pipeline.sling.theta import load_theta
+from stages.start import expect, expect_from
 
 
 @dataclass(frozen=True)

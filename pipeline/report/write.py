@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.files import write_json, write_text
+from pipeline.base.files import write_json, write_text
 from pipeline.report.chapters.appendix import budget, policies
 from pipeline.report.chapters.band import bands
 from pipeline.report.chapters.identification import identification

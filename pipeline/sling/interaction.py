@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pipeline.episode import Episode
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
+from pipeline.episode.episode import Episode
 from pipeline.sling.model import Sling, hanging_guess, material
 from pipeline.sling.solver import (
     FAILURE,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import warp as wp
 
-from pipeline.native import built_once, text_of
+from pipeline.base.native import built_once, text_of
 from pipeline.sling.tetrahedra import CORNERS
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.sling import tetrahedra
 
 GRAVITY = 9.81
@@ -71,7 +71,7 @@ class Sling:
         """Make it from params.yaml's `bands.<band>`, `setup` and `sling`.
 
         Args:
-            mounting: What the slack band shows of itself (pipeline/identify/mounting.py):
+            mounting: What the slack band shows of itself (pipeline/objective/clamps.py):
                 `clamp_direction` and `flexural_rigidity`; without it, the setup's clamp direction
                 and a solid round band.
             as_rod: Whatever mesh the resolution asks for.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.sling import tetrahedra
 from pipeline.sling.model import GRAVITY, TETRAHEDRA, Sling, fixed_frames
 
@@ -165,7 +165,7 @@ def run(
     """
     import warp as wp
 
-    from pipeline.native import launch
+    from pipeline.base.native import launch
     from pipeline.sling.kernel import sling_kernel
 
     if lane_state.shape != (len(parameters), LANE_STATE):

@@ -21,7 +21,9 @@ SHORT = {  # by stage and module
         "pipeline.confidence.profile": {"POINTS": 3},
     },
     "policy": {"pipeline.policy.robust": {"STEPS": 30}},
-    "report": {"pipeline.style": {"STYLE": {}}},  # a layout that is solved for draws all twice
+    "report": {
+        "pipeline.report.theme": {"STYLE": {}}
+    },  # a layout that is solved for draws all twice
 }
 read: set[str] = set()
 gc.set_threshold(100_000, 50, 50)  # it is looked for garbage while torch is imported

@@ -11,8 +11,8 @@ import pytest
 from pipeline.confidence.discrepancy import energy_gap, recoil_gap
 from pipeline.confidence.residuals import Group
 from pipeline.confidence.summary import corrected
-from pipeline.identify.nuisance import along_axes
-from tests.identify.toy import episode
+from pipeline.objective.nuisance import along_axes
+from tests.search.toy import episode
 
 
 def pulled():

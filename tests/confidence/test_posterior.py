@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.base.errors import UserError
 from pipeline.confidence.axes import Axes
 from pipeline.confidence.intervals import identifiable, interval
 from pipeline.confidence.profile import profiles
 from pipeline.confidence.residuals import Group
-from pipeline.errors import UserError
 from pipeline.params.identification import Prior
 from tests.confidence.toy import COUNT, GRID, SCALE, SPACE, TRUTH, Toy, ToyResiduals, fitted
-from tests.identify.toy import episode
+from tests.search.toy import episode
 
 
 def test_posterior_of_a_linear_model(monkeypatch) -> None:

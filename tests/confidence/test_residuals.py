@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.confidence.residuals import BINS, Residuals
-from pipeline.identify.loss import EpisodeLoss
-from tests.identify import toy
-from tests.identify.own_law import visible
+from pipeline.objective.loss import EpisodeLoss
+from tests.objective.own_law import visible
+from tests.search import toy
 
 PULL = np.linspace(0, 5, 60)  # N, rising, so that the band is taut at some time
 CAMERA = np.array([0.3, 0.4, 1.5])

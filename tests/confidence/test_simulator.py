@@ -6,18 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.bench import pull_and_release
 from pipeline.confidence import posterior as module
 from pipeline.confidence.axes import Axes
 from pipeline.confidence.intervals import interval
 from pipeline.confidence.posterior import fit
 from pipeline.confidence.summary import by_phase
-from pipeline.identify.space import Space
+from pipeline.episode.signal import cutoff_hz
+from pipeline.objective.space import Space
 from pipeline.params import load
-from pipeline.signal import cutoff_hz
 from pipeline.sling.model import Sling
-from tests.identify.own_law import disturbed, own_law_episode
+from tests.objective.own_law import disturbed, own_law_episode
 from tests.project import ROOT
+from validation.benchmarks.simulator import pull_and_release
 
 TRUTH = np.array([2.5e5, 0.47, 4e-3, 0.8, 0.6])
 

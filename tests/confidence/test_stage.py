@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from pipeline.confidence import rounds
-from pipeline.identify.evaluate import Evaluation
-from pipeline.identify.history import History
-from pipeline.identify.loss import TERMS
-from pipeline.identify.space import Space
+from pipeline.objective.evaluate import Evaluation
+from pipeline.objective.loss import TERMS
+from pipeline.objective.space import Space
 from pipeline.params import load
-from pipeline.theta import law_discrepancy, load_samples, load_theta
+from pipeline.search.history import History
+from pipeline.sling.theta import law_discrepancy, load_samples, load_theta
 from stages import theta
-from tests.identify.toy import episode
 from tests.project import ROOT
+from tests.search.toy import episode
 
 METHOD = "sling2sim2real"
 

@@ -11,8 +11,8 @@ from pipeline.confidence.axes import Axes
 from pipeline.confidence.posterior import fit
 from pipeline.confidence.residuals import Group
 from pipeline.confidence.rounds import Tolerances
-from pipeline.episode import Episode
-from pipeline.identify.space import Space
+from pipeline.episode.episode import Episode
+from pipeline.objective.space import Space
 from pipeline.sling.model import THETA
 
 SPACE = Space(

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from ruamel.yaml import YAML
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from tests.report.conftest import BAND, METHOD
 from tests.report.conftest import root as root  # noqa: PLC0414
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.episode import Episode
+from pipeline.episode.episode import Episode
 from pipeline.launches.stretch import recorded_stretch, stretch_of
 
 

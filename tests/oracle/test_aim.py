@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from pipeline.landing.landing_map import LandingMap
 from pipeline.oracle.aim import INSET, NEAR, hit, least_sensitive_draw, sensitivity
-from pipeline.policy.landing_map import LandingMap
 from tests.policy import toy
 
 TARGETS = (1.725, 1.925, 2.125)

@@ -7,9 +7,10 @@ import sys
 import numpy as np
 import pytest
 
-from pipeline.errors import UserError
-from pipeline.oracle.floor import errors_of, load_floor, trial_seeds
+from pipeline.base.errors import UserError
+from pipeline.oracle.floor import errors_of, trial_seeds
 from pipeline.params import load
+from pipeline.report.floors import load_floor
 from tests.project import ROOT
 
 

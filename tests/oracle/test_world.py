@@ -9,7 +9,7 @@ from ruamel.yaml import YAML
 from pipeline.oracle.aim import NEAR
 from pipeline.oracle.world import World
 from pipeline.params import load
-from pipeline.rig.launch import launch
+from pipeline.rig.physics.launch import launch
 from tests.project import ROOT
 
 DRAW = np.array([-0.30, -0.15])

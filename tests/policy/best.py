@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.landing.landing_map import landscape_of
+from pipeline.landing.response_surface import Landscape
+from pipeline.landing.simulator import simulator
+from pipeline.landing.stored import Stored
 from pipeline.params import load
 from pipeline.policy.expected import distance
-from pipeline.policy.landing_map import landscape_of
-from pipeline.policy.landscape import Landscape
 from pipeline.policy.robust import robust_maps
-from pipeline.policy.simulator import simulator
-from pipeline.policy.stored import Stored
-from pipeline.theta import load_samples, load_theta
+from pipeline.sling.theta import load_samples, load_theta
 
 NEAR = 0.06  # m: draws whose median landing is further from the target are not looked at
 

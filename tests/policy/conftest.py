@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipeline.policy.landing_map import LandingMap, landscape_of
+from pipeline.landing.landing_map import LandingMap, landscape_of
 from tests import once
 from tests.policy import toy
 

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
+from pipeline.landing.landing_map import LandingMap, landscape_of
 from pipeline.policy import train as module
-from pipeline.policy.landing_map import LandingMap, landscape_of
 from tests.policy import toy
 from tests.policy.conftest import SETTINGS
 

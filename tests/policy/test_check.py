@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.landing.response_surface import TOO_MUCH_FORCE
 from pipeline.policy.check import CONVERGED, Check, check, figures, robust_figures, verdict
-from pipeline.policy.landscape import TOO_MUCH_FORCE
 from tests.policy import toy
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import torch
 
+from pipeline.landing.landing_map import LandingMap, landscape_of
+from pipeline.landing.response_surface import TOO_MUCH_FORCE, Landscape
 from pipeline.policy.environment import SlingshotEnv, rewarded
-from pipeline.policy.landing_map import LandingMap, landscape_of
-from pipeline.policy.landscape import TOO_MUCH_FORCE, Landscape
 from tests.policy import toy
 
 TARGETS = (1.425, 2.425)

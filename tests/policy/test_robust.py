@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import torch
 
+from pipeline.base.progress import Progress, parse
+from pipeline.landing.landing_map import LandingMap, landscape_of
 from pipeline.params import load
 from pipeline.policy import robust
 from pipeline.policy.check import check_expected
-from pipeline.policy.landing_map import LandingMap, landscape_of
 from pipeline.policy.robust import refine, representative, robust_maps
 from pipeline.policy.train import told as said
 from pipeline.policy.train import train
-from pipeline.progress import Progress, parse
 from tests.policy import toy
 from tests.policy.best import best_draws, expected_error
 from tests.project import ROOT

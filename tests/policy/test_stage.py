@@ -12,9 +12,9 @@ import pyarrow.parquet as pq
 import pytest
 from ruamel.yaml import YAML
 
-from pipeline.files import write_json
+from pipeline.base.files import write_json
+from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.policy import robust
-from pipeline.policy.stored import PLAIN, ROBUST, Stored
 from pipeline.sling.model import THETA
 from stages import policy
 from tests.policy import toy

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import torch
 
+from pipeline.base.progress import Progress, parse
+from pipeline.landing.landing_map import LandingMap, landscape_of
 from pipeline.policy import train as module
 from pipeline.policy.checkpoint import Checkpoint
-from pipeline.policy.landing_map import LandingMap, landscape_of
 from pipeline.policy.train import Trained, train
-from pipeline.progress import Progress, parse
 from tests.policy import killed, toy
 
 ROOT = Path(__file__).parents[2]

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.episode import Episode
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
+from pipeline.episode.episode import Episode
 from pipeline.recording.build import build_episode, episode_of, process_recording
 from pipeline.recording.delays import delays_of
 from pipeline.recording.geometry import geometry_of

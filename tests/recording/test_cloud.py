@@ -7,12 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.params import load
-from pipeline.recording import bench, cloud
+from pipeline.recording import cloud
 from pipeline.recording.masks import masker
 from tests.recording import looks
 from tests.recording.looks import BAND, LOOKS
+from validation.benchmarks import recording as bench
 
 SETTINGS = load("params.yaml").cloud
 

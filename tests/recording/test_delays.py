@@ -10,9 +10,9 @@ import pytest
 
 from pipeline.recording.camera_delay import camera_delay
 from pipeline.recording.delays import Estimate, delays_of
-from pipeline.recording.felt import felt_tool
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.reader import read_recording
+from pipeline.recording.tool_inertia import felt_tool
 from tests.recording.bag import Truth
 from tests.recording.played import Played
 

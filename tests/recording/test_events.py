@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.events import find_grasp, find_release
 
 DIRECTION = np.array([0.3, -0.8, 0.52])

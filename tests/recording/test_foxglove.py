@@ -10,7 +10,7 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from pipeline.episode import Episode
+from pipeline.episode.episode import Episode
 from pipeline.recording.build import build_episode
 from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording, read_recording

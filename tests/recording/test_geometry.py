@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.frames import Transform, TransformTree
 

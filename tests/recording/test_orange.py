@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.intake.check import coverage
+from app.preflight.check import coverage
 from pipeline.params import Band, load
 from pipeline.recording.build import episode_of, process
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.errors import UserError
-from pipeline.recording.felt import felt_tool
+from pipeline.base.errors import UserError
 from pipeline.recording.signals import signals_of
+from pipeline.recording.tool_inertia import felt_tool
 from tests.recording.bag import HAND, SENSOR, START, Truth
 from tests.recording.played import GRAVITY, Played, stream
 

@@ -12,12 +12,12 @@ import torch
 from ruamel.yaml import YAML
 from torch import nn
 
-from pipeline.episode import Episode
-from pipeline.identify.regions import Region, save_regions
+from pipeline.episode.episode import Episode
+from pipeline.landing.landing_map import LandingMap, landscape_of
 from pipeline.params import load
 from pipeline.policy.export import write_onnx
-from pipeline.policy.landing_map import LandingMap, landscape_of
 from pipeline.policy.train import Policy
+from pipeline.search.regions import Region, save_regions
 from pipeline.sling.model import THETA as NAMES
 from tests.policy import toy
 

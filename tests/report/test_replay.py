@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from pipeline.episode import Episode
-from pipeline.identify.loss import EpisodeLoss
+from pipeline.episode.episode import Episode
+from pipeline.objective.loss import EpisodeLoss
 from pipeline.params import load
 from pipeline.report.replay import replay, work
 from pipeline.sling.interaction import interact

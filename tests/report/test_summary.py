@@ -7,7 +7,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from pipeline.report.chapters.summary import summary
-from pipeline.report.looks import looks
+from pipeline.report.styles import looks
 from tests.report.tables.toy_results import floor, launches, result, results
 
 NAMED = looks(["sling2sim2real", "package_si", "real2sim2real", "de"])

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.report import report as reporting
 from pipeline.report import write as writing
 from pipeline.report.metrics import metrics

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.params import Params, load
-from pipeline.rig.interaction import Interaction
-from pipeline.rig.record import record
+from pipeline.rig.recorder.interaction import Interaction
+from pipeline.rig.recorder.record import record
 from tests import once
 
 ROOT = Path(__file__).parents[2]

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.bench_methods import complete
-from pipeline.identify.evaluate import Evaluator
-from pipeline.identify.loss import EpisodeLoss
-from pipeline.identify.space import Space
+from pipeline.episode.signal import cutoff_hz
+from pipeline.objective.evaluate import Evaluator
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.objective.space import Space
 from pipeline.recording.build import build_episode
-from pipeline.rig.record import EPOCH
-from pipeline.rig.world import string_of
-from pipeline.signal import cutoff_hz
+from pipeline.rig.physics.world import string_of
+from pipeline.rig.recorder.record import EPOCH
 from pipeline.sling.model import THETA, Sling
-from tests.identify.own_law import own_law_episode, visible
+from tests.objective.own_law import own_law_episode, visible
+from validation.benchmarks.methods import complete
 
 METHOD = "sling2sim2real"
 TRUTH = np.array([2.5e5, 0.45, 4e-3, 0.7, 0.6])

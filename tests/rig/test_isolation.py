@@ -8,10 +8,10 @@ import pytest
 from mcap.reader import make_reader
 from ruamel.yaml import YAML
 
-from pipeline.identify.loss import EpisodeLoss
+from pipeline.objective.loss import EpisodeLoss
 from pipeline.params import Params
 from pipeline.recording.build import build_episode
-from pipeline.rig.interaction import Interaction
+from pipeline.rig.recorder.interaction import Interaction
 from pipeline.sling.model import Sling
 from tests.rig.conftest import ROOT
 

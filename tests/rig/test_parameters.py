@@ -12,8 +12,9 @@ import pytest
 from mcap.reader import make_reader
 
 from pipeline.params import Params, Section
-from pipeline.rig import camera, interaction, motion, record
-from pipeline.rig.launch import launch
+from pipeline.rig.physics import motion
+from pipeline.rig.physics.launch import launch
+from pipeline.rig.recorder import camera, interaction, record
 
 TF, GRIPPER = "/tf_static", "/franka_gripper/joint_states"
 POSE, WRENCH = "/franka_robot_state_broadcaster/current_pose", "/ft_sensor/wrench"

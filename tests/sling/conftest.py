@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.episode import Episode
+from pipeline.episode.episode import Episode
 from pipeline.params import load
 from pipeline.sling import Sling
 

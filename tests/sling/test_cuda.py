@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import warp as wp
 
-from pipeline.identify.evaluate import Evaluator
-from pipeline.identify.loss import EpisodeLoss
-from pipeline.identify.space import Space
+from pipeline.objective.evaluate import Evaluator
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.objective.space import Space
 from pipeline.params import load
 from pipeline.sling import interact, launch
 

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from pipeline.params import load
 from pipeline.sling.hang import hang
 from pipeline.sling.model import GRAVITY, Sling
-from pipeline.verify.closed import String
+from validation.simulator.closed import String
 
 THETAS = np.array([[2e5, 0.47, 2e-3, 0.5, 0.5], [6e5, 0.35, 2e-3, 0.5, 0.5]])
 LOAD = 1.5

@@ -10,7 +10,7 @@ import pytest
 from pipeline.sling import launch, solver
 from pipeline.sling.launch import ballistic_landing
 from pipeline.sling.model import GRAVITY, drawn_guess
-from pipeline.verify.twin import Twin
+from validation.simulator.reference import Twin
 
 THETA = [2.5e5, 0.45, 2e-3, 0.5, 1.0]
 DRAW = [-0.38, -0.2]

@@ -10,7 +10,7 @@ import pytest
 from pipeline.sling import launch
 from pipeline.sling.model import GRAVITY, hanging_guess, layers_of, material
 from pipeline.sling.solver import FREE, LANE_STATE, Schedule, relaxation, run
-from pipeline.verify.twin import Twin
+from validation.simulator.reference import Twin
 
 THETA = [5e5, 0.45, 2e-3, 0.5, 1.0]
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.sling import Sling, interact, launch
 from pipeline.sling.cylinder import cylinder, volumes
 from pipeline.sling.launch import schedule_of

@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input.images import LARGEST
 from pipeline.recording.input.readings import Reading, first_of, frame_of, stamp_of
 

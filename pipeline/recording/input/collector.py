@@ -14,7 +14,7 @@ from typing import BinaryIO
 from mcap import records as kinds
 from mcap.opcode import Opcode
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input.account import losses_of, notes_of
 from pipeline.recording.input.records import (
     HEAD,

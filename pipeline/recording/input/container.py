@@ -22,7 +22,7 @@ import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input.collector import Channel, Collector
 from pipeline.recording.input.records import MAGIC
 

@@ -16,7 +16,7 @@ from rosbags.typesys import (
 )
 from rosbags.typesys.store import Typestore
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input.container import Channel
 
 Decoder = Callable[[bytes], object]

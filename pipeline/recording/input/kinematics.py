@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 
 FOLDER = Path("robots")
 TIPS = ("tcp", "ee", "hand_tcp")  # last words of a link that is taken as the tip

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.container import Container, read_container, sha256
 from pipeline.recording.input.frames import TransformTree

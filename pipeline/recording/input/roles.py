@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import read_calibration
 from pipeline.recording.input.container import Channel

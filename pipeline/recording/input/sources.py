@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from functools import partial
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.container import Channel
 from pipeline.recording.input.decode import Decoder

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import median_filter
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input import clocks
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.input.roles import OPTIONAL

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input import images
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import Camera, camera_from

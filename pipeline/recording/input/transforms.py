@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input.container import Channel, Container
 from pipeline.recording.input.decode import decoder
 from pipeline.recording.input.frames import Transform, TransformTree

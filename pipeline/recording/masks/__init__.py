@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.masks.ridge import RidgeMask
 from pipeline.recording.view import Frame, View
 

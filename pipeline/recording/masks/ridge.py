@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.masks.colors import Colors
 from pipeline.recording.masks.hand import REACH, Shape
 from pipeline.recording.view import Frame, Scene, View, length

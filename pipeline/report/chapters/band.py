@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.policy.stored import PLAIN, ROBUST
+from pipeline.landing.stored import PLAIN, ROBUST
 from pipeline.report.figures import confidence, episode, policy, search
-from pipeline.report.looks import Look, drawn
 from pipeline.report.losses import has_another_loss
 from pipeline.report.report import Report
 from pipeline.report.results import Result
+from pipeline.report.styles import Look, drawn
 from pipeline.report.tables import identified, landings, policies
 from pipeline.report.tables.cells import markdown
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pipeline.report.looks import Look
 from pipeline.report.report import Report
 from pipeline.report.results import Results
+from pipeline.report.styles import Look
 from pipeline.report.tables import identified
 from pipeline.report.tables.cells import markdown
 

@@ -1,6 +1,6 @@
 """What all pictures share. Equal data give equal bytes.
 
-Black is what was measured; a method has one colour everywhere (pipeline/report/looks.py).
+Black is what was measured; a method has one colour everywhere (pipeline/report/styles.py).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 from matplotlib.ticker import LogFormatter
 from PIL import Image
 
-from pipeline.files import replacing
+from pipeline.base.files import replacing
 
 PARAMETERS = {  # name and unit on an axis, and the factor from SI to that unit
     "youngs_modulus": ("E [MPa]", 1e-6),

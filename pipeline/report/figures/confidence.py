@@ -9,10 +9,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from pipeline.report.figures.canvas import PARAMETERS, few_ticks, save
-from pipeline.report.looks import Look
 from pipeline.report.results import Result
+from pipeline.report.styles import Look
+from pipeline.report.theme import INK, STYLE
 from pipeline.sling.model import THETA
-from pipeline.style import INK, STYLE
 
 BINS = 14  # of a marginal, over the span that is shown
 TOP = 3.0  # of the misfit axis, in units of the misfit at the interval's ends

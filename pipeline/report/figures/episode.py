@@ -7,12 +7,12 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pipeline.episode import Episode
-from pipeline.identify.phases import phases, taut_frames
+from pipeline.episode.episode import Episode
+from pipeline.episode.phases import phases, taut_frames
 from pipeline.report.figures.canvas import save
-from pipeline.report.looks import Look
 from pipeline.report.replay import Replay
-from pipeline.style import INK, STYLE
+from pipeline.report.styles import Look
+from pipeline.report.theme import INK, STYLE
 
 DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)))  # so that curves that lie on each other are seen
 AROUND = (-0.25, 0.5)  # of the release, magnified [s]

@@ -12,11 +12,11 @@ from matplotlib.patches import Circle, Rectangle
 
 from pipeline.params import TARGET_AREA
 from pipeline.report.figures.canvas import save
-from pipeline.report.looks import SIDE_BY_SIDE, Look
 from pipeline.report.noise import landed
 from pipeline.report.results import Results
+from pipeline.report.styles import SIDE_BY_SIDE, Look
+from pipeline.report.theme import INK, STYLE
 from pipeline.sling.model import GRAVITY
-from pipeline.style import INK, STYLE
 
 BEHIND, BEYOND = -0.45, 0.35  # how far a picture reaches behind the fork, and past the target [m]
 RINGS = (0.05, 0.10)  # around a target [m]

@@ -7,12 +7,12 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pipeline.episode import Episode
+from pipeline.episode.episode import Episode
 from pipeline.report.figures.canvas import save
 from pipeline.report.figures.episode import DASHES
-from pipeline.report.looks import Look
 from pipeline.report.replay import LOAD, Replay
-from pipeline.style import INK, STYLE
+from pipeline.report.styles import Look
+from pipeline.report.theme import INK, STYLE
 
 SLACK, MARGIN = 0.05, 0.04  # of the peak force, below which the band is slack; of its draw [m]
 

@@ -8,12 +8,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
+from pipeline.landing.landing_map import LandingMap
 from pipeline.launches.stretch import stretch_of
-from pipeline.policy.landing_map import LandingMap
 from pipeline.report.figures.canvas import log_y, save
-from pipeline.report.looks import SIDE_BY_SIDE, Look, drawn
 from pipeline.report.results import Result
-from pipeline.style import COLORS, STYLE
+from pipeline.report.styles import SIDE_BY_SIDE, Look, drawn
+from pipeline.report.theme import COLORS, STYLE
 
 FAIR = 0.05  # of the distance, shaded
 ERRORS = (-80, -50, -20, -10, -5, 0, 5, 10, 20, 50, 100, 200)  # % at the axis

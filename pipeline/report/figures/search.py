@@ -11,11 +11,11 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Ellipse
 
 from pipeline.report.figures.canvas import PARAMETERS, few_ticks, log_y, save
-from pipeline.report.looks import SIDE_BY_SIDE, Look, drawn
 from pipeline.report.losses import best_so_far, printed
 from pipeline.report.results import Result
+from pipeline.report.styles import SIDE_BY_SIDE, Look, drawn
+from pipeline.report.theme import INK, STYLE
 from pipeline.sling.model import THETA
-from pipeline.style import INK, STYLE
 
 PATH, STAR = "#e4003a", "#ffd23f"
 NEAR = 0.3  # of the least loss, the part that is magnified

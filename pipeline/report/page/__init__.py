@@ -12,8 +12,8 @@ import re
 from pathlib import Path
 from string import Template
 
-from pipeline.errors import UserError
-from pipeline.files import write_text
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_text
 from pipeline.report.page.replays import content
 from pipeline.report.report import Report
 

@@ -6,8 +6,8 @@ import base64
 
 import numpy as np
 
-from pipeline.report.looks import SIDE_BY_SIDE, drawn
 from pipeline.report.report import Report
+from pipeline.report.styles import SIDE_BY_SIDE, drawn
 
 POINTS = 350  # of a cloud
 

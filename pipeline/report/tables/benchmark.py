@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 
 from pipeline.report import paper
-from pipeline.report.looks import KNOWN, Look
-from pipeline.report.looks import looks as looks_of
 from pipeline.report.results import Results
+from pipeline.report.styles import KNOWN, Look
+from pipeline.report.styles import looks as looks_of
 from pipeline.report.tables.cells import NONE, Table, number
 from pipeline.report.tables.landings import landing_errors, pooled_std
 

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from pipeline.report.looks import Look
 from pipeline.report.replay import Replay
 from pipeline.report.results import Results
+from pipeline.report.styles import Look
 from pipeline.report.tables.cells import NONE, Table, centimetres, number, percent
 from pipeline.report.tables.parameters import HEADS, exactly, printed_loss
 

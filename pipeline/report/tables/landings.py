@@ -8,9 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from pipeline.report.looks import Look
 from pipeline.report.noise import landed
 from pipeline.report.results import Results
+from pipeline.report.styles import Look
 from pipeline.report.tables.cells import Table, number, percent
 
 AIM = 0.05  # mean error of predicted landings inside the recorded stretch, share of the distance

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from pipeline.files import replacing, write_text
+from pipeline.base.files import replacing, write_text
 from pipeline.params import TARGET_AREA
 from pipeline.report import paper
-from pipeline.report.looks import Look
 from pipeline.report.noise import LEVEL, RESAMPLES
 from pipeline.report.report import Report
 from pipeline.report.results import Results
+from pipeline.report.styles import Look
 from pipeline.report.tables import benchmark, differences, parameters
 from pipeline.report.tables.cells import markdown, percent
 from pipeline.report.tables.latex import latex

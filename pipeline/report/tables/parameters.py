@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from pipeline.identify.space import Space
+from pipeline.objective.space import Space
 from pipeline.report import paper
-from pipeline.report.looks import Look
 from pipeline.report.losses import PRINTED
 from pipeline.report.results import Result, Results
+from pipeline.report.styles import Look
 from pipeline.report.tables.benchmark import APART, NOT_RUN, PAPER, band_name, method_name
 from pipeline.report.tables.cells import NONE, Table, number
 from pipeline.sling.model import THETA

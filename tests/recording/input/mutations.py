@@ -25,8 +25,8 @@ import zstandard
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from pipeline.episode import Episode
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
+from pipeline.episode.episode import Episode
 from pipeline.params import Params, load
 from pipeline.recording.build import Processed, episode_of, process
 from pipeline.recording.input import decode

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input.camera import Camera, camera_from, read_calibration
 
 K = np.array([[60.0, 0, 31.5], [0, 62.0, 23.5], [0, 0, 1]])

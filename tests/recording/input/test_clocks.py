@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input import clocks
 from pipeline.recording.input.reader import Recording, read_recording
 from tests.recording.bag import START, write_bag

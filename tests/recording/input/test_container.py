@@ -18,7 +18,7 @@ from mcap import records as kinds
 from mcap.data_stream import RecordBuilder
 from mcap.writer import CompressionType, IndexType, Writer
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input.container import read_container
 from pipeline.recording.input.records import MAGIC
 
@@ -222,7 +222,7 @@ def test_large_types_that_no_role_has_are_counted_only(tmp_path) -> None:
 BOMBS = """
 import resource, sys
 from pathlib import Path
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input.container import read_container
 for path in sorted(Path(sys.argv[1]).glob("*.mcap")):
     try:

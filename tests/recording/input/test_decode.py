@@ -13,7 +13,7 @@ from mcap.records import Schema
 from mcap_ros2._dynamic import serialize_dynamic
 from rosbags.typesys import Stores, get_typestore
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input.container import Channel
 from pipeline.recording.input.decode import decoder
 from pipeline.recording.input.readings import WRENCH

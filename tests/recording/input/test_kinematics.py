@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input import kinematics
 from pipeline.recording.input.kinematics import chain_of, integrated
 

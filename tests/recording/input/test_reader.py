@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType
 from mcap_ros2.decoder import DecoderFactory
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.build import build_episode
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.reader import read_recording

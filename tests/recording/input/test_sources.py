@@ -10,7 +10,7 @@ from mcap.records import Schema
 from mcap_ros2._dynamic import serialize_dynamic
 from scipy.spatial.transform import Rotation
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input import kinematics
 from pipeline.recording.input.container import Channel
 from tests.recording.input.messages import (

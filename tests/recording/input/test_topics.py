@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from mcap.records import Schema
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.input.container import Channel, Container
 from pipeline.recording.input.topics import camera_of
 from tests.recording.input.messages import (

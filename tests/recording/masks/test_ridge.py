@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.params import load
 from pipeline.recording.cloud import clouds_of
 from pipeline.recording.input.frames import Transform

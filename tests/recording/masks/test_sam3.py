@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.errors import UserError
+from pipeline.base.errors import UserError
 from pipeline.recording.masks import masker
 from tests.recording import looks
 from tests.recording.looks import LOOKS

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pipeline.report.figures import confidence
-from pipeline.report.looks import looks
 from pipeline.report.results import gather
+from pipeline.report.styles import looks
 from tests.report import conftest
 from tests.report.conftest import BAND, METHOD, THETA
 

@@ -11,8 +11,8 @@ from matplotlib.patches import Circle
 from scipy.integrate import solve_ivp
 
 from pipeline.report.figures import launches as drawing
-from pipeline.report.looks import looks
 from pipeline.report.results import gather
+from pipeline.report.styles import looks
 from pipeline.sling.model import GRAVITY
 from tests.report.conftest import BAND, METHOD
 

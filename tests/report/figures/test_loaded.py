@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.report.figures import loaded as drawing
-from pipeline.report.looks import looks
+from pipeline.report.styles import looks
 from tests.report.conftest import BAND, METHOD, episode
 from tests.report.toy_replay import toy_replay
 

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from pipeline.report.figures import policy
-from pipeline.report.looks import looks
 from pipeline.report.results import gather
+from pipeline.report.styles import looks
 from tests.report.conftest import BAND, METHOD, launches
 
 

@@ -8,8 +8,8 @@ import pytest
 from matplotlib.patches import Ellipse
 
 from pipeline.report.figures import search
-from pipeline.report.looks import looks
 from pipeline.report.results import gather
+from pipeline.report.styles import looks
 from tests.report.conftest import BAND, METHOD
 
 

@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pipeline.report.looks import looks
 from pipeline.report.page import write_page
 from pipeline.report.report import Report
 from pipeline.report.results import gather
+from pipeline.report.styles import looks
 from tests.report.conftest import BAND, METHOD
 from tests.report.toy_replay import toy_replay
 

@@ -9,12 +9,12 @@ import re
 import numpy as np
 import pytest
 
-from pipeline.errors import UserError
-from pipeline.report.looks import looks
+from pipeline.base.errors import UserError
 from pipeline.report.page import replays as packing
 from pipeline.report.page import write_page
 from pipeline.report.report import Report
 from pipeline.report.results import gather
+from pipeline.report.styles import looks
 from tests.report.conftest import BAND, METHOD
 from tests.report.toy_replay import toy_replay
 

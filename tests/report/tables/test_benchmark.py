@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from pipeline.report import paper
-from pipeline.report.looks import looks
+from pipeline.report.styles import looks
 from pipeline.report.tables.benchmark import ablation, as_table, benchmark, records, spread
 from tests.report.tables.toy_results import TARGETS, floor, launches, result, results
 

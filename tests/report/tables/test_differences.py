@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.report.looks import looks
+from pipeline.report.styles import looks
 from pipeline.report.tables.differences import as_table, claims, compared, records, robust
 from tests.report.tables.toy_results import launches, result, results
 

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from pipeline.params.identification import Prior
-from pipeline.report.looks import looks
 from pipeline.report.results import gather
+from pipeline.report.styles import looks
 from pipeline.report.tables.identified import (
     derived,
     held_out,

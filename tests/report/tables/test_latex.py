@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from pipeline.report.looks import KNOWN, looks
+from pipeline.report.styles import KNOWN, looks
 from pipeline.report.tables.benchmark import as_table, benchmark
 from pipeline.report.tables.latex import NAMES, latex, text
 from tests.report.tables.toy_results import TARGETS, floor, launches, result, results

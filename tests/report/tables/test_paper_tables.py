@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from pipeline.params import load
-from pipeline.report.looks import looks
+from pipeline.report.styles import looks
 from pipeline.report.tables.paper_tables import paper_tables
 from tests.report.conftest import confidence
 from tests.report.tables.toy_results import floor, launches, result, results

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.identify.space import Space
+from pipeline.objective.space import Space
 from pipeline.params import load
-from pipeline.report.looks import looks
+from pipeline.report.styles import looks
 from pipeline.report.tables.parameters import as_table, at_edge, identified, records
 from tests.report.conftest import THETA, confidence
 from tests.report.tables.toy_results import launches, result, results

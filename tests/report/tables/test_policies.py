@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.report.looks import looks
+from pipeline.report.styles import looks
 from pipeline.report.tables.policies import policies
 from tests.report.tables.toy_results import launches, result, results
 

@@ -1,0 +1,89 @@
+"""Aim: the policy's draw for a target, checked by a launch in the calibrated simulator."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.landing.simulator import simulator
+from pipeline.landing.stored import PLAIN, ROBUST, Stored
+from pipeline.launches.spread import landing_intervals
+from pipeline.params import expect_known
+from pipeline.sling.theta import law_discrepancy, load_samples, load_theta
+from stages.start import expect_from
+
+
+def aim(
+    params,
+    band: str,
+    method: str,
+    target: float,
+    root: str | Path = ".",
+    launcher=None,
+    robust: bool = False,
+) -> dict:
+    """Where to draw `band` so that the projectile lands at `target` [m].
+
+    Args:
+        params: The whole of params.yaml.
+        robust: By the policy that was trained over what the identification leaves open.
+        launcher: Simulates draws, shape (N, 2) [m], and with a second argument those of other θ,
+            as `simulator` does; the calibrated simulator by default.
+
+    Returns:
+        draw_y_m, draw_z_m, predicted_landing_m, interval_90_m, hold_force_n, max_force_n (the
+        arm's limit), warnings. The interval holds 90 % of the landings that samples of θ
+        (data/confidence), the law's own error as the recording shows it, and an error of
+        `trials.actuation_error` in the drawn position give. Landing and interval are None where
+        the launch fails.
+
+    Raises:
+        UserError: Unknown band or method, or a file that is missing.
+    """
+    expect_known(params, "band", band)
+    expect_known(params, "method", method)
+    root = Path(root)
+    source = root / "data" / "theta" / band / f"{method}.json"
+    content = load_theta(expect_from(params.run, "theta", band, method, source), band)
+    stored = Stored(params.run, band, method, root)
+    draw = stored.draws(np.array([target]), ROBUST if robust else PLAIN)[0]
+    launcher = launcher or simulator(params, band, content, root=root)
+    launched = launcher(draw[None])
+    warnings = []
+    low, high = params.policy.targets
+    if not low <= target <= high:
+        warnings.append(f"the policy was trained for targets from {low:g} to {high:g} m")
+    landing, interval = None, None
+    if launched.failure[0]:
+        warnings.append(f"the launch fails in simulation: {launched.failure[0]}")
+    else:
+        landing = float(launched.landing_y[0])
+        if abs(landing - target) > 0.05:
+            warnings.append(f"the simulated landing is {landing - target:+.2f} m off the target")
+        samples = load_samples(
+            params.run, root / "data" / "confidence" / band / f"{method}.json", band, method
+        )
+        if samples is None:
+            warnings.append("the interval leaves out how well the parameters are known")
+        error, discrepancy = params.trials.actuation_error, law_discrepancy(content)
+        found = landing_intervals(launcher, draw, samples, error, discrepancy)[0]
+        if np.isfinite(found).all():
+            interval = found.tolist()
+        else:
+            warnings.append("no interval: too many launches beside the predicted one fail")
+    force = float(launched.hold_force[0])
+    if force > params.setup.max_force:
+        warnings.append(
+            f"holding this draw takes {force:.1f} N, more than setup.max_force"
+            f" {params.setup.max_force:g} N"
+        )
+    return {
+        "draw_y_m": float(draw[0]),
+        "draw_z_m": float(draw[1]),
+        "predicted_landing_m": landing,
+        "interval_90_m": interval,
+        "hold_force_n": force if np.isfinite(force) else None,
+        "max_force_n": params.setup.max_force,
+        "warnings": warnings,
+    }

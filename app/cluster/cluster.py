@@ -1,0 +1,287 @@
+"""Stages on a Dask cluster: `sling flow --cluster tcp://scheduler:8786`.
+
+The flow and its Prefect tasks stay on the head; a task sends its stage to a Dask worker and waits.
+A worker runs it in its working copy, the folder that it was started in or SLING_COPY:
+
+- the head's own, in a shared folder: nothing travels;
+- another one: what the stage reads comes by the DVC remote, and what it makes goes back the same
+  way, with its entry of dvc.lock. A copy with other code or parameters is refused.
+"""
+
+from __future__ import annotations
+
+import logging
+import queue
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from app.cluster import exchange
+from app.cluster.worker import Order, introduce, versions, work
+from app.flow import child
+from pipeline.base.errors import UserError
+
+ANSWER = 10.0  # seconds that a scheduler has to answer
+END = 20.0  # seconds that a cancelled stage has to end its processes
+LOOK = 5.0  # seconds between looks at which workers are there
+TOKEN = ".checkpoints/cluster-"
+GPU = "GPU"  # Dask's resource, as in `dask worker --resources GPU=1`
+
+
+class Cluster:
+    """A Dask cluster that runs stages for the working copy `root`, the head; a context manager.
+
+    Attributes:
+        slots: Stages that the flow may hand over at a time. They wait in Dask's queue: workers may
+            come and go.
+
+    Raises:
+        UserError: The extra is not installed, or nothing answers at `address` within ten seconds.
+    """
+
+    slots = 64
+
+    def __init__(self, root: Path, address: str) -> None:
+        self.root, self.address = root, address
+        self.client = connect(address)
+        self._needs: dict[str, exchange.Needs] = {}
+        self._shares: dict[str, bool] = {}  # whether a worker works in the head's copy, by address
+        self._sent: set[str] = set()  # stages whose outputs the remote has
+        self._lock = threading.Lock()
+        self.token = f"{TOKEN}{uuid.uuid4().hex}"
+
+    def __enter__(self) -> Cluster:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        (self.root / self.token).unlink(missing_ok=True)
+        self.client.close()
+
+    def run_stage(
+        self,
+        root: Path,
+        name: str,
+        *,
+        environment: Mapping[str, str],
+        on_line: Callable[[str], None],
+        cancelled: Callable[[], bool] = lambda: False,
+    ) -> bool:
+        """`child.run_stage` on a worker; all that the stage made is here when it returns.
+
+        Args:
+            root: The head's working copy.
+            name: The stage.
+            environment: Of a stage that runs on the head; a worker's stage has the worker's own.
+            on_line: Called in the caller's thread with each line that the stage prints.
+            cancelled: Asked several times a second.
+
+        Returns:
+            Whether the stage ran.
+
+        Raises:
+            UserError: A worker refused it, files cannot travel, its workers died.
+            StageFailed, Cancelled: As `child.run_stage`.
+        """
+        with self._lock:
+            if not self._needs:
+                self._needs = exchange.needs(root)
+                self._begin()
+        needs = self._needs[name]
+        if not needs.travels:
+            on_line("runs on the head: what it makes is Git's, not DVC's")
+            return child.run_stage(
+                root, name, environment=environment, on_line=on_line, cancelled=cancelled
+            )
+        workers = self._some(on_line, cancelled)
+        if not all(self._shares[address] for address in workers):
+            exchange.expect_remote(root)
+            self._send(needs.producers, cancelled)
+        resources = {}
+        if needs.gpu and any(one["resources"].get(GPU) for one in workers.values()):
+            resources = {GPU: 1}
+        elif needs.gpu:
+            on_line(f"no worker offers {GPU} (dask worker --resources {GPU}=1): runs on any")
+        order = Order(
+            name,
+            self.token,
+            exchange.digests(root, needs.sources),
+            needs.producers,
+            exchange.entries(root, (name, *needs.producers)),
+        )
+        ran, entry = self._result(order, resources, on_line, cancelled)
+        if entry:
+            exchange.merge(root, {name: entry})
+            exchange.transfer(root, "pull", (name,), cancelled)
+            with self._lock:
+                self._sent.add(name)
+        return ran
+
+    def _begin(self) -> None:
+        """Leave the token, by which workers know the head's folder; those of killed flows go."""
+        token = self.root / self.token
+        token.parent.mkdir(exist_ok=True)
+        for old in self.root.glob(f"{TOKEN}*"):
+            old.unlink()
+        token.touch()
+
+    def _some(self, on_line, cancelled) -> dict[str, dict]:
+        """The workers, once there are some. Raises UserError, Cancelled."""
+        told = False
+        while not (workers := self._meet(on_line)):
+            if cancelled():
+                raise child.Cancelled
+            if not told:
+                on_line(waits({}, "", {}))
+            told = True
+            time.sleep(0.5)
+        return workers
+
+    def _meet(self, on_line: Callable[[str], None]) -> dict[str, dict]:
+        """The workers that are there, by address; new ones introduce themselves. UserError."""
+        with self._lock:
+            workers = self._workers()
+            new = [address for address in workers if address not in self._shares]
+            if not new:
+                return workers
+            answers = self.client.run(introduce, self.token, workers=new, on_error="return")
+            ours = versions()
+            for address, answer in answers.items():
+                if isinstance(answer, ImportError):
+                    raise UserError(
+                        f"worker {address}: {answer}; start it with the Python of a working copy's"
+                        " .venv, which knows the project"
+                    )
+                if isinstance(answer, BaseException):  # gone again
+                    continue
+                self._shares[address], theirs = answer
+                if differ := differences(ours, theirs):
+                    on_line(f"warning: worker {address} has {differ}")
+            return {address: workers[address] for address in workers if address in self._shares}
+
+    def _workers(self) -> dict[str, dict]:
+        try:
+            return dict(self.client.scheduler_info(n_workers=-1)["workers"])
+        except OSError as error:
+            raise self._gone() from error
+
+    def _gone(self) -> UserError:
+        return UserError(f"the Dask scheduler at {self.address} is gone")
+
+    def _send(self, producers: tuple[str, ...], cancelled: Callable[[], bool]) -> None:
+        """Push what the remote may lack of what these stages made. Raises as `transfer`."""
+        with self._lock:
+            new = tuple(one for one in producers if one not in self._sent)
+            exchange.transfer(self.root, "push", new, cancelled)
+            self._sent.update(new)
+
+    def _result(self, order, resources, on_line, cancelled) -> tuple[bool, dict | None]:
+        """What `work` returns on a worker that has these resources; passes its lines on."""
+        from concurrent.futures import CancelledError
+
+        from distributed import KilledWorker
+
+        with self._listening() as (topic, said):
+            future = self.client.submit(
+                work,
+                order,
+                topic,
+                key=f"{order.name.partition('@')[0]}-{uuid.uuid4().hex}",  # Dask counts by step
+                resources=resources,
+                pure=False,
+            )
+            on, told, looked = "", "", time.monotonic()
+            while True:
+                done = future.done()  # asked first: what was said before it is there by then
+                for kind, text in drained(said, 0.0 if done else 0.2):
+                    on = text if kind == "on" else on
+                    if kind != "end":
+                        on_line(f"on {text}" if kind == "on" else text)
+                if done:
+                    break
+                if cancelled():
+                    future.cancel()
+                    if on:  # wait until its processes have ended
+                        deadline = time.monotonic() + END
+                        while time.monotonic() < deadline:
+                            if any(kind == "end" for kind, _ in drained(said, 0.2)):
+                                break
+                    raise child.Cancelled
+                if time.monotonic() - looked > LOOK:
+                    looked = time.monotonic()
+                    tell = waits(self._workers(), on.split(" ")[0], resources)
+                    if tell and tell != told:
+                        on_line(tell)
+                    told = tell
+            try:
+                return future.result()
+            except KilledWorker as error:
+                raise UserError(
+                    f"{order.name}: the worker died under it {error.allowed_failures + 1} times,"
+                    f" last {error.last_worker.address}; its log says why"
+                ) from error
+            except CancelledError as error:
+                raise self._gone() from error
+
+    @contextmanager
+    def _listening(self) -> Iterator[tuple[str, queue.SimpleQueue]]:
+        """A topic of Dask's for what one stage says, and the queue in which that arrives."""
+        topic, said = f"sling-{uuid.uuid4().hex}", queue.SimpleQueue()
+        self.client.subscribe_topic(topic, lambda event: said.put(event[1]))
+        try:
+            yield topic, said
+        finally:
+            self.client.unsubscribe_topic(topic)
+
+
+def connect(address: str):
+    """A client of the scheduler there. Raises UserError."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise UserError(
+            "--cluster: Dask is not installed: .venv/bin/pip install -e '.[cluster]'"
+            " -c constraints.txt"
+        ) from error
+    for name in ("distributed", "distributed.client"):  # a scheduler that is gone is one line
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        return Client(address, timeout=ANSWER, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise UserError(
+            f"--cluster: no Dask scheduler answers at {address} ({str(error).splitlines()[0]});"
+            " `dask scheduler` starts one and says its address"
+        ) from error
+
+
+def drained(said: queue.SimpleQueue, patience: float) -> Iterator[tuple[str, str]]:
+    """What is in a queue, waiting for the first [s]."""
+    try:
+        yield tuple(said.get(timeout=patience) if patience else said.get_nowait())
+        while True:
+            yield tuple(said.get_nowait())
+    except queue.Empty:
+        return
+
+
+def waits(workers: Mapping[str, dict], on: str, resources: Mapping[str, int]) -> str:
+    """What a stage waits for, in words; empty while it runs `on` a worker that is there."""
+    if on in workers:
+        return ""
+    if on:
+        return f"worker {on} is gone: the stage begins anew on another"
+    fit = [one for one in workers.values() if not resources or one["resources"].get(GPU)]
+    return f"waits for a {'free ' if fit else ''}worker{f' with {GPU}' if resources else ''}"
+
+
+def differences(ours: Mapping[str, str], theirs: Mapping[str, str], most: int = 6) -> str:
+    """Versions that differ, of what both have, in words."""
+    differ = [
+        f"{name} {theirs[name]} (here {ours[name]})"
+        for name in ("python", *sorted(theirs.keys() - {"python"}))
+        if ours.get(name, theirs[name]) != theirs[name]
+    ]
+    more = f" and {len(differ) - most} more" if len(differ) > most else ""
+    return ", ".join(differ[:most]) + more

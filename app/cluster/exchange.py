@@ -1,0 +1,170 @@
+"""What of a stage travels between working copies: its entry of dvc.lock, and its files."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.flow import child, whole
+from pipeline.base.errors import UserError, one_line
+from pipeline.base.files import write_text
+
+ALWAYS = ("dvc.yaml", "params.yaml")  # what DVC itself reads, whatever the stage
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What a stage hangs on; paths are those in the working copy.
+
+    Attributes:
+        sources: Files and folders that no stage makes: code, parameters, recordings.
+        producers: The stages that make the rest of what it reads.
+        gpu: Whether it computes where SLING_DEVICE says.
+        travels: Whether DVC keeps all that it makes, so that a remote can carry it; the report is
+            Git's.
+    """
+
+    sources: tuple[str, ...]
+    producers: tuple[str, ...]
+    gpu: bool
+    travels: bool
+
+
+def needs(root: Path) -> dict[str, Needs]:
+    """What each stage of dvc.yaml needs, by the stage's name."""
+    from dvc.dependency.param import ParamsDependency
+    from dvc.repo import Repo
+    from dvc.stage import PipelineStage
+
+    with Repo(str(root)) as repo:
+        found = [stage for stage in repo.index.stages if isinstance(stage, PipelineStage)]
+        makers = {Path(out.fs_path): {stage.name} for stage in found for out in stage.outs}
+        inside = defaultdict(set)  # by folder, who makes something in it
+        for out, who in makers.items():
+            for folder in out.parents:
+                inside[folder] |= who
+        result = {}
+        for stage in found:
+            deps = {Path(one.fs_path) for one in stage.deps if type(one) is not ParamsDependency}
+            made = {
+                dep: set().union(*(makers.get(one, ()) for one in (dep, *dep.parents)))
+                | inside.get(dep, set())
+                for dep in deps
+            }
+            result[stage.name] = Needs(
+                (*ALWAYS, *_inside(root, (dep for dep in deps if not made[dep]))),
+                tuple(sorted(set().union(*made.values()))),
+                bool((stage.meta or {}).get("gpu")),
+                all(out.use_cache for out in stage.outs),
+            )
+    return result
+
+
+def _inside(root: Path, paths: Iterable[Path]) -> tuple[str, ...]:
+    return tuple(sorted(os.path.relpath(path, root.resolve()) for path in paths))
+
+
+def digests(root: Path, sources: tuple[str, ...]) -> dict[str, str]:
+    """Hash of each source's contents; empty for what is missing."""
+    return {source: _digest(root / source) for source in sources}
+
+
+def _digest(path: Path) -> str:
+    if path.is_file():
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    inside = sorted(one for one in path.rglob("*") if one.is_file() and _counts(one))
+    listing = "".join(f"{one.relative_to(path)} {_digest(one)}\n" for one in inside)
+    return hashlib.sha256(listing.encode()).hexdigest() if path.is_dir() else ""
+
+
+def _counts(path: Path) -> bool:
+    return "__pycache__" not in path.parts and path.suffix not in (".pyc", ".tmp")  # .dvcignore
+
+
+def differing(copy: Path, expected: Mapping[str, str]) -> str | None:
+    """How the sources of a working copy differ from `expected` digests; None if they do not."""
+    if not (copy / ".dvc").is_dir():
+        return "is no working copy of the project; start the worker in one, or set SLING_COPY"
+    present = digests(copy, tuple(expected))
+    differ = [source for source, digest in expected.items() if present[source] != digest]
+    if not differ:
+        return None
+    more = f" and {len(differ) - 1} more" if differ[1:] else ""
+    verb = "differ" if more else "differs" if present[differ[0]] else "is missing"
+    return f"{differ[0]}{more} {verb}; bring it to the head's state (git pull, or copy the files)"
+
+
+def entries(root: Path, names: tuple[str, ...]) -> dict[str, dict]:
+    """What dvc.lock says of these stages, as far as it knows them."""
+    known = _read(root / "dvc.lock").get("stages", {})
+    return {name: known[name] for name in names if name in known}
+
+
+def merge(root: Path, new: Mapping[str, dict]) -> None:
+    """Put entries into dvc.lock: at once or not at all, and never beside a DVC that writes it."""
+    from dvc.utils.serialize import dumps_yaml
+
+    path = root / "dvc.lock"
+    with locked(root):
+        if not whole.write(path, new):  # with more in it than stages
+            content = _read(path)
+            content.setdefault("stages", {}).update(new)
+            write_text(path, dumps_yaml(content))
+
+
+def _read(path: Path) -> dict:
+    from dvc.utils.serialize import parse_yaml
+
+    return parse_yaml(path.read_text(encoding="utf-8"), str(path)) if path.is_file() else {}
+
+
+@contextmanager
+def locked(root: Path) -> Iterator[None]:
+    """Hold DVC's lock of a working copy; wait for it."""
+    from dvc.repo import Repo
+
+    whole.sign_locks()
+    with Repo(str(root), _wait_for_lock=True) as repo, repo.lock:
+        yield
+
+
+def expect_remote(root: Path) -> None:
+    """Raises UserError where `dvc push` would not know where to."""
+    from dvc.config import Config
+
+    if not Config(str(root / ".dvc"))["core"].get("remote"):
+        raise UserError(
+            f"{root}: no default DVC remote, by which files could travel; `dvc remote add -d NAME"
+            " URL` in each working copy, or let all workers start in one shared folder"
+        )
+
+
+def transfer(
+    root: Path, command: str, stages: tuple[str, ...], cancelled: Callable[[], bool]
+) -> None:
+    """`dvc push` or `dvc pull` what these stages made, by the default remote.
+
+    What lies where a pulled file belongs gives way, as it does when DVC runs a stage.
+
+    Raises:
+        UserError: It failed.
+        child.Cancelled: `cancelled`, asked several times a second, became true.
+    """
+    if not stages:
+        return
+    force = ("--force",) if command == "pull" else ()
+    status, said = child.dvc(
+        root, (command, *force, *stages), environment=os.environ, cancelled=cancelled
+    )
+    if status:
+        text = "\n".join(said)
+        why = one_line(text.partition("ERROR: ")[2] or text)
+        raise UserError(
+            f"{root}: dvc {command} {' '.join(stages)}: {why or f'exit status {status}'}"
+        )

@@ -1,0 +1,160 @@
+"""What the UI shows of what a stage wrote: pictures and tables, drawn as the report draws them."""
+
+from __future__ import annotations
+
+import base64
+import re
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+from app.flow.graph import Stage
+
+LINK = re.compile(r"\[([^\]]*)\]\((?!https?:)[^)]*\)")  # to a file beside the report
+CHAPTERS = ("In short", "The paper's tables")
+DRAWING = threading.Lock()  # pyplot knows one thread
+
+
+def artifact(stage: Stage, root: Path) -> str:
+    """What there is to show of a stage that has run, as markdown; "" of most steps.
+
+    Pictures are in it as data URIs, for Prefect's server keeps no files.
+    """
+    make = MAKERS.get(stage.step.removeprefix("ablation_"))
+    band, _, method = stage.item.partition("-")
+    return "\n".join(make(Path(root), band, method)) if make else ""
+
+
+def _drawn(name: str, draw: Callable[[Path], None]) -> str:
+    with DRAWING, tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "picture.png")
+        draw(path)
+        content = base64.b64encode(path.read_bytes()).decode("ascii")
+    return f"![{name}](data:image/png;base64,{content})\n"
+
+
+def _episode(root: Path, band: str, method: str) -> Iterator[str]:
+    from pipeline.episode.episode import Episode
+    from pipeline.params import load
+    from pipeline.report.figures import episode
+
+    recorded = Episode.load(root / "data" / "episodes" / band)
+    frames = episode.moments(recorded)
+    diameter = load(root / "params.yaml").bands[band].diameter
+    yield _drawn("clouds", lambda path: episode.clouds(path, recorded, {}, {}, frames, diameter))
+
+
+def _theta(root: Path, band: str, method: str) -> Iterator[str]:
+    import pandas as pd
+
+    from pipeline.params import load
+    from pipeline.report.figures import search
+    from pipeline.report.losses import has_another_loss
+    from pipeline.report.styles import looks
+    from pipeline.report.tables import parameters
+    from pipeline.report.tables.benchmark import PAPER
+    from pipeline.report.tables.cells import markdown
+    from pipeline.sling.theta import load_theta
+
+    params, named = load(root / "params.yaml"), looks([method])
+    theta = load_theta(_file(root, "theta", band, f"{method}.json"), band)
+    steps = [
+        pd.read_parquet(_file(root, step, band, f"{method}.parquet"))
+        for step in ("history", "refined")
+    ]
+    result = SimpleNamespace(  # as much of report.results.Result as is there by now
+        band=band,
+        method=method,
+        theta=theta,
+        confidence=theta.get("confidence") or {},
+        history=pd.concat([one for one in steps if len(one)], ignore_index=True),
+    )
+    own = {method} if has_another_loss(dict(params.methods[method].weights)) else set()
+    yield _drawn("convergence", lambda path: search.convergence(path, {method: result}, named, own))
+    table2 = parameters.identified(SimpleNamespace(methods={band: {method: result}}), params)
+    mine = [row for row in table2 if (row.band, row.method) == (band, method)]
+    heads, rows = parameters.as_table([row for row in mine if row.source != PAPER], named)
+    turned = [list(pair) for pair in zip(heads, *rows, strict=True)]
+    yield markdown((["identified", "value (90 % interval)"], turned))
+
+
+def _policy(root: Path, band: str, method: str) -> Iterator[str]:
+    import pandas as pd
+
+    from pipeline.landing.stored import ROBUST, Stored
+    from pipeline.params import load
+    from pipeline.report.figures import policy
+    from pipeline.report.styles import looks
+    from pipeline.report.tables.cells import markdown
+    from pipeline.report.tables.policies import policies
+
+    stored = Stored(load(root / "params.yaml").run, band, method, root)
+    named = looks([method])
+    result = SimpleNamespace(
+        band=band,
+        method=method,
+        training=pd.read_parquet(stored.folder() / "training.parquet"),
+        card=stored.card(),
+        robust_card=stored.card(ROBUST) if ROBUST in stored.kinds() else None,
+    )
+    yield _drawn("training", lambda path: policy.training(path, {method: result}, named))
+    yield markdown(policies([result], named))
+
+
+def _trials(root: Path, band: str, method: str) -> Iterator[str]:
+    import pandas as pd
+
+    from pipeline.report.figures import policy
+    from pipeline.report.styles import looks
+    from pipeline.report.tables.cells import markdown
+    from pipeline.report.tables.landings import predictions
+
+    trials, named = (
+        pd.read_parquet(_file(root, "trials", band, f"{method}.parquet")),
+        looks([method]),
+    )
+    if trials.landing_y.notna().any():
+        yield _drawn("landings", lambda path: policy.landings(path, trials, named, [method]))
+    for kind, launched in trials.groupby("kind", sort=True):
+        table = predictions(launched) if kind == "predicted" else _errors(launched)
+        yield f"{kind.capitalize()} launches\n\n{markdown(table)}"
+
+
+def _errors(trials) -> tuple[list[str], list[list[str]]]:
+    """Landing errors of launches by policy and target, as in the report."""
+    from pipeline.report.tables.cells import NONE, centimetres
+    from pipeline.report.tables.landings import landing_errors
+
+    heads = ["policy", "target [m]", "launches", "failed", "mean miss [cm]", "±", "bias [cm]"]
+    rows = []
+    for policy, launched in trials.groupby(trials.policy.fillna(NONE), sort=True):
+        for target, one in landing_errors(launched).items():
+            where = "all" if target == "all" else f"{target:.3f}"
+            counts = str(one["launches"]), str(one["failed"])
+            figures = (centimetres(one[name]) for name in ("mean", "std", "bias"))
+            rows.append([policy, where, *counts, *figures])
+    return heads, rows
+
+
+def _report(root: Path, band: str, method: str) -> Iterator[str]:
+    text = (root / "reports" / "README.md").read_text(encoding="utf-8")
+    for chapter in text.split("\n## ")[1:]:
+        title, _, content = chapter.partition("\n")
+        if title in CHAPTERS:
+            without_links = LINK.sub(r"\1", content)
+            yield f"## {title}\n{without_links}"
+
+
+def _file(root: Path, step: str, band: str, name: str) -> Path:
+    return root / "data" / step / band / name
+
+
+MAKERS: dict[str, Callable[[Path, str, str], Iterator[str]]] = {
+    "episode": _episode,
+    "theta": _theta,
+    "policy": _policy,
+    "trials": _trials,
+    "report": _report,
+}

@@ -1,0 +1,198 @@
+"""A stage as a child: `dvc repro` of it alone, in a process group that ends with us."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from itertools import zip_longest
+from pathlib import Path
+from threading import Event, Thread
+
+from app.flow import guard, whole
+from pipeline.base.errors import UserError
+
+# What DVC itself says around a stage's own lines.
+CHATTER = re.compile(
+    r"$|WARNING: '.*' is empty|Running stage '|> |Updating lock file|Generating lock file"
+    r"|Use `dvc push`|To track the changes with git|\tgit add|To enable auto staging"
+    r"|\tdvc config|Data and pipelines are up to date|Stage '.*' (is cached|didn't change)"
+    r"|ERROR: failed to reproduce"
+)
+OWN_ERROR = re.compile(r"error: (.*)", re.IGNORECASE)
+COMMAND_FAILED = re.compile(
+    r"ERROR: failed to reproduce .*: failed to run: .*, exited with (-?\d+)$"
+)
+DVC_FAILED = re.compile(r"ERROR: failed to reproduce [^:]*: (.*)")
+
+
+class StageFailed(UserError):
+    """A stage failed; the message is its name and its own clear line."""
+
+
+class Cancelled(Exception):
+    """`cancelled` became true: the stage was ended."""
+
+
+def stage_environment(cores: int) -> dict[str, str]:
+    """What a stage gets: all that is exported here, `cores` threads, and this Python first.
+
+    DVC starts stages by $SHELL: a C shell would read its settings, and nologin is none.
+    """
+    path = [str(Path(sys.executable).parent), *filter(None, [os.environ.get("PATH")])]
+    return {
+        **os.environ,
+        "PATH": os.pathsep.join(path),
+        "SHELL": "/bin/sh",
+        "PYTHONUNBUFFERED": "1",  # its lines as they come
+        "SLING_WORKERS": str(cores),
+        "OMP_NUM_THREADS": str(cores),
+    }
+
+
+def run_stage(
+    root: Path,
+    name: str,
+    *,
+    environment: Mapping[str, str],
+    on_line: Callable[[str], None],
+    cancelled: Callable[[], bool] = lambda: False,
+) -> bool:
+    """Let DVC run one stage, whose producers are done; wait until it has ended.
+
+    Args:
+        root: The working copy.
+        name: As DVC calls it.
+        environment: The whole environment of the stage.
+        on_line: Called with each line of the stage, without its end, as it comes; DVC's are kept
+            back.
+        cancelled: Asked several times a second; once true, the stage and all its processes end.
+
+    Returns:
+        Whether the stage ran; False where DVC found it fresh, or had its outputs in its cache.
+
+    Raises:
+        StageFailed: With the stage's clear line.
+        Cancelled: All its processes have ended.
+    """
+    status, said = dvc(
+        root,
+        ("repro", "-s", name),
+        environment=environment,
+        on_line=on_line,
+        cancelled=cancelled,
+    )
+    if status == 0:
+        return any(line == f"Running stage '{name}':" for line in said)
+    raise StageFailed(f"{name}: {_reason(said, status)}")
+
+
+def dvc(
+    root: Path,
+    arguments: Sequence[str],
+    *,
+    environment: Mapping[str, str],
+    on_line: Callable[[str], None] = lambda line: None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> tuple[int, list[str]]:
+    """A DVC command in `root`, which waits for DVC's lock; see `run_stage`.
+
+    Returns:
+        Its exit status, and all lines that it said.
+
+    Raises:
+        Cancelled: All its processes have ended.
+    """
+    command = [sys.executable, "-P", whole.__file__, "--wait-for-lock", *arguments]
+    said: list[str] = []
+    if cancelled():
+        raise Cancelled
+    with _guarded(command, root, environment, cancelled) as process:
+        for line in process.stdout:
+            line = line.rstrip("\n")
+            said.append(line)
+            ending = cancelled() or (process.poll() or 0) < 0  # what an interrupt makes it say
+            if not (ending or CHATTER.match(line)):
+                on_line(line)
+    if process.returncode and cancelled():
+        raise Cancelled
+    return process.returncode, said
+
+
+@contextmanager
+def _guarded(
+    command: list[str], root: Path, environment: Mapping[str, str], cancelled: Callable[[], bool]
+) -> Iterator[subprocess.Popen]:
+    """The command behind its guard, with its lines on stdout; nothing of it is left afterwards."""
+    process = subprocess.Popen(
+        # A bare interpreter: it starts in a hundredth of a second.
+        [sys.executable, "-I", "-S", guard.__file__, *command],
+        cwd=root,
+        env=dict(environment),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        encoding="utf-8",
+        errors="replace",
+        start_new_session=True,  # a terminal's Ctrl-C is for us alone
+        close_fds=False,  # the flow's lock is held until its stages have ended, see run.py
+    )
+    group, ended = 0, Event()
+
+    def watch() -> None:
+        while not (ended.wait(0.1) or cancelled() or process.poll() is not None):
+            pass
+        with suppress(OSError):
+            process.stdin.close()
+        if process.poll() is not None and group:
+            guard.end_group(group)  # nobody is left in it, but where the guard itself was killed
+
+    watcher = Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        for line in process.stdout:  # the loader's own come first, such as on LD_PRELOAD
+            if line.strip().isdecimal():
+                group = int(line)
+                break
+        yield process
+    finally:
+        ended.set()
+        watcher.join()  # the guard's stdin is closed now
+        try:
+            process.wait(guard.GRACE + 5)
+        except subprocess.TimeoutExpired:
+            process.kill()
+        if process.wait() < 0 and group:
+            guard.end_group(group)
+        process.stdout.close()
+
+
+def _reason(said: list[str], status: int) -> str:
+    """Why a stage failed: its own line of error, else its last line, else what DVC says."""
+    if signal := _signal(status):  # whatever the stage said of that; DVC's comes by the guard
+        return f"{'its guard' if status < 0 else 'DVC'} was killed by signal {signal}"
+    own = [line for line in said if not CHATTER.match(line)]
+    exits = [int(found[1]) for line in said if (found := COMMAND_FAILED.match(line))]
+    if not exits:  # DVC failed before or after the stage's command
+        for line, following in zip_longest(said, said[1:], fillvalue=""):
+            if found := DVC_FAILED.match(line):  # "... blocked by:", and by whom
+                own.append(f"{found[1]} {following.strip()}" if line.endswith(":") else found[1])
+    errors = [found[1] for line in own if (found := OWN_ERROR.match(line))]
+    if errors:
+        return errors[-1]
+    code = exits[-1] if exits else status
+    if signal := _signal(code):
+        return f"was killed by signal {signal}"
+    return own[-1] if own else f"ended with exit status {code}"
+
+
+def _signal(status: int) -> int:
+    """The signal that ended a process: 9 of -9, as Python has it, and of 137, as a shell; else 0.
+
+    A stage's comes as either: some shells stay around it, others become it.
+    """
+    return abs(status) % 128 if status < 0 or 128 < status < 192 else 0

@@ -1,0 +1,1 @@
+"""The pull that a robot is to record: trajectory, limits, files."""

@@ -1,0 +1,234 @@
+"""`sling plan`: how a robot has to move so that its recording of a band can be used."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from app.plan import limits, messages
+from app.plan.force import Held, Prediction, predict, read_earlier
+from app.plan.hand import along_pull, quaternion
+from app.plan.pull import hanging_middle, trajectory_of
+from app.plan.trajectory import Trajectory
+from pipeline.base.errors import UserError
+from pipeline.base.files import replacing, write_json, write_text
+from pipeline.params import expect_known
+from pipeline.recording.input.frames import Transform
+
+RATES = (1.0, 10_000.0)  # Hz of the CSV
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A recording to be made.
+
+    Attributes:
+        band: Its name.
+        trajectory: Of the tool centre point, frame O.
+        base: Frame O to the robot's base.
+        base_source: Where that came from, in words.
+        frame: Name of the base.
+        hand: Orientation of the hand in the base, quaternion x, y, z, w.
+        stretch: Of the drawn band.
+        force: Predicted, to hold it.
+        max_force: That the arm may hold [N].
+        grip_force: Of each finger [N].
+        held_time, most_time: From grasp to release, and what the episode leaves for it [s].
+        hanging_source: Where the height of the hanging middle came from.
+    """
+
+    band: str
+    trajectory: Trajectory
+    base: Transform
+    base_source: str
+    frame: str
+    hand: np.ndarray
+    stretch: float
+    force: Prediction
+    max_force: float
+    grip_force: float
+    held_time: float
+    most_time: float
+    hanging_source: str
+
+    def rows(self) -> list[dict]:
+        """One row a phase, numbers in SI units."""
+        trajectory = self.trajectory
+        speeds, accelerations = trajectory.peaks(1), trajectory.peaks(2)
+        return [
+            {
+                "phase": phase.name,
+                "start_s": round(float(trajectory.times[i]), 6),
+                "end_s": round(float(trajectory.times[i + 1]), 6),
+                "fork": _plain(phase.to),
+                "base": _plain(self.base.apply(phase.to)),
+                "opening_m": float(phase.opening),
+                "max_speed_m_s": float(speeds[i]),
+                "max_acceleration_m_s2": float(accelerations[i]),
+            }
+            for i, phase in enumerate(trajectory.phases)
+        ]
+
+    def content(self) -> dict:
+        """Everything that the plan says of itself, for JSON."""
+        return {
+            "band": self.band,
+            "frame": self.frame,
+            "base_to_fork": [*_plain(self.base.translation), *_plain(self._fork_in_base)],
+            "base_to_fork_source": self.base_source,
+            "orientation": _plain(self.hand),
+            "hanging_source": self.hanging_source,
+            "duration_s": round(self.trajectory.duration, 6),
+            "grasp_s": round(self.trajectory.start_of("grasp"), 6),
+            "release_s": round(self.trajectory.start_of("release"), 6),
+            "held_s": round(self.held_time, 6),
+            "held_most_s": round(self.most_time, 6),
+            "stretch": self.stretch,
+            "hold_force_n": self.force.force,
+            "hold_force_source": self.force.source,
+            "max_force_n": self.max_force,
+            "phases": self.rows(),
+        }
+
+    @property
+    def _fork_in_base(self) -> np.ndarray:
+        return quaternion(self.base.rotation)
+
+    def to_json(self, files: list[Path]) -> str:
+        written = [str(path) for path in files]
+        return json.dumps({**self.content(), "files": written}, indent=2, allow_nan=False)
+
+    def to_text(self, files: list[Path]) -> str:
+        lines = [
+            f"{'phase':<10}{'from':>8}{'to':>8}   {'ends at, frame O':<26}"
+            f"{'in ' + self.frame:<26}{'fingers':>8}{'speed':>8}{'accel.':>8}",
+            f"{'':<10}{'s':>8}{'s':>8}   {'m':<26}{'m':<26}{'m':>8}{'m/s':>8}{'m/s^2':>8}",
+        ]
+        for row in self.rows():
+            fork, base = (" ".join(f"{v:+.4f}" for v in row[k]) for k in ("fork", "base"))
+            lines.append(
+                f"{row['phase']:<10}{row['start_s']:8.3f}{row['end_s']:8.3f}   {fork:<26}{base:<26}"
+                f"{row['opening_m']:8.3f}{row['max_speed_m_s']:8.3f}"
+                f"{row['max_acceleration_m_s2']:8.3f}"
+            )
+        force = self.force
+        if force.force is None:
+            known = force.source
+        else:
+            known = f"{force.force:.1f} N of {self.max_force:g} N ({force.source})"
+        facts = {
+            "hand": f"{' '.join(f'{v:+.4f}' for v in self.hand)} (x y z w in {self.frame})",
+            "fork": f"in {self.frame} by {self.base_source}",
+            "middle": self.hanging_source,
+            "window": f"grasp to release {self.held_time:.2f} s of {self.most_time:.2f} s",
+            "stretch": f"{self.stretch:.2f} of the rest length",
+            "force": known,
+        }
+        lines += ["", *(f"{name:<10}{value}" for name, value in facts.items())]
+        lines += ["", *(f"wrote {path}" for path in files)]
+        return "\n".join(lines)
+
+    def write(self, folder: Path, rate: float) -> list[Path]:
+        """Write trajectory.csv, waypoints.json, gripper.json and plan.png into a folder.
+
+        Everything is made before the first file is written. Raises UserError.
+        """
+        low, high = RATES
+        if not low <= rate <= high:
+            raise UserError(f"--rate: must be between {low:g} and {high:g} Hz, got {rate:g}")
+        pose = self.trajectory, self.base, self.hand
+        table = messages.csv_text(*pose, rate)
+        waypoints = messages.trajectory_message(*pose, self.frame)
+        gripper = messages.gripper_commands(self.trajectory, self.grip_force)
+        picture = io.BytesIO()
+        messages.draw_picture(self.trajectory, picture)
+        names = ("trajectory.csv", "waypoints.json", "gripper.json", "plan.png")
+        files = [Path(folder, name) for name in names]
+        try:
+            write_text(files[0], table)
+            write_json(files[1], waypoints)
+            write_json(files[2], gripper)
+            with replacing(files[3]) as temporary:
+                temporary.write_bytes(picture.getvalue())
+        except OSError as error:
+            raise UserError(f"{folder}: cannot be written ({error.strerror})") from error
+        return files
+
+
+def plan_recording(
+    params,
+    band: str,
+    *,
+    draw: tuple[float, float] | None = None,
+    theta: Path | None = None,
+    recording: Path | None = None,
+) -> Plan:
+    """Plan the recording of a band of params.yaml and check it against every limit.
+
+    Args:
+        draw: Drawn position (y, z), frame O [m]; plan.draw if None.
+        theta: θ file that says what holding the draw takes.
+        recording: Earlier one of this rig, whose /tf_static says where the fork stands in the
+            robot's base where setup.base_to_fork does not; and of this band, for the force.
+
+    Raises:
+        UserError: in one line, where a limit is broken or something is not known.
+    """
+    expect_known(params, "band", band)
+    setup, about = params.setup, params.bands[band]
+    settings = params.plan if draw is None else params.plan.model_copy(update={"draw": draw})
+    earlier = None if recording is None else read_earlier(recording, params)
+    if earlier is not None:
+        base, source, frame = earlier.base.inverse(), earlier.base_source, earlier.frame
+    elif setup.base_to_fork is not None:
+        base, source = Transform.of(setup.base_to_fork), "setup.base_to_fork"
+        frame = settings.frame
+    else:
+        raise UserError(
+            "setup.base_to_fork is null, so nothing says where the fork stands in the robot's base:"
+            " measure it (docs/recording.md, Calibration), or give an earlier recording whose"
+            " /tf_static has it: --recording FILE.mcap"
+        )
+    drawn = np.array([0.0, *settings.draw])
+    held = Held.of(about, setup)
+    limits.check_draw(setup, held, drawn)
+    hand = _orientation(settings.orientation, base, drawn)
+    axis = (base.rotation.inv() * hand).apply([0.0, 0.0, 1.0])
+    limits.check_hand(settings, about, axis, drawn)
+    trajectory = trajectory_of(settings, setup, params.episode, about, axis)
+    limits.check_motion(trajectory, settings)
+    limits.check_floor(trajectory, setup, settings)
+    held_time, most_time = limits.check_window(trajectory, settings, params.episode)
+    prediction = predict(params, band, drawn, theta, earlier)
+    limits.check_force(setup, held, drawn, prediction)
+    below = -hanging_middle(settings, setup, about)[2]
+    by = "as a string's catenary" if settings.hanging is None else "plan.hanging"
+    return Plan(
+        band=band,
+        trajectory=trajectory,
+        base=base,
+        base_source=source,
+        frame=frame,
+        hand=quaternion(hand),
+        stretch=held.stretch(drawn),
+        force=prediction,
+        max_force=setup.max_force,
+        grip_force=setup.grip_force,
+        held_time=held_time,
+        most_time=most_time,
+        hanging_source=f"hangs {below:.3f} m below the tips ({by})",
+    )
+
+
+def _orientation(given: tuple[float, ...] | None, base: Transform, drawn: np.ndarray) -> Rotation:
+    """Of the hand in the base: as given, else looking along the pull at the fork."""
+    return base.rotation * along_pull(drawn) if given is None else Rotation.from_quat(given)
+
+
+def _plain(vector: np.ndarray) -> list[float]:
+    return [round(float(value), 9) + 0.0 for value in vector]

@@ -1,0 +1,76 @@
+"""The phases of a recording: rest, grasp the hanging middle, lift, pull, pause, let go, wait."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.optimize import brentq
+
+from app.plan.trajectory import Phase, Trajectory, leg_time
+
+TICK = 0.001  # s: phases last whole ticks
+SPARE = 0.5  # s beyond what the episode asks for, since nobody starts a recorder on the tick
+
+
+def catenary_sag(length: float, width: float) -> float:
+    """How far the middle of a string hangs below its ends, `width` apart at equal heights [m].
+
+    An inextensible string without bending stiffness hangs as z = a cosh(x / a): its length is
+    2 a sinh(width / 2 a), and its sag a (cosh(width / 2 a) - 1).
+    """
+    ratio = length / width
+    if ratio <= 1:
+        raise ValueError(f"a string of {length} m does not reach across {width} m")
+    high = math.sqrt(6 * (ratio - 1))  # since sinh(u) / u > 1 + u^2 / 6
+    u = brentq(lambda u: math.sinh(u) / u - ratio, 1e-9 * high, high) if high > 1e-4 else high
+    return width / (2 * u) * (math.cosh(u) - 1)
+
+
+def hanging_middle(plan, setup, band) -> np.ndarray:
+    """Where the fingers take the band, frame O, shape (3,): plan.hanging, else a catenary's."""
+    below = plan.hanging
+    if below is None:
+        below = catenary_sag(band.rest_length, setup.fork_width)
+    return np.array([0.0, 0.0, -below])
+
+
+def trajectory_of(plan, setup, episode, band, axis: np.ndarray) -> Trajectory:
+    """The whole recording, frame O.
+
+    Args:
+        plan, setup, episode, band: Those sections of params.
+        axis: Unit vector along which the fingers point, shape (3,); they come and go along it.
+    """
+    middle = hanging_middle(plan, setup, band)
+    level = np.zeros(3)
+    drawn = np.array([0.0, *plan.draw])
+    start, end = middle - plan.approach * axis, drawn - plan.retreat * axis
+    wide, closed = plan.gripper.open, plan.gripper.closed
+
+    def leg(name: str, begin: np.ndarray, to: np.ndarray, speed: float, opening: float) -> Phase:
+        time = leg_time(float(np.linalg.norm(to - begin)), speed, plan.max_acceleration)
+        return Phase(name, to, _ticks(time), opening)
+
+    retreat = leg("retreat", drawn, end, plan.max_speed, wide)
+    phases = [
+        Phase("lead-in", start, _ticks(plan.lead_in), wide),
+        leg("approach", start, middle, plan.max_speed, wide),
+        Phase("grasp", middle, _ticks(plan.finger_time), closed),
+        leg("lift", middle, level, plan.max_speed, closed),
+        leg("pull", level, drawn, plan.pull_speed, closed),
+        Phase("pause", drawn, _ticks(plan.pause), closed),
+        Phase("release", drawn, _ticks(plan.finger_time), wide),
+    ]
+    so_far = sum(phase.duration for phase in phases)
+    wait = max(
+        plan.wait,
+        episode.tail + SPARE - plan.finger_time,
+        episode.duration + SPARE - so_far - retreat.duration,
+    )
+    phases += [Phase("swing", drawn, _ticks(wait), wide), retreat]
+    return Trajectory.through(start, wide, [phase for phase in phases if phase.duration > 0])
+
+
+def _ticks(time: float) -> float:
+    return math.ceil(round(time / TICK, 6)) * TICK

@@ -1,0 +1,74 @@
+"""The hand's pose for a draw, in the robot's base: how a robot carries out what `aim` says.
+
+The projectile sits at the band's middle, between the finger tips: at the tool centre point, whose
+pose the recording tracked. The hand's z points from the draw through the origin, its x along the
+fork (app/plan/hand.py), so that band, hand and launch lie in one plane: "we align the
+projectile direction (i.e., elevation angle) with the plane formed by the stretched sling".
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from app.plan.hand import along_pull, quaternion
+from pipeline.base.errors import UserError
+from pipeline.recording.input.frames import Transform
+
+
+def posed(answer: dict, params, band: str, root: str | Path = ".") -> dict:
+    """The answer of `aim` with the hand's pose for its draw.
+
+    Returns:
+        The answer, and before its warnings: pitch_rad of the launch above the horizon; tcp_frame,
+        tcp_position_m and tcp_quaternion_xyzw of the tool centre point in the robot's base. These
+        are None, with a warning, where nothing says where the fork stands in the base.
+    """
+    drawn = np.array([0.0, answer["draw_y_m"], answer["draw_z_m"]])
+    warnings, frame, position, turn = list(answer["warnings"]), None, None, None
+    try:
+        fork, frame = fork_in_base(params, band, root)
+    except UserError as error:
+        warnings.append(f"no pose of the hand in the robot's base: {error}")
+    else:
+        position = [round(float(value), 6) + 0.0 for value in fork.apply(drawn)]
+        turn = quaternion(fork.rotation * along_pull(drawn)).tolist()
+    return {
+        **{name: value for name, value in answer.items() if name != "warnings"},
+        "pitch_rad": math.atan2(-drawn[2], -drawn[1]),
+        "tcp_frame": frame,
+        "tcp_position_m": position,
+        "tcp_quaternion_xyzw": turn,
+        "warnings": warnings,
+    }
+
+
+def fork_in_base(params, band: str, root: str | Path = ".") -> tuple[Transform, str]:
+    """Frame O to the robot's base, and the base's name, as the band's recording has them.
+
+    There, setup.base_to_fork comes before /tf_static; without a recording that can be read it
+    stands alone, and plan.frame names the base. Raises UserError where neither tells.
+    """
+    given = params.setup.base_to_fork
+    try:
+        fork, frame = _recorded(Path(root, "data", "raw", f"{band}.mcap"), params.setup)
+    except UserError:
+        if given is None:
+            raise
+        fork, frame = Transform.of(given), ""
+    return fork, frame or params.plan.frame
+
+
+def _recorded(path: Path, setup) -> tuple[Transform, str]:
+    if not path.is_file():
+        raise UserError(
+            f"setup.base_to_fork is null and {path} is not there: measure where the fork stands"
+            " (docs/recording.md, Calibration)"
+        )
+    from pipeline.recording.geometry import geometry_of
+    from pipeline.recording.input.reader import read_recording
+
+    recording = read_recording(path, setup)
+    return geometry_of(recording, setup).base.inverse(), recording.pose.frame

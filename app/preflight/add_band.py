@@ -1,0 +1,120 @@
+"""Bring a recorded band into the project: check it, keep a copy, and name it in params.yaml."""
+
+from __future__ import annotations
+
+import io
+import re
+import shutil
+from pathlib import Path
+
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.nodes import ScalarNode
+from ruamel.yaml.representer import RoundTripRepresenter
+
+from app.preflight.check import check_recording
+from app.preflight.report import Report
+from pipeline.base.errors import UserError
+from pipeline.base.files import replacing, write_text
+from pipeline.params import Params, load, parse
+from pipeline.recording.input.container import expect_file, sha256
+
+NAME = re.compile(r"[a-z][a-z0-9_]*")
+
+
+def add_band(
+    name: str,
+    recording: Path,
+    mass: float,
+    diameter: float = 0.010,
+    rest_length: float = 0.52,
+    params_path: Path | str = "params.yaml",
+    root: Path | str = ".",
+) -> str:
+    """Check a recording, copy it to data/raw and add its band to params.yaml and to run.bands.
+
+    Nothing is written unless everything is right; params.yaml comes last. Adding the same band
+    with the same recording again changes nothing.
+
+    Args:
+        name: Of the band: small letters, digits and _.
+        recording: MCAP file.
+        mass: Of the band [kg].
+        diameter: Of its section [m].
+        rest_length: Between the clamps [m].
+        params_path: The params.yaml to extend.
+        root: Folder of the project.
+
+    Returns:
+        What was done, in words, and below it what of the recording costs accuracy.
+
+    Raises:
+        UserError: in one line, about the first thing that is wrong.
+    """
+    if not NAME.fullmatch(name):
+        raise UserError(f"band name {name!r}: use small letters, digits and _, a letter first")
+    recording, params_path = Path(recording), Path(params_path)
+    raw = Path(root, "data", "raw", f"{name}.mcap")
+    before = load(params_path)
+    band = {
+        "source": "recording",
+        "mass": mass,
+        "diameter": diameter,
+        "rest_length": rest_length,
+    }
+    known = name in before.bands
+    if known and before.bands[name].model_dump() != band:
+        raise UserError(
+            f"{params_path}: bands.{name} is there already with other values: choose another name,"
+            " or edit it"
+        )
+    text = _with_band(params_path, name, band)
+    after = parse(text, str(params_path))
+    expect_file(recording)
+    same = raw.exists() and sha256(raw) == sha256(recording)
+    if raw.exists() and not same:
+        raise UserError(f"{raw} is there already with other content: choose another name")
+    if same and known and name in before.run.bands:
+        return f"{name} is there already: nothing to do"
+
+    report = _checked(recording, after, name)
+    if not same:
+        with replacing(raw) as temporary:
+            shutil.copyfile(recording, temporary)
+    write_text(params_path, text)
+    facts = report.signals
+    added = (
+        f"{name} added: peak force {facts['peak_force_n']:.2f} N, release at"
+        f" {facts['release_s']:.3f} s; `dvc repro` identifies it"
+    )
+    return "\n".join([added, *(f"  - but {caution}" for caution in report.cautions)])
+
+
+def _checked(recording: Path, params: Params, name: str) -> Report:
+    report = check_recording(recording, params, params.bands[name])
+    if not report.usable:
+        raise UserError(f"{recording}: {report.problem}")
+    return report
+
+
+def _null(representer: RoundTripRepresenter, _: None) -> ScalarNode:
+    """Written out as it stands in the file, where ruamel would leave it empty."""
+    return representer.represent_scalar("tag:yaml.org,2002:null", "null")
+
+
+def _with_band(path: Path, name: str, band: dict[str, object]) -> str:
+    """The text of params.yaml with the band in `bands` and in `run.bands`, all else as it was."""
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.width = 10_000
+    yaml.representer.add_representer(type(None), _null)
+    content = yaml.load(path.read_text(encoding="utf-8"))
+    if name not in content["bands"]:
+        entry = CommentedMap(band)
+        entry.fa.set_flow_style()
+        content["bands"][name] = entry
+    if name not in content["run"]["bands"]:
+        content["run"]["bands"].append(name)
+    stream = io.StringIO()
+    yaml.dump(content, stream)
+    return stream.getvalue()

@@ -1,0 +1,252 @@
+"""What is in a recording, what is missing or wrong, and whether it can be used."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from app.preflight.coverage import by_phase, coverage, over_time
+from app.preflight.report import Report, Topic
+from app.preflight.tips import Tips, along, measure_tips
+from app.preflight.verdict import cautions_of
+from pipeline.base.errors import UserError
+from pipeline.params import expect_known
+from pipeline.recording.build import Processed, process_recording
+from pipeline.recording.delays import Delays, delays_of
+from pipeline.recording.geometry import geometry_of
+from pipeline.recording.input.container import Container, read_container, sha256
+from pipeline.recording.input.frames import Transform
+from pipeline.recording.input.reader import Recording, recording_of
+from pipeline.recording.signals import Signals, signals_of
+from pipeline.recording.view import Scene
+
+__all__ = ["Look", "check_recording", "coverage", "look_at"]
+
+ANY_BAND = SimpleNamespace(diameter=0.010, rest_length=0.52)  # where none is named
+ASSUMED = "assumed: give --band, or --diameter and --rest-length"
+
+
+@dataclass(frozen=True)
+class Look:
+    """The report, and as much of the recording as could be worked out for those who draw it."""
+
+    report: Report
+    recording: Recording | None = None
+    done: Processed | None = None
+    tips: Tips | None = None
+
+
+def check_recording(path: Path, params: object, band: object | None = None) -> Report:
+    """Look at a recording as far as it can be read.
+
+    Args:
+        path: The MCAP file.
+        params: The whole params.
+        band: Has diameter and rest_length [m]; a common one if None.
+
+    Raises:
+        UserError: where there is no MCAP file to look at. Anything else is in the report.
+    """
+    return look_at(path, params, band).report
+
+
+def look_at(path: Path, params: object, band: object | None = None, source: str = "given") -> Look:
+    """As `check_recording`, with what it was told from; `source` says where `band` is from."""
+    container = read_container(Path(path))
+    about = band or ANY_BAND
+    report = Report(
+        path=str(path),
+        sha256=sha256(path),
+        problem=None,
+        losses=container.losses,
+        notes=container.notes,
+        topics=_topics(container),
+        band={
+            "diameter_m": float(about.diameter),
+            "rest_length_m": float(about.rest_length),
+            "source": source if band else ASSUMED,
+        },
+    )
+    recording = None
+    try:
+        recording = recording_of(container, params.setup)
+        report.losses, report.notes = recording.losses, recording.notes
+        _add_roles(report.topics, recording)
+        done = process_recording(recording, about, params)
+    except UserError as error:
+        report.problem = str(error).removeprefix(f"{path}: ")
+        if recording:
+            _add_signals(report, recording, about, params)
+        return Look(report, recording)
+    return _whole_look(report, done, params)
+
+
+def band_of(
+    params: object, name: str | None, diameter: float | None, rest_length: float | None
+) -> tuple[object | None, str]:
+    """The band that a command line names, None where it names none, and where it is from.
+
+    Raises:
+        UserError: about a name that is not known, or a band too short for the fork.
+    """
+    if name is not None and (diameter or rest_length):
+        raise UserError("--band brings its diameter and rest length: leave the other two out")
+    if name is not None:
+        expect_known(params, "band", name, called="--band")
+        return params.bands[name], f"bands.{name} of params.yaml"
+    if diameter is None and rest_length is None:
+        return None, ASSUMED
+    band = SimpleNamespace(
+        diameter=diameter or ANY_BAND.diameter, rest_length=rest_length or ANY_BAND.rest_length
+    )
+    if band.rest_length <= params.setup.fork_width:
+        raise UserError(
+            f"--rest-length {band.rest_length:g}: must be longer than setup.fork_width"
+            f" {params.setup.fork_width:g}"
+        )
+    left = [n for n, v in (("--diameter", diameter), ("--rest-length", rest_length)) if v is None]
+    return band, f"given, but assumed: {left[0]}" if left else "given"
+
+
+def _whole_look(report: Report, done: Processed, params: object) -> Look:
+    report.frames = done.geometry.sources
+    report.signals = _signal_facts(done.recording, done.signals, done.scene)
+    report.delays = _delays(done.delays)
+    report.cloud = _cloud_facts(done)
+    report.coverage = over_time(done, report.signals["window_start_s"])
+    report.phases = by_phase(report.coverage)
+    tips = measure_tips(
+        done.scene,
+        done.clouds.time,
+        done.clouds.points,
+        done.geometry.camera.translation,
+        np.array(params.setup.clamp_direction),
+    )
+    if tips:
+        report.extrinsics = _extrinsics(tips, done)
+    if report.cloud["taut_coverage"] is None:
+        assumed = report.band["source"] == ASSUMED
+        cure = "which is assumed: give --rest-length" if assumed else "check it"
+        report.problem = (
+            "no picture shows the band drawn taut at a rest length of"
+            f" {report.band['rest_length_m']:g} m, {cure}, or record a longer pull"
+        )
+    report.cautions = cautions_of(report, done, params.setup)
+    return Look(report, done.recording, done, tips)
+
+
+def _topics(container: Container) -> list[Topic]:
+    rows = [Topic(c.topic, c.schema.name, len(c.payloads)) for c in container.channels]
+    return sorted(rows, key=lambda row: row.topic)
+
+
+def _add_roles(topics: list[Topic], recording: Recording) -> None:
+    by_name = {row.topic: row for row in topics}
+    for role, stream in recording.streams.items():
+        row = by_name[stream.topic]
+        row.role = f"{row.role}, {role}" if row.role else role
+        row.why = recording.choices[role]
+        row.rate, row.longest_gap = 1 / stream.period, stream.longest_gap
+        row.missing, row.lost = stream.missing, stream.lost
+        row.delay, row.clock_offset = stream.delay, recording.wrench.delay - stream.delay
+        row.notes = list(stream.notes)
+
+
+def _add_signals(report: Report, recording: Recording, band: object, params: object) -> None:
+    """What is known of force and motion where only the pictures cannot be used."""
+    try:
+        geometry = geometry_of(recording, params.setup)
+        report.frames = geometry.sources
+        delays = delays_of(recording, geometry, params)
+        report.delays = _delays(delays)
+        recording = delays.corrected(recording)
+        sections = params.episode, params.force, params.setup.tool
+        signals = signals_of(recording, geometry, *sections, delays.felt)
+    except UserError:  # it is the problem that was reported
+        return
+    scene = Scene.of(band, params.setup, signals)
+    report.signals = _signal_facts(recording, signals, scene)
+
+
+def _signal_facts(recording: Recording, signals: Signals, scene: Scene) -> dict[str, object]:
+    facts = signals.facts
+    start = (signals.origin - int(recording.wrench.stamp[0])) * 1e-9
+    by = recording.gripper or recording.pose
+    return {
+        "window_start_s": start,
+        "grasp_s": start + signals.grasp_time,
+        "grasp_error_s": by.period,
+        "release_s": start + signals.release_time,
+        "release_error_s": facts["release_error"],
+        "release_resolution_s": facts["release_resolution"],
+        "bias_n": facts["bias"],
+        "drift_n_s": facts["drift"],
+        "noise_n": facts["noise"],
+        "slips_s": [start + time for time in facts["slips"]],
+        "peak_force_n": facts["peak_force"],
+        "hold_force_n": facts["hold_force"],
+        "sign": "flipped" if facts["flipped"] else "as recorded",
+        "turn_deg": float(np.degrees(facts["turn"])),
+        "draw_m": signals.hand(signals.release_time).tolist(),
+        "stretch": scene.stretch(signals.release_time - 1e-3),
+    }
+
+
+def _delays(delays: Delays) -> dict[str, dict]:
+    return {
+        role: {
+            "value_s": None if one.error is None else one.value,
+            "error_s": one.error,
+            "source": one.source,
+            "applied": bool(one.applied),
+        }
+        for role, one in (("pose", delays.pose), ("camera", delays.camera))
+    }
+
+
+def _cloud_facts(done: Processed) -> dict[str, object]:
+    clouds = done.clouds
+    sizes = [len(points) for points in clouds.points]
+    covered, off = coverage(done)
+    return {
+        "frames": len(sizes),
+        "empty": clouds.empty,
+        "damaged": clouds.damaged,
+        "unpaired": clouds.unpaired,
+        "points_least": int(np.min(sizes)),
+        "points_median": int(np.median(sizes)),
+        "told_by_color": clouds.color_counts,
+        "taut_coverage": covered,
+        "taut_offset_m": off,
+    }
+
+
+def _extrinsics(tips: Tips, done: Processed) -> dict[str, object]:
+    geometry, turn = done.geometry, tips.correction.rotation.as_rotvec()
+    believed = geometry.camera @ geometry.color.inverse()
+    return {
+        "pictures": tips.frames,
+        "off_m": tips.off,
+        "off_error_m": tips.off_error,
+        "left_tip_m": tips.offsets[0].tolist(),
+        "left_tip_error_m": tips.errors[0].tolist(),
+        "right_tip_m": tips.offsets[1].tolist(),
+        "right_tip_error_m": tips.errors[1].tolist(),
+        "turn_deg": np.degrees(-turn).tolist(),
+        "turn_error_deg": np.degrees(tips.rotation_error).tolist(),
+        "hand_off_m": float(np.linalg.norm(tips.hand)),
+        "hand_off_error_m": along(tips.hand, tips.hand_error),
+        "hand_m": tips.hand.tolist(),
+        "hand_error_m": tips.hand_error.tolist(),
+        "residual_m": tips.residual,
+        "camera_to_fork": _pose((tips.correction @ believed).inverse()),
+    }
+
+
+def _pose(transform: Transform) -> list[float]:
+    """As setup.camera_to_fork has it."""
+    parts = [*transform.translation, *transform.rotation.as_quat(canonical=True)]
+    return [round(float(number), 6) for number in parts]

@@ -1,0 +1,54 @@
+"""`sling check`: the report, and what else was asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from app.preflight.check import band_of, look_at
+from app.preflight.output import expect_writable, written
+
+
+def check(
+    recording: Path,
+    params: object,
+    *,
+    band: str | None = None,
+    diameter: float | None = None,
+    rest_length: float | None = None,
+    as_json: bool = False,
+    sheet: Path | None = None,
+    rrd: Path | None = None,
+) -> tuple[str, int]:
+    """Look at a recording; draw it where that is asked for.
+
+    Args:
+        recording: The MCAP file.
+        params: The whole params.
+        band: One of params.bands.
+        diameter, rest_length: Of a band that is not there yet [m].
+        as_json: The report as JSON, with what was drawn under `written`.
+        sheet, rrd: Files to write.
+
+    Returns:
+        The report, and exit status 0 where the recording can be used, else 1.
+
+    Raises:
+        UserError: in one line, before anything is read where an output cannot be written.
+    """
+    if sheet:
+        expect_writable(sheet, ".png")
+    if rrd:
+        expect_writable(rrd, ".rrd")
+    look = look_at(recording, params, *band_of(params, band, diameter, rest_length))
+    if sheet:
+        from app.preflight.sheet import draw_sheet
+
+        with written(sheet):
+            look.report.written.append(draw_sheet(look, params, sheet))
+    if rrd:
+        from app.preflight.timeline import write_timeline
+
+        with written(rrd):
+            look.report.written.append(write_timeline(look, params, rrd))
+    report = look.report
+    return report.to_json() if as_json else report.to_text(), int(not report.usable)

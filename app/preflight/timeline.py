@@ -1,0 +1,233 @@
+"""A recording on one timeline for the Rerun viewer: pictures, cloud, hand, force, events.
+
+Seconds count from the first force, as in the report. Space is frame O. https://rerun.io
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from app.preflight.check import Look
+from app.preflight.output import expect_writable
+from app.preflight.sheet import masked_frames
+from pipeline.base.errors import UserError
+from pipeline.base.files import replacing
+from pipeline.recording.build import Processed
+from pipeline.recording.input import images
+from pipeline.recording.input.camera import Camera
+from pipeline.recording.input.frames import Transform
+from pipeline.recording.input.reader import Recording, Stream
+
+if TYPE_CHECKING:
+    import rerun
+
+NAME, SECONDS = "sling check", "recording"
+ARROW = 0.015  # m that a newton is drawn as
+PACKED = {b"\xff\xd8": "image/jpeg", b"\x89PNG": "image/png"}
+JPEG_QUALITY = 85  # of pictures that come raw
+BAND = (255, 0, 255, 150)  # RGBA of the mask
+
+
+def write_timeline(look: Look, params: object, path: Path) -> str:
+    """Write an .rrd of what can be shown.
+
+    Returns:
+        What was written, in words.
+
+    Raises:
+        UserError: where rerun-sdk is missing or `path` cannot be written.
+    """
+    path = Path(path)
+    expect_writable(path, ".rrd")
+    try:
+        import rerun
+    except ImportError:
+        raise UserError("--rrd: rerun-sdk is missing, `pip install rerun-sdk`") from None
+    if look.recording is None:
+        return f"{path} was not written: nothing in the recording can be shown"
+    with replacing(path) as temporary:
+        stream = rerun.RecordingStream(NAME, recording_id=look.report.sha256[:32])
+        stream.set_log_time_enabled(False)
+        stream.set_log_tick_enabled(False)
+        stream.save(temporary)
+        recording = look.done.recording if look.done else look.recording
+        log = _Log(stream, int(recording.wrench.stamp[0]))
+        log.still("report", rerun.TextDocument(look.report.to_text()))
+        _raw_force(log, recording.wrench)
+        _pictures(log, recording)
+        if look.done:
+            _scene(log, look.done)
+            _motion(log, look)
+            _clouds(log, look, params)
+        stream.send_blueprint(_layout())
+        stream.flush()
+        stream.disconnect()
+    if look.done:
+        return f"{path}: open it with `rerun {path}`"
+    return f"{path}: pictures and raw force, all that can be shown"
+
+
+class _Log:
+    """A stream whose clock starts with the first force."""
+
+    def __init__(self, stream: rerun.RecordingStream, origin: int):
+        self.stream, self.origin = stream, origin
+
+    def still(self, entity: str, what: object) -> None:
+        self.stream.log(entity, what, static=True)
+
+    def at(self, seconds: float, entity: str, what: object) -> None:
+        self.stream.set_time(SECONDS, duration=float(seconds))
+        self.stream.log(entity, what)
+
+    def columns(self, entity: str, seconds: np.ndarray, columns: object) -> None:
+        import rerun
+
+        self.stream.send_columns(entity, [rerun.TimeColumn(SECONDS, duration=seconds)], columns)
+
+    def curve(self, entity: str, seconds: np.ndarray, values: np.ndarray) -> None:
+        import rerun
+
+        self.columns(entity, seconds, rerun.Scalars.columns(scalars=values))
+
+
+def _raw_force(log: _Log, wrench: Stream) -> None:
+    for axis, values in zip("xyz", wrench.values.T, strict=True):
+        log.curve(f"raw_force/{axis}", wrench.seconds(log.origin), values)
+
+
+def _pictures(log: _Log, recording: Recording) -> None:
+    """All of them, colour as it was recorded where it is packed, depth as PNG in millimetres."""
+    import rerun
+
+    for seconds, picture in zip(
+        recording.color.seconds(log.origin), recording.color.values, strict=True
+    ):
+        content, kind = _packed_color(picture)
+        if content:
+            image = rerun.EncodedImage(contents=content, media_type=kind)
+            log.at(seconds, "fork/color/picture", image)
+    for seconds, picture in zip(
+        recording.depth.seconds(log.origin), recording.depth.values, strict=True
+    ):
+        try:
+            depth = np.clip(np.round(1000 * images.depth(picture)), 0, 65535).astype(np.uint16)
+        except images.Undecodable:
+            continue
+        content = cv2.imencode(".png", depth)[1].tobytes()
+        image = rerun.EncodedDepthImage(blob=content, media_type="image/png", meter=1000.0)
+        log.at(seconds, "fork/depth/picture", image)
+
+
+def _packed_color(picture: images.Picture) -> tuple[bytes, str]:
+    """A packed picture and its media type; nothing where it is damaged."""
+    content = bytes(picture.data) if picture.format else b""
+    for start, kind in PACKED.items():
+        if content.startswith(start):
+            return content, kind
+    try:
+        color = images.color(picture)
+    except images.Undecodable:
+        return b"", ""
+    quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
+    return cv2.imencode(".jpg", color, quality)[1].tobytes(), "image/jpeg"
+
+
+def _scene(log: _Log, done: Processed) -> None:
+    """What does not move: fork, cameras, floor's height."""
+    import rerun
+
+    scene, geometry = done.scene, done.geometry
+    log.still("fork", rerun.ViewCoordinates.RIGHT_HAND_Z_UP)
+    posts = [[tip, [*tip[:2], scene.floor]] for tip in scene.tips]
+    log.still("fork/posts", rerun.LineStrips3D(posts, colors=[120, 120, 120], radii=0.006))
+    log.still("fork/tips", rerun.Points3D(scene.tips, colors=[30, 30, 30], radii=0.008))
+    _camera(log, "fork/depth", done.recording.depth_camera, geometry.camera)
+    color = geometry.camera @ geometry.color.inverse()
+    _camera(log, "fork/color", done.recording.color_camera, color)
+
+
+def _camera(log: _Log, entity: str, camera: Camera, pose: Transform) -> None:
+    import rerun
+
+    at, turn = pose.translation, rerun.Quaternion(xyzw=pose.rotation.as_quat())
+    log.still(entity, rerun.Transform3D(translation=at, quaternion=turn))
+    size = [camera.width, camera.height]
+    pinhole = rerun.Pinhole(image_from_camera=camera.matrix, resolution=size)
+    log.still(entity, pinhole)
+
+
+def _motion(log: _Log, look: Look) -> None:
+    """Hand and force sample by sample, as the episode has them."""
+    import rerun
+
+    signals, facts = look.done.signals, look.report.signals
+    seconds = facts["window_start_s"] + signals.time
+    arrows = ARROW * signals.force
+    log.columns("fork/hand", seconds, rerun.Transform3D.columns(translation=signals.position))
+    log.still("fork/hand", rerun.Points3D([[0, 0, 0]], colors=[237, 174, 73], radii=0.01))
+    log.still("fork/hand/force", rerun.Arrows3D(vectors=[[0, 0, 0]], colors=[209, 73, 91]))
+    log.columns("fork/hand/force", seconds, rerun.Arrows3D.columns(vectors=arrows))
+    for axis, force, position in zip("xyz", signals.force.T, signals.position.T, strict=True):
+        log.curve(f"force/{axis}", seconds, force)
+        log.curve(f"position/{axis}", seconds, position)
+    log.curve("speed", seconds, np.linalg.norm(signals.velocity, axis=1))
+    if np.isfinite(signals.opening).all():
+        log.curve("opening", seconds, signals.opening)
+    for name in ("grasp", "release"):
+        log.at(facts[f"{name}_s"], "events", rerun.TextLog(name, level="INFO"))
+
+
+def _clouds(log: _Log, look: Look, params: object) -> None:
+    import rerun
+
+    done, start = look.done, look.report.signals["window_start_s"]
+    depth, color = done.recording.depth_camera, done.recording.color_camera
+    size = (depth.height, depth.width)
+    one = depth.frame == color.frame and size == (color.height, color.width)
+    entity = f"fork/{'color' if one else 'depth'}/mask"
+    log.still(entity, rerun.AnnotationContext([(0, "", (0, 0, 0, 0)), (1, "band", BAND)]))
+    whole = np.zeros(size, np.uint8)
+    for (frame, mask), points in zip(
+        masked_frames(done, params.cloud), done.clouds.points, strict=True
+    ):
+        whole[done.view.window] = mask
+        log.at(start + frame.time, entity, rerun.SegmentationImage(whole.copy()))
+        cloud = rerun.Points3D(points, colors=[0, 121, 140], radii=0.0015)
+        log.at(start + frame.time, "fork/cloud", cloud)
+    rows = look.report.coverage
+    seconds = np.array([row["time"] for row in rows])
+    log.curve("coverage", seconds, np.array([row["coverage"] for row in rows]))
+
+
+def _layout() -> object:
+    import rerun.blueprint as views
+
+    def curves(name: str) -> object:
+        return views.TimeSeriesView(origin=f"/{name}", name=name)
+
+    return views.Blueprint(
+        views.Horizontal(
+            views.Vertical(
+                views.Spatial2DView(origin="/fork/color", name="colour and mask"),
+                views.Spatial2DView(origin="/fork/depth", name="depth"),
+            ),
+            views.Vertical(
+                views.Spatial3DView(origin="/fork", name="frame O"),
+                curves("force"),
+                curves("coverage"),
+                row_shares=[3, 2, 1],
+            ),
+            views.Tabs(
+                views.TextDocumentView(origin="/report", name="report"),
+                views.TextLogView(origin="/events", name="events"),
+                curves("position"),
+                curves("raw_force"),
+            ),
+        ),
+        collapse_panels=True,
+    )

@@ -1,0 +1,1 @@
+"""What every concern stands on: errors, files, schemas, progress, processes, devices."""

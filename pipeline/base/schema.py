@@ -1,0 +1,161 @@
+"""What params.yaml's models are made of: ranges, names, vectors, and violations in one line."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, get_args
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+)
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from pipeline.base.errors import one_line
+
+
+class Section(BaseModel):
+    """A mapping of params.yaml. Integers pass for floats; nothing else is converted."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+def refusal(message: str) -> PydanticCustomError:
+    """The error by which a validator refuses a value; `message` follows the key's path."""
+    return PydanticCustomError("refused", "{message}", {"message": message})
+
+
+@dataclass(frozen=True)
+class Range:
+    """Closed range of a number; refuses NaN and infinity too."""
+
+    low: float
+    high: float
+
+    def __get_pydantic_core_schema__(
+        self, source: type, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        limits = f"between {self.low:.10g} and {self.high:.10g}"
+
+        def check(value: object, validate: ValidatorFunctionWrapHandler) -> float:
+            try:
+                number = validate(value)
+            except ValidationError:
+                kind = "whole number" if source is int else "number"
+                hint = " (no quotes around numbers)" if isinstance(value, str) else ""
+                raise refusal(f"must be a {kind} {limits}, got {_shown(value)}{hint}") from None
+            if not self.low <= number <= self.high:
+                raise refusal(f"must be {limits}, got {_shown(value)}")
+            return number
+
+        return core_schema.no_info_wrap_validator_function(check, handler(source))
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """A text of one form, which is a regular expression."""
+
+    form: str
+
+    def __get_pydantic_core_schema__(
+        self, source: type, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        def check(text: str) -> str:
+            if not re.fullmatch(self.form, text):
+                raise refusal(f"must match {self.form}, got {_shown(text)}")
+            return text
+
+        return core_schema.no_info_after_validator_function(check, handler(source))
+
+
+def _is_name(text: str) -> str:
+    if not (text.isascii() and text.isidentifier() and len(text) <= 40):
+        raise refusal(
+            f"a name has at most 40 letters, digits and _, no digit first: {_shown(text)}"
+        )
+    return text
+
+
+def _is_ascending(pair: tuple[float, float]) -> tuple[float, float]:
+    if not pair[0] < pair[1]:
+        raise refusal(f"the first must be less than the second, got {list(pair)}")
+    return pair
+
+
+def _has_unit_length(vector: tuple[float, ...]) -> tuple[float, ...]:
+    """A direction, or the quaternion at the end of a pose."""
+    if abs(math.hypot(*vector[-4:]) - 1.0) > 1e-3:
+        what = "quaternion" if len(vector) == 7 else "vector"
+        raise refusal(f"the {what} must have length 1, got {list(vector[-4:])}")
+    return vector
+
+
+def _has_no_twins(items: tuple[Hashable, ...]) -> tuple[Hashable, ...]:
+    if len(set(items)) < len(items):
+        raise refusal(f"lists an entry twice: {list(items)}")
+    return items
+
+
+LIST = Field(strict=False)  # YAML has lists where the models keep tuples
+FILLED = Field(min_length=1)
+ASCENDING = AfterValidator(_is_ascending)
+UNIQUE = AfterValidator(_has_no_twins)
+UNIT = AfterValidator(_has_unit_length)
+
+Name = Annotated[str, AfterValidator(_is_name)]
+Names = Annotated[tuple[Name, ...], LIST, UNIQUE]
+Seed = Annotated[int, Range(0, 2**31 - 1)]
+Metres = Annotated[float, Range(-10, 10)]
+Component = Annotated[float, Range(-1, 1)]
+Direction = Annotated[tuple[Component, Component, Component], LIST, UNIT]
+Pose = Annotated[  # x, y, z and the quaternion qx, qy, qz, qw
+    tuple[Metres, Metres, Metres, Component, Component, Component, Component], LIST, UNIT
+]
+
+
+def explained(error: ValidationError, model: type[Section]) -> str:
+    """The first violation in words; a misspelt key comes before the key that it leaves missing."""
+    errors = error.errors(include_url=False)
+    first = min(errors, key=lambda one: one["type"] != "extra_forbidden")
+    kind, got = first["type"], _shown(first.get("input"))
+    path = [str(part) for part in first["loc"] if part != "[key]"]
+    if kind == "extra_forbidden":
+        message = f"unknown key, the closest known one is {_closest(first['loc'], model)}"
+    elif kind == "missing":
+        message = "is missing"
+    elif kind == "refused":
+        message = first["msg"]
+    elif kind in ("tuple_type", "model_type", "dict_type"):
+        message = f"must be a {'list' if kind == 'tuple_type' else 'mapping'}, got {got}"
+    elif kind == "too_short":
+        message = "must not be empty"
+    else:
+        message = f"{first['msg'].replace('Input should', 'must')}, got {got}"
+    return one_line(": ".join(filter(None, (".".join(path), message))))
+
+
+def _shown(value: object) -> str:
+    try:
+        text = repr(value)
+    except ValueError:  # Python prints no integer of thousands of digits
+        text = "an enormous number"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _closest(path: Sequence[str | int], model: type[Section]) -> str:
+    """The known key that is most like the unknown one at the end of `path`."""
+    kind: Any = model
+    for part in path[:-1]:
+        is_section = isinstance(kind, type) and issubclass(kind, BaseModel)
+        kind = kind.model_fields[part].annotation if is_section else get_args(kind)[-1]
+    known = list(kind.model_fields)
+    return difflib.get_close_matches(str(path[-1]), known, n=1, cutoff=0)[0]

@@ -1,0 +1,1 @@
+"""The episode, real or simulated: its record, its filters, its phases."""

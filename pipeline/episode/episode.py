@@ -1,0 +1,117 @@
+"""Episode: the one record that real and simulated interactions share, and its Parquet files.
+
+An episode is a window of one interaction (grasp, lift, pull, pause, release, swing). Signals are
+averages over equal samples; clouds keep the camera's own stamps and are never resampled.
+Frame O: origin midway between the fork tips, y towards the target, z up, x along the fork.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from pipeline.base.files import replacing
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One interaction, SI units, frame O, times in seconds since the window's start.
+
+    Attributes:
+        band: Name of the band.
+        time: Middle of each sample, shape (T,).
+        position: End effector (tool centre point), shape (T, 3).
+        velocity: Its velocity, shape (T, 3).
+        force: Force of the band on the gripper, low-passed and averaged, shape (T, 3).
+        opening: Distance between the fingers, shape (T,); NaN where it was not recorded.
+        cloud_time: Stamps of the camera frames, shape (K,).
+        clouds: Sling points of each frame, K arrays of shape (<= points, 3), float32; may be empty.
+        grasp_time: The fingers hold the band from here on.
+        release_time: The hand lets go: the force begins to drop.
+        camera: Position of the depth camera, shape (3,).
+        metadata: Everything else worth keeping: frame, setup, preprocessing, hash of the input.
+    """
+
+    band: str
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    force: np.ndarray
+    opening: np.ndarray
+    cloud_time: np.ndarray
+    clouds: list[np.ndarray]
+    grasp_time: float
+    release_time: float
+    camera: np.ndarray
+    metadata: dict = field(default_factory=dict)
+
+    @property
+    def sample_period(self) -> float:
+        return float(self.time[1] - self.time[0])
+
+    def save(self, folder: Path) -> None:
+        """Write `signals.parquet` and `clouds.parquet` into `folder`."""
+        signals = {"t": pa.array(self.time, pa.float64())}
+        for name in ("position", "velocity", "force"):
+            for axis, column in zip("xyz", getattr(self, name).T, strict=True):
+                signals[f"{name}_{axis}"] = pa.array(column, pa.float64())
+        signals["opening"] = pa.array(self.opening, pa.float64())
+        clouds = {
+            "t": pa.array(self.cloud_time, pa.float64()),
+            "points": pa.array(
+                [cloud.astype(np.float32).tolist() for cloud in self.clouds],
+                pa.list_(pa.list_(pa.float32(), 3)),
+            ),
+        }
+        header = {
+            "version": SCHEMA_VERSION,
+            "band": self.band,
+            "frame": "O",
+            "sample_period": self.sample_period,
+            "grasp_time": self.grasp_time,
+            "release_time": self.release_time,
+            "camera": list(map(float, self.camera)),
+            **self.metadata,
+        }
+        schema_metadata = {"episode": json.dumps(header, sort_keys=True)}
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, columns in (("clouds", clouds), ("signals", signals)):
+            table = pa.table(columns).replace_schema_metadata(schema_metadata)
+            with replacing(folder / f"{name}.parquet") as temporary:
+                pq.write_table(table, temporary)
+
+    @classmethod
+    def load(cls, folder: Path) -> Episode:
+        """Read an episode that `save` wrote. Raises FileNotFoundError or ValueError."""
+        signals = pq.read_table(folder / "signals.parquet")
+        clouds = pq.read_table(folder / "clouds.parquet")
+        header = json.loads(signals.schema.metadata[b"episode"])
+        if header.pop("version") != SCHEMA_VERSION:
+            raise ValueError(f"{folder}: written by another version, run `dvc repro` again")
+
+        def vectors(name: str) -> np.ndarray:
+            return np.stack([signals[f"{name}_{axis}"].to_numpy() for axis in "xyz"], axis=1)
+
+        points = [np.asarray(row.as_py(), np.float32).reshape(-1, 3) for row in clouds["points"]]
+        header.pop("frame"), header.pop("sample_period")
+        return cls(
+            band=header.pop("band"),
+            time=signals["t"].to_numpy(),
+            position=vectors("position"),
+            velocity=vectors("velocity"),
+            force=vectors("force"),
+            opening=signals["opening"].to_numpy(),
+            cloud_time=clouds["t"].to_numpy(),
+            clouds=points,
+            grasp_time=header.pop("grasp_time"),
+            release_time=header.pop("release_time"),
+            camera=np.array(header.pop("camera")),
+            metadata=header,
+        )

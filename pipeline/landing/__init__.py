@@ -1,0 +1,1 @@
+"""Where launches land: simulated maps, their response surface, stored policies."""

@@ -1,0 +1,1 @@
+"""How far a simulated episode is from the recorded one: loss, parameter space, evaluation."""

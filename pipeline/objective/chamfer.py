@@ -1,0 +1,96 @@
+"""Distance between measured point clouds and simulated bands, for a batch of rollouts.
+
+A band is a tube around its centre line, one piece an edge. Measured to simulated: each point's
+distance to the surface of the nearest piece. Simulated to measured: for points on the ridge of the
+tube that faces the camera, the distance to the nearest measured point; what the camera cannot see
+counts for nothing.
+"""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+LANES = {"cpu": 16, "cuda": 32}
+SAMPLES = 3  # simulated points an edge
+
+
+class Chamfer:
+    """Frame by frame distances of one episode's clouds to simulated centre lines."""
+
+    def __init__(
+        self,
+        clouds: list[np.ndarray],
+        camera: np.ndarray,
+        *,
+        radius: float,
+        rest_length: float | np.ndarray,
+        symmetric: bool = True,
+    ) -> None:
+        """Keep the clouds, and from their first use on a device a copy there.
+
+        Args:
+            clouds: Points of each frame [m], K arrays of shape (P, 3); an empty one counts as NaN.
+            camera: Its position [m], shape (3,).
+            radius, rest_length: Of the unstretched band [m]; it thins where it is stretched, as
+                an incompressible body does. One length is shared evenly by the edges; an array
+                gives each edge its own.
+            symmetric: The mean of both directions; else measured to simulated alone.
+        """
+        self.camera = np.asarray(camera, float)
+        self.radius, self.rest_length = float(radius), np.asarray(rest_length, np.float32)
+        self.symmetric, self.clouds = symmetric, clouds
+        self.frames = len(clouds)
+        self._packed, self._lock = {}, threading.Lock()
+
+    def __call__(self, center_line: np.ndarray, device: str = "cpu") -> np.ndarray:
+        """Distances [m], shape (N, K), of centre lines [m], (N, K, L, 3), computed on `device`.
+
+        A frame's distance depends on no other frame or rollout, and so not on who shares its batch.
+
+        Args:
+            center_line: NumPy's, or Warp's on that device.
+        """
+        import warp as wp
+
+        from pipeline.base.native import launch
+        from pipeline.objective.kernel import chamfer_kernel
+
+        count, frames, nodes, _ = center_line.shape
+        if frames != self.frames:
+            raise ValueError(f"{frames} simulated frames, {self.frames} measured")
+        lanes = LANES["cuda" if device.startswith("cuda") else "cpu"]
+        kernel = chamfer_kernel(nodes - 1, SAMPLES, self.symmetric, lanes)
+        with self._lock:
+            if device not in self._packed:
+                arrays = _pack(self.clouds, lanes)
+                self._packed[device] = [wp.array(array, device=device) for array in arrays]
+            packed = self._packed[device]
+        if isinstance(center_line, np.ndarray):
+            center_line = np.ascontiguousarray(center_line, np.float32)
+            center_line = wp.array(center_line, device=device)
+        line = center_line.flatten()
+        errors = wp.zeros(count * frames * 2, dtype=wp.float32, device=device)
+        rest = self.rest_length
+        if rest.ndim == 0:
+            rest = np.full(nodes - 1, rest / (nodes - 1), np.float32)
+        rest = wp.array(rest, device=device)
+        camera = wp.vec3(*self.camera)
+        inputs = [line, *packed, frames, self.radius, rest, camera, errors]
+        launch(kernel, count * frames, inputs, device)
+        both = errors.numpy().reshape(count, frames, 2).astype(float)
+        return both.mean(axis=2) if self.symmetric else both[:, :, 0]
+
+
+def _pack(clouds: list[np.ndarray], lanes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Blocks of `lanes` points as rows x, y, z, weight; and where each frame's blocks begin."""
+    blocks, first = [], [0]
+    for cloud in clouds:
+        size = -(-len(cloud) // lanes)
+        rows = np.zeros((size * lanes, 4), np.float32)
+        rows[: len(cloud), :3], rows[: len(cloud), 3] = cloud, 1
+        rows[len(cloud) :, :3] = cloud[:1]  # weighs nothing, and is never nearer than the point
+        blocks.append(rows.reshape(size, lanes, 4).transpose(0, 2, 1).ravel())
+        first.append(first[-1] + size)
+    return np.concatenate([*blocks, np.zeros(0, np.float32)]), np.array(first, np.int32)

@@ -1,0 +1,147 @@
+"""Losses of a batch of parameters: simulate, compare, and say what failed."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from pipeline.episode.episode import Episode
+from pipeline.objective.loss import TERMS, EpisodeLoss
+from pipeline.objective.space import Space
+from pipeline.sling.interaction import Rollouts, interact
+
+NOT_FINITE = "the loss is not finite"  # the one failure that depends on the weights
+SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
+
+simulated = partial(interact, fetch=False)  # the loss is computed where the rollouts are
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """N evaluated parameter vectors of dimension D.
+
+    Attributes:
+        unit, theta: In the unit cube and physical, shape (N, D); nuisances are the last columns.
+        terms: Each loss term, shape (N,); NaN where the rollout failed.
+        total: Weighted sum of the terms, shape (N,); +inf where the rollout failed.
+        failure: None or the reason, length N.
+        seconds: What it took.
+    """
+
+    unit: np.ndarray
+    theta: np.ndarray
+    terms: dict[str, np.ndarray]
+    total: np.ndarray
+    failure: list[str | None]
+    seconds: float = 0.0
+
+
+class Evaluator:
+    """Evaluates points of the unit cube against one episode.
+
+    Results ignore the number of workers, and of GPUs of one kind: a rollout knows none of the
+    others in its batch.
+    """
+
+    def __init__(
+        self,
+        episode: Episode,
+        sling,
+        loss: EpisodeLoss,
+        space: Space,
+        *,
+        devices: Sequence[str] = ("cpu",),
+        workers: int | None = None,
+        simulate=simulated,
+    ) -> None:
+        """Keep what every batch needs.
+
+        Args:
+            devices: Of one kind; they share each batch evenly, in their order.
+            workers: Threads on the CPU (the kernels release the interpreter); None: all cores.
+            simulate: Called as `simulate(sling, episode=, thetas=, device=)`.
+        """
+        self.space, self.loss = space, loss
+        more = len(loss.stamps) / len(episode.cloud_time)  # frames than the camera's
+        if more > 1:
+            episode = replace(episode, cloud_time=loss.stamps)
+        self._sling = sling
+        self._simulate = partial(simulate, episode=episode)
+        on_gpu = devices[0].startswith("cuda")
+        self._slice = int(SLICE["cuda"] / more) if on_gpu else SLICE["cpu"]
+        threads = 1 if on_gpu else workers or os.cpu_count()
+        self._devices = devices
+        self._pools = [ThreadPoolExecutor(threads) for _ in devices]
+
+    def __call__(self, unit: np.ndarray) -> Evaluation:
+        """Evaluate points of the unit cube, shape (N, D)."""
+        start = time.perf_counter()
+        unit = np.array(unit, float)
+        theta = self.space.to_physical(unit)
+        shares = np.array_split(theta, len(self._devices))
+        begun = [  # on all of them, before any result is waited for
+            pool.map(partial(self._evaluate, device), self._slices(share))
+            for device, pool, share in zip(self._devices, self._pools, shares, strict=True)
+        ]
+        parts = [part for each in begun for part in each]
+        terms = {name: np.concatenate([part[0][name] for part in parts]) for name in TERMS}
+        failure = [reason for part in parts for reason in part[1]]
+        failed = np.array([reason is not None for reason in failure])
+        return Evaluation(
+            unit=unit,
+            theta=theta,
+            terms={name: np.where(failed, np.nan, values) for name, values in terms.items()},
+            total=np.where(failed, np.inf, self.loss.total(terms) + self.space.cost(theta)),
+            failure=failure,
+            seconds=time.perf_counter() - start,
+        )
+
+    def rollouts(
+        self, theta: np.ndarray, device: str | None = None
+    ) -> tuple[Rollouts, dict[str, np.ndarray]]:
+        """Simulate physical points (N, D); the rollouts and their nuisances, as the loss asks.
+
+        Args:
+            device: The one that simulates them all; None: the first.
+        """
+        first = self.space.dimension - len(self.space.nuisances)
+        nuisances = dict(zip(self.space.nuisances, theta[:, first:].T, strict=True))
+        sling = self._sling
+        if "air_drag" in nuisances:
+            sling = replace(sling, air_drag=nuisances["air_drag"])
+        device = device or self._devices[0]
+        return self._simulate(sling, thetas=theta[:, :first], device=device), nuisances
+
+    def _slices(self, theta: np.ndarray) -> Iterator[np.ndarray]:
+        return (theta[i : i + self._slice] for i in range(0, len(theta), self._slice))
+
+    def _evaluate(
+        self, device: str, theta: np.ndarray
+    ) -> tuple[dict[str, np.ndarray], list[str | None]]:
+        rollouts, nuisances = self.rollouts(theta, device)
+        with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
+            terms = self.loss.terms(rollouts, nuisances)
+            finite = np.isfinite(self.loss.total(terms))
+        failure = [
+            reason or (None if good else NOT_FINITE)
+            for reason, good in zip(rollouts.failure, finite, strict=True)
+        ]
+        return terms, failure
+
+
+class Penalty:
+    """What an optimiser is told: a failed point counts twice the worst finite loss so far."""
+
+    def __init__(self) -> None:
+        self.worst = 0.0
+
+    def __call__(self, total: np.ndarray) -> np.ndarray:
+        finite = np.isfinite(total)
+        self.worst = max([self.worst, *total[finite]])
+        return np.where(finite, total, 2 * self.worst if self.worst else 1e6)

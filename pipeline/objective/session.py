@@ -1,0 +1,91 @@
+"""What the searching stages share: an evaluator that reports, and remembers what it simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.base.errors import UserError
+from pipeline.base.fingerprint import fingerprint
+from pipeline.base.machine import devices, kind, workers
+from pipeline.base.progress import Progress
+from pipeline.episode.episode import Episode
+from pipeline.objective.cache import Memo
+from pipeline.objective.evaluate import Evaluation, Evaluator
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.objective.space import Space
+from pipeline.sling.model import load_sling, mounting_path
+from stages.start import expect_episode
+
+PIPELINE = Path(__file__).parents[1]
+SOURCES = (  # the code that a term of the loss hangs on
+    *(PIPELINE / name for name in ("episode", "objective", "sling")),
+    PIPELINE / "base" / "native.py",
+)
+
+
+class Told:
+    """An evaluator that tells of each batch: its number as in the history, and the best so far."""
+
+    def __init__(self, evaluate: Callable[[np.ndarray], Evaluation], progress: Progress) -> None:
+        self.evaluate, self.progress = evaluate, progress
+        self._generation, self._best = 0, np.inf
+
+    def __call__(self, unit: np.ndarray) -> Evaluation:
+        evaluation = self.evaluate(unit)
+        count, failed = len(evaluation.total), int(np.isinf(evaluation.total).sum())
+        self._best = min(self._best, evaluation.total.min())
+        self.progress.advance(
+            count,
+            f"generation {self._generation}",
+            f"best {self._best:.5g}",
+            f"failed {failed}/{count}",
+            seconds=evaluation.seconds,
+        )
+        self._generation += 1
+        return evaluation
+
+
+def service(stage: str, band: str, method: str, params, rollouts: int) -> Told:
+    """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
+    evaluate = evaluator(params, band, method)
+    sections = (params.bands[band], params.setup, params.sling, params.force, params.loss)
+    memo = Memo(
+        evaluate,
+        Path(".checkpoints", band),
+        fingerprint(
+            *SOURCES,
+            *(Path("data/episodes", band, f"{name}.parquet") for name in ("signals", "clouds")),
+            mounting_path(band),
+            *(section.model_dump_json() for section in sections),
+            *(f"{package} {version(package)}" for package in ("warp-lang", "numpy", "scipy")),
+            kind(),  # of the devices, not how many: that changes nothing
+        ),
+    )
+    return Told(memo, Progress(f"{stage}-{band}-{method}", rollouts, "rollouts"))
+
+
+def evaluator(params, band: str, method: str) -> Evaluator:
+    """The evaluator of a recorded band, on the devices that the environment names."""
+    for section, key in (("bands", band), ("methods", method)):
+        if key not in getattr(params, section):
+            raise UserError(f"params.yaml has no {section}.{key}")
+    episode = load_episode(band)
+    sling = load_sling(params, band)
+    return Evaluator(
+        episode,
+        sling,
+        EpisodeLoss.of(params, method, episode, sling),
+        Space.of_method(params, method),
+        devices=devices(),
+        workers=workers(),
+    )
+
+
+def load_episode(band: str) -> Episode:
+    """The recorded episode of a band. Raises UserError where it is missing."""
+    expect_episode(band)
+    return Episode.load(Path("data/episodes", band))

@@ -1,0 +1,1 @@
+"""Rubber, string, robot and launches of the virtual rig."""

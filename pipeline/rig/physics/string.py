@@ -1,0 +1,277 @@
+"""The band as a string in 3-D: distributed mass, finite strain, relaxation, drag, a little bending.
+
+    m x_tt = d/ds [T x_s / |x_s|] - EI (1 + eta d/dt) x_ssss + m g + drag,   T = A sigma(|x_s|, ...)
+
+with s the reference length, m the mass per s and sigma from rubber.py. Lumped masses on edges that
+are short near the clamps and the middle, where the band turns within millimetres: second order in
+space. Time is left to SciPy's LSODA (adaptive step and order).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from pipeline.rig.physics.rubber import UNIT_MODULUS, Rubber, energy_density, nominal_stress
+from pipeline.rig.physics.statics import balanced
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+AIR_DENSITY = 1.2  # kg/m3
+CYLINDER_DRAG = 1.1  # coefficient of a cylinder across the wind
+NUDGE = 1e-7  # of the difference quotients, in m, m/s and MPa
+SETTLING_TIME = 4.0
+FOREVER = 1e9  # s
+
+Hand = Callable[[float, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""Acceleration (3, ...) of the hand by time, and its place, velocity and the band's force on it."""
+
+
+def still(time: float, x: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """A hand that does not move, whatever pulls."""
+    return np.zeros_like(x)
+
+
+GRADING = 0.75  # edges are 1 - GRADING to 1 + GRADING of their mean
+
+
+@dataclass(frozen=True)
+class ElasticString:
+    """A band between two clamps.
+
+    A state Y has a row a node: x (3), v (3) and the memories w (K) of the edge that follows it
+    (those of the last row mean nothing). Arrays of states have trailing axes "...".
+
+    Attributes:
+        edges: Even, so that the middle is a node.
+        length, diameter, mass: Of the free band at rest [m, m, kg].
+        clamps: Both ends, shape (2, 3).
+        clamp_direction: Unit vector along which the band leaves both clamps.
+        rubber: The material.
+        payload: Extra mass that the middle node carries [kg].
+        damping: Of the motion, by mass [1/s]; 0 but for coming to rest.
+    """
+
+    edges: int
+    length: float
+    diameter: float
+    mass: float
+    clamps: np.ndarray
+    clamp_direction: np.ndarray
+    rubber: Rubber
+    payload: float = 0.0
+    damping: float = 0.0
+
+    @property
+    def nodes(self) -> int:
+        return self.edges + 1
+
+    @property
+    def middle(self) -> int:
+        return self.edges // 2
+
+    @cached_property
+    def sizes(self) -> np.ndarray:
+        """Reference lengths of the edges [m], shape (edges,)."""
+        part = np.linspace(0, 1, self.middle + 1)
+        half = np.diff(part - GRADING * np.sin(2 * np.pi * part) / (2 * np.pi))
+        return self.length / 2 * np.concatenate([half, half])
+
+    @cached_property
+    def shares(self) -> np.ndarray:
+        """Reference length of each node's share of the band [m], shape (nodes,)."""
+        return (np.append(self.sizes, 0) + np.append(0, self.sizes)) / 2
+
+    @cached_property
+    def stiffness(self) -> float:
+        """Tension per nominal stress of Treloar's rubber [N/MPa]."""
+        return self.rubber.scale * np.pi / 4 * self.diameter**2
+
+    @cached_property
+    def bending(self) -> float:
+        """EI of a solid round band [N m2]."""
+        return self.rubber.scale * UNIT_MODULUS * np.pi / 64 * self.diameter**4
+
+    @cached_property
+    def masses(self) -> np.ndarray:
+        """Of the nodes, shape (nodes,)."""
+        masses = self.mass / self.length * self.shares
+        masses[self.middle] += self.payload
+        return masses
+
+    def state(self, x: np.ndarray, memory: np.ndarray | None = None) -> np.ndarray:
+        """At rest at the nodes x (nodes, 3); `memory` (K,) is w_k / P, else relaxed (ones)."""
+        branches = len(self.rubber.times)
+        stress = nominal_stress(self.stretch(x))[0]
+        y = np.zeros((self.nodes, 6 + branches))
+        y[:, :3] = x
+        y[:-1, 6:] = stress[:, None] * (np.ones(branches) if memory is None else memory)
+        return y
+
+    def stretch(self, x: np.ndarray) -> np.ndarray:
+        """Of each edge, shape (edges, ...)."""
+        return np.linalg.norm(x[1:] - x[:-1], axis=1) / self.sizes
+
+    def forces(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of states (nodes, 6 + K, ...): node forces (nodes, 3, ...) [N], rates of the memories."""
+        rubber, ones = self.rubber, (1,) * (y.ndim - 2)
+        sizes, weight = self.sizes.reshape(-1, *ones), self.bending / self.shares
+        x, v, w = y[:, :3], y[:, 3:6], y[:-1, 6:]
+        slope = (x[1:] - x[:-1]) / sizes[:, None]  # x_s
+        turning = (v[1:] - v[:-1]) / sizes[:, None]
+        stretch = np.sqrt(np.einsum("ij...,ij...->i...", slope, slope))
+        along = slope / stretch[:, None]
+        stress, tangent = nominal_stress(stretch)
+        rate = np.einsum("ij...,ij...->i...", along, turning)
+        owed = stress[:, None] - w
+        total = stress + np.einsum("k,ik...->i...", rubber.weights, owed)
+        tension = self.stiffness * (total + rubber.viscosity * tangent * rate)
+
+        clamp = np.broadcast_to(self.clamp_direction.reshape(1, 3, *ones), (1, *slope.shape[1:]))
+        bent = np.concatenate([clamp, slope + rubber.viscosity * turning, -clamp])
+        moment = weight.reshape(-1, 1, *ones) * (bent[1:] - bent[:-1])
+        pull = tension[:, None] * along - (moment[1:] - moment[:-1]) / sizes[:, None]
+
+        wind = v[1:] + v[:-1]
+        wind -= np.einsum("ij...,ij...->i...", along, wind)[:, None] * along  # twice the air across
+        speed = np.sqrt(np.einsum("ij...,ij...->i...", wind, wind))
+        side = self.diameter * sizes * np.sqrt(stretch)  # volume is kept: d ~ stretch^-1/2
+        wind *= (AIR_DENSITY * CYLINDER_DRAG / 16 * side * speed)[:, None]  # on each end
+
+        force = np.empty_like(bent, shape=x.shape)
+        force[1:-1] = pull[1:] - pull[:-1] - wind[1:] - wind[:-1]
+        force[0], force[-1] = pull[0] - wind[0], -pull[-1] - wind[-1]
+        masses = self.masses.reshape(-1, 1, *ones)
+        force += masses * (GRAVITY.reshape(3, *ones) - self.damping * v)
+        return force, owed / rubber.times.reshape(-1, *ones)
+
+    def rates(self, y: np.ndarray, time: float = 0.0, hand: Hand | None = None) -> np.ndarray:
+        """dY/dt of states (nodes, 6 + K, ...); `hand` holds the middle node."""
+        force, forgetting = self.forces(y)
+        rates = np.zeros_like(y)
+        rates[1:-1, :3] = y[1:-1, 3:6]
+        rates[1:-1, 3:6] = force[1:-1] / self.masses[1:-1].reshape(-1, 1, *(1,) * (y.ndim - 2))
+        rates[:-1, 6:] = forgetting
+        if hand is not None:
+            place, velocity = y[self.middle, :3], y[self.middle, 3:6]
+            rates[self.middle, 3:6] = hand(time, place, velocity, force[self.middle])
+        return rates
+
+    def at_middle(self, y: np.ndarray) -> np.ndarray:
+        """Force of the band on what holds its middle, shape (..., 3) [N].
+
+        The middle node's inertia is not in it: it moves with the hand. States (..., nodes, 6 + K).
+        """
+        force = np.moveaxis(self.forces(np.moveaxis(y, (-2, -1), (0, 1)))[0], (0, 1), (-2, -1))
+        return force[..., self.middle, :]
+
+    def integrate(
+        self,
+        y: np.ndarray,
+        times: np.ndarray,
+        tolerance: float,
+        *,
+        hand: Hand | None = None,
+        event: Callable[[float, np.ndarray], float] | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Follow the state y (nodes, 6 + K) from times[0], where it holds.
+
+        Args:
+            times: To report at, ascending, shape (S,).
+            tolerance: Relative; a hundredth of it in m, m/s and MPa.
+            hand: What holds the middle node, if anything.
+            event: Ends the integration where it falls through zero.
+
+        Returns:
+            Times (R,) and states (R, nodes, 6 + K): those asked for, up to the event and with it.
+        """
+        shape = y.shape
+        reach = 2 * shape[1] + 5  # two nodes on, from the first of x to the last of v
+        colours = np.arange(y.size) % (2 * reach + 1)
+        tint = np.equal.outer(colours, np.arange(2 * reach + 1))
+
+        def rates(t: float, flat: np.ndarray) -> np.ndarray:
+            return self.rates(flat.reshape(shape), t, hand).ravel()
+
+        def jacobian(t: float, flat: np.ndarray) -> np.ndarray:
+            """Banded, by differences: columns of one colour share no row."""
+            moved = (flat[:, None] + NUDGE * tint).reshape(*shape, -1)
+            change = self.rates(moved, t, hand).reshape(y.size, -1) - rates(t, flat)[:, None]
+            rows = np.arange(y.size) + np.arange(-reach, reach + 1)[:, None]  # (band, column)
+            inside = (rows >= 0) & (rows < y.size)
+            return np.where(inside, change[rows.clip(0, y.size - 1), colours], 0.0) / NUDGE
+
+        if event is not None:
+            stop = lambda t, flat: event(t, flat.reshape(shape))  # noqa: E731
+            stop.terminal, stop.direction = True, -1
+        solution = solve_ivp(
+            rates,
+            (times[0], times[-1]),
+            y.ravel(),
+            method="LSODA",
+            t_eval=times,
+            events=stop if event is not None else None,
+            jac=jacobian,
+            lband=reach,
+            uband=reach,
+            rtol=tolerance,
+            atol=tolerance / 100,
+        )
+        if solution.status < 0:
+            raise RuntimeError(f"the band's integration failed: {solution.message}")
+        found, states = solution.t, solution.y.T
+        if solution.status == 1:
+            found = np.append(found, solution.t_events[0])
+            states = np.vstack([states, solution.y_events[0]])
+        return found, states.reshape(-1, *shape)
+
+    def at_rest(
+        self,
+        x: np.ndarray,
+        tolerance: float,
+        *,
+        held: bool = False,
+        memory: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """The state in which the band comes to rest from nodes x (nodes, 3).
+
+        Args:
+            held: The middle stays where it is.
+            memory: w_k / P of every edge (K,); None: all is relaxed.
+        """
+        rubber = self.rubber
+        excess = 0.0 if memory is None else float(rubber.weights @ (1 - memory))
+        frozen = replace(rubber, relaxation=np.array([[excess, FOREVER]]))
+        sticky = replace(self, rubber=frozen, damping=2 * np.sqrt(-GRAVITY[2] / (self.length / 2)))
+        start, hand = sticky.state(x, np.zeros(1)), still if held else None
+        if held and (nodes := sticky.balanced(start, tolerance / 100)) is not None:
+            return self.state(nodes, memory)
+        end = sticky.integrate(start, np.array([0.0, SETTLING_TIME]), tolerance, hand=hand)[1][-1]
+        return self.state(end[:, :3], memory)
+
+    def balanced(self, y: np.ndarray, tolerance: float) -> np.ndarray | None:
+        """Nodes (nodes, 3) near those of y (nodes, 6 + K) that no force moves; see statics.py.
+
+        Clamps, middle and memories stay.
+        """
+
+        def forces(x: np.ndarray) -> np.ndarray:
+            state = np.repeat(y[..., None], x.shape[-1], axis=-1)
+            state[:, :3] = x
+            return self.forces(state)[0]
+
+        return balanced(forces, y[:, :3], [0, self.middle, -1], tolerance)
+
+    def energy(self, y: np.ndarray) -> float:
+        """Motion, height, strain and bending of one state [J]; not what the memories hold."""
+        x, v = y[:, :3], y[:, 3:6]
+        slope = (x[1:] - x[:-1]) / self.sizes[:, None]
+        turn = np.diff(np.vstack([self.clamp_direction, slope, -self.clamp_direction]), axis=0)
+        return float(
+            np.sum(self.masses[:, None] * (v**2 / 2 - GRAVITY * x))
+            + self.stiffness * np.sum(self.sizes * energy_density(self.stretch(x)))
+            + self.bending / 2 * np.sum(turn**2 / self.shares[:, None])
+        )

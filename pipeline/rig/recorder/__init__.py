@@ -1,0 +1,1 @@
+"""What the virtual rig writes of a pull-and-release: sensors, camera, MCAP."""

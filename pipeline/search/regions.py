@@ -1,0 +1,149 @@
+"""Promising regions of a history: centres by non-maximum suppression, covariances of neighbours.
+
+Distances are those of the unit cube; failed rows count for nothing.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_json
+
+RIDGE = 1e-3  # of the mean variance, added to every variance
+LEAST_VARIANCE = 1e-6  # a thousandth of the box, where all neighbours are one point
+
+
+@dataclass(frozen=True)
+class Region:
+    """Where one local search starts.
+
+    Attributes:
+        mu: Centre in the unit cube, shape (D,).
+        sigma: Positive definite covariance, shape (D, D).
+        loss: Of the centre.
+        members: Rows of the history that the covariance is of, nearest first; the centre is one.
+    """
+
+    mu: np.ndarray
+    sigma: np.ndarray
+    loss: float
+    members: list[int]
+
+
+def regions_asked(about, optimizer) -> int:
+    """How many regions params.yaml's `methods.<name>` and `optimizer` ask for."""
+    return about.k_top or optimizer.k_top
+
+
+def regions_of(about, optimizer, history) -> tuple[list[Region], int]:
+    """Where a method's refinement begins, and how many regions were asked for.
+
+    Args:
+        about: params.yaml's `methods.<name>`.
+        optimizer: params.yaml's `optimizer`.
+        history: The `History` of what its exploration evaluated, on its free axes.
+
+    Raises:
+        UserError: As `find_regions`.
+    """
+    asked = regions_asked(about, optimizer)
+    regions = find_regions(
+        history.unit,
+        history.total,
+        k_top=asked,
+        k_nn=optimizer.k_nn,
+        delta=optimizer.delta,
+        covariance=about.covariance,
+    )
+    return regions, asked
+
+
+def find_regions(
+    unit: np.ndarray,
+    total: np.ndarray,
+    *,
+    k_top: int,
+    k_nn: int,
+    delta: float,
+    covariance: bool = True,
+) -> list[Region]:
+    """The k_top best regions of evaluated points (N, D) with losses (N,); fewer if there are fewer.
+
+    Without `covariance` each Sigma is a multiple of the identity, of the same determinant.
+
+    Raises UserError if not even two points have a finite loss.
+    """
+    good = np.flatnonzero(np.isfinite(total))
+    if len(good) < 2:
+        raise UserError(
+            f"only {len(good)} of {len(total)} simulations succeeded: no region to refine;"
+            " check the recording, and the box under `parameters` in params.yaml"
+        )
+    regions = []
+    for centre in suppress(unit[good], total[good], delta, k_top):
+        distance = np.linalg.norm(unit[good] - unit[good][centre], axis=1)
+        members = good[np.argsort(distance, kind="stable")[:k_nn]]
+        sigma = regularised(np.cov(unit[members], rowvar=False))
+        regions.append(
+            Region(
+                mu=unit[good[centre]],
+                sigma=sigma if covariance else isotropic(sigma),
+                loss=float(total[good[centre]]),
+                members=members.tolist(),
+            )
+        )
+    return regions
+
+
+def suppress(unit: np.ndarray, total: np.ndarray, radius: float, count: int) -> list[int]:
+    """Rows, best first, that lie further than `radius` from every better row that was kept."""
+    kept: list[int] = []
+    for row in np.argsort(total, kind="stable"):
+        if all(np.linalg.norm(unit[row] - unit[other]) > radius for other in kept):
+            kept.append(int(row))
+        if len(kept) == count:
+            break
+    return kept
+
+
+def regularised(covariance: np.ndarray) -> np.ndarray:
+    """Covariance (D, D) with a ridge, so that its Cholesky factor exists."""
+    covariance = np.atleast_2d(covariance)
+    dimension = len(covariance)
+    ridge = max(RIDGE * np.trace(covariance) / dimension, LEAST_VARIANCE)
+    return covariance + ridge * np.eye(dimension)
+
+
+def isotropic(covariance: np.ndarray) -> np.ndarray:
+    """The ball whose volume is that of the ellipsoid of a positive definite covariance (D, D)."""
+    dimension = len(covariance)
+    _, log_determinant = np.linalg.slogdet(covariance)
+    return np.exp(log_determinant / dimension) * np.eye(dimension)
+
+
+def save_regions(path: Path, names: tuple[str, ...], regions: list[Region], asked: int) -> None:
+    """Write JSON; mu and Sigma are in the unit cube, in the order of `names`."""
+    clusters = [
+        {
+            "mu": region.mu.tolist(),
+            "Sigma": region.sigma.tolist(),
+            "loss": region.loss,
+            "members": region.members,
+        }
+        for region in regions
+    ]
+    write_json(path, {"names": list(names), "asked": asked, "clusters": clusters})
+
+
+def load_regions(path: Path) -> list[Region]:
+    """Read what `save_regions` wrote."""
+    clusters = json.loads(path.read_text(encoding="utf-8"))["clusters"]
+    return [
+        Region(np.array(one["mu"]), np.array(one["Sigma"]), one["loss"], one["members"])
+        for one in clusters
+    ]

@@ -1,0 +1,170 @@
+"""Toy stages that take their time, and all processes of a run, whoever their parents are by now."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+
+from tests.project import ROOT
+
+SLING = [sys.executable, "-c", "from app.cli import main; main()"]
+DVC = [sys.executable, "-m", "dvc"]
+PROMPT = 10.0  # s after which nothing of a run may live
+STEPS = 12
+
+DVC_YAML = """\
+stages:
+  count:
+    matrix: {item: [a, b]}
+    cmd: python work.py ${item.item}
+    deps: [work.py]
+    outs: ['out/${item.item}.txt']
+  both:
+    cmd: cat out/a.txt out/b.txt > out/both.txt
+    deps: [out/a.txt, out/b.txt]
+    outs: [out/both.txt]
+"""
+# Counts in tenths of a second from where it was killed; a process of its own waits beside it.
+WORK = f"""\
+import os, signal, subprocess, sys, time
+from pathlib import Path
+from pipeline.base import errors
+from pipeline.base.files import write_text
+
+def main():
+    (name,), size = sys.argv[1:], int(os.environ.get("SIZE", 100))
+    helper = subprocess.Popen(["sleep", "300"])
+    kept = Path(".checkpoints", name)
+    count = int(kept.read_text()) if kept.is_file() else 0
+    while count < {STEPS}:
+        time.sleep(float(os.environ.get("PACE", 0.1)))
+        count += 1
+        write_text(kept, str(count))
+        print(f"step {{count}}", flush=True)
+        if os.environ.get("ABORT") == name and count == 3:
+            os.abort()
+    helper.kill()
+    helper.wait()
+    write_text(Path("out", f"{{name}}.txt"), name * size + "\\n")
+
+errors.run(main)
+"""
+OUTPUTS = {f"out/{name}.txt": f"{name * 100}\n" for name in "ab"}
+OUTPUTS["out/both.txt"] = "".join(OUTPUTS.values())
+
+
+class Toy:
+    """A project of three stages in a folder, and all that runs there."""
+
+    def __init__(self, folder: Path) -> None:
+        (folder / ".dvc").mkdir(parents=True)
+        (folder / ".dvc/config").write_text("[core]\n no_scm = true\n analytics = false\n")
+        (folder / "dvc.yaml").write_text(DVC_YAML)
+        (folder / "work.py").write_text(WORK)
+        (folder / "out").mkdir()
+        self.folder = folder
+        self.run = Run(folder)
+
+    def outputs(self) -> dict[str, str]:
+        files = (self.folder / "out").iterdir()
+        return {str(file.relative_to(self.folder)): file.read_text() for file in files}
+
+    def dvc(self, *arguments: str) -> str:
+        """Run DVC as a user would; what it says."""
+        done = subprocess.run(
+            [*DVC, *arguments], cwd=self.folder, env=self.run.environment, timeout=120,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout
+        return done.stdout
+
+
+class Run:
+    """Commands in a folder, whose processes all bear a mark in their environment."""
+
+    def __init__(self, folder: Path, **environment: str) -> None:
+        self.folder, self.mark = folder, uuid.uuid4().hex
+        self.environment = {
+            **os.environ,
+            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+            "PYTHONPATH": str(ROOT),
+            "OMP_NUM_THREADS": "1",
+            "DVC_SITE_CACHE_DIR": str(folder.parent / "site"),
+            "SLING_TEST_RUN": self.mark,
+            **environment,
+        }
+
+    def start(self, *command: str) -> subprocess.Popen:
+        """In a session of its own; its lines, errors among them, go to `folder`/../said.txt."""
+        with (self.folder.parent / "said.txt").open("w") as said:
+            return subprocess.Popen(
+                command, cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
+                stdout=said, stderr=subprocess.STDOUT, start_new_session=True,
+            )  # fmt: skip
+
+    @property
+    def said(self) -> str:
+        return (self.folder.parent / "said.txt").read_text(errors="replace")
+
+    def alive(self) -> list[psutil.Process]:
+        """Zombies apart, which wait for a parent to look at them."""
+        found = []
+        for process in psutil.process_iter():
+            try:
+                if process.status() == psutil.STATUS_ZOMBIE:
+                    continue
+                if process.environ().get("SLING_TEST_RUN") == self.mark:
+                    found.append(process)
+            except (psutil.NoSuchProcess, psutil.AccessDenied):
+                continue
+        return found
+
+    def named(self, word: str) -> list[psutil.Process]:
+        """Processes with `word` in their command line."""
+        return [process for process in self.alive() if word in told(process)]
+
+    def left(self, seconds: float = PROMPT) -> list[str]:
+        """Commands of what still lives after so long; what does is killed then."""
+        wait(lambda: not self.alive(), seconds)
+        left = self.alive()
+        said = [told(process) for process in left]
+        for process in left:
+            try:
+                process.kill()
+            except psutil.NoSuchProcess:
+                pass
+        return said
+
+
+def told(process: psutil.Process) -> str:
+    """The command line, empty if the process has just ended."""
+    try:
+        return " ".join(process.cmdline())
+    except psutil.NoSuchProcess:
+        return ""
+
+
+def wait(condition: Callable[[], bool], seconds: float) -> bool:
+    """Whether the condition came true in time."""
+    latest = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > latest:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def send(process: psutil.Process, number: int = signal.SIGKILL) -> None:
+    """A signal to what may have ended by now."""
+    try:
+        process.send_signal(number)
+    except psutil.NoSuchProcess:
+        pass

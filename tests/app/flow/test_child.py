@@ -1,0 +1,156 @@
+"""A stage as a child: its lines, why it failed, and that all its processes end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from threading import Event, Thread
+
+import pytest
+
+from app.flow import child, guard
+from tests.app.flow.toy import Toy, stage
+
+SHELLS = {
+    "nothing": "true",
+    "sleeper": "python -c 'print(\"sleeps\", flush=True); import time; time.sleep(600)'",
+}
+
+
+@pytest.fixture(scope="module")
+def toy(tmp_path_factory: pytest.TempPathFactory) -> Toy:
+    shells = {
+        name: {"cmd": command, "deps": ["word"], "outs": [f"{name}.out"]}
+        for name, command in SHELLS.items()
+    }
+    stages = {"good": stage("good", "word"), "bad": stage("bad", "wrong"), **shells}
+    return Toy(tmp_path_factory.mktemp("child") / "toy", stages, word="one\n", wrong="bad\n")
+
+
+def run(toy: Toy, name: str, lines: list[str] | None = None, **more) -> bool:
+    on_line = (lines if lines is not None else []).append
+    return child.run_stage(toy.folder, name, environment=toy.environment, on_line=on_line, **more)
+
+
+def until(condition: Callable[[], object], seconds: float = 20.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "it did not come to pass"
+        time.sleep(0.05)
+
+
+def alive(text: str) -> list[str]:
+    """Command lines of living processes that hold `text`."""
+    found = subprocess.run(["ps", "-eo", "stat,args"], capture_output=True, text=True).stdout
+    return [line for line in found.splitlines() if text in line and not line.startswith("Z")]
+
+
+def test_a_stage_runs_once_and_only_its_own_lines_are_heard(toy: Toy) -> None:
+    lines: list[str] = []
+    assert run(toy, "good", lines)
+    assert lines == ["good works"]
+    assert (toy.folder / "good.out").read_text() == "one\n"
+    assert not run(toy, "good", lines)
+    assert lines == ["good works"]
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("bad", "wrong: says bad; write something else"),
+        ("nothing", "output 'nothing.out' does not exist"),
+    ],
+)
+def test_a_failure_says_why_in_one_line(toy: Toy, name: str, reason: str) -> None:
+    with pytest.raises(child.StageFailed) as failure:
+        run(toy, name)
+    assert str(failure.value) == f"{name}: {reason}"
+
+
+def failed(*own: str, why: str) -> list[str]:
+    """What DVC said of a stage that failed, around the stage's own lines."""
+    return ["Running stage 'x':", "> x.py", *own, f"ERROR: failed to reproduce 'x': {why}"]
+
+
+RUN = "failed to run: x.py, exited with"
+FAULT = ["1", "Traceback (most recent call last):", '  File "x"', "ZeroDivisionError: division"]
+MISSING = "[Errno 2] No such file or directory: 'missing'"
+
+
+@pytest.mark.parametrize(
+    ("said", "status", "reason"),
+    [
+        (failed("1", why=f"{RUN} -9"), 255, "was killed by signal 9"),
+        (failed("Killed", why=f"{RUN} 137"), 255, "was killed by signal 9"),  # a shell around it
+        (failed("Aborted", why=f"{RUN} 134"), 255, "was killed by signal 6"),
+        (failed("error: it is", why=f"{RUN} 1"), 255, "it is"),
+        (failed(why=f"{RUN} 3"), 255, "ended with exit status 3"),
+        (failed(*FAULT, why=f"{RUN} 1"), 255, FAULT[-1]),
+        ([f"ERROR: failed to reproduce 'x': {MISSING}"], 255, MISSING),  # before it ran
+        (["Running stage 'x':", "> x.py", "1"], 128 + 9, "DVC was killed by signal 9"),
+        (failed("1", why=f"{RUN} -2"), -9, "its guard was killed by signal 9"),
+    ],
+)
+def test_why_a_stage_failed_by_lines_of_dvc(said: list[str], status: int, reason: str) -> None:
+    assert child._reason(said, status) == reason
+
+
+def test_lines_come_as_they_are_printed_and_a_cancelled_stage_leaves_nothing(toy: Toy) -> None:
+    cancelled, lines = Event(), []
+    ended: list[BaseException] = []
+
+    def body() -> None:
+        try:
+            run(toy, "sleeper", lines, cancelled=cancelled.is_set)
+        except BaseException as error:
+            ended.append(error)
+
+    thread = Thread(target=body, daemon=True)
+    thread.start()
+    until(lambda: lines == ["sleeps"])
+    assert alive("time.sleep(600)")
+    cancelled.set()
+    thread.join(guard.GRACE + 5)
+    assert [type(one) for one in ended] == [child.Cancelled]
+    assert not alive("time.sleep(600)")
+    rwlock = (toy.folder / ".dvc" / "tmp" / "rwlock").read_text()
+    assert "sleeper" not in rwlock  # DVC gave its locks back
+    assert toy.dvc("status", "good") == set()
+
+
+def test_a_group_that_does_not_listen_is_killed_after_the_grace() -> None:
+    deaf = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            "import signal, time; signal.signal(2, signal.SIG_IGN); print(flush=True);"
+            " time.sleep(600)",
+        ],
+        stdout=subprocess.PIPE,
+        process_group=0,
+    )
+    deaf.stdout.readline()
+    start = time.monotonic()
+    guard.end_group(deaf.pid, grace=0.3)
+    assert deaf.wait(5) == -signal.SIGKILL
+    assert time.monotonic() - start >= 0.3
+
+
+def test_what_a_command_leaves_behind_ends_with_it() -> None:
+    leave = "import subprocess; print(subprocess.Popen(['sleep', '601']).pid)"
+    process = subprocess.Popen(
+        [sys.executable, guard.__file__, "sh", "-c", f'python3 -c "{leave}"; exit 5'],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    _, left = process.stdout.readline(), int(process.stdout.readline())
+    assert process.wait(20) == 5
+    process.stdin.close()
+    process.stdout.close()
+    with pytest.raises(ProcessLookupError):
+        until(lambda: os.kill(left, 0))

@@ -1,0 +1,57 @@
+"""The guard where others do not do as they should: process 1, the loader, the guard itself."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.flow import child, guard
+
+# Orphans go to the nearest subreaper; here to one that looks at none of them but the guard.
+OUTER = """\
+import ctypes, os, subprocess, sys
+ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)
+started = subprocess.Popen(sys.argv[1:], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
+status = started.wait()
+try:
+    dead, _ = os.waitpid(-1, os.WNOHANG)
+except ChildProcessError:
+    dead = None
+print(status, dead)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux knows subreapers")
+def test_the_guard_reaps_what_its_command_leaves() -> None:
+    """Zombies count as members of the group: each stage would cost the whole grace."""
+    command = [sys.executable, guard.__file__, "sh", "-c", "sleep 600 & sleep 601 & exit 5"]
+    done = subprocess.run(
+        [sys.executable, "-c", OUTER, *command], capture_output=True, text=True, timeout=60
+    )
+    assert done.stdout == "5 None\n", done.stderr
+
+
+def test_the_loaders_own_lines_come_before_the_groups_number(tmp_path: Path) -> None:
+    environment = {**os.environ, "LD_PRELOAD": str(tmp_path / "missing.so")}
+    command = ["sh", "-c", "exit 3"]
+    with child._guarded(command, tmp_path, environment, lambda: False) as process:
+        process.stdout.read()
+    assert process.returncode == 3
+
+
+def test_a_guard_that_says_no_number_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mute = tmp_path / "mute.py"
+    mute.write_text("import sys\nprint('no number', flush=True)\nsys.stdin.read()\n")
+    monkeypatch.setattr(guard, "__file__", str(mute))
+    asked = iter(range(3))
+    with child._guarded(
+        ["true"], tmp_path, os.environ, lambda: next(asked, None) is None
+    ) as process:
+        assert process.stdout.read() == ""
+    assert process.returncode == 0

@@ -1,0 +1,204 @@
+"""Flows of a small project as a user starts them, shown by one Prefect server."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.flow import guard, run
+from pipeline.base.errors import UserError
+from tests.app.flow.test_child import until
+from tests.app.flow.toy import Toy, stage
+
+GPU = {"gpu": True}
+STAGES = {
+    "top": stage("top", "word"),
+    "side": {
+        "matrix": {"item": ["left", "right"]},
+        **stage("side-${item.item}", "top.out", seconds=0.5, meta=GPU),
+    },
+    "free-a": stage("free-a", "other", seconds="@free-b"),
+    "free-b": stage("free-b", "other", seconds="@free-a"),
+    "bottom": stage("bottom", "side-left.out", "side-right.out"),
+}
+NAMES = {"top", "side@left", "side@right", "free-a", "free-b", "bottom"}
+SLING = ["-c", "from app.cli import main; main()"]
+
+
+@pytest.fixture(scope="module")
+def toy(tmp_path_factory: pytest.TempPathFactory, history: Path) -> Toy:
+    toy = Toy(tmp_path_factory.mktemp("run") / "toy", STAGES, word="one\n", other="one\n")
+    shutil.copytree(history, toy.folder / ".prefect")
+    return toy
+
+
+@pytest.fixture(scope="module")
+def api(toy: Toy) -> Iterator[str]:
+    """The address of Prefect's API, served by `sling ui`."""
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        port = one.getsockname()[1]
+    command = [sys.executable, *SLING, "ui", "--port", str(port)]
+    server = subprocess.Popen(command, cwd=toy.folder, env=toy.environment)
+    address = f"http://127.0.0.1:{port}/api"
+
+    def answers() -> bool:
+        try:
+            return urllib.request.urlopen(f"{address}/health", timeout=5).status == 200
+        except OSError:
+            return False
+
+    until(answers, 90)
+    yield address
+    server.send_signal(signal.SIGINT)
+    server.wait(20)
+
+
+def asked(address: str, body: dict | None = None) -> object:
+    """What Prefect's API answers."""
+    data = None if body is None else json.dumps(body).encode()
+    request = urllib.request.Request(address, data, {"Content-Type": "application/json"})
+    with urllib.request.urlopen(request, timeout=10) as answer:
+        return json.load(answer)
+
+
+def sling(toy: Toy, *arguments: str, **exported: str) -> subprocess.CompletedProcess:
+    """`sling flow`."""
+    return subprocess.run(
+        [sys.executable, *SLING, "flow", *arguments],
+        cwd=toy.folder,
+        env={**toy.environment, **exported},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def overlap(toy: Toy, *names: str) -> bool:
+    notes = [toy.note(name) for name in names]
+    return max(one["begin"] for one in notes) < min(one["end"] for one in notes)
+
+
+@pytest.mark.slow
+def test_a_whole_flow(toy: Toy, api: str) -> None:
+    done = sling(toy, "--workers", "3", "--gpus", "1", SLING_DEVICE="cpu", COLOUR="blue")
+    assert done.returncode == 0, done.stderr
+    assert re.fullmatch(
+        r"stages: 6 ran, 0 fresh after all, 0 failed, 0 not run \(.* s\)\n", done.stdout
+    )
+    lines = done.stderr.splitlines()
+    assert "side@left | side-left works" in lines
+    assert all(line.split(" | ")[0] in NAMES for line in lines[2:]), done.stderr
+
+    assert overlap(toy, "free-a", "free-b")
+    assert not overlap(toy, "side-left", "side-right")  # one GPU
+    assert toy.note("top")["end"] < toy.note("side-left")["begin"]
+    assert toy.note("side-right")["end"] < toy.note("bottom")["begin"]
+    environment = toy.note("bottom")["environment"]
+    share = str(max(1, len(os.sched_getaffinity(0)) // 3))
+    assert environment["SLING_WORKERS"] == environment["OMP_NUM_THREADS"] == share
+    assert (environment["SLING_DEVICE"], environment["COLOUR"]) == ("cpu", "blue")
+
+    assert toy.dvc("repro") == set()
+    assert not (toy.folder / ".gitignore").exists()
+    limit = asked(f"{api}/v2/concurrency_limits/sling-gpu")
+    assert (limit["limit"], limit["active_slots"]) == (1, 0)
+    tasks = asked(f"{api}/task_runs/filter", {})
+    assert {one["name"]: one["state_name"] for one in tasks} == dict.fromkeys(NAMES, "Completed")
+
+
+@pytest.mark.slow
+def test_what_is_fresh_needs_no_prefect(toy: Toy, api: str) -> None:
+    script = (
+        "import sys; from pathlib import Path; from app.flow.run import run\n"
+        "print(run(Path.cwd())); assert 'prefect' not in sys.modules"
+    )
+    done = toy("-c", script)
+    assert done.returncode == 0, done.stderr
+    assert re.fullmatch(r"all 6 stages are fresh \(.* s\)\n", done.stdout)
+
+
+@pytest.mark.slow
+def test_a_failure_stops_only_what_follows_from_it(toy: Toy, api: str) -> None:
+    toy.ran()
+    (toy.folder / "word").write_text("bad\n")
+    (toy.folder / "other").write_text("two\n")
+    done = sling(toy)
+    assert done.returncode == 1
+    assert toy.ran() == {"free-a", "free-b"}
+    assert done.stdout == ""
+    assert done.stderr.splitlines()[-2].startswith("stages: 2 ran, 0 fresh after all, 1 failed, 3")
+    assert done.stderr.splitlines()[-1] == "error: top: word: says bad; write something else"
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.slow
+def test_the_next_flow_goes_on_and_an_unchanged_output_ends_it(toy: Toy, api: str) -> None:
+    """After the failure above, with the word that was there before it."""
+    toy.ran()
+    (toy.folder / "word").write_text("one\nmore\n")
+    done = sling(toy)
+    assert done.stdout.startswith("stages: 1 ran, 3 fresh after all, 0 failed, 0 not run (")
+    assert toy.ran() == {"top"}
+    assert toy.dvc("repro") == set()
+    tasks = asked(f"{api}/task_runs/filter", {"sort": "EXPECTED_START_TIME_DESC", "limit": 4})
+    assert sorted(one["state_name"] for one in tasks) == ["Completed", "Fresh", "Fresh", "Fresh"]
+
+
+def test_two_flows_in_one_folder_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guard, "GRACE", -4.0)
+    toy = Toy(tmp_path / "toy", {"one": stage("one", "word")}, word="one\n")
+    with run.alone(toy.folder):
+        with pytest.raises(UserError, match="another `sling flow` is at work"):
+            with run.alone(toy.folder):
+                pass
+    with run.alone(toy.folder):
+        pass
+
+
+def test_the_lock_lasts_as_long_as_a_guard(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A flow that was killed leaves it to those who end its stages."""
+    monkeypatch.setattr(guard, "GRACE", 0.0)
+    toy = Toy(tmp_path / "toy", {"one": stage("one", "word")}, word="one\n")
+    with run.alone(toy.folder):
+        heir = subprocess.Popen(["sleep", "1.5"], close_fds=False)
+    start = time.monotonic()
+    with run.alone(toy.folder):
+        assert time.monotonic() - start > 0.7
+    heir.wait(5)
+
+
+def test_elsewhere_it_says_so(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no dvc.yaml"):
+        run.run(tmp_path)
+
+
+def test_devices_are_shared_out_among_gpu_stages(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert run.gpu_shares({}, None) is None
+    assert run.gpu_shares({"SLING_DEVICE": "cpu"}, None) is None
+    assert run.gpu_shares({"SLING_DEVICE": "cuda:0"}, None) == [{}]
+    assert run.gpu_shares({}, 2) == [{}, {}]
+    three = ("cuda:0", "cuda:1", "cuda:2")
+    monkeypatch.setattr("pipeline.base.machine.devices", lambda: three)
+    assert run.gpu_shares({"SLING_DEVICE": "cuda"}, 2) == [
+        {"SLING_DEVICE": "cuda:0,cuda:2"},
+        {"SLING_DEVICE": "cuda:1"},
+    ]
+    assert [one["SLING_DEVICE"] for one in run.gpu_shares({"SLING_DEVICE": "cuda"}, 4)] == [
+        *three,
+        "cuda:0",
+    ]

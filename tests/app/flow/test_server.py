@@ -1,0 +1,262 @@
+"""The project's Prefect server: settings as Prefect reads them, where it listens, its history."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+
+from app.flow import server
+from pipeline.base.errors import UserError
+from tests.project import ROOT
+
+HERE = Path(__file__).parent
+SECONDS = 90.0  # that any wait may last
+SERVE = """
+import sys
+from app.flow.server import serve
+print(serve(sys.argv[1], int(sys.argv[2])))
+"""
+# Prefect's own reading of every setting, in a process that knows only our environment.
+EFFECTIVE = """
+import json, logging, os, sys
+import prefect.settings
+from prefect.analytics import is_telemetry_enabled
+from prefect.logging.configuration import setup_logging
+names = json.loads(sys.argv[1])
+own = {name: str(getattr(prefect.settings, name).value()) for name in names}
+setup_logging()
+own["console"] = logging.getLogger().handlers[0].level
+own["telemetry"] = is_telemetry_enabled()
+print(json.dumps(own))
+"""
+# A task that is watched; its server may be gone before it ends.
+FLOW = """
+import sys, time
+from pathlib import Path
+from app.flow.graph import Stage
+from app.flow.server import served
+from app.flow import reporter as watch
+root, words = Path(sys.argv[1]), sys.argv[2:]
+stage = Stage("history@b-m", "history", "b-m", (), True)
+with served(root) as url:
+    import prefect
+
+    @prefect.task
+    def task():
+        seen = watch.Watch(stage, root)
+        for done in (1, 2):
+            seen("a line of the stage")
+            seen(f"history-b-m {done}/2 rollouts  generation {done}  best 0.5  1.0 rollouts/s")
+            if done == 1:
+                time.sleep(1)
+                print(url, flush=True)
+                sys.stdin.readline()
+        begin = time.monotonic()
+        seen.done()
+        print(time.monotonic() - begin, flush=True)
+
+    @prefect.flow(name="sling flow", flow_run_name="b: m")
+    def flow():
+        task()
+
+    flow()
+"""
+
+
+def environment(**more: str) -> dict[str, str]:
+    """Of a process that notes its connections; in no continuous integration, as at a user's."""
+    kept = {name: text for name, text in os.environ.items() if name not in ("CI", "GITHUB_ACTIONS")}
+    return {**kept, "PYTHONPATH": os.pathsep.join([str(HERE / "connections"), str(ROOT)]), **more}
+
+
+def test_each_setting_is_one_of_prefects(tmp_path: Path) -> None:
+    settings = server.environment(tmp_path)
+    ours = {name: text for name, text in settings.items() if name.startswith("PREFECT_")}
+    ours.pop("PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL")  # of its logging.yml
+    done = subprocess.run(
+        [sys.executable, "-c", EFFECTIVE, json.dumps([*ours])],
+        env=environment(**settings, CONNECTIONS=str(tmp_path / "connections")),
+        capture_output=True,
+        text=True,
+        timeout=SECONDS,
+    )
+    assert done.returncode == 0, done.stderr
+    effective = json.loads(done.stdout)
+    assert (effective.pop("console"), effective.pop("telemetry")) == (50, False)
+    connection = effective["PREFECT_SERVER_DATABASE_CONNECTION_URL"]
+    if set(connection) == {"*"}:  # Prefect shows no secrets
+        effective["PREFECT_SERVER_DATABASE_CONNECTION_URL"] = ours[
+            "PREFECT_SERVER_DATABASE_CONNECTION_URL"
+        ]
+    assert {name: text.lower() for name, text in effective.items()} == {
+        name: f"{float(text)}" if text == "1" else text.lower() for name, text in ours.items()
+    }
+    assert not (tmp_path / "connections").exists()
+
+
+def test_nobody_elses_settings_are_taken(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("PREFECT_API_URL", "https://api.prefect.cloud")
+    monkeypatch.setenv("no_proxy", "example.org")
+    clean = server.clean(tmp_path)
+    assert "PREFECT_API_URL" not in clean and clean["no_proxy"] == "example.org,127.0.0.1"
+    assert {name for name in clean if name.startswith("PREFECT_")} < {*server.environment(tmp_path)}
+
+
+def test_a_stale_note_of_a_port_is_no_server(tmp_path: Path) -> None:
+    assert server.address(tmp_path) is None
+    (tmp_path / ".prefect").mkdir()
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        for text in ("1", "x", "99999", str(other.getsockname()[1])):
+            (tmp_path / ".prefect" / "port").write_text(text)
+            if text != str(other.getsockname()[1]):
+                assert server.address(tmp_path) is None
+
+
+def test_a_port_that_another_program_has_is_refused(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(server, "ASKING", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        with pytest.raises(UserError, match=rf"^port {port} cannot be used .*--port {port + 1}$"):
+            server.serve(tmp_path, port)
+    with pytest.raises(UserError, match="--port"):
+        server.serve(tmp_path, 70000)
+
+
+def ask(url: str, path: str, content: dict | None = None):
+    """GET, or POST of `content`, as JSON."""
+    data = None if content is None else json.dumps(content).encode()
+    request = urllib.request.Request(
+        f"{url}{path}", data, {"Content-Type": "application/json"} if data else {}
+    )
+    with urllib.request.urlopen(request, timeout=SECONDS) as answer:
+        return json.load(answer)
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as one:
+        return one.getsockname()[1]
+
+
+def until(happens, what: str):
+    """Wait for something true, and give it."""
+    deadline = time.monotonic() + SECONDS
+    while time.monotonic() < deadline:
+        found = happens()
+        if found:
+            return found
+        time.sleep(0.1)
+    raise AssertionError(f"not in time: {what}")
+
+
+@contextmanager
+def serving(root: Path) -> Iterator[tuple[str, subprocess.Popen]]:
+    """`sling ui` in a process that notes its connections, until SIGINT."""
+    with (root / "said").open("w") as said:
+        process = subprocess.Popen(
+            [sys.executable, "-c", SERVE, str(root), str(free_port())],
+            env=environment(CONNECTIONS=str(root / "connections")),
+            stdout=said,
+            stderr=said,
+        )
+    try:
+        url = until(
+            lambda: process.poll() is not None or server.address(root), (root / "said").read_text()
+        )
+        assert isinstance(url, str), (root / "said").read_text()
+        yield url, process
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(SECONDS) == 0
+    assert server.address(root) is None and not (root / ".prefect" / "port").exists()
+
+
+def listening(pid: int) -> set[tuple[str, int]]:
+    family = [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]
+    sockets = [one for process in family for one in process.net_connections("inet")]
+    return {(one.laddr.ip, one.laddr.port) for one in sockets if one.status == psutil.CONN_LISTEN}
+
+
+@pytest.mark.slow
+def test_the_ui_is_this_projects_alone_and_keeps_its_history(tmp_path: Path) -> None:
+    root, other = tmp_path / "mine", tmp_path / "other"
+    root.mkdir(), other.mkdir()
+    with serving(root) as (url, process):
+        port = int(url.rpartition(":")[2])
+        assert listening(process.pid) == {("127.0.0.1", port)}
+        assert f"Prefect UI: {url}" in (root / "said").read_text()
+        assert url in server.serve(root)  # says where it runs
+        with pytest.raises(UserError, match=f"{port}.*the Prefect server of {root}.*--port"):
+            server.serve(other, port)
+        assert server.address(other) is None
+        ui = ask(url, "/ui-settings")
+        assert (ui["api_url"], ui["default_ui"]) == (f"{url}/api", "v1")
+        with urllib.request.urlopen(url, timeout=SECONDS) as page:
+            allowed = page.headers["content-security-policy"]
+            assert "Prefect" in page.read().decode()
+        assert set(re.findall(r"\w+://(\S+)", allowed)) == {"127.0.0.1:*"}
+        settings = ask(url, "/api/admin/settings")["server"]
+        assert settings["analytics_enabled"] is settings["ui"]["show_promotional_content"] is False
+        ask(url, "/api/flows/", {"name": "kept"})
+        time.sleep(3)  # Prefect's services begin within a second or two
+    assert not (root / "connections").exists(), (root / "connections").read_text()
+    with serving(root) as (url, _):
+        assert ask(url, "/api/flows/name/kept")["name"] == "kept"
+
+
+@pytest.fixture
+def flow(tmp_path: Path, history: Path) -> Iterator[subprocess.Popen]:
+    """A flow that has shown a first line and waits; its server is temporary."""
+    shutil.copytree(history, tmp_path / ".prefect")
+    process = subprocess.Popen(
+        [sys.executable, "-c", FLOW, str(tmp_path)],
+        env=environment(CONNECTIONS=str(tmp_path / "connections")),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    yield process
+    process.kill()
+    process.communicate(timeout=SECONDS)
+
+
+def alive(url: str) -> bool:
+    with socket.socket() as one:
+        return one.connect_ex(("127.0.0.1", int(url.rpartition(":")[2]))) == 0
+
+
+@pytest.mark.slow
+def test_a_flows_own_server_shows_it_and_ends_with_it(flow, tmp_path: Path) -> None:
+    url = flow.stdout.readline().strip()
+
+    def shown() -> list[dict]:
+        found = ask(url, "/api/artifacts/filter", {})
+        return [one for one in found if one["type"] == "progress"]
+
+    (bar,) = until(shown, "progress")
+    assert (bar["key"], bar["data"]) == ("history-b-m", 50.0)
+    assert (
+        bar["description"] == "█████░░░░░ · 1/2 rollouts · generation 1 · best 0.5 · 1.0 rollouts/s"
+    )
+    said = until(lambda: ask(url, "/api/logs/filter", {}), "logs")
+    assert "a line of the stage" in {one["message"] for one in said}
+    (run,) = ask(url, "/api/flow_runs/filter", {})
+    assert run["name"] == "b: m" and bar["flow_run_id"] == run["id"]
+    (task,) = psutil.Process(flow.pid).children()
+    assert listening(task.pid) == {("127.0.0.1", int(url.rpartition(":")[2]))}
+    flow.kill()
+    until(lambda: not alive(url), "the server's end")
+    assert not (tmp_path / "connections").exists()

@@ -1,0 +1,104 @@
+"""A small DVC project: stages that sleep, note when, and write what follows from what they read."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from ruamel.yaml import YAML
+
+# Writes the first line of everything it reads, so that another second line changes nothing.
+WORK = """
+import json, os, pathlib, sys, time
+name, seconds, *sources = sys.argv[1:]
+begin = time.time()
+print(f"{name} works", flush=True)
+if seconds.startswith("@"):  # until that one works too
+    pathlib.Path(name + ".here").touch()
+    while not pathlib.Path(seconds[1:] + ".here").exists() and time.time() < begin + 90:
+        time.sleep(0.05)
+else:
+    time.sleep(float(seconds))
+firsts = []
+for source in sources:
+    lines = pathlib.Path(source).read_text().splitlines()
+    if lines[0] == "bad":
+        print(f"error: {source}: says bad; write something else", file=sys.stderr)
+        sys.exit(1)
+    firsts.append(lines[0])
+pathlib.Path(name + ".out").write_text(" ".join(firsts) + "\\n")
+note = {"begin": begin, "end": time.time(), "environment": dict(os.environ)}
+pathlib.Path("notes").mkdir(exist_ok=True)
+pathlib.Path("notes", name + ".json").write_text(json.dumps(note))
+"""
+
+
+def stage(name: str, *sources: str, seconds: float | str = 0.0, **more) -> dict:
+    """An entry of dvc.yaml: reads `sources`, writes NAME.out.
+
+    Args:
+        seconds: How long it takes; or @ and the name of one that must be at work meanwhile.
+    """
+    command = " ".join(["python work.py", name, str(seconds), *sources])
+    return {"cmd": command, "deps": ["work.py", *sources], "outs": [f"{name}.out"], **more}
+
+
+class Toy:
+    """The project in `folder`; its inputs are files with one word a line."""
+
+    def __init__(self, folder: Path, stages: dict, **inputs: str) -> None:
+        self.folder = folder
+        (folder / ".dvc").mkdir(parents=True)
+        settings = "[core]\n analytics = false\n check_update = false\n no_scm = true\n"
+        (folder / ".dvc" / "config").write_text(settings)
+        (folder / ".dvc" / ".gitignore").write_text("/config.local\n/tmp\n/cache\n")
+        (folder / "work.py").write_text(WORK)
+        for name, text in inputs.items():
+            (folder / name).write_text(text)
+        YAML().dump({"stages": stages}, folder / "dvc.yaml")
+        self.environment = {
+            **os.environ,
+            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+            "DVC_SITE_CACHE_DIR": str(folder.parent / f"{folder.name}-site"),
+            "PYTHONPATH": str(Path(__file__).parents[3]),
+        }
+
+    def copy(self, folder: Path) -> Toy:
+        """The project as it is, in another folder."""
+        shutil.copytree(self.folder, folder)
+        other = copy.copy(self)
+        other.folder = folder
+        return other
+
+    def __call__(self, *command: str) -> subprocess.CompletedProcess:
+        return subprocess.run(
+            [sys.executable, *command],
+            cwd=self.folder,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+
+    def dvc(self, *arguments: str) -> set[str]:
+        """Run DVC; the stages that really ran."""
+        done = self("-m", "dvc", *arguments)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return set(re.findall(r"^Running stage '(.+)':$", done.stdout, re.MULTILINE))
+
+    def note(self, name: str) -> dict:
+        """When a stage began and ended last, and in which environment."""
+        return json.loads((self.folder / "notes" / f"{name}.json").read_text())
+
+    def ran(self) -> set[str]:
+        """Outputs whose stages left a note since this was asked last."""
+        notes = [*(self.folder / "notes").glob("*.json")]
+        for one in notes:
+            one.unlink()
+        return {one.stem for one in notes}

@@ -1,0 +1,70 @@
+"""The calibration of docs/recording.md, run as it stands there."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from ruamel.yaml import YAML
+from scipy.spatial.transform import Rotation
+
+from app.plan.plan import plan_recording
+from pipeline.params import load
+
+ROOT = Path(__file__).parents[3]
+HEADS = "cannot be used", "can be used, but"
+
+
+def test_two_touched_tips_give_the_fork_in_the_base() -> None:
+    """A fork that stands askew: its tips in the base go in, and where it stands comes out."""
+    stands = Rotation.from_euler("z", -70, degrees=True), np.array([0.62, -0.11, 0.37])
+    left, right = (stands[0].apply([side * 0.1375, 0, 0]) + stands[1] for side in (-1, 1))
+    page = (ROOT / "docs/recording.md").read_text(encoding="utf-8")
+    code = page.split("```python\n")[1].split("```")[0]
+    given = code[code.index("left, right =") : code.index("up =")]
+    touched = f"left, right = np.array({left.tolist()}), np.array({right.tolist()})\n"
+    command = [sys.executable, "-c", code.replace(given, touched)]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    found = YAML(typ="safe").load(printed)
+    assert found["fork_width"] == 0.275
+    np.testing.assert_allclose(found["base_to_fork"][:3], stands[1], atol=1e-5)
+    turn = Rotation.from_quat(found["base_to_fork"][3:])
+    assert (turn.inv() * stands[0]).magnitude() < 1e-4
+
+    params = load(ROOT / "params.yaml")
+    setup = params.setup.model_copy(update={"base_to_fork": tuple(found["base_to_fork"])})
+    plan = plan_recording(params.model_copy(update={"setup": setup}), "band1")
+    drawn = plan.base.apply(np.array([0.0, -0.4, 0.0]))
+    np.testing.assert_allclose(drawn, stands[0].apply([0, -0.4, 0]) + stands[1], atol=1e-4)
+
+
+def test_the_table_of_phases_has_the_defaults() -> None:
+    """What the page says of times and ways is what params.yaml gives."""
+    params = load(ROOT / "params.yaml")
+    plan = params.plan
+    page = (ROOT / "docs/recording.md").read_text(encoding="utf-8")
+    assert f"| lead-in | {plan.lead_in:g} s |" in page
+    assert f"| approach, grasp | {plan.approach:.2f} m, {plan.finger_time:g} s |" in page
+    assert f"| pull | {-plan.draw[0]:.2f} m in 4 s |" in page
+    assert f"| pause | {plan.pause:g} s |" in page
+    assert f"| release, swing | {plan.finger_time + plan.wait:g} s |" in page
+    assert f"| retreat | {plan.retreat:.2f} m |" in page
+
+
+def test_what_check_says_is_quoted_as_it_says_it() -> None:
+    """Each piece of a quoted line stands in the code that reads and checks recordings."""
+    folders = (ROOT / "pipeline/recording", ROOT / "app/preflight")
+    files = sorted(file for folder in folders for file in folder.rglob("*.py"))
+    code = "\n".join(file.read_text(encoding="utf-8") for file in files)
+    said = re.sub(r'"\s*\n\s*f?"', "", code)  # strings that go on in the next line
+    page = (ROOT / "docs/recording.md").read_text(encoding="utf-8")
+    tables = [page.split(f"| {head} | do |\n|---|---|\n")[1].split("\n\n")[0] for head in HEADS]
+    rows = "\n".join(tables).splitlines()
+    quotes = [quote for row in rows for quote in row.split("|")[1].split("`")[1::2]]
+    assert len(quotes) > 20
+    for quote in quotes:
+        for piece in filter(None, (part.strip() for part in quote.split("..."))):
+            assert piece in said, f"no message says {piece!r}"

@@ -1,0 +1,345 @@
+"""`sling plan`: frames, files, limits, and that a robot which follows it makes a good recording."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation
+
+from app.plan import limits
+from app.plan.force import Earlier, Held, predict
+from app.plan.messages import COLUMNS
+from app.plan.plan import plan_recording
+from app.plan.trajectory import Phase, Trajectory
+from pipeline.base.errors import UserError
+from pipeline.params import Params, load
+from tests.recording.bag import BASE, HAND, REST, Truth, write_bag
+
+ROOT = Path(__file__).parents[3]
+FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target along the base's x
+
+
+def with_(params: Params, section: str, **values: object) -> Params:
+    return params.model_copy(update={section: getattr(params, section).model_copy(update=values)})
+
+
+@pytest.fixture(scope="module")
+def params() -> Params:
+    return with_(load(ROOT / "params.yaml"), "setup", base_to_fork=FORK_IN_BASE)
+
+
+@pytest.fixture(scope="module")
+def plan(params):
+    return plan_recording(params, "band1", draw=(-0.35, -0.1))
+
+
+def table(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    numbers = {name: np.array([float(r[name]) for r in rows]) for name in COLUMNS[:-1]}
+    return numbers, [row["phase"] for row in rows]
+
+
+def vectors(columns: dict[str, np.ndarray], names: str) -> np.ndarray:
+    return np.stack([columns[name] for name in names.split()], axis=1)
+
+
+def test_the_csv_is_the_trajectory_in_the_robots_base(plan, tmp_path) -> None:
+    """Taken back to frame O by a matrix that is written out by hand."""
+    columns, phases = table(plan.write(tmp_path, 50.0)[0])
+    t = columns["t"]
+    np.testing.assert_allclose(np.diff(t), 0.02, atol=1e-9)
+    assert plan.trajectory.duration <= t[-1] < plan.trajectory.duration + 0.02
+    to_base = np.array([[0.0, 1, 0, 0.7], [-1, 0, 0, 0.1], [0, 0, 1, 0.4], [0, 0, 0, 1]])
+    back = np.linalg.inv(to_base)
+    for names, derivative, one in (("x y z", 0, 1.0), ("vx vy vz", 1, 0), ("ax ay az", 2, 0)):
+        given = np.column_stack([vectors(columns, names), np.full(len(t), one)]) @ back.T
+        wanted = plan.trajectory.position(t, derivative)
+        np.testing.assert_allclose(given[:, :3], wanted, atol=1e-7)
+    hand = Rotation.from_quat(vectors(columns, "qx qy qz qw")).as_matrix()
+    ahead = back[:3, :3] @ hand[0] @ [0, 0, 1]
+    np.testing.assert_allclose(ahead, np.array([0, 0.35, 0.1]) / np.hypot(0.35, 0.1), atol=1e-8)
+    fingers = back[:3, :3] @ hand[0] @ [0, 1, 0]
+    assert fingers[0] == pytest.approx(0, abs=1e-8)  # they close across the band, which lies in x
+    np.testing.assert_array_equal(hand, hand[:1].repeat(len(hand), 0))
+    assert list(dict.fromkeys(phases)) == [phase.name for phase in plan.trajectory.phases]
+    assert set(columns["opening"]) >= {0.08, 0.0}
+
+
+def build(store, kind: str, content: object) -> object:
+    """A rosbags message from JSON, field by field as the type's definition has them."""
+    if kind not in store.types:  # a basic type
+        return content
+    values = {}
+    for field, (node, detail) in store.get_msgdef(kind).fields:
+        if node.name == "NAME":
+            values[field] = build(store, detail, content[field])
+        elif node.name == "BASE":
+            values[field] = content[field]
+        else:
+            (inner, what), _ = detail
+            name = what if inner.name == "NAME" else ""
+            values[field] = [build(store, name, one) for one in content[field]]
+    assert set(values) == set(content)
+    return store.types[kind](**values)
+
+
+def test_the_waypoints_are_a_ros_message_and_the_whole_plan(plan, tmp_path) -> None:
+    """Serialised by rosbags; cubics between its points give back every sample of the CSV."""
+    files = plan.write(tmp_path, 100.0)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kind = "trajectory_msgs/msg/MultiDOFJointTrajectory"
+    message = build(store, kind, json.loads(files[1].read_text()))
+    read = store.deserialize_cdr(store.serialize_cdr(message, kind), kind)
+    assert (read.header.frame_id, read.joint_names) == ("base", ["tcp"])
+
+    stamps = [p.time_from_start for p in read.points]
+    times = np.array([stamp.sec + stamp.nanosec * 1e-9 for stamp in stamps])
+    np.testing.assert_allclose(times, plan.trajectory.path.x, atol=1e-9)
+    places = [p.transforms[0].translation for p in read.points]
+    speeds = [p.velocities[0].linear for p in read.points]
+    spline = CubicHermiteSpline(
+        times, [[p.x, p.y, p.z] for p in places], [[v.x, v.y, v.z] for v in speeds]
+    )
+    columns, _ = table(files[0])
+    inside = columns["t"] <= times[-1]
+    at = columns["t"][inside]
+    np.testing.assert_allclose(spline(at), vectors(columns, "x y z")[inside], atol=1e-7)
+    accelerations = [p.accelerations[0].linear for p in read.points]
+    np.testing.assert_allclose(
+        [[a.x, a.y, a.z] for a in accelerations[:-1]], spline(times[:-1], 2), atol=1e-5
+    )
+    turned = read.points[0].transforms[0].rotation
+    np.testing.assert_allclose([turned.x, turned.y, turned.z, turned.w], plan.hand, atol=1e-12)
+
+
+def test_the_gripper_opens_closes_and_opens(plan, tmp_path) -> None:
+    files = plan.write(tmp_path, 10.0)
+    store = get_typestore(Stores.EMPTY)
+    kind = "control_msgs/msg/GripperCommand"
+    store.register(get_types_from_msg("float64 position\nfloat64 max_effort", kind))
+    commands = json.loads(files[2].read_text())
+    for one in commands:
+        message = build(store, kind, one["command"])
+        assert store.deserialize_cdr(store.serialize_cdr(message, kind), kind) == message
+    assert [one["command"]["position"] for one in commands] == [0.08, 0.0, 0.08]
+    assert {one["command"]["max_effort"] for one in commands} == {40.0}
+    stamps = [one["time_from_start"] for one in commands]
+    times = [stamp["sec"] + stamp["nanosec"] * 1e-9 for stamp in stamps]
+    content = json.loads(plan.to_json(files))
+    assert times == pytest.approx([0.0, content["grasp_s"], content["release_s"]])
+
+
+def test_what_is_printed(plan, tmp_path) -> None:
+    text = plan.to_text([tmp_path / "a.csv"])
+    assert f"wrote {tmp_path / 'a.csv'}" in text
+    assert "not checked: no θ file and no recording was given" in text
+    content = json.loads(plan.to_json([tmp_path / "a.csv"]))
+    assert content["files"] == [str(tmp_path / "a.csv")]
+    assert content["base_to_fork"] == pytest.approx(FORK_IN_BASE)
+    pull = next(row for row in content["phases"] if row["phase"] == "pull")
+    assert pull["fork"] == [0.0, -0.35, -0.1]
+    assert pull["base"] == pytest.approx([0.35, 0.1, 0.3])
+    assert pull["max_speed_m_s"] == pytest.approx(0.2, rel=1e-3)
+
+
+def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="cannot be written"):
+        plan.write(tmp_path / "file", 100.0)
+    with pytest.raises(UserError, match="--rate: must be between 1 and 10000 Hz"):
+        plan.write(tmp_path / "new", 1e9)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize(
+    ("section", "values", "expected"),
+    [
+        ("setup", {"base_to_fork": None}, "setup.base_to_fork is null"),
+        (
+            "plan",
+            {"draw": (-0.6, 0.0)},
+            "y = -0.6 m lies 0.15 m beyond the -0.45 m of setup.draw",
+        ),
+        ("plan", {"draw": (-0.3, -0.4)}, "z = -0.4 m lies 0.1 m beyond the -0.3 m of setup.draw_z"),
+        ("plan", {"draw": (-0.3, 0.5)}, "z = 0.5 m lies 0.5 m beyond the 0 m of setup.draw_z"),
+        ("plan", {"draw": (-1e-300, 0.0)}, "draw by 0.251 m at least, not 0.000 m"),
+        ("plan", {"draw": (-0.2, 0.0)}, "stretches the band to 0.93 of its rest length"),
+        ("plan", {"floor_clearance": 0.4}, "0.318 m above the floor, 0.082 m less than plan.floor"),
+        ("plan", {"orientation": (0.5, 0.5, 0.5, -0.5)}, "plan.orientation: the fingers (z) would"),
+        ("bands", None, "plan.gripper.open: 0.08 m is no wider than the band, 0.09 m thick"),
+        ("episode", {"duration": 7.0}, "it takes 7.71 s, 1.51 s more than episode.duration 7 less"),
+        (
+            "plan",
+            {"pull_speed": 0.15},
+            "raise plan.pull_speed to 0.179, or episode.duration to ",
+        ),
+    ],
+)
+def test_what_is_refused_and_how_it_is_said(params, section, values, expected) -> None:
+    if section == "bands":
+        thick = params.bands["band1"].model_copy(update={"diameter": 0.09})
+        changed = params.model_copy(update={"bands": {"band1": thick}})
+    else:
+        changed = with_(params, section, **values)
+    with pytest.raises(UserError) as error:
+        plan_recording(changed, "band1")
+    assert expected in str(error.value) and "\n" not in str(error.value)
+
+
+def test_the_advice_of_a_refusal_is_enough(params) -> None:
+    """With what the line says, and nothing else changed, the plan is accepted."""
+    plan_recording(with_(params, "plan", pull_speed=0.179), "band1")
+    slow = with_(params, "plan", pull_speed=0.15)
+    plan_recording(with_(slow, "episode", duration=9.9), "band1")
+    with pytest.raises(UserError, match=r"draw by 0.251 m at least, not 0.200 m"):
+        plan_recording(params, "band1", draw=(-0.2, 0.0))
+    plan_recording(params, "band1", draw=(-0.252, 0.0))
+
+
+def test_an_unknown_band(params) -> None:
+    with pytest.raises(UserError, match="band band9: not in params.yaml, which has band1"):
+        plan_recording(params, "band9")
+
+
+def test_speed_and_acceleration_of_any_trajectory(params) -> None:
+    """A leg of 0.4 m in 1 s reaches 0.8 m/s and 3.2 m/s^2."""
+    leg = [Phase("lift", np.array([0.0, 0.0, 0.4]), 1.0, 0.0)]
+    fast = Trajectory.through(np.zeros(3), 0.0, leg)
+    with pytest.raises(UserError, match=r"lift reaches 0.8 m/s, 0.4 more than plan.max_speed 0.4"):
+        limits.check_motion(fast, params.plan)
+    loose = params.plan.model_copy(update={"max_speed": 0.8})
+    with pytest.raises(UserError, match=r"lift reaches 3.2 m/s\^2, 1.2 more than plan.max_acc"):
+        limits.check_motion(fast, loose)
+    limits.check_motion(fast, loose.model_copy(update={"max_acceleration": 3.2}))
+
+
+def test_a_held_string_pulls_as_its_formula() -> None:
+    """Half the fork 3, drawn by 4: each half is 5 long and gives 4/5 of its tension."""
+    held = Held(half_width=3.0, rest_length=8.0)
+    point = np.array([0.0, -4.0, 0.0])
+    assert held.stretch(point) == pytest.approx(1.25)
+    assert held.force(point) == pytest.approx(2 * 4 / 5 * (1.25 - 1 / 1.25**2))
+    assert held.force(0.5 * point) == held.force(np.zeros(3)) == 0
+    part = held.reach(held.stretch, 1.1, point)
+    assert held.stretch(part * point) == pytest.approx(1.1)
+
+
+def test_the_force_by_theta(params, tmp_path) -> None:
+    from pipeline.sling.launch import launch
+    from pipeline.sling.model import THETA, load_sling
+
+    values = 3e5, 0.45, 5e-3, 0.5, 1.0
+    path = tmp_path / "theta.json"
+    theta = dict(zip(THETA, values, strict=True))
+    path.write_text(json.dumps({"band": "band1", "theta": theta}))
+    held = float(launch(load_sling(params, "band1"), np.array(values), (-0.3, -0.2)).hold_force[0])
+    planned = plan_recording(params, "band1", draw=(-0.3, -0.2), theta=path)
+    assert planned.force.force == held
+
+    weak = with_(params, "setup", max_force=held - 1)
+    with pytest.raises(UserError, match="1.0 N more than setup.max_force") as error:
+        plan_recording(weak, "band1", draw=(-0.3, -0.2), theta=path)
+    advised = tuple(map(float, str(error.value).split("--draw=")[1].split(",")))
+    assert plan_recording(weak, "band1", draw=advised, theta=path).force.force < held - 1
+
+
+def test_a_force_where_the_band_should_be_slack(params) -> None:
+    shallow = Earlier(Path("a.mcap"), None, "", "", 5.0, np.array([0.0, -0.15, 0.0]), None)
+    with pytest.raises(UserError, match="a.mcap: holds 5.0 N where the band should be slack"):
+        predict(params, "band1", np.array([0.0, -0.4, 0.0]), None, shallow)
+
+
+def test_a_band_that_the_arm_cannot_hold(params) -> None:
+    strong = Earlier(Path("a.mcap"), None, "", "", 900.0, np.array([0.0, -0.4, 0.0]), None)
+    held, drawn = Held.of(params.bands["band1"], params.setup), np.array([0.0, -0.4, 0.0])
+    with pytest.raises(UserError, match="900.0 N .* the band is too stiff for this arm"):
+        limits.check_force(params.setup, held, drawn, predict(params, "band1", drawn, None, strong))
+
+
+# A robot that follows the plan
+
+
+@dataclass(frozen=True)
+class Followed(Truth):
+    """The small recording's world, with the hand where the plan has it."""
+
+    way: Trajectory | None = None
+
+    def hand(self, t: float) -> np.ndarray:
+        return self.way.position(t)
+
+
+FAST = {"max_speed": 0.8, "pull_speed": 0.5, "max_acceleration": 5.0, "hanging": 0.195}
+FAST |= {"lead_in": 0.6, "finger_time": 0.3, "pause": 0.8, "wait": 0.5}
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """(path, plan, params) of a recording by a robot that follows a plan, with pictures."""
+    inverse = BASE[0].inv()
+    fork_in_base = (*inverse.apply(-BASE[1]), *inverse.as_quat())
+    whole = load(ROOT / "params.yaml")
+    placed = with_(whole, "setup", base_to_fork=tuple(map(float, fork_in_base)))
+    params = with_(with_(placed, "plan", **FAST), "episode", duration=4.2, samples=140, tail=0.5)
+    plan = plan_recording(params, "band1")
+    way, release = plan.trajectory, plan.trajectory.start_of("release") + 3e-4
+    truth = Followed(
+        grasp=way.start_of("lift"), release=release, end=way.duration, draw=0.4, way=way
+    )
+    path = tmp_path_factory.mktemp("plan") / "followed.mcap"
+    write_bag(path, truth)
+    return path, plan, params, truth
+
+
+def test_a_robot_that_follows_the_plan_makes_a_recording_that_check_accepts(recorded) -> None:
+    from app.preflight.check import check_recording
+
+    path, plan, params, truth = recorded
+    np.testing.assert_allclose(
+        Rotation.from_quat(plan.hand).as_matrix(), (BASE[0].inv() * HAND).as_matrix(), atol=1e-9
+    )
+    report = check_recording(path, params)
+    assert report.usable, report.problem
+    assert report.signals["release_s"] == pytest.approx(truth.release, abs=1e-3)
+    assert report.signals["draw_m"] == pytest.approx([0, -0.4, 0], abs=1e-3)
+
+
+def test_an_earlier_recording_gives_base_frame_and_force(recorded) -> None:
+    """Frame and force are the recording's; the law there is its formula, known at its own draw."""
+    path, plan, params, truth = recorded
+    unknown = with_(params, "setup", base_to_fork=None)
+    again = plan_recording(unknown, "band1", recording=path)
+    np.testing.assert_allclose(again.base.translation, plan.base.translation, atol=1e-6)
+    np.testing.assert_allclose(again.hand, plan.hand, atol=1e-6)
+    assert again.base_source == "/tf_static fork <- base"
+    force = float(np.linalg.norm(truth.force(truth.release - 0.1)))
+    assert again.force.force == pytest.approx(force, rel=0.01)
+    deeper = plan_recording(unknown, "band1", recording=path, draw=(-0.44, 0.0)).force
+    stretch = 2 * np.hypot(0.1375, np.array([0.4, 0.44])) / REST
+    tension = stretch - stretch**-2
+    cosine = np.array([0.4, 0.44]) / np.hypot(0.1375, [0.4, 0.44])
+    ratio = np.divide(*(tension * cosine)[::-1])
+    assert deeper.force / again.force.force == pytest.approx(ratio, rel=2e-3)
+    assert deeper.source.endswith("beyond that stretch a band may stiffen")
+    assert "scaled" not in again.force.source
+
+    weak = with_(unknown, "setup", max_force=force - 2)
+    with pytest.raises(UserError, match=r"N more than setup.max_force .*--draw=-0\.\d\d,0\.00"):
+        plan_recording(weak, "band1", recording=path)
+
+
+def test_a_recording_without_a_pull_gives_the_frame_alone(recorded, tmp_path) -> None:
+    path = tmp_path / "still.mcap"
+    write_bag(path, Truth(stiffness=0.0), cameras=False, rate=200)
+    unknown = with_(recorded[2], "setup", base_to_fork=None)
+    plan = plan_recording(unknown, "band1", recording=path)
+    assert plan.force.force is None
+    assert "no release of a drawn band is in it" in plan.force.source

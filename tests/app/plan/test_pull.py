@@ -1,0 +1,109 @@
+"""The catenary against its length, and the phases of any plan that params.yaml allows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from app.plan.pull import SPARE, TICK, catenary_sag, hanging_middle, trajectory_of
+from pipeline.params import Plan, load
+
+PARAMS = load(Path(__file__).parents[3] / "params.yaml")
+AHEAD = np.array([0.0, 1.0, 0.0])
+
+
+@settings(deadline=None)
+@given(width=st.floats(0.02, 2), ratio=st.floats(1.001, 50))
+def test_the_catenary_of_that_sag_has_that_length(width, ratio) -> None:
+    """z = a cosh(x / a), a from the sag alone, integrated along the curve."""
+    sag = catenary_sag(ratio * width, width)
+    half = width / 2
+    u = brentq(lambda u: half / u * (np.cosh(u) - 1) - sag, 1e-6, 300, xtol=1e-14)
+    length = 2 * quad(lambda x: np.cosh(u * x / half), 0, half, epsrel=1e-10)[0]
+    assert length == pytest.approx(ratio * width, rel=1e-5)
+
+
+def test_the_catenary_at_its_ends() -> None:
+    """Nearly taut it is a parabola, sag^2 = 3/8 w (L - w); deep it is two vertical halves."""
+    assert catenary_sag(1.0 + 1e-6, 1.0) == pytest.approx(np.sqrt(3 / 8 * 1e-6), rel=1e-4)
+    assert catenary_sag(1.0 + 1e-12, 1.0) == pytest.approx(np.sqrt(3 / 8 * 1e-12), rel=1e-3)
+    assert catenary_sag(3.0, 1e-4) == pytest.approx(1.5, rel=1e-3)
+    with pytest.raises(ValueError, match="does not reach"):
+        catenary_sag(0.2, 0.2)
+
+
+def test_the_default_is_the_pull_that_the_method_was_made_with() -> None:
+    """About 1 s to lift, 4 s to pull by 0.40 m, 2 s of pause."""
+    plan = trajectory_of(PARAMS.plan, PARAMS.setup, PARAMS.episode, PARAMS.bands["band1"], AHEAD)
+    lasts = {phase.name: phase.duration for phase in plan.phases}
+    assert lasts["lift"] == pytest.approx(1.0, abs=0.05)
+    assert (lasts["pull"], lasts["pause"]) == (pytest.approx(4.0), 2.0)
+    assert lasts["lead-in"] >= 0.5
+
+
+def test_plan_hanging_comes_before_the_catenary() -> None:
+    measured = PARAMS.plan.model_copy(update={"hanging": 0.19})
+    middle = hanging_middle(measured, PARAMS.setup, PARAMS.bands["band1"])
+    np.testing.assert_array_equal(middle, [0, 0, -0.19])
+    string = hanging_middle(PARAMS.plan, PARAMS.setup, PARAMS.bands["band1"])
+    assert string[2] == -catenary_sag(0.52, 0.275)
+
+
+def number(low: float, high: float):
+    return st.floats(low, high)
+
+
+PLANS = st.fixed_dictionaries(
+    {
+        "draw": st.lists(number(-2, -0.05), min_size=1, max_size=1).flatmap(
+            lambda y: number(-2, 1).map(lambda z: [y[0], z])
+        ),
+        "max_speed": number(0.005, 3),
+        "pull_speed": number(0.005, 3),
+        "max_acceleration": number(0.05, 30),
+        "lead_in": number(0.5, 60),
+        "finger_time": number(0.05, 10),
+        "pause": number(0.5, 60),
+        "wait": number(0, 60),
+        "approach": number(0, 0.5),
+        "retreat": number(0, 0.5),
+        "floor_clearance": number(0, 0.5),
+        "hanging": st.none() | number(0, 3),
+        "gripper": st.just({"open": 0.08, "closed": 0.0}),
+        "orientation": st.none(),
+        "frame": st.just("base"),
+    }
+).map(lambda one: {**one, "pull_speed": min(one["pull_speed"], one["max_speed"])})
+
+
+@settings(deadline=None, max_examples=100)
+@given(content=PLANS, angle=number(-1.5, 1.5), duration=number(1, 120), share=number(0.01, 0.9))
+def test_any_plan_rests_in_time_and_within_its_limits(content, angle, duration, share) -> None:
+    plan = Plan.model_validate(content)
+    episode = PARAMS.episode.model_copy(update={"duration": duration, "tail": share * duration})
+    axis = np.array([0.0, np.cos(angle), np.sin(angle)])
+    way = trajectory_of(plan, PARAMS.setup, episode, PARAMS.bands["band1"], axis)
+    names = [phase.name for phase in way.phases]
+    speeds = dict(zip(names, way.peaks(1), strict=True))
+    assert speeds.pop("pull") <= plan.pull_speed * (1 + 1e-6)
+    assert max(speeds.values()) <= plan.max_speed * (1 + 1e-6)
+    assert way.peaks(2).max() <= plan.max_acceleration * (1 + 1e-6)
+    ticks = way.times / TICK
+    np.testing.assert_allclose(ticks, np.round(ticks), atol=1e-6)
+
+    grasp, release = way.start_of("grasp"), way.start_of("release")
+    rest = np.linalg.norm(way.position(np.linspace(0, plan.lead_in, 5), 1), axis=1)
+    assert rest.max() < 1e-9 and grasp >= plan.lead_in - 1e-6
+    np.testing.assert_allclose(way.position(release), [0.0, *plan.draw], atol=1e-12)
+    still = np.linspace(release, release + episode.tail, 5)
+    np.testing.assert_allclose(way.position(still), [[0.0, *plan.draw]] * 5, atol=1e-12)
+    assert way.duration >= max(episode.duration, release + episode.tail) + SPARE - 2 * TICK
+    held = way.opening(np.linspace(grasp + plan.finger_time + TICK, release, 9))
+    np.testing.assert_allclose(held, 0.0, atol=1e-9)
+    assert way.opening(0.0) == way.opening(way.duration) == 0.08

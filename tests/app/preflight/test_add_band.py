@@ -1,0 +1,113 @@
+"""`sling add-band`: all of it or nothing."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+import pytest
+
+from app.preflight.add_band import add_band
+from pipeline.base.errors import UserError
+from pipeline.params import load
+from tests.recording.bag import write_bag
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A project's folder whose window suits the small recordings."""
+    text = Path("params.yaml").read_text()
+    for old, new in (
+        ("duration: 9.0", "duration: 3.6"),
+        ("samples: 300", "samples: 120"),
+        ("tail: 0.7", "tail: 0.5"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "params.yaml").write_text(text)
+    return tmp_path
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def add(project: Path, recording: Path, name: str = "red", **changes) -> str:
+    values = {"mass": 0.0408, "params_path": project / "params.yaml", "root": project, **changes}
+    return add_band(name, recording, **values)
+
+
+def test_a_band_is_added_and_nothing_else_changes(project, seen) -> None:
+    before = (project / "params.yaml").read_text().splitlines()
+    bands = load(project / "params.yaml").run.bands
+    said = add(project, seen[0]).splitlines()
+    assert said[0].startswith("red added: peak force")
+    assert any("pictures come at 15 Hz" in line for line in said[1:])  # what costs accuracy
+    after = (project / "params.yaml").read_text().splitlines()
+    lines = [x for x in difflib.ndiff(before, after) if x[0] in "+-"]
+    assert len([x for x in lines if x[0] == "-"]) == 1  # run.bands
+    assert len([x for x in lines if x[0] == "+"]) == 2
+    params = load(project / "params.yaml")
+    assert params.run.bands == (*bands, "red")
+    band = params.bands["red"]
+    assert (band.source, band.mass, band.diameter, band.rest_length) == (
+        "recording",
+        0.0408,
+        0.010,
+        0.52,
+    )
+    assert (project / "data/raw/red.mcap").read_bytes() == seen[0].read_bytes()
+
+    written = content(project)
+    assert "nothing to do" in add(project, seen[0])
+    with pytest.raises(UserError, match="other values"):
+        add(project, seen[0], mass=0.05)
+    other = project.parent / "other.mcap"
+    write_bag(other, cameras=False, rate=500)
+    with pytest.raises(UserError, match="other content"):
+        add(project, other)
+    assert content(project) == written
+
+    (project / "data/raw/red.mcap").unlink()  # as in a clone of a project that has the band
+    add(project, seen[0])
+    assert content(project) == written
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"name": "Red Band"}, "band name"),
+        ({"name": "../red"}, "band name"),
+        ({"name": "band1"}, "other values"),
+        ({"mass": -1.0}, "mass"),
+        ({"mass": 40.8}, "mass"),
+        ({"diameter": 0.0}, "diameter"),
+        ({"rest_length": float("nan")}, "rest_length"),
+        ({"recording": Path("missing.mcap")}, "no such file"),
+        ({"recording": Path("params.yaml")}, "not an MCAP"),
+        ({"recording": Path("tests")}, "tests: is a folder"),
+        ({"recording": Path("/dev/null")}, "is not a file"),
+        ({"name": "measured"}, "bands.measured: data/trials/measured"),
+        ({"rest_length": 0.2}, "bands.red.rest_length: 0.2 must be longer"),
+        ({"rest_length": 1.2}, "no picture shows the band drawn taut at a rest length of 1.2 m"),
+    ],
+)
+def test_bad_input_writes_nothing(project, seen, changes, words) -> None:
+    before = content(project)
+    with pytest.raises(UserError, match=words) as caught:
+        add(project, **{"recording": seen[0], **changes})
+    assert "\n" not in str(caught.value)
+    assert content(project) == before
+
+
+def test_an_empty_recording_is_said_to_be_empty(project) -> None:
+    (project / "empty.mcap").touch()
+    with pytest.raises(UserError, match="empty.mcap: is empty"):
+        add(project, project / "empty.mcap")
+
+
+def test_a_recording_that_cannot_be_used_writes_nothing(project, blind) -> None:
+    before = content(project)
+    with pytest.raises(UserError, match="empty mask"):
+        add(project, blind[0])
+    assert content(project) == before

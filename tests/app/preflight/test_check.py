@@ -1,0 +1,261 @@
+"""What `sling check` says of recordings whose truth is a formula."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.preflight.check import ASSUMED, band_of, check_recording
+from app.preflight.command import check
+from app.preflight.verdict import cautions_of, pause
+from pipeline.base.errors import UserError
+from tests.recording.bag import RADIUS, Truth, write_bag
+
+
+def abouts(report) -> set[str]:
+    return {caution.about for caution in report.cautions}
+
+
+def test_the_report_of_a_good_recording(looked, seen) -> None:
+    report, truth = looked.report, seen[1]
+    assert report.usable
+    content = json.loads(report.to_json())
+    signals = content["signals"]
+    assert signals["release_s"] == pytest.approx(truth.release, abs=1e-3)
+    assert abs(signals["release_s"] - truth.release) < 4 * signals["release_error_s"]
+    assert abs(signals["grasp_s"] - truth.grasp) <= signals["grasp_error_s"]
+    peak = np.linalg.norm(truth.force(truth.release - 0.01))
+    assert signals["peak_force_n"] == pytest.approx(peak, rel=0.02)
+    assert content["cloud"]["taut_coverage"] > 0.9
+    assert content["cloud"]["taut_offset_m"] == pytest.approx(RADIUS, abs=0.002)
+    assert content["band"] == {"diameter_m": 0.010, "rest_length_m": 0.52, "source": ASSUMED}
+    roles = {row["role"]: row for row in content["topics"] if row["role"]}
+    assert {"wrench", "pose", "gripper", "color", "depth"} <= set(roles)
+    assert roles["wrench"]["topic"] == "/ft/wrench" and roles["wrench"]["why"]
+    assert roles["color"]["rate"] == pytest.approx(15, rel=0.01)
+    assert set(content["delays"]) == {"pose", "camera"}
+    text = report.to_text()
+    assert "/ft/wrench" in text and "left tip off" in text and "can be used" in text
+
+
+def test_coverage_over_time_follows_the_phases(looked, seen) -> None:
+    rows, truth = looked.report.coverage, seen[1]
+    assert len(rows) == looked.report.cloud["frames"]
+    for row in rows:
+        if truth.drawn < row["time"] < truth.release:
+            assert row["phase"] == "drawn" and row["coverage"] > 0.9
+        assert (row["phase"] == "hanging") == (row["time"] < looked.report.signals["grasp_s"])
+        assert (row["phase"] in ("recoil", "swing")) == (row["time"] >= truth.release)
+    phases = looked.report.phases
+    assert [row["phase"] for row in phases] == ["hanging", "held", "drawn", "recoil", "swing"]
+    assert sum(row["pictures"] for row in phases) == len(rows)
+
+
+def test_a_cloud_without_one_side_covers_half(looked) -> None:
+    from app.preflight.coverage import share_covered
+
+    scene, clouds = looked.done.scene, looked.done.clouds
+    time = max(t for t in clouds.time if scene.taut(t))
+    points = clouds.points[int(np.flatnonzero(clouds.time == time)[0])]
+    assert share_covered(scene, time, points[points[:, 0] < 0]) == pytest.approx(0.5, abs=0.06)
+    assert share_covered(scene, 0.0, points[:0]) == 0
+    s = np.linspace(0, np.pi, 300)
+    hanging = np.stack([0.1375 * np.cos(s), 0 * s, -0.2 * np.sin(s)], axis=1)
+    assert share_covered(scene, 0.0, hanging) == 1
+    assert share_covered(scene, 0.0, hanging[hanging[:, 0] < 0]) == pytest.approx(0.5, abs=0.1)
+
+
+def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
+    """No gripper, a slow camera, a lost second of force, a short pause, too much force."""
+    start = []
+
+    def spoil(kind: str, stamp: int, message):
+        start.append(stamp)
+        lost = 1.3 < (stamp - start[0]) * 1e-9 < 1.35
+        return None if kind == "wrench" and lost else message
+
+    path = tmp_path / "poor.mcap"
+    write_bag(path, Truth(noise=0.6), rate=500, without=("gripper",), change=spoil)
+    weak = params.setup.model_copy(update={"max_force": 15.0})
+    report = check_recording(path, params.model_copy(update={"setup": weak}))
+    assert report.usable and report.verdict == "can be used, but:"
+    said = {"gripper", "picture_rate", "force_rate", "gap", "pause", "max_force", "noise"}
+    assert said <= abouts(report)
+    text = report.to_text()
+    for caution in report.cautions:
+        assert caution.cure and "\n" not in str(caution) and str(caution) in text
+
+
+def test_cautions_come_from_the_report_alone(looked, params) -> None:
+    report = looked.report
+    bad = replace(
+        report,
+        notes=["no checksums in the file: damage to its messages would not be noticed"],
+        losses=["2 damaged chunks dropped"],
+        signals={
+            **report.signals,
+            "grasp_s": 0.3,
+            "drift_n_s": [0.0, 1.0, 0.0],
+            "turn_deg": 3.0,
+            "release_error_s": 0.004,
+            "slips_s": [1.5],
+        },
+        delays={"pose": {"value_s": 0.012, "error_s": 0.001, "source": "x", "applied": True}},
+        cloud={**report.cloud, "empty": 20, "damaged": 20, "unpaired": 20},
+        phases=[{**report.phases[2], "coverage": 0.5}],
+        extrinsics={**report.extrinsics, "off_m": 0.02, "hand_off_m": 0.05},
+    )
+    found = {caution.about for caution in cautions_of(bad, looked.done, params.setup)}
+    said = "checksums losses lead_in drift turn release slip delay empty damaged unpaired coverage"
+    assert {*said.split(), "extrinsics", "hand"} <= found
+    none = cautions_of(replace(report, extrinsics={}), looked.done, params.setup)
+    assert "extrinsics" in {caution.about for caution in none}
+
+
+@pytest.mark.parametrize(
+    ("role", "offset", "said"),
+    [
+        ("pose", 0.3, True),
+        ("pose", -0.05, True),
+        ("pose", -0.01, False),
+        ("color", 0.045, True),  # received before it was taken
+        ("color", -0.06, False),  # a slow driver
+        ("color", -0.2, True),
+    ],
+)
+def test_times_of_receipt_tell_of_another_clock(looked, params, role, offset, said) -> None:
+    topics = [
+        replace(row, clock_offset=offset) if row.role == role else row
+        for row in looked.report.topics
+    ]
+    found = cautions_of(replace(looked.report, topics=topics), looked.done, params.setup)
+    words = [caution.what for caution in found if caution.about == "clock"]
+    assert len(words) == said and all(f"{offset:+.3f} s" in what for what in words)
+
+
+def test_a_clock_ahead_is_shown_with_its_sign(tmp_path, params) -> None:
+    """Stamps of the pose that are 0.2 s too large."""
+
+    def ahead(kind: str, stamp: int, message):
+        if kind == "pose":
+            whole = stamp + 200_000_000
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(whole, 10**9)
+        return message
+
+    path = tmp_path / "ahead.mcap"
+    write_bag(path, cameras=False, rate=500, change=ahead)
+    rows = {row.role: row for row in check_recording(path, params).topics}
+    assert rows["pose"].clock_offset == pytest.approx(0.2, abs=0.001)
+    assert rows["wrench"].clock_offset == 0
+    assert rows["depth"].clock_offset == pytest.approx(-0.0155, abs=0.001)  # it takes a while
+
+
+def test_a_camera_that_stops_before_the_release_is_said(looked, params) -> None:
+    phases = [row for row in looked.report.phases if row["phase"] in ("hanging", "held", "drawn")]
+    found = cautions_of(replace(looked.report, phases=phases), looked.done, params.setup)
+    said = [caution.what for caution in found if caution.about == "unseen"]
+    assert said == [f"no picture shows how the band {how}" for how in ("recoils", "swings")]
+
+
+def test_a_sensor_that_tf_static_does_not_know_is_said(looked, params) -> None:
+    assert "sensor" not in abouts(looked.report)
+    recording = looked.done.recording
+    loose = replace(recording, wrench=replace(recording.wrench, frame="elsewhere"))
+    found = cautions_of(looked.report, replace(looked.done, recording=loose), params.setup)
+    assert any(c.about == "sensor" and "'elsewhere'" in c.what for c in found)
+
+
+def test_tips_are_off_from_three_standard_errors(looked, params) -> None:
+    for off, error, said in ((0.0039, 0.0001, 0), (0.0045, 0.0016, 0), (0.0045, 0.0014, 1)):
+        facts = {**looked.report.extrinsics, "off_m": off, "off_error_m": error}
+        found = cautions_of(replace(looked.report, extrinsics=facts), looked.done, params.setup)
+        assert sum(caution.about == "extrinsics" for caution in found) == said
+
+
+def test_each_chosen_topic_stands_apart_from_its_role(looked) -> None:
+    """Also where one topic plays two roles."""
+    topics = [replace(row, role=row.role and "wrench, pose") for row in looked.report.topics]
+    assert "  wrench, pose  /ft/wrench  (" in replace(looked.report, topics=topics).to_text()
+
+
+def test_a_disk_that_is_full_is_one_line(seen, params, tmp_path, monkeypatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: full())
+    with pytest.raises(UserError, match="out.png: cannot be written .No space left"):
+        check(seen[0], params, sheet=tmp_path / "out.png")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_pause_before_the_release(looked, seen) -> None:
+    still, change = pause(looked.done.signals)
+    truth = seen[1]
+    assert still == pytest.approx(truth.release - truth.drawn, abs=0.25)  # it creeps to its end
+    assert change < 0.005
+    signals = looked.done.signals
+    rising = replace(signals, force=signals.force * (1 + 0.2 * signals.time[:, None]))
+    release = signals.release_time
+    middle = 1 + 0.2 * (release - 0.3)
+    assert pause(rising)[1] == pytest.approx(0.5 * 0.2 / middle, rel=0.1)
+
+
+def test_the_report_of_a_bad_recording(tmp_path, params) -> None:
+    path = tmp_path / "bad.mcap"
+    write_bag(path, cameras=False, rate=500, without=("wrench",))
+    report = check_recording(path, params)
+    assert not report.usable
+    assert "no force" in json.loads(report.to_json())["problem"]
+    assert "cannot be used: no force" in report.to_text()
+    assert "/arm/current_pose" in report.to_text()
+
+
+def test_a_report_without_pictures_of_the_band_has_its_signals(refused, blind) -> None:
+    report, truth = refused.report, blind[1]
+    assert not report.usable and not report.phases and not report.extrinsics
+    assert report.signals["release_s"] == pytest.approx(truth.release, abs=2e-3)
+    assert "release_s" in report.to_text() and json.loads(report.to_json())["signals"]
+
+
+def test_the_band_of_a_command_line(params) -> None:
+    band, source = band_of(params, "band1", None, None)
+    assert band is params.bands["band1"] and "band1" in source
+    assert band_of(params, None, None, None) == (None, ASSUMED)
+    band, source = band_of(params, None, 0.008, None)
+    assert (band.diameter, band.rest_length) == (0.008, 0.52) and "--rest-length" in source
+    assert band_of(params, None, 0.008, 0.5)[1] == "given"
+    for arguments, words in (
+        (("red", None, None), "--band red: not in params.yaml, which has band1"),
+        (("band1", 0.01, None), "leave the other two out"),
+        ((None, None, 0.2), "--rest-length 0.2: must be longer"),
+    ):
+        with pytest.raises(UserError, match=words):
+            band_of(params, *arguments)
+
+
+def test_outputs_are_refused_before_anything_is_read(tmp_path, params) -> None:
+    missing = tmp_path / "missing.mcap"
+    (tmp_path / "folder.png").mkdir()
+    for options, words in (
+        ({"sheet": tmp_path / "no" / "out.png"}, "there is no folder .*no, make it first"),
+        ({"sheet": tmp_path / "folder.png"}, "is a folder"),
+        ({"sheet": tmp_path / "out.jpg"}, "must end with .png"),
+        ({"rrd": tmp_path / "no" / "out.rrd"}, "there is no folder"),
+        ({"rrd": missing}, "must end with .rrd"),
+    ):
+        with pytest.raises(UserError, match=words):
+            check(missing, params, **options)
+    with pytest.raises(UserError, match="no such file"):
+        check(missing, params, sheet=tmp_path / "out.png")
+    assert [p.name for p in tmp_path.iterdir()] == ["folder.png"]
+
+
+def test_the_whole_command(seen, params, tmp_path) -> None:
+    sheet = tmp_path / "out.png"
+    text, status = check(seen[0], params, band="band1", as_json=True, sheet=sheet)
+    content = json.loads(text)
+    assert status == 0 and content["usable"] and sheet.exists()
+    assert str(sheet) in content["written"][0] and "band1" in content["band"]["source"]

@@ -1,0 +1,166 @@
+"""Aiming with a toy policy: the closed form says where the draw lands."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from app.aim import aim
+from pipeline.base.errors import UserError
+from pipeline.landing.stored import Stored
+from pipeline.sling.model import THETA
+from tests.policy import toy
+from tests.policy.linear import write_policy
+
+PARAMS = SimpleNamespace(
+    bands={"toy": None},
+    methods={"none": None, "other": None, "without": None, "idle": None},
+    run=toy.RUN,
+    policy=SimpleNamespace(targets=(1.425, 2.425)),
+    trials=SimpleNamespace(actuation_error=0.001),
+    setup=SimpleNamespace(max_force=15.0),
+)
+
+
+ROBUST_DRAW = (-0.37, -0.21)
+LEFT_OUT = "the interval leaves out how well the parameters are known"
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    """A plain policy that hits 1.925 m and lands near its other targets, and a robust one."""
+    root = tmp_path_factory.mktemp("root")
+    along = np.linspace(*toy.DRAW_Y, 1001)
+    landing = toy.launch(np.column_stack([along, np.full(1001, -0.15)])).landing_y
+    short, far = np.interp([1.925, 2.425], landing[::-1], along[::-1])
+    slope = (far - short) / 0.5
+    plain = root / "data/policies/toy/none/policy.onnx"
+    write_policy(plain, (slope, 0), (short - 1.925 * slope, -0.15))
+    write_policy(root / "data/policies/toy/none/robust/policy.onnx", (0, 0), ROBUST_DRAW)
+    file = root / "data/theta/toy/none.json"
+    file.parent.mkdir(parents=True)
+    theta = dict.fromkeys(THETA, 0.4) | {"youngs_modulus": 4e5}
+    file.write_text(json.dumps({"band": "toy", "theta": theta}))
+    return root
+
+
+def shoot(root, target: float, launcher=toy.launch, robust=False, **settings) -> dict:
+    params = SimpleNamespace(**{**vars(PARAMS), **settings})
+    return aim(params, "toy", "none", target, root, launcher=launcher, robust=robust)
+
+
+def test_the_draw_lands_on_the_target(root) -> None:
+    answer = shoot(root, 1.925)
+    draw = np.array([[answer["draw_y_m"], answer["draw_z_m"]]])
+    truth = toy.launch(draw)
+    assert truth.landing_y[0] == pytest.approx(1.925, abs=0.02)
+    assert answer["predicted_landing_m"] == pytest.approx(truth.landing_y[0], abs=1e-6)
+    assert answer["hold_force_n"] == pytest.approx(truth.hold_force[0], abs=1e-6)
+    assert answer["max_force_n"] == 15.0
+    assert answer["warnings"] == [LEFT_OUT]
+    again = Stored(toy.RUN, "toy", "none", root).draws([1.925])
+    np.testing.assert_allclose(again, draw)
+
+
+def test_the_robust_policy_is_another_one_with_an_interval_of_its_own(root) -> None:
+    answer = shoot(root, 1.925, robust=True)
+    draw = [answer["draw_y_m"], answer["draw_z_m"]]
+    np.testing.assert_allclose(draw, ROBUST_DRAW, atol=1e-7)
+    truth = toy.launch(np.array([draw])).landing_y[0]
+    assert answer["predicted_landing_m"] == pytest.approx(truth)
+    low, high = answer["interval_90_m"]
+    assert low < truth < high
+    assert f"{truth - 1.925:+.2f} m off the target" in answer["warnings"][0]
+
+
+def test_nine_landings_of_ten_lie_in_the_interval(root) -> None:
+    answer = shoot(root, 1.925)
+    draw = np.array([answer["draw_y_m"], answer["draw_z_m"]])
+    spread = draw + np.random.default_rng(0).normal(0, 0.001, (4000, 2))
+    low, high = answer["interval_90_m"]
+    landing = toy.launch(spread).landing_y
+    assert 0.88 < ((landing > low) & (landing < high)).mean() < 0.92
+
+
+def test_what_is_known_of_theta_widens_the_interval(root) -> None:
+    """Samples whose landings spread by a tenth: nine of ten of those lie inside."""
+
+    def launcher(draws, thetas=None):
+        launched = toy.launch(draws)
+        if thetas is not None:
+            launched.landing_y = launched.landing_y * thetas[:, 0]
+        return launched
+
+    narrow = shoot(root, 1.925)["interval_90_m"]
+    spread = np.linspace(0.9, 1.1, 201)
+    file = root / "data/confidence/toy/none.json"
+    file.parent.mkdir(parents=True)
+    samples = np.tile(spread[:, None], (1, len(THETA))).tolist()
+    file.write_text(json.dumps({"names": list(THETA), "samples": samples}))
+    answer = shoot(root, 1.925, launcher=launcher)
+    file.unlink()
+    landing = answer["predicted_landing_m"]
+    assert answer["warnings"] == []
+    np.testing.assert_allclose(answer["interval_90_m"], [0.91 * landing, 1.09 * landing], rtol=0.01)
+    assert np.ptp(narrow) < 0.5 * np.ptp(answer["interval_90_m"])
+
+
+def test_what_the_recording_shows_of_the_law_widens_the_interval(root) -> None:
+    """A theta file whose recording is off by a tenth: 1.645 tenths on each side, and the draw's."""
+    file = root / "data/theta/toy/none.json"
+    before = file.read_text()
+    narrow = np.ptp(shoot(root, 1.925)["interval_90_m"])
+    known = {"discrepancy": {"energy": 0.06, "recoil": 0.04, "landing": 0.1}}
+    file.write_text(json.dumps(json.loads(before) | {"confidence": known}))
+    answer = shoot(root, 1.925)
+    file.write_text(before)
+    expected = np.hypot(narrow, 2 * 1.645 * 0.1 * answer["predicted_landing_m"])
+    assert np.ptp(answer["interval_90_m"]) == pytest.approx(expected, rel=0.03)
+
+
+def test_warns_outside_the_trained_range_and_above_the_force(root) -> None:
+    assert "trained for targets" in shoot(root, 2.7)["warnings"][0]
+    weak = SimpleNamespace(max_force=1.0)
+    assert any("setup.max_force" in line for line in shoot(root, 1.925, setup=weak)["warnings"])
+
+
+def test_a_failed_launch_has_no_prediction(root) -> None:
+    def broken(draws: np.ndarray):
+        launched = toy.launch(draws)
+        launched.failure = ["it broke"] * len(draws)
+        return launched
+
+    answer = shoot(root, 1.925, launcher=broken)
+    assert answer["predicted_landing_m"] is None and answer["interval_90_m"] is None
+    assert any("it broke" in line for line in answer["warnings"])
+
+
+def test_says_why_there_is_no_interval(root) -> None:
+    """The draw lands, and one a millimetre shorter does not."""
+
+    def brittle(draws: np.ndarray):
+        launched = toy.launch(draws)
+        launched.failure = ["it broke" if len(draws) > 1 else None] * len(draws)
+        return launched
+
+    answer = shoot(root, 1.925, launcher=brittle)
+    assert answer["predicted_landing_m"] is not None and answer["interval_90_m"] is None
+    assert any(line.startswith("no interval: ") for line in answer["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("band", "method", "message"),
+    [
+        ("none", "none", "band none: not in params.yaml, which has toy"),
+        ("toy", "missing", "method missing: not in params.yaml"),
+        ("toy", "other", "other.json: missing; `dvc repro theta@toy-other` makes it"),
+        ("toy", "without", "missing; `dvc repro ablation_theta@toy-without` makes it"),
+        ("toy", "idle", "missing; name idle under run.methods or run.ablations"),
+    ],
+)
+def test_says_what_is_missing(root, band: str, method: str, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        aim(PARAMS, band, method, 1.925, root, launcher=toy.launch)

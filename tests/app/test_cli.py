@@ -1,0 +1,214 @@
+"""The command line: what it accepts, and that every mistake is one line without a traceback."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.cli import draw, parser, positive, shown
+from pipeline.sling.model import THETA
+from tests.policy.linear import write_policy
+
+ROOT = Path(__file__).parents[2]
+SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
+
+
+def sling(*arguments: str, folder: Path = ROOT) -> subprocess.CompletedProcess:
+    """Run `sling` in `folder` as a user would."""
+    command = [sys.executable, "-c", "from app.cli import main; main()", *arguments]
+    environment = {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    return subprocess.run(
+        command, cwd=folder, env={**os.environ, **environment}, capture_output=True, text=True
+    )
+
+
+def refused(done: subprocess.CompletedProcess, status: int) -> str:
+    assert done.returncode == status, done.stderr
+    assert done.stdout == ""
+    lines = done.stderr.splitlines()
+    assert len(lines) == 1, done.stderr
+    assert lines[0].startswith("error: ")
+    return lines[0]
+
+
+def test_draw_is_two_numbers_behind_the_fork() -> None:
+    assert draw("-0.30,-0.17") == (-0.30, -0.17)
+    for wrong in ("", "-0.3", "-0.3,", "-0.3,a", "-0.3,-0.1,0", "0.3,-0.1", "nan,0", "-inf,0"):
+        with pytest.raises(argparse.ArgumentTypeError):
+            draw(wrong)
+
+
+def test_positive_numbers() -> None:
+    assert positive("0.0408") == 0.0408
+    for wrong in ("0", "-1", "nan", "inf", "a", ""):
+        with pytest.raises(argparse.ArgumentTypeError):
+            positive(wrong)
+
+
+def test_the_documented_commands_are_understood() -> None:
+    parse = parser().parse_args
+    band = parse("add-band orange --recording o.mcap --mass 0.0408".split())
+    assert (band.name, band.recording, band.mass) == ("orange", Path("o.mcap"), 0.0408)
+    assert (band.diameter, band.rest_length) == (0.010, 0.52)
+    assert parse("check o.mcap --json".split()).json
+    planned = parse("plan --band band1 --recording o.mcap --draw=-0.30,-0.17 --rate 50".split())
+    assert (planned.draw, planned.rate, planned.out) == ((-0.30, -0.17), 50.0, None)
+    looked = parse("check o.mcap --band band1 --sheet o.png --rrd o.rrd".split())
+    assert (looked.band, looked.sheet, looked.rrd) == ("band1", Path("o.png"), Path("o.rrd"))
+    launched = parse("launch --theta t.json --band band1 --draw=-0.30,-0.17".split())
+    assert (launched.theta, launched.draw) == (Path("t.json"), (-0.30, -0.17))
+    aimed = parse("aim --band band1 --target 1.925".split())
+    assert (aimed.method, aimed.target, aimed.json) == ("sling2sim2real_taut", 1.925, False)
+    assert not aimed.robust and parse("aim --band b --target 2 --robust".split()).robust
+    assert parse("aim --band band1 --method m --target 1.925".split()).method == "m"
+    assert parse("bench --device cuda:0 --json".split()).device == "cuda:0"
+
+
+def test_results_are_json_or_lines() -> None:
+    content = {"landing_y_m": None, "interval_90_m": [1.0, 1.25], "failure": "broke"}
+    assert json.loads(shown(content, True)[0]) == content
+    assert shown(content, False)[0].splitlines() == [
+        "landing_y_m    -",
+        "interval_90_m  1 1.25",
+        "failure        broke",
+    ]
+    with pytest.raises(ValueError, match="JSON"):
+        shown({"x": float("nan")}, True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ("", "required: COMMAND"),
+        ("lunch", "invalid choice: 'lunch'"),
+        ("launch --theta t.json --band band1", "required: --draw"),
+        ("launch --theta t.json --band band1 --draw -0.30,-0.17", "joined by ="),
+        ("launch --theta t.json --band band1 --draw=0.30,-0.17", "y must be below 0"),
+        ("launch --theta t.json --band band1 --draw=-0.30", "must be Y,Z such as"),
+        ("aim --band band1 --target inf", "must be a number, got 'inf'"),
+        ("aim --band band1 --target 1e30", "must be at most 100 m"),
+        ("aim --band band1 --target far", "must be a number, got 'far'"),
+        ("aim --band band1 --target -1.9", "must be above 0"),
+        ("aim --band band1", "required: --target"),
+        ("add-band new --recording new.mcap --mass 0", "must be above 0"),
+    ],
+)
+def test_a_command_line_that_makes_no_sense(arguments: str, expected: str) -> None:
+    assert expected in refused(sling(*arguments.split()), 2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ("launch --theta none.json --band band1 --draw=-0.30,-0.17", "none.json: no such file"),
+        ("launch --theta none.json --band band9 --draw=-0.30,-0.17", "band band9: not in params"),
+        ("launch --theta none.json --band band1 --draw=-0.30,-0.60", "lies below the floor"),
+        ("launch --theta none.json --band band1 --draw=-2.30,0", "at most 2 m from the fork"),
+        ("aim --band band9 --target 1.925", "band band9: not in params.yaml"),
+        ("aim --band band1 --method best --target 1.925", "method best: not in params.yaml"),
+        ("check none.mcap", "none.mcap"),
+        ("check none.mcap --band band9", "band9"),
+        ("check none.mcap --sheet none/out.png", "none"),
+        ("plan --band band1", "setup.base_to_fork is null"),
+        ("plan --band band9", "band band9: not in params.yaml"),
+        ("plan --band band1 --recording none.mcap", "none.mcap: no such file"),
+        ("bench --recording none.mcap", "none.mcap: no such file"),
+        ("add-band new --recording none.mcap --mass 0.04", "none.mcap"),
+    ],
+)
+def test_a_users_mistake(arguments: str, expected: str) -> None:
+    assert expected in refused(sling(*arguments.split()), 1)
+
+
+def test_a_reader_that_has_seen_enough() -> None:
+    """`sling ... | head` is no mistake of anybody."""
+    endless = "from pipeline.base.errors import run; run(lambda: print('a line\\n' * 1_000_000))"
+    command = ["bash", "-c", f'"{sys.executable}" -c "{endless}" | head -n 1']
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+    assert (done.stdout, done.stderr) == ("a line\n", "")
+
+
+def test_a_folder_without_params(tmp_path: Path) -> None:
+    done = sling("aim", "--band", "band1", "--target", "1.9", folder=tmp_path)
+    assert "params.yaml: cannot be read" in refused(done, 1)
+
+
+def aimable(folder: Path) -> None:
+    """A project with a policy of band1."""
+    shutil.copy(ROOT / "params.yaml", folder)
+    theta = folder / "data/theta/band1/sling2sim2real_taut.json"
+    theta.parent.mkdir(parents=True)
+    theta.write_text(json.dumps({"band": "band1", "theta": SOFT}))
+    policy = folder / "data/policies/band1/sling2sim2real_taut/policy.onnx"
+    write_policy(policy, slope=(-0.01, 0.0), offset=(-0.31, -0.15))
+
+
+def test_aim_prints_one_json_object(tmp_path: Path) -> None:
+    """The keys that scripts rely on, and the pose in the robot's base; the text has them too."""
+    aimable(tmp_path)
+    arguments = ("aim", "--band", "band1", "--target", "1.9")
+    done = sling(*arguments, "--json", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    stable = ["draw_y_m", "draw_z_m", "predicted_landing_m", "interval_90_m", "hold_force_n"]
+    pose = ["pitch_rad", "tcp_frame", "tcp_position_m", "tcp_quaternion_xyzw"]
+    assert list(answer) == [*stable, "max_force_n", *pose, "warnings"]
+    assert answer["draw_y_m"] == pytest.approx(-0.329, abs=1e-6)
+    assert answer["tcp_position_m"] is None
+    assert "setup.base_to_fork is null" in answer["warnings"][-1]
+    assert answer["interval_90_m"][0] < answer["predicted_landing_m"] < answer["interval_90_m"][1]
+
+    params = tmp_path / "params.yaml"
+    known = "base_to_fork: [0.5, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0]"
+    params.write_text(params.read_text().replace("base_to_fork: null", known))
+    lines = sling(*arguments, folder=tmp_path).stdout.splitlines()
+    shown = dict(line.split(maxsplit=1) for line in lines if not line.startswith("warning: "))
+    assert shown["tcp_position_m"] == "0.5 -0.329 0.25"
+    assert shown["max_force_n"] == "30"
+    assert any(line.startswith("warning: the interval leaves out") for line in lines)
+
+
+def test_aim_by_a_robust_policy_that_is_not_there(tmp_path: Path) -> None:
+    aimable(tmp_path)
+    line = refused(
+        sling("aim", "--band", "band1", "--target", "1.9", "--robust", folder=tmp_path), 1
+    )
+    assert "robust/policy.onnx: missing" in line
+    assert "dvc repro policy@band1-sling2sim2real_taut" in line
+
+
+def test_aim_by_an_ablation_names_its_own_stages(tmp_path: Path) -> None:
+    aimable(tmp_path)
+    aim = ("aim", "--band", "band1", "--method", "de", "--target", "1.9")
+    assert refused(sling(*aim, folder=tmp_path), 1).endswith(
+        "de.json: missing; `dvc repro ablation_theta@band1-de` makes it"
+    )
+    theta = tmp_path / "data/theta/band1"
+    shutil.copy(theta / "sling2sim2real_taut.json", theta / "de.json")
+    assert refused(sling(*aim, folder=tmp_path), 1).endswith(
+        "policy.onnx: missing; `dvc repro ablation_policy@band1-de` makes it"
+    )
+
+
+def test_launch_prints_one_json_object(tmp_path: Path) -> None:
+    """A hand-written θ file with only band and theta is enough."""
+    theta = tmp_path / "theta.json"
+    theta.write_text(json.dumps({"band": "band1", "theta": SOFT}))
+    arguments = ("launch", "--theta", str(theta), "--band", "band1", "--json")
+    done = sling(*arguments, "--draw=-0.30,-0.17")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert set(result) == {"landing_y_m", "speed_m_s", "hold_force_n", "failure"}
+    assert result["failure"] is None
+    assert 0.5 < result["landing_y_m"] < 6.0
+    assert 1.0 < result["hold_force_n"] < 30.0
+    broken = json.loads(sling(*arguments, "--draw=-0.45,-0.30").stdout)
+    assert broken["landing_y_m"] is None
+    assert "N, more than" in broken["failure"]

@@ -1,0 +1,172 @@
+"""The hand's pose for a draw: by hand, by matrices, as the plan has it, as a robot reported it."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap_ros2.reader import read_ros2_messages
+from scipy.spatial.transform import Rotation
+
+from app.plan.plan import plan_recording
+from app.pose import posed
+from pipeline.params import load
+from tests.project import ROOT
+from tests.recording.bag import write_bag
+
+pytestmark = pytest.mark.usefixtures("nowhere")
+
+PARAMS = load(ROOT / "params.yaml")
+FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target along the base's x
+TIPS = np.array([[-0.1375, 0, 0], [0.1375, 0, 0]])
+
+
+def standing(pose: tuple | None):
+    """params.yaml with the fork there in the robot's base."""
+    setup = PARAMS.setup.model_copy(update={"base_to_fork": pose})
+    return PARAMS.model_copy(update={"setup": setup})
+
+
+def at(y: float, z: float, params, root=".") -> dict:
+    answer = {"draw_y_m": y, "draw_z_m": z, "hold_force_n": 9.0, "warnings": ["as before"]}
+    return posed(answer, params, "band1", root)
+
+
+def test_a_draw_by_hand() -> None:
+    """45 degrees upwards, the fork's y along the base's x, its x against the base's y.
+
+    In frame O the hand's z is (0, 1, 1) / sqrt 2. In the base its axes are then the columns of
+    [[0, s, s], [-1, 0, 0], [0, -s, s]], s = 1 / sqrt 2, whose trace is s: w = sqrt(1 + s) / 2, and
+    the rest follows from the differences across the diagonal over 4 w.
+    """
+    pose = at(-0.3, -0.3, standing(FORK_IN_BASE))
+    assert pose["tcp_frame"] == "base"
+    assert pose["tcp_position_m"] == pytest.approx([0.7 - 0.3, 0.1, 0.4 - 0.3])
+    assert pose["pitch_rad"] == pytest.approx(np.pi / 4)
+    s = 0.5**0.5
+    w = np.sqrt(1 + s) / 2
+    by_hand = [-s / (4 * w), s / (4 * w), -(1 + s) / (4 * w), w]
+    np.testing.assert_allclose(pose["tcp_quaternion_xyzw"], by_hand, atol=1e-12)
+    assert (pose["warnings"], pose["hold_force_n"]) == (["as before"], 9.0)
+    assert list(pose)[-1] == "warnings"
+
+
+def test_a_level_draw_in_frame_o() -> None:
+    """A base that is frame O: a quarter turn about x brings z to y."""
+    level = at(-0.4, 0.0, standing((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)))
+    assert level["tcp_position_m"] == [0.0, -0.4, 0.0]
+    assert level["pitch_rad"] == 0.0
+    np.testing.assert_allclose(level["tcp_quaternion_xyzw"], [-(0.5**0.5), 0, 0, 0.5**0.5])
+
+
+UNIT = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1)
+PLACE = st.lists(st.floats(-2, 2), min_size=3, max_size=3)
+
+
+@settings(deadline=None, max_examples=200)
+@given(place=PLACE, turn=UNIT, y=st.floats(-2, -0.05), z=st.floats(-2, 1))
+def test_band_hand_and_launch_lie_in_one_plane(place, turn, y, z) -> None:
+    """In the base, by a homogeneous matrix: all of the band's plane is across the hand's y."""
+    turn = np.array(turn) / np.linalg.norm(turn)
+    pose = at(y, z, standing((*place, *turn)))
+    to_base = np.eye(4)
+    to_base[:3, :3], to_base[:3, 3] = Rotation.from_quat(turn).as_matrix(), place
+
+    def in_base(point) -> np.ndarray:
+        return (to_base @ [*point, 1.0])[:3]
+
+    quaternion = np.array(pose["tcp_quaternion_xyzw"])
+    assert np.linalg.norm(quaternion) == pytest.approx(1.0, abs=1e-12) and quaternion[3] >= 0
+    axes = Rotation.from_quat(quaternion).as_matrix()
+    tcp = np.array(pose["tcp_position_m"])
+    np.testing.assert_allclose(tcp, in_base([0, y, z]), atol=1e-6)
+    seen = [axes.T @ (in_base(point) - tcp) for point in (*TIPS, np.zeros(3))]
+    np.testing.assert_allclose([way[1] for way in seen], 0.0, atol=2e-6)
+    left, right, origin = seen
+    np.testing.assert_allclose(origin, [0, 0, np.hypot(y, z)], atol=2e-6)  # straight ahead
+    np.testing.assert_allclose(right - left, [0.275, 0, 0], atol=1e-9)
+    launch = np.array([0, np.cos(pose["pitch_rad"]), np.sin(pose["pitch_rad"])])
+    np.testing.assert_allclose(axes[:, 2], to_base[:3, :3] @ launch, atol=1e-12)
+
+
+def test_a_half_turn_about_the_approach_axis_as_the_docs_say() -> None:
+    """(qy, -qx, qw, -qz) points ahead alike, with the other side up."""
+    x, y, z, w = at(-0.3, -0.2, standing(FORK_IN_BASE))["tcp_quaternion_xyzw"]
+    axes, turned = (Rotation.from_quat(q).as_matrix() for q in ((x, y, z, w), (y, -x, w, -z)))
+    np.testing.assert_allclose(turned, axes * [-1, -1, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("draw", [(-0.35, -0.10), (-0.40, 0.0), (-0.3, -0.25)])
+def test_the_plan_of_a_recording_holds_the_same_draw_alike(draw, tmp_path) -> None:
+    """By the CSV that a robot would follow: its pause."""
+    params = standing((0.62, -0.05, 0.41, 0.02, -0.03, -0.7, np.sqrt(1 - 0.4913)))
+    plan = plan_recording(params, "band1", draw=draw)
+    with plan.write(tmp_path, 100.0)[0].open(newline="") as file:
+        drawn = next(row for row in csv.DictReader(file) if row["phase"] == "pause")
+    pose = at(*draw, params)
+    assert pose["tcp_frame"] == plan.frame
+    position, turn = ([float(drawn[name]) for name in names.split()] for names in COLUMNS)
+    np.testing.assert_allclose(pose["tcp_position_m"], position, atol=1e-6)
+    np.testing.assert_allclose(pose["tcp_quaternion_xyzw"], turn, atol=1e-8)
+
+
+COLUMNS = "x y z", "qx qy qz qw"
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """(root, truth) of a project with a recording of band1 whose /tf_static joins base and fork."""
+    root = tmp_path_factory.mktemp("project")
+    (root / "data" / "raw").mkdir(parents=True)
+    path = root / "data" / "raw" / "band1.mcap"
+    return root, write_bag(path, cameras=False, rate=200, pose_rate=100)
+
+
+def test_the_recorded_draw_is_the_pose_that_the_robot_reported(recorded) -> None:
+    """Before the release, read by another library: same frame, place and turn of the hand."""
+    root, truth = recorded
+    path = root / "data/raw/band1.mcap"
+    poses = [one.ros_msg for one in read_ros2_messages(path, topics=["/arm/current_pose"])]
+    start = poses[0].header.stamp.sec + poses[0].header.stamp.nanosec * 1e-9
+    reported = next(
+        one
+        for one in reversed(poses)
+        if one.header.stamp.sec + one.header.stamp.nanosec * 1e-9 - start < truth.release - 0.01
+    )
+    pose = at(-truth.draw, 0.0, standing(None), root)
+    assert pose["tcp_frame"] == reported.header.frame_id == "base"
+    place, turn = reported.pose.position, reported.pose.orientation
+    np.testing.assert_allclose(pose["tcp_position_m"], [place.x, place.y, place.z], atol=1e-6)
+    told = np.array([turn.x, turn.y, turn.z, turn.w])
+    assert abs(told @ pose["tcp_quaternion_xyzw"]) == pytest.approx(1.0, abs=1e-9)
+    assert pose["warnings"] == ["as before"]
+
+
+def test_setup_comes_before_tf_static_and_the_recording_names_the_base(recorded, tmp_path) -> None:
+    """As where a recording becomes an episode; without one that can be read, plan.frame does."""
+    params = standing(FORK_IN_BASE)
+    params = params.model_copy(update={"plan": params.plan.model_copy(update={"frame": "arm"})})
+    (tmp_path / "data" / "raw").mkdir(parents=True)
+    poses = [at(-0.3, -0.3, params, root) for root in (recorded[0], tmp_path)]
+    (tmp_path / "data/raw/band1.mcap").write_bytes(b"no recording")
+    poses.append(at(-0.3, -0.3, params, tmp_path))
+    assert [pose["tcp_frame"] for pose in poses] == ["base", "arm", "arm"]
+    for pose in poses:
+        assert pose["tcp_position_m"] == pytest.approx([0.4, 0.1, 0.1])
+        assert pose["warnings"] == ["as before"]
+
+
+def test_a_base_that_is_not_known_is_one_warning(tmp_path) -> None:
+    pose = at(-0.3, -0.3, standing(None), tmp_path)
+    assert [pose[name] for name in pose if name.startswith("tcp")] == [None, None, None]
+    assert pose["pitch_rad"] == pytest.approx(np.pi / 4)
+    before, warning = pose["warnings"]
+    assert before == "as before" and "setup.base_to_fork is null" in warning
+    (tmp_path / "data" / "raw").mkdir(parents=True)
+    (tmp_path / "data/raw/band1.mcap").write_bytes(b"no recording")
+    damaged = at(-0.3, -0.3, standing(None), tmp_path)
+    assert damaged["tcp_position_m"] is None
+    assert "band1.mcap" in damaged["warnings"][1] and "\n" not in damaged["warnings"][1]

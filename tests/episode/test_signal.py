@@ -1,0 +1,64 @@
+"""Filter against its closed form, averages against integrals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.episode.signal import average, cutoff_hz, lowpass, uniform
+
+
+def test_the_papers_cutoff_is_the_same_frequency_at_any_rate() -> None:
+    assert cutoff_hz(0.224, "rad/sample") == pytest.approx(35.65, abs=0.01)
+    assert cutoff_hz(0.224, "rad/s") == pytest.approx(0.03565, abs=1e-5)
+    assert cutoff_hz(12.0, "Hz") == 12.0
+
+
+@pytest.mark.parametrize("rate", [1000.0, 333.0])
+@pytest.mark.parametrize("frequency", [5.0, 35.65, 80.0])
+def test_lowpass_has_the_gain_of_butterworth_squared_and_no_delay(rate, frequency) -> None:
+    cutoff = 35.65
+    t = np.arange(0, 4, 1 / rate)
+    # Second order, bilinear transform, forwards and backwards.
+    ratio = math.tan(math.pi * frequency / rate) / math.tan(math.pi * cutoff / rate)
+    gain = 1 / (1 + ratio**4)
+    wave = np.sin(math.tau * frequency * t)
+    middle = slice(len(t) // 4, -len(t) // 4)
+    np.testing.assert_allclose(lowpass(wave, rate, cutoff)[middle], gain * wave[middle], atol=2e-3)
+
+
+def test_lowpass_treats_each_column_alike_and_keeps_constants() -> None:
+    x = np.random.default_rng(0).normal(size=(500, 3))
+    np.testing.assert_allclose(lowpass(x, 1000, 35)[:, 1], lowpass(x[:, 1], 1000, 35))
+    np.testing.assert_allclose(lowpass(np.full(500, 3.0), 1000, 35), 3.0)
+
+
+def test_lowpass_beyond_nyquist_changes_nothing() -> None:
+    x = np.random.default_rng(0).normal(size=50)
+    np.testing.assert_array_equal(lowpass(x, 60, 35), x)
+
+
+def test_average_is_the_integral_of_the_line_through_irregular_samples() -> None:
+    random = np.random.default_rng(1)
+    t = np.sort(np.append(random.uniform(0, 2, 300), [0, 2]))
+    means = average(t, np.stack([3 * t - 1, 0 * t + 7], 1), 0.1, 0.05, 20)
+    middles = 0.1 + 0.05 * (np.arange(20) + 0.5)
+    np.testing.assert_allclose(means, np.stack([3 * middles - 1, np.full(20, 7)], 1), atol=1e-12)
+
+
+def test_average_does_not_depend_on_the_steps() -> None:
+    """A simulation with tiny steps after the release must not weigh that part more."""
+    coarse = np.linspace(0, 1, 11)
+    x = np.sin(5 * coarse)
+    fine = np.union1d(coarse, np.linspace(0.31, 0.39, 500))
+    np.testing.assert_allclose(
+        average(fine, np.interp(fine, coarse, x), 0, 0.2, 5), average(coarse, x, 0, 0.2, 5)
+    )
+
+
+def test_uniform_grid_covers_the_samples() -> None:
+    grid, x = uniform(np.array([0.0, 0.3, 1.0]), np.array([0.0, 3.0, 10.0]), 10)
+    np.testing.assert_allclose(grid, np.arange(11) / 10)
+    np.testing.assert_allclose(x, np.arange(11.0))

@@ -1,0 +1,168 @@
+"""Batches of parameters: slicing, workers, failures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from threading import Barrier
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.base.errors import UserError
+from pipeline.objective import session
+from pipeline.objective.evaluate import Evaluator, Penalty
+from pipeline.objective.loss import TERMS, EpisodeLoss
+from pipeline.objective.space import Space
+from pipeline.params import load
+from pipeline.params.identification import Prior
+from tests.search import toy
+from validation.benchmarks.simulator import recorded_yardstick
+
+PARAMS = load("params.yaml")
+EPISODE = toy.episode()
+SPACE = Space(
+    ("offset", "pull"), np.array([0.0, 0.1]), np.array([0.01, 10]), np.array([0, 1], bool)
+)
+
+
+def simulate(sling, episode, thetas, device):
+    """A band `offset` away and a force `pull`; beyond 8 mm it fails, beyond 9 N it is NaN."""
+    assert (sling, episode, device) == (toy.SLING, EPISODE, "cpu")
+    offset, pull = thetas.T
+    result = toy.rollouts(episode, count=len(thetas))
+    result.center_line[..., 2] -= offset[:, None, None].astype(np.float32)
+    result.force[..., 0] = np.where(pull > 9, np.nan, pull)[:, None]
+    result.failure = ["too far" if far else None for far in offset > 0.008]
+    return result
+
+
+def evaluator(workers: int = 1, **options) -> Evaluator:
+    loss = EpisodeLoss(
+        EPISODE,
+        radius=toy.RADIUS,
+        rest_length=toy.LENGTH,
+        weights={"geom": 1.0, "force": 0.5, "work": 1.0, "taut": 0.0},
+        cutoff=toy.CUTOFF,
+    )
+    options = {"simulate": simulate, **options}
+    return Evaluator(EPISODE, toy.SLING, loss, SPACE, workers=workers, **options)
+
+
+def test_losses_of_a_batch() -> None:
+    """Physical values in, weighted sum out; the unit cube is what was asked."""
+    unit = np.array([[0.5, 0.5], [0.0, 0.0]])
+    found = evaluator(1)(unit)
+    np.testing.assert_array_equal(found.unit, unit)
+    np.testing.assert_allclose(found.theta, [[0.005, 1.0], [0.0, 0.1]])
+    np.testing.assert_allclose(found.terms["geom"], [0.5, 0.0], atol=0.01)
+    np.testing.assert_allclose(found.terms["force"], [1.0, 0.1])
+    np.testing.assert_allclose(found.total, found.terms["geom"] + 0.5 * found.terms["force"])
+    assert found.failure == [None, None]
+
+
+def test_priors_of_the_space_are_in_the_total() -> None:
+    unit = np.random.default_rng(1).random((20, 2))
+    plain, dear = evaluator(1), evaluator(1)
+    dear.space = replace(SPACE, priors={"offset": Prior(mean=0.005, weight=0.5)})
+    found, with_prior = plain(unit), dear(unit)
+    good = np.isfinite(found.total)
+    added = with_prior.total[good] - found.total[good]
+    assert good.sum() > 5 and np.array_equal(good, np.isfinite(with_prior.total))
+    np.testing.assert_allclose(added, 100 * found.theta[good, 0])
+    np.testing.assert_array_equal(with_prior.terms["geom"], found.terms["geom"])
+
+
+def test_the_number_of_workers_changes_nothing() -> None:
+    unit = np.random.default_rng(1).random((67, 2))
+    one, three = evaluator(1)(unit), evaluator(3)(unit)
+    np.testing.assert_array_equal(one.total, three.total)
+    assert one.failure == three.failure
+    for name in TERMS:
+        np.testing.assert_array_equal(one.terms[name], three.terms[name])
+
+
+@pytest.mark.parametrize(("devices", "count"), [(2, 67), (2, 17), (3, 2), (3, 1)])
+def test_nor_does_the_number_of_devices(devices: int, count: int) -> None:
+    """Rows in their order, failures too; some devices may find nothing to do."""
+    unit = np.random.default_rng(1).random((count, 2))
+    one, several = evaluator()(unit), evaluator(devices=["cpu"] * devices)(unit)
+    np.testing.assert_array_equal(one.theta, several.theta)
+    np.testing.assert_array_equal(one.total, several.total)
+    assert one.failure == several.failure
+    for name in TERMS:
+        np.testing.assert_array_equal(one.terms[name], several.terms[name])
+    if count == 67:
+        assert 0 < sum(reason is not None for reason in one.failure) < count
+
+
+def test_devices_share_a_batch_evenly_and_at_once() -> None:
+    """Each of two waits for the other, and would do so forever if they took turns."""
+    both, asked = Barrier(2, timeout=60), {}
+
+    def simulate_on(sling, episode, thetas, device):
+        asked[device] = len(thetas)
+        both.wait()
+        return simulate(sling, episode, thetas, "cpu")
+
+    found = evaluator(devices=("cpu", "cpu:1"), simulate=simulate_on)(np.full((11, 2), 0.5))
+    assert asked == {"cpu": 6, "cpu:1": 5} and np.isfinite(found.total).all()
+
+
+def test_what_a_device_raises_is_raised() -> None:
+    def broken(sling, episode, thetas, device):
+        raise UserError(f"{device}: out of memory")
+
+    with pytest.raises(UserError, match="out of memory"):
+        evaluator(devices=["cpu", "cpu"], simulate=broken)(np.full((3, 2), 0.5))
+
+
+def test_nor_does_either_where_nuisances_are_searched() -> None:
+    """Those of the simulator and those of the loss, in the real ones."""
+    sling, recorded = recorded_yardstick(PARAMS)
+    bounds = {
+        "air_drag": (0.0, 8.0),
+        "camera_delay": (-0.003, 0.003),
+        "force_delay": (0.0, 0.004),
+        "cloud_shift_z": (-0.01, 0.01),
+    }
+    about = PARAMS.methods["sling2sim2real_taut"].model_copy(update={"nuisances": bounds})
+    params = PARAMS.model_copy(update={"methods": {"toy": about}})
+    space = Space.of_method(params, "toy")
+    unit = np.random.default_rng(1).random((40, space.dimension))
+    unit[1:3] = unit[0]
+    unit[1, space.names.index("air_drag")] += 0.1
+    unit[2, space.names.index("cloud_shift_z")] += 0.1
+    unit[:3] %= 1
+    found = []
+    loss = EpisodeLoss.of(params, "toy", recorded, sling)
+    for workers, devices in ((1, ["cpu"]), (2, ["cpu"]), (1, ["cpu", "cpu"])):
+        evaluate = Evaluator(recorded, sling, loss, space, workers=workers, devices=devices)
+        found.append(evaluate(unit))
+    assert found[0].failure == found[1].failure == found[2].failure
+    assert np.isfinite(found[0].total[:3]).all() and len(set(found[0].total[:3])) == 3
+    for name in TERMS:
+        for other in found[1:]:
+            np.testing.assert_array_equal(found[0].terms[name], other.terms[name])
+
+
+def test_failures_are_infinite_and_have_a_reason() -> None:
+    found = evaluator(2)(np.array([[0.9, 0.5], [0.5, 0.999], [0.5, 0.5]]))
+    assert found.failure == ["too far", "the loss is not finite", None]
+    np.testing.assert_array_equal(np.isinf(found.total), [True, True, False])
+    assert np.isnan(found.terms["geom"][:2]).all()
+
+
+def test_a_failure_counts_twice_the_worst_so_far() -> None:
+    penalty = Penalty()
+    np.testing.assert_array_equal(penalty(np.array([1.0, np.inf, 3.0])), [1, 6, 3])
+    np.testing.assert_array_equal(penalty(np.array([2.0, np.inf])), [2, 6])
+    np.testing.assert_array_equal(penalty(np.array([5.0, np.inf])), [5, 10])
+    assert np.isfinite(Penalty()(np.array([np.inf]))).all()
+
+
+@pytest.mark.parametrize(("band", "method"), [("no", "yes"), ("yes", "no")])
+def test_an_unknown_band_or_method_is_refused(band: str, method: str) -> None:
+    params = SimpleNamespace(bands={"yes": None}, methods={"yes": None})
+    with pytest.raises(UserError, match=r"params.yaml has no (bands|methods)\.no"):
+        session.evaluator(params, band, method)

@@ -1,0 +1,362 @@
+"""params.yaml is read as it is written, and every mistake in it is one line with the key's path."""
+
+from __future__ import annotations
+
+import copy
+import io
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+
+from pipeline.base.errors import UserError
+from pipeline.params import Params, load, pairs, parse
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "params.yaml").read_text(encoding="utf-8")
+CONTENT = YAML(typ="safe").load(TEXT)
+WINDY = CONTENT["methods"]["bo"] | {"nuisances": {"air_drag": [0, 8]}}
+INSTRUMENTS_ALONE = {
+    "fixed": {name: box["low"] for name, box in CONTENT["parameters"].items()},
+    "nuisances": {"camera_delay": [-0.003, 0.003]},
+}
+
+
+def leaves(node: object, path: tuple = ()) -> list[tuple[tuple, object]]:
+    """Every (path, value) of the file that is no mapping or list."""
+    if isinstance(node, dict):
+        return [leaf for key, value in node.items() for leaf in leaves(value, (*path, key))]
+    if isinstance(node, list):
+        return [leaf for key, value in enumerate(node) for leaf in leaves(value, (*path, key))]
+    return [(path, node)]
+
+
+def changed(path: tuple, value: object) -> str:
+    """The YAML text with the value at `path` replaced."""
+    content = copy.deepcopy(CONTENT)
+    node = content
+    for part in path[:-1]:
+        node = node[part]
+    node[path[-1]] = value
+    text = io.StringIO()
+    YAML(typ="safe").dump(content, text)
+    return text.getvalue()
+
+
+def refusal(text: str) -> str:
+    with pytest.raises(UserError) as error:
+        parse(text)
+    message = str(error.value)
+    assert "\n" not in message
+    return message
+
+
+ALIKE = set(CONTENT["methods"]) - {"sling2sim2real", "no_multistart", "package_si"}
+NUMBERS = [
+    (path, v) for path, v in leaves(CONTENT) if type(v) in (int, float) and path[1] not in ALIKE
+]
+TEXTS = [(path, v) for path, v in leaves(CONTENT) if isinstance(v, str)]
+
+
+def test_attributes_are_the_keys_of_the_file() -> None:
+    def compare(node: object, view: object) -> None:
+        if isinstance(node, dict):
+            for key, value in node.items():
+                compare(value, view[key] if isinstance(view, dict) else getattr(view, key))
+        elif isinstance(node, list):
+            for value, entry in zip(node, view, strict=True):
+                compare(value, entry)
+        else:
+            assert view == node
+
+    compare(CONTENT, load(ROOT / "params.yaml"))
+
+
+def test_the_view_cannot_be_changed() -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        load(ROOT / "params.yaml").optimizer.k_top = 2
+
+
+@pytest.mark.parametrize(("path", "value"), NUMBERS, ids=lambda x: str(x).replace(" ", ""))
+@pytest.mark.parametrize("wrong", [-1e30, 1e30, float("nan"), float("inf"), True, "1e-6", None])
+def test_every_number_has_a_range_and_a_type(path: tuple, value: float, wrong: object) -> None:
+    if wrong is None and path == ("methods", "no_multistart", "k_top"):
+        return  # as if left out
+    if isinstance(value, int) and wrong in (-1e30, 1e30):
+        wrong = int(wrong)
+    message = refusal(changed(path, wrong))
+    assert message.startswith(f"params.yaml: {'.'.join(map(str, path))}: must be ")
+    assert "between" in message
+
+
+@pytest.mark.parametrize(("path", "value"), TEXTS, ids=lambda x: str(x).replace(" ", ""))
+def test_every_text_refuses_a_number(path: tuple, value: str) -> None:
+    assert refusal(changed(path, 3)).startswith(f"params.yaml: {'.'.join(map(str, path))}: ")
+
+
+def test_whole_numbers_refuse_fractions_and_numbers_accept_whole_ones() -> None:
+    assert "whole number between 1 and 50, got 2.5" in refusal(changed(("optimizer", "k_top"), 2.5))
+    assert parse(changed(("setup", "max_force"), 30)).setup.max_force == 30.0
+
+
+def test_exact_lines() -> None:
+    zero = refusal(changed(("optimizer", "k_top"), 0))
+    assert zero == "params.yaml: optimizer.k_top: must be between 1 and 50, got 0"
+    misspelt = refusal(TEXT.replace(" k_top:", " ktop:"))
+    assert misspelt == "params.yaml: optimizer.ktop: unknown key, the closest known one is k_top"
+    missing = refusal(TEXT.replace("  k_top:", "  # k_top:"))
+    assert missing == "params.yaml: optimizer.k_top: is missing"
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "expected"),
+    [
+        ("run.rig", [], "run.rig: must list"),
+        ("run.bands", ["band1", "other"], "run.bands: other is not one of band1"),
+        ("run.bands", ["band1", "band1"], "run.bands: lists an entry twice"),
+        ("run.bands", [], "run.bands: must not be empty"),
+        ("run.methods", ["best"], "run.methods: best is not one of"),
+        ("run.ablations.methods", ["best"], "run.ablations.methods: best is not one of"),
+        ("run.ablations.methods", ["sling2sim2real"], "ablations.methods: sling2sim2real is one"),
+        ("run.ablations.bands", ["other"], "run: ablations.bands: other is not one of run.bands"),
+        ("rig.bands", {}, "rig.bands: lacks band1"),
+        ("bands", {"band-1": CONTENT["bands"]["band1"]}, "bands.band-1: a name has"),
+        ("bands.band1.source", "bag", "bands.band1.source: must be 'recording' or 'rig'"),
+        ("parameters.youngs_modulus.low", 1e8, "parameters.youngs_modulus: low must be less"),
+        ("parameters.dynamic_friction", {"low": 0, "high": 1, "scale": "log"}, "above 0"),
+        ("setup.draw_y", [-0.25, -0.45], "setup.draw_y: the first must be less"),
+        ("setup.draw_y", -0.3, "setup.draw_y: must be a list"),
+        ("setup.draw_y", [-0.3], "setup.draw_y.1: is missing"),
+        ("setup.clamp_direction", [0, 0, 0.5], "setup.clamp_direction: the vector must have"),
+        ("setup.base_to_fork", [0] * 7, "setup.base_to_fork: the quaternion must have"),
+        ("force.cutoff_unit", "kHz", "force.cutoff_unit: must be 'rad/sample'"),
+        ("force", {"cutoff": 3.2, "cutoff_unit": "rad/sample"}, "force: cutoff must be below pi"),
+        ("optimizer.k_nn", 5, "optimizer.k_nn: must be between 6"),
+        ("optimizer.k_nn", 9999, "optimizer: k_nn must be at most"),
+        ("optimizer.cma_rollouts", 4, "optimizer: cma_rollouts must be at least"),
+        ("sling.edges", 25, "sling: edges must be even"),
+        ("sling.tet_edges", 53, "sling: tet_edges must be even"),
+        ("sling.mesh", "wedge", "sling.mesh: must be 'rod' or 'tetrahedra'"),
+        ("loss.median_window", 6, "loss: median_window must be odd"),
+        ("episode.tail", 59.0, "episode: tail must be less"),
+        ("trials.targets", [0.5], "trials.targets: 0.5 lies outside policy.targets"),
+        ("trials.targets", [1.5, 2.6], "trials.targets: 2.6 lies outside"),
+        ("bands", {"measured": CONTENT["bands"]["band1"]}, "bands.measured: data/trials/measured"),
+        ("bands.band1.rest_length", 0.2, "bands.band1.rest_length: 0.2 must be longer than setup."),
+        ("policy.hidden", [], "policy.hidden: must not be empty"),
+        ("loss", 3, "loss: must be a mapping"),
+        ("weather", 3, "weather: unknown key"),
+        (
+            "methods.sling2sim2real.weights",
+            dict.fromkeys(("geom", "force", "work", "taut"), 0),
+            "methods.sling2sim2real.weights: at least one weight",
+        ),
+        ("methods.de.search", "cmaes", "methods.de.search: must be multistart, de, bo, adam or"),
+        ("methods.de.search", "my.module:", "or package.module:Class, got 'my.module:'"),
+        ("methods.de.search", "my module:Class", "methods.de.search: must be multistart"),
+        ("methods.no_work.settings", {"rate": 1}, "methods.no_work: settings are for another"),
+        ("methods.de.settings", {"seed": 3}, "methods.de: settings: seed stands under `optimizer`"),
+        ("optimizer.mutation", [0.5, 2.0], "optimizer.mutation.1: must be between 0 and 1.99"),
+        (
+            "methods.sling2sim2real_taut.fixed",
+            {"poissons_ratio": 0.4},  # in the box, not in the method's bounds
+            "methods.sling2sim2real_taut.fixed.poissons_ratio: must be between 0.45 and 0.49",
+        ),
+        (
+            "methods.bo",
+            WINDY | {"fixed": {"air_drag": 9}},
+            "methods.bo.fixed.air_drag: must be between 0 and 8, got 9",
+        ),
+        (
+            "methods.de.priors",
+            {"air_drag": {"mean": 1.0, "weight": 0.02}},
+            "methods.de: priors: air_drag is not one of the method's nuisances",
+        ),
+        (
+            "methods.bo",
+            CONTENT["methods"]["bo"]
+            | {"nuisances": {"force_gain": [0.8, 1.2]}, "fixed": {"youngs_modulus": 3e5}}
+            | {"priors": {"force_gain": {"mean": 0.1, "weight": 1.0}}},
+            "methods.bo: priors: force_gain is about 1 and a prior about 0, so it has none",
+        ),
+        (
+            "methods.bo",
+            WINDY | {"priors": {"air_drag": {"mean": 0, "weight": 0.02}}},
+            "methods.bo.priors.air_drag.mean: must be between 1e-06 and 1000000",
+        ),
+        (
+            "methods.bo",
+            WINDY | {"priors": {"air_drag": {"mean": 1.0, "weight": -1}}},
+            "methods.bo.priors.air_drag.weight: must be between 0 and 1000000",
+        ),
+        (
+            "methods.bo",
+            WINDY | {"priors": {"air_drag": {"mean": 1.0}}},
+            "methods.bo.priors.air_drag.weight: is missing",
+        ),
+        (
+            "methods.bo",
+            WINDY | {"priors": {"air_drag": 0.02}},
+            "methods.bo.priors.air_drag: must be a mapping",
+        ),
+        (
+            "methods.de.fixed",
+            {"air_drag": 1.0},  # no nuisance of this method
+            "methods.de.fixed: air_drag is not one of youngs_modulus",
+        ),
+        (
+            "methods.de.bounds",
+            {"air_drag": [0.0, 1.0]},
+            "methods.de.bounds: air_drag is not one of youngs_modulus",
+        ),
+        (
+            "methods.de.bounds",
+            {"poissons_ratio": [0.2, 0.4]},
+            "methods.de.bounds.poissons_ratio: must be [low, high] within parameters.poissons",
+        ),
+        ("methods.de.settings", {"rate": [1]}, "methods.de.settings.rate: must be a number, true"),
+        ("methods.de.k_top", 3, "methods.de: k_top and covariance are for search: multistart"),
+        ("methods.de.covariance", False, "methods.de: k_top and covariance are for search"),
+        ("methods.no_work.covariance", 1, "methods.no_work.covariance: must be a valid boolean"),
+        ("policy.robust.methods", ["best"], "policy.robust.methods: best is not one of"),
+        ("methods.no_work.k_top", 0, "methods.no_work.k_top: must be between 1 and 50"),
+        ("methods.de.fixed", {"poisson": 0.4}, "methods.de.fixed: poisson is not one of youngs_"),
+        (
+            "methods.de.fixed",
+            {"poissons_ratio": 0.2},
+            "methods.de.fixed.poissons_ratio: must be between 0.3 and 0.49, got 0.2",
+        ),
+        ("methods.de.fixed", INSTRUMENTS_ALONE["fixed"], "methods.de.fixed: names every parameter"),
+        (
+            "methods.de",
+            CONTENT["methods"]["de"] | INSTRUMENTS_ALONE,
+            "methods.de.fixed: names every parameter, so neither one of them nor air_drag",
+        ),
+        (
+            "methods.de.nuisances",
+            {"delay": [0, 1]},
+            "methods.de.nuisances: delay is not one of air_drag, camera_delay",
+        ),
+        (
+            "methods.de.nuisances",
+            {"camera_delay": [-0.1, 0.1]},
+            "methods.de.nuisances: camera_delay: must be [low, high] between -0.02 and 0.02 with 0",
+        ),
+        ("methods.de.nuisances", {"force_bias_x": [0.1, 0.2]}, "with 0 in it, got [0.1, 0.2]"),
+        ("methods.de.nuisances", {"camera_delay": 0.1}, "camera_delay: must be a list"),
+        (
+            "methods.de.nuisances",
+            {"force_gain": [0.8, 1.2]},
+            "methods.de: force_gain and youngs_modulus cannot both be free",
+        ),
+        ("loss.held_out.length", 0.1, "loss.held_out.length: must be between 0.5 and 5"),
+    ],
+)
+def test_what_is_refused_and_how_it_is_said(path: str, value: object, expected: str) -> None:
+    message = refusal(changed(tuple(path.split(".")), value))
+    assert message.startswith("params.yaml: ")
+    assert expected in message
+
+
+def test_keys_of_a_method_may_be_left_out() -> None:
+    about = parse(changed(("methods", "de"), {"weights": CONTENT["methods"]["de"]["weights"]}))
+    about = about.methods["de"]
+    assert (about.search, about.k_top, about.covariance) == ("multistart", None, True)
+    assert (about.settings, about.fixed, about.nuisances, about.priors) == ({}, {}, {}, {})
+
+
+def test_a_methods_regions_need_rollouts() -> None:
+    content = YAML(typ="safe").load(changed(("optimizer", "cma_rollouts"), 100))
+    content["methods"]["no_work"]["k_top"] = 13
+    dumped = io.StringIO()
+    YAML().dump(content, dumped)
+    message = refusal(dumped.getvalue())
+    assert "methods.no_work.k_top: k_top x optimizer.cma_population" in message
+
+
+def test_ablations_run_on_their_bands_only() -> None:
+    content = {"bands": ["band1", "band2"], "rig": ["band1", "band2"], "methods": ["de", "bo"]}
+    content["ablations"] = {"bands": ["band2"], "methods": ["no_work"]}
+    assert pairs(parse(changed(("run",), content)).run) == [
+        ("band1", "de"),
+        ("band1", "bo"),
+        ("band2", "de"),
+        ("band2", "bo"),
+        ("band2", "no_work"),
+    ]
+
+
+def test_what_a_method_may_ask_for() -> None:
+    base = CONTENT["methods"]["de"]
+    own = {"search": "lab.search:Own", "settings": {"rate": 0.1, "steps": 3, "name": "x"}}
+    assert parse(changed(("methods", "de"), base | own)).methods["de"].settings["rate"] == 0.1
+    gain = {"nuisances": {"force_gain": [0.8, 1.2]}, "fixed": {"youngs_modulus": 3e5}}
+    assert parse(changed(("methods", "de"), base | gain)).methods["de"].nuisances == {
+        "force_gain": (0.8, 1.2)
+    }
+    held = {"nuisances": {"camera_delay": [0, 0.01]}, "fixed": {"camera_delay": 0.005}}
+    assert parse(changed(("methods", "de"), base | held)).methods["de"].fixed["camera_delay"]
+    drag = INSTRUMENTS_ALONE | {"nuisances": {"air_drag": [0, 8]}}
+    assert len(parse(changed(("methods", "de"), base | drag)).methods["de"].fixed) == 5
+
+
+def test_targets_beyond_the_paper_area_are_refused_though_trained() -> None:
+    text = TEXT.replace("targets: [1.425, 2.425]", "targets: [1.0, 3.0]")
+    assert parse(text).policy.targets == (1.0, 3.0)
+    far = text.replace("targets: [1.725,", "targets: [2.8,")
+    assert "trials.targets: 2.8 lies outside the target on the floor" in refusal(far)
+
+
+def test_broken_yaml_is_refused_with_its_line() -> None:
+    line = TEXT[: TEXT.index("  delta:")].count("\n") + 1
+    for damage in ("delta: 0.1\n  delta:", "delta: [", "delta: ]"):
+        message = refusal(TEXT.replace("delta:", damage))
+        assert message.startswith("params.yaml, line ")
+        assert abs(int(message.split("line ")[1].split(":")[0]) - line) <= 1
+    assert "must hold a mapping" in refusal("")
+
+
+def test_missing_or_unreadable_file(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="nothing.yaml: cannot be read"):
+        load(tmp_path / "nothing.yaml")
+    (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(UserError, match="binary.yaml: cannot be read"):
+        load(tmp_path / "binary.yaml")
+
+
+JUNK = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=8),
+    st.lists(st.floats(), max_size=8),
+    st.dictionaries(st.text(max_size=5) | st.integers(), st.integers(), max_size=3),
+    st.dates(),
+    st.binary(max_size=4),
+)
+
+
+@settings(deadline=None, max_examples=200)
+@given(
+    path=st.sampled_from([path[:n] for path, _ in leaves(CONTENT) for n in (1, 2, 3)]), junk=JUNK
+)
+def test_any_other_value_is_accepted_or_refused_in_one_line(path: tuple, junk: object) -> None:
+    try:
+        assert isinstance(parse(changed(path, junk)), Params)
+    except UserError as error:
+        assert "\n" not in str(error)
+
+
+@settings(deadline=None, max_examples=200)
+@given(data=st.data())
+def test_any_damaged_text_is_accepted_or_refused_in_one_line(data: st.DataObject) -> None:
+    start = data.draw(st.integers(0, len(TEXT)))
+    end = data.draw(st.integers(start, min(start + 20, len(TEXT))))
+    text = TEXT[:start] + data.draw(st.text(max_size=6)) + TEXT[end:]
+    try:
+        assert isinstance(parse(text), Params)
+    except UserError as error:
+        assert "\n" not in str(error)

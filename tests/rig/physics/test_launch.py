@@ -1,0 +1,115 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.integrate import simpson
+
+from pipeline.params import Params
+from pipeline.rig.physics.launch import FOOT, POINTS, flight, fly, launch, launch_from
+from pipeline.rig.physics.world import bent_at, string_of
+
+DRAW = (-0.30, -0.15)
+
+
+def test_flight_is_the_parabola() -> None:
+    y, z, vy, vz, floor = -0.1, -0.05, 4.0, 1.5, -0.52
+    time = (vz + np.sqrt(vz**2 + 2 * 9.81 * (z - floor))) / 9.81
+    landing = fly(np.array([y, z]), np.array([vy, vz]), floor, 0.0)
+    assert np.isclose(landing, y + vy * time, rtol=1e-8)
+
+
+def test_drag_shortens_the_flight() -> None:
+    """Against small explicit steps."""
+    position, velocity, k, step = np.zeros(2), np.array([6.0, 2.0]), 0.02, 2e-5
+    landing = fly(position, velocity, -0.52, k)
+    while position[1] > -0.52:
+        position = position + step * velocity
+        velocity = velocity + step * ([0.0, -9.81] - k * np.hypot(*velocity) * velocity)
+    assert np.isclose(landing, position[0], rtol=1e-4)
+    assert landing < 0.99 * fly(np.zeros(2), np.array([6.0, 2.0]), -0.52, 0.0)
+
+
+def test_a_flight_is_kept_evenly_in_time() -> None:
+    """Without drag a parabola from the first point to the floor."""
+    position, velocity, floor = np.array([-0.1, -0.05]), np.array([4.0, 1.5]), -0.52
+    way = flight(position, velocity, floor, 0.0)
+    time = (way[:, 0] - position[0]) / velocity[0]
+    assert way.shape == (POINTS, 2) and np.allclose(np.diff(time), time[1], rtol=1e-6)
+    height = position[1] + velocity[1] * time - 9.81 * time**2 / 2
+    np.testing.assert_allclose(way[:, 1], height, atol=1e-6)
+    assert way[-1, 0] == fly(position, velocity, floor, 0.0) and np.isclose(way[-1, 1], floor)
+    assert flight(np.array([0.1, floor]), velocity, floor, 0.0).tolist() == [[0.1, floor]]
+
+
+def test_equal_seeds_give_equal_errors(coarse: Params) -> None:
+    first, again, other = (launch("band1", coarse, DRAW, seed) for seed in (3, 3, 4))
+    assert first == again
+    assert first.landing_y != other.landing_y
+    exact = launch("band1", coarse, DRAW, None)
+    assert abs(first.landing_y - exact.landing_y) < 0.1  # 1 mm is about 2 cm
+
+
+def test_pouch_pushes_until_the_band_slackens(coarse: Params) -> None:
+    """The projectile takes less than the drawn band holds, and most of it."""
+    string = string_of(coarse, "band1")
+    trial = launch("band1", coarse, DRAW, None)
+    force = []
+    distances = np.linspace(1.0, 0.6, 5)
+    for part in distances:
+        at = bent_at(string, part * np.array([0.0, *DRAW]))
+        held = string.at_rest(at, coarse.rig.tolerance, held=True)
+        force.append(np.linalg.norm(string.at_middle(held)))
+    stored = -simpson(force, x=distances * np.hypot(*DRAW))
+    energy = coarse.setup.projectile_mass * trial.speed**2 / 2
+    assert 0.5 * stored < energy < stored
+    assert np.isclose(trial.angle, np.arctan2(-DRAW[1], -DRAW[0]), atol=0.15)
+
+
+def test_failures_say_why(coarse: Params) -> None:
+    weak_arm = coarse.model_copy(
+        update={"setup": coarse.setup.model_copy(update={"max_force": 5.0})}
+    )
+    strong = launch("band1", weak_arm, DRAW, None)
+    assert strong.failure.startswith("holding takes")
+    assert strong.hold_force > 5 and np.isnan(strong.landing_y) and strong.flight is None
+    assert "slack" in launch("band1", coarse, (-0.15, -0.1), None).failure
+    assert "too short: lands" in launch("band1", coarse, (-0.24, -0.02), None).failure
+    far = launch("band1", coarse, (-0.44, -0.28), None)
+    assert far.failure.startswith("beyond the area") and far.landing_y > 2.425
+    assert far.flight[-1, 0] == far.landing_y
+
+
+def test_a_low_flight_hits_the_forks_foot(coarse: Params) -> None:
+    """It would reach the floor just behind the fork, and meets the bar between the rods."""
+    floor = -0.52
+    low = np.array([-0.2, floor + 0.03]), np.array([3.0, 0.0])
+    assert fly(*low, floor, 0.0) > 0 > fly(*low, floor + FOOT, 0.0)
+    table = coarse.setup.model_copy(update={"fork_height": 0.1})
+    table = coarse.model_copy(update={"setup": table})
+    trial = launch("band1", table, (-0.27, 0.0), None)
+    assert trial.failure.startswith("hits the fork") and np.isnan(trial.landing_y)
+    assert (trial.flight[:, 0] < 0).all()  # it ends there
+    short = launch("band1", table, (-0.24, 0.0), None)
+    assert "fell before the fork" in short.failure and np.isnan(short.landing_y)
+
+
+def test_a_kick_moves_the_landing(coarse: Params) -> None:
+    """Along the launch it adds to the speed; equal seeds give every method the same kick."""
+    string, aim = string_of(coarse, "band1"), np.array([0.0, *DRAW])
+    heading = -aim / np.linalg.norm(aim)
+    plain, kicked = (launch_from(string, coarse, aim, k * heading) for k in (0.0, 0.2))
+    assert kicked.speed > plain.speed
+    calm = coarse.rig.model_copy(update={"release_jitter": 0.0})
+    calm = coarse.model_copy(update={"rig": calm})
+    assert launch("band1", coarse, DRAW, 3).landing_y != launch("band1", calm, DRAW, 3).landing_y
+
+
+def test_landing_is_converged(params: Params) -> None:
+    """Half the edges at ten times the tolerance move a landing by less than half a per cent."""
+    string, aim = string_of(params, "band1"), np.array([0.0, *DRAW])
+    best = launch_from(string, params, aim).landing_y
+    loose = params.rig.model_copy(update={"tolerance": 10 * params.rig.tolerance})
+    loose = params.model_copy(update={"rig": loose})
+    coarser = launch_from(replace(string, edges=60), loose, aim).landing_y
+    assert np.isclose(coarser, best, rtol=5e-3)

@@ -1,0 +1,175 @@
+"""Bayesian optimisation on functions with known minima, against random points and closed forms."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.stats import norm
+
+from pipeline.search.loop import latin_hypercube
+from pipeline.search.optimizers.bayes import Bayes, greedy, standardised, training_rows
+from tests.search.functions import CENTRE, NAMES, Evaluate, alone, changed, correlated, quadratic
+
+ROLLOUTS, POPULATION = 96, 12
+
+
+def branin(unit: np.ndarray) -> np.ndarray:
+    """Three equal minima, 0.397887 (Dixon and Szegö 1978)."""
+    x, y = 15 * unit[:, 0] - 5, 15 * unit[:, 1]
+    bowl = (y - 5.1 / (4 * np.pi**2) * x**2 + 5 / np.pi * x - 6) ** 2
+    return bowl + 10 * (1 - 1 / (8 * np.pi)) * np.cos(x) + 10
+
+
+def hartmann(unit: np.ndarray) -> np.ndarray:
+    """Six dimensions, four wells; the least value is -3.32237 (Hartman 1973)."""
+    a = np.array(
+        [
+            [10, 3, 17, 3.5, 1.7, 8],
+            [0.05, 10, 17, 0.1, 8, 14],
+            [3, 3.5, 1.7, 10, 17, 8],
+            [17, 8, 0.05, 10, 0.1, 14],
+        ]
+    )
+    p = 1e-4 * np.array(
+        [
+            [1312, 1696, 5569, 124, 8283, 5886],
+            [2329, 4135, 8307, 3736, 1004, 9991],
+            [2348, 1451, 3522, 2883, 3047, 6650],
+            [4047, 8828, 8732, 5743, 1091, 381],
+        ]
+    )
+    distance = (a * (unit[:, None] - p) ** 2).sum(axis=2)
+    return -(np.exp(-distance) @ [1.0, 1.2, 3.0, 3.2])
+
+
+def random_points(count: int, dimension: int, seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).random((count, dimension))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("function", "names", "least", "near"),
+    [(branin, NAMES[:2], 0.397887, 0.02), (hartmann, (*NAMES, "f"), -3.32237, 0.4)],
+)
+def test_it_beats_random_points(function, names, least: float, near: float, seed: int) -> None:
+    history = alone(
+        "bo", Evaluate(function, names), ROLLOUTS, changed(seed=seed, population=POPULATION), names
+    )
+    assert len(history.total) == ROLLOUTS
+    assert least <= history.total.min() < least + near
+    for other in range(10):
+        assert history.total.min() < function(random_points(ROLLOUTS, len(names), other)).min()
+
+
+def test_it_goes_round_a_part_that_fails() -> None:
+    """A valley of two pairs that trade off, its minimum two tenths from a wall of failures."""
+    evaluate = quadratic(CENTRE, correlated(), fails=lambda unit: unit[:, 3] > 0.9)
+    random = [evaluate(random_points(240, 5, other)).total.min() for other in range(10)]
+    found = []
+    for seed in (1, 2, 3):
+        history = alone("bo", evaluate, 240, changed(population=20, seed=seed))
+        assert np.isinf(history.total).any()
+        assert np.isinf(history.total[-60:]).mean() < 0.1
+        found.append(history.total.min())
+    assert np.median(found) < min(random)  # ten times as many points
+    assert max(found) - 1 < (np.median(random) - 1) / 3
+
+
+def test_its_first_batch_is_the_latin_hypercube() -> None:
+    optimizer = Bayes(4, rollouts=100, seed=3, population=10)
+    np.testing.assert_array_equal(optimizer.ask(), latin_hypercube(4, 10, 3))
+
+
+def points(seed: int = 1, threads: int = 1) -> np.ndarray:
+    torch.set_num_threads(threads)
+    history = alone(
+        "bo", quadratic(CENTRE, correlated()), 60, changed(seed=seed, population=POPULATION)
+    )
+    assert torch.get_num_threads() == threads
+    return history.unit
+
+
+def test_the_same_seed_asks_for_the_same_points() -> None:
+    """Whatever the number of threads; no global generator is used or touched."""
+    before = torch.get_num_threads()
+    try:
+        torch.manual_seed(5)
+        np.random.seed(5)
+        states = torch.random.get_rng_state(), np.random.get_state()[1].copy()
+        first = points()
+        assert torch.equal(torch.random.get_rng_state(), states[0])
+        np.testing.assert_array_equal(np.random.get_state()[1], states[1])
+        torch.manual_seed(6)
+        np.testing.assert_array_equal(points(threads=2), first)
+        assert not np.array_equal(points(seed=2), first)
+    finally:
+        torch.set_num_threads(before)
+
+
+def test_it_survives_losses_that_are_all_alike() -> None:
+    history = alone("bo", Evaluate(lambda unit: np.ones(len(unit))), 60, changed(population=20))
+    assert len(np.unique(history.unit, axis=0)) > 50
+
+
+def test_a_search_warns_of_nothing(recwarn) -> None:
+    """Though its climbs stop early, and points that are alike need a jitter."""
+    alone("bo", Evaluate(lambda unit: np.ones(len(unit))), 60, changed(population=20))
+    alone("bo", quadratic(CENTRE, correlated()), 48, changed(population=POPULATION))
+    assert not recwarn.list
+
+
+def test_greedy_takes_what_adds_most() -> None:
+    """Against the definition, over all that is left; and the first by EI's closed form."""
+    rng = np.random.default_rng(1)
+    samples = rng.normal(size=(40, 12))
+    chosen = greedy(samples, 0.3, 5)
+    reached = np.full(40, 0.3)
+    for place, candidate in enumerate(chosen):
+        left = [one for one in range(12) if one not in chosen[:place]]
+        gains = {one: np.maximum(samples[:, one], reached).mean() for one in left}
+        assert candidate == max(gains, key=gains.get)
+        reached = np.maximum(reached, samples[:, candidate])
+    mean, deviation, best = np.array([0.0, 0.4, 0.2]), np.array([1.0, 0.3, 0.6]), 0.5
+    z = (mean - best) / deviation
+    expected = (mean - best) * norm.cdf(z) + deviation * norm.pdf(z)
+    samples = mean + deviation * rng.normal(size=(100_000, 3))
+    assert greedy(samples, best, 1) == [int(expected.argmax())]
+
+
+@given(
+    loss=arrays(float, st.integers(2, 40), elements=st.floats(-1e3, 1e3)),
+    outlier=st.floats(1e7, 1e12),
+)
+def test_an_outlier_counts_no_more_than_a_bad_loss(loss, outlier: float) -> None:
+    """However huge it is."""
+    loss = loss.round(9)  # of differences near 1e-160 the squares are no numbers any more
+    told = standardised(np.append(loss, outlier))
+    np.testing.assert_allclose(told, standardised(np.append(loss, 10 * outlier)), atol=1e-9)
+    assert abs(told.mean()) < 1e-9
+    assert told.std(ddof=1) == pytest.approx(1) or np.ptp(told) < 1e-9
+
+
+def test_units_and_offset_of_the_loss_do_not_matter() -> None:
+    loss = np.random.default_rng(1).lognormal(0, 3, 50)
+    np.testing.assert_allclose(standardised(7 * loss - 3), standardised(loss), atol=1e-12)
+
+
+def test_the_process_sees_the_best_and_the_latest() -> None:
+    loss = np.array([5.0, 1.0, 9.0, 2.0, 8.0, 7.0, 6.0])
+    assert training_rows(loss, 7).tolist() == list(range(7))
+    assert training_rows(loss, 4).tolist() == [1, 3, 5, 6]
+
+
+def test_torch_waits_until_it_is_asked_for() -> None:
+    code = (
+        "import sys, pipeline.search.optimizers.bayes, pipeline.search.optimizers.adam;"
+        "sys.exit('torch' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,132 @@
+"""Differential evolution behind ask and tell is SciPy's, and leaves no thread behind."""
+
+from __future__ import annotations
+
+import gc
+import threading
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import differential_evolution
+
+from pipeline.search.history import History
+from pipeline.search.loop import latin_hypercube, search
+from pipeline.search.optimizers.evolution import Evolution
+from tests.search.functions import NAMES, Evaluate, rosenbrock
+
+
+def threads() -> list[threading.Thread]:
+    return [one for one in threading.enumerate() if one.name == "differential evolution"]
+
+
+def left() -> list[threading.Thread]:
+    """Threads that do not end by themselves within a second."""
+    gc.collect()
+    end = time.monotonic() + 1
+    while threads() and time.monotonic() < end:
+        time.sleep(0.01)
+    return threads()
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    dimension=st.integers(1, 6),
+    population=st.integers(5, 30),
+    generations=st.integers(0, 12),
+    seed=st.integers(0, 1000),
+    recombination=st.floats(0, 1),
+)
+def test_its_points_are_those_of_scipy(
+    dimension: int, population: int, generations: int, seed: int, recombination: float
+) -> None:
+    """To the last bit, from the same first population and generator."""
+    expected = []
+
+    def objective(unit: np.ndarray) -> np.ndarray:
+        expected.append(unit.T.copy())
+        return ((unit.T - 0.3) ** 2).sum(axis=1)
+
+    differential_evolution(
+        objective,
+        [(0, 1)] * dimension,
+        strategy="best1bin",
+        init=latin_hypercube(dimension, population, seed),
+        rng=np.random.default_rng([seed, 1]),
+        maxiter=generations,
+        mutation=(0.4, 0.9),
+        recombination=recombination,
+        vectorized=True,
+        updating="deferred",
+        polish=False,
+        tol=0,
+        atol=-1,
+    )
+    one = Evolution(
+        dimension,
+        rollouts=population * (generations + 1),
+        seed=seed,
+        population=population,
+        mutation=(0.4, 0.9),
+        recombination=recombination,
+    )
+    for unit in expected:
+        asked = one.ask()
+        np.testing.assert_array_equal(asked, unit)
+        one.tell(((asked - 0.3) ** 2).sum(axis=1))
+
+
+def test_its_first_generation_is_the_common_latin_hypercube() -> None:
+    """Each of 24 strata of each parameter holds one agent."""
+    asked = Evolution(5, rollouts=48, seed=4, population=24).ask()
+    np.testing.assert_array_equal(asked, latin_hypercube(5, 24, 4))
+    strata = np.sort(np.floor(asked * 24).astype(int), axis=0)
+    np.testing.assert_array_equal(strata, np.tile(np.arange(24)[:, None], 5))
+
+
+def test_the_bottom_of_rosenbrocks_valley_is_found() -> None:
+    history = History("toy", NAMES[:3])
+    one = Evolution(3, rollouts=6000, seed=1, population=30)
+    search(one, Evaluate(rosenbrock, NAMES[:3]), history, rollouts=6000)
+    assert history.best()["total"] < 1e-6
+
+
+@pytest.mark.parametrize("told", [0, 1, 3])
+def test_no_thread_is_left(told: int) -> None:
+    """Dropped before it was asked, in the middle, and after its budget."""
+    one = Evolution(2, rollouts=15, seed=1, population=5)
+    for _ in range(told):
+        one.tell(rosenbrock(one.ask()))
+    assert threads()
+    del one
+    assert not left()
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
+def test_a_failing_evaluation_surfaces_and_leaves_no_thread(error: type[BaseException]) -> None:
+    def broken(unit: np.ndarray):
+        raise error
+
+    with pytest.raises(error):
+        search(
+            Evolution(2, rollouts=15, seed=1, population=5),
+            broken,
+            History("toy", NAMES[:2]),
+            rollouts=15,
+        )
+    assert not left()
+
+
+def test_what_scipy_raises_surfaces() -> None:
+    with pytest.raises(ValueError, match="mutation"):
+        Evolution(2, rollouts=15, seed=1, population=5, mutation=(0.5, 7.0))
+    with pytest.raises(ValueError, match="population supplied"):
+        Evolution(2, rollouts=15, seed=1, population=3).ask()
+    one = Evolution(2, rollouts=10, seed=1, population=5)
+    for _ in range(3):
+        one.tell(rosenbrock(one.ask()))
+    with pytest.raises(RuntimeError, match="beyond its budget"):
+        one.ask()
+    assert not left()

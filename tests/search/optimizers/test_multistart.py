@@ -1,0 +1,90 @@
+"""CMA-ES side by side: where it starts, who asked, and that it leaves other generators alone."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.search.history import History
+from pipeline.search.loop import search
+from pipeline.search.optimizers.multistart import Multistart, Solver
+from pipeline.search.regions import Region
+from tests.search.functions import CENTRE, Evaluate, correlated, quadratic, rosenbrock
+
+NAMES = ("a", "b", "c")
+
+
+def test_first_candidates_follow_the_region() -> None:
+    """They are mu + L z with z from N(0, I): mean mu, covariance Sigma."""
+    factor = np.array([[0.04, 0, 0], [0.03, 0.02, 0], [0, -0.01, 0.03]])
+    sigma = factor @ factor.T
+    mu = np.array([0.4, 0.5, 0.6])
+    asked = Solver(Region(mu, sigma, 1.0, []), population=4000, seed=3).ask()
+    np.testing.assert_allclose(asked.mean(axis=0), mu, atol=0.003)
+    np.testing.assert_allclose(np.cov(asked, rowvar=False), sigma, atol=1.5e-4)
+
+
+def balls(*centres: float, size: float = 0.01, dimension: int = 3) -> list[Region]:
+    sigma = size * np.eye(dimension)
+    return [Region(np.full(dimension, centre), sigma, 1.0, []) for centre in centres]
+
+
+def test_all_solvers_ask_as_one_batch_and_learn_their_own_losses() -> None:
+    """Two solvers side by side do what each of them does alone, told the same."""
+    both = Multistart(balls(0.3, 0.7), population=6, seed=5)
+    seeds = np.random.SeedSequence(5).generate_state(2)
+    single = [
+        Solver(region, 6, int(seed)) for region, seed in zip(balls(0.3, 0.7), seeds, strict=True)
+    ]
+    np.testing.assert_array_equal(both.owner, np.repeat([0, 1], 6))
+    for _ in range(5):
+        unit = both.ask()
+        parts = [solver.ask() for solver in single]
+        np.testing.assert_array_equal(unit, np.concatenate(parts))
+        both.tell(rosenbrock(unit))
+        for solver, part in zip(single, parts, strict=True):
+            solver.tell(rosenbrock(part))
+
+
+def test_the_bottom_of_rosenbrocks_valley_is_found() -> None:
+    history = History("toy", NAMES)
+    several = Multistart(balls(0.5, 0.2), population=10, seed=1)
+    search(several, Evaluate(rosenbrock, NAMES), history, rollouts=3000)
+    assert history.best()["total"] < 1e-8
+    np.testing.assert_allclose([history.best()[f"unit_{name}"] for name in NAMES], 0.75, atol=1e-4)
+
+
+@pytest.mark.parametrize("rollouts", [1, 15, 16, 17, 100])
+def test_the_budget_is_spent_whatever_the_number_of_solvers(rollouts: int) -> None:
+    history = History("toy", NAMES)
+    several = Multistart(balls(0.3, 0.7), population=8, seed=1)
+    search(several, Evaluate(rosenbrock, NAMES), history, rollouts=rollouts)
+    owner = np.tile(np.repeat([0, 1], 8), 7)[:rollouts]
+    assert history.table["solver"].to_pylist() == owner.tolist()
+    generation = history.table["generation"].to_pylist()
+    assert generation == [row // 16 for row in range(rollouts)]
+
+
+def test_it_goes_on_where_nothing_is_left_to_gain() -> None:
+    """After convergence, and on a plain, CMA-ES asks on for points of the cube."""
+    for matrix in (correlated(), np.zeros((5, 5))):
+        history = History("toy", tuple("abcde"))
+        several = Multistart(balls(0.4, dimension=5), population=8, seed=1)
+        search(several, quadratic(CENTRE, matrix), history, rollouts=8000)
+        assert len(history.total) == 8000
+
+
+def test_numpys_generator_and_the_folder_are_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.random.seed(3)
+    expected = np.random.RandomState(3).random()
+    history = History("toy", NAMES)
+    several = Multistart(balls(0.5), population=8, seed=0)
+    search(several, Evaluate(rosenbrock, NAMES), history, rollouts=80)
+    assert np.random.random() == expected
+    assert not os.listdir(tmp_path)

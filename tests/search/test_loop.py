@@ -1,0 +1,210 @@
+"""The loop around optimisers, and the whole chain, on functions with known minima."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.base.errors import UserError
+from pipeline.objective.space import Space
+from pipeline.params import load
+from pipeline.search.history import History, theta_content
+from pipeline.search.loop import Free, budget, latin_hypercube, search
+from pipeline.search.optimizers import build
+from tests.search.functions import (
+    CENTRE,
+    NAMES,
+    Evaluate,
+    alone,
+    chain,
+    changed,
+    correlated,
+    quadratic,
+)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_minimum_of_a_correlated_quadratic_is_found(seed: int) -> None:
+    """Through a tenth of the box that fails; the refinement improves on the exploration."""
+    evaluate = quadratic(CENTRE, correlated(), fails=lambda unit: unit[:, 4] > 0.9)
+    explored, refined, _ = chain(evaluate, changed(seed=seed, cma_rollouts=1600))
+    assert len(explored.total) == 24 * 13
+    assert len(refined.total) == 1600
+    assert np.isinf(explored.total).any()
+    assert refined.best()["total"] - 1 < 1e-3 < explored.best()["total"] - 1
+    np.testing.assert_allclose([refined.best()[f"unit_{n}"] for n in NAMES], CENTRE, atol=0.02)
+
+
+def test_everything_evaluated_is_recorded_inside_the_box() -> None:
+    """With the minimum in a corner, most candidates of CMA-ES fall outside and are reflected."""
+    asked = []
+    inner = quadratic(np.zeros(5), np.eye(5))
+
+    def evaluate(unit):
+        asked.append(unit)
+        return inner(unit)
+
+    explored, refined, regions = chain(evaluate)
+    rows = np.concatenate([explored.unit, refined.unit])
+    np.testing.assert_array_equal(rows, np.concatenate(asked))
+    assert rows.min() >= 0
+    assert rows.max() <= 1
+    table = refined.table
+    assert set(table["phase"].to_pylist()) == {"cma"}
+    assert len(regions) == 5
+    assert table["generation"].to_pylist() == [g for g in range(8) for _ in range(40)]
+    assert table["solver"].to_pylist()[:40] == [k for k in range(5) for _ in range(8)]
+
+
+def test_a_box_that_fails_everywhere_is_searched_to_the_end() -> None:
+    """An optimiser is told finite losses even so; only then the failure is said."""
+    evaluate = quadratic(CENTRE, np.eye(5), fails=lambda unit: unit[:, 0] >= 0)
+    history = alone("de", evaluate, 312)
+    assert np.isinf(history.total).all()
+    with pytest.raises(UserError, match="each of 312 simulations failed"):
+        history.best()
+
+
+class Recorder:
+    """Asks for batches of sizes that were given, and keeps what it is told."""
+
+    phase = "recorder"
+
+    def __init__(self, *sizes: int) -> None:
+        self._sizes, self.told = iter(sizes), []
+
+    def ask(self) -> np.ndarray:
+        return np.full((next(self._sizes), 5), 0.5)
+
+    def tell(self, losses: np.ndarray) -> None:
+        self.told.append(losses)
+
+
+@given(sizes=st.lists(st.integers(1, 9), min_size=1, max_size=9), data=st.data())
+def test_exactly_the_budget_is_spent(sizes: list[int], data: st.DataObject) -> None:
+    """Whatever sizes are asked for; the batch that is cut is not told."""
+    rollouts = data.draw(st.integers(1, sum(sizes)))
+    one, history = Recorder(*sizes), History("toy", NAMES)
+    search(one, quadratic(CENTRE, np.eye(5)), history, rollouts=rollouts)
+    assert len(history.total) == rollouts
+    whole = [size for size, end in zip(sizes, np.cumsum(sizes), strict=True) if end <= rollouts]
+    assert [len(losses) for losses in one.told] == whole
+    generation = np.repeat(np.arange(len(sizes)), sizes)[:rollouts]
+    assert history.table["generation"].to_pylist() == generation.tolist()
+
+
+def test_failed_points_are_told_as_twice_the_worst_so_far() -> None:
+    values = iter([np.array([1.0, np.inf, 3.0]), np.array([2.0, np.inf]), np.array([4.0, np.inf])])
+    evaluate = Evaluate(lambda unit: next(values), fails=lambda unit: np.arange(len(unit)) == 1)
+    one = Recorder(3, 2, 2)
+    search(one, evaluate, History("toy", NAMES), rollouts=7)
+    assert [losses.tolist() for losses in one.told] == [[1.0, 6.0, 3.0], [2.0, 6.0], [4.0, 8.0]]
+
+
+def test_fixed_axes_keep_their_physical_values() -> None:
+    """The optimiser searches the other axes; the history has all of them."""
+    parameters = load("params.yaml").parameters
+    space = Space.of(parameters)
+    free = Free.of(space, {"poissons_ratio": 0.45, "elasticity_damping": 5e-3})
+    assert free.names == ("youngs_modulus", "dynamic_friction", "damping_scale")
+    evaluate = quadratic(CENTRE, np.eye(5))
+    evaluate.space = space
+    history = History("toy", space.names)
+    one = build("de", 3, rollouts=600, seed=1, population=20)
+    search(one, evaluate, history, rollouts=600, free=free)
+    np.testing.assert_allclose(history.table["poissons_ratio"], 0.45, rtol=1e-12)
+    np.testing.assert_allclose(history.table["elasticity_damping"], 5e-3, rtol=1e-12)
+    best = [history.best()[f"unit_{name}"] for name in free.names]
+    np.testing.assert_allclose(best, CENTRE[[0, 3, 4]], atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["multistart", "de", "bo", "adam"])
+def test_one_free_axis_is_enough(name: str) -> None:
+    evaluate = quadratic(CENTRE[:1], np.eye(1), names=NAMES[:1])
+    budget = changed(population=10, generations=5, k_nn=6, k_top=2, cma_rollouts=64)
+    if name == "multistart":
+        explored, history, _ = chain(evaluate, budget, NAMES[:1])
+    else:
+        history = alone(name, evaluate, 124, budget, NAMES[:1])
+    assert abs(history.best()["unit_a"] - CENTRE[0]) < 0.02
+
+
+def test_every_search_has_the_same_budget() -> None:
+    optimizer = load("params.yaml").optimizer
+    explore, refine = budget(optimizer, "multistart")
+    assert explore == optimizer.population * (optimizer.generations + 1)
+    assert budget(optimizer, "bo") == (explore + refine, 0)
+    assert explore + refine == 600
+
+
+@pytest.mark.parametrize("name", ["de", "bo", "adam", "tests.search.own:RandomSearch"])
+def test_an_optimiser_is_deterministic_and_spends_its_budget(name: str) -> None:
+    """And starts, if it is ours, from the common Latin hypercube."""
+    runs = []
+    for number, seed in enumerate((1, 1, 2)):
+        np.random.seed(number)
+        optimizer = changed(seed=seed, population=8)
+        runs.append(alone(name, quadratic(CENTRE, correlated()), 29, optimizer))
+    for history in runs:
+        assert len(history.total) == 29
+        assert history.unit.min() >= 0
+        assert history.unit.max() <= 1
+    assert runs[0].table.equals(runs[1].table)
+    assert not runs[0].table.equals(runs[2].table)
+    if ":" not in name:
+        assert set(runs[0].table["phase"].to_pylist()) == {name}
+        np.testing.assert_array_equal(runs[0].unit[:8], latin_hypercube(5, 8, 1))
+
+
+def test_a_history_without_rows_can_be_kept(tmp_path: Path) -> None:
+    """What a search of one phase leaves for the second one: the same columns."""
+    empty, full = History("toy", NAMES), alone("de", quadratic(CENTRE, np.eye(5)), 30)
+    empty.save(tmp_path / "empty.parquet")
+    full.save(tmp_path / "full.parquet")
+    loaded = History.load("toy", NAMES, tmp_path / "full.parquet", tmp_path / "empty.parquet")
+    assert loaded.table.equals(full.table)
+    assert len(History.load("toy", NAMES, tmp_path / "empty.parquet").total) == 0
+
+
+def test_the_same_seed_gives_the_same_bytes(tmp_path) -> None:
+    """And another seed does not; NumPy's global generator has no part in it."""
+    files = []
+    for number, seed in enumerate((1, 1, 2)):
+        np.random.seed(number)
+        for phase, history in zip(
+            "ab", chain(quadratic(CENTRE, correlated()), changed(seed=seed))[:2], strict=True
+        ):
+            history.save(tmp_path / f"{number}{phase}.parquet")
+        files.append([(tmp_path / f"{number}{phase}.parquet").read_bytes() for phase in "ab"])
+    assert files[0] == files[1]
+    assert files[0][0] != files[2][0]
+    assert files[0][1] != files[2][1]
+
+
+def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
+    explored, refined, _ = chain(quadratic(CENTRE, correlated()))
+    explored.save(tmp_path / "a.parquet")
+    refined.save(tmp_path / "b.parquet")
+    for order, phase in (("ab", "cma"), ("aa", "de")):
+        history = History.load("toy", NAMES, *(tmp_path / f"{name}.parquet" for name in order))
+        content = theta_content(history, "band1")
+        best = np.argmin(history.total)
+        assert content["loss"]["total"] == history.total[best]
+        np.testing.assert_array_equal(list(content["theta"].values()), 10 * history.unit[best])
+        assert content["rollouts"] == len(history.total)
+        assert (content["band"], content["method"]) == ("band1", "toy")
+        assert content["found"]["phase"] == phase
+        assert content["confidence"] is None
+
+
+def test_nuisances_stand_beside_theta(tmp_path: Path) -> None:
+    explored = alone("de", quadratic(CENTRE, np.eye(5)), 60)
+    explored.save(tmp_path / "a.parquet")
+    content = theta_content(History.load("toy", NAMES[:3], tmp_path / "a.parquet"), "band1")
+    assert list(content["theta"]) == ["a", "b", "c"]
+    assert list(content["nuisances"]) == ["d", "e"]
+    assert content["nuisances"]["d"] == explored.best()["d"]

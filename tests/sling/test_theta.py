@@ -1,0 +1,119 @@
+"""θ files: read as written, and every mistake in them is one line that names it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.base.errors import UserError
+from pipeline.sling.model import THETA
+from pipeline.sling.theta import in_air, law_discrepancy, load_samples, load_theta, vector
+from tests.policy.toy import RUN
+
+SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
+
+
+def refusal(file: Path, text: str) -> str:
+    file.write_text(text)
+    with pytest.raises(UserError) as error:
+        load_theta(file, "red")
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_a_theta_file_comes_back(tmp_path: Path) -> None:
+    file = tmp_path / "theta.json"
+    file.write_text(json.dumps({"band": "red", "theta": SOFT}))
+    assert vector(load_theta(file, "red")).tolist() == list(SOFT.values())
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("youngs_modulus", 0),
+        ("youngs_modulus", 10**400),
+        ("poissons_ratio", 0.5),
+        ("poissons_ratio", -0.1),
+        ("elasticity_damping", 10.0),
+        ("dynamic_friction", 50),
+        ("dynamic_friction", float("nan")),
+        ("damping_scale", 1.01),
+        ("damping_scale", True),
+        ("damping_scale", "1"),
+    ],
+)
+def test_values_out_of_range_are_named(tmp_path: Path, name: str, value: object) -> None:
+    text = json.dumps({"band": "red", "theta": SOFT | {name: value}})
+    message = refusal(tmp_path / "theta.json", text)
+    assert f"theta.{name} must be a number between" in message and len(message) < 300
+
+
+@pytest.mark.parametrize("text", ["[" * 200_000, "", "{", "1" * 5000])
+def test_what_is_no_json_object(tmp_path: Path, text: str) -> None:
+    assert "cannot be read as JSON" in refusal(tmp_path / "theta.json", text)
+
+
+def test_nuisances_come_back_and_the_sling_gets_their_drag(tmp_path: Path) -> None:
+    file = tmp_path / "theta.json"
+    said = {"air_drag": 2.5, "force_bias_x": -0.1}
+    file.write_text(json.dumps({"band": "red", "theta": SOFT, "nuisances": said}))
+    assert load_theta(file, "red")["nuisances"] == said
+    sling, theta = in_air(Windless(), np.array([[1.0, 2, 3, 4, 5, 0.7], [1.0, 2, 3, 4, 5, 0.9]]))
+    assert theta.tolist() == [[1, 2, 3, 4, 5]] * 2
+    np.testing.assert_array_equal(sling.air_drag, [0.7, 0.9])
+    assert in_air(Windless(), theta)[0].air_drag == 0.0
+
+
+@dataclass(frozen=True)
+class Windless:
+    air_drag: float = 0.0
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ({"wind": 1.0}, '"nuisances" may hold air_drag, camera_delay, '),
+        ([1.0], '"nuisances" may hold air_drag'),
+        (None, '"nuisances" may hold air_drag'),
+        ({"air_drag": -1}, "nuisances.air_drag must be a number between 0 and 50, got -1"),
+        ({"air_drag": float("nan")}, "nuisances.air_drag must be a number"),
+        ({"air_drag": float("inf")}, "nuisances.air_drag must be a number"),
+        ({"camera_delay": True}, "nuisances.camera_delay must be a number between -0.02"),
+        ({"force_gain": "1"}, "nuisances.force_gain must be a number between 0.5 and 2"),
+    ],
+)
+def test_bad_nuisances_are_one_line(tmp_path: Path, said: object, message: str) -> None:
+    text = json.dumps({"band": "red", "theta": SOFT, "nuisances": said})
+    assert message in refusal(tmp_path / "theta.json", text)
+
+
+def test_a_theta_file_that_says_nothing_of_the_law_adds_nothing() -> None:
+    for content in ({}, {"confidence": None}, {"confidence": {"level": 0.9}}):
+        assert law_discrepancy(content) == 0.0
+    assert law_discrepancy({"confidence": {"discrepancy": {"landing": 0.07}}}) == 0.07
+
+
+def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:
+    path, samples = tmp_path / "none.json", np.linspace(0.1, 1, 15).reshape(3, 5)
+    assert load_samples(RUN, path, "toy", "none") is None
+    content = {"names": list(THETA), "samples": samples.tolist()}
+    path.write_text(json.dumps(content))
+    np.testing.assert_array_equal(load_samples(RUN, path, "toy", "none"), samples)
+    path.write_text('{"samples": []}')  # of a θ without confidence
+    assert load_samples(RUN, path, "toy", "none") is None
+    with_drag = {"names": [*THETA, "air_drag"], "samples": [[0.5] * 6] * 4}
+    path.write_text(json.dumps(with_drag))
+    assert load_samples(RUN, path, "toy", "none").shape == (4, 6)
+    path.write_text(json.dumps(content | {"names": with_drag["names"]}))
+    with pytest.raises(UserError, match="damaged"):
+        load_samples(RUN, path, "toy", "none")
+    for damaged in ("{", "[]", json.dumps(content | {"names": ["a"]}), '{"names": []}'):
+        path.write_text(damaged)
+        with pytest.raises(UserError, match="damaged; `dvc repro --force theta@toy-none`"):
+            load_samples(RUN, path, "toy", "none")
+    with pytest.raises(UserError, match="damaged; `dvc repro --force ablation_theta@toy-without`"):
+        load_samples(RUN, path, "toy", "without")

@@ -1,0 +1,94 @@
+"""Stage scripts as a user calls them: every mistake is one line."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.objective.evaluate import Evaluation
+from pipeline.objective.loss import TERMS
+from pipeline.objective.space import Space
+from pipeline.params import load
+from pipeline.search.history import History
+
+ROOT = Path(__file__).parents[2]
+OF_A_BAND = ("record", "episode", "mounting")
+OF_A_METHOD = ("history", "clusters", "refined", "theta", "policy", "trials")
+
+
+@pytest.fixture
+def stage(tmp_path: Path, monkeypatch, capsys) -> Callable[..., tuple[int, str]]:
+    """Run a script where nothing has run yet: its exit status and its one line on stderr."""
+    (tmp_path / "params.yaml").write_bytes((ROOT / "params.yaml").read_bytes())
+    monkeypatch.chdir(tmp_path)
+
+    def run(name: str, *arguments: str) -> tuple[int, str]:
+        monkeypatch.setattr(sys, "argv", ["", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_module(f"stages.{name}", run_name="__main__", alter_sys=True)
+        lines = capsys.readouterr().err.splitlines()
+        assert len(lines) == 1, lines
+        return ended.value.code, lines[0]
+
+    return run
+
+
+@pytest.mark.parametrize("name", [*OF_A_BAND, *OF_A_METHOD, "report"])
+def test_wrong_arguments_are_answered_by_the_usage(name: str, stage) -> None:
+    words = {"report": ""}.get(name, " BAND" if name in OF_A_BAND else " BAND METHOD")
+    expected = (2, f"usage: python -m stages.{name}{words}")
+    assert stage(name, "a", "b", "c") == expected
+    if words:
+        assert stage(name) == expected
+
+
+def test_unknown_names(stage) -> None:
+    status, line = stage("history", "band9", "sling2sim2real")
+    assert status == 1 and line.startswith("error: band band9: not in params.yaml, which has band1")
+    status, line = stage("theta", "band1", "best")
+    assert status == 1 and line.startswith("error: method best: not in params.yaml, which has")
+
+
+def test_a_history_that_failed_says_why(stage) -> None:
+    space = Space.of(load(ROOT / "params.yaml").parameters)
+    unit = np.random.default_rng(1).random((30, 5))
+    nothing = {term: np.full(30, np.nan) for term in TERMS}
+    theta, reasons = space.to_physical(unit), ["the band slipped"] * 30
+    history = History("sling2sim2real", space.names)
+    history.add(
+        Evaluation(unit, theta, nothing, np.full(30, np.inf), reasons), phase="de", generation=0
+    )
+    history.save(Path("data/history/band1/sling2sim2real.parquet"))
+    status, line = stage("clusters", "band1", "sling2sim2real")
+    assert status == 1
+    assert line.startswith(
+        "error: sling2sim2real: each of 30 simulations failed (the band slipped)"
+    )
+
+
+def test_a_hint_names_the_group_by_which_a_method_runs(stage) -> None:
+    """`run.methods` and `run.ablations` are stages of different names; another method is none."""
+    path = Path("params.yaml")
+    run = load(path).run.ablations
+    assert "band1" in run.bands and {"de", "adam"} <= set(run.methods)
+    makes = {"clusters": "history", "refined": "clusters", "theta": "history"}
+    for name, step in makes.items():
+        for method, group in (("sling2sim2real", step), ("de", f"ablation_{step}")):
+            _, line = stage(name, "band1", method)
+            assert line.endswith(f"missing; `dvc repro {group}@band1-{method}` makes it")
+        _, line = stage(name, "band2", "adam")
+        assert "missing; name adam under run.methods or run.ablations" in line
+
+
+@pytest.mark.parametrize("name", [*OF_A_BAND[1:], *OF_A_METHOD, "report"])
+def test_missing_inputs(name: str, stage) -> None:
+    method = ("sling2sim2real",) if name in OF_A_METHOD else ()
+    band = ("band1",) if name != "report" else ()
+    status, line = stage(name, *band, *method)
+    assert status == 1 and line.startswith("error: data/"), line
+    assert "missing; `dvc repro " in line or "no such file" in line, line

@@ -1,0 +1,72 @@
+"""`sling bench --methods` times what the stages do, and its yardstick is met by its own theta."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.base.errors import UserError
+from pipeline.objective.evaluate import Evaluator
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.objective.space import Space
+from pipeline.params import load
+from validation.benchmarks import methods as bench
+from validation.benchmarks.simulator import THETA, recorded_yardstick
+
+PARAMS = load(Path(__file__).parents[3] / "params.yaml")
+SMALL = {"population": 6, "generations": 2, "cma_population": 4, "cma_rollouts": 16, "k_top": 2}
+
+
+def test_the_recorded_theta_is_where_the_loss_is_least() -> None:
+    """No sensor has noise: the force agrees to rounding, and every other theta is worse."""
+    sling, episode = recorded_yardstick(PARAMS)
+    space = Space.of(PARAMS.parameters)
+    loss = EpisodeLoss.of(PARAMS, "sling2sim2real", episode, sling)
+    evaluate = Evaluator(episode, sling, loss, space, workers=1)
+    truth = space.to_unit(np.array([THETA]))
+    others = np.random.default_rng(1).random((15, 5))
+    evaluation = evaluate(np.concatenate([truth, others]))
+    assert evaluation.terms["force"][0] < 1e-3
+    assert evaluation.terms["work"][0] < 1e-3
+    assert evaluation.total[0] < evaluation.total[1:].min() / 2
+
+
+def test_every_search_spends_its_budget_and_says_what_it_took(monkeypatch) -> None:
+    monkeypatch.setitem(bench.BUDGETS, "laptop", SMALL)
+    names = ("sling2sim2real", "package_si")
+    params = PARAMS.model_copy(update={"methods": {name: PARAMS.methods[name] for name in names}})
+    result = bench.bench_methods(params)
+    assert list(result["methods"]) == list(names)
+    for name, row in result["methods"].items():
+        assert row["rollouts"] == 34
+        assert row["regions"] == (2 if name == "sling2sim2real" else 0)
+        assert row["seconds"] == pytest.approx(row["evaluation_s"] + row["optimizer_s"])
+        assert min(row["evaluation_s"], row["optimizer_s"]) > 0
+        assert np.isfinite(row["best_loss"])
+    assert 0 < result["batch"]["simulation_s"] < 2 * result["batch"]["with_loss_s"]
+    text = bench.table(result)
+    assert all(name in text for name in names)
+
+
+def test_a_search_is_timed_in_the_box_of_its_method() -> None:
+    """Bounds and nuisances of the method included."""
+    sling, episode = recorded_yardstick(PARAMS)
+    for method in ("sling2sim2real", "sling2sim2real_taut"):
+        evaluate = bench.evaluator(PARAMS, method, sling, episode, ["cpu"])
+        expected = Space.of_method(PARAMS, method)
+        assert evaluate.space.names == expected.names
+        np.testing.assert_array_equal(evaluate.space.low, expected.low)
+        np.testing.assert_array_equal(evaluate.space.high, expected.high)
+
+
+def test_the_papers_budget_is_the_papers() -> None:
+    optimizer = PARAMS.optimizer.model_copy(update=bench.BUDGETS["paper"])
+    assert bench.budget(optimizer, "multistart") == (2560, 3200)
+    assert bench.budget(optimizer, "bo") == (5760, 0)
+
+
+def test_a_device_that_is_not_there_is_refused() -> None:
+    with pytest.raises(UserError, match="--device must be cpu.*got 'tpu:0'"):
+        bench.bench_methods(PARAMS, device="tpu:0")

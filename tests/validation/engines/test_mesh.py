@@ -1,0 +1,47 @@
+"""The band as both peers take it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.params import load
+from pipeline.sling.model import Sling
+from validation.engines.mesh import CLAMPED, Tube
+from validation.simulator.closed import String
+
+THETA = np.array([2.2e5, 0.45, 3e-3, 1.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def sling():
+    params = load()
+    return Sling.of(params.bands["band1"], params.setup, params.sling)
+
+
+def test_it_weighs_as_much_as_the_band_and_what_is_in_the_clamps(sling):
+    tube = Tube.of(sling)
+    whole = 1 + 2 * CLAMPED / sling.rest_length
+    assert tube.mass.sum() == pytest.approx(sling.mass * whole)
+    assert tube.arc[[0, -1]] == pytest.approx([0, sling.rest_length])
+    assert tube.rest[tube.middle, 0, 0] == pytest.approx(sling.rest_length / 2)
+
+
+def test_it_hangs_in_the_clamps_unstretched(sling):
+    tube = Tube.of(sling)
+    tips = tube.clamped[[1, -2], 0]
+    assert tips == pytest.approx(sling.tips, abs=1e-12)
+    assert tube.clamped[0, 0] - tips[0] == pytest.approx(-CLAMPED * sling.clamp_direction)
+    edges = np.linalg.norm(np.diff(tube.hanging[1:-1, 0], axis=0), axis=1)
+    assert edges == pytest.approx(np.diff(tube.arc), rel=0.01)
+
+
+@pytest.mark.parametrize("rings", [1, 2])
+def test_its_force_is_the_closed_form_of_a_straight_string(sling, rings):
+    tube, string, stretch = Tube.of(sling, rings=rings), String.of(sling, THETA), 1.7
+    across = np.sqrt(string.volume(stretch) / stretch)
+    force = tube.elastic_force(tube.rest * [stretch, across, across], THETA)
+    pull = float(string.force(stretch))
+    ends = force.sum(axis=1)
+    assert ends[[0, -1]] == pytest.approx(np.array([[pull, 0, 0], [-pull, 0, 0]]), abs=1e-9)
+    assert force[1:-1] == pytest.approx(np.zeros(force[1:-1].shape), abs=1e-9)

@@ -1,0 +1,63 @@
+"""Our simulator against MuJoCo's 3D flex, at the tolerances of the report; shorter runs of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.params import load
+from validation.engines import checks
+from validation.engines.mesh import Tube
+from validation.engines.mujoco_flex import Band
+from validation.simulator.check import Bench, unmet
+
+mujoco = pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[validation]'")
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return Bench(load())
+
+
+@pytest.fixture(scope="module")
+def held(bench):
+    return checks.pull(bench, checks.THETA, step=2e-3)
+
+
+def test_its_law_is_ours(bench):
+    tube = Tube.of(checks.sling_of(bench), edges=4)
+    band = Band(tube, checks.THETA, 5e-4)
+    moved = tube.rest + 0.002 * np.random.default_rng(1).standard_normal(tube.rest.shape)
+    band.data.qpos[:] = (moved - tube.rest).ravel()
+    mujoco.mj_forward(band.model, band.data)
+    force = band.data.qfrc_passive.reshape(tube.rest.shape)
+    expected = tube.elastic_force(moved, checks.THETA)
+    assert force == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+
+
+def test_force_and_centre_line_while_held(held):
+    assert not unmet(checks.pull_checks(held, "", fine=True))
+    assert np.linalg.norm(held.force[:, -1], axis=1).min() > 15  # N: it was pulled
+
+
+def test_other_forces_and_lines_would_be_noticed(held):
+    other = replace(
+        held,
+        force=held.force * np.array([1.0, 1.03])[:, None, None],
+        lines=held.lines + np.array([0.0, 0.005])[:, None, None, None],
+    )
+    assert len(unmet(checks.pull_checks(other, "", fine=True))) == 2
+
+
+def test_a_launch_lands_at_the_same_place(bench):
+    check = checks.launch_check(bench, checks.LAUNCHES[:2], step=5e-4)
+    assert check.met, check
+
+
+@pytest.mark.validation
+def test_the_whole_comparison(bench):
+    section = checks.section(bench)
+    assert len(section.checks) == 10
+    assert not unmet(section.checks)

@@ -1,0 +1,41 @@
+"""No rates and no steps gain energy; a heavy middle decays as the closed form says, within 2 %."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from validation.simulator import damping
+from validation.simulator.agreement import random_thetas
+from validation.simulator.check import Bench
+from validation.simulator.damping import ROUNDING, STATES
+from validation.simulator.experiment import band_of
+from validation.simulator.reference import Twin
+
+from .kept import assert_kept
+
+# Where neighbours are turned against each other by half a radian, a joint may gain a little:
+# `sling verify` states how much.
+KINDS = sorted(set(STATES) - {"far from rest"})
+
+
+def test_no_rates_gain_energy_in_random_states(bench: Bench):
+    @settings(max_examples=24, deadline=None, derandomize=True)
+    @given(st.sampled_from(KINDS), st.integers(0, 2**32 - 1))
+    def gains_nothing(kind: str, seed: int) -> None:
+        rng, sling = np.random.default_rng(seed), band_of(bench)
+        layers = damping.random_states(sling, kind, 1, rng)[0]
+        theta = random_thetas(bench, 1, seed)[0]
+        assert damping.power_gain(Twin(sling, tuple(theta)), layers) <= ROUNDING
+
+    gains_nothing()
+
+
+def test_steps_gain_no_energy_from_random_states(bench):
+    assert_kept(damping.growth(bench, count=16))
+
+
+def test_heavy_middle_is_a_damped_oscillator(bench):
+    cases = [(0.30, 1.0, 0), (0.49, 0.5, 0), (0.30, 0.0, 0), (0.45, 0.5, 1)]
+    assert_kept(damping.oscillator(bench, cases))

@@ -1,0 +1,56 @@
+"""The report says what is kept and what is not, and why something was not run."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+
+from pipeline.base.errors import UserError
+from validation.simulator import report
+from validation.simulator.check import Check, Section, off
+
+KEPT = Check("pull", "closed form", 0.2, "%", 0.5, "16 pairs")
+MISSED = Check("beam", "Euler–Bernoulli", 3.4, "%", 3.0)
+STATED = Check("cost", "—", 12.0, "s")
+
+
+def test_a_check_is_met_within_its_limit_and_never_without_a_number():
+    assert KEPT.met is True and MISSED.met is False and STATED.met is None
+    assert Check("x", "y", math.nan, "%", 1.0).met is False
+    assert math.isnan(off([1.0, math.nan], [1.0, 1.0]))
+    assert off([1.01, 0.98], [1.0, 1.0]) == pytest.approx(2.0)
+
+
+def test_report_and_figures(bench, tmp_path, monkeypatch):
+    def missing(_):
+        raise UserError("mujoco is not installed")
+
+    def drawn(where):
+        (where.figures / "x.png").write_bytes(b"png")
+        return Section("Drawn", [KEPT], "Text.", {"x.png": "a picture"})
+
+    monkeypatch.setattr(report, "SECTIONS", {"drawn": drawn})
+    monkeypatch.setattr(report, "CAMPAIGNS", {})
+    lines = []
+    extra = {"Against MuJoCo": missing, "other": lambda _: Section("Other", [MISSED, STATED])}
+    sections = report.verify(bench.params, progress=lines.append, extra=extra, root=tmp_path)
+    text = (tmp_path / "reports/simulator.md").read_text("utf-8")
+    assert "| pull | 0.2 % | ≤ 0.5 % | yes | closed form | 16 pairs |" in text
+    assert "| beam | 3.4 % | ≤ 3 % | **no** |" in text
+    assert "## Against MuJoCo\n\nNot run: mujoco is not installed." in text
+    assert "1 of 2 limits are kept, 1 not" in text
+    assert (tmp_path / "reports/simulator/x.png").read_bytes() == b"png"
+    kept = json.loads((tmp_path / "reports/simulator.json").read_text("utf-8"))
+    assert kept["sections"][2]["checks"][0]["met"] is False and kept["device"] == "cpu"
+    assert any("NOT MET: beam" in line for line in lines)
+    summary, missed = report.summary(sections)
+    assert missed == 1 and "1 of 2 limits kept" in summary
+    assert "not run: Against MuJoCo: mujoco is not installed" in summary
+
+
+def test_unknown_device_is_refused(bench, tmp_path):
+    with pytest.raises(UserError, match="cuda:7"):
+        report.verify(bench.params, "cuda:7", root=tmp_path)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,1 @@
+"""Proof: the simulator held against truth, other engines, benchmarks, campaigns."""

@@ -1,0 +1,1 @@
+"""How fast: simulator, recordings, methods, other engines."""

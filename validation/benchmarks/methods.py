@@ -1,0 +1,174 @@
+"""How long a whole search takes, method by method, on the yardstick of `sling bench`.
+
+A search is all that the stages history, clusters and refined do, with nothing remembered. Its time
+is what evaluations take (simulation, loss, keeping them) and what is left: the optimiser's own.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.base.machine import named
+from pipeline.episode.episode import Episode
+from pipeline.objective.cache import Memo
+from pipeline.objective.evaluate import Evaluator, simulated
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.objective.space import Space
+from pipeline.params import expect_known
+from pipeline.search.history import History
+from pipeline.search.loop import Free, budget, latin_hypercube, search
+from pipeline.search.optimizers import explorer
+from pipeline.search.optimizers.multistart import Multistart
+from pipeline.search.regions import regions_asked, regions_of
+from pipeline.sling.model import THETA, Sling
+from validation.benchmarks.simulator import recorded_yardstick, seconds, shared, timed
+
+PAPER = {"population": 64, "generations": 39, "cma_population": 16, "cma_rollouts": 3200}
+BUDGETS = {"laptop": {}, "paper": PAPER}  # laptop: as params.yaml has it
+
+
+class Clocked:
+    """A callable that sums up what its calls took [s]."""
+
+    def __init__(self, function) -> None:
+        self.function, self.seconds = function, 0.0
+
+    def __call__(self, *arguments):
+        result, _, wall = timed(partial(self.function, *arguments))
+        self.seconds += wall
+        return result
+
+
+def bench_methods(
+    params, device: str = "cpu", size: str = "laptop", methods: list[str] | None = None
+) -> dict:
+    """Time a search with each of params.yaml's methods.
+
+    Args:
+        device: Or several that share each batch, as SLING_DEVICE names them.
+        size: Of the budget, laptop (params.yaml's) or paper.
+        methods: These alone; none or an empty list means all.
+
+    Returns:
+        `budget`: its name and settings; `batch`: seconds of one generation, simulated alone and
+        with the loss; `methods`, by name: regions (0: it has none), rollouts, failures, seconds of
+        the whole, CPU seconds of all threads, seconds of evaluations and of the optimiser,
+        rollouts/s, best loss.
+
+    Raises:
+        UserError: There is no such device or method.
+    """
+    for method in methods or ():
+        expect_known(params, "method", method)
+    devices = named(device, "--device")
+    optimizer = params.optimizer.model_copy(update=BUDGETS[size])
+    sling, episode = recorded_yardstick(params)
+    first = next(iter(params.methods))
+    _import_and_compile(params, sling, episode, first, devices)
+    return {
+        "budget": {"name": size} | {name: getattr(optimizer, name) for name in PAPER},
+        "batch": _generation(params, sling, episode, first, devices, optimizer.population),
+        "methods": {
+            method: time_search(params, method, optimizer, sling, episode, devices)[0]
+            for method in methods or params.methods
+        },
+    }
+
+
+def time_search(
+    params, method: str, optimizer, sling: Sling, episode: Episode, devices: Sequence[str]
+) -> tuple[dict, History]:
+    """One search from nothing, all its rollouts counted; and what it evaluated."""
+    with tempfile.TemporaryDirectory() as folder:
+        memo = Memo(evaluator(params, method, sling, episode, devices), Path(folder), "bench")
+        evaluate = Clocked(memo)
+        history, cpu, wall = timed(partial(complete, params, method, optimizer, evaluate))
+    count, about = len(history.total), params.methods[method]
+    row = {
+        "regions": regions_asked(about, optimizer) if about.search == "multistart" else 0,
+        "rollouts": count,
+        "failed": int(np.isinf(history.total).sum()),
+        "seconds": wall,
+        "cpu_seconds": cpu,
+        "evaluation_s": evaluate.seconds,
+        "optimizer_s": wall - evaluate.seconds,
+        "rollouts_per_s": count / wall,
+        "best_loss": history.best()["total"],
+    }
+    return row, history
+
+
+def complete(params, method: str, optimizer, evaluate) -> History:
+    """Everything that the stages history, clusters and refined evaluate for a method."""
+    about = params.methods[method]
+    space = Space.of_method(params, method)
+    free = Free.of(space, about.fixed)
+    explore, refine = budget(optimizer, about.search)
+    history = History(method, space.names)
+    first = explorer(about, optimizer, len(free.axes), explore)
+    search(first, evaluate, history, rollouts=explore, free=free)
+    if refine:
+        explored = History(method, free.names, [history.table])
+        regions, _ = regions_of(about, optimizer, explored)
+        solvers = Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed)
+        search(solvers, evaluate, history, rollouts=refine, free=free)
+    return history
+
+
+def _generation(params, sling: Sling, episode: Episode, method: str, devices, count: int):
+    """Seconds of one generation: simulated, and with the loss, on all cores or GPUs."""
+    evaluate = evaluator(params, method, sling, episode, devices)
+    unit = latin_hypercube(evaluate.space.dimension, count, params.optimizer.seed)
+    thetas = evaluate.space.to_physical(unit)[:, : len(THETA)]
+    simulate = partial(simulated, sling, episode, workers=os.cpu_count())
+    simulation = seconds(partial(shared, devices, simulate, thetas))
+    whole = seconds(partial(evaluate, unit))
+    return {"rollouts": count, "simulation_s": simulation, "with_loss_s": whole}
+
+
+def evaluator(
+    params, method: str, sling: Sling, episode: Episode, devices: Sequence[str]
+) -> Evaluator:
+    """A method's, with nothing remembered."""
+    loss = EpisodeLoss.of(params, method, episode, sling)
+    return Evaluator(episode, sling, loss, Space.of_method(params, method), devices=devices)
+
+
+def _import_and_compile(
+    params, sling: Sling, episode: Episode, method: str, devices: Sequence[str]
+) -> None:
+    """What a machine does once, and a method should not pay for."""
+    import torch  # noqa: F401
+
+    evaluate = evaluator(params, method, sling, episode, devices)
+    evaluate(np.full((len(devices), evaluate.space.dimension), 0.5))
+
+
+def table(result: dict) -> str:
+    """What `bench_methods` found, as lines for people."""
+    batch, methods = result["batch"], result["methods"]
+    width = max(map(len, methods))
+    heads = ("rollouts", "seconds", "evaluation", "optimizer", "rollouts/s", "best loss")
+    lines = ["  ".join([" " * width, *heads])]
+    for name, row in methods.items():
+        values = (
+            f"{row['rollouts']}",
+            f"{row['seconds']:.1f}",
+            f"{row['evaluation_s']:.1f}",
+            f"{row['optimizer_s']:.1f}",
+            f"{row['rollouts_per_s']:.0f}",
+            f"{row['best_loss']:.4f}",
+        )
+        cells = [f"{value:>{len(head)}}" for value, head in zip(values, heads, strict=True)]
+        lines.append("  ".join([f"{name:{width}}", *cells]))
+    lines.append(
+        f"a generation of {batch['rollouts']}: {batch['simulation_s']:.3f} s simulated,"
+        f" {batch['with_loss_s']:.3f} s with the loss"
+    )
+    return "\n".join(lines)

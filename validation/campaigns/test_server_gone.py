@@ -1,0 +1,21 @@
+"""A Prefect server that is killed while a stage runs."""
+
+from __future__ import annotations
+
+import psutil
+import pytest
+
+from tests.app.flow.test_server import alive, flow, until
+
+__all__ = ["flow"]  # a fixture
+
+
+@pytest.mark.validation
+def test_a_server_that_is_gone_keeps_no_stage(flow) -> None:
+    url = flow.stdout.readline().strip()
+    (server,) = psutil.Process(flow.pid).children()
+    server.kill()
+    until(lambda: not alive(url), "the server's end")
+    flow.stdin.write("\n")
+    flow.stdin.flush()
+    assert float(flow.stdout.readline()) < 30  # s: the task's code ended, without an error

@@ -1,0 +1,247 @@
+"""Our simulator against MuJoCo's 3D flex: the same band, pulled and launched."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.episode.episode import Episode
+from pipeline.sling.interaction import interact
+from pipeline.sling.launch import launch
+from pipeline.sling.model import ROD, TETRAHEDRA, Sling
+from validation.benchmarks.simulator import ease, unseen
+from validation.engines import mujoco_flex
+from validation.simulator.check import Bench, Check, Section
+
+THETA = np.array([2.2e5, 0.30, 3e-3, 1.0, 1.0])
+GRASP, LIFTED, DRAWN, RELEASE = 0.1, 0.7, 1.8, 2.0  # s
+DRAW, DROP = 0.38, 0.15  # m
+PULLS = (  # Poisson's ratio, rings of the section, whether the mesh is fine enough
+    (0.30, 1, True),
+    (0.45, 2, True),
+    (0.45, 1, False),
+)
+LAUNCHES = (  # Young's modulus, Poisson's ratio, damping, draw
+    (2.2e5, 0.30, 2e-3, (-0.32, -0.12)),
+    (2.2e5, 0.45, 5e-3, (-0.36, -0.15)),
+    (1.5e5, 0.40, 2e-3, (-0.40, -0.15)),
+    (3.0e5, 0.35, 5e-3, (-0.30, -0.20)),
+    (1.8e5, 0.45, 1e-3, (-0.35, -0.10)),
+    (2.5e5, 0.30, 8e-3, (-0.33, -0.25)),
+)
+TEXT = """\
+MuJoCo simulates the same band with another element (tetrahedra, 7 or 19 vertices a section),
+another integrator (one linearised step of backward Euler) and another solver. The law is the same;
+d times the rate of the whole elastic stress (damping_scale 1) means the same, and MuJoCo's d is
+less by its step, which damps as much. Both idealise alike: clamps and fingers hold a whole section,
+along `setup.clamp_direction` and along the fork, and neither turn nor deform it; the hand keeps
+its path and the band does not slip in it; the projectile is a mass at the middle section, drawn to
+rest, let go at once and gone at the first pull; there is no air. What is left of a difference while
+the band is slack, and where it becomes taut, is mostly the bending of coarse tetrahedra: it is
+several times too stiff, the more so the closer Poisson's ratio is to 0.5, and finer sections come
+closer to our figures. With `sling.mesh: tetrahedra` both engines have the very same mesh, and what
+is left is integrator and solver."""
+SAME_MESH = {"edges": 52, "grading": 1.0}  # of `tet_edges`, evenly spaced
+
+
+@dataclass(frozen=True)
+class Pull:
+    """Both engines while the hand holds the band.
+
+    Attributes:
+        times: Of the forces [s], shape (S,).
+        force: Ours and MuJoCo's on the hand [N], shape (2, S, 3).
+        frames: Stamps of the centre lines [s], shape (K,).
+        lines: Ours and MuJoCo's at the same places along the band [m], shape (2, K, L, 3).
+    """
+
+    times: np.ndarray
+    force: np.ndarray
+    frames: np.ndarray
+    lines: np.ndarray
+
+    @property
+    def force_error(self) -> float:
+        """Largest difference of the forces over the largest force [%]."""
+        ours, theirs = self.force
+        peak = np.linalg.norm(ours, axis=1).max()
+        return float(100 * np.linalg.norm(theirs - ours, axis=1).max() / peak)
+
+    @property
+    def held_error(self) -> float:
+        """Difference of the forces at the end of the hold [%]."""
+        ours, theirs = np.linalg.norm(self.force[:, -1], axis=1)
+        return float(100 * (theirs / ours - 1))
+
+    @property
+    def line_errors(self) -> np.ndarray:
+        """RMS distance of the centre lines in each frame [mm], shape (K,)."""
+        distance = np.linalg.norm(self.lines[1] - self.lines[0], axis=-1)
+        return 1e3 * np.sqrt((distance**2).mean(axis=1))
+
+
+def episode_of(sling: Sling) -> Episode:
+    """Lift, pull to (-DRAW, -DROP) and hold; a camera at 30 Hz."""
+    t = np.arange(0.0, RELEASE + 0.5, 0.01)
+    hang = np.sqrt(sling.rest_length**2 / 4 - sling.half_width**2)
+    lift, pull = ease(t, GRASP, LIFTED), ease(t, LIFTED - 0.1, DRAWN)
+    position = np.stack([0 * t, -DRAW * pull, hang * (lift - 1) - DROP * pull], axis=1)
+    stamps = np.arange(np.ceil(30 * GRASP), 30 * t[-1]) / 30
+    return unseen("peers", t, position, stamps, GRASP, RELEASE)
+
+
+def pull(bench: Bench, theta, step: float = 5e-4, **mesh) -> Pull:
+    """The same episode in both engines.
+
+    Args:
+        step: MuJoCo's [s].
+        mesh: As in `Tube.of`.
+
+    Raises:
+        UserError: MuJoCo is not installed.
+    """
+    sling = sling_of(bench)
+    episode = episode_of(sling)
+    theirs = mujoco_flex.interact(sling, episode, theta, step, **mesh)
+    ours = interact(sling, episode, np.array([theta]), device=bench.device)
+    force = _interpolate(theirs.times, ours.times, ours.force[0])
+    first = int(np.searchsorted(episode.cloud_time, theirs.cloud_time[0]))
+    frames = ours.center_line[0, first : first + len(theirs.cloud_time)]
+    lines = np.array([_interpolate(theirs.arc, sling.arc, line) for line in frames])
+    return Pull(
+        times=theirs.times,
+        force=np.array([force, theirs.force]),
+        frames=theirs.cloud_time,
+        lines=np.array([lines, theirs.center_line]),
+    )
+
+
+def pull_checks(result: Pull, title: str, fine: bool) -> list[Check]:
+    """Force and centre line; without limits where the mesh is known to be too coarse."""
+    worst = result.line_errors
+    frame = int(worst.argmax())
+    return [
+        Check(
+            f"force on the hand while held, of its peak, {title}",
+            "MuJoCo 3D flex",
+            result.force_error,
+            "%",
+            2.0 if fine else None,
+            f"{result.held_error:+.2f} % at the end of the hold"
+            + ("" if fine else "; its section is too coarse to bend freely"),
+        ),
+        Check(
+            f"centre line while held, rms, {title}",
+            "MuJoCo 3D flex",
+            float(np.sqrt((worst**2).mean())),
+            "mm",
+            5.0 if fine else None,
+            f"at most {worst[frame]:.1f} mm in a frame, at {result.frames[frame]:.2f} s",
+        ),
+    ]
+
+
+def launch_check(
+    bench: Bench, cases=LAUNCHES, step: float = 2.5e-4, title: str = "", **mesh
+) -> Check:
+    """The largest difference of the landings of `cases`, as listed in LAUNCHES."""
+    sling = sling_of(bench)
+    thetas = np.array([[young, poisson, d, 1.0, 1.0] for young, poisson, d, _ in cases])
+    draws = np.array([draw for *_, draw in cases])
+    ours = launch(sling, thetas, draws, device=bench.device)
+    theirs = [
+        mujoco_flex.launch(sling, theta, draw, step, **mesh)
+        for theta, draw in zip(thetas, draws, strict=True)
+    ]
+    landing = 100 * (np.array([one.landing_y for one in theirs]) / ours.landing_y - 1)
+    speed = 100 * (np.array([one.speed for one in theirs]) / ours.speed - 1)
+    hold = 100 * (np.array([one.hold_force for one in theirs]) / ours.hold_force - 1)
+    return Check(
+        f"landing of {len(cases)} launches, the largest difference{title}",
+        "MuJoCo 3D flex",
+        float(np.abs(landing).max()),
+        "%",
+        3.0,
+        f"landings {', '.join(f'{x:+.1f}' for x in landing)} %; speeds within"
+        f" {np.abs(speed).max():.1f} %, forces of the draw within {np.abs(hold).max():.1f} %",
+    )
+
+
+def section(bench: Bench) -> Section:
+    """All comparisons.
+
+    Raises:
+        UserError: MuJoCo is not installed.
+    """
+    rod, same = _with_mesh(bench, ROD, bench.device), solid(bench)
+    checks, results = [], []
+    for poisson, rings, fine in PULLS:
+        theta = THETA.copy()
+        theta[1] = poisson
+        results.append(pull(rod, theta, rings=rings))
+        title = f"Poisson's ratio {poisson:.2f}, {900 * rings**2} tetrahedra"
+        checks += pull_checks(results[-1], title, fine)
+    checks.append(launch_check(rod))
+    title = ", the same 936 tetrahedra in both"
+    checks += pull_checks(pull(same, theta, **SAME_MESH), f"Poisson's ratio 0.45{title}", True)
+    checks.append(launch_check(same, title=title, **SAME_MESH))
+    pictures = {}
+    if bench.figures:
+        draw(results[1], bench.figures / "mujoco.png")
+        pictures["mujoco.png"] = (
+            "The hand's force and the band seen from the side and from the front: ours (lines) and"
+            " MuJoCo's (dashes)."
+        )
+    return Section("Against MuJoCo", checks, TEXT, pictures)
+
+
+def draw(result: Pull, path) -> None:
+    """Force over time, and centre lines at five moments from the side and from the front."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, (left, side, front) = plt.subplots(
+        1, 3, figsize=(12, 3.8), width_ratios=[1.1, 1.4, 1], layout="constrained"
+    )
+    ours, theirs = result.force
+    for axis, name in enumerate("xyz"):
+        left.plot(result.times, ours[:, axis], label=f"{name}, ours")
+        left.plot(result.times, theirs[:, axis], "k--", label="MuJoCo" if name == "z" else None)
+    left.set(xlabel="time [s]", ylabel="force on the hand [N]")
+    left.legend()
+    for k in np.linspace(0, len(result.frames) - 1, 5).astype(int):
+        ours, theirs = result.lines[:, k].transpose(0, 2, 1)
+        side.plot(*ours[1:], label=f"{result.frames[k]:.2f} s")
+        side.plot(*theirs[1:], "k--")
+        front.plot(*ours[::2])
+        front.plot(*theirs[::2], "k--")
+    side.set(xlabel="y [m]", ylabel="z [m]", aspect="equal")
+    front.set(xlabel="x [m]", ylabel="z [m]", aspect="equal")
+    side.legend(ncols=2, loc="upper left")
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def solid(bench: Bench) -> Bench:
+    """The same with our own tetrahedra in place of the rod; they run on the CPU alone."""
+    return _with_mesh(bench, TETRAHEDRA, "cpu")
+
+
+def _with_mesh(bench: Bench, mesh: str, device: str) -> Bench:
+    resolution = bench.params.sling.model_copy(update={"mesh": mesh})
+    params = bench.params.model_copy(update={"sling": resolution})
+    return replace(bench, params=params, device=device)
+
+
+def sling_of(bench: Bench) -> Sling:
+    """The first band of params.yaml, mounted as `setup` says."""
+    params = bench.params
+    return Sling.of(params.bands[next(iter(params.bands))], params.setup, params.sling)
+
+
+def _interpolate(at: np.ndarray, places: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Rows (P, 3) at ascending `places` (P,), read at `at` (Q,): shape (Q, 3)."""
+    return np.stack([np.interp(at, places, column) for column in rows.T], axis=1)

@@ -1,0 +1,135 @@
+"""The kernel against its NumPy twin: the same steps of the same bands, in double precision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.objective.space import Space
+from pipeline.sling.model import Sling, drawn_guess, hanging_guess
+from pipeline.sling.solver import FREE, HELD, OPENING, POUCH, relaxation, steps
+from validation.simulator.check import Bench, Check, Section
+from validation.simulator.experiment import (
+    TIGHT,
+    band_of,
+    launched,
+    move,
+    rest,
+    straight,
+    straight_guess,
+)
+from validation.simulator.march import march
+from validation.simulator.reference import Twin
+
+LIMIT = 1e-7  # of the band's motion, or of its pull
+SEED = 7
+
+
+def random_thetas(bench: Bench, count: int, seed: int = SEED) -> np.ndarray:
+    """Of the box in params.yaml, shape (count, 5)."""
+    unit = np.random.default_rng(seed).random((count, 5))
+    return Space.of(bench.params.parameters).to_physical(unit)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A band at rest in one way (`before`, from `guess`), and steps of it in another.
+
+    Attributes:
+        before: None where the steps begin from the guess itself.
+        turned: How far the sections are turned about the band before the steps, in its middle.
+    """
+
+    sling: Sling
+    table: np.ndarray
+    guess: np.ndarray
+    before: Sling | None = None
+    hold: int = FREE
+    payload: float = 0.0
+    turned: float = 0.0
+
+
+def _turned(sling: Sling, layers: np.ndarray, most: float) -> np.ndarray:
+    """Layers (L, 9) with their sections turned about the band, by `most` in its middle."""
+    angle = most * np.sin(np.pi * sling.arc / sling.rest_length)[:, None]
+    a, b = layers[:, 3:6], layers[:, 6:]
+    turned = np.cos(angle) * a + np.sin(angle) * b, np.cos(angle) * b - np.sin(angle) * a
+    return np.hstack([layers[:, :3], *turned])
+
+
+def scenes(sling: Sling) -> dict[str, Scene]:
+    """Every way to hold a band, and both orders of steps."""
+    path = np.linspace([0.0, 0.0, -0.2], [0.01, -0.03, -0.18], 8)
+    held = steps(0.002 * np.arange(9), 0.002, hold=HELD)
+    held[:, 6:9], held[:, 9], held[:, 10] = path, 1e4, np.linspace(1, 0.3, 8)
+    opening = steps(0.016 + 0.00025 * np.arange(9), 0.002, hold=OPENING, order=2)
+    opening[:, 9] = sling.grip_force * np.linspace(0, 1, 8)
+    free = steps(0.018 + 0.0005 * np.arange(9), 0.00025, hold=FREE, order=2)
+    draw = np.array([[-0.38, -0.2]])
+    taut = straight(sling, 1.3 * sling.rest_length)
+    loose = replace(taut, clamped=(False, False))
+    start = straight_guess(taut)
+    return {
+        "held, opened and let go": Scene(
+            sling, np.vstack([held, opening, free]), hanging_guess(sling)
+        ),
+        "brought to rest": Scene(sling, relaxation(FREE)[:12], hanging_guess(sling)),
+        "launched": Scene(
+            sling,
+            launched(0.00025, 16),
+            drawn_guess(sling, draw)[0],
+            before=sling,
+            hold=POUCH,
+            payload=sling.projectile_mass,
+        ),
+        "twisted and let go": Scene(taut, launched(0.0005, 12, 1), start, before=taut, turned=0.3),
+        "stretched and let go at both ends": Scene(loose, launched(0.0005, 12), start, before=taut),
+    }
+
+
+def compare(bench: Bench, thetas: np.ndarray) -> dict[str, tuple[float, float]]:
+    """Largest difference of a scene's states and forces, by what the twin says they do."""
+    result = {}
+    for name, scene in scenes(band_of(bench)).items():
+        states, forces = [], []
+        for theta in thetas:
+            start = scene.guess.copy()
+            if scene.before is not None:
+                table = relaxation(scene.hold)
+                table[:, 6:9] = scene.guess[scene.sling.middle, :3]
+                start = rest(bench, scene.before, theta, start, table=table, double=True)
+            start = _turned(scene.sling, start, scene.turned)
+            options = {"payload": scene.payload}
+            motion = move(bench, scene.sling, theta, scene.table, start, **options, **TIGHT)
+            band = Twin(scene.sling, tuple(theta), **options)
+            twin = march(band, scene.table, start, grip=2 * theta[3])
+            size, pull = np.abs(twin.x - start).max(), np.abs(twin.force).max()
+            states.append(np.abs(motion.x[0] - twin.x).max() / size)
+            forces.append(np.abs(motion.force[0] - twin.force).max() / max(pull, 1e-9))
+        result[name] = (float(np.max(states)), float(np.max(forces)))
+    return result
+
+
+def checks(bench: Bench, count: int = 4) -> list[Check]:
+    against = "NumPy twin, Newton's method to rounding"
+    note = f"{count} random θ of the box, double precision"
+    result = []
+    for name, (states, forces) in compare(bench, random_thetas(bench, count)).items():
+        result.append(
+            Check(f"states of a band {name}", against, states, "of its motion", LIMIT, note)
+        )
+        if forces > 0:
+            result.append(
+                Check(f"force of a band {name}", against, forces, "of its peak", LIMIT, note)
+            )
+    return result
+
+
+def section(bench: Bench) -> Section:
+    return Section(
+        "The kernel against its twin",
+        checks(bench),
+        "`validation/simulator/reference.py` is the rod written a second time, in plain NumPy from"
+        " its equations. Both take the same steps in double precision.",
+    )

@@ -1,0 +1,200 @@
+"""Where the hand's work goes: the balance of a pull, hold and release, step by step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.sling.interaction import schedule_of
+from pipeline.sling.model import hanging_guess
+from pipeline.sling.solver import HELD, OPENING, RELAX_STEPS
+from validation.benchmarks import simulator as yardstick
+from validation.simulator import figures
+from validation.simulator.check import Bench, Check, Section
+from validation.simulator.experiment import band_of, move
+from validation.simulator.reference import Twin
+
+LIMIT = 1.0  # percent of the hand's work
+THETA = (6e5, 0.45, 5e-3, 0.6, 0.8)
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Sums [J] since the band hung at rest, shape (S,) each, at `time` (S,).
+
+    Attributes:
+        hand: Work of the hand on the node that it leads.
+        turning: Work of the fingers as they take and leave the direction of the middle.
+        pads: Lost to the pads while they open.
+        viscous: Lost to damping.
+        integrator: Lost to the steps: what inertia and elastic forces do in a step is not quite
+            the change of their energies.
+    """
+
+    time: np.ndarray
+    hand: np.ndarray
+    turning: np.ndarray
+    elastic: np.ndarray
+    kinetic: np.ndarray
+    gravity: np.ndarray
+    viscous: np.ndarray
+    pads: np.ndarray
+    integrator: np.ndarray
+    release: float
+
+    @property
+    def remainder(self) -> np.ndarray:
+        """What no entry explains: the residual of the steps, by the twin's forces."""
+        return self.miss - self.integrator
+
+    @property
+    def miss(self) -> np.ndarray:
+        """What the hand and the fingers put in, less what is stored and physically dissipated."""
+        stored = self.elastic + self.kinetic + self.gravity
+        return self.hand + self.turning - stored - self.viscous - self.pads
+
+    def share(self, energy: np.ndarray) -> float:
+        """In percent of all of the hand's work, at its largest."""
+        return float(100 * np.abs(energy).max() / np.abs(self.hand).max())
+
+
+def balance(bench: Bench, theta=THETA) -> Balance:
+    """The bench's pull and release in double precision, every step of it accounted for."""
+    sling = band_of(bench)
+    episode = yardstick.pull_and_release("band", bench.params.episode, sling)
+    table = schedule_of(sling, episode).table
+    motion = move(bench, sling, theta, table, hanging_guess(sling), double=True)
+    first = RELAX_STEPS - 1  # the band hangs
+    rows, hold = table[first + 1 :], table[first + 1 :, 5]
+    x1, x = motion.x[0, first:-1], motion.x[0, first + 1 :]
+    v1, v, at = motion.v[0, first:-1], motion.v[0, first + 1 :], motion.at[0, first + 1 :]
+    v2 = np.concatenate([v1[:1], v1[:-1]])
+    c1, c2, beta = (rows[:, k, None, None] for k in (1, 2, 3))
+    moved = x - x1
+    twin = Twin(sling, tuple(theta))
+
+    def work(force: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        return (force * moved).sum((-2, -1))
+
+    elastic, before, conservative, viscous = (np.empty(len(x)) for _ in range(4))
+    for gripped in (False, True):
+        part = (hold == HELD) == gripped
+        band = replace(twin, gripped=gripped)
+        still = np.zeros_like(v[part])
+        elastic[part], before[part] = band.elastic(x[part]), band.elastic(x1[part])
+        conservative[part] = work(band.internal(x[part], still, at[part]), moved[part])
+        viscous[part] = work(band.viscous(v[part], at[part]), moved[part])
+    rate = (v - c1 * v1 + c2 * v2) / (beta * rows[:, 0, None, None])
+    kinetic = np.append(0.0, twin.kinetic(v))
+    integrator = (
+        work(twin.mass * rate, moved) - np.diff(kinetic) + conservative - (elastic - before)
+    )
+    hand = -(motion.force[0, first + 1 :] * moved[:, sling.middle, :3]).sum(-1)
+    hanging = twin.elastic(x1[0])
+    turning = before - np.append(hanging, elastic[:-1])
+    return Balance(
+        time=rows[:, 11],
+        hand=np.cumsum(np.where(hold == HELD, hand, 0.0)),
+        turning=np.cumsum(turning),
+        elastic=elastic - hanging,
+        kinetic=kinetic[1:],
+        gravity=twin.weight(x) - twin.weight(x1[0]),
+        viscous=np.cumsum(viscous),
+        pads=-np.cumsum(np.where(hold == OPENING, hand, 0.0)),
+        integrator=np.cumsum(integrator),
+        release=episode.release_time,
+    )
+
+
+def checks(done: Balance) -> list[Check]:
+    held = done.time <= done.release + 1e-9
+    total = np.abs(done.hand).max()
+    taut = (done.time > done.release) & (done.time < done.release + 0.1)
+    parts = {
+        name: getattr(done, name)[-1]
+        for name in ("elastic", "kinetic", "gravity", "viscous", "pads")
+    }
+    parts["steps"] = done.miss[-1]
+    note = " + ".join(f"{name} {value:.4f}" for name, value in parts.items())
+    against = "hand + fingers' turning = elastic + kinetic + gravity + dissipated (viscous, pads)"
+    return [
+        Check(
+            "balance of energy, largest miss at any time",
+            against,
+            done.share(done.miss),
+            "%",
+            LIMIT,
+            "of the hand's work; the steps' own loss is the miss",
+        ),
+        Check(
+            "balance of energy, miss at the end",
+            against,
+            float(100 * np.abs(done.miss[-1]) / total),
+            "%",
+            LIMIT,
+            f"hand {done.hand[-1]:.4f} J and turning {done.turning[-1]:.4f} J = {note} J",
+        ),
+        Check(
+            "work of the fingers' turning, largest at any time",
+            "—",
+            done.share(done.turning),
+            "%",
+            None,
+            "of the hand's work: what taking and leaving the direction of the middle does to the"
+            f" elastic energy; the balance misses {done.share(done.miss - done.turning):.2f} %"
+            " without it",
+        ),
+        Check(
+            "residual of the kernel's steps by the twin's forces",
+            "balance with the steps' loss, by its formula, as an entry",
+            done.share(done.remainder),
+            "%",
+            LIMIT,
+            "of the hand's work, largest at any time: every step is solved, no force is missing",
+        ),
+        Check(
+            "lost to the steps while held",
+            "0 for infinitely short steps",
+            done.share(done.integrator[held]),
+            "%",
+            LIMIT,
+            "backward Euler, of the hand's work",
+        ),
+        Check(
+            "lost to the steps in the first 0.1 s after the release",
+            "0 for infinitely short steps",
+            float(100 * np.abs(done.integrator[taut] - done.integrator[held][-1]).max() / total),
+            "%",
+            LIMIT,
+            "second order, of the hand's work",
+        ),
+        Check(
+            "lost to the opening pads",
+            "their friction at the band's path",
+            float(100 * done.pads[-1] / total),
+            "%",
+            None,
+            "of the hand's work",
+        ),
+    ]
+
+
+def section(bench: Bench) -> Section:
+    done = balance(bench)
+    pictures = {}
+    if bench.figures:
+        figures.balance(bench.figures / "energy.png", done)
+        pictures["energy.png"] = (
+            "Where the hand's work goes: a pull of 0.35 m in 4 s, a pause, the release at 8 s, and"
+            " (right) the first 100 ms after it."
+        )
+    return Section(
+        "Energy of a pull, hold and release",
+        checks(done),
+        "The yardstick of `sling bench`, in double precision, each step accounted for with the"
+        " twin's energies and forces. What the hand puts in is stored or dissipated but for what"
+        " the steps lose: what inertia and elastic forces do in a step, less the change of their"
+        " energies.",
+        pictures,
+    )

@@ -1,0 +1,127 @@
+"""Steps of the twin: Newton's method to machine precision on the equations of step.h."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.sling.solver import FREE, HELD, OPENING, POUCH, RELAX
+from validation.simulator.reference import Twin
+
+SMALL = 1e-30  # imaginary step: derivatives without cancellation
+
+
+@dataclass(frozen=True)
+class March:
+    """States x and rates v after each step, shape (S, L, 9), and the force on the hand (S, 3)."""
+
+    x: np.ndarray
+    v: np.ndarray
+    force: np.ndarray
+
+
+def march(
+    twin: Twin, table: np.ndarray, start: np.ndarray, *, grip: float = np.inf, direction=(0, 0, 0)
+) -> March:
+    """Step `start` (L, 9), at rest, through the rows of a schedule (S, 13).
+
+    Args:
+        grip: 2 times the coefficient of friction: with the normal force what two pads can hold.
+        direction: Of the pull that opening pads resist, until a held step says, shape (3,).
+    """
+    middle = twin.sling.middle
+    x1 = x2 = np.array(start, float)
+    v1 = v2 = np.zeros_like(x1)
+    offset, pull, direction = None, 0.0, np.asarray(direction, float)
+    xs, vs, forces = [], [], []
+    for row in table:
+        h, c1, c2, beta, mode, hold, *target, limit, blend, _, share = row
+        bh = beta * h
+        band = replace(twin, share=share, gripped=hold == HELD)
+        free = _free(band)
+        at = x1 + h * v1
+        if hold in (HELD, POUCH):
+            offset = x1[middle, :3] - target if offset is None else offset
+            at[middle, :3] = np.asarray(target) + blend * offset
+            free[middle, :3] = False
+        else:
+            offset = None
+        y = c1 * x1 - c2 * x2
+        inertial = y + bh * (c1 * v1 - c2 * v2)
+        inertial[:, 2] -= bh**2 * twin.gravity
+        capacity = max(pull - limit * grip, 0.0) if hold == OPENING else 0.0
+
+        def residual(
+            x, band=band, at=at, y=y, inertial=inertial, bh=bh, held_back=capacity * direction
+        ):
+            force = band.mass * (x - inertial) / bh**2 + band.internal(x, (x - y) / bh, at)
+            force[..., middle, :3] += held_back
+            return force
+
+        x = solve(residual, at, free)
+        force = -residual(x)[middle, :3]
+        if hold == HELD:
+            pull = np.linalg.norm(force)
+            direction = force / max(pull, 1e-9)
+        if hold in (FREE, OPENING):
+            force = capacity * direction
+        v = (x - y) / bh
+        if mode == RELAX:
+            x1, x2, v1, v2 = x, x, 0 * v, 0 * v
+        else:
+            x1, x2, v1, v2 = x, x1, v, v1
+        xs.append(x), vs.append(v1), forces.append(force)
+    return March(np.array(xs), np.array(vs), np.array(forces))
+
+
+def _free(twin: Twin) -> np.ndarray:
+    """Which unknowns move, shape (L, 9): not the clamped nodes, nor the last layer's directors."""
+    free = np.ones((twin.sling.layers, 9), bool)
+    free[[0, -1], :3] = ~np.array(twin.sling.clamped)[:, None]
+    free[-1, 3:] = False
+    return free
+
+
+def solve(residual, start: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Newton's method from `start` on the `free` unknowns, down the step's potential.
+
+    A residual is that potential's gradient. Where the Hessian is not positive, its diagonal is
+    raised until it is; a step past the bottom, to where it is steeper than before, is halved.
+    """
+    x = start
+    for _ in range(100):
+        slope = residual(x)[free]
+        step = np.zeros(x.shape)
+        step[free] = _downhill(jacobian(residual, x)[free][:, free], slope)
+        steep, scale = slope @ step[free], 1.0
+        while -residual(x - scale * step)[free] @ step[free] > steep and scale > 1e-4:
+            scale /= 2
+        x = x - scale * step
+        if np.abs(step).max() < 1e-11:  # the next one would be rounding
+            return x
+    raise ArithmeticError("the twin's Newton method did not converge")
+
+
+def _downhill(hessian: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    diagonal, raised = np.abs(np.diag(hessian)), 0.0
+    while True:
+        try:
+            factor = np.linalg.cholesky(hessian + raised * np.diag(diagonal))
+            return np.linalg.solve(factor.T, np.linalg.solve(factor, slope))
+        except np.linalg.LinAlgError:
+            raised = max(4 * raised, 1e-3)
+
+
+def jacobian(residual, x: np.ndarray) -> np.ndarray:
+    """Of a residual in which a layer meets its neighbours only, shape (L, 9, L, 9)."""
+    layers = len(x)
+    probes = np.zeros((3, 9, layers, 9))
+    for i in range(layers):
+        probes[i % 3, range(9), i, range(9)] = 1
+    slopes = residual(x + 1j * SMALL * probes).imag / SMALL
+    result = np.zeros((layers, 9, layers, 9))
+    for i in range(layers):
+        for row in range(max(i - 1, 0), min(i + 2, layers)):
+            result[row, :, i] = slopes[i % 3, :, row].T
+    return result

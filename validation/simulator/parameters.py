@@ -1,0 +1,197 @@
+"""Each of the five parameters does what its definition says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.sling import Sling, interact
+from pipeline.sling.solver import HELD
+from validation.benchmarks import simulator as yardstick
+from validation.simulator.check import Bench, Check, Section, off
+from validation.simulator.closed import String
+from validation.simulator.damping import oscillate
+from validation.simulator.experiment import band_of, move, settling, straight, straight_guess
+from validation.simulator.statics import STRING
+
+THETA = (6e5, 0.45, 5e-3, 0.6, 0.8)
+THIN = f"a string {STRING} times thinner than the band"
+SLIP = "the band slipped out of the fingers"
+
+
+def _with(**changes: float) -> list[float]:
+    names = ("young", "poisson", "damping", "friction", "scale")
+    return [changes.get(name, value) for name, value in zip(names, THETA, strict=True)]
+
+
+def held_force(bench: Bench, sling: Sling, thetas: list, when: float = 7.9) -> np.ndarray:
+    """Force (N,) on the hand in the yardstick's pause before the release."""
+    episode = yardstick.pull_and_release("band", bench.params.episode, sling)
+    done = interact(sling, episode, np.array(thetas), device=bench.device, workers=bench.workers)
+    force = np.linalg.norm(done.force[:, np.argmin(np.abs(done.times - when))], axis=1)
+    return np.where([reason is None for reason in done.failure], force, np.nan)
+
+
+def young(bench: Bench) -> list[Check]:
+    sling = replace(band_of(bench), mass=1e-4, grip_force=1e5)
+    one, two = held_force(bench, sling, [_with(), _with(young=2 * THETA[0])])
+    return [
+        Check(
+            "held force at 2 E over that at E",
+            "2",
+            off(two / one, 2.0),
+            "%",
+            0.5,
+            f"{two / one:.4f}; a weightless band in the episode, held fast",
+        )
+    ]
+
+
+def poisson(bench: Bench, stretch: float = 1.5) -> list[Check]:
+    """Volume of a straight, held string, and its pull at given E, from nu 0.30 to 0.49."""
+    sling = band_of(bench)
+    sling = replace(sling, radius=sling.radius / STRING)
+    half = sling.rest_length / 2
+    sling = straight(sling, (stretch + 1) * half)
+    target = (stretch * half - sling.half_width, 0.0, 0.0)
+    thetas = [_with(poisson=nu) for nu in (0.30, 0.49)]
+    motion = move(
+        bench, sling, thetas, settling(HELD, target), straight_guess(sling, stretch * half),
+        gravity=0.0, double=True,
+    )  # fmt: skip
+    strings = [String.of(sling, theta) for theta in thetas]
+    edge = sling.middle // 2  # away from the ends
+    layers = motion.x[:, -1]
+    g = (layers[:, edge + 1, :3] - layers[:, edge, :3]) / sling.edge_lengths[edge]
+    volume = np.einsum("ij,ij->i", g, np.cross(layers[:, edge, 3:6], layers[:, edge, 6:9]))
+    expected = np.array([float(one.volume(stretch)) for one in strings])
+    pull = -motion.force[:, -1, 0]
+    ratio = float(strings[1].force(stretch) / strings[0].force(stretch))
+    return [
+        Check(
+            f"volume that a string gains at stretch {stretch:g}, ν 0.30 and 0.49",
+            "J − 1 = μ/λ (1 − 1/l)",
+            off(volume - 1, expected - 1),
+            "%",
+            1.0,
+            f"{100 * (volume[0] - 1):.2f} % and {100 * (volume[1] - 1):.2f} %; {THIN}",
+        ),
+        Check(
+            "pull at ν 0.49 over that at ν 0.30, same E",
+            "P = μ (l − J/l²)",
+            off(pull[1] / pull[0], ratio),
+            "%",
+            0.5,
+            f"{pull[1] / pull[0]:.4f}; {THIN}",
+        ),
+    ]
+
+
+def damping(bench: Bench) -> list[Check]:
+    """Decay of the heavy middle: d scales it, s its shape part and not its volume part."""
+
+    def decay(d: float, s: float) -> tuple[float, float]:
+        theta = _with(young=1e6, poisson=0.30, damping=d, scale=s)
+        _, _, fitted, closed = oscillate(bench, theta)
+        return fitted[1], closed[1]
+
+    base, closed = decay(1e-2, 1.0)
+    twice, _ = decay(2e-2, 1.0)
+    half, _ = decay(1e-2, 0.5)
+    none, closed_none = decay(1e-2, 0.0)
+    volume = closed_none / closed
+    return [
+        Check(
+            "decay at 2 d over that at d",
+            "2",
+            off(twice / base, 2.0),
+            "%",
+            1.0,
+            f"{twice / base:.4f}; along the band, ν 0.30, s 1; {THIN}",
+        ),
+        Check(
+            "decay lost from s = 1 to s = 0.5",
+            "half of the shape part",
+            off((base - half) / (base - none), 0.5),
+            "%",
+            1.0,
+            f"{(base - half) / (base - none):.4f} of what is lost from 1 to 0; {THIN}",
+        ),
+        Check(
+            "decay that is left at s = 0, over that at s = 1",
+            "the volume part, d (λ − μ/3) J'²",
+            off(none / base, volume),
+            "%",
+            2.0,
+            f"{none / base:.4f}, closed form {volume:.4f}; {THIN}",
+        ),
+    ]
+
+
+def friction(bench: Bench, count: int = 33) -> list[Check]:
+    """Coulomb: pads with the normal force N hold a pull of 2 mu N; then they open."""
+    sling = band_of(bench)
+    episode = yardstick.pull_and_release("band", bench.params.episode, sling)
+    strong = interact(
+        replace(sling, grip_force=1e5), episode, np.array([_with()]), device=bench.device
+    )
+    held = strong.times <= episode.release_time + 1e-9
+    force = np.linalg.norm(strong.force[0], axis=1)
+    peak = force[held].max()
+    least = peak / (2 * sling.grip_force)
+    tries = least * np.linspace(0.98, 1.02, count)
+    done = interact(
+        sling,
+        episode,
+        np.array([_with(friction=mu) for mu in tries]),
+        device=bench.device,
+        workers=bench.workers,
+    )
+    reasons = done.failure
+    holds = np.array([reason is None for reason in reasons])
+    named = all(reason in (None, SLIP) for reason in reasons)
+    found = tries[holds].min() if holds.any() and named else np.nan
+
+    mu = max(2 * least, 0.05)
+    open_ = interact(sling, episode, np.array([_with(friction=mu)]), device=bench.device)
+    size, times = np.linalg.norm(open_.force[0], axis=1), open_.times - episode.release_time
+    first = np.argmin(np.abs(times))
+    window = (times > 1e-9) & (times <= sling.finger_opening_time)
+    rate = 2 * mu * sling.grip_force / sling.finger_opening_time
+    expected = np.maximum(size[first] - rate * times[window], 0)
+    miss = 100 * np.abs(size[window] - expected).max() / size[first]
+    return [
+        Check(
+            "least friction that holds the pull",
+            "Coulomb, F = 2 μ N",
+            off(found, least),
+            "%",
+            0.25,
+            f"{found:.4f}; {peak:.2f} N, pads of {sling.grip_force:g} N; below it: “{SLIP}”",
+        ),
+        Check(
+            "θ below it that do not slip",
+            "0",
+            float(holds[tries < 0.999 * least].sum()),
+            "θ",
+            0.0,
+            f"of {int((tries < 0.999 * least).sum())}",
+        ),
+        Check(
+            "force while the fingers open",
+            f"pull − 2 μ N t / T, T {1e3 * sling.finger_opening_time:g} ms",
+            float(miss),
+            "% of the pull",
+            0.1,
+            f"gone after {1e3 * size[first] / rate:.2f} ms of T",
+        ),
+    ]
+
+
+def section(bench: Bench) -> Section:
+    return Section(
+        "The five parameters",
+        [*young(bench), *poisson(bench), *damping(bench), *friction(bench)],
+        "Each changes the episode as its definition says.",
+    )

@@ -1,0 +1,162 @@
+"""Parameter vectors of the whole box and its boundary: rollouts are finite, or say why not."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from pipeline.objective.space import Space
+from pipeline.sling import THETA, Sling, interact, launch
+from validation.benchmarks import simulator as yardstick
+from validation.simulator.agreement import random_thetas
+from validation.simulator.check import Bench, Check, Section
+from validation.simulator.experiment import band_of
+
+COUNT, LAUNCHES, FACES, BATCH, SEED = 10_000, 2_000, 500, 500, 1
+HELD_FAST = 1e5  # N: at this force of the pads no band slips out
+UNCONVERGED = "the simulation did not converge"
+ALLOWED = 10  # of 10,000 that did not converge, each marked so
+
+
+def corners(bench: Bench) -> np.ndarray:
+    """Thetas (32, 5) at a bound of the box each."""
+    unit = np.array(list(product((0.0, 1.0), repeat=len(THETA))))
+    return Space.of(bench.params.parameters).to_physical(unit)
+
+
+def on_faces(bench: Bench, count: int) -> np.ndarray:
+    """Random thetas (count, 5) of the box, one parameter of each at a bound, every one in turn."""
+    unit = np.random.default_rng(SEED).random((count, len(THETA)))
+    turn = np.arange(count)
+    unit[turn, turn % len(THETA)] = turn // len(THETA) % 2
+    return Space.of(bench.params.parameters).to_physical(unit)
+
+
+def ranges(thetas: list[dict[str, float]]) -> str:
+    """Between what bounds the parameters of thetas lie; one that all share is named as such."""
+
+    def told(name: str) -> str:
+        low, high = (f"{f([one[name] for one in thetas]):.3g}" for f in (min, max))
+        return f"{name} {low}" if low == high else f"{name} {low}–{high}"
+
+    return ", ".join(told(name) for name in THETA)
+
+
+def survey(bench: Bench, sling: Sling, thetas: np.ndarray, progress=print) -> dict:
+    """Roll all thetas out, batch by batch, and count what comes of them."""
+    episode = yardstick.pull_and_release("band", bench.params.episode, sling)
+    reasons, bad, farthest, failed = Counter(), 0, 0.0, []
+    for first in range(0, len(thetas), BATCH):
+        part = thetas[first : first + BATCH]
+        done = interact(sling, episode, part, device=bench.device, workers=bench.workers)
+        good = np.array([reason is None for reason in done.failure])
+        reasons.update(reason for reason in done.failure if reason is not None)
+        lines, force = done.center_line[good], done.force[good]
+        bad += int(np.sum(~np.isfinite(lines).all((1, 2, 3)) | ~np.isfinite(force).all((1, 2))))
+        farthest = max(farthest, float(np.linalg.norm(lines, axis=3).max(initial=0)))
+        failed += [
+            dict(zip(THETA, map(float, part[k]), strict=True))
+            for k in np.flatnonzero(~good)
+            if done.failure[k] == UNCONVERGED
+        ]
+        if first // BATCH % 4 == 3:
+            progress(f"  {first + len(part)}/{len(thetas)} rollouts, {dict(reasons)}")
+    return {
+        "rollouts": len(thetas),
+        "reasons": dict(reasons),
+        "unconverged": failed,
+        "not_finite": bad,
+        "farthest_node_m": farthest,
+    }
+
+
+def survey_launches(bench: Bench, sling: Sling, thetas: np.ndarray) -> dict:
+    """Launch with all thetas from random draws of the arm's box, and count what comes of them."""
+    rng, setup = np.random.default_rng(SEED), bench.params.setup
+    draws = np.column_stack(
+        [rng.uniform(*box, len(thetas)) for box in (setup.draw_y, setup.draw_z)]
+    )
+    done = launch(sling, thetas, draws, device=bench.device, workers=bench.workers)
+    good = np.array([reason is None for reason in done.failure])
+    outcome = np.column_stack([done.landing_y, done.speed, done.angle, done.hold_force])
+    return {
+        "launches": len(thetas),
+        "reasons": dict(Counter(reason for reason in done.failure if reason is not None)),
+        "not_finite": int(np.sum(~np.isfinite(outcome[good]).all(1))),
+    }
+
+
+def section(
+    bench: Bench,
+    count: int = COUNT,
+    launches: int = LAUNCHES,
+    faces: int = FACES,
+    progress=print,
+) -> Section:
+    sling, thetas = band_of(bench), random_thetas(bench, count, SEED)
+    fast = replace(sling, grip_force=HELD_FAST)
+    held = survey(bench, fast, thetas, progress)
+    edges = {
+        "corners": survey(bench, fast, corners(bench), progress),
+        "faces": survey(bench, fast, on_faces(bench, faces), progress),
+    }
+    gripped = survey(bench, sling, thetas[:launches], progress)
+    launched = survey_launches(bench, sling, thetas[:launches])
+    surveys = {"held_fast": held, "default_grip": gripped, "launches": launched} | edges
+    allowed = ALLOWED * count / COUNT
+
+    def told(reasons: dict) -> str:
+        return "; ".join(f"{number} “{reason}”" for reason, number in reasons.items()) or "none"
+
+    def failed(name: str, one: dict) -> Check:
+        total = float(sum(one["reasons"].values()))
+        return Check(name, "—", total, "θ", None, told(one["reasons"]))
+
+    boundary = [
+        Check(
+            f"unconverged, and marked so, of {one['rollouts']} rollouts {where}, held fast",
+            "—",
+            float(len(one["unconverged"])),
+            "θ",
+            None,
+            ranges(one["unconverged"]) if one["unconverged"] else "",
+        )
+        for where, one in (
+            ("at the corners of the box", edges["corners"]),
+            ("on its faces, one parameter at a bound", edges["faces"]),
+        )
+    ]
+    checks = [
+        Check(
+            f"not finite, though not marked failed, of {count} rollouts, {len(corners(bench))} at"
+            f" corners and {faces} on faces of the box, {launches} with the default grip and"
+            f" {launches} launches",
+            "0",
+            float(sum(one["not_finite"] for one in surveys.values())),
+            "θ",
+            0.0,
+            f"farthest node {held['farthest_node_m']:.2f} m from the fork",
+        ),
+        Check(
+            f"unconverged, and marked so, of {count} rollouts within the box, held fast",
+            "0, or marked failed with a reason",
+            float(len(held["unconverged"])),
+            "θ",
+            allowed,
+            told(held["reasons"]),
+        ),
+        *boundary,
+        failed(f"failed of {launches} with the default grip", gripped),
+        failed(f"failed of {launches} launches from random draws", launched),
+    ]
+    return Section(
+        "Random parameters",
+        checks,
+        "θ from the box of `params.yaml`, on the pull-and-release of `sling bench`; a rollout that"
+        " fails carries its reason and counts for nothing. Random θ lie within the box; what lies"
+        " on its boundary is harder and counted apart.",
+        details={"seed": SEED, "surveys": surveys},
+    )

@@ -1,0 +1,248 @@
+"""At rest: pull of a string, bending of beams, torsion of the cylinder, all in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.sling import launch
+from pipeline.sling.model import GRAVITY
+from pipeline.sling.solver import HELD
+from validation.simulator import figures
+from validation.simulator.check import Bench, Check, Section, off
+from validation.simulator.closed import String, cantilever, clamped_beam
+from validation.simulator.experiment import (
+    TIGHT,
+    band_of,
+    move,
+    rest,
+    settling,
+    straight,
+    straight_guess,
+)
+from validation.simulator.launches import with_edges
+from validation.simulator.reference import Twin
+
+PULL_LIMIT, BEAM_LIMIT, TORSION_LIMIT = 0.5, 3.0, 5.0  # percent
+YOUNG = (3e4, 2e5, 1e6, 1e7)
+POISSON = (0.30, 0.40, 0.45, 0.49)
+STRETCH = (1.2, 1.6, 2.2)
+DRAWN, SOFT = (1.2, 1.6, 2.2), 1.5  # of a draw; up to SOFT the turns at its ends matter
+STRING = 5  # times thinner than the band: the held sections at its ends hardly count
+BEAM_POISSON = (0.30, 0.45, 0.49)
+BEAM_YOUNG = 1e7
+MESH = "; the mesh's doing: about 3.1 % with edges graded by 10 instead of 8"
+
+
+def thetas(young=YOUNG, poisson=POISSON) -> np.ndarray:
+    """Every pair of E and nu, shape (N, 5)."""
+    return np.array([[e, nu, 2e-3, 0.5, 1.0] for e in young for nu in poisson])
+
+
+def straight_pull(
+    bench: Bench, stretch: float, theta: np.ndarray, thinner: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Measured and closed-form pull (N,) of a straight band whose other half is at its rest length.
+
+    The fingers hold the middle; the first half is stretched, so that the hand feels it alone.
+
+    Args:
+        thinner: How many times thinner the band is than its own diameter.
+    """
+    sling = band_of(bench)
+    sling = replace(sling, radius=sling.radius / thinner)
+    half = sling.rest_length / 2
+    sling = straight(sling, (stretch + 1) * half)
+    target = (stretch * half - sling.half_width, 0.0, 0.0)
+    start = straight_guess(sling, stretch * half)
+    motion = move(bench, sling, theta, settling(HELD, target), start, gravity=0.0)
+    measured = np.where(motion.failed, np.nan, -motion.force[:, -1, 0])
+    return measured, np.array([float(String.of(sling, one).force(stretch)) for one in theta])
+
+
+def drawn_pull(bench: Bench, depth: float, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Measured and closed-form hold force (N,) of a weightless band drawn at the fork."""
+    sling = replace(band_of(bench), mass=1e-4, projectile_mass=1e-6)
+    half = np.hypot(depth, sling.half_width)
+    stretch = 2 * half / sling.rest_length
+    done = launch(sling, theta, [-depth, 0.0], device=bench.device, workers=bench.workers)
+    strings = [String.of(sling, one) for one in theta]
+    expected = [2 * float(one.force(stretch)) * depth / half for one in strings]
+    return done.hold_force, np.array(expected)
+
+
+def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> list[Check]:
+    """Pull forces in single precision, the default."""
+    theta = thetas() if theta is None else theta
+    against = "closed form in uniaxial stress, P = μ (λ − J/λ²)"
+    checks = [
+        Check(
+            f"pull of a straight string at stretch {stretch:g}, worst of E and ν",
+            against,
+            off(*straight_pull(bench, stretch, theta, STRING)),
+            "%",
+            PULL_LIMIT,
+            f"a string {STRING} times thinner than the band; {len(theta)} pairs,"
+            " E 0.03–10 MPa, ν 0.30–0.49, single precision",
+        )
+        for stretch in stretches
+    ]
+    checks.append(
+        Check(
+            f"pull of the band itself at stretch {stretches[0]:g}, worst of E and ν",
+            against,
+            off(*straight_pull(bench, stretches[0], theta)),
+            "%",
+            None,
+            "of its full thickness; clamp and fingers keep their sections from thinning, which"
+            " stiffens it: no string",
+        )
+    )
+    width, length = band_of(bench).half_width, band_of(bench).rest_length
+    for stretch in DRAWN:
+        depth = np.sqrt((stretch * length / 2) ** 2 - width**2)
+        checks.append(
+            Check(
+                f"hold force of a draw of {depth:.2f} m (stretch {stretch:g}), worst of E and ν",
+                f"two straight strings, {against}",
+                off(*drawn_pull(bench, depth, theta)),
+                "%",
+                PULL_LIMIT if stretch > SOFT else None,
+                "as `launch` gives it, single precision; bending at tips and pouch"
+                + (" hardly counts" if stretch > SOFT else " counts, and is no string's"),
+            )
+        )
+    return checks
+
+
+def _beam(
+    bench: Bench, poisson: float, clamped: tuple[bool, bool], double: bool, times: int = 1
+) -> float:
+    """Deflection over Euler-Bernoulli's, of a band so light that it stays nearly straight.
+
+    Args:
+        times: How many times as many edges as by default.
+    """
+    sling = with_edges(band_of(bench), times)
+    young = BEAM_YOUNG
+    sling = straight(sling, sling.rest_length, clamped=clamped, mass=sling.mass / 200)
+    layers = rest(
+        bench, sling, [young, poisson, 2e-3, 0.5, 1.0], straight_guess(sling), double=double
+    )
+    load = sling.mass * GRAVITY / sling.rest_length
+    rigidity = young * np.pi * sling.radius**4 / 4
+    both = all(clamped)
+    closed = clamped_beam if both else cantilever
+    node = sling.middle if both else -1
+    return -layers[node, 2] / closed(load, sling.rest_length, rigidity)
+
+
+def beams(bench: Bench, poissons=BEAM_POISSON, double: bool = True) -> list[Check]:
+    """Deflections on the default mesh, and on one of twice as many edges for comparison."""
+    edges, checks = band_of(bench).edges, []
+    for name, clamped, formula in (
+        ("cantilever", (True, False), "q L⁴ / 8 E I"),
+        ("beam clamped at both ends", (True, True), "q L⁴ / 384 E I"),
+    ):
+        for poisson in poissons:
+            ratio, finer = (_beam(bench, poisson, clamped, double, times) for times in (1, 2))
+            note = f"E {BEAM_YOUNG / 1e6:g} MPa, {'double' if double else 'single'} precision"
+            both = (
+                (f"deflection of a {name}, ν {poisson:.2f}", ratio, BEAM_LIMIT, edges),
+                (
+                    f"deflection of a {name} on {2 * edges} edges, ν {poisson:.2f}",
+                    finer,
+                    None,
+                    2 * edges,
+                ),
+            )
+            checks += [
+                Check(
+                    title,
+                    f"Euler–Bernoulli, {formula}",
+                    off(one, 1.0),
+                    "%",
+                    limit,
+                    f"{one:.4f} of it on {count} edges, {note}"
+                    + (MESH if all(clamped) and limit else ""),
+                )
+                for title, one, limit, count in both
+            ]
+    return checks
+
+
+def torque_ratio(bench: Bench, angle: float, poisson: float) -> float:
+    """Torque on the last clamp over G J angle / L, from the energy of the band at rest."""
+    sling = band_of(bench)
+    sling = straight(sling, sling.rest_length, clamp_twist=angle)
+    theta = (1e6, poisson, 2e-3, 0.5, 1.0)
+    layers = rest(bench, sling, theta, straight_guess(sling), gravity=0.0, **TIGHT)
+    step = 1e-5
+    sides = [
+        Twin(replace(sling, clamp_twist=angle + turn), theta).elastic(layers)
+        for turn in (step, -step)
+    ]
+    shear = theta[0] / (2 * (1 + poisson))
+    expected = shear * np.pi * sling.radius**4 / 2 * angle / sling.rest_length
+    return (sides[0] - sides[1]) / (2 * step) / expected
+
+
+def torsion(bench: Bench, poissons=BEAM_POISSON) -> list[Check]:
+    against = "torsion of a cylinder, G J θ / L"
+    checks = []
+    for poisson in poissons:
+        ratio = torque_ratio(bench, 0.1, poisson)
+        note = f"{ratio:.4f} of it"
+        checks.append(
+            Check(
+                f"torque at a twist of 0.1 rad, ν {poisson:.2f}",
+                against,
+                off(ratio, 1.0),
+                "%",
+                TORSION_LIMIT,
+                note,
+            )
+        )
+    ratio = torque_ratio(bench, np.pi, 0.45)
+    checks.append(
+        Check(
+            "torque at half a turn, ν 0.45",
+            against,
+            off(ratio, 1.0),
+            "%",
+            None,
+            f"{ratio:.4f} of it; the small-twist form need not hold there",
+        )
+    )
+    return checks
+
+
+def curves(bench: Bench, stretch: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Measured and closed-form pull over E A at stretches (S,), by pair of E and nu."""
+    pairs = thetas((3e4, 1e7), (0.30, 0.49))
+    pulls = np.array([straight_pull(bench, one, pairs, STRING) for one in stretch])
+    thin = band_of(bench).area / STRING**2
+    return {
+        f"E {theta[0] / 1e6:g} MPa, ν {theta[1]:.2f}": tuple(pulls[:, :, k].T / theta[0] / thin)
+        for k, theta in enumerate(pairs)
+    }
+
+
+def section(bench: Bench) -> Section:
+    pictures = {}
+    if bench.figures:
+        stretch = np.linspace(1.1, 2.2, 12)
+        figures.pull(bench.figures / "pull.png", stretch, curves(bench, stretch))
+        pictures["pull.png"] = (
+            f"Pull of a straight string, {STRING} times thinner than the band, over its stretch, in"
+            " single precision: simulator (dots) and closed form (lines), and their difference."
+        )
+    return Section(
+        "At rest",
+        [*pull(bench), *beams(bench), *torsion(bench)],
+        "A straight band, drawn, loaded by its weight, or twisted at a clamp, after it has come to"
+        f" rest. The string is a band {STRING} times thinner: the sections that clamp and fingers"
+        " hold hardly count there. Beams are light enough to stay nearly straight.",
+        pictures,
+    )

@@ -19,7 +19,7 @@ from pipeline.base.errors import run
 from pipeline.params import load
 from pipeline.recording.build import process
 from pipeline.recording.input import images
-from pipeline.report.theme import COLORS, INK, STYLE
+from pipeline.report.styles import COLORS, INK, THEME
 from pipeline.rig.physics.rubber import nominal_stress
 
 ROOT = Path(__file__).parents[1]
@@ -29,7 +29,7 @@ SMOOTHED = 0.1  # s before the release, where the filtered force falls already
 
 
 def main() -> None:
-    plt.rcParams.update(STYLE)
+    plt.rcParams.update(THEME)
     FOLDER.mkdir(exist_ok=True)
     if TRELOAR.is_file():
         treloar()

@@ -52,13 +52,13 @@ def _theta(root: Path, band: str, method: str) -> Iterator[str]:
     from pipeline.params import load
     from pipeline.report.figures import search
     from pipeline.report.losses import has_another_loss
-    from pipeline.report.styles import looks
+    from pipeline.report.styles import styles
     from pipeline.report.tables import parameters
     from pipeline.report.tables.benchmark import PAPER
     from pipeline.report.tables.cells import markdown
     from pipeline.sling.theta import load_theta
 
-    params, named = load(root / "params.yaml"), looks([method])
+    params, named = load(root / "params.yaml"), styles([method])
     theta = load_theta(_file(root, "theta", band, f"{method}.json"), band)
     steps = [
         pd.read_parquet(_file(root, step, band, f"{method}.parquet"))
@@ -86,12 +86,12 @@ def _policy(root: Path, band: str, method: str) -> Iterator[str]:
     from pipeline.landing.stored import ROBUST, Stored
     from pipeline.params import load
     from pipeline.report.figures import policy
-    from pipeline.report.styles import looks
+    from pipeline.report.styles import styles
     from pipeline.report.tables.cells import markdown
     from pipeline.report.tables.policies import policies
 
     stored = Stored(load(root / "params.yaml").run, band, method, root)
-    named = looks([method])
+    named = styles([method])
     result = SimpleNamespace(
         band=band,
         method=method,
@@ -107,13 +107,13 @@ def _trials(root: Path, band: str, method: str) -> Iterator[str]:
     import pandas as pd
 
     from pipeline.report.figures import policy
-    from pipeline.report.styles import looks
+    from pipeline.report.styles import styles
     from pipeline.report.tables.cells import markdown
     from pipeline.report.tables.landings import predictions
 
     trials, named = (
         pd.read_parquet(_file(root, "trials", band, f"{method}.parquet")),
-        looks([method]),
+        styles([method]),
     )
     if trials.landing_y.notna().any():
         yield _drawn("landings", lambda path: policy.landings(path, trials, named, [method]))

@@ -97,10 +97,10 @@ def draw_picture(trajectory: Trajectory, path: Path) -> None:
     from matplotlib.figure import Figure
     from matplotlib.style import context
 
-    from pipeline.report.theme import COLORS, INK, STYLE
+    from pipeline.report.styles import COLORS, INK, THEME
 
     time = np.linspace(0, trajectory.duration, 1000)
-    with context(STYLE):
+    with context(THEME):
         figure = Figure(figsize=(7.0, 5.5))
         axes = figure.subplots(3, sharex=True)
         for axis, name, color in zip((1, 2), "yz", COLORS, strict=False):

@@ -17,7 +17,7 @@ from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.masks import masker
 from pipeline.recording.view import Frame, Scene
-from pipeline.report.theme import COLORS, INK, STYLE
+from pipeline.report.styles import COLORS, INK, THEME
 
 MOMENTS = ("hanging", "grasp", "lift", "mid pull", "held", "recoil")
 SIZE, DPI = (16.0, 12.0), 100  # inches, dots an inch
@@ -52,7 +52,7 @@ def draw_sheet(look: Look, params: object, path: Path) -> str:
     expect_writable(path, ".png")
     if look.recording is None:
         return f"{path} was not drawn: nothing in the recording can be shown"
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         figure = plt.figure(figsize=SIZE if look.done else (16, 6.5), dpi=DPI)
         if look.done:
             _whole(figure, look, params)

@@ -12,7 +12,7 @@ from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.params import Params
 from pipeline.report.replay import Replay, replay
 from pipeline.report.results import Result, Results, gather
-from pipeline.report.styles import SIDE_BY_SIDE, Look, drawn, looks
+from pipeline.report.styles import SIDE_BY_SIDE, Styles, drawn, styles
 
 
 @dataclass(frozen=True)
@@ -21,21 +21,21 @@ class Report:
 
     Attributes:
         replays: By band and method; of the methods that are drawn, of all where data are held out.
-        looks: By method.
+        styles: By method.
         root: Of the project, with data/ and reports/.
     """
 
     params: Params
     results: Results
     replays: dict[str, dict[str, Replay]]
-    looks: dict[str, Look]
+    styles: Styles
     root: Path
 
     @classmethod
     def of(cls, params: Params, root: Path) -> Report:
         """Of everything in params.run. Raises UserError where an input is missing."""
         results = gather(params, root)
-        named = looks(dict.fromkeys(result.method for result in results))
+        named = styles(dict.fromkeys(result.method for result in results))
         replays = {band: _replays(params, results, band) for band in params.run.bands}
         return cls(params, results, replays, named, root)
 

@@ -1,10 +1,25 @@
-"""How a method is named and coloured, in every table and every picture alike."""
+"""How a method is named and coloured in every table and picture, and how all pictures look."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import matplotlib
+
+matplotlib.use("Agg")  # drawn without a screen
+
+COLORS = ("#d1495b", "#00798c", "#edae49", "#66a182", "#8d6a9f", "#2e4057", "#f17300", "#5b8e7d")
+INK = "#222222"  # of what others are held against
+THEME = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "legend.frameon": False,
+    "figure.constrained_layout.use": True,
+}
 # Red is ours, teal the paper's, blue to violet its ablations, yellow to brown other optimisers,
 # green the geometry-only baselines. Names are the paper's where the methods are.
 KNOWN = {
@@ -27,21 +42,24 @@ FEW, SIDE_BY_SIDE = 2, 4
 
 
 @dataclass(frozen=True)
-class Look:
+class Style:
     """A method's name for readers, and its colour."""
 
     name: str
     color: str
 
 
-def looks(methods: Iterable[str]) -> dict[str, Look]:
-    """A look for each method; one that the paper and we do not have keeps its own name."""
+Styles = dict[str, Style]  # by method
+
+
+def styles(methods: Iterable[str]) -> Styles:
+    """A style for each method; one that the paper and we do not have keeps its own name."""
     methods = list(methods)
     others = [method for method in methods if method not in KNOWN]
     return {
-        method: Look(*KNOWN[method])
+        method: Style(*KNOWN[method])
         if method in KNOWN
-        else Look(method, SPARE[others.index(method) % len(SPARE)])
+        else Style(method, SPARE[others.index(method) % len(SPARE)])
         for method in methods
     }
 

@@ -7,25 +7,27 @@ from hypothesis import strategies as st
 
 from pipeline.params import load
 from pipeline.report import paper
-from pipeline.report.styles import FEW, KNOWN, SIDE_BY_SIDE, drawn, looks
+from pipeline.report.styles import FEW, KNOWN, SIDE_BY_SIDE, drawn, styles
 
 METHODS = st.lists(st.sampled_from([*KNOWN, "mine", "yours", "theirs"]), unique=True, min_size=1)
 
 
 def test_every_method_of_the_project_has_its_own_name_and_colour() -> None:
-    named = looks(load().methods).values()
-    assert len({look.name for look in named}) == len({look.color for look in named}) == len(named)
+    named = styles(load().methods).values()
+    assert (
+        len({style.name for style in named}) == len({style.color for style in named}) == len(named)
+    )
     assert set(KNOWN) == set(load().methods)
     assert set(paper.METHODS) <= set(KNOWN)
 
 
 @given(METHODS)
 def test_a_method_looks_the_same_in_every_company(methods: list[str]) -> None:
-    named = looks(methods)
+    named = styles(methods)
     assert list(named) == methods
-    assert len({look.color for look in named.values()}) == len(methods)
+    assert len({style.color for style in named.values()}) == len(methods)
     for method in set(methods) & set(KNOWN):
-        assert named[method] == looks([method])[method]
+        assert named[method] == styles([method])[method]
     others = [method for method in methods if method not in KNOWN]
     assert all(named[method].name == method for method in others)
 

@@ -7,16 +7,16 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from pipeline.report.chapters.summary import summary
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from tests.report.tables.toy_results import floor, launches, result, results
 
-NAMED = looks(["sling2sim2real", "package_si", "real2sim2real", "de"])
+NAMED = styles(["sling2sim2real", "package_si", "real2sim2real", "de"])
 CLOSE = launches([[0.03, -0.01]] * 3)
 
 
 def said(*some, floors=None, unused=None) -> list[str]:
     ran = replace(results(*some, floors=floors), unused=unused or {})
-    text = summary(SimpleNamespace(results=ran, looks=NAMED))
+    text = summary(SimpleNamespace(results=ran, styles=NAMED))
     return [line for line in text.splitlines() if line.startswith("- ")]
 
 

@@ -22,7 +22,7 @@ from pipeline.oracle.aim import hit, least_sensitive_draw
 from pipeline.oracle.floor import errors_of, trial_seeds
 from pipeline.oracle.world import World
 from pipeline.params import load
-from pipeline.report.theme import COLORS, INK, STYLE
+from pipeline.report.styles import COLORS, INK, THEME
 from pipeline.sling.model import THETA
 from pipeline.sling.theta import load_theta
 from tests.project import ROOT
@@ -178,7 +178,7 @@ def band_figures(params, root: Path, band: str, methods, progress) -> dict:
 def draw_figure(figures: dict, path: Path) -> None:
     """Errors with one thing perfect beside the floor, and what each landing's bias is made of."""
     kinds = (AS_IT_IS, THETA_, AIMED, HIT)
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         size = 3.6 * len(figures), 5.6
         figure, axes = plt.subplots(2, len(figures), figsize=size, squeeze=False)
         for (band, one), (above, below) in zip(figures.items(), axes.T, strict=True):

@@ -7,7 +7,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pipeline.report.theme import COLORS, INK, STYLE
+from pipeline.report.styles import COLORS, INK, THEME
 
 
 def _save(figure, path: Path) -> None:
@@ -21,7 +21,7 @@ def pull(path: Path, stretch: np.ndarray, curves: dict[str, tuple[np.ndarray, np
     Args:
         curves: Measured and closed-form pull over E A, shape (S,) each, by name.
     """
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.2))
         for number, (name, (measured, closed)) in enumerate(curves.items()):
             left.plot(stretch, closed, color=INK, lw=1, zorder=1)
@@ -45,7 +45,7 @@ def oscillation(path: Path, cases: dict[str, tuple[np.ndarray, np.ndarray, np.nd
     Args:
         cases: Time [s], simulated and closed-form displacement [m], shape (S,) each, by name.
     """
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         figure, axes = plt.subplots(1, len(cases), figsize=(9, 2.8), sharey=True)
         for number, (ax, (name, (time, place, closed))) in enumerate(
             zip(np.atleast_1d(axes), cases.items(), strict=True)
@@ -70,7 +70,7 @@ def balance(path: Path, done) -> None:
     """The energies of energy.Balance over time, and around the release."""
     entries = ("elastic", "kinetic", "gravity", "viscous", "pads", "integrator")
     names = {"viscous": "damping", "integrator": "steps"}
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         figure, axes = plt.subplots(1, 2, figsize=(9, 3.4), sharey=True, width_ratios=(1, 1.4))
         work = done.hand + done.turning
         lost = 1e3 * (done.time - done.release)

@@ -24,7 +24,7 @@ criterion in full). Training reads landings off maps of simulated launches; thei
 the range of targets, comes next. *Expected*: the mean error over samples of the posterior and
 errors of the draw, of a robust policy and of the plain one beside it.
 
-{markdown(tables.policies(report.results, report.looks))}"""
+{markdown(tables.policies(report.results, report.styles))}"""
 
 
 def budget(report: Report) -> str:

@@ -13,7 +13,7 @@ from pipeline.report.figures import confidence, episode, policy, search
 from pipeline.report.losses import has_another_loss
 from pipeline.report.report import Report
 from pipeline.report.results import Result
-from pipeline.report.styles import Look, drawn
+from pipeline.report.styles import Styles, drawn
 from pipeline.report.tables import identified, landings, policies
 from pipeline.report.tables.cells import markdown
 
@@ -41,19 +41,19 @@ class Band:
     name: str
     methods: dict[str, Result]
     near: dict[str, Result]
-    looks: dict[str, Look]
+    styles: Styles
 
     @classmethod
     def of(cls, report: Report, name: str) -> Band:
         methods = report.results.methods[name]
         near = {method: methods[method] for method in drawn(methods)}
         return cls(
-            report, name, methods, near, {method: report.looks[method] for method in methods}
+            report, name, methods, near, {method: report.styles[method] for method in methods}
         )
 
     @property
     def near_names(self) -> str:
-        return " and ".join(self.looks[method].name for method in self.near)
+        return " and ".join(self.styles[method].name for method in self.near)
 
     def picture(self, name: str, alt: str, draw: Callable[[Path], None]) -> str:
         return self.report.picture(f"{self.name}-{name}", alt, draw)
@@ -80,7 +80,7 @@ def _predictions(band: Band) -> list[str]:
     text, trials = [], band.report.results.trials
     trials = trials[trials.band == band.name]
     for kind, words in PREDICTED.items():
-        table = landings.prediction_summary(band.report.results, band.name, kind, band.looks)
+        table = landings.prediction_summary(band.report.results, band.name, kind, band.styles)
         if table:
             text.append(f"### Predicted and {kind} landings\n\n{words} {ERRORS}\n")
             text.append(markdown(table))
@@ -88,7 +88,7 @@ def _predictions(band: Band) -> list[str]:
         shown = band.picture(
             "landings",
             "predicted and actual landings",
-            lambda path: policy.landings(path, trials, band.looks, list(band.near)),
+            lambda path: policy.landings(path, trials, band.styles, list(band.near)),
         )
         text.append(f"Left: {band.near_names}. Right: every method, a dot a launch.\n\n{shown}")
     for method, result in band.near.items():
@@ -96,7 +96,7 @@ def _predictions(band: Band) -> list[str]:
             launches = result.trials[result.trials.kind == kind]
             if not launches.empty:
                 table = markdown(landings.predictions(launches))
-                text.append(f"{band.looks[method].name}, {title}:\n\n{table}")
+                text.append(f"{band.styles[method].name}, {title}:\n\n{table}")
                 if kind == "predicted":
                     text.append(
                         "No landing of this policy has been measured. Launch from these draws and"
@@ -107,20 +107,20 @@ def _predictions(band: Band) -> list[str]:
 
 
 def _recording(band: Band) -> list[str]:
-    report, looks = band.report, band.looks
+    report, styles = band.report, band.styles
     recorded, replays = report.results.episodes[band.name], report.replays[band.name]
     shown = {method: replays[method] for method in band.near}
     frames, diameter = episode.moments(recorded), report.params.bands[band.name].diameter
     force = band.picture(
-        "force", "force over time", lambda path: episode.force(path, recorded, shown, looks)
+        "force", "force over time", lambda path: episode.force(path, recorded, shown, styles)
     )
     work = band.picture(
-        "work", "work over time", lambda path: episode.work(path, recorded, shown, looks)
+        "work", "work over time", lambda path: episode.work(path, recorded, shown, styles)
     )
     clouds = band.picture(
         "clouds",
         "point clouds",
-        lambda path: episode.clouds(path, recorded, shown, looks, frames, diameter),
+        lambda path: episode.clouds(path, recorded, shown, styles, frames, diameter),
     )
     text = [
         "### Recording and calibrated simulation\n\n"
@@ -138,18 +138,18 @@ def _recording(band: Band) -> list[str]:
             " pull: mean force error, and mean distance of the clouds. Blocks lie at moments of"
             " their own, harder or easier than the rest, so a ratio says less than methods beside"
             " each other: one that over-fits has the less fitted and the greater held-out"
-            f" residual.\n\n{markdown(identified.held_out(replays, looks))}"
+            f" residual.\n\n{markdown(identified.held_out(replays, styles))}"
         )
     return text
 
 
 def _search(band: Band) -> list[str]:
-    params, looks = band.report.params, band.looks
+    params, styles = band.report.params, band.styles
     own = {m for m in band.methods if has_another_loss(dict(params.methods[m].weights))}
     convergence = band.picture(
         "convergence",
         "convergence",
-        lambda path: search.convergence(path, band.methods, looks, own),
+        lambda path: search.convergence(path, band.methods, styles, own),
     )
     text = [
         "### Search\n\n"
@@ -159,7 +159,7 @@ def _search(band: Band) -> list[str]:
         " one parameter.\n",
     ]
     for method, result in band.near.items():
-        name = looks[method].name
+        name = styles[method].name
 
         def draw(path: Path, result=result, name=name) -> None:
             search.corner(path, result, params.parameters, name)
@@ -173,16 +173,16 @@ def _confidence(band: Band) -> list[str]:
     trusted = {method: result for method, result in band.near.items() if result.confidence}
     if not trusted:
         return []
-    boxes, looks = band.report.params.parameters, band.looks
+    boxes, styles = band.report.params.parameters, band.styles
     profiles = band.picture(
         "profiles",
         "profile curves",
-        lambda path: confidence.profiles(path, trusted, looks, boxes),
+        lambda path: confidence.profiles(path, trusted, styles, boxes),
     )
     correlation = band.picture(
         "correlation",
         "correlation of the parameters",
-        lambda path: confidence.correlation(path, trusted, looks),
+        lambda path: confidence.correlation(path, trusted, styles),
     )
     return [
         "### Confidence\n\n"
@@ -193,14 +193,14 @@ def _confidence(band: Band) -> list[str]:
 
 
 def _policy(band: Band) -> list[str]:
-    report, looks = band.report, band.looks
+    report, styles = band.report, band.styles
     targets, aims = np.array(report.params.trials.targets), {}
     for method, result in band.near.items():
         for kind, draws in report.draws(result, targets).items():
-            name = looks[method].name + (", robust" if kind == ROBUST else "")
+            name = styles[method].name + (", robust" if kind == ROBUST else "")
             aims[name] = result.landing_map, draws
     training = band.picture(
-        "training", "training", lambda path: policy.training(path, band.methods, looks)
+        "training", "training", lambda path: policy.training(path, band.methods, styles)
     )
     return [
         f"### Policy\n\n{training}",
@@ -217,7 +217,7 @@ def _map(band: Band, result: Result, targets: np.ndarray) -> str:
     path_of = band.report.draws(result, np.linspace(*params.policy.targets, 101))
     return band.picture(
         f"{result.method}-map",
-        f"landing map of {band.looks[result.method].name}",
+        f"landing map of {band.styles[result.method].name}",
         lambda path: policy.landing_map(
             path,
             result,

@@ -11,24 +11,24 @@ from pipeline.report.report import Report, side_by_side
 
 
 def pictures(report: Report) -> str:
-    results, looks, setup = report.results, report.looks, report.params.setup
+    results, styles, setup = report.results, report.styles, report.params.setup
     methods = side_by_side(report.params)
     trajectories = report.picture(
         "trajectories",
         "flights of every band and method",
-        lambda path: launches.trajectories(path, results, methods, looks, setup.fork_height),
+        lambda path: launches.trajectories(path, results, methods, styles, setup.fork_height),
     )
     scatter = report.picture(
         "scatter",
         "landings on the target",
-        lambda path: launches.scatter(path, results, methods, looks),
+        lambda path: launches.scatter(path, results, methods, styles),
     )
     shown = {band: {m: of_band[m] for m in methods} for band, of_band in report.replays.items()}
     under_load = report.picture(
         "loaded",
         "bands under load",
         lambda path: loaded.loaded(
-            path, results.episodes, shown, looks, setup.fork_width, setup.fork_height
+            path, results.episodes, shown, styles, setup.fork_width, setup.fork_height
         ),
     )
     flights = "Flights of the projectile from the pouch to the floor, to scale"

@@ -6,7 +6,7 @@ import pandas as pd
 
 from pipeline.report.report import Report
 from pipeline.report.results import Result, Results
-from pipeline.report.styles import Look
+from pipeline.report.styles import Styles
 from pipeline.report.tables.benchmark import APART
 from pipeline.report.tables.landings import AIM, intervals, landing_errors, prediction_error
 
@@ -25,14 +25,14 @@ position (y, z) of the projectile, y < 0; a *target* g is a distance along y on 
 
 def summary(report: Report) -> str:
     """A line a band of the rig, one a method where launches were measured, and what went wrong."""
-    results, looks = report.results, report.looks
+    results, styles = report.results, report.styles
     lines = [INTRODUCTION, "## In short\n"]
-    lines += [line for band in results.methods for line in _virtual(results, band, looks)]
+    lines += [line for band in results.methods for line in _virtual(results, band, styles)]
     for one in results:
         said = measured(one.trials)
         if said:
-            lines.append(f"- **{_name(one, looks)}**: {'; '.join(said)}.")
-    lines += [f"- {line}" for one in results for line in _doubts(one, _name(one, looks))]
+            lines.append(f"- **{_name(one, styles)}**: {'; '.join(said)}.")
+    lines += [f"- {line}" for one in results for line in _doubts(one, _name(one, styles))]
     lines += [
         f"- {band}: {count} measured launches name a method that does not run on this band."
         for band, count in results.unused.items()
@@ -40,11 +40,11 @@ def summary(report: Report) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _name(result: Result, looks: dict[str, Look]) -> str:
-    return f"{result.band}, {looks[result.method].name}"
+def _name(result: Result, styles: Styles) -> str:
+    return f"{result.band}, {styles[result.method].name}"
 
 
-def _virtual(results: Results, band: str, looks: dict[str, Look]) -> list[str]:
+def _virtual(results: Results, band: str, styles: Styles) -> list[str]:
     """How far the methods miss, beside what errors of the launch alone would give.
 
     Ablations are left to their tables.
@@ -55,9 +55,9 @@ def _virtual(results: Results, band: str, looks: dict[str, Look]) -> list[str]:
         if method in APART or trials.empty:
             continue
         total = landing_errors(trials)["all"]
-        words = f"{looks[method].name} {100 * total['mean']:.1f} cm"
+        words = f"{styles[method].name} {100 * total['mean']:.1f} cm"
         if total["failed"] == total["launches"]:
-            words = f"{looks[method].name} N/A"
+            words = f"{styles[method].name} N/A"
         elif total["failed"]:
             words += f" ({total['failed']} of {total['launches']} launches failed)"
         elif floor:

@@ -10,15 +10,14 @@ from scipy.stats import chi2
 
 from pipeline.report.figures.canvas import PARAMETERS, few_ticks, save
 from pipeline.report.results import Result
-from pipeline.report.styles import Look
-from pipeline.report.theme import INK, STYLE
+from pipeline.report.styles import INK, THEME, Styles
 from pipeline.sling.model import THETA
 
 BINS = 14  # of a marginal, over the span that is shown
 TOP = 3.0  # of the misfit axis, in units of the misfit at the interval's ends
 
 
-def profiles(path: Path, results: dict[str, Result], looks: dict[str, Look], boxes) -> None:
+def profiles(path: Path, results: dict[str, Result], styles: Styles, boxes) -> None:
     """Least misfit with one parameter held at each value, and the posterior's marginals.
 
     Args:
@@ -27,7 +26,7 @@ def profiles(path: Path, results: dict[str, Result], looks: dict[str, Look], box
     """
     level = next(iter(results.values())).confidence["level"]
     reach = float(chi2.ppf(level, 1))
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         figure, axes = plt.subplots(2, 3, figsize=(9.6, 5.6), sharey=True)
         for ax, name in zip(axes.flat, THETA, strict=False):
             label, unit = PARAMETERS[name]
@@ -36,10 +35,10 @@ def profiles(path: Path, results: dict[str, Result], looks: dict[str, Look], box
                 ax.set_xscale("log")
             for number, (method, result) in enumerate(results.items()):
                 about = result.confidence["parameters"][name]
-                color, best = looks[method].color, unit * result.theta["theta"][name]
+                color, best = styles[method].color, unit * result.theta["theta"][name]
                 if about.get("fixed"):
                     ax.axvline(best, color=color, lw=1.2, ls=":")
-                    marks.append(f"{looks[method].name}: held fixed")
+                    marks.append(f"{styles[method].name}: held fixed")
                     continue
                 samples = unit * _column(result, name)
                 _marginal(ax, samples, color, reach, log=box.scale == "log")
@@ -48,7 +47,7 @@ def profiles(path: Path, results: dict[str, Result], looks: dict[str, Look], box
                 ax.plot(value, curve["misfit"], "o-", ms=2.5, color=color, lw=1.5)
                 _interval(ax, unit * about["low"], unit * about["high"], best, color, number, reach)
                 if not about["identifiable"]:
-                    marks.append(f"{looks[method].name}: not identifiable")
+                    marks.append(f"{styles[method].name}: not identifiable")
             if box.scale == "log":
                 few_ticks(ax.xaxis)
             else:  # the whole box, so that an interval that fills it is seen to
@@ -58,12 +57,12 @@ def profiles(path: Path, results: dict[str, Result], looks: dict[str, Look], box
             ax.set_xlabel(label)
             words = {"va": "top", "fontsize": 7.5, "zorder": 6}
             ax.text(0.03, 0.98, "\n".join(marks), transform=ax.transAxes, **words)
-        _product(axes[1, 2], results, looks, reach)
+        _product(axes[1, 2], results, styles, reach)
         axes[0, 0].set_ylim(0, TOP * reach)
         for ax in axes[:, 0]:
             ax.set_ylabel("misfit above its least")
-        handles = [plt.Line2D([], [], color=looks[method].color) for method in results]
-        names = [looks[method].name for method in results]
+        handles = [plt.Line2D([], [], color=styles[method].color) for method in results]
+        names = [styles[method].name for method in results]
         handles += [
             plt.Line2D([], [], color="0.5", ls="--", lw=0.8),
             plt.Line2D([], [], color="0.4", lw=3),
@@ -75,14 +74,14 @@ def profiles(path: Path, results: dict[str, Result], looks: dict[str, Look], box
         save(figure, path)
 
 
-def _product(ax: plt.Axes, results: dict[str, Result], looks, reach: float) -> None:
+def _product(ax: plt.Axes, results: dict[str, Result], styles, reach: float) -> None:
     """Marginal of s·d, the damping that a recording can see."""
     for number, (method, result) in enumerate(results.items()):
         about = result.confidence["derived"].get("damping_product")
         if about is None:
             continue
         samples = 1e3 * _column(result, "damping_scale") * _column(result, "elasticity_damping")
-        color = looks[method].color
+        color = styles[method].color
         _marginal(ax, samples, color, reach, log=False)
         theta = result.theta["theta"]
         low, high = 1e3 * about["low"], 1e3 * about["high"]
@@ -113,11 +112,11 @@ def _interval(ax, low: float, high: float, best: float, color: str, number: int,
     ax.plot(best, height, "o", ms=6, color=color, mec="w", mew=1)
 
 
-def correlation(path: Path, results: dict[str, Result], looks: dict[str, Look]) -> None:
+def correlation(path: Path, results: dict[str, Result], styles: Styles) -> None:
     """Correlations of the posterior, a matrix a method."""
     cells = max(len(one.confidence["correlation"]["names"]) for one in results.values())
     inches = max(3.4, 0.47 * cells)
-    with plt.rc_context({**STYLE, "axes.grid": False}):
+    with plt.rc_context({**THEME, "axes.grid": False}):
         size = (len(results) * (inches + 0.9) + 0.7, inches + 0.8)
         figure, axes = plt.subplots(1, len(results), figsize=size, squeeze=False)
         for ax, (method, result) in zip(axes.flat, results.items(), strict=True):
@@ -133,7 +132,7 @@ def correlation(path: Path, results: dict[str, Result], looks: dict[str, Look]) 
                 ax.text(column, row, text, ha="center", va="center", **ink)
             ax.set_xticks(range(len(names)), names, rotation=40, ha="right", rotation_mode="anchor")
             ax.set_yticks(range(len(names)), names)
-            ax.set_title(looks[method].name, fontsize=9, color=looks[method].color)
+            ax.set_title(styles[method].name, fontsize=9, color=styles[method].color)
             ax.tick_params(length=0)
             ax.spines[:].set_visible(False)
         figure.colorbar(image, ax=axes, label="correlation", shrink=0.8)

@@ -11,8 +11,7 @@ from pipeline.episode.episode import Episode
 from pipeline.episode.phases import phases, taut_frames
 from pipeline.report.figures.canvas import save
 from pipeline.report.replay import Replay
-from pipeline.report.styles import Look
-from pipeline.report.theme import INK, STYLE
+from pipeline.report.styles import INK, THEME, Styles
 
 DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)))  # so that curves that lie on each other are seen
 AROUND = (-0.25, 0.5)  # of the release, magnified [s]
@@ -20,10 +19,10 @@ MOVED = 0.005  # after the release, by which the band is seen to have left the h
 MOST_RECOIL = 3  # frames of the recoil that are shown
 
 
-def force(path: Path, episode: Episode, replays: dict[str, Replay], looks: dict[str, Look]) -> None:
+def force(path: Path, episode: Episode, replays: dict[str, Replay], styles: Styles) -> None:
     """Force over time, its residual, and the clouds' distance; the release magnified."""
     rows = ("force, y [N]", "force, z [N]", "|residual| [N]", "clouds off by [cm]")
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         figure, axes = plt.subplots(
             4, 2, figsize=(9.6, 7.4), width_ratios=(1.9, 1), height_ratios=(1.35, 1, 1, 1),
             sharex="col", sharey="row",
@@ -32,7 +31,7 @@ def force(path: Path, episode: Episode, replays: dict[str, Replay], looks: dict[
             for row, axis in ((0, 1), (1, 2)):
                 ax[row].plot(episode.time, episode.force[:, axis], color=INK, lw=2)
             for number, (method, replay) in enumerate(replays.items()):
-                style = {"color": looks[method].color, "lw": 1.3, "ls": DASHES[number % 3]}
+                style = {"color": styles[method].color, "lw": 1.3, "ls": DASHES[number % 3]}
                 ax[0].plot(episode.time, replay.force[:, 1], **style)
                 ax[1].plot(episode.time, replay.force[:, 2], **style)
                 residual = np.linalg.norm(episode.force - replay.force, axis=1)
@@ -50,25 +49,25 @@ def force(path: Path, episode: Episode, replays: dict[str, Replay], looks: dict[
         axes[3, 1].set_xlim(episode.release_time + AROUND[0], episode.release_time + AROUND[1])
         handles = [plt.Line2D([], [], color=INK, lw=2)]
         for number, method in enumerate(replays):
-            style = {"color": looks[method].color, "lw": 1.3, "ls": DASHES[number % 3]}
+            style = {"color": styles[method].color, "lw": 1.3, "ls": DASHES[number % 3]}
             handles.append(plt.Line2D([], [], **style))
-        names = ["measured", *(looks[method].name for method in replays)]
+        names = ["measured", *(styles[method].name for method in replays)]
         figure.legend(handles, names, loc="outside lower center", ncols=len(names))
         save(figure, path)
 
 
-def work(path: Path, episode: Episode, replays: dict[str, Replay], looks: dict[str, Look]) -> None:
+def work(path: Path, episode: Episode, replays: dict[str, Replay], styles: Styles) -> None:
     """Work of the band on the hand since the start, measured and simulated, and the difference."""
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 3.3), sharex=True)
         first = next(iter(replays.values()))
         left.plot(episode.time, first.measured_work, color=INK, lw=2, label="measured")
         for number, (method, replay) in enumerate(replays.items()):
-            style = {"color": looks[method].color, "lw": 1.3, "ls": DASHES[number % 3]}
-            left.plot(episode.time, replay.work, label=looks[method].name, **style)
+            style = {"color": styles[method].color, "lw": 1.3, "ls": DASHES[number % 3]}
+            left.plot(episode.time, replay.work, label=styles[method].name, **style)
             gap = replay.measured_work - replay.work
             right.plot(episode.time, gap, **style | {"ls": "-"})
-            ending = {"ha": "left", "va": "center", "fontsize": 8, "color": looks[method].color}
+            ending = {"ha": "left", "va": "center", "fontsize": 8, "color": styles[method].color}
             right.annotate(
                 _signed(gap[-1], ".3f") + " J", (1, gap[-1]), xycoords=("axes fraction", "data"),
                 xytext=(3, 0), textcoords="offset points", annotation_clip=False, **ending,
@@ -109,7 +108,7 @@ def clouds(
     path: Path,
     episode: Episode,
     replays: dict[str, Replay],
-    looks: dict[str, Look],
+    styles: Styles,
     frames: dict[str, int],
     diameter: float,
 ) -> None:
@@ -121,7 +120,7 @@ def clouds(
     high = np.max([points.max(0) for points in seen], axis=0) + 0.02
     wide, tall = high[0] - low[0], [high[up] - low[up] for _, up in views]
     inches = (11.0 - 1.2) / len(frames) / wide  # a metre
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         figure, axes = plt.subplots(
             2, len(frames), figsize=(11, inches * sum(tall) + 1.6), sharex=True, sharey="row",
             height_ratios=tall, squeeze=False,
@@ -133,7 +132,7 @@ def clouds(
             for ax, (_, up) in zip(axes[:, column], views, strict=True):
                 ax.plot(points[:, 0], points[:, up], ".", ms=1.5, color=INK, zorder=2.5)
                 for method, replay in replays.items():
-                    line, color = replay.center_line[frame][:, [0, up]].T, looks[method].color
+                    line, color = replay.center_line[frame][:, [0, up]].T, styles[method].color
                     ax.plot(*line, color=color, lw=1, zorder=3)
                     ax.plot(*line, color=color, alpha=0.25, zorder=2, gid="tube")
                 ax.set_aspect("equal")
@@ -141,15 +140,15 @@ def clouds(
                 axes[0, column].text(
                     0.98, 0.02 + 0.05 * number, f"{100 * replay.distance[frame]:.2f} cm",
                     transform=axes[0, column].transAxes, ha="right", fontsize=8,
-                    color=looks[method].color,
+                    color=styles[method].color,
                 )  # fmt: skip
             axes[1, column].set_xlabel("x [m]")
         for row, (view, up) in zip(axes, views, strict=True):
             row[0].set(xlim=(low[0], high[0]), ylim=(low[up], high[up]))
             row[0].set_ylabel(f"{'xyz'[up]} [m], {view}")
         dots = [plt.Line2D([], [], ls="", marker=".", color=INK)]
-        lines = [plt.Line2D([], [], color=looks[method].color) for method in replays]
-        names = ["measured points", *(looks[method].name for method in replays)]
+        lines = [plt.Line2D([], [], color=styles[method].color) for method in replays]
+        names = ["measured points", *(styles[method].name for method in replays)]
         figure.legend(dots + lines, names, loc="outside lower center", ncols=4)
         figure.draw_without_rendering()  # the layout decides how many points a metre takes
         for ax in axes.flat:

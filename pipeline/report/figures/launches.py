@@ -14,8 +14,7 @@ from pipeline.params import TARGET_AREA
 from pipeline.report.figures.canvas import save
 from pipeline.report.noise import landed
 from pipeline.report.results import Results
-from pipeline.report.styles import SIDE_BY_SIDE, Look
-from pipeline.report.theme import INK, STYLE
+from pipeline.report.styles import INK, SIDE_BY_SIDE, THEME, Styles
 from pipeline.sling.model import GRAVITY
 
 BEHIND, BEYOND = -0.45, 0.35  # how far a picture reaches behind the fork, and past the target [m]
@@ -35,7 +34,7 @@ def flight(y: float, z: float, speed: float, angle: float, floor: float) -> np.n
 
 
 def trajectories(
-    path: Path, results: Results, methods: list[str], looks: dict[str, Look], fork_height: float
+    path: Path, results: Results, methods: list[str], styles: Styles, fork_height: float
 ) -> None:
     """Flights from the pouch to the floor, a panel a band and method, to scale.
 
@@ -54,7 +53,7 @@ def trajectories(
     low, high = -fork_height - 0.13, max(0.1, float(highest) + 0.05)
     wide = min(14.0 / columns, 5.6)
     tall = wide * (high - low) / (view[1] - view[0])
-    with plt.rc_context({**STYLE, "axes.grid": False, "axes.spines.bottom": False}):
+    with plt.rc_context({**THEME, "axes.grid": False, "axes.spines.bottom": False}):
         figure, axes = plt.subplots(
             rows, columns, figsize=(columns * wide, rows * (tall + 0.35) + 0.9),
             sharex=True, sharey=True, squeeze=False,
@@ -62,10 +61,10 @@ def trajectories(
         for ax in axes.flat[len(panels) :]:
             ax.remove()
         for number, (ax, (band, method)) in enumerate(zip(axes.flat, panels, strict=False)):
-            rows_of, look = trials[band, method], looks[method]
-            _scenery(ax, fork_height, sorted(set(rows_of.target)), look.color)
-            _flights(ax, rows_of, predicted[band, method], look.color, fork_height)
-            ax.set_title(f"{band}, {look.name}", fontsize=9, color=look.color)
+            rows_of, style = trials[band, method], styles[method]
+            _scenery(ax, fork_height, sorted(set(rows_of.target)), style.color)
+            _flights(ax, rows_of, predicted[band, method], style.color, fork_height)
+            ax.set_title(f"{band}, {style.name}", fontsize=9, color=style.color)
             ax.set(xlim=view, ylim=(low, high), aspect="equal")
             if number % columns == 0:
                 ax.set_ylabel("z [m]")
@@ -165,7 +164,7 @@ def _key(figure: plt.Figure, kinds: list[str]) -> None:
     )
 
 
-def scatter(path: Path, results: Results, methods: list[str], looks: dict[str, Look]) -> None:
+def scatter(path: Path, results: Results, methods: list[str], styles: Styles) -> None:
     """Landings on the target, seen from above, a panel a band and a strip a method.
 
     Launches go in the plane of the band: nothing is known across it, and nothing is shown.
@@ -174,12 +173,12 @@ def scatter(path: Path, results: Results, methods: list[str], looks: dict[str, L
         methods: Those that ran on every band and are drawn.
     """
     near, far = TARGET_AREA
-    strips_of = {band: _strips(results, band, methods, looks) for band in results.methods}
+    strips_of = {band: _strips(results, band, methods, styles) for band in results.methods}
     launched = [trials for strips in strips_of.values() for *_, trials in strips]
     kinds = sorted({kind for trials in launched for kind in trials.kind[landed(trials)]})
     more = 0.04 * max([0, *(len(_failed(trials)) - 1 for trials in launched)])  # for words [m]
     inches = min(4.5 * len(strips_of) + 0.6, 13.5), 5.6 + 6 * more
-    with plt.rc_context({**STYLE, "axes.grid": False}):
+    with plt.rc_context({**THEME, "axes.grid": False}):
         figure, axes = plt.subplots(1, len(strips_of), figsize=inches, sharey=True, squeeze=False)
         for ax, (band, strips) in zip(axes.flat, strips_of.items(), strict=True):
             width = (far - near) / max(len(strips), 1)
@@ -202,15 +201,15 @@ def scatter(path: Path, results: Results, methods: list[str], looks: dict[str, L
         save(figure, path)
 
 
-def _strips(results: Results, band: str, methods: list[str], looks: dict[str, Look]) -> list:
+def _strips(results: Results, band: str, methods: list[str], styles: Styles) -> list:
     """Name, colour and launches of each strip; a robust policy has one of its own."""
     strips = []
     for method in methods:
-        result, look = results.methods[band][method], looks[method]
-        strips.append((look.name, look.color, _with_target(result.trials)))
+        result, style = results.methods[band][method], styles[method]
+        strips.append((style.name, style.color, _with_target(result.trials)))
         if len(result.robust_trials):
             robust = _with_target(result.robust_trials)
-            strips.append((f"{look.name}, robust", look.color, robust))
+            strips.append((f"{style.name}, robust", style.color, robust))
     return strips
 
 

@@ -11,8 +11,7 @@ from pipeline.episode.episode import Episode
 from pipeline.report.figures.canvas import save
 from pipeline.report.figures.episode import DASHES
 from pipeline.report.replay import LOAD, Replay
-from pipeline.report.styles import Look
-from pipeline.report.theme import INK, STYLE
+from pipeline.report.styles import INK, THEME, Styles
 
 SLACK, MARGIN = 0.05, 0.04  # of the peak force, below which the band is slack; of its draw [m]
 
@@ -21,7 +20,7 @@ def loaded(
     path: Path,
     episodes: dict[str, Episode],
     replays: dict[str, dict[str, Replay]],
-    looks: dict[str, Look],
+    styles: Styles,
     fork_width: float,
     fork_height: float,
 ) -> None:
@@ -35,26 +34,26 @@ def loaded(
     low, half = min(deepest, -fork_height) - 0.05, fork_width / 2 + 0.06
     columns = len(replays)
     wide = min(4.2, 13.0 / columns)
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         figure, axes = plt.subplots(
             2, columns, figsize=(columns * wide, 8.2), height_ratios=(1.25, 1), squeeze=False,
             sharey="row",
         )  # fmt: skip
         for (top, bottom), (band, of_band) in zip(axes.T, replays.items(), strict=True):
-            _hanging(top, of_band, looks, fork_width, fork_height)
+            _hanging(top, of_band, styles, fork_width, fork_height)
             top.set(xlim=(-half - 0.16, half + 0.16), ylim=(low, 0.03), aspect="equal")
             top.set_title(band, fontsize=10)
             top.set_xlabel("x [m]")
-            _drawn(bottom, episodes[band], of_band, looks)
+            _drawn(bottom, episodes[band], of_band, styles)
             bottom.set_xlabel("draw: the hand's distance from the fork [m]")
         axes[0, 0].set_ylabel(f"z [m], {LOAD:g} kg at the middle (simulated)")
         axes[1, 0].set_ylabel("force of the recorded pull [N]")
         methods = list(dict.fromkeys(method for of_band in replays.values() for method in of_band))
         handles = [plt.Line2D([], [], color=INK, lw=2)]
         handles += [
-            plt.Line2D([], [], color=looks[m].color, **_style(n)) for n, m in enumerate(methods)
+            plt.Line2D([], [], color=styles[m].color, **_style(n)) for n, m in enumerate(methods)
         ]
-        names = ["measured (the pull alone)", *(looks[method].name for method in methods)]
+        names = ["measured (the pull alone)", *(styles[method].name for method in methods)]
         figure.legend(handles, names, loc="outside lower center", ncols=3)
         save(figure, path)
 
@@ -63,12 +62,12 @@ def _style(number: int) -> dict:
     return {"lw": 1.5, "ls": DASHES[number % len(DASHES)]}
 
 
-def _hanging(ax, replays: dict[str, Replay], looks, fork_width: float, fork_height: float) -> None:
+def _hanging(ax, replays: dict[str, Replay], styles, fork_width: float, fork_height: float) -> None:
     for side in (-1, 1):
         ax.plot([side * fork_width / 2] * 2, [0, -fork_height], color="0.6", lw=3, zorder=1)
     said = []
     for number, (method, replay) in enumerate(replays.items()):
-        color, shape = looks[method].color, replay.loaded
+        color, shape = styles[method].color, replay.loaded
         depth = -shape[len(shape) // 2, 2]
         if np.isfinite(depth):
             ax.plot(shape[:, 0], shape[:, 2], color=color, **_style(number), zorder=3)
@@ -79,7 +78,7 @@ def _hanging(ax, replays: dict[str, Replay], looks, fork_width: float, fork_heig
         ax.text(*place, text, transform=ax.transAxes, ha="right", va="top", fontsize=8, color=color)
 
 
-def _drawn(ax: plt.Axes, episode: Episode, replays: dict[str, Replay], looks) -> None:
+def _drawn(ax: plt.Axes, episode: Episode, replays: dict[str, Replay], styles) -> None:
     last = episode.release_time - 2 * episode.sample_period  # later samples mix in the release
     held = (episode.time >= episode.grasp_time) & (episode.time <= last)
     draw = np.linalg.norm(episode.position[held, 1:], axis=1)
@@ -89,4 +88,4 @@ def _drawn(ax: plt.Axes, episode: Episode, replays: dict[str, Replay], looks) ->
     ax.set_xlim(max(taut.min() - MARGIN, 0), draw.max() + MARGIN / 4)
     for number, (method, replay) in enumerate(replays.items()):
         size = np.linalg.norm(replay.force[held], axis=1)
-        ax.plot(draw, size, color=looks[method].color, **_style(number), zorder=3)
+        ax.plot(draw, size, color=styles[method].color, **_style(number), zorder=3)

@@ -12,8 +12,7 @@ from pipeline.landing.landing_map import LandingMap
 from pipeline.launches.stretch import stretch_of
 from pipeline.report.figures.canvas import log_y, save
 from pipeline.report.results import Result
-from pipeline.report.styles import SIDE_BY_SIDE, Look, drawn
-from pipeline.report.theme import COLORS, STYLE
+from pipeline.report.styles import COLORS, SIDE_BY_SIDE, THEME, Styles, drawn
 
 FAIR = 0.05  # of the distance, shaded
 ERRORS = (-80, -50, -20, -10, -5, 0, 5, 10, 20, 50, 100, 200)  # % at the axis
@@ -21,17 +20,17 @@ REACH = 2.0  # of the farthest target, up to which a landing map tells landings 
 LEVEL = 90  # % that the predicted intervals are of
 
 
-def landings(path: Path, trials: pd.DataFrame, looks: dict[str, Look], near: list[str]) -> None:
+def landings(path: Path, trials: pd.DataFrame, styles: Styles, near: list[str]) -> None:
     """Landings against predictions of two methods, and the error of every method.
 
     Args:
-        looks: Of every method, in the order of the rows.
+        styles: Of every method, in the order of the rows.
         near: Methods of the left panel.
     """
     trials = trials[trials.landing_y.notna() & trials.predicted_y.notna()]
     inside = trials.stretch <= trials.recorded_stretch
-    with plt.rc_context(STYLE):
-        tall = max(4.0, 1.6 + 0.3 * len(looks))
+    with plt.rc_context(THEME):
+        tall = max(4.0, 1.6 + 0.3 * len(styles))
         figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, tall), width_ratios=(1, 1.15))
         shown = trials[trials.method.isin(near)]
         both = shown[["landing_y", "predicted_y"]].to_numpy()
@@ -40,31 +39,33 @@ def landings(path: Path, trials: pd.DataFrame, looks: dict[str, Look], near: lis
         left.fill_between(line, (1 - FAIR) * line, (1 + FAIR) * line, color="0.9", lw=0)
         left.plot(line, line, color="0.6", lw=1)
         for method in near:
-            for chosen, face in ((inside, looks[method].color), (~inside, "none")):
+            for chosen, face in ((inside, styles[method].color), (~inside, "none")):
                 mine = trials[(trials.method == method) & chosen]
-                _with_intervals(left, mine, looks[method].color, face)
+                _with_intervals(left, mine, styles[method].color, face)
         kinds = " and ".join(sorted(set(trials.kind))) or "no"
         left.set(xlabel=f"{kinds} landing [m]", ylabel="predicted landing [m]")
         left.set(xlim=(low, high), ylim=(low, high), aspect="equal")
         right.axvspan(-100 * FAIR, 100 * FAIR, color="0.9", lw=0)
         right.axvline(0, color="0.6", lw=1)
-        for row, (method, look) in enumerate(looks.items()):
-            for chosen, face in ((inside, look.color), (~inside, "none")):
+        for row, (method, style) in enumerate(styles.items()):
+            for chosen, face in ((inside, style.color), (~inside, "none")):
                 mine = trials[(trials.method == method) & chosen]
                 error = 100 * (mine.predicted_y / mine.landing_y - 1)
                 place = np.full(len(mine), row)
-                right.scatter(error, place, s=20, facecolors=face, edgecolors=look.color, alpha=0.7)
-        right.set_yticks(range(len(looks)), [look.name for look in looks.values()])
-        right.set_ylim(len(looks) - 0.5, -0.5)
+                right.scatter(
+                    error, place, s=20, facecolors=face, edgecolors=style.color, alpha=0.7
+                )
+        right.set_yticks(range(len(styles)), [style.name for style in styles.values()])
+        right.set_ylim(len(styles) - 0.5, -0.5)
         right.set_xscale("symlog", linthresh=10)
         right.xaxis.set_major_locator(plt.FixedLocator(ERRORS))
         right.xaxis.set_major_formatter("{x:g}")
         right.set_xlabel("predicted / landed − 1 [%], logarithmic beyond ± 10")
         style = {"ls": "", "marker": "o", "ms": 5, "color": "0.4"}
-        marks = [plt.Line2D([], [], ls="", marker="o", color=looks[m].color) for m in near]
+        marks = [plt.Line2D([], [], ls="", marker="o", color=styles[m].color) for m in near]
         marks += [plt.Line2D([], [], **style), plt.Line2D([], [], mfc="none", **style)]
         marks += [plt.Rectangle((0, 0), 1, 1, color="0.9")]
-        names = [*(looks[m].name for m in near), "inside the recorded stretch", "beyond it"]
+        names = [*(styles[m].name for m in near), "inside the recorded stretch", "beyond it"]
         names += [f"± {100 * FAIR:g} %"]
         if "predicted_low" in trials and trials.predicted_low.notna().any():
             marks.append(plt.Line2D([], [], color="0.4", lw=1))
@@ -83,16 +84,16 @@ def _with_intervals(ax: plt.Axes, trials: pd.DataFrame, color: str, face: str) -
     )
 
 
-def training(path: Path, results: dict[str, Result], looks: dict[str, Look]) -> None:
+def training(path: Path, results: dict[str, Result], styles: Styles) -> None:
     """Landing error of the deterministic policy by iteration of PPO, in its own simulator."""
     first = drawn(results, SIDE_BY_SIDE)  # on top where curves lie on each other
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         figure, ax = plt.subplots(figsize=(7.2, 3.4))
         for method, result in results.items():
-            curve, look = result.training, looks[method]
+            curve, own = result.training, styles[method]
             style = {"lw": 1.6, "zorder": 3} if method in first else {"lw": 0.9, "zorder": 2}
             error = 100 * curve.mean_error
-            ax.plot(curve.iteration, error, color=look.color, label=look.name, **style)
+            ax.plot(curve.iteration, error, color=own.color, label=own.name, **style)
         ax.axhline(1, color="0.6", lw=1)
         ax.set(
             xlabel="PPO iteration (line: the aim of 1 cm)",
@@ -126,7 +127,7 @@ def landing_map(
     points = np.stack([y.ravel(), z.ravel()], 1)
     landed = chart(points)
     stretch = stretch_of(np.insert(points, 0, 0, axis=1), fork_width, rest_length).reshape(y.shape)
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         figure, ax = plt.subplots(figsize=(6, 4.6))
         landing = landed.landing_y.reshape(y.shape)
         ax.set_facecolor("0.8")

@@ -13,8 +13,7 @@ from matplotlib.patches import Ellipse
 from pipeline.report.figures.canvas import PARAMETERS, few_ticks, log_y, save
 from pipeline.report.losses import best_so_far, printed
 from pipeline.report.results import Result
-from pipeline.report.styles import SIDE_BY_SIDE, Look, drawn
-from pipeline.report.theme import INK, STYLE
+from pipeline.report.styles import INK, SIDE_BY_SIDE, THEME, Styles, drawn
 from pipeline.sling.model import THETA
 
 PATH, STAR = "#e4003a", "#ffd23f"
@@ -23,7 +22,7 @@ EDGE = 0.02
 SHOWN = 0.9  # share of the evaluated points that the colour scale tells apart
 
 
-def convergence(path: Path, results: dict[str, Result], looks: dict[str, Look], own) -> None:
+def convergence(path: Path, results: dict[str, Result], styles: Styles, own) -> None:
     """The printed loss of every method's best so far, against rollouts.
 
     Args:
@@ -31,16 +30,16 @@ def convergence(path: Path, results: dict[str, Result], looks: dict[str, Look], 
     """
     least = min(printed(result.history).min() for result in results.values())
     first = drawn(results, SIDE_BY_SIDE)  # on top where curves lie on each other
-    with plt.rc_context(STYLE):
+    with plt.rc_context(THEME):
         figure, axes = plt.subplots(1, 2, figsize=(10.5, 4.2))
         for method, result in results.items():
             common = printed(result.history)
             best = common[best_so_far(result.history)]
             best = np.where(np.isfinite(best), best, np.nan)
             rollouts = np.arange(1, len(best) + 1)
-            style = {"color": looks[method].color, "ls": "--" if method in own else "-"}
+            style = {"color": styles[method].color, "ls": "--" if method in own else "-"}
             style |= {"lw": 1.6, "zorder": 3} if method in first else {"lw": 1.0, "zorder": 2}
-            label = f"{looks[method].name}: {best[-1]:.3f}"
+            label = f"{styles[method].name}: {best[-1]:.3f}"
             later = np.flatnonzero(result.history.phase.to_numpy() == "cma")[:1]
             for ax in axes:
                 ax.plot(rollouts, best, drawstyle="steps-post", label=label, **style)
@@ -82,7 +81,7 @@ def corner(path: Path, result: Result, boxes, title: str) -> None:
     color = {"c": total[good], "cmap": "viridis", "norm": LogNorm(total[best], worst)}
     sizes = np.where(history.phase.to_numpy()[good] == "cma", 5, 14)
     style = {"axes.spines.top": True, "axes.spines.right": True, "axes.grid": False}
-    with plt.rc_context({**STYLE, **style, "figure.constrained_layout.use": False}):
+    with plt.rc_context({**THEME, **style, "figure.constrained_layout.use": False}):
         inches = 1.4 + 1.55 * max(size, 3)
         figure, axes = plt.subplots(size, size, figsize=(inches, inches), squeeze=False)
         figure.subplots_adjust(0.08, 0.07, 0.93, 0.98, wspace=0.08, hspace=0.08)

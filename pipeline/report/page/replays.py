@@ -27,7 +27,7 @@ def content(report: Report) -> dict:
 
 
 def _band(report: Report, band: str) -> dict:
-    episode, replays, named = report.results.episodes[band], report.replays[band], report.looks
+    episode, replays, named = report.results.episodes[band], report.replays[band], report.styles
     clouds = [thinned(cloud) for cloud in episode.clouds]
     chosen = drawn(replays, SIDE_BY_SIDE)
     everything = np.concatenate(

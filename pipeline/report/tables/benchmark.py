@@ -11,8 +11,7 @@ import pandas as pd
 
 from pipeline.report import paper
 from pipeline.report.results import Results
-from pipeline.report.styles import KNOWN, Look
-from pipeline.report.styles import looks as looks_of
+from pipeline.report.styles import KNOWN, Styles, styles
 from pipeline.report.tables.cells import NONE, Table, number
 from pipeline.report.tables.landings import landing_errors, pooled_std
 
@@ -21,7 +20,7 @@ FLOOR, ORACLE = "actuation floor", "virtual, oracle"
 NOT_RUN, NOT_LAUNCHED = "not run", "no launch yet"
 LAUNCHED = ("virtual", "measured")
 NOTHING = {"launches": 0, "failed": None, "mean": math.nan, "std": math.nan}
-LOOKS = looks_of(KNOWN)
+STYLES = styles(KNOWN)
 APART = {*paper.OPTIMISERS, *paper.ABLATIONS} - set(paper.BENCHMARK)  # tables 3 and 4 hold these
 
 
@@ -108,7 +107,7 @@ def _floor(floor: dict) -> dict:
     return result | {"all": errors(floor) | {"pooled_std": pooled_std(result.values())}}
 
 
-def as_table(rows: list[Row], targets: Iterable[float], looks: dict[str, Look]) -> Table:
+def as_table(rows: list[Row], targets: Iterable[float], styles: Styles) -> Table:
     """Mean ± deviation in cm; bold: the lowest of a band where no launch failed."""
     tried = {key for row in rows for key in row.errors if key != "all"}
     keys = [*sorted({*targets, *paper.TARGETS, *tried}), "all"]
@@ -123,7 +122,7 @@ def as_table(rows: list[Row], targets: Iterable[float], looks: dict[str, Look]) 
             cells.append(f"**{spread(one)}**" if best else spread(one))
         total = row.errors.get("all", NOTHING)
         failed = NONE if total["failed"] is None else f"{total['failed']} of {total['launches']}"
-        names = band_name(row.band), method_name(row.method, looks), row.source
+        names = band_name(row.band), method_name(row.method, styles), row.source
         lines.append([*names, *cells, number(100 * total["std"], ".2f"), failed])
     heads = [f"g = {100 * key:.1f}" for key in keys[:-1]]
     return ["band", "method", "source", *heads, "all targets", "± over all", "failed"], lines
@@ -156,9 +155,9 @@ def band_name(band: str) -> str:
     return f"{theirs} ({paper.KINDS[theirs]})" if theirs else band
 
 
-def method_name(method: str, looks: dict[str, Look]) -> str:
+def method_name(method: str, styles: Styles) -> str:
     """For readers, also of a method that did not run."""
-    return method if method == FLOOR else (looks | LOOKS)[method].name
+    return method if method == FLOOR else (styles | STYLES)[method].name
 
 
 def records(rows: list[Row]) -> pd.DataFrame:

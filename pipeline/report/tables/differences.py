@@ -10,7 +10,7 @@ import pandas as pd
 
 from pipeline.report.noise import Difference, difference, landed
 from pipeline.report.results import Results
-from pipeline.report.styles import Look
+from pipeline.report.styles import Styles
 from pipeline.report.tables.benchmark import LAUNCHED, band_name, spread
 from pipeline.report.tables.cells import NONE, Table, number
 from pipeline.report.tables.landings import landing_errors
@@ -55,16 +55,16 @@ def _aimed(trials: pd.DataFrame, kind: str) -> pd.DataFrame:
     return trials[(trials.kind == kind) & trials.target.notna()]
 
 
-def as_table(rows: list[Compared], looks: dict[str, Look]) -> Table:
+def as_table(rows: list[Compared], styles: Styles) -> Table:
     """Differences in cm with their intervals; bold where the interval leaves out zero."""
     heads = ["band", "method", "launches"]
-    heads += [f"beside {looks[one].name}" for one in REFERENCES if one in looks]
+    heads += [f"beside {styles[one].name}" for one in REFERENCES if one in styles]
     lines = [
         [
             band_name(band),
-            looks[method].name,
+            styles[method].name,
             kind,
-            *(shown(found[one]) if one in found else NONE for one in REFERENCES if one in looks),
+            *(shown(found[one]) if one in found else NONE for one in REFERENCES if one in styles),
         ]
         for band, method, kind, found in rows
     ]
@@ -86,16 +86,16 @@ def _signed(metres: float) -> str:
     return f"{100 * metres:+.2f}".replace("-", "−")
 
 
-def claims(rows: list[Compared], looks: dict[str, Look]) -> list[str]:
+def claims(rows: list[Compared], styles: Styles) -> list[str]:
     """What the intervals allow to be said, a line a band and reference."""
     said: dict[tuple[str, str, str], dict[str, list[str]]] = {}
     for band, method, kind, found in rows:
         for reference, one in found.items():
             parts = said.setdefault((band, kind, reference), {})
             few = f" ({one.launches[1]} launches count)" if one and one.left_out else ""
-            parts.setdefault(_verdict(one), []).append(looks[method].name + few)
+            parts.setdefault(_verdict(one), []).append(styles[method].name + few)
     return [
-        f"- {band_name(band)}, {kind}, beside **{looks[reference].name}**: "
+        f"- {band_name(band)}, {kind}, beside **{styles[reference].name}**: "
         + "; ".join(
             f"{verdict}: {' · '.join(parts[verdict])}" for verdict in VERDICTS if verdict in parts
         )
@@ -139,7 +139,7 @@ def records(rows: list[Compared]) -> pd.DataFrame:
     )
 
 
-def robust(results: Results, looks: dict[str, Look], seed: int) -> Table | None:
+def robust(results: Results, styles: Styles, seed: int) -> Table | None:
     """Robust policies beside the plain ones of the same method; None where there is none."""
     rows = []
     for result in results:
@@ -151,7 +151,7 @@ def robust(results: Results, looks: dict[str, Look], seed: int) -> Table | None:
         rows.append(
             [
                 band_name(result.band),
-                looks[result.method].name,
+                styles[result.method].name,
                 "virtual",
                 *(spread(one) for one in errors),
                 *(number(100 * _scatter(trials), ".2f") for trials in (first, second)),

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.report.replay import Replay
 from pipeline.report.results import Results
-from pipeline.report.styles import Look
+from pipeline.report.styles import Styles
 from pipeline.report.tables.cells import NONE, Table, centimetres, number, percent
 from pipeline.report.tables.parameters import HEADS, exactly, printed_loss
 
@@ -28,10 +28,10 @@ SEARCHES = {
 TERMS = {"geom": "geom [cm]", "force": "force [N]", "work": "work [J]", "taut": "taut [cm]"}
 
 
-def methods(results: Results, params, looks: dict[str, Look]) -> Table:
+def methods(results: Results, params, styles: Styles) -> Table:
     """What each method searched, what it minimises, and what it holds fixed."""
     rows = []
-    for method, look in looks.items():
+    for method, style in styles.items():
         about = params.methods[method]
         terms = [
             term if weight == 1 else f"{weight:g} {term}"
@@ -47,7 +47,7 @@ def methods(results: Results, params, looks: dict[str, Look]) -> Table:
         fixed = [_held(name, value) for name, value in about.fixed.items()]
         known = {name: f" (prior: mean {one.mean:g})" for name, one in about.priors.items()}
         more = [name + known.get(name, "") for name in about.nuisances]
-        shown = [look.name, f"`{method}`", search, " + ".join(terms), ", ".join(fixed) or NONE]
+        shown = [style.name, f"`{method}`", search, " + ".join(terms), ", ".join(fixed) or NONE]
         rows.append([*shown, ", ".join(more) or NONE])
     heads = ["method", "in params.yaml", "search", "minimises", "held fixed", "nuisances besides"]
     return heads, rows
@@ -59,7 +59,7 @@ def _held(name: str, value: float) -> str:
     return f"{symbol} {exactly(name, value)} {unit.rstrip(']')}".rstrip()
 
 
-def derived(results: Results, looks: dict[str, Look]) -> Table | None:
+def derived(results: Results, styles: Styles) -> Table | None:
     """Quantities that data can see, with intervals; None where no θ has a confidence."""
     shown = [result for result in results if result.confidence]
     if not shown:
@@ -74,7 +74,7 @@ def derived(results: Results, looks: dict[str, Look]) -> Table | None:
         for name in names:
             about, factor = result.confidence["derived"].get(name), titles[name][1]
             cells.append(NONE if about is None else _range(about, factor))
-        rows.append([result.band, looks[result.method].name, *cells])
+        rows.append([result.band, styles[result.method].name, *cells])
     return ["band", "method", *(title for title, _ in titles.values())], rows
 
 
@@ -88,7 +88,7 @@ def _range(about: dict, factor: float) -> str:
     return f"{value:.{digits}f} ({low:.{digits}f} – {high:.{digits}f})"
 
 
-def phases(results: Results, looks: dict[str, Look]) -> Table | None:
+def phases(results: Results, styles: Styles) -> Table | None:
     """Root mean square residuals by part of the episode; None without a confidence."""
     shown = [result for result in results if result.confidence.get("phases")]
     if not shown:
@@ -99,12 +99,12 @@ def phases(results: Results, looks: dict[str, Look]) -> Table | None:
         about = result.confidence["phases"]
         force = [number(about[part].get("force_rms"), ".3f") for part in parts]
         cloud = [centimetres(about[part].get("cloud_rms")) for part in parts]
-        rows.append([result.band, looks[result.method].name, *force, *cloud])
+        rows.append([result.band, styles[result.method].name, *force, *cloud])
     heads = [f"force, {part} [N]" for part in parts] + [f"cloud, {part} [cm]" for part in parts]
     return ["band", "method", *heads], rows
 
 
-def losses(results: Results, params, looks: dict[str, Look]) -> Table:
+def losses(results: Results, params, styles: Styles) -> Table:
     """Terms of the loss at θ, the share that each weighs, the printed total, and the budget."""
     found = {term for one in results for term in one.theta.get("loss", {}) if term != "total"}
     terms = TERMS | {term: term for term in sorted(found - TERMS.keys())}
@@ -120,11 +120,11 @@ def losses(results: Results, params, looks: dict[str, Look]) -> Table:
             cells.append(number(value, ".3g") + (share if np.isfinite(value) else ""))
         common = printed_loss(result)
         cells += [number(total, ".4g"), number(common, ".4g"), str(len(result.history))]
-        rows.append([result.band, looks[result.method].name, *cells])
+        rows.append([result.band, styles[result.method].name, *cells])
     return heads, rows
 
 
-def held_out(replays: dict[str, Replay], looks: dict[str, Look]) -> Table:
+def held_out(replays: dict[str, Replay], styles: Styles) -> Table:
     """Residuals of fitted and of held-out data of a band's pull."""
     rows = []
     for method, replay in replays.items():
@@ -132,6 +132,6 @@ def held_out(replays: dict[str, Replay], looks: dict[str, Look]) -> Table:
         for kind, form in (("force", ".3f"), ("cloud", ".2f")):
             fitted, held = (replay.residuals[kind][part] for part in ("fitted", "held_out"))
             cells += [number(fitted, form), number(held, form), number(held / fitted, ".2f")]
-        rows.append([looks[method].name, *cells])
+        rows.append([styles[method].name, *cells])
     heads = [f"{what}, {part}" for what in ("force [N]", "cloud [cm]") for part in PARTS]
     return ["method", *heads], rows

@@ -10,7 +10,7 @@ import pandas as pd
 
 from pipeline.report.noise import landed
 from pipeline.report.results import Results
-from pipeline.report.styles import Look
+from pipeline.report.styles import Styles
 from pipeline.report.tables.cells import Table, number, percent
 
 AIM = 0.05  # mean error of predicted landings inside the recorded stretch, share of the distance
@@ -126,9 +126,7 @@ def intervals(trials: pd.DataFrame) -> dict[str, dict] | None:
     }
 
 
-def prediction_summary(
-    results: Results, band: str, kind: str, looks: dict[str, Look]
-) -> Table | None:
+def prediction_summary(results: Results, band: str, kind: str, styles: Styles) -> Table | None:
     """Prediction error of each method on launches of a kind, and what its intervals cover."""
     rows = []
     for method, result in results.methods[band].items():
@@ -138,7 +136,7 @@ def prediction_summary(
         parts, ranges = prediction_error(trials), intervals(trials) or {}
         rows.append(
             [
-                looks[method].name,
+                styles[method].name,
                 *(_share(parts[name]) for name in ("inside", "beyond", "all")),
                 number(100 * parts["all"]["bias"], "+.1f"),
                 f"{parts['all']['unpredicted']} of {parts['all']['tried']}",

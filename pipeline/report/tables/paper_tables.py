@@ -12,7 +12,7 @@ from pipeline.report import paper
 from pipeline.report.noise import LEVEL, RESAMPLES
 from pipeline.report.report import Report
 from pipeline.report.results import Results
-from pipeline.report.styles import Look
+from pipeline.report.styles import Styles
 from pipeline.report.tables import benchmark, differences, parameters
 from pipeline.report.tables.cells import markdown, percent
 from pipeline.report.tables.latex import latex
@@ -98,7 +98,7 @@ interval as above, which again holds for launches and not for another identifica
 
 def paper_tables(report: Report) -> str:
     """The chapter; writes table1.csv, table1.tex, ... table4.tex and differences.csv."""
-    params, results, named = report.params, report.results, report.looks
+    params, results, named = report.params, report.results, report.styles
     folder, floors = report.folder / "tables", results.floors
     found = parameters.identified(results, params)
     tables = {2: (parameters.as_table(found, named), parameters.records(found))}
@@ -125,7 +125,7 @@ def _titled(count: int, name: str, folder: Path) -> str:
     return f"### Table {count}\n\n{CAPTIONS[count]} [CSV]({csv}), [LaTeX]({tex})\n"
 
 
-def _doubt(results: Results, found: list[parameters.Row], named: dict[str, Look]) -> list[str]:
+def _doubt(results: Results, found: list[parameters.Row], named: Styles) -> list[str]:
     """How to read table 2."""
     edges = any(value.at_edge for row in found for value in row.values)
     trusted = any(result.confidence for result in results)
@@ -146,7 +146,7 @@ def _doubt(results: Results, found: list[parameters.Row], named: dict[str, Look]
     return [DOUBT if trusted else NO_CONFIDENCE, *notes]
 
 
-def _noise(params, results: Results, named: dict[str, Look], folder: Path) -> list[str]:
+def _noise(params, results: Results, named: Styles, folder: Path) -> list[str]:
     text, seed = [], params.trials.seed
     rows = differences.compared(results, seed)
     if rows:

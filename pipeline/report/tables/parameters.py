@@ -12,7 +12,7 @@ from pipeline.objective.space import Space
 from pipeline.report import paper
 from pipeline.report.losses import PRINTED
 from pipeline.report.results import Result, Results
-from pipeline.report.styles import Look
+from pipeline.report.styles import Styles
 from pipeline.report.tables.benchmark import APART, NOT_RUN, PAPER, band_name, method_name
 from pipeline.report.tables.cells import NONE, Table, number
 from pipeline.sling.model import THETA
@@ -104,7 +104,7 @@ def at_edge(value: float, name: str, box: Space) -> bool:
     return not 0.01 <= (value - low) / (high - low) <= 0.99
 
 
-def as_table(rows: list[Row], looks: dict[str, Look]) -> Table:
+def as_table(rows: list[Row], styles: Styles) -> Table:
     """Parameters with their intervals; bold: the least loss of a band."""
     losses: dict[tuple[str, str], list[float]] = {}
     for row in rows:
@@ -116,7 +116,7 @@ def as_table(rows: list[Row], looks: dict[str, Look]) -> Table:
         loss = number(row.loss, ".4f")
         loss = f"**{loss}**" if row.loss == least[row.band, row.source] else loss
         lines.append(
-            [band_name(row.band), method_name(row.method, looks), row.source, *cells, loss]
+            [band_name(row.band), method_name(row.method, styles), row.source, *cells, loss]
         )
     return ["band", "method", "source", *HEADS.values(), "loss"], lines
 

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.landing.landing_map import LandingMap
 from pipeline.landing.stored import PLAIN, ROBUST
 from pipeline.report.results import Result, Results
-from pipeline.report.styles import Look
+from pipeline.report.styles import Styles
 from pipeline.report.tables.cells import NONE, Table, centimetres, number
 
 
@@ -36,7 +36,7 @@ def aims(named: dict[str, tuple[LandingMap, np.ndarray]], targets: np.ndarray) -
     return ["policy", "target [m]", "draw y, z [m]", "predicted [m]", "hold force [N]"], rows
 
 
-def policies(results: Results, looks: dict[str, Look]) -> Table:
+def policies(results: Results, styles: Styles) -> Table:
     """How each policy converged in its own simulator, and how well its map interpolates."""
     heads = [
         "band",
@@ -52,7 +52,7 @@ def policies(results: Results, looks: dict[str, Look]) -> Table:
     for one in results:
         for name, card in ((PLAIN, one.card), (ROBUST, one.robust_card)):
             if card is not None:
-                names = one.band, looks[one.method].name, name
+                names = one.band, styles[one.method].name, name
                 rows.append([*names, *_converged(card), _expected(one, name)])
     return heads, rows
 

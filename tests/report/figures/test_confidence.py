@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.report.figures import confidence
 from pipeline.report.results import gather
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from tests.report import conftest
 from tests.report.conftest import BAND, METHOD, THETA
 
@@ -18,7 +18,7 @@ def results(root, params):
 
 
 def test_a_profile_a_parameter_and_its_interval(kept, results, params) -> None:
-    confidence.profiles("", results, looks([METHOD]), params.parameters)
+    confidence.profiles("", results, styles([METHOD]), params.parameters)
     axes = {ax.get_xlabel(): ax for ax in kept[0].axes}
     assert list(axes)[:5] == ["E [MPa]", "ν", "d [ms]", "friction", "s"]
     d = 1e3 * THETA["elasticity_damping"]
@@ -36,14 +36,14 @@ def test_a_profile_a_parameter_and_its_interval(kept, results, params) -> None:
 def test_a_fixed_parameter_has_no_curve(kept, results, params) -> None:
     results[METHOD].theta["confidence"] = conftest.confidence(fixed="damping_scale")
     del results[METHOD].posterior["profiles"]["damping_scale"]
-    confidence.profiles("", results, looks([METHOD]), params.parameters)
+    confidence.profiles("", results, styles([METHOD]), params.parameters)
     ax = next(ax for ax in kept[0].axes if ax.get_xlabel() == "s")
     assert "held fixed" in ax.texts[0].get_text() and len(ax.lines) == 2
     assert ax.lines[0].get_xdata()[0] == THETA["damping_scale"]
 
 
 def test_the_product_of_the_dampings_is_that_of_the_samples(kept, results, params) -> None:
-    confidence.profiles("", results, looks([METHOD]), params.parameters)
+    confidence.profiles("", results, styles([METHOD]), params.parameters)
     stairs = kept[0].axes[5].patches[0].get_data()
     spread = np.array([0.9, 1.1]) ** 2
     span = 1e3 * THETA["damping_scale"] * THETA["elasticity_damping"] * spread
@@ -51,7 +51,7 @@ def test_the_product_of_the_dampings_is_that_of_the_samples(kept, results, param
 
 
 def test_correlations_are_written_into_their_cells(kept, results) -> None:
-    confidence.correlation("", results, looks([METHOD]))
+    confidence.correlation("", results, styles([METHOD]))
     ax = kept[0].axes[0]
     texts = {tuple(map(int, text.get_position())): text.get_text() for text in ax.texts}
     assert len(texts) == 25

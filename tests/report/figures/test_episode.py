@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from pipeline.report.figures import episode as drawing
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from tests.report.conftest import METHOD, episode
 from tests.report.toy_replay import toy_replay
 
-LOOKS = looks([METHOD])
+STYLES = styles([METHOD])
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def recorded():
 
 def test_force_residual_and_distance_over_time(kept, recorded) -> None:
     replays = {METHOD: toy_replay(None, "", METHOD, recorded, {})}
-    drawing.force("", recorded, replays, LOOKS)
+    drawing.force("", recorded, replays, STYLES)
     axes = np.array(kept[0].axes).reshape(4, 2)
     for column in (0, 1):
         measured, simulated = axes[0, column].lines[:2]
@@ -43,7 +43,7 @@ def test_force_residual_and_distance_over_time(kept, recorded) -> None:
 
 def test_work_and_where_it_ends_apart(kept, recorded) -> None:
     replays = {METHOD: toy_replay(None, "", METHOD, recorded, {})}
-    drawing.work("", recorded, replays, LOOKS)
+    drawing.work("", recorded, replays, STYLES)
     left, right = kept[0].axes
     # f_y = t until 8 s, v_y = -0.1 m/s: the band does -0.1 * 32 J on the hand; where in its sample
     # the force falls from 8 N, trapezoids cannot know
@@ -68,13 +68,13 @@ def test_a_recording_without_a_frame_in_the_recoil_has_pictures_too(kept, record
     frames = drawing.moments(blind)
     assert "taut recoil" not in frames and "swinging" in frames
     replays = {METHOD: toy_replay(None, "", METHOD, blind, {})}
-    drawing.clouds("", blind, replays, LOOKS, frames, 0.01)
+    drawing.clouds("", blind, replays, STYLES, frames, 0.01)
     assert len(kept[0].axes) == 2 * len(frames)
 
 
 def test_clouds_are_as_thick_as_the_band_and_at_one_scale(kept, recorded) -> None:
     replays = {METHOD: toy_replay(None, "", METHOD, recorded, {})}
-    drawing.clouds("", recorded, replays, LOOKS, drawing.moments(recorded), 0.01)
+    drawing.clouds("", recorded, replays, STYLES, drawing.moments(recorded), 0.01)
     figure = kept[0]
     scales = set()
     for ax in figure.axes:

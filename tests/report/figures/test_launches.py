@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from pipeline.report.figures import launches as drawing
 from pipeline.report.results import gather
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from pipeline.sling.model import GRAVITY
 from tests.report.conftest import BAND, METHOD
 
@@ -69,7 +69,7 @@ def test_a_predicted_flight_is_that_of_a_falling_point() -> None:
 
 
 def test_flights_end_where_they_land_and_targets_stand_on_the_floor(kept, results) -> None:
-    drawing.trajectories("", results, METHODS, looks(METHODS), -FLOOR)
+    drawing.trajectories("", results, METHODS, styles(METHODS), -FLOOR)
     first, second = kept[0].axes
     flights = [line for line in first.lines if len(line.get_xdata()) == 40]
     assert len(flights) == 3 + 1  # of the rig, and one prediction for two equal draws
@@ -90,7 +90,7 @@ def test_measured_landings_without_a_flight_are_crosses_on_the_floor(kept, resul
     result = results.methods[BAND][METHOD]
     bare = result.trials.assign(kind="measured", flight_y=None, flight_z=None)
     results.methods[BAND][METHOD] = replace(result, trials=bare)
-    drawing.trajectories("", results, [METHOD], looks(METHODS), -FLOOR)
+    drawing.trajectories("", results, [METHOD], styles(METHODS), -FLOOR)
     crosses = [line for line in kept[0].axes[0].lines if line.get_marker() == "x"]
     np.testing.assert_allclose([line.get_xdata()[0] for line in crosses], [1.70, 1.76, 1.93])
     np.testing.assert_allclose([line.get_ydata()[0] for line in crosses], FLOOR)
@@ -100,7 +100,7 @@ def test_measured_landings_without_a_flight_are_crosses_on_the_floor(kept, resul
 def test_every_landing_lies_in_its_strip_at_its_distance(kept, results) -> None:
     robust = results.methods[BAND][METHOD].trials.iloc[:1].assign(landing_y=1.8)
     results.methods[BAND][METHOD] = replace(results.methods[BAND][METHOD], robust_trials=robust)
-    drawing.scatter("", results, METHODS, looks(METHODS))
+    drawing.scatter("", results, METHODS, styles(METHODS))
     (ax,) = kept[0].axes
     names = [label.get_text() for label in ax.get_xticklabels()]
     assert names == ["Sling2Sim2Real", "Sling2Sim2Real,\nrobust", "DE_L"]
@@ -126,7 +126,7 @@ def test_measured_marks_are_hollow_and_failures_counted_by_kind(kept, results) -
     measured = outside.assign(kind="measured", landing_y=[1.71, None, 1.95, 2.7], failure=None)
     both = pd.concat([outside, measured], ignore_index=True)
     results.methods[BAND][METHOD] = replace(result, trials=both)
-    drawing.scatter("", results, METHODS, looks(METHODS))
+    drawing.scatter("", results, METHODS, styles(METHODS))
     (ax,) = kept[0].axes
     marks = {True: [], False: []}
     for dots in ax.collections:
@@ -136,5 +136,5 @@ def test_measured_marks_are_hollow_and_failures_counted_by_kind(kept, results) -
     assert ax.get_ylabel() == "measured and virtual landing, y [m]"
     assert [text.get_text() for text in ax.texts] == ["2 of 4 measured\n1 of 4 virtual\nfailed"]
     assert "measured (filled: virtual)" in [t.get_text() for t in kept[0].legends[0].get_texts()]
-    drawing.trajectories("", results, METHODS, looks(METHODS), -FLOOR)
+    drawing.trajectories("", results, METHODS, styles(METHODS), -FLOOR)
     assert kept[1].axes[0].texts[0].get_text() == "2 of 4 measured,\n1 of 4 virtual failed"

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from pipeline.report.figures import loaded as drawing
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from tests.report.conftest import BAND, METHOD, episode
 from tests.report.toy_replay import toy_replay
 
 
 def drawn(recorded, replays) -> None:
-    drawing.loaded("", {BAND: recorded}, {BAND: replays}, looks([METHOD, "de"]), 0.275, 0.52)
+    drawing.loaded("", {BAND: recorded}, {BAND: replays}, styles([METHOD, "de"]), 0.275, 0.52)
 
 
 def test_the_weight_hangs_at_the_middle_and_its_depth_is_told(kept) -> None:

@@ -8,14 +8,14 @@ import pytest
 
 from pipeline.report.figures import policy
 from pipeline.report.results import gather
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from tests.report.conftest import BAND, METHOD, launches
 
 
 def test_every_method_has_a_row_and_two_have_intervals(kept) -> None:
     methods = [METHOD, "de", "bo"]
     trials = pd.concat([launches().assign(method=method) for method in methods])
-    policy.landings("", trials, looks(methods), methods[:2])
+    policy.landings("", trials, styles(methods), methods[:2])
     left, right = kept[0].axes
     bars = [line for line in left.lines if len(set(line.get_xdata())) == 1]
     assert len(bars) == 2 * 3  # the fourth did not land
@@ -32,7 +32,7 @@ def test_every_method_has_a_row_and_two_have_intervals(kept) -> None:
 
 def test_launches_without_intervals_are_drawn_too(kept) -> None:
     trials = launches().drop(columns=["predicted_low", "predicted_high"])
-    policy.landings("", trials, looks([METHOD]), [METHOD])
+    policy.landings("", trials, styles([METHOD]), [METHOD])
     assert "90 % interval" not in [text.get_text() for text in kept[0].legends[0].get_texts()]
 
 
@@ -57,7 +57,7 @@ def test_the_map_shows_the_paths_of_both_policies(kept, result) -> None:
 
 
 def test_training_is_drawn_in_centimetres(kept, result) -> None:
-    policy.training("", {METHOD: result, "de": result}, looks([METHOD, "de"]))
+    policy.training("", {METHOD: result, "de": result}, styles([METHOD, "de"]))
     curve = kept[0].axes[0].lines[0]
     np.testing.assert_array_equal(curve.get_xdata(), [1, 2])
     np.testing.assert_allclose(curve.get_ydata(), [30, 0.4])

@@ -9,7 +9,7 @@ from matplotlib.patches import Ellipse
 
 from pipeline.report.figures import search
 from pipeline.report.results import gather
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from tests.report.conftest import BAND, METHOD
 
 
@@ -32,7 +32,7 @@ def pairs(figure: plt.Figure) -> list[plt.Axes]:
 
 
 def test_convergence_draws_the_printed_loss_of_the_best_so_far(kept, result) -> None:
-    search.convergence("", {METHOD: result, "de": result}, looks([METHOD, "de"]), {"de"})
+    search.convergence("", {METHOD: result, "de": result}, styles([METHOD, "de"]), {"de"})
     for ax in kept[0].axes:
         steps, other = (line for line in ax.lines if len(line.get_xdata()) == 5)
         assert steps.get_xdata().tolist() == [1, 2, 3, 4, 5]

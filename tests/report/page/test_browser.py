@@ -21,7 +21,7 @@ from PIL import Image
 from pipeline.report.page import write_page
 from pipeline.report.report import Report
 from pipeline.report.results import gather
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from tests.report.conftest import BAND, METHOD
 from tests.report.toy_replay import toy_replay
 
@@ -110,7 +110,7 @@ def pages(root, params):
         ],
     )
     replays = {BAND: {METHOD: one, "de": one}, "far": {METHOD: far}}
-    report = Report(params, results, replays, looks([METHOD, "de"]), root)
+    report = Report(params, results, replays, styles([METHOD, "de"]), root)
     write_page(report, "# Report\n\n## In short\n")
     return report.folder / "index.html", one, far
 
@@ -147,7 +147,7 @@ def test_the_replay_runs_alone_and_without_an_error(pages, tmp_path) -> None:
     seen = visited(page, tmp_path)
     assert seen["failures"] == [] and seen["requests"] == [] and seen["noticed"] > 0
 
-    named = looks([METHOD, "de"])
+    named = styles([METHOD, "de"])
     start, slid = seen["start"], seen["slid"]
     assert start["traces"] == 4 and slid["frame"] == 5 and "frame 6/90" in slid["time"]
     assert "−7.500 s" in slid["time"]  # released at 8 s

@@ -14,7 +14,7 @@ from pipeline.report.page import replays as packing
 from pipeline.report.page import write_page
 from pipeline.report.report import Report
 from pipeline.report.results import gather
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from tests.report.conftest import BAND, METHOD
 from tests.report.toy_replay import toy_replay
 
@@ -52,7 +52,7 @@ def replays(results):
 
 @pytest.fixture
 def report(tmp_path, params, results, replays) -> Report:
-    return Report(params, results, replays, looks([METHOD]), tmp_path / "shown")
+    return Report(params, results, replays, styles([METHOD]), tmp_path / "shown")
 
 
 @pytest.fixture

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from pipeline.report.tables.differences import as_table, claims, compared, records, robust
 from tests.report.tables.toy_results import launches, result, results
 
 NOISE = np.random.default_rng(0).normal(0, 0.01, (3, 5))
-NAMED = looks(["sling2sim2real", "sling2sim2real_taut", "package_si", "real2sim2real"])
+NAMED = styles(["sling2sim2real", "sling2sim2real_taut", "package_si", "real2sim2real"])
 RAN = results(
     result("band1", "sling2sim2real", launches(0.05 - NOISE)),
     result("band1", "sling2sim2real_taut", launches(0.05 + NOISE)),
@@ -105,7 +105,7 @@ def test_robust_policies_stand_beside_the_plain_ones() -> None:
     )  # counts for no scatter, as if it had come down nowhere
     nowhere = far.assign(landing_y=far.landing_y.where(far.failure.isna()))
     one, other = (
-        robust(results(result("band1", "bo", plain, robust_trials=t)), looks(["bo"]), 1)[1]
+        robust(results(result("band1", "bo", plain, robust_trials=t)), styles(["bo"]), 1)[1]
         for t in (far, nowhere)
     )
     assert one == other

@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.params.identification import Prior
 from pipeline.report.results import gather
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from pipeline.report.tables.identified import (
     derived,
     held_out,
@@ -27,7 +27,7 @@ def results(root, params):
 
 @pytest.fixture
 def named(params):
-    return looks(params.run.methods)
+    return styles(params.run.methods)
 
 
 def ran(regions: dict[str, list[int]]) -> list[SimpleNamespace]:
@@ -62,14 +62,14 @@ def test_what_a_method_searches_besides(params) -> None:
         }
     )
     params = params.model_copy(update={"methods": params.methods | {"sling2sim2real_taut": windy}})
-    table = methods(ran({m: [1] for m in params.methods}), params, looks(params.methods))
+    table = methods(ran({m: [1] for m in params.methods}), params, styles(params.methods))
     besides = dict(zip(column(table, "method"), column(table, "nuisances besides"), strict=True))
     assert besides["ours (taut)"] == "air_drag (prior: mean 1)" and besides["DE_L"] == "–"
 
 
 def test_what_a_method_minimises_and_by_what_search(params) -> None:
     counts = {m: [1] for m in params.methods} | {"sling2sim2real": [4, 3, 4], "no_work": [2]}
-    table = methods(ran(counts), params, looks(params.methods))
+    table = methods(ran(counts), params, styles(params.methods))
     minimises = dict(zip(column(table, "method"), column(table, "minimises"), strict=True))
     search = dict(zip(column(table, "method"), column(table, "search"), strict=True))
     assert minimises["Sling2Sim2Real"] == "geom + force + work"
@@ -114,7 +114,7 @@ def test_held_out_residuals_stand_beside_the_fitted(params, named) -> None:
     }
     heads, rows = held_out({METHOD: toy_replay(*inputs, residuals=residuals)}, named)
     assert rows == [["Sling2Sim2Real", "0.200", "0.300", "1.50", "0.50", "0.25", "0.50"]]
-    named = looks(["de", METHOD])  # one that knows nothing takes nothing from the other
+    named = styles(["de", METHOD])  # one that knows nothing takes nothing from the other
     replays = {"de": toy_replay(*inputs), METHOD: toy_replay(*inputs, residuals=residuals)}
     unknown = ["DE_L", "0.200", "–", "–", "0.20", "–", "–"]
     assert held_out(replays, named)[1] == [unknown, *rows]

@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from pipeline.report.styles import KNOWN, looks
+from pipeline.report.styles import KNOWN, styles
 from pipeline.report.tables.benchmark import as_table, benchmark
 from pipeline.report.tables.latex import NAMES, latex, text
 from tests.report.tables.toy_results import TARGETS, floor, launches, result, results
@@ -71,7 +71,7 @@ def table_1() -> str:
     rows = benchmark(
         results(*ran, result("my_band", "de", trials)), {"band1": floor(*[(0.01,) * 3] * 2)}
     )
-    table = as_table(rows, TARGETS, looks(KNOWN))
+    table = as_table(rows, TARGETS, styles(KNOWN))
     return latex(table, "Mean ± deviation of |landing − target|.", "tab:1", ("error [cm]", 4, 8))
 
 

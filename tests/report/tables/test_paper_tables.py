@@ -10,14 +10,14 @@ import pandas as pd
 import pytest
 
 from pipeline.params import load
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from pipeline.report.tables.paper_tables import paper_tables
 from tests.report.conftest import confidence
 from tests.report.tables.toy_results import floor, launches, result, results
 
 PARAMS = load()
 NOISE = np.random.default_rng(0).normal(0, 0.01, (3, 5))
-NAMED = looks(["sling2sim2real_taut", "package_si", "de"])
+NAMED = styles(["sling2sim2real_taut", "package_si", "de"])
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def written(tmp_path):
     def run(*some, floors=None) -> str:
         ran = results(*some, floors=floors)
         return paper_tables(
-            SimpleNamespace(params=PARAMS, results=ran, looks=NAMED, folder=tmp_path)
+            SimpleNamespace(params=PARAMS, results=ran, styles=NAMED, folder=tmp_path)
         )
 
     return run

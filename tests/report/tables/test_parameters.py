@@ -11,12 +11,12 @@ import pytest
 
 from pipeline.objective.space import Space
 from pipeline.params import load
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from pipeline.report.tables.parameters import as_table, at_edge, identified, records
 from tests.report.conftest import THETA, confidence
 from tests.report.tables.toy_results import launches, result, results
 
-PARAMS, NAMED = load(), looks(["sling2sim2real", "package_si", "adam"])
+PARAMS, NAMED = load(), styles(["sling2sim2real", "package_si", "adam"])
 TRIALS = launches([[0.0]] * 3)
 
 

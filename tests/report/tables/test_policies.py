@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.report.styles import looks
+from pipeline.report.styles import styles
 from pipeline.report.tables.policies import policies
 from tests.report.tables.toy_results import launches, result, results
 
@@ -15,7 +15,7 @@ def card(**training) -> dict:
 
 
 def test_a_robust_policy_is_a_row_with_what_both_are_expected_to_miss() -> None:
-    trials, named = launches([[0.0]] * 3), looks(["package_si", "sling2sim2real"])
+    trials, named = launches([[0.0]] * 3), styles(["package_si", "sling2sim2real"])
     robust = card(converged=False, expected_error_m=0.03, plain_expected_error_m=0.04)
     ran = results(
         result("band1", "sling2sim2real", trials, card=card(), robust_card=robust),

@@ -53,8 +53,9 @@ def named(text: str, source: str) -> tuple[str, ...]:
 
 def gpus() -> tuple[str, ...]:
     """Names of the GPUs that CUDA sees, cuda:0 first."""
-    from pipeline.base.native import wp
+    from pipeline.base.native import start, wp
 
+    start()
     return tuple(str(one) for one in wp.get_cuda_devices())
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
 import re
+import sys
+import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -13,6 +17,39 @@ import warp as wp
 wp.config.log_level = wp.LOG_ERROR
 wp.config.enable_backward = False
 _one_at_a_time = Lock()
+DRIVERS = "libcuda.so", "libcuda.so.1"  # as Warp looks for them
+
+
+@cache
+def start() -> None:
+    """Start Warp, without its warning on a machine that has no CUDA driver.
+
+    Whoever asks for a GPU there is told by `machine.named`. The warning is a line of native code.
+    """
+    if any(map(_loads, DRIVERS)):
+        wp.init()
+        return
+    sys.stderr.flush()
+    with tempfile.TemporaryFile() as said:
+        stderr = os.dup(2)
+        os.dup2(said.fileno(), 2)
+        try:
+            wp.init()
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)
+            said.seek(0)
+            for line in said:
+                if not line.startswith(b"Warp CUDA warning: Could not find or load"):
+                    os.write(2, line)
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
 
 
 def text_of(*paths: Path, **macros) -> str:
@@ -29,7 +66,7 @@ def built_once(build: Callable[..., wp.Kernel]) -> Callable[..., wp.Kernel]:
 
     def built(*key) -> wp.Kernel:
         with _one_at_a_time:
-            wp.init()  # two threads that start Warp at once would undo each other's modules
+            start()  # two threads that start Warp at once would undo each other's modules
             return build(*key)
 
     return built

@@ -30,3 +30,16 @@ def test_warp_starts_once_whoever_comes_first() -> None:
         [sys.executable, "-c", STARTED_TWICE], capture_output=True, text=True, check=True
     )
     assert done.stdout.split()[-1] == "1"
+
+
+def test_a_start_without_a_cuda_driver_is_silent_and_hides_nothing_else() -> None:
+    code = """
+import os
+from pipeline.base import native
+
+start = native.wp.init
+native.wp.init = lambda: (start(), os.write(2, b"something else\\n"))
+native.start()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("", "something else\n")

@@ -7,8 +7,8 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-import warp as wp
 
+from pipeline.base.machine import gpus
 from pipeline.objective.evaluate import Evaluator
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
@@ -17,7 +17,7 @@ from pipeline.sling import interact, launch
 
 from .test_interaction import random_thetas
 
-pytestmark = pytest.mark.skipif(not wp.is_cuda_available(), reason="no CUDA device on this machine")
+pytestmark = pytest.mark.skipif(not gpus(), reason="no CUDA device on this machine")
 
 
 def test_interaction_agrees_with_the_cpu(strong_grip, episode):
@@ -56,7 +56,7 @@ def test_what_stays_on_the_gpu_is_what_is_fetched(strong_grip, episode):
     assert np.array_equal(stays.force.numpy(), fetched.force)
 
 
-@pytest.mark.skipif(wp.get_cuda_device_count() < 2, reason="fewer than two GPUs on this machine")
+@pytest.mark.skipif(len(gpus()) < 2, reason="fewer than two GPUs on this machine")
 def test_gpus_share_a_batch_and_change_nothing(strong_grip, sling, episode, monkeypatch):
     """Rollouts with their loss in shares of 34 and 33, and launches."""
     time = episode.cloud_time

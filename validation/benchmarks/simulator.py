@@ -23,8 +23,9 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import qmc
 
+import pipeline.sling
 from pipeline.base.fingerprint import fingerprint
-from pipeline.base.machine import named
+from pipeline.base.machine import gpus, named
 from pipeline.episode.episode import Episode
 from pipeline.objective.evaluate import Evaluator
 from pipeline.objective.loss import EpisodeLoss
@@ -38,7 +39,7 @@ BATCHES = {"cpu": (64, 256), "cuda": (64, 1024, 16384)}
 DRAW = 0.35  # m
 THETA = (2e5, 0.45, 2e-3, 0.5, 0.5)  # of the band that is recorded
 GRASP, LIFTED, DRAWN, RELEASE, DURATION = 1.0, 2.0, 6.0, 8.1, 9.0  # s
-SIMULATOR = fingerprint(Path(__file__).parent / "sling")[:12]  # as it is imported
+SIMULATOR = fingerprint(Path(pipeline.sling.__file__).parent)[:12]  # as it is imported
 REPEATS = 3  # the best of them counts: others may use the machine too
 
 
@@ -143,9 +144,7 @@ def yardstick(band, params) -> Sling:
 
 
 def available(device: str) -> bool:
-    import warp as wp
-
-    return device in {str(one) for one in wp.get_devices()} | {"cpu"}
+    return device in {"cpu", *gpus()}
 
 
 def environment(device: str, command: str = "") -> dict:

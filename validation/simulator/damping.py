@@ -244,8 +244,8 @@ def section(bench: Bench) -> Section:
         "A heavy middle of a stretched, light string, a band made"
         f" {STRING} times thinner, decays as k and c in closed form say"
         " (`validation/simulator/closed.py`). Dissipation is a quadratic form of the rates, whose"
-        " lowest eigenvalue is taken in random states of the whole band, near rest and far from it; and"
-        " random states are let go without gravity, ends clamped or free, to see whether the"
+        " lowest eigenvalue is taken in random states of the whole band, near rest and far from it;"
+        " and random states are let go without gravity, ends clamped or free, to see whether the"
         " simulator's own steps ever gain energy. Those that do not converge are marked failed and"
         " left out: most of the inverted states, turned inside out, and more than half of those"
         " far from rest.",

@@ -12,7 +12,7 @@ from pathlib import Path
 from pipeline.base import errors
 from pipeline.base.files import write_json
 from pipeline.base.machine import cores
-from pipeline.objective.clamps import fit_mounting
+from pipeline.objective.clamps import calibrate_clamps
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.session import load_episode
 from pipeline.sling.model import Sling
@@ -23,7 +23,7 @@ def main() -> None:
     params, band = started("band")
     # with the rod, whatever simulates afterwards: a solid mesh has no rigidity to fit
     sling = Sling.of(params.bands[band], params.setup, params.sling, as_rod=True)
-    content = fit_mounting(
+    content = calibrate_clamps(
         sling,
         load_episode(band),
         lambda part: EpisodeLoss.plain(params, part, sling),

@@ -19,7 +19,7 @@ from pipeline.objective.evaluate import NOT_FINITE, Evaluation, Evaluator
 from pipeline.objective.loss import TERMS
 
 
-class Memo:
+class EvaluationCache:
     """An evaluator that looks into a folder before it simulates."""
 
     def __init__(self, evaluate: Evaluator, folder: Path, fingerprint: str) -> None:

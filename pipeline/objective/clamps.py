@@ -73,7 +73,7 @@ def nominal_young(sling: Sling, episode: Episode) -> float:
     return float(3 * tension / (sling.area * (stretch - stretch**-2)))
 
 
-def fit_mounting(sling: Sling, episode: Episode, make_loss, *, workers: int) -> dict:
+def calibrate_clamps(sling: Sling, episode: Episode, make_loss, *, workers: int) -> dict:
     """Fit the clamps' angle and the flexural rigidity to the slack part of an episode.
 
     Args:
@@ -90,14 +90,14 @@ def fit_mounting(sling: Sling, episode: Episode, make_loss, *, workers: int) -> 
     theta = np.array([young, POISSON, 5e-3, 1.0, 1.0])
     held_fast = replace(sling, grip_force=1e6)
 
-    def mounted(angle: float) -> np.ndarray:
+    def direction(angle: float) -> np.ndarray:
         turn = Rotation.from_euler("y", -angle, degrees=True)
         return turn.apply(sling.clamp_direction)
 
     def losses(angle: float, rigidity: np.ndarray) -> np.ndarray:
         """One angle with several rigidities, which share a batch, shape (len(rigidity),)."""
         trial = replace(
-            held_fast, clamp_direction=mounted(angle), flexural_rigidity=solid * rigidity
+            held_fast, clamp_direction=direction(angle), flexural_rigidity=solid * rigidity
         )
         rollouts = interact(trial, part, np.tile(theta, (len(rigidity), 1)))
         terms = loss.terms(rollouts)
@@ -127,7 +127,7 @@ def fit_mounting(sling: Sling, episode: Episode, make_loss, *, workers: int) -> 
             f" bands.{episode.band} (mass, diameter, rest_length) and the extrinsics"
         )
     return {
-        "clamp_direction": mounted(angle).tolist(),
+        "clamp_direction": direction(angle).tolist(),
         "flexural_rigidity": solid * rigidity,
         "clamp_angle_deg": angle,
         "relative_rigidity": rigidity,

@@ -13,7 +13,7 @@ from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import devices, kind, workers
 from pipeline.base.progress import Progress
 from pipeline.episode.episode import Episode
-from pipeline.objective.cache import Memo
+from pipeline.objective.cache import EvaluationCache
 from pipeline.objective.evaluate import Evaluation, Evaluator
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
@@ -27,7 +27,7 @@ SOURCES = (  # the code that a term of the loss hangs on
 )
 
 
-class Told:
+class LoggingEvaluator:
     """An evaluator that tells of each batch: its number as in the history, and the best so far."""
 
     def __init__(self, evaluate: Callable[[np.ndarray], Evaluation], progress: Progress) -> None:
@@ -49,11 +49,11 @@ class Told:
         return evaluation
 
 
-def service(stage: str, band: str, method: str, params, rollouts: int) -> Told:
+def service(stage: str, band: str, method: str, params, rollouts: int) -> LoggingEvaluator:
     """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
     evaluate = evaluator(params, band, method)
     sections = (params.bands[band], params.setup, params.sling, params.force, params.loss)
-    memo = Memo(
+    cache = EvaluationCache(
         evaluate,
         Path(".checkpoints", band),
         fingerprint(
@@ -65,7 +65,7 @@ def service(stage: str, band: str, method: str, params, rollouts: int) -> Told:
             kind(),  # of the devices, not how many: that changes nothing
         ),
     )
-    return Told(memo, Progress(f"{stage}-{band}-{method}", rollouts, "rollouts"))
+    return LoggingEvaluator(cache, Progress(f"{stage}-{band}-{method}", rollouts, "rollouts"))
 
 
 def evaluator(params, band: str, method: str) -> Evaluator:

@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.base.fingerprint import fingerprint
-from pipeline.objective.cache import Memo
+from pipeline.objective.cache import EvaluationCache
 from pipeline.objective.evaluate import NOT_FINITE, Evaluation, Evaluator
 from pipeline.objective.session import SOURCES
 from pipeline.params.identification import Prior
@@ -87,8 +87,8 @@ def remembered(tmp_path: Path):
 
     def evaluate(units: list[np.ndarray], stamp: str = "x", **more) -> tuple[int, list[Evaluation]]:
         inner = bowl(fails=fails, **more)
-        memo = Memo(inner, tmp_path / "memory", stamp)
-        found = [memo(unit) for unit in units]
+        cache = EvaluationCache(inner, tmp_path / "memory", stamp)
+        found = [cache(unit) for unit in units]
         return inner.count, found
 
     return evaluate
@@ -189,10 +189,10 @@ def test_a_full_disk_is_said_in_one_line(tmp_path: Path) -> None:
 import resource
 from pathlib import Path
 from pipeline.base import errors
-from pipeline.objective.cache import Memo
+from pipeline.objective.cache import EvaluationCache
 from tests.objective.test_cache import batches, bowl
 resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))
-errors.run(lambda: Memo(bowl(), Path("memory"), "x")(batches(0.1)[0]) and None)
+errors.run(lambda: EvaluationCache(bowl(), Path("memory"), "x")(batches(0.1)[0]) and None)
 """
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
@@ -238,7 +238,7 @@ def test_a_loss_that_is_not_finite_is_so_by_the_weights(tmp_path: Path, first: s
     second = {"geom": "work", "work": "geom"}[first]
     for name in (first, second, first):
         inner = Evaluator(episode, toy.SLING, Loss(**{name: 1.0}), space, simulate=simulate)
-        expected, found = inner(unit), Memo(inner, tmp_path, "x")(unit)
+        expected, found = inner(unit), EvaluationCache(inner, tmp_path, "x")(unit)
         assert found.failure == expected.failure
         assert (NOT_FINITE in found.failure) == (name == "work")
         np.testing.assert_array_equal(found.total, expected.total)

@@ -11,7 +11,7 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import average, uniform
-from pipeline.objective.clamps import fit_mounting, nominal_young, slack_part
+from pipeline.objective.clamps import calibrate_clamps, nominal_young, slack_part
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.params import load
 from pipeline.sling.interaction import interact
@@ -79,7 +79,7 @@ def episode() -> Episode:
 
 def test_angle_and_rigidity_are_found(episode):
     sling = Sling.of(BAND, PARAMS.setup, PARAMS.sling)
-    found = fit_mounting(
+    found = calibrate_clamps(
         sling, episode, lambda part: EpisodeLoss.plain(PARAMS, part, sling), workers=2
     )
     assert found["clamp_angle_deg"] == pytest.approx(15.0, abs=5.0)

@@ -1,4 +1,4 @@
-"""A search that kills itself in the middle of its batch number `argv[4]`; see test_memo.py.
+"""A search that kills itself in the middle of its batch number `argv[4]`; see test_cache.py.
 
 python -m tests.search.killed OPTIMISER MEMORY OUTPUT BATCH
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.objective.cache import Memo
+from pipeline.objective.cache import EvaluationCache
 from pipeline.search.history import History
 from tests.search.functions import CENTRE, Evaluate, alone, chain, correlated, quadratic
 
@@ -36,7 +36,7 @@ def main() -> None:
         return VALLEY(unit)
 
     evaluate = Evaluate(dies)
-    for number, history in enumerate(searched(name, Memo(evaluate, folder, "inputs"))):
+    for number, history in enumerate(searched(name, EvaluationCache(evaluate, folder, "inputs"))):
         history.save(output / f"{number}.parquet")
     print(evaluate.count)
 

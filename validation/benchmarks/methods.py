@@ -16,7 +16,7 @@ import numpy as np
 
 from pipeline.base.machine import named
 from pipeline.episode.episode import Episode
-from pipeline.objective.cache import Memo
+from pipeline.objective.cache import EvaluationCache
 from pipeline.objective.evaluate import Evaluator, simulated
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
@@ -86,8 +86,10 @@ def time_search(
 ) -> tuple[dict, History]:
     """One search from nothing, all its rollouts counted; and what it evaluated."""
     with tempfile.TemporaryDirectory() as folder:
-        memo = Memo(evaluator(params, method, sling, episode, devices), Path(folder), "bench")
-        evaluate = Clocked(memo)
+        cache = EvaluationCache(
+            evaluator(params, method, sling, episode, devices), Path(folder), "bench"
+        )
+        evaluate = Clocked(cache)
         history, cpu, wall = timed(partial(complete, params, method, optimizer, evaluate))
     count, about = len(history.total), params.methods[method]
     row = {

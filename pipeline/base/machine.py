@@ -8,7 +8,9 @@ SLING_WORKERS: threads on the CPU (default: all cores that this process may use)
 from __future__ import annotations
 
 import os
+import platform
 import re
+import subprocess
 from pathlib import Path
 
 from pipeline.base.errors import UserError
@@ -83,3 +85,23 @@ def cores() -> int:
     except (OSError, ValueError):
         return ours or 1
     return min(ours or 1, -(-time // period))
+
+
+def processor() -> str:
+    """The processor's name where Linux tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def commit(folder: Path) -> str | None:
+    """What Git calls the working copy that `folder` lies in; None where that is not known."""
+    about = ["git", "describe", "--always", "--dirty"]
+    try:
+        git = subprocess.run(about, cwd=folder, capture_output=True, text=True, check=False)
+    except OSError:
+        return None
+    return git.stdout.strip() or None

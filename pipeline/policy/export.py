@@ -7,7 +7,6 @@ normalisation is inside. Equal networks give equal bytes, so the cache sees when
 from __future__ import annotations
 
 import io
-import platform
 import warnings
 import zipfile
 from importlib.metadata import version
@@ -194,8 +193,8 @@ def card(
         },
         "training": {name: _strict(training[name]) for name in training},
         "landing_map": landing_map,
-        "trained_on": {"device": device, "machine": platform.machine()},
-        "versions": {"python": platform.python_version(), **{name: version(name) for name in USED}},
+        "trained_on": {"device": device},
+        "versions": {name: version(name).partition("+")[0] for name in USED},
     }
 
 

@@ -1,4 +1,4 @@
-"""Write reports/: README.md, its pictures, tables and metrics, and all in index.html."""
+"""Write reports/: README.md, its pictures, tables and metrics, all in index.html, and run.js."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pipeline.report.chapters.summary import summary
 from pipeline.report.metrics import metrics
 from pipeline.report.page import write_page
 from pipeline.report.report import Report
+from pipeline.report.run import write_run
 from pipeline.report.tables.paper_tables import paper_tables
 
 # Each makes its text of a Report, and writes the pictures and tables that the text names.
@@ -26,4 +27,5 @@ def write(params, root: str | Path = ".") -> None:
     for name, content in metrics(report.results).items():
         write_json(report.folder / "metrics" / f"{name}.json", content)
     write_text(report.folder / "README.md", markdown)
+    write_run(report.folder)
     write_page(report, markdown)

@@ -25,7 +25,7 @@ from scipy.stats import qmc
 
 import pipeline.sling
 from pipeline.base.fingerprint import fingerprint
-from pipeline.base.machine import gpus, named
+from pipeline.base.machine import commit, gpus, named, processor
 from pipeline.episode.episode import Episode
 from pipeline.objective.evaluate import Evaluator
 from pipeline.objective.loss import EpisodeLoss
@@ -154,16 +154,9 @@ def environment(device: str, command: str = "") -> dict:
     """
     import warp as wp
 
-    devices, name = named(device, "--device"), _processor()
+    devices, name = named(device, "--device"), processor()
     if device != "cpu":
         name = wp.get_device(devices[0]).name
-    git = subprocess.run(
-        ["git", "describe", "--always", "--dirty"],
-        cwd=Path(__file__).parent,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
     packages = ("warp-lang", "numpy", "scipy")
     return {
         "device": device,
@@ -171,21 +164,11 @@ def environment(device: str, command: str = "") -> dict:
         "devices": len(devices),
         "cores": os.cpu_count(),
         "command": command or f"sling bench --device {device} --json",
-        "commit": git.stdout.strip() or None,
+        "commit": commit(Path(__file__).parent),
         "simulator": SIMULATOR,
         "versions": {"python": platform.python_version()}
         | {package: version(package) for package in packages},
     }
-
-
-def _processor() -> str:
-    """The processor's name where Linux tells it."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or platform.machine()
 
 
 def seconds(run: Callable[[], object], repeats: int = REPEATS) -> float:

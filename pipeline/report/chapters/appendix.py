@@ -1,15 +1,10 @@
-"""The policies, budget and versions."""
+"""The policies and the budget."""
 
 from __future__ import annotations
-
-import platform
-from importlib.metadata import version
 
 from pipeline.report.report import Report
 from pipeline.report.tables import policies as tables
 from pipeline.report.tables.cells import markdown
-
-PACKAGES = ("numpy", "scipy", "warp-lang", "cma", "torch", "rsl-rl-lib", "pyarrow", "dvc")
 
 
 def policies(report: Report) -> str:
@@ -30,10 +25,9 @@ errors of the draw, of a robust policy and of the plain one beside it.
 def budget(report: Report) -> str:
     params = report.params
     optimizer, policy, trials = params.optimizer, params.policy, params.trials
-    versions = [f"python {platform.python_version()}", *(f"{n} {version(n)}" for n in PACKAGES)]
     explored = optimizer.population * (optimizer.generations + 1)
     return f"""\
-## Budget and versions
+## Budget
 
 - Search: {explored} rollouts of exploration ({optimizer.population} agents, moved
   {optimizer.generations} times), then {optimizer.cma_rollouts} of CMA-ES shared by the regions; a
@@ -44,5 +38,4 @@ def budget(report: Report) -> str:
   {1e3 * trials.actuation_error:g} mm (standard deviation) on the virtual rig, with the same errors
   for every method.
 - Seeds: search {optimizer.seed}, policy {policy.seed}, trials {trials.seed}.
-- Versions: {", ".join(versions)}.
 """

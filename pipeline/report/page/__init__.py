@@ -1,7 +1,7 @@
-"""reports/index.html: the report as one file that fetches nothing, with a replay to turn and play.
+"""reports/index.html: the report as one file without a network, with a replay to turn and play.
 
-Its content security policy forbids every request, so that what is shown is what the file holds.
-Equal inputs give equal bytes.
+Its content security policy forbids every request but for run.js beside it, which says where and
+when it was written and may be missing. Equal inputs give equal bytes.
 """
 
 from __future__ import annotations

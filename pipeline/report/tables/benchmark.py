@@ -174,7 +174,7 @@ def records(rows: list[Row]) -> pd.DataFrame:
                     "target_m": key,
                     "launches": one["launches"],
                     "failed": one["failed"],
-                    "mean_error_cm": f"{100 * one['mean']:.6g}" if counts else "N/A",
+                    "mean_error_cm": f"{100 * one['mean']:.4g}" if counts else "N/A",
                     "std_cm": 100 * one["std"],
                     "std_within_targets_cm": 100 * one.get("pooled_std", one["std"]),
                     "bias_cm": 100 * one.get("bias", math.nan),

@@ -159,4 +159,4 @@ def _noise(params, results: Results, named: Styles, folder: Path) -> list[str]:
 
 def _write_csv(path: Path, records: pd.DataFrame) -> None:
     with replacing(path) as temporary:
-        records.to_csv(temporary, index=False, float_format="%.6g", lineterminator="\n")
+        records.to_csv(temporary, index=False, float_format="%.4g", lineterminator="\n")

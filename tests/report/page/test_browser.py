@@ -21,6 +21,7 @@ from PIL import Image
 from pipeline.report.page import write_page
 from pipeline.report.report import Report
 from pipeline.report.results import gather
+from pipeline.report.run import write_run
 from pipeline.report.styles import styles
 from tests.report.conftest import BAND, METHOD
 from tests.report.toy_replay import toy_replay
@@ -75,6 +76,7 @@ addEventListener("load", async () => {
     seen.hidden = await state();
     seen.other = await act("band", "change", 1);
   } catch (error) { failures.push(String(error)); }
+  seen.run = find("run").textContent;
   seen.requests = performance.getEntriesByType("resource").map((one) => one.name)
     .filter((name) => !name.startsWith("data:") && !name.startsWith("blob:"));
   seen.failures = [...failures];
@@ -112,12 +114,13 @@ def pages(root, params):
     replays = {BAND: {METHOD: one, "de": one}, "far": {METHOD: far}}
     report = Report(params, results, replays, styles([METHOD, "de"]), root)
     write_page(report, "# Report\n\n## In short\n")
+    write_run(report.folder, runs="a test")
     return report.folder / "index.html", one, far
 
 
 def visited(page, tmp_path) -> dict:
     text = page.read_text("utf-8")
-    probed = tmp_path / "probed.html"
+    probed = page.with_name("probed.html")  # beside run.js
     text = text.replace("<head>", f"<head>{LISTEN}", 1)
     probed.write_text(text.replace("</body>", f"{VISIT}</body>"), "utf-8")
     profile = tmp_path / "profile"
@@ -146,6 +149,7 @@ def test_the_replay_runs_alone_and_without_an_error(pages, tmp_path) -> None:
     page, one, far = pages
     seen = visited(page, tmp_path)
     assert seen["failures"] == [] and seen["requests"] == [] and seen["noticed"] > 0
+    assert seen["run"].startswith("This run. written: ") and "runs: a test" in seen["run"]
 
     named = styles([METHOD, "de"])
     start, slid = seen["start"], seen["slid"]

@@ -21,7 +21,8 @@ from pipeline.confidence.rounds import NoConfidence
 from pipeline.confidence.summary import confidence
 from pipeline.objective.session import load_episode
 from pipeline.search.history import History, theta_content
-from pipeline.sling.model import THETA, load_sling
+from pipeline.sling.load import load_sling
+from pipeline.sling.material import THETA
 from stages.start import expect_from, started
 
 

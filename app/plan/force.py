@@ -141,7 +141,7 @@ def predict(
 
 def _simulated(params, band: str, drawn: np.ndarray, path: Path) -> float:
     from pipeline.sling.launch import launch
-    from pipeline.sling.model import load_sling
+    from pipeline.sling.load import load_sling
     from pipeline.sling.theta import load_theta, vector
 
     theta = vector(load_theta(path, band))

@@ -14,7 +14,7 @@ from pipeline.confidence.profile import profiles
 from pipeline.confidence.residuals import PHASES
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import cutoff_hz
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 
 SAMPLES = 200  # that are kept
 UNITS = {

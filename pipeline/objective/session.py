@@ -17,7 +17,7 @@ from pipeline.objective.cache import EvaluationCache
 from pipeline.objective.evaluate import Evaluation, Evaluator
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
-from pipeline.sling.model import load_sling, mounting_path
+from pipeline.sling.load import load_sling, mounting_path
 from stages.start import expect_episode
 
 PIPELINE = Path(__file__).parents[1]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.params.identification import NUISANCES, Prior
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from pipeline.sling.interaction import Rollouts, interact
 from pipeline.sling.launch import Launches, launch
-from pipeline.sling.model import THETA, Sling
+from pipeline.sling.material import THETA
+from pipeline.sling.model import Sling
 
 __all__ = ["THETA", "Launches", "Rollouts", "Sling", "interact", "launch"]

@@ -1,4 +1,4 @@
-"""A tetrahedral mesh of the band: a cylinder in layers, three tetrahedra a prism."""
+"""A tetrahedral mesh of the band: a cylinder in cross-sections, three tetrahedra a prism."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import numpy as np
 
 
 def cylinder(arc: np.ndarray, diameter: float, rings: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Mesh a straight cylinder along x with one layer of vertices at each place of `arc`.
+    """Mesh a straight cylinder along x with one cross-section of vertices at each place of `arc`.
 
     The section is a centre and `rings` rings of 6, 12, ... vertices, scaled to the circle's area.
     Diagonals run from the lower to the higher index, so that neighbours share them.
 
     Args:
-        arc: Ascending places of the layers along the axis [m], shape (L,).
+        arc: Ascending places of the sections along the axis [m], shape (L,).
         diameter: Of the round section [m].
 
     Returns:
         Rest vertices (L, V, 3) and positively oriented tetrahedra (T, 4), as indices into the
-        vertices in row-major order; layer after layer, V = 1 + 3 rings (rings + 1).
+        vertices in row-major order; section after section, V = 1 + 3 rings (rings + 1).
     """
     points, triangles = section(diameter / 2, rings)
     vertices = np.empty((len(arc), len(points), 3))
@@ -28,24 +28,12 @@ def cylinder(arc: np.ndarray, diameter: float, rings: int = 1) -> tuple[np.ndarr
     high = low + len(points)
     a, b, c, up = low[:, 0], low[:, 1], low[:, 2], high
     prism = np.stack([[a, b, c, up[:, 2]], [a, b, up[:, 1], up[:, 2]], [a, *up.T]])
-    layer = prism.transpose(2, 0, 1).reshape(-1, 4)
-    edges = np.diff(vertices.reshape(-1, 3)[layer], axis=1)
+    slab = prism.transpose(2, 0, 1).reshape(-1, 4)
+    edges = np.diff(vertices.reshape(-1, 3)[slab], axis=1)
     turned = np.linalg.det(edges) < 0
-    layer[turned] = layer[turned][:, [0, 2, 1, 3]]
-    tetrahedra = np.arange(len(arc) - 1)[:, None, None] * len(points) + layer
+    slab[turned] = slab[turned][:, [0, 2, 1, 3]]
+    tetrahedra = np.arange(len(arc) - 1)[:, None, None] * len(points) + slab
     return vertices, tetrahedra.reshape(-1, 4)
-
-
-def layers(length: float, count: int, clamped: float = 0.0) -> np.ndarray:
-    """Places of `count` layers along a band, shape (count,), 0 where it leaves the first clamp.
-
-    Args:
-        length: Whole length [m]; `clamped` of it at each end is one interval in the clamp.
-    """
-    if not clamped:
-        return np.linspace(0.0, length, count)
-    free = length - 2 * clamped
-    return np.concatenate([[-clamped], np.linspace(0.0, free, count - 2), [free + clamped]])
 
 
 def section(radius: float, rings: int = 1) -> tuple[np.ndarray, np.ndarray]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.sling.model import Sling, drawn_guess, material
+from pipeline.sling.initial import drawn_guess
+from pipeline.sling.material import material
+from pipeline.sling.model import Sling
 from pipeline.sling.solver import (
     FAILURE,
     FREE,
@@ -21,7 +23,7 @@ LONG = 10.0 ** np.arange(1, 6)  # s: steps in which the weight's inertia counts 
 
 
 def hang(sling: Sling, thetas: np.ndarray, load: float) -> np.ndarray:
-    """Nodes [m] of the band at rest under a weight at its middle, shape (N, layers, 3).
+    """Nodes [m] of the band at rest under a weight at its middle, shape (N, sections, 3).
 
     NaN where the simulation did not converge. There is no floor.
 

@@ -9,7 +9,9 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
-from pipeline.sling.model import Sling, hanging_guess, material
+from pipeline.sling.initial import hanging_guess
+from pipeline.sling.material import material
+from pipeline.sling.model import Sling
 from pipeline.sling.solver import (
     FAILURE,
     FREE,
@@ -37,7 +39,7 @@ class Rollouts:
         times: Ends of the steps [s], shape (S,); irregular.
         force: Of the band on the gripper [N], shape (N, S, 3).
         cloud_time: The camera's stamps [s], shape (K,).
-        center_line: Nodes of the band at those stamps [m], shape (N, K, layers, 3), float32.
+        center_line: Nodes of the band at those stamps [m], shape (N, K, sections, 3), float32.
         failure: None, or why this rollout counts for nothing, length N.
         iterations: Newton steps it took, shape (N,); those of a SIMD vector or a warp together.
     """

@@ -13,7 +13,7 @@ from pipeline.sling.tetrahedra import CORNERS
 
 @built_once
 def sling_kernel(
-    element: str, unknowns: int, layers: int, middle: int, double: bool, lanes: int, team: int
+    element: str, dofs: int, sections: int, middle: int, double: bool, lanes: int, team: int
 ):
     """Compile the native text for a mesh; Warp keeps the binary in its cache."""
     scalar = wp.float64 if double else wp.float32
@@ -25,8 +25,8 @@ def sling_kernel(
         SC="double" if double else "float",
         W=lanes,
         T=team,
-        N=unknowns,
-        L=layers,
+        N=dofs,
+        L=sections,
         MID=middle,
         **tetrahedra,
     )

@@ -2,9 +2,9 @@
 //
 // A team of T threads steps one sling. On a CPU T is 1 and the thread has W slings in its SIMD lanes (`real`
 // is a vector of W numbers). On a GPU `real` is one number, a warp has 32 / T teams, and the threads of a
-// team share the work: each has a layer to assemble and a column of the blocks to eliminate.
+// team share the work: each has a section to assemble and a column of the blocks to eliminate.
 //
-// Wants the macros SC (float or double), W, T, L (layers), MID (the held layer), N (unknowns of a layer).
+// Wants the macros SC (float or double), W, T, L (cross-sections), MID (the held one), N (degrees of freedom of each).
 
 #if defined(__CUDA_ARCH__)
 typedef SC real;

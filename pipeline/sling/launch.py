@@ -8,18 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.sling.model import GRAVITY, Sling, drawn_guess, material
+from pipeline.sling.initial import drawn_guess
+from pipeline.sling.material import material
+from pipeline.sling.model import GRAVITY, Sling
 from pipeline.sling.solver import (
     DIRECTION,
     FAILURE,
     FREE,
     HELD_FORCE,
     LANE_STATE,
-    LEAVING,
     LEFT,
     PAYLOAD,
     POUCH,
     RELAX_STEPS,
+    SEPARATION,
     Schedule,
     relaxation,
     run,
@@ -38,8 +40,8 @@ class Launches:
         speed, angle: Of the projectile as it leaves the pouch [m/s, rad above the horizon].
         hold_force: Of the drawn band on the hand, shape (N,); known for failed launches too,
             but for those that did not converge.
-        leave_time: After the release [s].
-        leave_y, leave_z: Where it leaves.
+        separation_time: After the release [s].
+        separation_y, separation_z: Where it leaves.
         failure: None, or the reason, length N.
     """
 
@@ -47,9 +49,9 @@ class Launches:
     speed: np.ndarray
     angle: np.ndarray
     hold_force: np.ndarray
-    leave_time: np.ndarray
-    leave_y: np.ndarray
-    leave_z: np.ndarray
+    separation_time: np.ndarray
+    separation_y: np.ndarray
+    separation_z: np.ndarray
     failure: list[str | None]
 
 
@@ -112,7 +114,7 @@ def launch(
     hold_force = np.linalg.norm(lane_state[:, HELD_FORCE].astype(float), axis=1)
     code = np.round(lane_state[:, FAILURE])
     hold_force[code > 0] = np.nan
-    time, y, z, vy, vz = lane_state[:, LEAVING].astype(float).T
+    time, y, z, vy, vz = lane_state[:, SEPARATION].astype(float).T
     landing = ballistic_landing(y, z, vy, vz, -sling.fork_height)
     failure: list[str | None] = []
     for i in range(count):

@@ -1,6 +1,6 @@
 // The element: an extensible director rod.
 //
-// Layer i holds the node r_i and the directors a_i, b_i of the edge between r_i and r_i+1: 9 unknowns.
+// Cross-section i holds the node r_i and the directors a_i, b_i of the edge between r_i and r_i+1: 9 degrees of freedom.
 // With g_i = (r_i+1 - r_i) / ds, the deformation gradient of an edge is F = [g a b], of the material of
 // material.h. Each edge has its own rest length ds, a joint the length l between the middles of its edges, and
 //
@@ -11,15 +11,15 @@
 // d s/2 times the first, bending form in the rates damps it: with the twist's part of it, neighbours that are turned
 // far from each other would gain energy.
 //
-// For solve.h and step.h: what one layer adds to the Hessian and the residual (stage_layer), as columns (column), and what
-// else depends on the element: which unknowns are places (the first ones), their masses, and the hand's hold.
+// For solve.h and step.h: what one section adds to the Hessian and the residual (stage_section), as columns (column), and what
+// else depends on the element: which degrees of freedom are places (the first ones), their masses, and the hand's hold.
 
-const int PLACES = 3;  // of the node; the other unknowns are directors
-auto share = [](int) -> SC { return 1; };             // of a place in the layer's mass
+const int PLACES = 3;  // of the node; the others are directors
+auto share = [](int) -> SC { return 1; };             // of a place in the section's mass
 auto in_hand = [](int) -> SC { return 0; };           // a place from the hand's, while it is held
 
-// a staged layer: its own block (lower triangle), stretch between nodes, gradient of the twist on both sides of
-// the joint, coefficients of bending and twist, residual of this layer and of the next
+// a staged section: its own block (lower triangle), stretch between nodes, gradient of the twist on both sides of
+// the joint, coefficients of bending and twist, residual of this section and of the next
 enum { OWN = 0, STRETCH = 45, TWIST = 51, TWIST_NEXT = 57, BEND = 63, TWISTING = 64, FORCE = 65, FORCE_NEXT = 74, STAGED = 83 };
 #if defined(__CUDA_ARCH__)
 __shared__ SC staged[STAGED * 33], felt[54 * TEAMS];
@@ -36,7 +36,7 @@ real staged[STAGED], felt[54];
 #define RESIDUAL_NEXT(m, j) GET(FORCE_NEXT + (m), j)
 #define LOWER(m, n) ((m) >= (n) ? (m) * ((m) + 1) / 2 + (n) : (n) * ((n) + 1) / 2 + (m))
 
-// which unknowns have an equation: not a node that is clamped or held, nor the directors of the last layer, which
+// which degrees of freedom have an equation: not a node that is clamped or held, nor the directors of the last section, which
 // has no edge (they are the clamp's)
 auto moves = [&](int i, int m) -> bool {
   if (m >= 3) return i < L - 1;
@@ -64,7 +64,7 @@ auto hand_force = [&](int c, real scale) -> real {
   return force;
 };
 
-auto stage_layer = [&](int i) {
+auto stage_section = [&](int i) {
   real own[45], f[N], f_next[N];
   UNROLL for (int m = 0; m < 45; ++m) own[m] = zero;
   UNROLL for (int m = 0; m < N; ++m) f_next[m] = zero;
@@ -159,8 +159,8 @@ auto stage_layer = [&](int i) {
   UNROLL for (int m = 0; m < N; ++m) { PUT(FORCE + m) = f[m]; PUT(FORCE_NEXT + m) = f_next[m]; }
 };
 
-// column c of a staged layer: D of its block, U of the transposed coupling with the next layer (what its unknown c
-// feels of this layer), and what is carried into the next layer's block; c = N is the residual
+// column c of a staged section: D of its block, U of the transposed coupling with the next section (what its number c
+// feels of this section), and what is carried into the next section's block; c = N is the residual
 auto column = [&](int j, int c, real* D, real* U, real* carry) {
   const bool residual = c >= N, node = c < 3, director = !residual && !node;
   const real bend = GET(BEND, j), twisting = -GET(TWISTING, j) * GET(TWIST_NEXT + (director ? c - 3 : 0), j);

@@ -1,13 +1,13 @@
-// Newton's system: the Hessian is block-tridiagonal, a block N x N a layer. It is eliminated from the first layer to
+// Newton's system: the Hessian is block-tridiagonal, a block N x N a section. It is eliminated from the first section to
 // the last (D = L diag L' of each block; Schur complement into the next) and substituted back.
 //
-// A thread has COLUMNS columns of a block: of D itself, of U, the transposed coupling with the next layer, and of
-// `next`, what goes into the next layer's block. Column N of U and `next` is the residual.
+// A thread has COLUMNS columns of a block: of D itself, of U, the transposed coupling with the next section, and of
+// `next`, what goes into the next section's block. Column N of U and `next` is the residual.
 
 real change = zero, imbalance = zero;         // longest entry of Newton's step [m]; largest residual [N]
 real indefinite = zero, poison = zero;        // whether a pivot is not positive; no number as soon as anything is
 
-// the residual of the layers from `first` on, a layer a member, before elimination mixes it
+// the residual of the sections from `first` on, a section a member, before elimination mixes it
 auto weigh = [&](int first, real (&before)[N]) {
   const int i = first + member;
   if (i < L) UNROLL for (int m = 0; m < N; ++m) {
@@ -17,9 +17,9 @@ auto weigh = [&](int first, real (&before)[N]) {
   UNROLL for (int m = 0; m < N; ++m) before[m] = RESIDUAL_NEXT(m, T - 1);
 };
 
-// my columns of layer i, of which `next` has what the layers before left
+// my columns of section i, of which `next` has what the sections before left
 auto take = [&](int i, real (&D)[COLUMNS][N], real (&U)[COLUMNS][N], real (&next)[COLUMNS][N]) {
-  const bool special = i == 0 || i == MID - 1 || i == MID || i >= L - 2;  // some unknowns there may have no equation
+  const bool special = i == 0 || i == MID - 1 || i == MID || i >= L - 2;  // some degrees of freedom there may have no equation
   UNROLL for (int q = 0; q < COLUMNS; ++q) {
     const int c = q + member;
     real carry[N];
@@ -67,7 +67,7 @@ auto factorise = [&](real (&D)[COLUMNS][N], real (&U)[COLUMNS][N], real (&invers
 #endif
 };
 
-// Schur complement into the next layer; what the back substitution needs is kept
+// Schur complement into the next section; what the back substitution needs is kept
 auto complement = [&](int i, real (&D)[COLUMNS][N], real (&U)[COLUMNS][N], real (&inverse)[N], real (&own_inverse)[COLUMNS],
                       real (&next)[COLUMNS][N]) {
   SHARE(U);
@@ -89,7 +89,7 @@ auto complement = [&](int i, real (&D)[COLUMNS][N], real (&U)[COLUMNS][N], real 
 };
 
 auto substitute = [&]() {
-  real after[COLUMNS];  // of layer i + 1
+  real after[COLUMNS];  // of section i + 1
   UNROLL for (int q = 0; q < COLUMNS; ++q) after[q] = zero;
   BEGIN_KEPT;
   for (int i = L - 1; i >= 0; --i) {
@@ -124,7 +124,7 @@ auto solve = [&]() {
   for (int i = 0; i < L; ++i) {
     if (i % T == 0) {
       SYNC;
-      if (i + member < L) stage_layer(i + member);
+      if (i + member < L) stage_section(i + member);
       SYNC;
       weigh(i, before);
     }

@@ -9,11 +9,12 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.sling import tetrahedra
-from pipeline.sling.model import GRAVITY, TETRAHEDRA, Sling, fixed_frames
+from pipeline.sling.initial import fixed_frames
+from pipeline.sling.model import GRAVITY, TETRAHEDRA, Sling
 
 LANES, TEAM = 16, 10  # slings in a CPU thread's SIMD lanes; GPU threads that share a sling
 NOT_CONVERGED, SLIPPED, LEFT = 1, 2, -1  # lane_state[4] as state.h says
-DIRECTION, PAYLOAD, FAILURE, LEAVING, HELD_FORCE = slice(0, 3), 3, 4, slice(5, 10), slice(10, 13)
+DIRECTION, PAYLOAD, FAILURE, SEPARATION, HELD_FORCE = slice(0, 3), 3, 4, slice(5, 10), slice(10, 13)
 ITERATIONS, LANE_STATE = 13, 14
 
 
@@ -92,14 +93,14 @@ def _widths(
 ) -> dict[str, int]:
     """Numbers that each array holds of one sling."""
     # of a GPU, a warp's spare threads count
-    columns = -(-32 // (32 // TEAM)) if on_gpu else sling.unknowns + 1
+    columns = -(-32 // (32 // TEAM)) if on_gpu else sling.dofs + 1
     return {
-        "state": sling.unknowns * sling.layers,
+        "state": sling.dofs * sling.sections,
         "lane_state": LANE_STATE,
-        "scratch": 9 * sling.unknowns * sling.layers,
-        "saved": (2 * sling.unknowns + 1) * sling.layers * columns,
+        "scratch": 9 * sling.dofs * sling.sections,
+        "saved": (2 * sling.dofs + 1) * sling.sections * columns,
         "output": 0 if launching else 4 * n_steps,
-        "frames": n_frames * sling.layers * frame_width,
+        "frames": n_frames * sling.sections * frame_width,
     }
 
 
@@ -114,11 +115,11 @@ class Result:
     """Of N slings through S steps, K frames recorded.
 
     Attributes:
-        state: At the end, shape (N, layers, unknowns).
+        state: At the end, shape (N, sections, dofs).
         lane_state: As documented in state.h, shape (N, LANE_STATE).
         output: Force on the hand and Newton iterations of each step, shape (N, S, 4); empty for
             launches.
-        frames: Shape (N, K, layers, width). This and `output` are what is long: from a GPU they
+        frames: Shape (N, K, sections, width). This and `output` are what is long: from a GPU they
             come as Warp arrays that stay there, if asked for.
     """
 
@@ -151,10 +152,10 @@ def run(
 
     Args:
         parameters: As `model.material` gives them, shape (N, 7).
-        state: Initial layers, shape (N, layers, unknowns) or (layers, unknowns).
+        state: Initial sections, shape (N, sections, dofs) or (sections, dofs).
         lane_state: As documented in state.h, shape (N, LANE_STATE).
         frame_steps, frame_weights: Step in which each frame falls and its place in it, shape (K,).
-        frame_width: 3 for centre lines, `sling.unknowns` for all of each layer.
+        frame_width: 3 for centre lines, `sling.dofs` for all of each section.
         launching: The projectile (lane_state[:, PAYLOAD]) is followed until it leaves.
         fetch: Copy what is long from a GPU.
         workers: Threads, on the CPU; a result does not depend on their number.
@@ -176,9 +177,9 @@ def run(
     dtype, scalar = (np.float64, wp.float64) if double else (np.float32, wp.float32)
     lanes, team = (1, TEAM) if on_gpu else (LANES // (2 if double else 1), 1)
     together = 32 // team if on_gpu else 1  # rows of slings that one thread (one warp) steps
-    layers, unknowns = sling.layers, sling.unknowns
+    sections, dofs = sling.sections, sling.dofs
     count, n_steps, n_frames = len(parameters), len(schedule.table), len(frame_steps)
-    kernel = sling_kernel(sling.mesh, unknowns, layers, sling.middle, double, lanes, team)
+    kernel = sling_kernel(sling.mesh, dofs, sections, sling.middle, double, lanes, team)
 
     mesh, shortest = sling.edge_lengths, sling.edge_lengths.min()
     if sling.mesh == TETRAHEDRA:
@@ -198,7 +199,7 @@ def run(
         wp.array(first, device=device),
         wp.array(np.append(frame_weights, 0.0).astype(dtype), device=device),
     ]
-    state = np.broadcast_to(state, (count, layers, unknowns)).swapaxes(1, 2).reshape(count, -1)
+    state = np.broadcast_to(state, (count, sections, dofs)).swapaxes(1, 2).reshape(count, -1)
     rows = [
         _interleave(values, lanes, together, dtype) for values in (parameters, state, lane_state)
     ]
@@ -238,8 +239,8 @@ def run(
         arrays = [np.concatenate(values) for values in zip(*parts, strict=True)]
     state, lane_state, output, frames = (array[:count] for array in arrays)
     return Result(
-        state=state.reshape((count, unknowns, layers)).swapaxes(1, 2),
+        state=state.reshape((count, dofs, sections)).swapaxes(1, 2),
         lane_state=lane_state,
         output=output.reshape((count, 0 if launching else n_steps, 4)),
-        frames=frames.reshape((count, n_frames, layers, frame_width)),
+        frames=frames.reshape((count, n_frames, sections, frame_width)),
     )

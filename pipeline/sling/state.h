@@ -15,7 +15,7 @@ const SC node_shift = node_mass * (SC)2.5e5;  // the inertia of a 2 ms step
 auto PAR = ROW(parameter, 7);
 const real mu = PAR[0], lam = PAR[1], bulk = lam - mu / (SC)3, d = PAR[2], s = PAR[3], friction = PAR[4], drag = PAR[6];
 
-// unknown k of layer i: now, predicted, the y and xh of step.h, Newton's change, and of the two steps before
+// degree of freedom k of cross-section i: now, predicted, the y and xh of step.h, Newton's change, and of the two steps before
 auto INITIAL = ROW(state, N * L);
 auto STATE = ROW(scratch, 9 * N * L);
 #define FIELD(f, k, i) STATE[((f) * N + (k)) * L + (i)]
@@ -34,10 +34,10 @@ auto SAVE_ROWS = SAVE;
 #define KEEP(i, row, q) SAVE_ROWS[((i) * SAVED + (row)) * SAVE_STRIDE + (q)]
 
 #if defined(__CUDA_ARCH__)
-__shared__ __align__(16) SC rows[2 * TEAMS * (N + 1) * ROW_LENGTH];  // a layer's columns, for the whole team; two layers in turn
+__shared__ __align__(16) SC rows[2 * TEAMS * (N + 1) * ROW_LENGTH];  // a section's columns, for the whole team; two sections in turn
 #define SHARED(c, k) rows[(((i & 1) * TEAMS + team) * (N + 1) + (c)) * ROW_LENGTH + (k)]
 #define SHARE(U) if (member <= N) { UNROLL for (int k = 0; k < N; ++k) SHARED(member, k) = U[0][k]; } SYNC
-// the back substitution reads a layer ahead, so that it need not wait for the memory
+// the back substitution reads a section ahead, so that it need not wait for the memory
 #define BEGIN_KEPT SC now[SAVED], ahead[SAVED]; UNROLL for (int r = 1; r < SAVED; ++r) ahead[r] = KEEP(L - 1, r, 0)
 #define NEXT_KEPT(i) UNROLL for (int r = 1; r < SAVED; ++r) { now[r] = ahead[r]; ahead[r] = KEEP(i ? i - 1 : 0, r, 0); }
 #define KEPT(i, row, q) now[row]
@@ -59,7 +59,7 @@ UNROLL for (int c = 0; c < 5; ++c) leaving[c] = zero;
 
 // of the step under way
 SC ibh = 0, ibh2 = 0, ct = 0;              // 1 / (beta h), its square; torsion
-bool attached = false, gripped = false;    // the hand leads the middle layer's places; its pads hold the direction as well
+bool attached = false, gripped = false;    // the hand leads the middle section's places; its pads hold the direction as well
 bool opening = false;                      // its fingers open
 real capacity = zero;                      // what the pads can hold [N]
 real cb = zero, dh = zero, dsh = zero;     // bending, d / (beta h), that times s

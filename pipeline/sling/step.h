@@ -1,4 +1,4 @@
-// Steps slings through a schedule. A step solves, for all layers at once,
+// Steps slings through a schedule. A step solves, for all sections at once,
 //
 //   M (x - xh)/(beta h)^2 + c M x' + dW/dx + dD/dx' = 0,   x' = (x - y)/(beta h),
 //   y = c1 x_n - c2 x_n-1,   xh = y + beta h (c1 v_n - c2 v_n-1) + (beta h)^2 gravity
@@ -15,9 +15,9 @@ UNROLL for (int m = 0; m < PLACES; ++m) offset[m] = zero;
 real contact_before = zero;  // of the pouch
 int iterations = 0;
 
-auto middle = [&](const real* unknowns, int c) -> real {  // of the held layer: the mean of its places
-  real mean = share(0) * unknowns[c * L];
-  UNROLL for (int m = 3; m < PLACES; m += 3) mean += share(m) * unknowns[(m + c) * L];
+auto middle = [&](const real* dofs, int c) -> real {  // of the held section: the mean of its places
+  real mean = share(0) * dofs[c * L];
+  UNROLL for (int m = 3; m < PLACES; m += 3) mean += share(m) * dofs[(m + c) * L];
   return mean;
 };
 
@@ -125,7 +125,7 @@ for (int step = 0; step < steps; ++step) {
     contact_before = contact;
   }
 
-  // ---- records: force and iterations; centre lines (with a frame_width of N all unknowns) at the camera's stamps
+  // ---- records: force and iterations; centre lines (with a frame_width of N all degrees of freedom) at the camera's stamps
   if (member == 0 && !launching) {
     UNROLL for (int c = 0; c < 3; ++c) OUT[4 * step + c] = force[c];
     OUT[4 * step + 3] = zero + (SC)iteration;

@@ -1,19 +1,19 @@
-// The element: linear tetrahedra, a solid cylinder in layers.
+// The element: linear tetrahedra, a solid cylinder in cross-sections.
 //
-// Layer i is a section of N / 3 vertices, the centre first: their places are the unknowns. Between two layers lie the
+// Cross-section i has N / 3 vertices, the centre first: their places are its degrees of freedom. Between two sections lie the
 // tetrahedra of cylinder.py. In each the deformation gradient is constant, F = sum_a x_a grad_a over its corners,
 // of the material of material.h, and so are the nodal forces V P grad_a. Nothing else stores energy: bending and
 // twist are what the tetrahedra make of them. Coarse ones lock: reports/simulator.md says how much.
 //
-// Clamps and the hand hold whole layers, so that none of their vertices has an equation. A point force on a vertex would
-// only dent the mesh. What of the band lies inside the clamps does not deform, and needs no layers.
+// Clamps and the hand hold whole sections, so that none of their vertices has an equation. A point force on a vertex would
+// only dent the mesh. What of the band lies inside the clamps does not deform, and needs no sections.
 //
-// For the CPU alone: 21 unknowns a layer are more than a GPU's shared memory holds.
-// Wants the macros TETS (in a slab, between two layers) and CORNERS (of each, among the slab's vertices).
+// For the CPU alone: 21 degrees of freedom a cross-section are more than a GPU's shared memory holds.
+// Wants the macros TETS (in a slab, between two sections) and CORNERS (of each, among the slab's vertices).
 
 const int PLACES = N, VERTICES = N / 3;
 const int corners[TETS][4] = CORNERS;
-// after the edges' lengths: share of each vertex in a layer's mass, its place in the section across the band, and of a
+// after the edges' lengths: share of each vertex in a section's mass, its place across the band, and of a
 // slab 1 m long the volumes of the tetrahedra and the gradients of their corners
 const SC* shares = edge + L - 1;
 const SC* sections = shares + VERTICES;
@@ -33,18 +33,18 @@ auto mass_of = [&](int i, int m) -> real {
   return share(m) * (zero + line_mass * length + (i == MID ? payload : zero));
 };
 
-// a staged layer: Hessian of its own unknowns, of the next layer's, and across, by columns (on the diagonal the lower
-// triangle); residual of this layer and of the next
+// a staged section: Hessian of its own degrees of freedom, of the next section's, and across, by columns (on the diagonal the lower
+// triangle); residual of this section and of the next
 real own[N][N], following[N][N], across[N][N], force_here[N], force_there[N];
 #define RESIDUAL(m, j) force_here[m]
 #define RESIDUAL_NEXT(m, j) force_there[m]
-// of the slabs on both sides of the hand: force on the held layer, and what it has of the other layer's unknowns
+// of the slabs on both sides of the hand: force on the held section, and what it has of the other section's degrees of freedom
 real felt[2][3], felt_of[2][3][N];
 
 // drag of the air on the moving band, which the projectile does not feel
 auto wind_of = [&](int i, int m) -> real { return air * (mass_of(i, m) - (i == MID ? share(m) * payload : zero)); };
 auto wind_on = [&](int i, int m) -> real { return wind_of(i, m) * (X(m, i) - Y(m, i)); };
-auto hand_force = [&](int c, real scale) -> real {  // on the held layer, after Newton's change times `scale`, to first order
+auto hand_force = [&](int c, real scale) -> real {  // on the held section, after Newton's change times `scale`, to first order
   real force = felt[0][c] + felt[1][c];
   for (int m = c; m < N; m += 3) force += mass_of(MID, m) * ibh2 * (X(m, MID) - XH(m, MID)) + wind_on(MID, m);
   for (int m = 0; m < N; ++m)
@@ -52,13 +52,13 @@ auto hand_force = [&](int c, real scale) -> real {  // on the held layer, after 
   return force;
 };
 
-// energy of the slab between the layers i and i + 1
+// energy of the slab between the sections i and i + 1
 auto stage_slab = [&](int i) {
   const SC ds = edge[i], per_ds = (SC)1 / ds;
   real x[2 * VERTICES][3], xp[2 * VERTICES][3], xt[2 * VERTICES][3];  // now, predicted, rate
   for (int v = 0; v < 2 * VERTICES; ++v) UNROLL for (int c = 0; c < 3; ++c) {
-    const int m = 3 * (v % VERTICES) + c, layer = i + v / VERTICES;
-    x[v][c] = X(m, layer); xp[v][c] = XP(m, layer); xt[v][c] = (x[v][c] - Y(m, layer)) * ibh;
+    const int m = 3 * (v % VERTICES) + c, section = i + v / VERTICES;
+    x[v][c] = X(m, section); xp[v][c] = XP(m, section); xt[v][c] = (x[v][c] - Y(m, section)) * ibh;
   }
   for (int t = 0; t < TETS; ++t) {
     SC grad[4][3];
@@ -107,7 +107,7 @@ auto stage_slab = [&](int i) {
   }
 };
 
-auto stage_layer = [&](int i) {
+auto stage_section = [&](int i) {
   for (int c = 0; c < N; ++c) {
     for (int m = 0; m < N; ++m) own[c][m] = following[c][m] = across[c][m] = zero;
     force_here[c] = force_there[c] = zero;
@@ -120,7 +120,7 @@ auto stage_layer = [&](int i) {
   }
 };
 
-// column c of the staged layer, as rod.h's; c = N is the residual
+// column c of the staged section, as rod.h's; c = N is the residual
 auto column = [&](int, int c, real* D, real* U, real* carry) {
   if (c == N) {
     for (int m = 0; m < N; ++m) { U[m] = force_here[m]; carry[m] = force_there[m]; }

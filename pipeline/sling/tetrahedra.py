@@ -6,21 +6,21 @@ import numpy as np
 
 from pipeline.sling.cylinder import cylinder, volumes
 
-VERTICES = 7  # of a layer
-UNKNOWNS = 3 * VERTICES
-CORNERS = cylinder([0.0, 1.0], 1.0)[1]  # of the slab between two layers, shape (18, 4)
+VERTICES = 7  # of a section
+DOFS = 3 * VERTICES
+CORNERS = cylinder([0.0, 1.0], 1.0)[1]  # of the slab between two sections, shape (18, 4)
 
 
 def section(radius: float) -> np.ndarray:
-    """Places of a layer's vertices along its directors a and b [m], shape (VERTICES, 2)."""
+    """Places of a section's vertices along its directors a and b [m], shape (VERTICES, 2)."""
     return cylinder([0.0, 1.0], 2 * radius)[0][0, :, 1:]
 
 
 def shares() -> np.ndarray:
-    """Of each vertex in the mass of its layer, shape (VERTICES,).
+    """Of each vertex in the mass of its section, shape (VERTICES,).
 
-    A quarter of each tetrahedron's mass: as much from the slab before a layer as from the one after
-    where both are equally long.
+    A quarter of each tetrahedron's mass: as much from the slab before a section as from the one
+    after where both are equally long.
     """
     vertices, corners = cylinder([0.0, 1.0], 1.0)
     quarter = np.repeat(volumes(vertices, corners), 4)
@@ -38,8 +38,8 @@ def table(radius: float) -> np.ndarray:
     return np.concatenate([np.ravel(part) for part in parts])
 
 
-def layers(nodes: np.ndarray, directors: np.ndarray, radius: float) -> np.ndarray:
-    """Unknowns (..., L, UNKNOWNS) of sections at `nodes` (..., L, 3), directors (..., L, 6)."""
+def sections(nodes: np.ndarray, directors: np.ndarray, radius: float) -> np.ndarray:
+    """Vertices (..., L, DOFS) of sections at `nodes` (..., L, 3), with directors (..., L, 6)."""
     pairs = directors.reshape(*nodes.shape[:-1], 2, 3)
     vertices = nodes[..., None, :] + section(radius) @ pairs
-    return vertices.reshape(*nodes.shape[:-1], UNKNOWNS)
+    return vertices.reshape(*nodes.shape[:-1], DOFS)

@@ -19,7 +19,9 @@ from pipeline.base.errors import UserError
 from pipeline.base.schema import Range
 from pipeline.params import Parameters
 from pipeline.params.identification import NUISANCES
-from pipeline.sling.model import THETA, Sling, load_sling
+from pipeline.sling.load import load_sling
+from pipeline.sling.material import THETA
+from pipeline.sling.model import Sling
 from stages.start import remedy
 
 

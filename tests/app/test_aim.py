@@ -11,7 +11,7 @@ import pytest
 from app.aim import aim
 from pipeline.base.errors import UserError
 from pipeline.landing.stored import Stored
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 from tests.policy import toy
 from tests.policy.linear import write_policy
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from app.cli import draw, parser, positive, shown
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 from tests.policy.linear import write_policy
 
 ROOT = Path(__file__).parents[2]

@@ -13,7 +13,7 @@ from pipeline.confidence.residuals import Group
 from pipeline.confidence.rounds import Tolerances
 from pipeline.episode.episode import Episode
 from pipeline.objective.space import Space
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 
 SPACE = Space(
     names=THETA,

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.landing.simulator import simulator
 from pipeline.params import load
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 from tests.project import ROOT
 
 

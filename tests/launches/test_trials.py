@@ -16,9 +16,9 @@ PREDICTED = Launches(
     speed=np.array([4.5, np.nan, 4.7]),
     angle=np.array([0.5, np.nan, 0.5]),
     hold_force=np.array([9.0, np.nan, 31.0]),
-    leave_time=np.array([0.04, np.nan, 0.04]),
-    leave_y=np.array([-0.05, np.nan, -0.06]),
-    leave_z=np.array([-0.03, np.nan, -0.03]),
+    separation_time=np.array([0.04, np.nan, 0.04]),
+    separation_y=np.array([-0.05, np.nan, -0.06]),
+    separation_z=np.array([-0.03, np.nan, -0.03]),
     failure=[None, "it broke", None],
 )
 
@@ -105,7 +105,7 @@ def test_the_limit_is_the_simulators_own() -> None:
     limit = float(free.hold_force.mean())
     expected, found = launch(sling, theta, draws, max_force=limit), limited(free, limit)
     assert found.failure == expected.failure and found.failure[0] is None
-    for name in ("landing_y", "speed", "angle", "leave_y", "leave_z", "hold_force"):
+    for name in ("landing_y", "speed", "angle", "separation_y", "separation_z", "hold_force"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
 
 

@@ -12,7 +12,7 @@ from pipeline.base.files import write_json
 from pipeline.base.progress import parse
 from pipeline.objective import session
 from pipeline.params import load
-from pipeline.sling.model import mounting_path
+from pipeline.sling.load import mounting_path
 from tests.search import toy
 from tests.search.functions import Evaluate, rosenbrock
 

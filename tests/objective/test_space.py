@@ -12,7 +12,7 @@ from scipy.stats import laplace
 from pipeline.objective.space import Space, reflect
 from pipeline.params import load
 from pipeline.params.identification import Prior
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 
 SPACE = Space.of(load().parameters)
 CUBE = arrays(float, (3, 5), elements=st.floats(0, 1))

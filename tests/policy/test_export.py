@@ -18,7 +18,7 @@ import torch
 from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.params import load
 from pipeline.policy.export import ROBUST_TRAINING, TRAINING, card, write_onnx, write_torchscript
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 from tests.policy import toy
 from tests.policy.card_schema import SCHEMA
 from tests.project import ROOT

@@ -15,7 +15,7 @@ from ruamel.yaml import YAML
 from pipeline.base.files import write_json
 from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.policy import robust
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 from stages import policy
 from tests.policy import toy
 from tests.project import ROOT

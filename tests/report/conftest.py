@@ -18,7 +18,7 @@ from pipeline.params import load
 from pipeline.policy.export import write_onnx
 from pipeline.policy.train import Policy
 from pipeline.search.regions import Region, save_regions
-from pipeline.sling.model import THETA as NAMES
+from pipeline.sling.material import THETA as NAMES
 from tests.policy import toy
 
 BAND, METHOD = "toy", "sling2sim2real"

@@ -13,7 +13,7 @@ from pipeline.objective.loss import EpisodeLoss
 from pipeline.params import load
 from pipeline.report.replay import replay, work
 from pipeline.sling.interaction import interact
-from pipeline.sling.model import THETA as NAMES
+from pipeline.sling.material import THETA as NAMES
 from pipeline.sling.model import Sling
 from tests.project import ROOT
 

@@ -14,7 +14,8 @@ from pipeline.objective.space import Space
 from pipeline.recording.build import build_episode
 from pipeline.rig.physics.world import string_of
 from pipeline.rig.recorder.record import EPOCH
-from pipeline.sling.model import THETA, Sling
+from pipeline.sling.material import THETA
+from pipeline.sling.model import Sling
 from tests.objective.own_law import own_law_episode, visible
 from validation.benchmarks.methods import complete
 

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from pipeline.sling.cylinder import cylinder, volumes
+from pipeline.sling.initial import sections_of
 from pipeline.sling.interaction import interact
 from pipeline.sling.launch import launch
-from pipeline.sling.model import GRAVITY, ROD, TETRAHEDRA, Sling, layers_of, material
+from pipeline.sling.material import material
+from pipeline.sling.model import GRAVITY, ROD, TETRAHEDRA, Sling
 from pipeline.sling.solver import FREE, LANE_STATE, PAYLOAD, Schedule, run, steps
 
 THETA = [3e5, 0.45, 2e-3, 0.5, 1.0]
@@ -24,11 +26,11 @@ def fallen(sling: Sling, drags: np.ndarray, payload: float = 0.0) -> np.ndarray:
         payload: At the middle [kg].
     """
     loose = replace(sling, clamped=(False, False), air_drag=drags)
-    nodes = np.column_stack([sling.arc, np.zeros((sling.layers, 2))])
+    nodes = np.column_stack([sling.arc, np.zeros((sling.sections, 2))])
     lane_state = np.zeros((len(drags), LANE_STATE))
     lane_state[:, PAYLOAD] = payload
     table = steps(H * np.arange(COUNT + 1), H, hold=FREE)
-    start = layers_of(loose, nodes)
+    start = sections_of(loose, nodes)
     done = run(
         loose, Schedule(table, COUNT), material(loose, np.array([THETA] * len(drags))), start,
         lane_state, double=True, tolerance=1e-10,
@@ -43,7 +45,7 @@ def fallen(sling: Sling, drags: np.ndarray, payload: float = 0.0) -> np.ndarray:
 
 
 def masses(sling: Sling) -> np.ndarray:
-    """Share of each vertex, shape (layers, vertices)."""
+    """Share of each vertex, shape (sections, vertices)."""
     rest, corners = cylinder(sling.arc, 2 * sling.radius)
     mass = np.bincount(corners.ravel(), np.repeat(volumes(rest, corners), 4)).reshape(-1, 7)
     mass[[0, -1]] = mass[1] / 2  # by the section, not by which way the diagonals run

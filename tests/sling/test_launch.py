@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from pipeline.sling import launch, solver
+from pipeline.sling.initial import drawn_guess
 from pipeline.sling.launch import ballistic_landing
-from pipeline.sling.model import GRAVITY, drawn_guess
-from validation.simulator.reference import Twin
+from pipeline.sling.model import GRAVITY
+from validation.simulator.reference import ReferenceRod
 
 THETA = [2.5e5, 0.45, 2e-3, 0.5, 1.0]
 DRAW = [-0.38, -0.2]
@@ -29,9 +30,9 @@ def test_landing_is_the_flight_from_the_leaving_state(sling):
     assert shot.failure == [None]
     vy = shot.speed[0] * np.cos(shot.angle[0])
     vz = shot.speed[0] * np.sin(shot.angle[0])
-    y = ballistic_landing(shot.leave_y[0], shot.leave_z[0], vy, vz, -sling.fork_height)
+    y = ballistic_landing(shot.separation_y[0], shot.separation_z[0], vy, vz, -sling.fork_height)
     assert shot.landing_y[0] == pytest.approx(y, rel=1e-9)
-    assert -0.3 < shot.leave_y[0] < -0.1  # the band goes slack about 0.2 m before the fork
+    assert -0.3 < shot.separation_y[0] < -0.1  # the band goes slack about 0.2 m before the fork
 
 
 def test_launch_is_converged_in_time(sling):
@@ -54,13 +55,13 @@ def test_launch_is_converged_in_time(sling):
 
 def test_projectile_gets_no_more_than_the_stored_energy(sling):
     """Little damping: most of the energy; much damping: less of it; never more than there is."""
-    twin, drawn = Twin(sling, tuple(THETA)), drawn_guess(sling, np.array([DRAW]))[0]
-    stored = twin.elastic(drawn) + twin.weight(drawn)
+    rod, drawn = ReferenceRod(sling, tuple(THETA)), drawn_guess(sling, np.array([DRAW]))[0]
+    stored = rod.elastic(drawn) + rod.weight(drawn)
     speeds = []
     for damping in (1e-4, 5e-3, 2e-2):
         theta = [*THETA[:2], damping, *THETA[3:]]
         shot = launch(sling, theta, DRAW)
-        lifted = sling.projectile_mass * GRAVITY * (shot.leave_z[0] - DRAW[1])
+        lifted = sling.projectile_mass * GRAVITY * (shot.separation_z[0] - DRAW[1])
         assert sling.projectile_mass / 2 * shot.speed[0] ** 2 + lifted < stored
         speeds.append(shot.speed[0])
     assert speeds[0] > speeds[1] > speeds[2]
@@ -88,7 +89,7 @@ def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch):
         asked.clear()
         several = launch(sling, thetas, draws, device=("a", "b", "c"))
         assert set(asked) == expected and several.failure == one.failure
-        for name in ("landing_y", "speed", "angle", "hold_force", "leave_time"):
+        for name in ("landing_y", "speed", "angle", "hold_force", "separation_time"):
             np.testing.assert_array_equal(getattr(several, name), getattr(one, name))
     assert 0 < sum(reason is None for reason in one.failure) < 9
 

@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 
 from pipeline.sling import launch
-from pipeline.sling.model import GRAVITY, hanging_guess, layers_of, material
+from pipeline.sling.initial import hanging_guess, sections_of
+from pipeline.sling.material import material
+from pipeline.sling.model import GRAVITY
 from pipeline.sling.solver import FREE, LANE_STATE, Schedule, relaxation, run
-from validation.simulator.reference import Twin
+from validation.simulator.reference import ReferenceRod
 
 THETA = [5e5, 0.45, 2e-3, 0.5, 1.0]
 
 
 def relaxed(sling, theta, start, double=True):
-    """Layers (L, 9) at rest under gravity, from `start`."""
+    """Sections (L, 9) at rest under gravity, from `start`."""
     table = relaxation(FREE)
     result = run(
         sling,
@@ -53,25 +55,25 @@ def test_clamped_beam_sags_as_euler_bernoulli_says(sling, poisson):
         sling, half_width=sling.rest_length / 2, clamp_direction=np.array([1.0, 0.0, 0.0])
     )
     young = 1e7
-    nodes = np.zeros((beam.layers, 3))
+    nodes = np.zeros((beam.sections, 3))
     nodes[:, 0] = beam.arc - beam.half_width
     load = beam.mass / 20 * GRAVITY / beam.rest_length  # light: the sag stays small
     beam = replace(beam, mass=beam.mass / 20)
     inertia = np.pi * beam.radius**4 / 4
     expected = load * beam.rest_length**4 / (384 * young * inertia)
-    layers = relaxed(beam, [young, poisson, 2e-3, 0.5, 1.0], layers_of(beam, nodes))
-    assert -layers[beam.middle, 2] == pytest.approx(expected, rel=0.03)
+    sections = relaxed(beam, [young, poisson, 2e-3, 0.5, 1.0], sections_of(beam, nodes))
+    assert -sections[beam.middle, 2] == pytest.approx(expected, rel=0.03)
 
 
 def test_hanging_band_is_an_equilibrium_of_the_energy(sling):
-    layers = relaxed(sling, THETA, hanging_guess(sling))
-    twin = Twin(sling, tuple(THETA))
-    slope = twin.gradient(layers)
-    slope[:, 2] += twin.gravity * twin.mass[:, 2]
+    sections = relaxed(sling, THETA, hanging_guess(sling))
+    rod = ReferenceRod(sling, tuple(THETA))
+    slope = rod.gradient(sections)
+    slope[:, 2] += rod.gravity * rod.mass[:, 2]
     weight = sling.mass / sling.edges * GRAVITY
     assert np.abs(slope[1:-1, :3]).max() < 0.05 * weight
     assert np.abs(slope[:-1, 3:]).max() < 0.05 * weight * sling.rest_length / sling.edges
-    assert layers[sling.middle, 2] < -0.15
+    assert sections[sling.middle, 2] < -0.15
 
 
 def test_single_and_double_precision_hold_the_same_force(sling):

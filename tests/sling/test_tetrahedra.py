@@ -10,16 +10,10 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.sling import Sling, interact, launch
 from pipeline.sling.cylinder import cylinder, volumes
+from pipeline.sling.initial import clamp_tangents, drawn_guess, hanging_guess, sections_of
 from pipeline.sling.launch import schedule_of
-from pipeline.sling.model import (
-    GRAVITY,
-    TETRAHEDRA,
-    clamp_tangents,
-    drawn_guess,
-    hanging_guess,
-    layers_of,
-    material,
-)
+from pipeline.sling.material import material
+from pipeline.sling.model import GRAVITY, TETRAHEDRA
 from pipeline.sling.solver import (
     FAILURE,
     FREE,
@@ -54,10 +48,10 @@ def straight(solid):
     )
 
 
-def straight_layers(sling, stretch=1.0):
-    nodes = np.zeros((sling.layers, 3))
+def straight_sections(sling, stretch=1.0):
+    nodes = np.zeros((sling.sections, 3))
     nodes[:, 0] = stretch * (sling.arc - sling.rest_length / 2)
-    return layers_of(sling, nodes)
+    return sections_of(sling, nodes)
 
 
 def settled(sling, theta, start):
@@ -73,7 +67,7 @@ def settled(sling, theta, start):
     return result.state[0]
 
 
-def forces(sling, theta, layers):
+def forces(sling, theta, sections):
     """Minus the slope of the elastic energy by each vertex, shape (L, 7, 3), in NumPy."""
     mu, lam = material(sling, np.array([theta]))[0, :2]
     rest, corners = cylinder(sling.arc, 2 * sling.radius)
@@ -88,26 +82,26 @@ def forces(sling, theta, layers):
         squares = (f**2).sum(axis=(1, 2))
         return volume * (mu / 2 * (squares - 3) - mu * (j - 1) + lam / 2 * (j - 1) ** 2)
 
-    places, result = layers.reshape(-1, 3)[corners], np.zeros((sling.layers * 7, 3))
+    places, result = sections.reshape(-1, 3)[corners], np.zeros((sling.sections * 7, 3))
     for corner in range(4):
         for axis in range(3):
             moved = np.zeros((4, 3))
             moved[corner, axis] = 1e-7
             slope = (densities(places + moved) - densities(places - moved)) / 2e-7
             np.add.at(result[:, axis], corners[:, corner], -slope)
-    return result.reshape(sling.layers, 7, 3)
+    return result.reshape(sling.sections, 7, 3)
 
 
 def test_hanging_band_is_an_equilibrium_of_the_energy(solid):
-    layers = settled(solid, THETA, hanging_guess(solid))
-    pull = forces(solid, THETA, layers).sum(axis=1)[1:-1]
+    sections = settled(solid, THETA, hanging_guess(solid))
+    pull = forces(solid, THETA, sections).sum(axis=1)[1:-1]
     weight = solid.mass / solid.edges * GRAVITY
     assert np.abs(pull - [0.0, 0.0, weight]).max() < 0.02 * weight
-    assert layers[solid.middle, 2] < -0.15
+    assert sections[solid.middle, 2] < -0.15
 
 
 def test_hand_feels_what_the_drawn_band_pulls_with(solid):
-    """The force on the hand is that of the energy on the held layer, and the layers' weight."""
+    """The force on the hand is that of the energy on the held section, and the sections' weight."""
     table = schedule_of(solid).table[:RELAX_STEPS]
     lane = np.zeros((1, LANE_STATE))
     lane[0, PAYLOAD] = solid.projectile_mass
@@ -123,7 +117,7 @@ def test_hand_feels_what_the_drawn_band_pulls_with(solid):
 
 
 def test_thin_band_pulls_as_a_string_the_finer_its_mesh(solid):
-    """The closed form of test_statics.py; a clamp keeps a layer's length of band from thinning."""
+    """The closed form of test_statics.py; a clamp keeps a slab's length from thinning."""
     gaps = []
     for edges in (52, 104):
         thin = replace(solid, radius=solid.radius / 4, mass=1e-4, projectile_mass=1e-6, edges=edges)
@@ -140,10 +134,10 @@ def test_thin_band_pulls_as_a_string_the_finer_its_mesh(solid):
 def test_coarse_tetrahedra_lock_in_bending(straight):
     """5.4 times Euler-Bernoulli's stiffness at nu 0.45: known of meshes like the paper's."""
     light = replace(straight, mass=straight.mass / 200)
-    layers = settled(light, [1e7, 0.45, 2e-3, 0.5, 1.0], straight_layers(light))
+    sections = settled(light, [1e7, 0.45, 2e-3, 0.5, 1.0], straight_sections(light))
     load, inertia = light.mass * GRAVITY / light.rest_length, np.pi * light.radius**4 / 4
     sag = load * light.rest_length**4 / (384 * 1e7 * inertia)
-    assert sag / -layers[light.middle, 2] == pytest.approx(5.4, rel=0.03)
+    assert sag / -sections[light.middle, 2] == pytest.approx(5.4, rel=0.03)
 
 
 def test_free_band_falls_as_one_mass(straight):
@@ -151,7 +145,7 @@ def test_free_band_falls_as_one_mass(straight):
     free = replace(straight, clamped=(False, False))
     h, count = 1e-3, 20
     table = steps(h * np.arange(count + 1), h, hold=FREE)
-    start = straight_layers(free, 1.3)
+    start = straight_sections(free, 1.3)
     done = run(
         free, Schedule(table, count), material(free, np.array([THETA])), start,
         np.zeros((1, LANE_STATE)), double=True, tolerance=1e-10,
@@ -215,8 +209,8 @@ def test_mesh_is_chosen_in_params_and_not_for_a_gpu(params):
     band = params.bands["band1"]
     chosen = params.sling.model_copy(update={"mesh": TETRAHEDRA})
     solid = Sling.of(band, params.setup, chosen)
-    assert (solid.layers, solid.unknowns) == (53, 21)
-    assert Sling.of(band, params.setup, params.sling).unknowns == 9
+    assert (solid.sections, solid.dofs) == (53, 21)
+    assert Sling.of(band, params.setup, params.sling).dofs == 9
     with pytest.raises(UserError, match="CPU"):
         launch(solid, THETA, DRAW, device="cuda:0")
 
@@ -241,7 +235,7 @@ def stepped(solid, table, **options):
         np.zeros((1, LANE_STATE)),
         frame_steps=np.arange(len(table)),
         frame_weights=np.ones(len(table)),
-        frame_width=solid.unknowns,
+        frame_width=solid.dofs,
         **options,
     )
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 from pipeline.sling.theta import in_air, law_discrepancy, load_samples, load_theta, vector
 from tests.policy.toy import RUN
 

@@ -26,7 +26,8 @@ from pipeline.search.loop import Free, budget, latin_hypercube, search
 from pipeline.search.optimizers import explorer
 from pipeline.search.optimizers.multistart import Multistart
 from pipeline.search.regions import regions_asked, regions_of
-from pipeline.sling.model import THETA, Sling
+from pipeline.sling.material import THETA
+from pipeline.sling.model import Sling
 from validation.benchmarks.simulator import recorded_yardstick, seconds, shared, timed
 
 PAPER = {"population": 64, "generations": 39, "cma_population": 16, "cma_rollouts": 3200}

@@ -20,7 +20,8 @@ from pipeline.params import expect_known
 from pipeline.search.history import History
 from pipeline.search.loop import latin_hypercube
 from pipeline.sling.launch import Launches, launch
-from pipeline.sling.model import THETA, load_sling
+from pipeline.sling.load import load_sling
+from pipeline.sling.material import THETA
 from validation.benchmarks.methods import BUDGETS, evaluator, time_search
 from validation.benchmarks.simulator import DRAW, REPEATS, recorded_yardstick, seconds, timed
 
@@ -145,7 +146,7 @@ def _searched(one: History) -> list[np.ndarray]:
 
 
 def _launched(one: Launches) -> list[np.ndarray]:
-    return [one.landing_y, one.hold_force, one.leave_time, np.array(one.failure, str)]
+    return [one.landing_y, one.hold_force, one.separation_time, np.array(one.failure, str)]
 
 
 def table(result: dict) -> str:

@@ -27,7 +27,8 @@ from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
 from pipeline.search.history import History, theta_content
 from pipeline.sling.interaction import interact
-from pipeline.sling.model import THETA, Sling
+from pipeline.sling.material import THETA
+from pipeline.sling.model import Sling
 from tests.objective.own_law import disturbed, own_law_episode
 from validation.benchmarks.methods import complete
 from validation.benchmarks.simulator import pull_and_release

@@ -23,7 +23,7 @@ from pipeline.oracle.floor import errors_of, trial_seeds
 from pipeline.oracle.world import World
 from pipeline.params import load
 from pipeline.report.styles import COLORS, INK, THEME
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 from pipeline.sling.theta import load_theta
 from tests.project import ROOT
 from validation.campaigns.test_orange import copy_of_the_project, run

@@ -21,7 +21,8 @@ from pipeline.objective.space import Space
 from pipeline.params import load
 from pipeline.search.history import theta_content
 from pipeline.sling.launch import launch
-from pipeline.sling.model import THETA, load_sling
+from pipeline.sling.load import load_sling
+from pipeline.sling.material import THETA
 from pipeline.sling.theta import vector
 from validation.benchmarks.methods import PAPER, complete
 from validation.campaigns.test_orange import (

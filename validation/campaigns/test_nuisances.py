@@ -34,7 +34,8 @@ from pipeline.search.loop import Free, search
 from pipeline.search.optimizers import explorer
 from pipeline.search.optimizers.multistart import Multistart
 from pipeline.search.regions import Region
-from pipeline.sling.model import THETA, load_sling
+from pipeline.sling.load import load_sling
+from pipeline.sling.material import THETA
 from tests.objective.flaws import flawed_episode
 from validation.campaigns.test_orange import BAND, MASS, RECORDING, copy_of_the_project, run
 

@@ -8,8 +8,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pipeline.sling.cylinder import cylinder, volumes
+from pipeline.sling.initial import fixed_frames
 from pipeline.sling.interaction import GRASP_BLEND
-from pipeline.sling.model import ROD, Sling, fixed_frames
+from pipeline.sling.model import ROD, Sling
 
 CLAMPED = 0.015  # m of band in each clamp
 EDGES, GRADING = 48, 6.0  # 50 intervals with those in the clamps: 900 tetrahedra
@@ -17,18 +18,18 @@ EDGES, GRADING = 48, 6.0  # 50 intervals with those in the clamps: 900 tetrahedr
 
 @dataclass(frozen=True)
 class Tube:
-    """A tetrahedral band of `shape` (layers, V, 3), row-major.
+    """A tetrahedral band of `shape` (sections, V, 3), row-major.
 
-    The outermost two layers on each side lie in the clamps. Clamps, fingers and pouch hold whole
-    layers, which then neither turn nor deform.
+    The outermost two sections on each side lie in the clamps. Clamps, fingers and pouch hold whole
+    sections, which then neither turn nor deform.
 
     Attributes:
         rest: Vertices of the straight band at rest [m], `shape`.
         tetrahedra: Indices into the vertices, shape (T, 4).
-        mass: Of each vertex, a quarter of what its tetrahedra weigh [kg], shape (layers V,).
+        mass: Of each vertex, a quarter of what its tetrahedra weigh [kg], shape (sections V,).
         hanging: A smooth U of unstretched band to start from, `shape`.
-        clamped: `hanging` with the clamped layers where the clamps hold them, `shape`.
-        arc: Places of the layers between the clamps [m].
+        clamped: `hanging` with the clamped sections where the clamps hold them, `shape`.
+        arc: Places of the sections between the clamps [m].
     """
 
     rest: np.ndarray
@@ -55,22 +56,22 @@ class Tube:
         density = sling.mass / (sling.area * sling.rest_length)
         hanging = _hanging(sling, whole, rest)
         clamped, frames = hanging.copy(), fixed_frames(sling)
-        for layers, tip, (a, b), start in (
+        for sections, tip, (a, b), start in (
             (slice(0, 2), sling.tips[0], frames[0], 0.0),
             (slice(-2, None), sling.tips[1], frames[1], sling.rest_length),
         ):
             axes = np.array([np.cross(a, b), a, b])
-            clamped[layers] = tip + (rest[layers] - [start, 0.0, 0.0]) @ axes
+            clamped[sections] = tip + (rest[sections] - [start, 0.0, 0.0]) @ axes
         mass = density * np.bincount(tetrahedra.ravel(), share)
         return cls(rest, tetrahedra, mass, hanging, clamped, arc)
 
     @property
     def middle(self) -> int:
-        """The layer in the hand."""
+        """The section in the hand."""
         return len(self.rest) // 2
 
     def elastic_force(self, positions: np.ndarray, theta) -> np.ndarray:
-        """Force of the stretched band on each vertex [N], for positions (layers, V, 3), that shape.
+        """Force of the stretched band on each vertex [N], like `positions` (sections, V, 3).
 
         The law of material.h: nominal stress P = mu F + (lam (J - 1) - mu) cof F in each
         tetrahedron.

@@ -61,12 +61,12 @@ class Band:
 
     @property
     def positions(self) -> np.ndarray:
-        """Of all vertices, shape (layers, V, 3)."""
+        """Of all vertices, shape (sections, V, 3)."""
         return self.tube.rest + self.data.qpos.reshape(self.tube.rest.shape)
 
     @property
     def velocities(self) -> np.ndarray:
-        """Of all vertices, a view of shape (layers, V, 3)."""
+        """Of all vertices, a view of shape (sections, V, 3)."""
         return self.data.qvel.reshape(self.tube.rest.shape)
 
     @property
@@ -85,7 +85,7 @@ class Band:
         self.model.body_mass[1 + vertices] = self.tube.mass[vertices] + mass / count
 
     def step(self, velocity=0.0) -> None:
-        """Advance by one step; led vertices have `velocity` [m/s], which fits (layers, V, 3)."""
+        """Advance by one step; led vertices have `velocity` [m/s], which fits (sections, V, 3)."""
         velocity = np.broadcast_to(velocity, self._led.shape)
         self.velocities[self._led] = velocity[self._led]
         self.model.dof_armature[:] = LED * self._led.ravel()
@@ -94,7 +94,7 @@ class Band:
         self.force = LED * acceleration[self.tube.middle].sum(axis=0)
 
     def settle(self, goal: np.ndarray) -> None:
-        """Come to rest with the led vertices at `goal` (layers, V, 3), led there step by step.
+        """Come to rest with the led vertices at `goal` (sections, V, 3), led there step by step.
 
         Long steps without speed are Newton's method on the statics, with a little inertia.
         """
@@ -167,7 +167,7 @@ class Launch:
     speed: float
     angle: float
     hold_force: float
-    leave_time: float
+    separation_time: float
 
 
 def launch(sling: Sling, theta, draw, step: float = 2.5e-4, **mesh) -> Launch:
@@ -209,7 +209,7 @@ def launch(sling: Sling, theta, draw, step: float = 2.5e-4, **mesh) -> Launch:
                 speed=float(np.hypot(vy, vz)),
                 angle=float(np.arctan2(vz, vy)),
                 hold_force=hold_force,
-                leave_time=(i + part) * step,
+                separation_time=(i + part) * step,
             )
     return Launch(np.nan, np.nan, np.nan, hold_force, np.nan)
 

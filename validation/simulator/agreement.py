@@ -1,4 +1,4 @@
-"""The kernel against its NumPy twin: the same steps of the same bands, in double precision."""
+"""The kernel against its NumPy reference: the same steps of the same bands, in double precision."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.objective.space import Space
-from pipeline.sling.model import Sling, drawn_guess, hanging_guess
+from pipeline.sling.initial import drawn_guess, hanging_guess
+from pipeline.sling.model import Sling
 from pipeline.sling.solver import FREE, HELD, OPENING, POUCH, relaxation, steps
 from validation.simulator.check import Bench, Check, Section
 from validation.simulator.experiment import (
@@ -20,7 +21,7 @@ from validation.simulator.experiment import (
     straight_guess,
 )
 from validation.simulator.march import march
-from validation.simulator.reference import Twin
+from validation.simulator.reference import ReferenceRod
 
 LIMIT = 1e-7  # of the band's motion, or of its pull
 SEED = 7
@@ -50,12 +51,12 @@ class Scene:
     turned: float = 0.0
 
 
-def _turned(sling: Sling, layers: np.ndarray, most: float) -> np.ndarray:
-    """Layers (L, 9) with their sections turned about the band, by `most` in its middle."""
+def _turned(sling: Sling, sections: np.ndarray, most: float) -> np.ndarray:
+    """Sections (L, 9) with their sections turned about the band, by `most` in its middle."""
     angle = most * np.sin(np.pi * sling.arc / sling.rest_length)[:, None]
-    a, b = layers[:, 3:6], layers[:, 6:]
+    a, b = sections[:, 3:6], sections[:, 6:]
     turned = np.cos(angle) * a + np.sin(angle) * b, np.cos(angle) * b - np.sin(angle) * a
-    return np.hstack([layers[:, :3], *turned])
+    return np.hstack([sections[:, :3], *turned])
 
 
 def scenes(sling: Sling) -> dict[str, Scene]:
@@ -89,7 +90,7 @@ def scenes(sling: Sling) -> dict[str, Scene]:
 
 
 def compare(bench: Bench, thetas: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Largest difference of a scene's states and forces, by what the twin says they do."""
+    """Largest difference of a scene's states and forces, by what the reference says they do."""
     result = {}
     for name, scene in scenes(band_of(bench)).items():
         states, forces = [], []
@@ -102,17 +103,17 @@ def compare(bench: Bench, thetas: np.ndarray) -> dict[str, tuple[float, float]]:
             start = _turned(scene.sling, start, scene.turned)
             options = {"payload": scene.payload}
             motion = move(bench, scene.sling, theta, scene.table, start, **options, **TIGHT)
-            band = Twin(scene.sling, tuple(theta), **options)
-            twin = march(band, scene.table, start, grip=2 * theta[3])
-            size, pull = np.abs(twin.x - start).max(), np.abs(twin.force).max()
-            states.append(np.abs(motion.x[0] - twin.x).max() / size)
-            forces.append(np.abs(motion.force[0] - twin.force).max() / max(pull, 1e-9))
+            band = ReferenceRod(scene.sling, tuple(theta), **options)
+            expected = march(band, scene.table, start, grip=2 * theta[3])
+            size, pull = np.abs(expected.x - start).max(), np.abs(expected.force).max()
+            states.append(np.abs(motion.x[0] - expected.x).max() / size)
+            forces.append(np.abs(motion.force[0] - expected.force).max() / max(pull, 1e-9))
         result[name] = (float(np.max(states)), float(np.max(forces)))
     return result
 
 
 def checks(bench: Bench, count: int = 4) -> list[Check]:
-    against = "NumPy twin, Newton's method to rounding"
+    against = "NumPy reference implementation, Newton's method to rounding"
     note = f"{count} random θ of the box, double precision"
     result = []
     for name, (states, forces) in compare(bench, random_thetas(bench, count)).items():
@@ -128,7 +129,7 @@ def checks(bench: Bench, count: int = 4) -> list[Check]:
 
 def section(bench: Bench) -> Section:
     return Section(
-        "The kernel against its twin",
+        "The kernel against a reference implementation",
         checks(bench),
         "`validation/simulator/reference.py` is the rod written a second time, in plain NumPy from"
         " its equations. Both take the same steps in double precision.",

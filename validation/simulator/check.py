@@ -16,7 +16,7 @@ class Check:
 
     Attributes:
         name: What is compared.
-        against: What it is held against: a closed form, the twin, finer steps.
+        against: What it is held against: a closed form, the reference, finer steps.
         value: How far off it is, or the figure itself, in `unit`.
         limit: The most it may be; None states the figure only.
         note: What a reader of the figure should know.

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.sling.model import Sling, material
+from pipeline.sling.material import material
+from pipeline.sling.model import Sling
 
 
 @dataclass(frozen=True)

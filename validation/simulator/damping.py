@@ -21,7 +21,7 @@ from validation.simulator.experiment import (
     straight,
     straight_guess,
 )
-from validation.simulator.reference import Twin
+from validation.simulator.reference import ReferenceRod
 from validation.simulator.statics import STRING
 
 SEED = 11
@@ -41,23 +41,23 @@ def random_states(sling: Sling, kind: str, count: int, rng) -> np.ndarray:
     """Rough states (count, L, 9) of a straight band."""
     along, across, rough = STATES[kind]
     result = np.tile(straight_guess(straight(sling, sling.rest_length)), (count, 1, 1))
-    for layers in result:
+    for sections in result:
         g = np.tile([rng.uniform(*along), 0.0, 0.0], (sling.edges, 1))
         g += rough * rng.normal(size=g.shape)
-        layers[1:, :3] = layers[0, :3] + np.cumsum(g * sling.edge_lengths[:, None], axis=0)
-        layers[:-1, 3:] *= rng.uniform(*across)
-        layers[:-1, 3:] += rough * rng.normal(size=(sling.edges, 6))
+        sections[1:, :3] = sections[0, :3] + np.cumsum(g * sling.edge_lengths[:, None], axis=0)
+        sections[:-1, 3:] *= rng.uniform(*across)
+        sections[:-1, 3:] += rough * rng.normal(size=(sling.edges, 6))
     return result
 
 
-def power_gain(twin: Twin, layers: np.ndarray) -> float:
-    """Most power that any rates gain in a state (L, 9); each unknown alone loses 1.
+def power_gain(rod: ReferenceRod, sections: np.ndarray) -> float:
+    """Most power that any rates gain in a state (L, 9); each degree of freedom alone loses 1.
 
     Dissipation is a quadratic form of the rates: its lowest eigenvalue, the diagonal scaled to 1.
     """
-    size = layers.size
-    rates = np.eye(size).reshape(size, *layers.shape)
-    form = twin.viscous(rates, np.broadcast_to(layers, rates.shape)).reshape(size, size)
+    size = sections.size
+    rates = np.eye(size).reshape(size, *sections.shape)
+    form = rod.viscous(rates, np.broadcast_to(sections, rates.shape)).reshape(size, size)
     diagonal = np.abs(np.diag(form))
     moves = diagonal > 0
     scale = np.sqrt(np.outer(diagonal[moves], diagonal[moves]))
@@ -73,7 +73,7 @@ def dissipation(bench: Bench, count: int = 10) -> list[Check]:
         thetas = random_thetas(bench, count, SEED + number)
         states = random_states(sling, kind, count, rng)
         gains = [
-            power_gain(Twin(sling, tuple(theta)), x)
+            power_gain(ReferenceRod(sling, tuple(theta)), x)
             for theta, x in zip(thetas, states, strict=True)
         ]
         checks.append(
@@ -104,10 +104,10 @@ def recoil_energies(
     motion = move(bench, sling, thetas, launched(h, steps, order), start, gravity=0.0, double=True)
     energies = []
     for k in np.flatnonzero(~motion.failed):
-        twin = Twin(sling, tuple(thetas[k]), gravity=0.0)
+        rod = ReferenceRod(sling, tuple(thetas[k]), gravity=0.0)
         first = motion.start[k]
-        total = twin.elastic(motion.x[k]) + twin.kinetic(motion.v[k])
-        energies.append(np.append(twin.elastic(first), total) / twin.elastic(first))
+        total = rod.elastic(motion.x[k]) + rod.kinetic(motion.v[k])
+        energies.append(np.append(rod.elastic(first), total) / rod.elastic(first))
     return np.reshape(energies, (-1, steps + 1))
 
 

@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.sling import Launches, Rollouts, Sling, interact, launch
+from pipeline.sling.initial import sections_of
 from pipeline.sling.interaction import schedule_of
-from pipeline.sling.model import GRAVITY, ROD, TETRAHEDRA, layers_of, material
+from pipeline.sling.material import material
+from pipeline.sling.model import GRAVITY, ROD, TETRAHEDRA
 from pipeline.sling.solver import (
     FAILURE,
     FREE,
@@ -30,19 +32,18 @@ DEPTHS = (0.40, 0.55)  # of draws [m]
 POISSON = (0.30, 0.45, 0.49)
 PLACES = np.linspace(0, 1, 101)  # along the band, where centre lines are compared
 TEXT = """\
-`sling.mesh: tetrahedra` takes a solid cylinder instead of the rod: layers of a centre and a \
-hexagon, three linear tetrahedra a prism, through the same solver, material, hand and steps. \
-Clamps and hand hold whole sections. (The paper's band of 55 cm has 1.5 cm in each clamp, which \
-do not deform: 52 cm are meshed.)
+`sling.mesh: tetrahedra` takes a solid cylinder instead of the rod: cross-sections of a centre and \
+a hexagon, three linear tetrahedra a prism, through the same solver, material, hand and steps. \
+Clamps and hand hold whole cross-sections. (The paper's band of 55 cm has 1.5 cm in each clamp, \
+which do not deform: 52 cm are meshed.)
 
 Linear tetrahedra lock: they are too stiff in bending, the more so the closer ν is to 0.5. And a \
-held section keeps a whole layer's length of band from thinning, which adds to the pull. Twice as \
-many layers mend the latter, at twice the cost, but the former hardly, as long as the section has \
+held cross-section keeps a slab's length of band from thinning, which adds to the pull. Twice as \
+many cross-sections mend the latter, at twice the cost, but the former hardly, as long as each has \
 one ring of vertices. So both elements say nearly the same of a taut band; a slack one hangs and \
 swings as if it were stiffer. A measured `flexural_rigidity` does not apply to a solid mesh. \
 Tetrahedra run on the CPU alone. Figures against the rod are medians over random θ where nothing \
 else is said.
-
 """
 
 
@@ -77,7 +78,7 @@ class Figures:
 
 
 def slings(params) -> dict[str, Sling]:
-    """The first band of params.yaml in either mesh, and in twice as many layers."""
+    """The first band of params.yaml in either mesh, and in twice as many sections."""
     band = params.bands[next(iter(params.bands))]
     rod, solid = (
         Sling.of(band, params.setup, params.sling.model_copy(update={"mesh": mesh}))
@@ -96,7 +97,7 @@ def bending(sling: Sling, poissons=POISSON) -> np.ndarray:
         mass=sling.mass / 200,
     )
     young = 1e7
-    nodes = np.zeros((beam.layers, 3))
+    nodes = np.zeros((beam.sections, 3))
     nodes[:, 0] = beam.arc - beam.half_width
     last = steps(10.0 ** np.arange(1, 6), 1.0, hold=FREE, mode=RELAX)
     table = np.vstack([relaxation(FREE), last])
@@ -105,7 +106,7 @@ def bending(sling: Sling, poissons=POISSON) -> np.ndarray:
         beam,
         Schedule(table, first_free=len(table)),
         material(beam, thetas),
-        layers_of(beam, nodes),
+        sections_of(beam, nodes),
         np.zeros((len(thetas), LANE_STATE)),
         double=True,
     )
@@ -179,9 +180,13 @@ def table(columns: dict[str, Figures]) -> str:
     """Markdown: a row a figure, a column an element."""
     rod = next(iter(columns.values()))
     far = [compare(one, rod) for one in columns.values()]
+    slings = [one.sling for one in columns.values()]
     rows: list[tuple[str, list[str]]] = [
-        ("edges along the band", [f"{one.sling.edges}" for one in columns.values()]),
-        ("unknowns", [f"{one.sling.layers * one.sling.unknowns:,}" for one in columns.values()]),
+        ("edges along the band", [f"{sling.edges}" for sling in slings]),
+        (
+            "degrees of freedom",
+            [f"{sling.sections * sling.dofs:,}" for sling in slings],
+        ),
     ]
     for index, depth in enumerate(DEPTHS):
         values = [f"{100 * (one.pull[index] - 1):+.2f} %" for one in columns.values()]

@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.sling.initial import hanging_guess
 from pipeline.sling.interaction import schedule_of
-from pipeline.sling.model import hanging_guess
 from pipeline.sling.solver import HELD, OPENING, RELAX_STEPS
 from validation.benchmarks import simulator as yardstick
 from validation.simulator import figures
 from validation.simulator.check import Bench, Check, Section
 from validation.simulator.experiment import band_of, move
-from validation.simulator.reference import Twin
+from validation.simulator.reference import ReferenceRod
 
 LIMIT = 1.0  # percent of the hand's work
 THETA = (6e5, 0.45, 5e-3, 0.6, 0.8)
@@ -45,7 +45,7 @@ class Balance:
 
     @property
     def remainder(self) -> np.ndarray:
-        """What no entry explains: the residual of the steps, by the twin's forces."""
+        """What no entry explains: the residual of the steps, by the reference's forces."""
         return self.miss - self.integrator
 
     @property
@@ -72,7 +72,7 @@ def balance(bench: Bench, theta=THETA) -> Balance:
     v2 = np.concatenate([v1[:1], v1[:-1]])
     c1, c2, beta = (rows[:, k, None, None] for k in (1, 2, 3))
     moved = x - x1
-    twin = Twin(sling, tuple(theta))
+    rod = ReferenceRod(sling, tuple(theta))
 
     def work(force: np.ndarray, moved: np.ndarray) -> np.ndarray:
         return (force * moved).sum((-2, -1))
@@ -80,18 +80,16 @@ def balance(bench: Bench, theta=THETA) -> Balance:
     elastic, before, conservative, viscous = (np.empty(len(x)) for _ in range(4))
     for gripped in (False, True):
         part = (hold == HELD) == gripped
-        band = replace(twin, gripped=gripped)
+        band = replace(rod, gripped=gripped)
         still = np.zeros_like(v[part])
         elastic[part], before[part] = band.elastic(x[part]), band.elastic(x1[part])
         conservative[part] = work(band.internal(x[part], still, at[part]), moved[part])
         viscous[part] = work(band.viscous(v[part], at[part]), moved[part])
     rate = (v - c1 * v1 + c2 * v2) / (beta * rows[:, 0, None, None])
-    kinetic = np.append(0.0, twin.kinetic(v))
-    integrator = (
-        work(twin.mass * rate, moved) - np.diff(kinetic) + conservative - (elastic - before)
-    )
+    kinetic = np.append(0.0, rod.kinetic(v))
+    integrator = work(rod.mass * rate, moved) - np.diff(kinetic) + conservative - (elastic - before)
     hand = -(motion.force[0, first + 1 :] * moved[:, sling.middle, :3]).sum(-1)
-    hanging = twin.elastic(x1[0])
+    hanging = rod.elastic(x1[0])
     turning = before - np.append(hanging, elastic[:-1])
     return Balance(
         time=rows[:, 11],
@@ -99,7 +97,7 @@ def balance(bench: Bench, theta=THETA) -> Balance:
         turning=np.cumsum(turning),
         elastic=elastic - hanging,
         kinetic=kinetic[1:],
-        gravity=twin.weight(x) - twin.weight(x1[0]),
+        gravity=rod.weight(x) - rod.weight(x1[0]),
         viscous=np.cumsum(viscous),
         pads=-np.cumsum(np.where(hold == OPENING, hand, 0.0)),
         integrator=np.cumsum(integrator),
@@ -146,7 +144,7 @@ def checks(done: Balance) -> list[Check]:
             " without it",
         ),
         Check(
-            "residual of the kernel's steps by the twin's forces",
+            "residual of the kernel's steps by the reference's forces",
             "balance with the steps' loss, by its formula, as an entry",
             done.share(done.remainder),
             "%",
@@ -193,8 +191,8 @@ def section(bench: Bench) -> Section:
         "Energy of a pull, hold and release",
         checks(done),
         "The yardstick of `sling bench`, in double precision, each step accounted for with the"
-        " twin's energies and forces. What the hand puts in is stored or dissipated but for what"
-        " the steps lose: what inertia and elastic forces do in a step, less the change of their"
-        " energies.",
+        " reference's energies and forces. What the hand puts in is stored or dissipated but for"
+        " what the steps lose: what inertia and elastic forces do in a step, less the change of"
+        " their energies.",
         pictures,
     )

@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.sling.model import GRAVITY, Sling, fixed_frames, layers_of, material
+from pipeline.sling.initial import fixed_frames, sections_of
+from pipeline.sling.material import material
+from pipeline.sling.model import GRAVITY, Sling
 from pipeline.sling.solver import (
     FAILURE,
     FREE,
@@ -61,12 +63,12 @@ def straight(sling: Sling, length: float, **changes) -> Sling:
 
 
 def straight_guess(sling: Sling, first_half: float | None = None) -> np.ndarray:
-    """Layers (L, 9) of a straight band, its first half stretched to `first_half` [m]."""
+    """Sections (L, 9) of a straight band, its first half stretched to `first_half` [m]."""
     middle = 0.0 if first_half is None else first_half - sling.half_width
     place = [0.0, sling.arc[sling.middle], sling.rest_length]
-    nodes = np.zeros((sling.layers, 3))
+    nodes = np.zeros((sling.sections, 3))
     nodes[:, 0] = np.interp(sling.arc, place, [-sling.half_width, middle, sling.half_width])
-    return layers_of(sling, nodes)
+    return sections_of(sling, nodes)
 
 
 def launched(h: float, count: int, order: int = 2, hold: int = FREE) -> np.ndarray:
@@ -148,7 +150,7 @@ def rates(
 
 
 def rest(bench: Bench, sling: Sling, theta, start, *, table=None, **options) -> np.ndarray:
-    """Layers (L, 9) of one band at rest."""
+    """Sections (L, 9) of one band at rest."""
     table = settling() if table is None else table
     motion = move(bench, sling, theta, table, start, **options)
     return np.full_like(motion.x[0, -1], np.nan) if motion.failed[0] else motion.x[0, -1]

@@ -8,12 +8,13 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from pipeline.sling import Launches, Sling, launch
+from pipeline.sling.initial import drawn_guess
 from pipeline.sling.launch import schedule_of
-from pipeline.sling.model import GRAVITY, drawn_guess
+from pipeline.sling.model import GRAVITY
 from pipeline.sling.solver import POUCH, relaxation
 from validation.simulator.check import Bench, Check, Section, off
 from validation.simulator.experiment import band_of, rest
-from validation.simulator.reference import Twin
+from validation.simulator.reference import ReferenceRod
 
 COUNT, SEED, REFINE = 20, 3, 10
 RANGES = {  # of what a launch depends on: friction belongs to the pads, which a launch has not
@@ -101,8 +102,8 @@ def order_in_time(bench: Bench, count: int = COUNT) -> list[Check]:
         common = {"device": bench.device, "workers": bench.workers}
         return launch(sling, thetas, draws, double=True, refine=refine, **common).speed
 
-    reference = speed(REFERENCE)
-    errors = np.array([np.abs(speed(refine) / reference - 1) for refine in REFINED])
+    finest = speed(REFERENCE)
+    errors = np.array([np.abs(speed(refine) / finest - 1) for refine in REFINED])
     lowest = (np.log(errors[0] / errors[-1]) / np.log(REFINED[-1] / REFINED[0])).min()
     worst = 100 * errors.max(axis=1)
     orders = np.log2(worst[:-1] / worst[1:])
@@ -139,7 +140,7 @@ def physics(bench: Bench, count: int = COUNT) -> list[Check]:
     """Ballistic flight, and the energy that the drawn band holds."""
     sling, (thetas, draws) = band_of(bench), random_launches(count)
     done = launch(sling, thetas, draws, device=bench.device, workers=bench.workers)
-    state = zip(done.leave_y, done.leave_z, done.speed, done.angle, strict=True)
+    state = zip(done.separation_y, done.separation_z, done.speed, done.angle, strict=True)
     flights = [_flight(*one, -sling.fork_height) for one in state]
     shares = []
     for k, (theta, draw) in enumerate(zip(thetas, draws, strict=True)):
@@ -148,10 +149,10 @@ def physics(bench: Bench, count: int = COUNT) -> list[Check]:
         drawn = rest(
             bench, sling, theta, drawn_guess(sling, draw[None])[0], table=table, double=True
         )
-        twin = Twin(sling, tuple(theta))
-        lift = sling.projectile_mass * GRAVITY * (done.leave_z[k] - draw[1])
+        rod = ReferenceRod(sling, tuple(theta))
+        lift = sling.projectile_mass * GRAVITY * (done.separation_z[k] - draw[1])
         gained = sling.projectile_mass / 2 * done.speed[k] ** 2 + lift
-        shares.append(gained / twin.elastic(drawn))
+        shares.append(gained / rod.elastic(drawn))
     named = sum(reason is not None for reason in done.failure)
     return [
         Check(

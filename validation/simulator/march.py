@@ -1,4 +1,4 @@
-"""Steps of the twin: Newton's method to machine precision on the equations of step.h."""
+"""Steps of the reference: Newton's method to machine precision on the equations of step.h."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.sling.solver import FREE, HELD, OPENING, POUCH, RELAX
-from validation.simulator.reference import Twin
+from validation.simulator.reference import ReferenceRod
 
 SMALL = 1e-30  # imaginary step: derivatives without cancellation
 
@@ -22,7 +22,12 @@ class March:
 
 
 def march(
-    twin: Twin, table: np.ndarray, start: np.ndarray, *, grip: float = np.inf, direction=(0, 0, 0)
+    rod: ReferenceRod,
+    table: np.ndarray,
+    start: np.ndarray,
+    *,
+    grip: float = np.inf,
+    direction=(0, 0, 0),
 ) -> March:
     """Step `start` (L, 9), at rest, through the rows of a schedule (S, 13).
 
@@ -30,7 +35,7 @@ def march(
         grip: 2 times the coefficient of friction: with the normal force what two pads can hold.
         direction: Of the pull that opening pads resist, until a held step says, shape (3,).
     """
-    middle = twin.sling.middle
+    middle = rod.sling.middle
     x1 = x2 = np.array(start, float)
     v1 = v2 = np.zeros_like(x1)
     offset, pull, direction = None, 0.0, np.asarray(direction, float)
@@ -38,7 +43,7 @@ def march(
     for row in table:
         h, c1, c2, beta, mode, hold, *target, limit, blend, _, share = row
         bh = beta * h
-        band = replace(twin, share=share, gripped=hold == HELD)
+        band = replace(rod, share=share, gripped=hold == HELD)
         free = _free(band)
         at = x1 + h * v1
         if hold in (HELD, POUCH):
@@ -49,7 +54,7 @@ def march(
             offset = None
         y = c1 * x1 - c2 * x2
         inertial = y + bh * (c1 * v1 - c2 * v2)
-        inertial[:, 2] -= bh**2 * twin.gravity
+        inertial[:, 2] -= bh**2 * rod.gravity
         capacity = max(pull - limit * grip, 0.0) if hold == OPENING else 0.0
 
         def residual(
@@ -75,16 +80,16 @@ def march(
     return March(np.array(xs), np.array(vs), np.array(forces))
 
 
-def _free(twin: Twin) -> np.ndarray:
-    """Which unknowns move, shape (L, 9): not the clamped nodes, nor the last layer's directors."""
-    free = np.ones((twin.sling.layers, 9), bool)
-    free[[0, -1], :3] = ~np.array(twin.sling.clamped)[:, None]
+def _free(rod: ReferenceRod) -> np.ndarray:
+    """Which degrees of freedom move, shape (L, 9): but for clamped nodes and the last directors."""
+    free = np.ones((rod.sling.sections, 9), bool)
+    free[[0, -1], :3] = ~np.array(rod.sling.clamped)[:, None]
     free[-1, 3:] = False
     return free
 
 
 def solve(residual, start: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Newton's method from `start` on the `free` unknowns, down the step's potential.
+    """Newton's method from `start` on the `free` ones, down the step's potential.
 
     A residual is that potential's gradient. Where the Hessian is not positive, its diagonal is
     raised until it is; a step past the bottom, to where it is steeper than before, is halved.
@@ -100,7 +105,7 @@ def solve(residual, start: np.ndarray, free: np.ndarray) -> np.ndarray:
         x = x - scale * step
         if np.abs(step).max() < 1e-11:  # the next one would be rounding
             return x
-    raise ArithmeticError("the twin's Newton method did not converge")
+    raise ArithmeticError("the reference's Newton method did not converge")
 
 
 def _downhill(hessian: np.ndarray, slope: np.ndarray) -> np.ndarray:
@@ -114,14 +119,14 @@ def _downhill(hessian: np.ndarray, slope: np.ndarray) -> np.ndarray:
 
 
 def jacobian(residual, x: np.ndarray) -> np.ndarray:
-    """Of a residual in which a layer meets its neighbours only, shape (L, 9, L, 9)."""
-    layers = len(x)
-    probes = np.zeros((3, 9, layers, 9))
-    for i in range(layers):
+    """Of a residual in which a section meets its neighbours only, shape (L, 9, L, 9)."""
+    sections = len(x)
+    probes = np.zeros((3, 9, sections, 9))
+    for i in range(sections):
         probes[i % 3, range(9), i, range(9)] = 1
     slopes = residual(x + 1j * SMALL * probes).imag / SMALL
-    result = np.zeros((layers, 9, layers, 9))
-    for i in range(layers):
-        for row in range(max(i - 1, 0), min(i + 2, layers)):
+    result = np.zeros((sections, 9, sections, 9))
+    for i in range(sections):
+        for row in range(max(i - 1, 0), min(i + 2, sections)):
             result[row, :, i] = slopes[i % 3, :, row].T
     return result

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.sling.model import GRAVITY, Sling, layers_of
+from pipeline.sling.initial import sections_of
+from pipeline.sling.model import GRAVITY, Sling
 from pipeline.sling.solver import FREE, steps
 from validation.simulator.check import Bench, Check, Section
 from validation.simulator.experiment import TIGHT, band_of, launched, move, straight, straight_guess
-from validation.simulator.reference import Twin
+from validation.simulator.reference import ReferenceRod
 
 ROUNDING = 1e-11
 ANGULAR_LIMIT = 1e-3  # of the parts' angular momenta
@@ -69,9 +70,9 @@ def free_fall(bench: Bench, count: int = 60) -> list[Check]:
     return checks
 
 
-def momenta(twin: Twin, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def momenta(rod: ReferenceRod, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Linear and angular momentum (..., 3) about the origin; the sections' turning included."""
-    moving = twin.mass * v
+    moving = rod.mass * v
     linear = moving[..., :3].sum(-2)
     parts = [
         np.cross(x[..., k : k + 3], moving[..., k : k + 3])[..., : None if k == 0 else -1, :]
@@ -81,7 +82,7 @@ def momenta(twin: Twin, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def bent(sling: Sling) -> np.ndarray:
-    """Layers (L, 9) of a band stretched by up to 1.3 and bent in space.
+    """Sections (L, 9) of a band stretched by up to 1.3 and bent in space.
 
     Stretch and curvature fade out towards the free ends, which bear neither pull nor moment: so
     no front runs in from them, and steps can show their order.
@@ -91,9 +92,9 @@ def bent(sling: Sling) -> np.ndarray:
     rise = 0.3 * (place - np.sin(4 * np.pi * place) / (4 * np.pi) - 0.5)
     along = [np.cos(turn) * np.cos(rise), np.sin(turn) * np.cos(rise), np.sin(rise)]
     length = sling.edge_lengths * (1 + 0.3 * np.sin(np.pi * place) ** 2)
-    nodes = np.zeros((sling.layers, 3))
+    nodes = np.zeros((sling.sections, 3))
     nodes[1:] = np.cumsum(length[:, None] * np.transpose(along), axis=0)
-    return layers_of(sling, nodes - nodes.mean(0))
+    return sections_of(sling, nodes - nodes.mean(0))
 
 
 def recoil(bench: Bench, h: float, order: int, damping: float, span: float = 0.02):
@@ -103,16 +104,16 @@ def recoil(bench: Bench, h: float, order: int, damping: float, span: float = 0.0
         Largest linear and largest angular momentum that appear.
     """
     sling = loose_band(bench)
-    layers = bent(sling)
+    sections = bent(sling)
     theta = (THETA[0], THETA[1], damping, *THETA[3:])
     table = launched(h, int(round(span / h)), order)
-    motion = move(bench, sling, theta, table, layers, gravity=0.0, **TIGHT)
+    motion = move(bench, sling, theta, table, sections, gravity=0.0, **TIGHT)
     x, v = motion.x[0], motion.v[0]
-    twin = Twin(sling, theta, gravity=0.0)
-    linear, angular = momenta(twin, x, v)
-    moving = np.abs(twin.mass * v)
+    rod = ReferenceRod(sling, theta, gravity=0.0)
+    linear, angular = momenta(rod, x, v)
+    moving = np.abs(rod.mass * v)
     speed = moving[..., :3].sum((-2, -1)).max()
-    turning = np.linalg.norm(np.cross(x[..., :3], (twin.mass * v)[..., :3]), axis=-1).sum(-1).max()
+    turning = np.linalg.norm(np.cross(x[..., :3], (rod.mass * v)[..., :3]), axis=-1).sum(-1).max()
     return (
         float(np.linalg.norm(linear, axis=-1).max() / speed),
         float(np.linalg.norm(angular, axis=-1).max() / turning),

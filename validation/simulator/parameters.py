@@ -62,9 +62,9 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Check]:
     )  # fmt: skip
     strings = [String.of(sling, theta) for theta in thetas]
     edge = sling.middle // 2  # away from the ends
-    layers = motion.x[:, -1]
-    g = (layers[:, edge + 1, :3] - layers[:, edge, :3]) / sling.edge_lengths[edge]
-    volume = np.einsum("ij,ij->i", g, np.cross(layers[:, edge, 3:6], layers[:, edge, 6:9]))
+    sections = motion.x[:, -1]
+    g = (sections[:, edge + 1, :3] - sections[:, edge, :3]) / sling.edge_lengths[edge]
+    volume = np.einsum("ij,ij->i", g, np.cross(sections[:, edge, 3:6], sections[:, edge, 6:9]))
     expected = np.array([float(one.volume(stretch)) for one in strings])
     pull = -motion.force[:, -1, 0]
     ratio = float(strings[1].force(stretch) / strings[0].force(stretch))

@@ -1,6 +1,6 @@
 """The rod of pipeline/sling/rod.h in plain NumPy, float64, written a second time.
 
-A state x has shape (..., L, 9): per layer the node and the directors a, b of the edge behind it.
+A state x has shape (..., L, 9): per section the node and the directors a, b of the edge behind it.
 The columns of the deformation gradients, F = [g a b], and the differences of neighbouring frames
 are linear in x; everything else is algebra on them. Leading axes are a batch. Nothing here is fast:
 tests and `sling verify` hold rod.h against it, and measure energies with it.
@@ -15,7 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.sling.model import GRAVITY, Sling, fixed_frames, material
+from pipeline.sling.initial import fixed_frames
+from pipeline.sling.material import material
+from pipeline.sling.model import GRAVITY, Sling
 
 
 def cofactor(f: np.ndarray) -> np.ndarray:
@@ -38,7 +40,7 @@ def _sum(product: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Twin:
+class ReferenceRod:
     """One band with one theta.
 
     Attributes:
@@ -67,9 +69,9 @@ class Twin:
         g = np.diff(x[..., :3], axis=-2) / self.sling.edge_lengths[:, None]
         return np.stack([g, x[..., :-1, 3:6], x[..., :-1, 6:9]], axis=-2)
 
-    def _to_layers(self, stress: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-        """Forces on the unknowns from those on columns (..., E, 3, 3) and edge directors."""
-        force = np.zeros((*stress.shape[:-3], self.sling.layers, 9), stress.dtype)
+    def _to_sections(self, stress: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+        """Forces on sections from those on columns (..., E, 3, 3) and edge directors."""
+        force = np.zeros((*stress.shape[:-3], self.sling.sections, 9), stress.dtype)
         force[..., :-1, :3] -= stress[..., 0, :]
         force[..., 1:, :3] += stress[..., 0, :]
         volume = self.sling.edge_lengths[:, None, None]
@@ -159,13 +161,13 @@ class Twin:
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
         """Of the stored energy, shape (..., L, 9)."""
-        return self._to_layers(
+        return self._to_sections(
             self.stress(x), self._joint_forces(x, np.zeros_like(x), x, bounded=False)
         )
 
     def internal(self, x: np.ndarray, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Elastic and viscous forces of a step: the latter at, the twist about the state `at`."""
-        return self._to_layers(
+        return self._to_sections(
             self.stress(x) + self.viscous_stress(rate, at),
             self._joint_forces(x, rate, at, bounded=True),
         )
@@ -176,10 +178,10 @@ class Twin:
 
     @property
     def mass(self) -> np.ndarray:
-        """Inertia of each unknown, shape (L, 9): halves of edges, and their sections' directors."""
+        """Inertia of each degree of freedom, shape (L, 9): halves of edges, and directors."""
         sling, ds = self.sling, self.sling.edge_lengths
         line = sling.mass / sling.rest_length
-        mass = np.zeros((sling.layers, 9))
+        mass = np.zeros((sling.sections, 9))
         mass[:, :3] = line * (np.append(ds, 0) + np.append(0, ds))[:, None] / 2
         mass[:, 3:] = line * np.append(ds, ds[-1])[:, None] * sling.radius**2 / 4
         mass[sling.middle, :3] += self.payload

@@ -47,7 +47,7 @@ Device {device}, {device_name}; commit {commit}; {seconds:.0f} s in all.
 """
 SECTIONS: dict[str, Callable[..., Section]] = {
     "at rest": statics.section,
-    "the kernel and its twin": agreement.section,
+    "the kernel and its reference implementation": agreement.section,
     "damping": damping.section,
     "free motion": motion.section,
     "energy": energy.section,

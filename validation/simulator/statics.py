@@ -22,7 +22,7 @@ from validation.simulator.experiment import (
     straight_guess,
 )
 from validation.simulator.launches import with_edges
-from validation.simulator.reference import Twin
+from validation.simulator.reference import ReferenceRod
 
 PULL_LIMIT, BEAM_LIMIT, TORSION_LIMIT = 0.5, 3.0, 5.0  # percent
 YOUNG = (3e4, 2e5, 1e6, 1e7)
@@ -127,7 +127,7 @@ def _beam(
     sling = with_edges(band_of(bench), times)
     young = BEAM_YOUNG
     sling = straight(sling, sling.rest_length, clamped=clamped, mass=sling.mass / 200)
-    layers = rest(
+    sections = rest(
         bench, sling, [young, poisson, 2e-3, 0.5, 1.0], straight_guess(sling), double=double
     )
     load = sling.mass * GRAVITY / sling.rest_length
@@ -135,7 +135,7 @@ def _beam(
     both = all(clamped)
     closed = clamped_beam if both else cantilever
     node = sling.middle if both else -1
-    return -layers[node, 2] / closed(load, sling.rest_length, rigidity)
+    return -sections[node, 2] / closed(load, sling.rest_length, rigidity)
 
 
 def beams(bench: Bench, poissons=BEAM_POISSON, double: bool = True) -> list[Check]:
@@ -177,10 +177,10 @@ def torque_ratio(bench: Bench, angle: float, poisson: float) -> float:
     sling = band_of(bench)
     sling = straight(sling, sling.rest_length, clamp_twist=angle)
     theta = (1e6, poisson, 2e-3, 0.5, 1.0)
-    layers = rest(bench, sling, theta, straight_guess(sling), gravity=0.0, **TIGHT)
+    sections = rest(bench, sling, theta, straight_guess(sling), gravity=0.0, **TIGHT)
     step = 1e-5
     sides = [
-        Twin(replace(sling, clamp_twist=angle + turn), theta).elastic(layers)
+        ReferenceRod(replace(sling, clamp_twist=angle + turn), theta).elastic(sections)
         for turn in (step, -step)
     ]
     shear = theta[0] / (2 * (1 + poisson))

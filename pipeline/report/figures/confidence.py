@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from pipeline.report.figures.canvas import PARAMETERS, few_ticks, save
 from pipeline.report.results import Result
 from pipeline.report.styles import INK, THEME, Styles
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 
 BINS = 14  # of a marginal, over the span that is shown
 TOP = 3.0  # of the misfit axis, in units of the misfit at the interval's ends

@@ -14,7 +14,7 @@ from pipeline.report.figures.canvas import PARAMETERS, few_ticks, log_y, save
 from pipeline.report.losses import best_so_far, printed
 from pipeline.report.results import Result
 from pipeline.report.styles import INK, SIDE_BY_SIDE, THEME, Styles, drawn
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 
 PATH, STAR = "#e4003a", "#ffd23f"
 NEAR = 0.3  # of the least loss, the part that is magnified

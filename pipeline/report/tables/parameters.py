@@ -15,7 +15,7 @@ from pipeline.report.results import Result, Results
 from pipeline.report.styles import Styles
 from pipeline.report.tables.benchmark import APART, NOT_RUN, PAPER, band_name, method_name
 from pipeline.report.tables.cells import NONE, Table, number
-from pipeline.sling.model import THETA
+from pipeline.sling.material import THETA
 
 HEADS = {  # as the paper has them, with units
     "youngs_modulus": "E [Pa]",

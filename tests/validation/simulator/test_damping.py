@@ -11,7 +11,7 @@ from validation.simulator.agreement import random_thetas
 from validation.simulator.check import Bench
 from validation.simulator.damping import ROUNDING, STATES
 from validation.simulator.experiment import band_of
-from validation.simulator.reference import Twin
+from validation.simulator.reference import ReferenceRod
 
 from .kept import assert_kept
 
@@ -25,9 +25,9 @@ def test_no_rates_gain_energy_in_random_states(bench: Bench):
     @given(st.sampled_from(KINDS), st.integers(0, 2**32 - 1))
     def gains_nothing(kind: str, seed: int) -> None:
         rng, sling = np.random.default_rng(seed), band_of(bench)
-        layers = damping.random_states(sling, kind, 1, rng)[0]
+        sections = damping.random_states(sling, kind, 1, rng)[0]
         theta = random_thetas(bench, 1, seed)[0]
-        assert damping.power_gain(Twin(sling, tuple(theta)), layers) <= ROUNDING
+        assert damping.power_gain(ReferenceRod(sling, tuple(theta)), sections) <= ROUNDING
 
     gains_nothing()
 

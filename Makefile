@@ -1,5 +1,5 @@
 # Each target works first on a fresh clone: it sets up .venv where that is missing or out of date.
-.PHONY: setup run paper ui test lint validate clean
+.PHONY: setup run large paper ui test lint validate clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready
@@ -10,8 +10,8 @@ setup: .venv/ready
 run: setup            # everything that is stale, by the budget of params.yaml
 	PATH="$(CURDIR)/.venv/bin:$$PATH" dvc repro
 
-paper: setup          # the same with the paper's budget; an hour and more
-	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/python tools/paper.py
+large paper: setup    # the same with ten times the rollouts a method; an hour and more
+	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/python tools/large.py
 
 ui: setup             # what `sling flow` does, in a browser on this machine: http://127.0.0.1:4200
 	@.venv/bin/sling ui

@@ -137,7 +137,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="METHOD",
         help="time searches, all or of these methods",
     )
-    sub.add_argument("--budget", choices=("laptop", "paper"), default="laptop", help="of --methods")
+    sub.add_argument("--budget", choices=("laptop", "large"), default="laptop", help="of --methods")
     sub.add_argument("--json", action="store_true")
     return top
 

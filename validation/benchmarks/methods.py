@@ -30,8 +30,8 @@ from pipeline.sling.material import THETA
 from pipeline.sling.model import Sling
 from validation.benchmarks.simulator import recorded_yardstick, seconds, shared, timed
 
-PAPER = {"population": 64, "generations": 39, "cma_population": 16, "cma_rollouts": 3200}
-BUDGETS = {"laptop": {}, "paper": PAPER}  # laptop: as params.yaml has it
+LARGE = {"population": 64, "generations": 39, "cma_population": 16, "cma_rollouts": 3200}
+BUDGETS = {"laptop": {}, "large": LARGE}  # laptop: as params.yaml has it
 
 
 class Clocked:
@@ -53,7 +53,7 @@ def bench_methods(
 
     Args:
         device: Or several that share each batch, as SLING_DEVICE names them.
-        size: Of the budget, laptop (params.yaml's) or paper.
+        size: Of the budget, laptop (params.yaml's) or large.
         methods: These alone; none or an empty list means all.
 
     Returns:
@@ -73,7 +73,7 @@ def bench_methods(
     first = next(iter(params.methods))
     _import_and_compile(params, sling, episode, first, devices)
     return {
-        "budget": {"name": size} | {name: getattr(optimizer, name) for name in PAPER},
+        "budget": {"name": size} | {name: getattr(optimizer, name) for name in LARGE},
         "batch": _generation(params, sling, episode, first, devices, optimizer.population),
         "methods": {
             method: time_search(params, method, optimizer, sling, episode, devices)[0]

@@ -42,7 +42,7 @@ def bench_scaling(
         device: As SLING_DEVICE names them, two or more.
         band: Whose episode and mounting lie in data/; None takes the yardstick of `sling bench`.
         method: Whose search is timed, and in whose box the generations lie.
-        size: Of the search's budget, laptop (params.yaml's) or paper.
+        size: Of the search's budget, laptop (params.yaml's) or large.
 
     Returns:
         `scaling`: of `generations` and `launches` their count, and of those and the `search` for

@@ -24,7 +24,7 @@ from pipeline.sling.launch import launch
 from pipeline.sling.load import load_sling
 from pipeline.sling.material import THETA
 from pipeline.sling.theta import vector
-from validation.benchmarks.methods import PAPER, complete
+from validation.benchmarks.methods import LARGE, complete
 from validation.campaigns.test_orange import (
     BAND,
     LANDINGS,
@@ -82,9 +82,9 @@ class Recorded:
                 "params": self.changed(nuisances={"air_drag": (0.0, 8.0)})
             },
             "with five starts": {"params": self.changed(k_top=None)},
-            "with the paper's budget": {
+            "with the large budget": {
                 "params": self.params.model_copy(
-                    update={"optimizer": self.params.optimizer.model_copy(update=PAPER)}
+                    update={"optimizer": self.params.optimizer.model_copy(update=LARGE)}
                 )
             },
             "without bounds of nu": {"params": self.changed(bounds={})},

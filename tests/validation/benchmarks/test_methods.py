@@ -61,8 +61,8 @@ def test_a_search_is_timed_in_the_box_of_its_method() -> None:
         np.testing.assert_array_equal(evaluate.space.high, expected.high)
 
 
-def test_the_papers_budget_is_the_papers() -> None:
-    optimizer = PARAMS.optimizer.model_copy(update=bench.BUDGETS["paper"])
+def test_the_large_budget_is_ten_times_the_laptops() -> None:
+    optimizer = PARAMS.optimizer.model_copy(update=bench.BUDGETS["large"])
     assert bench.budget(optimizer, "multistart") == (2560, 3200)
     assert bench.budget(optimizer, "bo") == (5760, 0)
 

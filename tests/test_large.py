@@ -1,4 +1,4 @@
-"""The paper's budget in params.yaml; how long the run took, though it was killed."""
+"""The large budget in params.yaml; how long the run took, though it was killed."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.params import load
 from tests.project import ROOT
-from tools.paper import KEPT, timed, with_budget
-from validation.benchmarks.methods import PAPER
+from tools.large import KEPT, timed, with_budget
+from validation.benchmarks.methods import LARGE
 
 RUN = ["sh", "-c", "test -e finish || exec sleep 60"]
-TOLD = "import sys; from pathlib import Path; from tools.paper import timed;"
+TOLD = "import sys; from pathlib import Path; from tools.large import timed;"
 
 
 def test_stretches_add_up_over_a_kill_until_a_run_succeeds(tmp_path: Path) -> None:
@@ -53,13 +53,13 @@ def test_the_budget_is_all_that_changes_in_params(tmp_path: Path) -> None:
     path.write_text(before, encoding="utf-8")
     with_budget(path)
     after = path.read_text(encoding="utf-8")
-    assert {name: getattr(load(path).optimizer, name) for name in PAPER} == PAPER
+    assert {name: getattr(load(path).optimizer, name) for name in LARGE} == LARGE
     changed = [
         (old, new)
         for old, new in zip(before.splitlines(), after.splitlines(), strict=True)
         if old != new
     ]
-    assert len(changed) == len(PAPER)
+    assert len(changed) == len(LARGE)
     assert all(old.partition("#")[1:] == new.partition("#")[1:] for old, new in changed)
 
 

@@ -1,16 +1,15 @@
-"""Run everything with the paper's budget, and say where and how in reports/run.json.
+"""Run everything with the large budget, ten times params.yaml's, and say how long it took.
 
-    python tools/paper.py        # as `make paper`; arguments go to `sling flow`
+    python tools/large.py        # as `make large`; arguments go to `sling flow`
 
 The budget of validation/benchmarks/methods.py is written into params.yaml, for `git diff` to show
-and `git checkout params.yaml` to take back; then `sling flow`. Killed, it goes on where it was, and
-`seconds` adds up its stretches.
+and `git checkout params.yaml reports dvc.lock` to take back; then `sling flow`. Killed, it goes on
+where it was, and `seconds` in reports/run.js adds up its stretches.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import re
 import signal
 import subprocess
@@ -26,25 +25,25 @@ from pipeline.base import errors  # noqa: E402
 from pipeline.base.errors import UserError  # noqa: E402
 from pipeline.base.files import replacing, write_json  # noqa: E402
 from pipeline.params import load  # noqa: E402
-from validation.benchmarks.methods import PAPER  # noqa: E402
-from validation.benchmarks.simulator import environment  # noqa: E402
+from pipeline.report.run import write_run  # noqa: E402
+from validation.benchmarks.methods import LARGE  # noqa: E402
 
-KEPT = Path(".checkpoints", "paper.json")  # "runs" and the "stretches" [s] of a run without an end
+KEPT = Path(".checkpoints", "large.json")  # "runs" and the "stretches" [s] of a run without an end
 TICK = 10.0  # s, that a kill may lose of its stretch
 
 
 def with_budget(path: Path) -> None:
-    """Write the paper's budget into params.yaml, whose comments stay. Raises UserError."""
+    """Write the large budget into params.yaml, whose comments stay. Raises UserError."""
     text = path.read_text(encoding="utf-8")
-    for name, value in PAPER.items():
+    for name, value in LARGE.items():
         text = re.sub(rf"(?m)^(  {name}: *)[0-9_]+", rf"\g<1>{value}", text)
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
         optimizer = load(temporary).optimizer
-        off = [name for name, value in PAPER.items() if getattr(optimizer, name) != value]
+        off = [name for name, value in LARGE.items() if getattr(optimizer, name) != value]
         if off:
             raise UserError(
-                f"{path}: write optimizer.{off[0]}: {PAPER[off[0]]} on a line of its own"
+                f"{path}: write optimizer.{off[0]}: {LARGE[off[0]]} on a line of its own"
             )
 
 
@@ -76,14 +75,15 @@ def timed(run: list[str], root: Path = ROOT, tick: float = TICK) -> tuple[int, l
 
 def main() -> int:
     run = ["sling", "flow", *sys.argv[1:]]
-    about = environment(os.environ.get("SLING_DEVICE", "cpu"), "make paper")
     with_budget(ROOT / "params.yaml")
     status, stretches = timed(run)
     if status == 0:
-        about |= {"runs": " ".join(run), "seconds": round(sum(stretches))}
-        about |= {"stretches": len(stretches)} if len(stretches) > 1 else {}
-        write_json(ROOT / "reports" / "run.json", about)
-        print(json.dumps(about, indent=4))
+        took = {
+            "runs": " ".join(run),
+            "seconds": round(sum(stretches)),
+            "stretches": len(stretches),
+        }
+        print(json.dumps(write_run(ROOT / "reports", **took), indent=2))
     return status
 
 

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.base.layout import Layout
 from pipeline.landing.simulator import simulator
 from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.launches.spread import landing_intervals
 from pipeline.params import expect_known
 from pipeline.sling.theta import law_discrepancy, load_samples, load_theta
-from stages.start import expect_from
+from stages.start import note_unmounted
 
 
 def aim(
@@ -43,12 +44,13 @@ def aim(
     """
     expect_known(params, "band", band)
     expect_known(params, "method", method)
-    root = Path(root)
-    source = root / "data" / "theta" / band / f"{method}.json"
-    content = load_theta(expect_from(params.run, "theta", band, method, source), band)
-    stored = Stored(params.run, band, method, root)
+    layout = Layout(Path(root))
+    content = load_theta(layout.theta(band, method), band)
+    stored = Stored(band, method, layout.root)
     draw = stored.draws(np.array([target]), ROBUST if robust else PLAIN)[0]
-    launcher = launcher or simulator(params, band, content, root=root)
+    if launcher is None:
+        note_unmounted(band, root)
+        launcher = simulator(params, band, content, root=root)
     launched = launcher(draw[None])
     warnings = []
     low, high = params.policy.targets
@@ -61,9 +63,7 @@ def aim(
         landing = float(launched.landing_y[0])
         if abs(landing - target) > 0.05:
             warnings.append(f"the simulated landing is {landing - target:+.2f} m off the target")
-        samples = load_samples(
-            params.run, root / "data" / "confidence" / band / f"{method}.json", band, method
-        )
+        samples = load_samples(layout.confidence(band, method))
         if samples is None:
             warnings.append("the interval leaves out how well the parameters are known")
         error, discrepancy = params.trials.actuation_error, law_discrepancy(content)

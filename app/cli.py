@@ -14,8 +14,9 @@ import sys
 from pathlib import Path
 from typing import NoReturn
 
-from pipeline.base import errors
 from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout
+from stages.start import note_unmounted, run
 
 DEFAULT_METHOD = "sling2sim2real_taut"
 FURTHEST_TARGET, FURTHEST_DRAW = 100.0, 2.0  # m
@@ -24,7 +25,7 @@ FURTHEST_TARGET, FURTHEST_DRAW = 100.0, 2.0  # m
 def main() -> None:
     """Entry point of the console script."""
     arguments = parser().parse_args()
-    errors.run(lambda: execute(arguments))
+    run(lambda: execute(arguments))
 
 
 def execute(arguments: argparse.Namespace) -> int:
@@ -242,7 +243,7 @@ def run_plan(arguments: argparse.Namespace) -> tuple[str, int]:
         theta=arguments.theta,
         recording=arguments.recording,
     )
-    files = plan.write(arguments.out or Path("data", "plans", arguments.band), arguments.rate)
+    files = plan.write(arguments.out or Layout().plans(arguments.band), arguments.rate)
     return plan.to_json(files) if arguments.json else plan.to_text(files), 0
 
 
@@ -262,6 +263,7 @@ def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
     if math.hypot(*arguments.draw) > FURTHEST_DRAW:
         raise UserError(f"--draw: must be at most {FURTHEST_DRAW:g} m from the fork")
     content = load_theta(arguments.theta, arguments.band)
+    note_unmounted(arguments.band)
     sling = calibrated(params, arguments.band, content)
     result = launch(sling, vector(content), arguments.draw, max_force=params.setup.max_force)
     return shown(
@@ -291,15 +293,15 @@ def run_aim(arguments: argparse.Namespace) -> tuple[str, int]:
 
 
 def run_flow(arguments: argparse.Namespace) -> tuple[str, int]:
-    from app.flow.run import run
+    from app.flow import run as flow
 
     root, workers, gpus = Path.cwd(), arguments.workers, arguments.gpus
     if arguments.cluster is None:
-        return run(root, workers=workers, gpus=gpus), 0
+        return flow.run(root, workers=workers, gpus=gpus), 0
     from app.cluster.cluster import Cluster
 
     with Cluster(root, arguments.cluster) as cluster:
-        done = run(
+        done = flow.run(
             root,
             workers=workers or cluster.slots,
             gpus=gpus or cluster.slots,

@@ -15,6 +15,7 @@ import numpy as np
 
 from app.plan.hand import along_pull, quaternion
 from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout
 from pipeline.recording.input.frames import Transform
 
 
@@ -53,7 +54,7 @@ def fork_in_base(params, band: str, root: str | Path = ".") -> tuple[Transform, 
     """
     given = params.setup.base_to_fork
     try:
-        fork, frame = _recorded(Path(root, "data", "raw", f"{band}.mcap"), params.setup)
+        fork, frame = _recorded(Layout(Path(root)).recording(band), params.setup)
     except UserError:
         if given is None:
             raise

@@ -8,24 +8,21 @@ no region where the method's search has one phase.
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from pipeline.base import errors
+from pipeline.base.layout import Layout, made
 from pipeline.objective.space import Space
 from pipeline.search.history import History
 from pipeline.search.loop import Free
 from pipeline.search.regions import regions_of, save_regions
-from stages.start import expect_from, started
+from stages.start import run, started
 
 
 def main() -> None:
     params, band, method = started("band", "method")
     about, optimizer = params.methods[method], params.optimizer
     free = Free.of(Space.of_method(params, method), about.fixed)
-    source = Path("data/history", band, f"{method}.parquet")
-    expect_from(params.run, "history", band, method, source)
-    history = History.load(method, free.names, source)
-    target = Path("data/clusters", band, f"{method}.json")
+    layout = Layout()
+    history = History.load(method, free.names, made(layout.history(band, method)))
+    target = layout.clusters(band, method)
     if about.search != "multistart":
         save_regions(target, free.names, [], 0)
         print(f"{band} {method}: {about.search} has no second phase")
@@ -38,4 +35,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    errors.run(main)
+    run(main)

@@ -7,17 +7,16 @@ Reads data/raw/<band>.mcap; writes data/episodes/<band>/: signals.parquet and cl
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from pipeline.base import errors
+from pipeline.base.layout import Layout
 from pipeline.recording.build import build_episode
-from stages.start import started
+from stages.start import run, started
 
 
 def main() -> None:
     params, band = started("band")
-    episode = build_episode(Path("data/raw", f"{band}.mcap"), band, params)
-    episode.save(Path("data/episodes", band))
+    layout = Layout()
+    episode = build_episode(layout.recording(band), band, params)
+    episode.save(layout.episode(band))
     force = episode.metadata["preprocessing"]["peak_force"]
     print(
         f"{band}: grasp {episode.grasp_time:.3f} s, release {episode.release_time:.4f} s,"
@@ -26,4 +25,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    errors.run(main)
+    run(main)

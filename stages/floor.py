@@ -10,15 +10,14 @@ target that is out of reach has no draw, and no launch at it lands. Only the rep
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
-from pipeline.base import errors
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
+from pipeline.base.layout import Layout
 from pipeline.oracle.aim import least_sensitive_draw
 from pipeline.oracle.floor import errors_of, trial_seeds
 from pipeline.oracle.world import World
-from stages.start import started
+from stages.start import run, started
 
 
 def main() -> None:
@@ -46,11 +45,11 @@ def main() -> None:
         "release_jitter": params.rig.release_jitter,
         "seed": params.trials.seed,
     }
-    write_json(Path("data/floor", f"{band}.json"), content)
+    write_json(Layout().floor(band), content)
     mean, landed = floor["mean_error_m"], floor["launches"] - floor["failed"]
     said = "no launch lands" if mean is None else f"{100 * mean:.2f} cm over {landed} launches"
     print(f"{band}: floor {said}")
 
 
 if __name__ == "__main__":
-    errors.run(main)
+    run(main)

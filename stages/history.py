@@ -10,15 +10,13 @@ SLING_WORKERS say where it runs.
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from pipeline.base import errors
+from pipeline.base.layout import Layout
 from pipeline.objective.session import service
 from pipeline.objective.space import Space
 from pipeline.search.history import History
 from pipeline.search.loop import Free, budget, search
 from pipeline.search.optimizers import explorer
-from stages.start import started
+from stages.start import run, started
 
 
 def main() -> None:
@@ -35,8 +33,8 @@ def main() -> None:
         rollouts=rollouts,
         free=free,
     )
-    history.save(Path("data/history", band, f"{method}.parquet"))
+    history.save(Layout().history(band, method))
 
 
 if __name__ == "__main__":
-    errors.run(main)
+    run(main)

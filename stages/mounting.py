@@ -7,16 +7,14 @@ Reads data/episodes/<band>/; writes data/mounting/<band>.json.
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from pipeline.base import errors
 from pipeline.base.files import write_json
+from pipeline.base.layout import Layout
 from pipeline.base.machine import cores
 from pipeline.objective.clamps import calibrate_clamps
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.session import load_episode
 from pipeline.sling.model import Sling
-from stages.start import started
+from stages.start import run, started
 
 
 def main() -> None:
@@ -29,7 +27,7 @@ def main() -> None:
         lambda part: EpisodeLoss.plain(params, part, sling),
         workers=cores(),
     )
-    write_json(Path("data/mounting", f"{band}.json"), content)
+    write_json(Layout().mounting(band), content)
     print(
         f"{band}: clamps at {content['clamp_angle_deg']:.1f} deg, bending"
         f" {content['relative_rigidity']:.2f} of a solid round band's"
@@ -37,4 +35,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    errors.run(main)
+    run(main)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.base import errors
+from pipeline.base.layout import Layout
 from pipeline.base.machine import devices, kind
 from pipeline.base.progress import Progress
 from pipeline.landing.landing_map import LandingMap, landscape_of, validation
@@ -27,15 +27,15 @@ from pipeline.policy.check import check, check_expected, figures, robust_figures
 from pipeline.policy.export import export
 from pipeline.policy.train import Policy, train
 from pipeline.sling.theta import load_samples, load_theta
-from stages.start import expect_from, started
+from stages.start import run, started
 
 EVERY = 1.0  # s, between two lines of a training
 
 
 def main() -> None:
     params, band, method = started("band", "method")
-    source = Path("data/theta", band, f"{method}.json")
-    theta = load_theta(expect_from(params.run, "theta", band, method, source), band)
+    layout = Layout()
+    theta = load_theta(layout.theta(band, method), band)
     launcher = simulator(params, band, theta, device=devices())
     landing_map = LandingMap.simulate(
         launcher,
@@ -51,7 +51,7 @@ def main() -> None:
     checked = check(plain.policy, launcher, params)
     training = figures(plain, checked)
 
-    stored = Stored(params.run, band, method)
+    stored = Stored(band, method)
     landing_map.save(stored.folder() / "map.parquet", {"band": band, "method": method})
     about = {"params": params, "band": band, "method": method, "theta": theta, "device": kind()}
     validated = landing_map.validation(params.policy.targets)
@@ -60,8 +60,8 @@ def main() -> None:
 
     shutil.rmtree(stored.folder(ROBUST), ignore_errors=True)  # of an earlier run
     if method in params.policy.robust.methods:
-        source = Path("data/confidence", band, f"{method}.json")
-        samples = load_samples(params.run, source, band, method)
+        source = layout.confidence(band, method)
+        samples = load_samples(source)
         if samples is None:
             print(f"{band} {method}: no robust policy, for there are no samples in {source}")
         else:
@@ -90,4 +90,4 @@ def _robust(folder: Path, plain: Policy, samples: np.ndarray, launcher, about) -
 
 
 if __name__ == "__main__":
-    errors.run(main)
+    run(main)

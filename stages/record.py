@@ -5,11 +5,10 @@ python -m stages.record band1
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from pipeline.base.errors import UserError, run
+from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout
 from pipeline.rig.recorder.record import record
-from stages.start import started
+from stages.start import run, started
 
 
 def main() -> None:
@@ -18,7 +17,7 @@ def main() -> None:
         raise UserError(f"{band}: not a band with source: rig in params.yaml")
     if band not in params.rig.bands:
         raise UserError(f"{band}: rig.bands in params.yaml does not say what it is made of")
-    record(params, band, Path(f"data/raw/{band}.mcap"), lambda line: print(line, flush=True))
+    record(params, band, Layout().recording(band), lambda line: print(line, flush=True))
 
 
 if __name__ == "__main__":

@@ -9,24 +9,22 @@ Killed, it resumes from .checkpoints/. SLING_DEVICE and SLING_WORKERS say where 
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from pipeline.base import errors
+from pipeline.base.layout import Layout, made
 from pipeline.objective.session import service
 from pipeline.objective.space import Space
 from pipeline.search.history import History
 from pipeline.search.loop import Free, search
 from pipeline.search.optimizers.multistart import Multistart
 from pipeline.search.regions import load_regions
-from stages.start import expect_from, started
+from stages.start import run, started
 
 
 def main() -> None:
     params, band, method = started("band", "method")
     about, optimizer = params.methods[method], params.optimizer
     space = Space.of_method(params, method)
-    source = Path("data/clusters", band, f"{method}.json")
-    regions = load_regions(expect_from(params.run, "clusters", band, method, source))
+    layout = Layout()
+    regions = load_regions(made(layout.clusters(band, method)))
     history = History(method, space.names)
     if regions:
         search(
@@ -36,8 +34,8 @@ def main() -> None:
             rollouts=optimizer.cma_rollouts,
             free=Free.of(space, about.fixed),
         )
-    history.save(Path("data/refined", band, f"{method}.parquet"))
+    history.save(layout.refined(band, method))
 
 
 if __name__ == "__main__":
-    errors.run(main)
+    run(main)

@@ -7,9 +7,8 @@ Fails, and says which stage is missing, where an expected input is not there.
 
 from __future__ import annotations
 
-from pipeline.base import errors
 from pipeline.report.write import write
-from stages.start import started
+from stages.start import run, started
 
 
 def main() -> None:
@@ -19,4 +18,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    errors.run(main)
+    run(main)

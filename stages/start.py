@@ -1,12 +1,17 @@
-"""What every stage's script begins with: its arguments, params.yaml, and inputs that are there."""
+"""What every script begins and ends with: arguments, params.yaml, and an error with its remedy."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
+from pipeline.base import errors
 from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout, NotMade, owner
 from pipeline.params import Params, expect_known, load, pairs
+
+STEPS = {"raw": "record", "episodes": "episode", "confidence": "theta", "policies": "policy"}
 
 
 def arguments(*names: str) -> list[str]:
@@ -28,40 +33,44 @@ def started(*names: str) -> tuple[Params, *tuple[str, ...]]:
     return params, *given
 
 
-def expect(path: Path, stage: str) -> Path:
-    """`path`, which `stage` makes. Raises UserError where it is missing."""
-    if not path.is_file():
-        raise UserError(f"{path}: missing; `dvc repro {stage}` makes it")
-    return path
+def run(main: Callable[[], int | None]) -> None:
+    """Run a stage or a command: a mistake is one line, which says what makes a missing file."""
+
+    def explained() -> int | None:
+        try:
+            return main()
+        except NotMade as error:
+            raise UserError("; ".join(filter(None, (str(error), remedy(error))))) from error
+
+    errors.run(explained)
 
 
-def expect_from(run, step: str, band: str, method: str, path: Path) -> Path:
-    """`path`, which `step` makes for a band and a method. Raises UserError where it is missing.
+def remedy(error: NotMade) -> str:
+    """In words how a user gets a file, or gets it anew; "" where no stage makes it."""
+    known = owner(error.path)
+    if known is None:
+        return ""
+    folder, band, method = known
+    step, asked = STEPS.get(folder, folder), load().run
+    stage = f"{step}@{band}"
+    if method is not None:
+        if (band, method) not in pairs(asked):
+            return (
+                f"name {method} under run.methods or run.ablations in params.yaml,"
+                " then `dvc repro` makes it"
+            )
+        stage = f"{'' if method in asked.methods else 'ablation_'}{stage}-{method}"
+    if error.problem != "missing":
+        return f"`dvc repro --force {stage}` makes it anew"
+    return " ".join(filter(None, (f"`dvc repro {stage}` makes it", error.condition)))
 
-    Args:
-        run: params.yaml's `run`, which says by what name the step goes; read only if need be.
-    """
-    if path.is_file():
-        return path
-    raise UserError(f"{path}: missing; {remedy(run, step, band, method)}")
 
-
-def remedy(run, step: str, band: str, method: str, *, damaged: bool = False) -> str:
-    """In words how a user gets what `step` makes for a band and a method, or gets it anew."""
-    if (band, method) not in pairs(run):
-        return (
-            f"name {method} under run.methods or run.ablations in params.yaml,"
-            " then `dvc repro` makes it"
+def note_unmounted(band: str, root: str | Path = ".") -> None:
+    """Say on stderr where nothing is known of how a band hangs: simulations go on without."""
+    path = Layout(Path(root)).mounting(band)
+    if not path.exists():
+        print(
+            f"note: {path} is missing, so the band hangs as `setup` says; `dvc repro"
+            f" mounting@{band}` fits it to a recording",
+            file=sys.stderr,
         )
-    stage = f"{'' if method in run.methods else 'ablation_'}{step}@{band}-{method}"
-    return (
-        f"`dvc repro --force {stage}` makes it anew" if damaged else f"`dvc repro {stage}` makes it"
-    )
-
-
-def expect_episode(band: str) -> Path:
-    """Folder of the band's episode. Raises UserError where it is missing."""
-    folder = Path("data/episodes", band)
-    for name in ("signals.parquet", "clouds.parquet"):
-        expect(folder / name, f"episode@{band}")
-    return folder

@@ -12,10 +12,9 @@ how many threads.
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
-from pipeline.base import errors
 from pipeline.base.files import write_json
+from pipeline.base.layout import Layout, made
 from pipeline.base.machine import workers
 from pipeline.confidence.rounds import NoConfidence
 from pipeline.confidence.summary import confidence
@@ -23,15 +22,13 @@ from pipeline.objective.session import load_episode
 from pipeline.search.history import History, theta_content
 from pipeline.sling.load import load_sling
 from pipeline.sling.material import THETA
-from stages.start import expect_from, started
+from stages.start import run, started
 
 
 def main() -> None:
     params, band, method = started("band", "method")
-    sources = [
-        expect_from(params.run, step, band, method, Path("data", step, band, f"{method}.parquet"))
-        for step in ("history", "refined")
-    ]
+    layout = Layout()
+    sources = made(layout.history(band, method)), made(layout.refined(band, method))
     content = theta_content(History.load(method, THETA, *sources), band)
     episode, sling = load_episode(band), load_sling(params, band)
     try:
@@ -40,8 +37,8 @@ def main() -> None:
         print(f"warning: {method}: {error}", file=sys.stderr)
         known, kept = None, {"samples": []}
     content["confidence"] = known
-    write_json(Path("data/confidence", band, f"{method}.json"), kept | {"band": band})
-    write_json(Path("data/theta", band, f"{method}.json"), content)
+    write_json(layout.confidence(band, method), kept | {"band": band})
+    write_json(layout.theta(band, method), content)
     print(f"{band} {method}: loss {content['loss']['total']:.5g}")
     for name, value in content["theta"].items():
         print(f"  {name} {value:.4g}{_trust(known['parameters'][name]) if known else ''}")
@@ -55,4 +52,4 @@ def _trust(about: dict) -> str:
 
 
 if __name__ == "__main__":
-    errors.run(main)
+    run(main)

@@ -11,11 +11,10 @@ recorded band the calibrated simulator predicts the measured launches, or else t
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
-from pipeline.base import errors
+from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.landing.simulator import simulator
 from pipeline.landing.stored import Stored
@@ -24,20 +23,19 @@ from pipeline.launches.stretch import recorded_stretch, stretch_of
 from pipeline.params import load
 from pipeline.rig.physics.launch import Trial, launch
 from pipeline.sling.theta import law_discrepancy, load_samples, load_theta
-from stages.start import expect_episode, expect_from, started
+from stages.start import run, started
 
 
 def main() -> None:
     params, band, method = started("band", "method")
     about, fork_width = params.bands[band], params.setup.fork_width
-    source = Path("data/theta", band, f"{method}.json")
-    theta = load_theta(expect_from(params.run, "theta", band, method, source), band)
-    source = Path("data/confidence", band, f"{method}.json")
-    samples = load_samples(params.run, source, band, method)
-    episode = Episode.load(expect_episode(band))
+    layout = Layout()
+    theta = load_theta(layout.theta(band, method), band)
+    samples = load_samples(layout.confidence(band, method))
+    episode = Episode.load(layout.episode(band))
 
-    stored, targets = Stored(params.run, band, method), params.trials.targets
-    batches = trials.measured(params, band, method, Path("data/trials/measured"))
+    stored, targets = Stored(band, method), params.trials.targets
+    batches = trials.measured(params, band, method, layout.measured)
     if about.source == "rig":
         own = trials.aimed(stored, np.repeat(targets, params.trials.repeats).tolist())
         batches = trials.launched(own, partial(_launch, band), params.trials) + batches
@@ -56,7 +54,7 @@ def main() -> None:
         stretch=stretch_of(np.insert(draws, 0, 0, axis=1), fork_width, about.rest_length),
         recorded=recorded_stretch(episode, fork_width, about.rest_length),
     )
-    trials.save(table, Path("data/trials", band, f"{method}.parquet"))
+    trials.save(table, layout.trials(band, method))
     said = [" ".join(filter(None, (g.kind, g.policy, str(len(g.draws))))) for g in batches]
     print(f"{band} {method}: launches: {', '.join(said)}")
 
@@ -67,4 +65,4 @@ def _launch(band: str, draw: np.ndarray, seed: int) -> Trial:
 
 
 if __name__ == "__main__":
-    errors.run(main)
+    run(main)

@@ -79,6 +79,14 @@ def concern(file: Path) -> str:
     return "/".join(name.split("/")[: 3 if name.startswith(NESTED) else 2])
 
 
+def test_one_module_knows_where_files_lie_under_data() -> None:
+    spelt = re.compile(r"""Path\([^)]*["']data\b|/ ["']data\b""")
+    for file in code():
+        name = relative(file)
+        if name != "pipeline/base/layout.py" and not name.startswith("validation/"):
+            assert not spelt.search(file.read_text()), name
+
+
 def test_a_folder_of_folders_holds_no_code() -> None:
     """It is no dependency of a stage, so nothing may hang on it."""
     for name in ("pipeline/__init__.py", *(f"{folder}__init__.py" for folder in NESTED)):

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from app.flow.graph import Stage
+from pipeline.base.layout import Layout
 
 LINK = re.compile(r"\[([^\]]*)\]\((?!https?:)[^)]*\)")  # to a file beside the report
 CHAPTERS = ("In short", "The paper's tables")
@@ -40,7 +41,7 @@ def _episode(root: Path, band: str, method: str) -> Iterator[str]:
     from pipeline.params import load
     from pipeline.report.figures import episode
 
-    recorded = Episode.load(root / "data" / "episodes" / band)
+    recorded = Episode.load(Layout(root).episode(band))
     frames = episode.moments(recorded)
     diameter = load(root / "params.yaml").bands[band].diameter
     yield _drawn("clouds", lambda path: episode.clouds(path, recorded, {}, {}, frames, diameter))
@@ -58,12 +59,9 @@ def _theta(root: Path, band: str, method: str) -> Iterator[str]:
     from pipeline.report.tables.cells import markdown
     from pipeline.sling.theta import load_theta
 
-    params, named = load(root / "params.yaml"), styles([method])
-    theta = load_theta(_file(root, "theta", band, f"{method}.json"), band)
-    steps = [
-        pd.read_parquet(_file(root, step, band, f"{method}.parquet"))
-        for step in ("history", "refined")
-    ]
+    layout, params, named = Layout(root), load(root / "params.yaml"), styles([method])
+    theta = load_theta(layout.theta(band, method), band)
+    steps = [pd.read_parquet(file(band, method)) for file in (layout.history, layout.refined)]
     result = SimpleNamespace(  # as much of report.results.Result as is there by now
         band=band,
         method=method,
@@ -84,13 +82,12 @@ def _policy(root: Path, band: str, method: str) -> Iterator[str]:
     import pandas as pd
 
     from pipeline.landing.stored import ROBUST, Stored
-    from pipeline.params import load
     from pipeline.report.figures import policy
     from pipeline.report.styles import styles
     from pipeline.report.tables.cells import markdown
     from pipeline.report.tables.policies import policies
 
-    stored = Stored(load(root / "params.yaml").run, band, method, root)
+    stored = Stored(band, method, root)
     named = styles([method])
     result = SimpleNamespace(
         band=band,
@@ -111,10 +108,7 @@ def _trials(root: Path, band: str, method: str) -> Iterator[str]:
     from pipeline.report.tables.cells import markdown
     from pipeline.report.tables.landings import predictions
 
-    trials, named = (
-        pd.read_parquet(_file(root, "trials", band, f"{method}.parquet")),
-        styles([method]),
-    )
+    trials, named = pd.read_parquet(Layout(root).trials(band, method)), styles([method])
     if trials.landing_y.notna().any():
         yield _drawn("landings", lambda path: policy.landings(path, trials, named, [method]))
     for kind, launched in trials.groupby("kind", sort=True):
@@ -145,10 +139,6 @@ def _report(root: Path, band: str, method: str) -> Iterator[str]:
         if title in CHAPTERS:
             without_links = LINK.sub(r"\1", content)
             yield f"## {title}\n{without_links}"
-
-
-def _file(root: Path, step: str, band: str, name: str) -> Path:
-    return root / "data" / step / band / name
 
 
 MAKERS: dict[str, Callable[[Path, str, str], Iterator[str]]] = {

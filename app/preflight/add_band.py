@@ -16,6 +16,7 @@ from app.preflight.check import check_recording
 from app.preflight.report import Report
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_text
+from pipeline.base.layout import Layout
 from pipeline.params import Params, load, parse
 from pipeline.recording.input.container import expect_file, sha256
 
@@ -54,7 +55,7 @@ def add_band(
     if not NAME.fullmatch(name):
         raise UserError(f"band name {name!r}: use small letters, digits and _, a letter first")
     recording, params_path = Path(recording), Path(params_path)
-    raw = Path(root, "data", "raw", f"{name}.mcap")
+    raw = Layout(Path(root)).recording(name)
     before = load(params_path)
     band = {
         "source": "recording",

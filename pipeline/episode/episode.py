@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.base.files import replacing
+from pipeline.base.layout import made
 
 SCHEMA_VERSION = 1
 
@@ -89,9 +90,9 @@ class Episode:
 
     @classmethod
     def load(cls, folder: Path) -> Episode:
-        """Read an episode that `save` wrote. Raises FileNotFoundError or ValueError."""
-        signals = pq.read_table(folder / "signals.parquet")
-        clouds = pq.read_table(folder / "clouds.parquet")
+        """Read an episode that `save` wrote. Raises NotMade or ValueError."""
+        paths = [made(folder / f"{name}.parquet") for name in ("signals", "clouds")]
+        signals, clouds = map(pq.read_table, paths)
         header = json.loads(signals.schema.metadata[b"episode"])
         if header.pop("version") != SCHEMA_VERSION:
             raise ValueError(f"{folder}: written by another version, run `dvc repro` again")

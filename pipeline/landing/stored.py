@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.base.errors import UserError
-from stages.start import remedy
+from pipeline.base.layout import Layout, NotMade
 
 PLAIN, ROBUST = "plain", "robust"  # ROBUST is also the folder of a method's second policy
 
@@ -19,18 +18,16 @@ class Stored:
     """The policies of `method` for `band`: a plain one, and beside it a robust one or none.
 
     Attributes:
-        run: params.yaml's `run`, which says what stage trains them.
-        root: Of the project, with data/.
+        root: Of the project.
     """
 
-    run: object
     band: str
     method: str
     root: Path = Path()
 
     def folder(self, kind: str = PLAIN) -> Path:
         """Where a policy's files lie, or would."""
-        plain = self.root / "data" / "policies" / self.band / self.method
+        plain = Layout(self.root).policy(self.band, self.method)
         return plain / ROBUST if kind == ROBUST else plain
 
     def kinds(self) -> list[str]:
@@ -38,18 +35,18 @@ class Stored:
         return [PLAIN, ROBUST] if (self.folder(ROBUST) / "card.json").is_file() else [PLAIN]
 
     def card(self, kind: str = PLAIN) -> dict:
-        """What a policy's card says (export.card). Raises UserError: missing, or damaged."""
+        """What a policy's card says (export.card). Raises NotMade: missing, or damaged."""
         path = self._file(kind, "card.json")
         try:
             return json.loads(path.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
-            raise self._damaged(path) from error
+            raise NotMade(path, "damaged") from error
 
     def draws(self, targets: np.ndarray, kind: str = PLAIN) -> np.ndarray:
         """Draws (y, z) [m], shape (N, 2), for targets [m], (N,).
 
         Raises:
-            UserError: The policy is not there, or damaged.
+            NotMade: The policy is not there, or damaged.
         """
         import onnxruntime
 
@@ -64,20 +61,14 @@ class Stored:
             )
             return session.run(["draw"], {"target": targets})[0].astype(float)
         except Exception as error:  # onnxruntime has an error of its own for each kind of damage
-            raise self._damaged(path) from error
+            raise NotMade(path, "damaged") from error
 
     def _file(self, kind: str, name: str) -> Path:
         path = self.folder(kind) / name
         if path.is_file():
             return path
-        trains = remedy(self.run, "policy", self.band, self.method)
-        if kind == ROBUST:
-            trains += (
-                f" where policy.robust.methods in params.yaml names {self.method} and its θ file"
-                " tells its confidence"
-            )
-        raise UserError(f"{path}: missing; {trains}")
-
-    def _damaged(self, path: Path) -> UserError:
-        trains = remedy(self.run, "policy", self.band, self.method, damaged=True)
-        return UserError(f"{path}: damaged; {trains}")
+        trains = (
+            f"where policy.robust.methods in params.yaml names {self.method} and its θ file tells"
+            " its confidence"
+        )
+        raise NotMade(path, condition=trains if kind == ROBUST else "")

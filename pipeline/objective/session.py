@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.base.fingerprint import fingerprint
+from pipeline.base.layout import Layout
 from pipeline.base.machine import devices, kind, workers
 from pipeline.base.progress import Progress
 from pipeline.episode.episode import Episode
@@ -17,8 +18,7 @@ from pipeline.objective.cache import EvaluationCache
 from pipeline.objective.evaluate import Evaluation, Evaluator
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
-from pipeline.sling.load import load_sling, mounting_path
-from stages.start import expect_episode
+from pipeline.sling.load import load_sling
 
 PIPELINE = Path(__file__).parents[1]
 SOURCES = (  # the code that a term of the loss hangs on
@@ -51,15 +51,15 @@ class LoggingEvaluator:
 
 def service(stage: str, band: str, method: str, params, rollouts: int) -> LoggingEvaluator:
     """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
-    evaluate = evaluator(params, band, method)
+    evaluate, layout = evaluator(params, band, method), Layout()
     sections = (params.bands[band], params.setup, params.sling, params.force, params.loss)
     cache = EvaluationCache(
         evaluate,
         Path(".checkpoints", band),
         fingerprint(
             *SOURCES,
-            *(Path("data/episodes", band, f"{name}.parquet") for name in ("signals", "clouds")),
-            mounting_path(band),
+            *(layout.episode(band) / f"{name}.parquet" for name in ("signals", "clouds")),
+            layout.mounting(band),
             *(section.model_dump_json() for section in sections),
             *(f"{package} {version(package)}" for package in ("warp-lang", "numpy", "scipy")),
             kind(),  # of the devices, not how many: that changes nothing
@@ -86,6 +86,5 @@ def evaluator(params, band: str, method: str) -> Evaluator:
 
 
 def load_episode(band: str) -> Episode:
-    """The recorded episode of a band. Raises UserError where it is missing."""
-    expect_episode(band)
-    return Episode.load(Path("data/episodes", band))
+    """The recorded episode of a band. Raises NotMade."""
+    return Episode.load(Layout().episode(band))

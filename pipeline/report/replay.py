@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout, NotMade
 from pipeline.episode.episode import Episode
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.nuisance import along_axes
 from pipeline.sling.theta import calibrated, vector
-from stages.start import remedy
 
 LOAD = 1.5  # kg: the paper's dumbbell
 SEEN_BY_CAMERA = ("camera_delay", "cloud_shift_x", "cloud_shift_y", "cloud_shift_z")
@@ -45,7 +44,7 @@ def replay(params, band: str, method: str, episode: Episode, theta: dict) -> Rep
     """Simulate the episode's interaction with a θ file's content.
 
     Raises:
-        UserError: θ fails in simulation.
+        NotMade: θ fails in simulation.
     """
     from pipeline.sling.hang import hang
     from pipeline.sling.interaction import interact
@@ -57,8 +56,7 @@ def replay(params, band: str, method: str, episode: Episode, theta: dict) -> Rep
     late = replace(episode, cloud_time=episode.cloud_time - delay)
     rollouts = interact(sling, late, vector(theta)[None])
     if rollouts.failure[0]:
-        again = remedy(params.run, "theta", band, method, damaged=True)
-        raise UserError(f"theta of {band}: {rollouts.failure[0]}; {again}")
+        raise NotMade(Layout().theta(band, method), rollouts.failure[0])
     if shift is not None:
         rollouts = replace(rollouts, center_line=rollouts.center_line + shift[:, None, None])
     nuisances = {name: one for name, one in nuisances.items() if name not in SEEN_BY_CAMERA}

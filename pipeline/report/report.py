@@ -50,7 +50,7 @@ class Report:
 
     def draws(self, result: Result, targets: np.ndarray) -> dict[str, np.ndarray]:
         """Draws (N, 2) [m] for targets (N,) [m] of a plain policy, and of a robust one if any."""
-        stored = Stored(self.params.run, result.band, result.method, self.root)
+        stored = Stored(result.band, result.method, self.root)
         kinds = [PLAIN, ROBUST] if result.robust_card else [PLAIN]
         return {kind: stored.draws(targets, kind) for kind in kinds}
 

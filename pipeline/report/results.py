@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from pipeline.base.layout import Layout, made
 from pipeline.episode.episode import Episode
 from pipeline.landing.landing_map import LandingMap
 from pipeline.landing.stored import ROBUST, Stored
@@ -17,7 +18,6 @@ from pipeline.params import pairs
 from pipeline.report.floors import load_floor
 from pipeline.search.regions import Region, load_regions
 from pipeline.sling.theta import load_theta
-from stages.start import expect, expect_from
 
 
 @dataclass(frozen=True)
@@ -82,44 +82,34 @@ class Results:
 
 def gather(params, root: str | Path = ".") -> Results:
     """Read the outputs of every band and method of params.run. Raises UserError."""
-    data = Path(root) / "data"
-    episodes, methods = {}, {band: {} for band in params.run.bands}
-    for band in methods:
-        expect(data / "episodes" / band / "signals.parquet", f"episode@{band}")
-        episodes[band] = Episode.load(data / "episodes" / band)
+    layout = Layout(Path(root))
+    episodes = {band: Episode.load(layout.episode(band)) for band in params.run.bands}
+    methods = {band: {} for band in episodes}
     for band, method in pairs(params.run):
-        methods[band][method] = _result(params.run, data, band, method)
-    floors = {
-        band: load_floor(expect(data / "floor" / f"{band}.json", f"floor@{band}"))
-        for band in params.run.rig
-    }
-    unused = {band: _unused(params, data, band, methods[band]) for band in methods}
+        methods[band][method] = _result(layout, band, method)
+    floors = {band: load_floor(layout.floor(band)) for band in params.run.rig}
+    unused = {band: _unused(params, layout, band, methods[band]) for band in methods}
     return Results(episodes, methods, floors, {band: n for band, n in unused.items() if n})
 
 
-def _unused(params, data: Path, band: str, methods: Collection[str]) -> int:
+def _unused(params, layout: Layout, band: str, methods: Collection[str]) -> int:
     """How many measured launches name a method that does not run on the band."""
-    path = file_of(data / "trials" / "measured", band, params.bands)
+    path = file_of(layout.measured, band, params.bands)
     launches = named(path) if path else {}
     return sum(n for method, n in launches.items() if method not in ("", *methods))
 
 
-def _result(run, data: Path, band: str, method: str) -> Result:
-    def path(step: str, name: str, stage: str) -> Path:
-        return expect_from(run, stage, band, method, data / step / band / name)
-
-    policy = f"{method}/"
-    history = [
-        pd.read_parquet(path(step, f"{method}.parquet", step)) for step in ("history", "refined")
-    ]
-    clusters = path("clusters", f"{method}.json", "clusters")
-    theta = load_theta(path("theta", f"{method}.json", "theta"), band)
+def _result(layout: Layout, band: str, method: str) -> Result:
+    steps = layout.history(band, method), layout.refined(band, method)
+    history = [pd.read_parquet(made(path)) for path in steps]
+    clusters = made(layout.clusters(band, method))
+    theta = load_theta(layout.theta(band, method), band)
     posterior = None
     if theta.get("confidence"):
-        posterior = json.loads(path("confidence", f"{method}.json", "theta").read_text("utf-8"))
-    trials = pd.read_parquet(path("trials", f"{method}.parquet", "trials"))
+        posterior = json.loads(made(layout.confidence(band, method)).read_text("utf-8"))
+    trials = pd.read_parquet(made(layout.trials(band, method)))
     robust = trials.policy == ROBUST
-    stored = Stored(run, band, method, data.parent)
+    stored, policy = Stored(band, method, layout.root), layout.policy(band, method)
     return Result(
         band=band,
         method=method,
@@ -130,8 +120,8 @@ def _result(run, data: Path, band: str, method: str) -> Result:
         posterior=posterior,
         card=stored.card(),
         robust_card=stored.card(ROBUST) if ROBUST in stored.kinds() else None,
-        training=pd.read_parquet(path("policies", policy + "training.parquet", "policy")),
-        landing_map=LandingMap.load(path("policies", policy + "map.parquet", "policy")),
+        training=pd.read_parquet(made(policy / "training.parquet")),
+        landing_map=LandingMap.load(made(policy / "map.parquet")),
         trials=trials[~robust].reset_index(drop=True),
         robust_trials=trials[robust].reset_index(drop=True),
     )

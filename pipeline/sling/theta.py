@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.base.layout import NotMade, owner
 from pipeline.base.schema import Range
 from pipeline.params import Parameters
 from pipeline.params.identification import NUISANCES
 from pipeline.sling.load import load_sling
 from pipeline.sling.material import THETA
 from pipeline.sling.model import Sling
-from stages.start import remedy
 
 
 def _limits(name: str) -> Range:
@@ -40,6 +40,8 @@ def load_theta(path: Path, band: str) -> dict:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
+        if owner(path):
+            raise NotMade(path) from error
         raise UserError(
             f"{path}: no such file; `dvc repro` writes those of data/theta/{band}/"
         ) from error
@@ -67,11 +69,10 @@ def _expect_number(path: Path, key: str, value: object, low: float, high: float)
         )
 
 
-def load_samples(run, path: Path, band: str, method: str) -> np.ndarray | None:
+def load_samples(path: Path) -> np.ndarray | None:
     """Samples of θ, and of the air's drag if searched, (M, 5) or (M, 6); None where there are none.
 
-    `run` is params.yaml's, which says what stage makes them. Raises UserError where the file is
-    damaged.
+    Raises NotMade where the file is damaged.
     """
     if not path.is_file():
         return None
@@ -84,8 +85,7 @@ def load_samples(run, path: Path, band: str, method: str) -> np.ndarray | None:
         if not known or samples.ndim != 2 or samples.shape[1] != len(content["names"]):
             raise ValueError
     except (OSError, ValueError, KeyError, TypeError) as error:
-        makes = remedy(run, "theta", band, method, damaged=True)
-        raise UserError(f"{path}: damaged; {makes}") from error
+        raise NotMade(path, "damaged") from error
     return samples
 
 

@@ -17,8 +17,7 @@ from tests.policy.linear import write_policy
 
 PARAMS = SimpleNamespace(
     bands={"toy": None},
-    methods={"none": None, "other": None, "without": None, "idle": None},
-    run=toy.RUN,
+    methods={"none": None, "other": None},
     policy=SimpleNamespace(targets=(1.425, 2.425)),
     trials=SimpleNamespace(actuation_error=0.001),
     setup=SimpleNamespace(max_force=15.0),
@@ -61,7 +60,7 @@ def test_the_draw_lands_on_the_target(root) -> None:
     assert answer["hold_force_n"] == pytest.approx(truth.hold_force[0], abs=1e-6)
     assert answer["max_force_n"] == 15.0
     assert answer["warnings"] == [LEFT_OUT]
-    again = Stored(toy.RUN, "toy", "none", root).draws([1.925])
+    again = Stored("toy", "none", root).draws([1.925])
     np.testing.assert_allclose(again, draw)
 
 
@@ -156,9 +155,7 @@ def test_says_why_there_is_no_interval(root) -> None:
     [
         ("none", "none", "band none: not in params.yaml, which has toy"),
         ("toy", "missing", "method missing: not in params.yaml"),
-        ("toy", "other", "other.json: missing; `dvc repro theta@toy-other` makes it"),
-        ("toy", "without", "missing; `dvc repro ablation_theta@toy-without` makes it"),
-        ("toy", "idle", "missing; name idle under run.methods or run.ablations"),
+        ("toy", "other", "data/theta/toy/other.json: missing"),
     ],
 )
 def test_says_what_is_missing(root, band: str, method: str, message: str) -> None:

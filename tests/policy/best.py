@@ -8,10 +8,10 @@ The best draws are found by trying all of a fine grid: slow, and no policy, but 
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
+from pipeline.base.layout import Layout
 from pipeline.landing.landing_map import landscape_of
 from pipeline.landing.response_surface import Landscape
 from pipeline.landing.simulator import simulator
@@ -48,9 +48,9 @@ def expected_error(landscape: Landscape, draws: np.ndarray, targets: np.ndarray)
 def main() -> None:
     band, method = sys.argv[1:]
     params = load()
-    stored = Stored(params.run, band, method)
-    launcher = simulator(params, band, load_theta(Path(f"data/theta/{band}/{method}.json"), band))
-    samples = load_samples(params.run, Path(f"data/confidence/{band}/{method}.json"), band, method)
+    stored = Stored(band, method)
+    launcher = simulator(params, band, load_theta(Layout().theta(band, method), band))
+    samples = load_samples(Layout().confidence(band, method))
     targets = np.linspace(*params.policy.targets, 64)
     middle = stored.draws(np.mean(params.policy.targets, keepdims=True))[0]
     maps = robust_maps(launcher, samples, middle, params)

@@ -28,7 +28,7 @@ TARGETS = np.random.default_rng(0).uniform(1.425, 2.425, (1000, 1)).astype(np.fl
 
 @pytest.fixture(scope="module")
 def stored(trained, tmp_path_factory):
-    stored = Stored(toy.RUN, "toy", "none", tmp_path_factory.mktemp("root"))
+    stored = Stored("toy", "none", tmp_path_factory.mktemp("root"))
     write_onnx(trained.policy, stored.folder() / "policy.onnx")
     write_torchscript(trained.policy, stored.folder() / "policy.pt")
     return stored

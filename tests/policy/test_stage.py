@@ -21,7 +21,7 @@ from tests.policy import toy
 from tests.project import ROOT
 
 POINT = (2e5, 0.47, 2e-3, 0.5, 0.6)
-STORED = Stored(toy.RUN, "band1", "sling2sim2real_taut")
+STORED = Stored("band1", "sling2sim2real_taut")
 FOLDER = STORED.folder()
 FILES = {"card.json", "policy.onnx", "policy.pt", "training.parquet"}
 

@@ -13,11 +13,6 @@ import numpy as np
 STIFFNESS, MASS, GRAVITY = 24.0, 0.0565, 9.81
 FORK_WIDTH, FORK_HEIGHT, REST_LENGTH = 0.275, 0.52, 0.52
 DRAW_Y, DRAW_Z = (-0.45, -0.25), (-0.30, -0.10)
-RUN = SimpleNamespace(  # as params.yaml's `run`
-    bands=("toy",),
-    methods=("none", "other"),
-    ablations=SimpleNamespace(bands=("toy",), methods=("without",)),
-)
 
 
 def launch(draws: np.ndarray) -> SimpleNamespace:

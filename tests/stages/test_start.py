@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import runpy
 import sys
 from collections.abc import Callable
@@ -10,11 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.base.layout import NotMade
 from pipeline.objective.evaluate import Evaluation
 from pipeline.objective.loss import TERMS
 from pipeline.objective.space import Space
 from pipeline.params import load
 from pipeline.search.history import History
+from stages.start import remedy
 
 ROOT = Path(__file__).parents[2]
 OF_A_BAND = ("record", "episode", "mounting")
@@ -92,3 +95,30 @@ def test_missing_inputs(name: str, stage) -> None:
     status, line = stage(name, *band, *method)
     assert status == 1 and line.startswith("error: data/"), line
     assert "missing; `dvc repro " in line or "no such file" in line, line
+
+
+def test_a_file_that_is_missing_or_damaged_says_what_makes_it(stage) -> None:
+    """By its place alone: in any project's folder, and none for what no stage makes."""
+    cases = {
+        "data/raw/band1.mcap": "record@band1",
+        "data/episodes/band1/clouds.parquet": "episode@band1",
+        "data/mounting/band1.json": "mounting@band1",
+        "data/floor/band1.json": "floor@band1",
+        "/data/x/data/confidence/band1/de.json": "ablation_theta@band1-de",
+        "data/policies/band2/sling2sim2real/robust/card.json": "policy@band2-sling2sim2real",
+        **{
+            f"data/{step}/band1/de.parquet": f"ablation_{step}@band1-de"
+            for step in ("history", "clusters", "refined", "theta", "trials")
+        },
+    }
+    for path, makes in cases.items():
+        assert remedy(NotMade(Path(path))) == f"`dvc repro {makes}` makes it"
+        anew = f"`dvc repro --force {makes}` makes it anew"
+        assert remedy(NotMade(Path(path), "damaged")) == anew
+    path = Path("data/policies/band1/de/robust/card.json")
+    assert remedy(NotMade(path, condition="where asked")).endswith("makes it where asked")
+    assert remedy(NotMade(Path("data/theta/band2/adam.json"))).startswith("name adam under run.")
+    for path in ("mine.json", "data/trials/measured/band1.csv", "data/plans/band1/a.csv", "data"):
+        assert remedy(NotMade(Path(path))) == ""
+    error = pickle.loads(pickle.dumps(NotMade(path, "damaged")))
+    assert (str(error), error.problem) == (f"{path}: damaged", "damaged")

@@ -100,7 +100,7 @@ def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
     band, targets = world.band, np.array(params.trials.targets)
     seeds = trial_seeds(params)
     path = root / "data/theta" / band / f"{method}.json"
-    stored = Stored(params.run, band, method, root)
+    stored = Stored(band, method, root)
     content = load_theta(path, band)
     values = content["theta"] | content.get("nuisances", {})
     launcher = simulator(params, band, content, root=root)

@@ -54,7 +54,7 @@ def scored(params, root: Path, band: str, method: str, draws, landing) -> dict:
     """Coverage, width and errors of one method's intervals, as shares of the measured distance."""
     content = load_theta(root / "data/theta" / band / f"{method}.json", band)
     kept = root / "data/confidence" / band / f"{method}.json"
-    samples = load_samples(params.run, kept, band, method)
+    samples = load_samples(kept)
     launcher, share = simulator(params, band, content, root=root), law_discrepancy(content)
     error = params.trials.actuation_error
     predicted = launcher(draws).landing_y

@@ -1,0 +1,116 @@
+"""Where files lie under data/, and the error of one that is not there, or not whole.
+
+No other module spells these paths. What makes a file is told where errors are printed
+(stages/start.py), by its place alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.base.errors import UserError
+
+OF_A_BAND = ("raw", "episodes", "mounting", "floor")
+OF_A_METHOD = ("history", "clusters", "refined", "theta", "confidence", "policies", "trials")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The files of a project.
+
+    Attributes:
+        root: Of the project; the working folder by default.
+    """
+
+    root: Path = Path()
+
+    @property
+    def data(self) -> Path:
+        return Path(self.root, "data")
+
+    @property
+    def measured(self) -> Path:
+        """Folder of the launches that a user measured, a CSV a band."""
+        return self.data / "trials" / "measured"
+
+    def recording(self, band: str) -> Path:
+        return self.data / "raw" / f"{band}.mcap"
+
+    def episode(self, band: str) -> Path:
+        """Folder of signals.parquet and clouds.parquet."""
+        return self.data / "episodes" / band
+
+    def mounting(self, band: str) -> Path:
+        return self.data / "mounting" / f"{band}.json"
+
+    def floor(self, band: str) -> Path:
+        return self.data / "floor" / f"{band}.json"
+
+    def plans(self, band: str) -> Path:
+        """Folder of what a robot is to do."""
+        return self.data / "plans" / band
+
+    def history(self, band: str, method: str) -> Path:
+        return self.data / "history" / band / f"{method}.parquet"
+
+    def clusters(self, band: str, method: str) -> Path:
+        return self.data / "clusters" / band / f"{method}.json"
+
+    def refined(self, band: str, method: str) -> Path:
+        return self.data / "refined" / band / f"{method}.parquet"
+
+    def theta(self, band: str, method: str) -> Path:
+        return self.data / "theta" / band / f"{method}.json"
+
+    def confidence(self, band: str, method: str) -> Path:
+        """Samples of the posterior and profiles, on which a θ file's confidence rests."""
+        return self.data / "confidence" / band / f"{method}.json"
+
+    def policy(self, band: str, method: str) -> Path:
+        """Folder of a policy's files."""
+        return self.data / "policies" / band / method
+
+    def trials(self, band: str, method: str) -> Path:
+        return self.data / "trials" / band / f"{method}.parquet"
+
+
+def owner(path: Path) -> tuple[str, str, str | None] | None:
+    """Folder under data/, band and method (None: of the band alone) of a file that a run makes.
+
+    None for any other file.
+    """
+    parts = Path(path).parts
+    if "data" not in parts:
+        return None
+    place = len(parts) - parts[::-1].index("data")
+    folder, band, method = (*parts[place : place + 3], "", "", "")[:3]
+    if folder in OF_A_BAND and band:
+        return folder, band.partition(".")[0], None
+    if folder in OF_A_METHOD and method and band != "measured":
+        return folder, band, method.partition(".")[0]
+    return None
+
+
+class NotMade(UserError):
+    """A file that a run makes is missing, or not as the run has left it.
+
+    Attributes:
+        path: Of the file.
+        problem: What is wrong with it.
+        condition: What the run hangs on that makes it: "where ...".
+    """
+
+    def __init__(self, path: Path, problem: str = "missing", condition: str = "") -> None:
+        super().__init__(path, problem, condition)
+        self.path, self.problem, self.condition = Path(path), problem, condition
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.problem}"
+
+
+def made(path: Path) -> Path:
+    """`path`, which must be a file. Raises NotMade."""
+    if not path.is_file():
+        raise NotMade(path)
+    return path

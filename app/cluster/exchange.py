@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.flow import child, whole
+from app.flow import child
 from pipeline.base.errors import UserError, one_line
 from pipeline.base.files import write_text
 
@@ -102,26 +102,27 @@ def differing(copy: Path, expected: Mapping[str, str]) -> str | None:
 
 def entries(root: Path, names: tuple[str, ...]) -> dict[str, dict]:
     """What dvc.lock says of these stages, as far as it knows them."""
-    known = _read(root / "dvc.lock").get("stages", {})
+    from dvc.utils.serialize import parse_yaml
+
+    with locked(root):  # DVC writes it in place
+        text = _lock_text(root)
+    known = parse_yaml(text, "dvc.lock").get("stages", {})
     return {name: known[name] for name in names if name in known}
 
 
 def merge(root: Path, new: Mapping[str, dict]) -> None:
     """Put entries into dvc.lock: at once or not at all, and never beside a DVC that writes it."""
-    from dvc.utils.serialize import dumps_yaml
+    from dvc.utils.serialize import dumps_yaml, parse_yaml_for_update
 
-    path = root / "dvc.lock"
     with locked(root):
-        if not whole.write(path, new):  # with more in it than stages
-            content = _read(path)
-            content.setdefault("stages", {}).update(new)
-            write_text(path, dumps_yaml(content))
+        content = parse_yaml_for_update(_lock_text(root), "dvc.lock")
+        content.setdefault("stages", {}).update(new)
+        write_text(root / "dvc.lock", dumps_yaml(content))
 
 
-def _read(path: Path) -> dict:
-    from dvc.utils.serialize import parse_yaml
-
-    return parse_yaml(path.read_text(encoding="utf-8"), str(path)) if path.is_file() else {}
+def _lock_text(root: Path) -> str:
+    path = root / "dvc.lock"
+    return path.read_text(encoding="utf-8") if path.is_file() else "schema: '2.0'\n"
 
 
 @contextmanager
@@ -129,7 +130,6 @@ def locked(root: Path) -> Iterator[None]:
     """Hold DVC's lock of a working copy; wait for it."""
     from dvc.repo import Repo
 
-    whole.sign_locks()
     with Repo(str(root), _wait_for_lock=True) as repo, repo.lock:
         yield
 

@@ -3,30 +3,22 @@
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from itertools import zip_longest
 from pathlib import Path
 from threading import Event, Thread
 
-from app.flow import guard, whole
+from app.flow import guard
 from pipeline.base.errors import UserError
 
-# What DVC itself says around a stage's own lines.
-CHATTER = re.compile(
-    r"$|WARNING: '.*' is empty|Running stage '|> |Updating lock file|Generating lock file"
-    r"|Use `dvc push`|To track the changes with git|\tgit add|To enable auto staging"
-    r"|\tdvc config|Data and pipelines are up to date|Stage '.*' (is cached|didn't change)"
-    r"|ERROR: failed to reproduce"
-)
-OWN_ERROR = re.compile(r"error: (.*)", re.IGNORECASE)
-COMMAND_FAILED = re.compile(
-    r"ERROR: failed to reproduce .*: failed to run: .*, exited with (-?\d+)$"
-)
-DVC_FAILED = re.compile(r"ERROR: failed to reproduce [^:]*: (.*)")
+# How the lines begin that DVC itself says around a stage's own.
+DVCS = (
+    "Running stage '", "> ", "Updating lock file", "Generating lock file", "Use `dvc push`",
+    "To track the changes with git", "\tgit add", "To enable auto staging", "\tdvc config",
+    "Data and pipelines are up to date", "Stage '", "WARNING: '", "ERROR: failed to reproduce",
+)  # fmt: skip
 
 
 class StageFailed(UserError):
@@ -87,7 +79,7 @@ def run_stage(
     )
     if status == 0:
         return any(line == f"Running stage '{name}':" for line in said)
-    raise StageFailed(f"{name}: {_reason(said, status)}")
+    raise StageFailed(f"{name}: {_reason(name, said, status)}")
 
 
 def dvc(
@@ -106,7 +98,7 @@ def dvc(
     Raises:
         Cancelled: All its processes have ended.
     """
-    command = [sys.executable, "-P", whole.__file__, "--wait-for-lock", *arguments]
+    command = [sys.executable, "-P", "-m", "dvc", "--wait-for-lock", *arguments]
     said: list[str] = []
     if cancelled():
         raise Cancelled
@@ -115,7 +107,7 @@ def dvc(
             line = line.rstrip("\n")
             said.append(line)
             ending = cancelled() or (process.poll() or 0) < 0  # what an interrupt makes it say
-            if not (ending or CHATTER.match(line)):
+            if not ending and _is_own(line):
                 on_line(line)
     if process.returncode and cancelled():
         raise Cancelled
@@ -171,23 +163,28 @@ def _guarded(
         process.stdout.close()
 
 
-def _reason(said: list[str], status: int) -> str:
-    """Why a stage failed: its own line of error, else its last line, else what DVC says."""
+def _is_own(line: str) -> bool:
+    """Whether a line is a stage's own, and not DVC's."""
+    return bool(line) and not line.startswith(DVCS)
+
+
+def _reason(name: str, said: list[str], status: int) -> str:
+    """Why a stage failed: its own line of error, else what DVC says, else its last line."""
     if signal := _signal(status):  # whatever the stage said of that; DVC's comes by the guard
         return f"{'its guard' if status < 0 else 'DVC'} was killed by signal {signal}"
-    own = [line for line in said if not CHATTER.match(line)]
-    exits = [int(found[1]) for line in said if (found := COMMAND_FAILED.match(line))]
-    if not exits:  # DVC failed before or after the stage's command
-        for line, following in zip_longest(said, said[1:], fillvalue=""):
-            if found := DVC_FAILED.match(line):  # "... blocked by:", and by whom
-                own.append(f"{found[1]} {following.strip()}" if line.endswith(":") else found[1])
-    errors = [found[1] for line in own if (found := OWN_ERROR.match(line))]
+    own = [line for line in said if _is_own(line)]
+    for line, following in zip(said, [*said[1:], ""], strict=True):
+        why = line.removeprefix(f"ERROR: failed to reproduce '{name}': ")
+        if why.startswith("failed to run: "):  # ..., exited with 1
+            status = int(why.rpartition(" ")[2])
+        elif why != line:  # DVC failed before or after the stage's command
+            own.append(f"{why} {following.strip()}" if why.endswith(":") else why)
+    errors = [line[7:] for line in own if line.lower().startswith("error: ")]
     if errors:
         return errors[-1]
-    code = exits[-1] if exits else status
-    if signal := _signal(code):
+    if signal := _signal(status):
         return f"was killed by signal {signal}"
-    return own[-1] if own else f"ended with exit status {code}"
+    return own[-1] if own else f"ended with exit status {status}"
 
 
 def _signal(status: int) -> int:

@@ -1,36 +1,39 @@
-"""What killed DVC commands leave behind and DVC itself does not clear: locks, half copies."""
+"""What killed DVC commands leave behind and DVC itself does not clear: locks, half files."""
 
 from __future__ import annotations
 
 import json
 import re
-import socket
 from pathlib import Path
 
-from app.flow import whole
-from pipeline.base.files import write_json
+from pipeline.base.files import write_json, write_text
 
 COPIES = (".dvc/cache", "data", "reports")  # where DVC copies to
 HALF = re.compile(r"\.[\w-]{22}\.tmp")  # its names of what it has not copied to the end
+ENTRY = re.compile(r"^  [^ ]", re.MULTILINE)  # where a stage's entry of dvc.lock begins
 
 
 def mend(root: Path) -> None:
     """Clear up in a working copy. Call it while no other flow runs there."""
     from dvc.config import Config
     from dvc.exceptions import DvcException
-    from dvc.lock import make_lock
+    from dvc.lock import Lock, make_lock
 
     folder = Path(root, ".dvc", "tmp")
 
     def lock(name: str):
-        if hardlink:
-            _free(folder / name)
-        return make_lock(str(folder / name), tmp_dir=str(folder), hardlink_lock=hardlink)
+        path = folder / name
+        if hardlink and path.is_file() and path.stat().st_nlink == 1:
+            with Lock(
+                str(path)
+            ):  # of the other kind, whose files stay behind: a link cannot be made
+                path.unlink()
+        return make_lock(str(path), tmp_dir=str(folder), hardlink_lock=hardlink)
 
-    whole.sign_locks()
     try:
         hardlink = Config(str(folder.parent))["core"].get("hardlink_lock", False)
-        with lock("lock"):  # whoever copies holds it
+        with lock("lock"):  # whoever copies, or writes dvc.lock, holds it
+            _cut_back(Path(root, "dvc.lock"))
             for file in (file for top in COPIES for file in Path(root, top).rglob(".*.tmp")):
                 if HALF.fullmatch(file.name):
                     file.unlink(missing_ok=True)
@@ -40,28 +43,36 @@ def mend(root: Path) -> None:
         return
 
 
-def _free(path: Path) -> None:
-    """Make room for a hardlink lock, whose name must not be there. Raises DVC's LockError.
+def _cut_back(path: Path) -> None:
+    """Drop the stage's entry in which dvc.lock ends too early; no DVC command reads it else.
 
-    DVC's other kind of lock leaves its file behind; a hardlink lock is left by who was killed. Who
-    holds one on another machine, or did not sign it (whole.sign_locks), is not known here.
+    DVC writes it in place, so a kill, Ctrl-C or a full disk cuts it off. What it no longer names
+    DVC finds in its cache of runs.
     """
-    import psutil
-    from dvc.lock import Lock
+    if not path.is_file():
+        return
+    text = path.read_text(encoding="utf-8", errors="replace")
+    if _is_valid(text):
+        return
+    begins = [one.start() for one in ENTRY.finditer(text)]
+    kept = text[: begins[-1]] if begins else ""
+    if len(begins) < 2:
+        path.unlink()
+    elif _is_valid(kept):  # else it is damaged otherwise: the user's to mend, as DVC will say
+        write_text(path, kept)
+
+
+def _is_valid(text: str) -> bool:
+    """Whether DVC would read this dvc.lock."""
+    from dvc.schema import COMPILED_LOCKFILE_SCHEMA
+    from dvc.utils.serialize import ParseError, parse_yaml
+    from voluptuous import Invalid
 
     try:
-        said = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return
-    _, *holder = said.rsplit("|", 3)
-    if len(holder) == 3:
-        host, pid, _ = holder
-        if host == socket.gethostname() and not psutil.pid_exists(int(pid)):
-            path.unlink()
-            path.with_name(Path(said).name).unlink(missing_ok=True)
-    elif not said or said.strip().isdecimal():
-        with Lock(str(path)):  # unless it is held
-            path.unlink()
+        COMPILED_LOCKFILE_SCHEMA(parse_yaml(text, "dvc.lock"))
+    except (ParseError, Invalid):
+        return False
+    return True
 
 
 def _release(path: Path) -> None:

@@ -21,8 +21,8 @@ WAITING = 60.0  # s, for the last artifacts of a stage
 NAMED = 3  # methods in a flow run's name
 
 
-class Watch:
-    """Watches one stage; to be made in its task.
+class Reporter:
+    """Reports one stage; to be made in its task.
 
     Logging is Prefect's, in its own thread; artifacts are made in a thread of ours, so that a
     server that is slow or gone keeps no stage. Once it has failed, no more are made.
@@ -32,7 +32,7 @@ class Watch:
         self.stage, self.root = stage, root
         self._logger = _logger()
         self._context = contextvars.copy_context()  # says whose artifacts they are
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix=f"watch {stage.name}")
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix=f"reporter {stage.name}")
         self._moved: dict[str, float] = {}  # when, by title
         self._bars: dict[str, object] = {}  # ids, by title
         self._failed = self._logger is None

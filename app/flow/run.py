@@ -11,7 +11,7 @@ from pathlib import Path
 
 from app.flow import child, guard, locks
 from app.flow.graph import Graph
-from app.flow.scheduler import Board, width
+from app.flow.scheduler import Scheduler, width
 from app.flow.tasks import Place, Tasks, lasted, perform, say
 from pipeline.base import machine
 from pipeline.base.errors import UserError
@@ -52,17 +52,20 @@ def run(
         workers = workers or min(cores, width(stale))
         environment = child.stage_environment(max(1, cores // workers) if here else cores)
         shares = gpu_shares(environment, gpus, here)
-        board = Board(stale, workers, shares)
+        scheduler = Scheduler(stale, workers, shares)
         say(
             f"{len(stale)} of {len(graph.stages)} stages are stale or follow from such;"
             f" {workers} at a time"
         )
         tasks = Tasks(root, graph, environment, place, limited=shares is not None)
-        perform(root, board, tasks)
-    summary = f"{board.summary()} ({lasted(start)})"
-    if board.failed:
+        try:
+            perform(root, scheduler, tasks)
+        finally:
+            locks.mend(root)  # what next comes may be a `dvc` of the user's
+    summary = f"{scheduler.summary()} ({lasted(start)})"
+    if scheduler.failed:
         say(summary)
-        raise next(iter(board.failed.values()))
+        raise next(iter(scheduler.failed.values()))
     return summary
 
 

@@ -9,7 +9,7 @@ from pipeline.base.errors import UserError
 
 
 @dataclass
-class Board:
+class Scheduler:
     """Which stage is next, and what became of the others. Knows nothing of how they run.
 
     Attributes:

@@ -12,9 +12,9 @@ from pathlib import Path
 from queue import SimpleQueue
 from threading import Event
 
-from app.flow import child, guard
+from app.flow import child, guard, reporter
 from app.flow.graph import Graph, Stage
-from app.flow.scheduler import Board
+from app.flow.scheduler import Scheduler
 from pipeline.base.errors import UserError, one_line
 
 GPU_LIMIT = "sling-gpu"  # a Prefect concurrency limit
@@ -39,13 +39,11 @@ class Tasks:
         if self.graph.is_fresh(stage.name):
             say("is fresh", stage)
             return False
-        from app.flow.reporter import Watch
-
-        watch, start = Watch(stage, self.root), time.monotonic()
+        show, start = reporter.Reporter(stage, self.root), time.monotonic()
 
         def on_line(line: str) -> None:
             say(line, stage)
-            watch(line)
+            show(line)
 
         with self._slot(stage):
             say("begins", stage)
@@ -58,7 +56,7 @@ class Tasks:
             )
         say(f"{'done' if ran else 'taken from the cache'} ({lasted(start)})", stage)
         if ran:
-            watch.done()
+            show.done()
         return ran
 
     @contextmanager
@@ -70,7 +68,7 @@ class Tasks:
         from prefect.concurrency.sync import concurrency
 
         slot = ExitStack()
-        with suppress(Exception):  # the board keeps the limit within this flow anyway
+        with suppress(Exception):  # the scheduler keeps the limit within this flow anyway
             slot.enter_context(
                 concurrency(
                     GPU_LIMIT,
@@ -86,17 +84,17 @@ class Tasks:
                 slot.close()
 
 
-def perform(root: Path, board: Board, tasks: Tasks) -> None:
-    """Run the board's stages as a Prefect flow. Raises UserError, KeyboardInterrupt."""
+def perform(root: Path, scheduler: Scheduler, tasks: Tasks) -> None:
+    """Run the scheduler's stages as a Prefect flow. Raises UserError, KeyboardInterrupt."""
     from app.flow.server import served
 
     try:
         with served(root) as url:  # from here on Prefect may be imported
             say(f"seen at {url}")
             try:
-                _prepare(board)
-                state = _flow(board, tasks)(return_state=True)
-                if not tasks.interrupted and (board.waiting or board.running):
+                _prepare(scheduler)
+                state = Run(scheduler, tasks)()
+                if not tasks.interrupted and (scheduler.waiting or scheduler.running):
                     ended = one_line(state.message or state.name)
                     raise UserError(f"Prefect ended the flow early ({ended}); run it again")
             finally:
@@ -104,7 +102,7 @@ def perform(root: Path, board: Board, tasks: Tasks) -> None:
     except UserError:
         raise
     except Exception as error:
-        if not (board.waiting or board.running or tasks.interrupted):
+        if not (scheduler.waiting or scheduler.running or tasks.interrupted):
             say("Prefect's server went away before the end; its history lacks some of it")
         elif not tasks.interrupted:
             raise UserError(
@@ -115,73 +113,84 @@ def perform(root: Path, board: Board, tasks: Tasks) -> None:
         raise KeyboardInterrupt
 
 
-def _flow(board: Board, tasks: Tasks):
-    """The flow, which fills the board."""
-    import prefect
-    from prefect.cache_policies import NO_CACHE
-    from prefect.exceptions import TerminationSignal
-    from prefect.states import Cancelled, Completed, Failed
+class Run:
+    """A flow run: it fills the scheduler, and a task of Prefect's follows each stage."""
 
-    from app.flow import reporter as watch
+    def __init__(self, scheduler: Scheduler, tasks: Tasks) -> None:
+        self.scheduler, self.tasks = scheduler, tasks
+        self._futures: dict = {}  # by stage
+        self._ended: SimpleQueue[Stage] = SimpleQueue()
 
-    futures: dict = {}
-    ended: SimpleQueue[Stage] = SimpleQueue()
+    def __call__(self):
+        """Run it; the state that Prefect ends it in."""
+        import prefect
 
-    def one(stage: Stage, share: dict[str, str]):
+        name, tags = reporter.names(self.scheduler.waiting)
+        options = {"persist_result": False, "validate_parameters": False}
+        with prefect.tags(*tags):
+            flow = prefect.flow(self._body, name="sling flow", flow_run_name=name, **options)
+            return flow(return_state=True)
+
+    def _body(self):
+        from prefect.exceptions import TerminationSignal
+        from prefect.states import Cancelled, Completed, Failed
+
+        scheduler, tasks = self.scheduler, self.tasks
         try:
-            ran = tasks(stage, share)
-        except child.Cancelled:
-            return Cancelled(message="interrupted")
-        return True if ran else Completed(name="Fresh", message="nothing to do", data=False)
-
-    def submit(stage: Stage, share: dict[str, str]) -> None:
-        task = prefect.task(
-            one,
-            name=stage.step,
-            task_run_name=stage.name,
-            tags=watch.tags(stage),
-            cache_policy=NO_CACHE,
-            persist_result=False,
-        )
-        producers = [futures[name] for name in stage.producers if name in futures]
-        futures[stage.name] = future = task.submit(stage, share, wait_for=producers)
-        future.add_done_callback(lambda _: ended.put(stage))
-
-    def flow():
-        try:
-            while True:
-                while found := board.next():
-                    submit(*found)
-                if not board.running:
-                    break
-                stage = ended.get()
-                board.done(stage, _outcome(futures[stage.name], stage))
+            self._run_all()
         except (KeyboardInterrupt, TerminationSignal):
             tasks.interrupted = True
             tasks.cancelled.set()
             say("ending the stages that run")
-            board.stop()
-            stages = tasks.graph.stages
-            for name in futures.keys() & board.running:  # who ended as it came may be in no queue
-                board.done(stages[name], _outcome(futures[name], stages[name], guard.GRACE + 15))
-            return Cancelled(message=board.summary())
+            scheduler.stop()
+            for name in [*scheduler.running]:  # who ended as it came may be in no queue
+                self._close(tasks.graph.stages[name], guard.GRACE + 15)
+            return Cancelled(message=scheduler.summary())
         except BaseException:
             tasks.cancelled.set()  # Prefect waits for the threads
             raise
-        if board.failed:
-            return Failed(message=f"{board.summary()}; {next(iter(board.failed.values()))}")
-        return Completed(message=board.summary())
+        if scheduler.failed:
+            return Failed(message=f"{scheduler.summary()}; {next(iter(scheduler.failed.values()))}")
+        return Completed(message=scheduler.summary())
 
-    name, tags = watch.names(board.waiting)
-    flow = prefect.flow(
-        flow, name="sling flow", flow_run_name=name, persist_result=False, validate_parameters=False
-    )
+    def _run_all(self) -> None:
+        while True:
+            while found := self.scheduler.next():
+                self._submit(*found)
+            if not self.scheduler.running:
+                return
+            self._close(self._ended.get())
 
-    def tagged(**options):
-        with prefect.tags(*tags):
-            return flow(**options)
+    def _submit(self, stage: Stage, share: dict[str, str]) -> None:
+        import prefect
+        from prefect.cache_policies import NO_CACHE
 
-    return tagged
+        task = prefect.task(
+            self._task,
+            name=stage.step,
+            task_run_name=stage.name,
+            tags=reporter.tags(stage),
+            cache_policy=NO_CACHE,
+            persist_result=False,
+        )
+        producers = [self._futures[name] for name in stage.producers if name in self._futures]
+        self._futures[stage.name] = future = task.submit(stage, share, wait_for=producers)
+        future.add_done_callback(lambda _: self._ended.put(stage))
+
+    def _task(self, stage: Stage, share: dict[str, str]):
+        from prefect.states import Cancelled, Completed
+
+        try:
+            ran = self.tasks(stage, share)
+        except child.Cancelled:
+            return Cancelled(message="interrupted")
+        return True if ran else Completed(name="Fresh", message="nothing to do", data=False)
+
+    def _close(self, stage: Stage, timeout: float | None = None) -> None:
+        """Tell the scheduler of the end of a stage, for which to wait so many seconds."""
+        future = self._futures.get(stage.name)
+        if future:  # else it was interrupted before it was one
+            self.scheduler.done(stage, _outcome(future, stage, timeout))
 
 
 def _outcome(future, stage: Stage, timeout: float | None = None) -> bool | UserError:
@@ -208,7 +217,7 @@ def _flush() -> None:
         sender.drain_all(timeout=10)
 
 
-def _prepare(board: Board) -> None:
+def _prepare(scheduler: Scheduler) -> None:
     """Clear up after flows that were killed, for no other one is at work; set the GPU limit."""
     from prefect.client.orchestration import get_client
     from prefect.client.schemas.actions import GlobalConcurrencyLimitCreate
@@ -222,12 +231,12 @@ def _prepare(board: Board) -> None:
             client.set_task_run_state(run.id, killed, force=True)
         for run in client.read_flow_runs(flow_run_filter=FlowRunFilter(**running)):
             client.set_flow_run_state(run.id, killed, force=True)
-        if board.shares is None:
+        if scheduler.shares is None:
             return
         with suppress(ObjectNotFound):  # with slots that are still taken
             client.delete_global_concurrency_limit_by_name(GPU_LIMIT)
         client.create_global_concurrency_limit(
-            GlobalConcurrencyLimitCreate(name=GPU_LIMIT, limit=len(board.shares))
+            GlobalConcurrencyLimitCreate(name=GPU_LIMIT, limit=len(scheduler.shares))
         )
 
 

@@ -96,7 +96,7 @@ MISSING = "[Errno 2] No such file or directory: 'missing'"
     ],
 )
 def test_why_a_stage_failed_by_lines_of_dvc(said: list[str], status: int, reason: str) -> None:
-    assert child._reason(said, status) == reason
+    assert child._reason("x", said, status) == reason
 
 
 def test_lines_come_as_they_are_printed_and_a_cancelled_stage_leaves_nothing(toy: Toy) -> None:

@@ -1,63 +1,47 @@
-"""Locks of DVC's two kinds, as killed commands leave them; more in test_killed.py."""
+"""What killed DVC commands leave: locks, half of dvc.lock; see test_killed.py too."""
 
 from __future__ import annotations
 
 import json
 import os
-import socket
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-from dvc.lock import Lock, LockError, make_lock
+from dvc.lock import Lock, make_lock
 
-from app.flow import child, locks, whole
+from app.flow import child, locks
 from app.flow.graph import Graph
+from pipeline.base.errors import UserError
 from tests.app.flow.toy import Toy, stage
 
 
 @pytest.fixture
 def toy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Toy:
-    """A project whose locks are to be hardlinks, as in a shared folder."""
-    toy = Toy(tmp_path / "toy", {"one": stage("one", "word")}, word="one\n")
+    stages = {name: stage(name, "word") for name in ("one", "two")}
+    toy = Toy(tmp_path / "toy", stages, word="one\n")
     monkeypatch.setenv("DVC_SITE_CACHE_DIR", toy.environment["DVC_SITE_CACHE_DIR"])
-    with (toy.folder / ".dvc/config").open("a") as config:
-        config.write(" hardlink_lock = true\n")
     (toy.folder / ".dvc/tmp").mkdir()
     return toy
 
 
-def dead() -> int:
-    """The number of a process that has ended."""
-    process = subprocess.Popen(["true"])
-    process.wait()
-    return process.pid
-
-
-def held(path: Path, host: str, pid: int) -> Path:
-    """A hardlink lock that this process left; its claim."""
-    claim = path.with_name(f"{path.name}|{host}|{pid}|1")
-    claim.write_text(str(claim))
-    path.hardlink_to(claim)
-    return claim
-
-
-def test_a_file_of_the_other_kind_of_lock_is_in_nobodys_way(toy: Toy) -> None:
+def test_hardlink_locks_as_in_a_shared_folder(toy: Toy, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file of the other kind of lock is in nobody's way; one that is held is never broken."""
+    tmp = toy.folder / ".dvc/tmp"
+    with (toy.folder / ".dvc/config").open("a") as config:
+        config.write(" hardlink_lock = true\n")
     for name in ("lock", "rwlock.lock"):
-        with Lock(str(toy.folder / ".dvc/tmp" / name)):
+        with Lock(str(tmp / name)):
             pass
-        assert (toy.folder / ".dvc/tmp" / name).exists()
     locks.mend(toy.folder)
-    assert [*Graph(toy.folder).stages] == ["one"]
-    assert not (toy.folder / ".dvc/tmp/lock").exists()  # of the kind that is configured
-
-
-def test_what_the_dead_of_this_machine_hold_is_free(toy: Toy) -> None:
-    path = toy.folder / ".dvc/tmp/lock"
-    claim = held(path, socket.gethostname(), dead())
-    locks.mend(toy.folder)
-    assert [*Graph(toy.folder).stages] == ["one"]
-    assert not claim.exists()
+    assert [*Graph(toy.folder).stages] == ["one", "two"]
+    assert not (tmp / "lock").exists()
+    monkeypatch.setattr("dvc.lock.DEFAULT_TIMEOUT", 0.1)
+    with make_lock(str(tmp / "lock"), tmp_dir=str(tmp), hardlink_lock=True):
+        locks.mend(toy.folder)
+        with pytest.raises(UserError, match="another DVC command is at work.* rm .dvc/tmp/lock"):
+            Graph(toy.folder)
 
 
 def test_who_is_in_a_stages_way_is_named_in_one_line(toy: Toy) -> None:
@@ -68,23 +52,51 @@ def test_who_is_in_a_stages_way_is_named_in_one_line(toy: Toy) -> None:
     assert str(failure.value).endswith(f"is being blocked by: (PID {os.getpid()}): dvc status")
 
 
-def test_what_the_living_and_others_hold_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "lock"
-    whole.sign_locks()
-    with make_lock(str(path), tmp_dir=str(tmp_path), hardlink_lock=True):
-        assert f"|{socket.gethostname()}|{os.getpid()}|" in path.read_text()
-        locks._free(path)
-        assert path.exists()
+def test_paths_of_the_dead_are_released_and_those_of_the_living_kept(toy: Toy) -> None:
+    path = toy.folder / ".dvc/tmp/rwlock"
+    locks.mend(toy.folder)
     assert not path.exists()
-    claim = held(path, "another", dead())
-    locks._free(path)
-    assert path.exists()
-    path.unlink()
-    claim.unlink()
-    monkeypatch.setattr("dvc.lock.DEFAULT_TIMEOUT", 0)
-    with Lock(str(path)):
-        with pytest.raises(LockError):
-            locks._free(path)
-        assert path.exists()
+    code = "import time; time.sleep(60)"
+    living = subprocess.Popen([sys.executable, "-c", code, "repro", "-s", "count@a"])
+    try:
+        alive = {"pid": living.pid, "cmd": "dvc repro -s count@a"}
+        other = {"pid": os.getpid(), "cmd": "dvc repro -s count@b"}  # a number that lives again
+        held = {"write": {"/a": alive, "/b": other}, "read": {"/c": [alive, other], "/d": [other]}}
+        path.write_text(json.dumps(held))
+        locks.mend(toy.folder)
+        assert json.loads(path.read_text()) == {"write": {"/a": alive}, "read": {"/c": [alive]}}
+    finally:
+        living.kill()
+        living.wait()
+    for damaged in ("", '{"write": {', "[]", '{"write": {"/a": 1}}'):
+        path.write_text(damaged)
+        locks.mend(toy.folder)
+        assert not path.exists()
+
+
+def test_a_dvc_lock_that_is_cut_off_anywhere_costs_its_last_entry(toy: Toy) -> None:
+    """And no work: DVC has what that stage made in its cache of runs."""
+    assert toy.dvc("repro") == {"one", "two"}
+    path = toy.folder / "dvc.lock"
+    whole = path.read_text()
+    second = whole.index("  two:\n")
+    for end in range(0, len(whole), 7):
+        path.write_text(whole[:end])
+        locks.mend(toy.folder)
+        if path.is_file():
+            left = path.read_text()
+            assert left in (whole[:end], whole[:second])
+            assert locks._is_valid(left)
+            assert end < second or left.startswith(whole[:second])
+        else:
+            assert end < second
+    path.write_text(whole[: second + 30])
+    locks.mend(toy.folder)
+    assert toy.dvc("repro") == set()
+    assert path.read_text() == whole
+    conflict = whole.replace("  one:\n", "<<<<<<< HEAD\n  one:\n")  # not ours to mend
+    path.write_text(conflict)
+    locks.mend(toy.folder)
+    assert path.read_text() == conflict
+    with pytest.raises(UserError, match="^DVC: [^\n]*dvc.lock[^\n]*$"):
+        Graph(toy.folder)

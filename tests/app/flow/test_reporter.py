@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import prefect.artifacts
 import pytest
 
-from app.flow import reporter as watch
+from app.flow import reporter
 from app.flow.graph import Stage
 
 STAGE = Stage("theta@band1-no_work", "theta", "band1-no_work", (), False)
@@ -30,15 +30,15 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
 
     for name in ("create_progress", "update_progress", "create_markdown"):
         stand_in(f"{name}_artifact")
-    monkeypatch.setattr(watch, "_logger", lambda: logging.getLogger("task"))
-    monkeypatch.setattr(watch, "artifact", lambda stage, root: "")
+    monkeypatch.setattr(reporter, "_logger", lambda: logging.getLogger("task"))
+    monkeypatch.setattr(reporter, "artifact", lambda stage, root: "")
     return calls
 
 
 def test_a_bar_moves_at_most_once_a_second_and_to_its_end(shown, monkeypatch, tmp_path) -> None:
     clock = iter([0.0, 0.5, 1.25, 1.5])
-    monkeypatch.setattr(watch, "time", SimpleNamespace(monotonic=lambda: next(clock)))
-    seen = watch.Watch(STAGE, tmp_path)
+    monkeypatch.setattr(reporter, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    seen = reporter.Reporter(STAGE, tmp_path)
     for done in (1, 2, 3, 4):
         seen(f"policy-band1-no_work {done}/4 iterations  mean error {done}.00 cm")
     seen.done()
@@ -52,7 +52,7 @@ def test_a_bar_moves_at_most_once_a_second_and_to_its_end(shown, monkeypatch, tm
 
 
 def test_a_stages_lines_are_logged_and_two_bars_are_told_apart(shown, tmp_path, caplog) -> None:
-    seen = watch.Watch(STAGE, tmp_path)
+    seen = reporter.Reporter(STAGE, tmp_path)
     lines = ["x 1/2 rollouts", "x-robust 1/2 steps", "words"]
     with caplog.at_level(logging.INFO):
         for line in lines:
@@ -66,13 +66,13 @@ def test_a_stages_lines_are_logged_and_two_bars_are_told_apart(shown, tmp_path, 
 
 
 def test_what_a_stage_wrote_carries_its_name(shown, monkeypatch, tmp_path) -> None:
-    monkeypatch.setattr(watch, "artifact", lambda stage, root: "| a |")
-    watch.Watch(STAGE, tmp_path).done()
+    monkeypatch.setattr(reporter, "artifact", lambda stage, root: "| a |")
+    reporter.Reporter(STAGE, tmp_path).done()
     assert shown == [("create_markdown_artifact", "| a |", "theta-band1-no-work", STAGE.name)]
 
 
 def test_a_clear_line_is_logged_as_an_error(shown, tmp_path, caplog) -> None:
-    watch.Watch(STAGE, tmp_path)("error: params.yaml: no such file")
+    reporter.Reporter(STAGE, tmp_path)("error: params.yaml: no such file")
     assert [(one.levelname, one.message) for one in caplog.records] == [
         ("ERROR", "error: params.yaml: no such file")
     ]
@@ -85,7 +85,7 @@ def test_prefects_failure_is_told_once_and_ends_the_artifacts(
         raise ConnectionError("no server")
 
     monkeypatch.setattr(prefect.artifacts, "create_progress_artifact", gone)
-    seen = watch.Watch(STAGE, tmp_path)
+    seen = reporter.Reporter(STAGE, tmp_path)
     for title in ("x", "y"):
         seen(f"{title} 1/2 rollouts")
         time.sleep(0.2)
@@ -98,8 +98,8 @@ def test_prefects_failure_is_told_once_and_ends_the_artifacts(
 def test_a_slow_server_keeps_neither_lines_nor_the_end(shown, monkeypatch, tmp_path) -> None:
     free = threading.Event()
     monkeypatch.setattr(prefect.artifacts, "create_progress_artifact", lambda *a: free.wait(60))
-    monkeypatch.setattr(watch, "WAITING", 0.1)
-    seen, begin = watch.Watch(STAGE, tmp_path), time.monotonic()
+    monkeypatch.setattr(reporter, "WAITING", 0.1)
+    seen, begin = reporter.Reporter(STAGE, tmp_path), time.monotonic()
     for title in "abc":
         seen(f"{title} 1/2 rollouts")
     seen.done()
@@ -111,13 +111,13 @@ def test_a_picture_that_cannot_be_drawn_fails_nothing(shown, monkeypatch, tmp_pa
     def broken(stage, root):
         raise ValueError("no such column")
 
-    monkeypatch.setattr(watch, "artifact", broken)
-    watch.Watch(STAGE, tmp_path).done()
+    monkeypatch.setattr(reporter, "artifact", broken)
+    reporter.Reporter(STAGE, tmp_path).done()
     assert shown == []
 
 
 def test_outside_of_any_task_nothing_is_shown(tmp_path) -> None:
-    seen = watch.Watch(STAGE, tmp_path)
+    seen = reporter.Reporter(STAGE, tmp_path)
     seen("x 1/2 rollouts")
     seen.done()
 
@@ -129,8 +129,8 @@ def test_names_and_tags_are_bands_and_methods() -> None:
         Stage("report", "report", "", (), False),
     ]
     stages += [Stage(f"theta@b2-{one}", "theta", f"b2-{one}", (), False) for one in methods]
-    assert watch.tags(stages[2]) == ["b2", "no_work"] and watch.tags(stages[1]) == []
-    name, tags = watch.names(stages)
+    assert reporter.tags(stages[2]) == ["b2", "no_work"] and reporter.tags(stages[1]) == []
+    name, tags = reporter.names(stages)
     assert name == "b1, b2: no_work, de, bo, 2 more"
     assert tags == ["b1", "b2", *methods]
-    assert watch.names(stages[1:2]) == ("report", [])
+    assert reporter.names(stages[1:2]) == ("report", [])

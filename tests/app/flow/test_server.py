@@ -49,7 +49,7 @@ import sys, time
 from pathlib import Path
 from app.flow.graph import Stage
 from app.flow.server import served
-from app.flow import reporter as watch
+from app.flow import reporter
 root, words = Path(sys.argv[1]), sys.argv[2:]
 stage = Stage("history@b-m", "history", "b-m", (), True)
 with served(root) as url:
@@ -57,7 +57,7 @@ with served(root) as url:
 
     @prefect.task
     def task():
-        seen = watch.Watch(stage, root)
+        seen = reporter.Reporter(stage, root)
         for done in (1, 2):
             seen("a line of the stage")
             seen(f"history-b-m {done}/2 rollouts  generation {done}  best 0.5  1.0 rollouts/s")

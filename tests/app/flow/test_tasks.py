@@ -10,7 +10,7 @@ import pytest
 
 from app.flow import tasks
 from app.flow.graph import Stage
-from app.flow.scheduler import Board
+from app.flow.scheduler import Scheduler
 from pipeline.base.errors import UserError
 
 STATE = SimpleNamespace(name="Failed", message="it raised:\n  RuntimeError: no\nmore")
@@ -29,11 +29,11 @@ def test_a_flow_that_prefect_ends_early_is_an_error(
 ) -> None:
     """Prefect keeps what the body of a flow raises, and returns its state."""
     stage = Stage("one", "one", "", (), False)
-    board = Board([stage] if waiting else [], 1)
+    scheduler = Scheduler([stage] if waiting else [], 1)
     for name in ("_prepare", "_flush"):
         monkeypatch.setattr(tasks, name, lambda *_: None)
-    monkeypatch.setattr(tasks, "_flow", lambda *_: lambda return_state: STATE)
+    monkeypatch.setattr(tasks, "Run", lambda *_: lambda: STATE)
     monkeypatch.setattr("app.flow.server.served", lambda root: nullcontext("nowhere"))
     all_of_it = SimpleNamespace(interrupted=interrupted)
     with pytest.raises(ends[0], match=ends[1]) if ends else nullcontext():
-        tasks.perform(Path(), board, all_of_it)
+        tasks.perform(Path(), scheduler, all_of_it)

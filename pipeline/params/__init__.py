@@ -15,25 +15,25 @@ from ruamel.yaml import YAML, YAMLError
 from pipeline.base.errors import UserError
 from pipeline.base.schema import FILLED, Name, Section, explained, refusal
 from pipeline.params.identification import (
-    Loss,
-    Method,
-    Optimizer,
+    LossParams,
+    MethodParams,
+    OptimizerParams,
     Parameters,
-    Sling,
+    SlingParams,
     check_method,
 )
-from pipeline.params.lab import Band, BandName, Plan, Run, Setup
-from pipeline.params.launches import TARGET_AREA, Floor, Policy, Trials
-from pipeline.params.recording import Cloud, Episode, Force
-from pipeline.params.virtual_rig import Rig, RigArm, RigBand, RigCamera, RigClock, RigWrench
+from pipeline.params.lab import BandName, BandParams, PlanParams, RunParams, SetupParams
+from pipeline.params.launches import TARGET_AREA, FloorParams, PolicyParams, TrialsParams
+from pipeline.params.recording import CloudParams, EpisodeParams, ForceParams
+from pipeline.params.virtual_rig import RigArm, RigBand, RigCamera, RigClock, RigParams, RigWrench
 
 __all__ = [
     "TARGET_AREA",
-    "Band",
+    "BandParams",
     "Parameters",
     "Params",
-    "Plan",
-    "Rig",
+    "PlanParams",
+    "RigParams",
     "RigArm",
     "RigBand",
     "RigCamera",
@@ -47,22 +47,22 @@ __all__ = [
 
 
 class Params(Section):
-    run: Run
-    bands: Annotated[dict[BandName, Band], FILLED]
-    setup: Setup
-    plan: Plan
-    episode: Episode
-    force: Force
-    cloud: Cloud
-    sling: Sling
+    run: RunParams
+    bands: Annotated[dict[BandName, BandParams], FILLED]
+    setup: SetupParams
+    plan: PlanParams
+    episode: EpisodeParams
+    force: ForceParams
+    cloud: CloudParams
+    sling: SlingParams
     parameters: Parameters
-    loss: Loss
-    optimizer: Optimizer
-    methods: Annotated[dict[Name, Method], FILLED]
-    policy: Policy
-    trials: Trials
-    floor: Floor
-    rig: Rig
+    loss: LossParams
+    optimizer: OptimizerParams
+    methods: Annotated[dict[Name, MethodParams], FILLED]
+    policy: PolicyParams
+    trials: TrialsParams
+    floor: FloorParams
+    rig: RigParams
 
     @model_validator(mode="after")
     def _names_agree(self) -> Params:
@@ -122,7 +122,7 @@ def _expect_all(names, known, key: str) -> None:
             raise refusal(f"{key}: {name} is not one of {', '.join(known)}")
 
 
-def pairs(run: Run) -> list[tuple[str, str]]:
+def pairs(run: RunParams) -> list[tuple[str, str]]:
     """Every band with every method that runs on it, band by band."""
     ablated = {band: run.ablations.methods for band in run.ablations.bands}
     return [

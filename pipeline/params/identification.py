@@ -23,7 +23,7 @@ NUISANCES = {  # how far the box of each may reach: 1/s, s, 1, N, m
 }
 
 
-class Sling(Section):
+class SlingParams(Section):
     mesh: Literal["rod", "tetrahedra"]
     edges: Annotated[int, Range(4, 400)]
     grading: Annotated[float, Range(1, 20)]
@@ -36,7 +36,7 @@ class Sling(Section):
     launch_time: Annotated[float, Range(0.01, 10)]
 
     @model_validator(mode="after")
-    def _middle_is_a_layer(self) -> Sling:
+    def _middle_is_a_layer(self) -> SlingParams:
         for name in ("edges", "tet_edges"):
             if getattr(self, name) % 2:
                 raise refusal(f"{name} must be even: the hand holds the middle")
@@ -74,13 +74,13 @@ class HeldOut(Section):
     length: Annotated[float, Range(0.5, 5)]  # s
 
 
-class Loss(Section):
+class LossParams(Section):
     chamfer: Literal["symmetric", "measured"]
     median_window: Annotated[int, Range(1, 101)]
     held_out: HeldOut
 
     @model_validator(mode="after")
-    def _window_has_a_middle(self) -> Loss:
+    def _window_has_a_middle(self) -> LossParams:
         if self.median_window % 2 == 0:
             raise refusal("median_window must be odd")
         return self
@@ -89,7 +89,7 @@ class Loss(Section):
 Factor = Annotated[float, Range(0, 1.99)]  # SciPy's differential evolution wants less than 2
 
 
-class Optimizer(Section):
+class OptimizerParams(Section):
     seed: Seed
     population: Annotated[int, Range(5, 100_000)]
     generations: Annotated[int, Range(1, 100_000)]
@@ -102,7 +102,7 @@ class Optimizer(Section):
     cma_rollouts: Annotated[int, Range(4, 10_000_000)]
 
     @model_validator(mode="after")
-    def _budgets_suffice(self) -> Optimizer:
+    def _budgets_suffice(self) -> OptimizerParams:
         history = self.population * (self.generations + 1)
         if self.k_nn > history:
             raise refusal(f"k_nn must be at most population x (generations + 1) = {history}")
@@ -167,7 +167,7 @@ class Prior(Section):
     weight: Weight  # of size / mean in the loss, which is no likelihood; the posterior needs none
 
 
-class Method(Section):
+class MethodParams(Section):
     """What is weighed, what is searched, and how; keys that have a default may be left out."""
 
     weights: Weights
@@ -181,7 +181,7 @@ class Method(Section):
     covariance: bool = True  # else isotropic starts of the same determinant
 
     @model_validator(mode="after")
-    def _keys_belong_to_the_search(self) -> Method:
+    def _keys_belong_to_the_search(self) -> MethodParams:
         given = {"rollouts", "seed", "population"} & {*self.settings}
         if given:
             raise refusal(f"settings: {min(given)} stands under `optimizer`, for all methods")
@@ -192,7 +192,7 @@ class Method(Section):
         return self
 
     @model_validator(mode="after")
-    def _priors_are_of_nuisances(self) -> Method:
+    def _priors_are_of_nuisances(self) -> MethodParams:
         for name in self.priors:
             if name not in self.nuisances:
                 raise refusal(f"priors: {name} is not one of the method's nuisances")
@@ -201,13 +201,15 @@ class Method(Section):
         return self
 
     @model_validator(mode="after")
-    def _gain_is_no_modulus(self) -> Method:
+    def _gain_is_no_modulus(self) -> MethodParams:
         if "force_gain" in self.nuisances and not {"force_gain", "youngs_modulus"} & {*self.fixed}:
             raise refusal("force_gain and youngs_modulus cannot both be free: fix one in `fixed`")
         return self
 
 
-def check_method(method: Method, path: str, parameters: Parameters, optimizer: Optimizer) -> None:
+def check_method(
+    method: MethodParams, path: str, parameters: Parameters, optimizer: OptimizerParams
+) -> None:
     """Refuse what a method, whose key ends with `path`, asks for outside the box or the budget."""
     boxes = {name: (box.low, box.high) for name, box in parameters}
     for name, (low, high) in method.bounds.items():

@@ -49,14 +49,14 @@ class Ablations(Section):
     methods: Names
 
 
-class Run(Section):
+class RunParams(Section):
     bands: Annotated[Names, FILLED]
     rig: Names
     methods: Annotated[Names, FILLED]
     ablations: Ablations
 
     @model_validator(mode="after")
-    def _nothing_runs_twice(self) -> Run:
+    def _nothing_runs_twice(self) -> RunParams:
         for band in self.ablations.bands:
             if band not in self.bands:
                 raise refusal(f"ablations.bands: {band} is not one of run.bands")
@@ -66,7 +66,7 @@ class Run(Section):
         return self
 
 
-class Band(Section):
+class BandParams(Section):
     source: Literal["recording", "rig"]
     mass: Annotated[float, Range(1e-4, 1)]
     diameter: Annotated[float, Range(5e-4, 0.05)]
@@ -95,7 +95,7 @@ DrawY = Annotated[float, Range(-2, -0.05)]
 DrawZ = Annotated[float, Range(-2, 1)]
 
 
-class Setup(Section):
+class SetupParams(Section):
     fork_width: Annotated[float, Range(0.02, 2)]
     fork_height: Annotated[float, Range(0.05, 3)]
     clamp_direction: Direction
@@ -131,7 +131,7 @@ class Gripper(Section):
         return self
 
 
-class Plan(Section):
+class PlanParams(Section):
     """What it asks of the episode is checked by `sling plan`, which alone reads it."""
 
     draw: Annotated[tuple[DrawY, DrawZ], LIST]
@@ -151,7 +151,7 @@ class Plan(Section):
     frame: Annotated[str, FILLED]
 
     @model_validator(mode="after")
-    def _pulls_slower(self) -> Plan:
+    def _pulls_slower(self) -> PlanParams:
         if self.pull_speed > self.max_speed:
             raise refusal("pull_speed must be at most max_speed")
         return self

@@ -29,7 +29,7 @@ class Robust(Section):
     map_size: Annotated[tuple[Nodes, Nodes], LIST]
 
 
-class Policy(Section):
+class PolicyParams(Section):
     seed: Seed
     targets: Annotated[tuple[Distance, Distance], LIST, ASCENDING]
     map_size: Annotated[tuple[Nodes, Nodes], LIST]
@@ -44,20 +44,20 @@ class Policy(Section):
     robust: Robust
 
 
-class Floor(Section):
+class FloorParams(Section):
     """How far launches of an oracle policy miss: what no method can help."""
 
     map_size: Annotated[tuple[Nodes, Nodes], LIST]
     launches: Annotated[int, Range(0, 10_000)]  # a target, beside those with the trials' errors
 
 
-class Trials(Section):
+class TrialsParams(Section):
     seed: Seed
     targets: Annotated[tuple[Distance, ...], LIST, FILLED, UNIQUE]
     repeats: Annotated[int, Range(1, 10_000)]
     actuation_error: Annotated[float, Range(0, 0.1)]
 
 
-def trial_seed(trials: Trials, number):
+def trial_seed(trials: TrialsParams, number):
     """Seed of a band's launch by its number, an int or an array; the same for every policy."""
     return 1_000_000 * trials.seed + number

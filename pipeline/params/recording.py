@@ -12,30 +12,30 @@ from pipeline.base.schema import FILLED, Pattern, Range, Section, refusal
 Delay = Annotated[float, Range(-0.5, 0.5)]
 
 
-class Delays(Section):
+class DelayParams(Section):
     pose: Delay | None
     camera: Delay | None
 
 
-class Episode(Section):
+class EpisodeParams(Section):
     samples: Annotated[int, Range(30, 10_000)]
     duration: Annotated[float, Range(1, 120)]
     tail: Annotated[float, Range(0.1, 60)]
-    delays: Delays
+    delays: DelayParams
 
     @model_validator(mode="after")
-    def _tail_within(self) -> Episode:
+    def _tail_within(self) -> EpisodeParams:
         if self.tail >= self.duration:
             raise refusal("tail must be less than duration")
         return self
 
 
-class Force(Section):
+class ForceParams(Section):
     cutoff: Annotated[float, Range(1e-4, 1e4)]
     cutoff_unit: Literal["rad/sample", "rad/s", "Hz"]
 
     @model_validator(mode="after")
-    def _below_nyquist(self) -> Force:
+    def _below_nyquist(self) -> ForceParams:
         if self.cutoff_unit == "rad/sample" and self.cutoff >= math.pi:
             raise refusal("cutoff must be below pi rad/sample")
         return self
@@ -47,7 +47,7 @@ class Sam3(Section):
     device: Annotated[str, Pattern("cuda(:[0-9]+)?|cpu")]
 
 
-class Cloud(Section):
+class CloudParams(Section):
     points: Annotated[int, Range(10, 100_000)]
     mask: Literal["opencv", "sam3"]
     sam3: Sam3

@@ -63,7 +63,7 @@ class RigCamera(Section):
     rotation_error: Annotated[float, Range(0, 0.1)]
 
 
-class Rig(Section):
+class RigParams(Section):
     seed: Seed
     edges: Annotated[int, Range(4, 1000)]
     tolerance: Annotated[float, Range(1e-10, 1e-3)]
@@ -81,7 +81,7 @@ class Rig(Section):
     bands: dict[Name, RigBand]
 
     @model_validator(mode="after")
-    def _middle_is_a_node(self) -> Rig:
+    def _middle_is_a_node(self) -> RigParams:
         if self.edges % 2:
             raise refusal("edges must be even: the hand holds the middle node")
         return self

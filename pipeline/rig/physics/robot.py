@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 if TYPE_CHECKING:
-    from pipeline.params import Rig
+    from pipeline.params import RigParams
 
 SENSOR_LEVER = 0.15  # m from the force sensor to the tool centre point
 
@@ -30,7 +30,7 @@ class Robot:
     sensor_in_tool: Rotation
 
     @classmethod
-    def of(cls, rig: Rig) -> Robot:
+    def of(cls, rig: RigParams) -> Robot:
         down, ahead = np.sin(rig.tool_pitch), np.cos(rig.tool_pitch)
         axes = np.array([[1.0, 0.0, 0.0], [0.0, -down, ahead], [0.0, -ahead, -down]])
         return cls(

@@ -12,7 +12,7 @@ from pipeline.rig.physics.rubber import Rubber, nominal_stress
 from pipeline.rig.physics.string import ElasticString
 
 if TYPE_CHECKING:
-    from pipeline.params import Band, Params, RigBand
+    from pipeline.params import BandParams, Params, RigBand
 
 HISTORY_STEP = 0.01
 
@@ -32,7 +32,7 @@ def string_of(params: Params, band_name: str) -> ElasticString:
 
 @lru_cache
 def _string_of(
-    band: Band,
+    band: BandParams,
     hidden: RigBand,
     fork_width: float,
     clamp_direction: tuple[float, float, float],

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from app.plan.pull import SPARE, TICK, catenary_sag, hanging_middle, trajectory_of
-from pipeline.params import Plan, load
+from pipeline.params import PlanParams, load
 
 PARAMS = load(Path(__file__).parents[3] / "params.yaml")
 AHEAD = np.array([0.0, 1.0, 0.0])
@@ -85,7 +85,7 @@ PLANS = st.fixed_dictionaries(
 @settings(deadline=None, max_examples=100)
 @given(content=PLANS, angle=number(-1.5, 1.5), duration=number(1, 120), share=number(0.01, 0.9))
 def test_any_plan_rests_in_time_and_within_its_limits(content, angle, duration, share) -> None:
-    plan = Plan.model_validate(content)
+    plan = PlanParams.model_validate(content)
     episode = PARAMS.episode.model_copy(update={"duration": duration, "tail": share * duration})
     axis = np.array([0.0, np.cos(angle), np.sin(angle)])
     way = trajectory_of(plan, PARAMS.setup, episode, PARAMS.bands["band1"], axis)

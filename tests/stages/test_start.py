@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import runpy
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -122,3 +124,13 @@ def test_a_file_that_is_missing_or_damaged_says_what_makes_it(stage) -> None:
         assert remedy(NotMade(Path(path))) == ""
     error = pickle.loads(pickle.dumps(NotMade(path, "damaged")))
     assert (str(error), error.problem) == (f"{path}: damaged", "damaged")
+
+
+def test_a_stage_has_one_thread_of_blas_whatever_the_machine() -> None:
+    """Several round otherwise: theta's confidence differed in its last digits."""
+    code = "import stages, numpy, threadpoolctl as t;"
+    code += "print([one['num_threads'] for one in t.threadpool_info()])"
+    environment = os.environ | {"OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"}
+    asked = [sys.executable, "-c", code]
+    done = subprocess.run(asked, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.stdout == "[1]\n", done.stderr

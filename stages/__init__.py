@@ -1,0 +1,9 @@
+"""The scripts of the steps, each with one thread of BLAS.
+
+The sums of several threads round otherwise, and DVC would see another result on a machine with more
+cores. Our own threads, which change no bit, are as many as SLING_WORKERS says.
+"""
+
+import os
+
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # NumPy's and SciPy's; read when they are imported

@@ -5,21 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.sling.initial import drawn_guess
-from pipeline.sling.material import material
+from pipeline.sling.layout import Grip
 from pipeline.sling.model import Sling
-from pipeline.sling.solver import (
-    FAILURE,
-    FREE,
-    LANE_STATE,
-    PAYLOAD,
-    RELAX,
-    Schedule,
-    relaxation,
-    run,
-    steps,
-)
-
-LONG = 10.0 ** np.arange(1, 6)  # s: steps in which the weight's inertia counts for nothing
+from pipeline.sling.schedule import Schedule, statics
+from pipeline.sling.solver import Frames, Slings, run
 
 
 def hang(sling: Sling, thetas: np.ndarray, load: float) -> np.ndarray:
@@ -32,18 +21,11 @@ def hang(sling: Sling, thetas: np.ndarray, load: float) -> np.ndarray:
         load: The weight's mass [kg].
     """
     thetas = np.atleast_2d(thetas).astype(float)
-    table = np.vstack([relaxation(FREE), steps(LONG, 1.0, hold=FREE, mode=RELAX)])
-    lanes = np.zeros((len(thetas), LANE_STATE))
-    lanes[:, PAYLOAD] = load
-    result = run(
-        sling,
-        Schedule(table, first_free=len(table)),
-        material(sling, thetas),
-        drawn_guess(sling, np.array([[0.0, -sling.rest_length]]))[0],
-        lanes,
-        frame_steps=np.array([len(table) - 1]),
-        frame_weights=np.ones(1),
-    )
-    nodes = result.frames[:, 0].astype(float)
-    nodes[result.lane_state[:, FAILURE] > 0] = np.nan
+    steps = statics(Grip.FREE)
+    guess = drawn_guess(sling, np.array([[0.0, -sling.rest_length]]))[0]
+    slings = Slings.of(sling, thetas, guess, payload=load)
+    last = Frames(np.array([len(steps) - 1]), np.ones(1))
+    done = run(sling, Schedule(steps, first_free=len(steps)), slings, last)
+    nodes = done.frames[:, 0].astype(float)
+    nodes[done.lanes["outcome"] > 0] = np.nan
     return nodes

@@ -10,24 +10,16 @@ from scipy.interpolate import CubicSpline
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.sling.initial import hanging_guess
-from pipeline.sling.material import material
+from pipeline.sling.layout import Grip, Outcome
 from pipeline.sling.model import Sling
-from pipeline.sling.solver import (
-    FAILURE,
-    FREE,
-    HELD,
-    ITERATIONS,
-    LANE_STATE,
-    NOT_CONVERGED,
-    OPENING,
-    RELAX_STEPS,
-    SLIPPED,
-    Schedule,
-    relaxation,
-    run,
-    steps,
-)
+from pipeline.sling.schedule import RELAX_STEPS, Schedule, relaxation, steps
+from pipeline.sling.solver import Frames, Options, Slings, run
 
+FAILURES = {
+    Outcome.GOING_ON: None,
+    Outcome.NOT_CONVERGED: "the simulation did not converge",
+    Outcome.SLIPPED: "the band slipped out of the fingers",
+}
 GRASP_BLEND = 0.5  # s in which the held node moves from where the band hung to the hand's path
 
 
@@ -59,41 +51,44 @@ def schedule_of(sling: Sling, episode: Episode, refine: int = 1) -> Schedule:
     shows that moment, whatever the friction. From then on the friction that is left falls as the
     pads' normal force does, which is gone after `finger_opening_time`.
     """
-    size = sling.steps
-    release = episode.release_time
-    clear = release + sling.finger_opening_time
-    end = max(episode.time[-1], *episode.cloud_time[-1:]) + 1e-3
+    size, release = sling.steps, episode.release_time
     if release <= episode.grasp_time:
         raise UserError(
             f"episode of {episode.band}: released at {release:g} s, grasped at"
             f" {episode.grasp_time:g} s; a recording needs a pull between them"
         )
-
-    def grid(first: float, last: float, step: float) -> np.ndarray:
-        return np.linspace(
-            first, last, max(int(np.ceil((last - first) / step * refine - 1e-9)), 1) + 1
-        )
-
+    clear = release + sling.finger_opening_time
+    end = max(episode.time[-1], *episode.cloud_time[-1:]) + 1e-3
     recoil_end = max(min(clear + size.recoil_time, end), clear + size.recoil_step)
-    relax = relaxation(FREE)
-    relax[:, 11] = episode.grasp_time
-    held = steps(grid(episode.grasp_time, release, size.grip_step), 1, hold=HELD)
-    opening_times = grid(release, clear, size.recoil_step)
-    opening = steps(opening_times, held[-1, 0], hold=OPENING, order=2)
-    recoil = steps(grid(clear, recoil_end, size.recoil_step), opening[-1, 0], hold=FREE, order=2)
-    swing = np.zeros((0, 13))
-    if end > recoil_end:
-        swing = steps(grid(recoil_end, end, size.swing_step), recoil[-1, 0], hold=FREE, order=2)
-    held[:, 9] = sling.grip_force
-    opening[:, 9] = sling.grip_force * (opening[:, 11] - release) / sling.finger_opening_time
-    table = np.vstack([relax, held, opening, recoil, swing])
+    phases = (  # until when, in steps of what size and order
+        (release, size.grip_step, Grip.HELD, 1),
+        (clear, size.recoil_step, Grip.OPENING, 2),
+        (recoil_end, size.recoil_step, Grip.FREE, 2),
+        (end, size.swing_step, Grip.FREE, 2),
+    )
+    rows = relaxation(Grip.FREE)
+    rows["time"] = begin = episode.grasp_time
+    previous = 1.0
+    for until, step, grip, order in phases:
+        if until > begin:
+            count = max(int(np.ceil((until - begin) / step * refine - 1e-9)), 1)
+            times = np.linspace(begin, until, count + 1)
+            rows = np.concatenate([rows, steps(times, previous, grip=grip, order=order)])
+            begin, previous = until, rows["h"][-1]
+    _lead(rows, sling, episode)
+    return Schedule(rows, first_free=RELAX_STEPS + np.count_nonzero(rows["grip"]))
 
+
+def _lead(rows: np.ndarray, sling: Sling, episode: Episode) -> None:
+    """Say of steps where the hand is, and with what force its pads hold the band."""
+    time, opening = rows["time"], rows["grip"] == Grip.OPENING
+    rows["grip_force"][rows["grip"] == Grip.HELD] = sling.grip_force
+    since = time[opening] - episode.release_time
+    rows["grip_force"][opening] = sling.grip_force * since / sling.finger_opening_time
     hand = CubicSpline(episode.time, episode.position, axis=0)
-    inside = np.clip(table[:, 11], episode.time[0], episode.time[-1])
-    table[:, 6:9] = hand(inside)
-    part = np.clip((table[:, 11] - episode.grasp_time) / GRASP_BLEND, 0, 1)
-    table[:, 10] = 1 - part**3 * (10 - 15 * part + 6 * part**2)
-    return Schedule(table, first_free=RELAX_STEPS + len(held) + len(opening))
+    rows["target"] = hand(np.clip(time, episode.time[0], episode.time[-1]))
+    part = np.clip((time - episode.grasp_time) / GRASP_BLEND, 0, 1)
+    rows["blend"] = 1 - part**3 * (10 - 15 * part + 6 * part**2)
 
 
 def interact(
@@ -116,34 +111,29 @@ def interact(
     """
     thetas = np.atleast_2d(thetas)
     schedule = schedule_of(sling, episode, refine)
-    times = schedule.times
-    frame_steps = np.searchsorted(times, episode.cloud_time).clip(RELAX_STEPS - 1, len(times) - 1)
-    before = times[frame_steps] - schedule.table[frame_steps, 0]
-    weights = np.clip((episode.cloud_time - before) / schedule.table[frame_steps, 0], 0, 1)
-    weights[frame_steps < RELAX_STEPS] = 1.0
-    result = run(
+    times = schedule.steps["time"]
+    done = run(
         sling,
         schedule,
-        material(sling, thetas),
-        hanging_guess(sling),
-        np.zeros((len(thetas), LANE_STATE)),
-        frame_steps=frame_steps,
-        frame_weights=weights,
-        device=device,
-        fetch=fetch,
-        workers=workers,
-        double=double,
+        Slings.of(sling, thetas, hanging_guess(sling)),
+        _frames(schedule, episode.cloud_time),
+        Options(device, workers, fetch=fetch, double=double),
     )
-    reasons = {
-        0: None,
-        NOT_CONVERGED: "the simulation did not converge",
-        SLIPPED: "the band slipped out of the fingers",
-    }
     return Rollouts(
         times=times[RELAX_STEPS - 1 :],
-        force=result.output[:, RELAX_STEPS - 1 :, :3],
+        force=done.output[:, RELAX_STEPS - 1 :, :3],
         cloud_time=episode.cloud_time,
-        center_line=result.frames,
-        failure=[reasons[int(round(code))] for code in result.lane_state[:, FAILURE]],
-        iterations=result.lane_state[:, ITERATIONS].astype(int),
+        center_line=done.frames,
+        failure=[FAILURES[int(round(code))] for code in done.lanes["outcome"]],
+        iterations=done.lanes["iterations"].astype(int),
     )
+
+
+def _frames(schedule: Schedule, stamps: np.ndarray) -> Frames:
+    """The camera's, at stamps (K,); those before the grasp show the band at rest."""
+    ends, lengths = schedule.steps["time"], schedule.steps["h"]
+    within = np.searchsorted(ends, stamps).clip(RELAX_STEPS - 1, len(ends) - 1)
+    before = ends[within] - lengths[within]
+    weights = np.clip((stamps - before) / lengths[within], 0, 1)
+    weights[within < RELAX_STEPS] = 1.0
+    return Frames(within, weights)

@@ -8,19 +8,46 @@ from pathlib import Path
 import warp as wp
 
 from pipeline.base.native import built_once, text_of
+from pipeline.sling.layout import macros
 from pipeline.sling.tetrahedra import CORNERS
 
 
 @built_once
 def sling_kernel(
     element: str, dofs: int, sections: int, middle: int, double: bool, lanes: int, team: int
-):
-    """Compile the native text for a mesh; Warp keeps the binary in its cache."""
+) -> tuple[wp.Kernel, type]:
+    """Compile the native text for a mesh; Warp keeps the binary in its cache.
+
+    Returns:
+        The kernel, and the structure of arrays that it takes.
+    """
     scalar = wp.float64 if double else wp.float32
     array, indices = wp.array(dtype=scalar), wp.array(dtype=wp.int32)
+
+    @wp.struct
+    class Arrays:
+        setting: array
+        mesh: array
+        clamp: array
+        schedule: array
+        coefficients: array
+        state: array
+        scratch: array
+        work: array
+        lanes: array
+        output: array
+        frames: array
+        frame_first: indices
+        frame_weight: array
+        n_frames: int
+        frame_width: int
+        steps: int
+        first_free: int
+        launching: int
+
     parts = ("lanes.h", "state.h", "material.h", f"{element}.h", "solve.h", "step.h")
     tetrahedra = {} if element == "rod" else {"TETS": len(CORNERS), "CORNERS": _braced(CORNERS)}
-    text = text_of(
+    text = "".join(f"\nconst auto {name} = arrays.{name};" for name in Arrays.vars) + text_of(
         *(Path(__file__).with_name(part) for part in parts),
         SC="double" if double else "float",
         W=lanes,
@@ -29,60 +56,18 @@ def sling_kernel(
         L=sections,
         MID=middle,
         **tetrahedra,
+        **macros(),
     )
 
     @wp.func_native(text)
-    def sling(
-        tid: int,
-        geometry: array,
-        mesh: array,
-        clamp: array,
-        schedule: array,
-        parameter: array,
-        state: array,
-        scratch: array,
-        work: array,
-        lane_state: array,
-        output: array,
-        frames: array,
-        frame_first: indices,
-        frame_weight: array,
-        n_frames: int,
-        frame_width: int,
-        steps: int,
-        first_free: int,
-        launching: int,
-    ): ...
+    def march(tid: int, arrays: Arrays): ...
 
     # approximate reciprocals do for Newton's method; on the CPU it would drop the checks for NaN
     @wp.kernel(module="unique", module_options={"fast_math": team > 1})
-    def run(
-        geometry: array,
-        mesh: array,
-        clamp: array,
-        schedule: array,
-        parameter: array,
-        state: array,
-        scratch: array,
-        work: array,
-        lane_state: array,
-        output: array,
-        frames: array,
-        frame_first: indices,
-        frame_weight: array,
-        n_frames: int,
-        frame_width: int,
-        steps: int,
-        first_free: int,
-        launching: int,
-    ):
-        sling(
-            wp.tid(), geometry, mesh, clamp, schedule, parameter, state, scratch, work,
-            lane_state, output, frames, frame_first, frame_weight, n_frames, frame_width, steps,
-            first_free, launching,
-        )  # fmt: skip
+    def run(arrays: Arrays):
+        march(wp.tid(), arrays)
 
-    return run
+    return run, Arrays
 
 
 def _braced(table) -> str:

@@ -9,24 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.sling.initial import drawn_guess
-from pipeline.sling.material import material
+from pipeline.sling.layout import Grip, Outcome
 from pipeline.sling.model import GRAVITY, Sling
-from pipeline.sling.solver import (
-    DIRECTION,
-    FAILURE,
-    FREE,
-    HELD_FORCE,
-    LANE_STATE,
-    LEFT,
-    PAYLOAD,
-    POUCH,
-    RELAX_STEPS,
-    SEPARATION,
-    Schedule,
-    relaxation,
-    run,
-    steps,
-)
+from pipeline.sling.schedule import RELAX_STEPS, Schedule, relaxation, steps
+from pipeline.sling.solver import Options, Slings, run
 
 SHARE = 1024  # launches: a device more for fewer would only cost its start
 
@@ -63,13 +49,13 @@ def ballistic_landing(y, z, vy, vz, floor: float):
 
 def schedule_of(sling: Sling, refine: int = 1) -> Schedule:
     """Relax at the draw, then recoil in second-order steps."""
-    relax = relaxation(POUCH)
-    relax[:, 10] = 1.0
+    relax = relaxation(Grip.POUCH)
+    relax["blend"] = 1.0
     h = sling.steps.launch_step / refine
     count = int(round(sling.steps.launch_time / h))
-    first = steps([0.0, h], h, hold=FREE)
-    rest = steps(h * np.arange(1, count + 1), h, hold=FREE, order=2)
-    return Schedule(np.vstack([relax, first, rest]), first_free=RELAX_STEPS)
+    first = steps([0.0, h], h, grip=Grip.FREE)
+    rest = steps(h * np.arange(1, count + 1), h, grip=Grip.FREE, order=2)
+    return Schedule(np.concatenate([relax, first, rest]), first_free=RELAX_STEPS)
 
 
 def launch(
@@ -93,42 +79,56 @@ def launch(
     """
     thetas, draws = np.atleast_2d(thetas).astype(float), np.atleast_2d(draws).astype(float)
     count = max(len(thetas), len(draws))
-    thetas = np.broadcast_to(thetas, (count, 5))
-    draws = np.broadcast_to(draws, (count, 2))
-    lane_state = np.zeros((count, LANE_STATE))
+    thetas, draws = np.broadcast_to(thetas, (count, 5)), np.broadcast_to(draws, (count, 2))
     distance = np.linalg.norm(draws, axis=1, keepdims=True)
-    lane_state[:, DIRECTION][:, 1:] = -draws / np.maximum(distance, 1e-9)
-    lane_state[:, PAYLOAD] = sling.projectile_mass
+    direction = np.column_stack([np.zeros(count), -draws / np.maximum(distance, 1e-9)])
+    slings = Slings.of(
+        sling, thetas, drawn_guess(sling, draws),
+        direction=direction, payload=sling.projectile_mass,
+    )  # fmt: skip
     schedule = schedule_of(sling, refine)
-    begin = material(sling, thetas), drawn_guess(sling, draws), lane_state
 
     def launched(place: str, share: np.ndarray) -> np.ndarray:
-        rows = (values[share] for values in begin)
-        options = {"launching": True, "device": place, "workers": workers, "double": double}
-        return run(sling, schedule, *rows, **options).lane_state
+        options = Options(place, workers, launching=True, double=double)
+        return run(sling, schedule, slings[share], options=options).lanes
 
     devices = [device] if isinstance(device, str) else device[: max(count // SHARE, 1)]
     shares = np.array_split(np.arange(count), len(devices))
     with ThreadPoolExecutor(len(devices)) as pool:
-        lane_state = np.concatenate(list(pool.map(launched, devices, shares)))
-    hold_force = np.linalg.norm(lane_state[:, HELD_FORCE].astype(float), axis=1)
-    code = np.round(lane_state[:, FAILURE])
-    hold_force[code > 0] = np.nan
-    time, y, z, vy, vz = lane_state[:, SEPARATION].astype(float).T
+        lanes = np.concatenate(list(pool.map(launched, devices, shares)))
+    return _outcomes(sling, lanes, max_force)
+
+
+def _outcomes(sling: Sling, lanes: np.ndarray, max_force: float) -> Launches:
+    """Of slings that have been launched, by their records (N,) of layout.LANE."""
+    outcome = np.round(lanes["outcome"])
+    hold_force = np.linalg.norm(lanes["hold_force"], axis=1)
+    hold_force[outcome > 0] = np.nan
+    time, y, z, vy, vz = lanes["separation"].T
     landing = ballistic_landing(y, z, vy, vz, -sling.fork_height)
-    failure: list[str | None] = []
-    for i in range(count):
+
+    def reason(i: int) -> str | None:
         if not np.isfinite(hold_force[i]):
-            failure.append("the simulation did not converge")
-        elif hold_force[i] > max_force:
-            failure.append(f"holding takes {hold_force[i]:.1f} N, more than {max_force:g} N")
-        elif code[i] != LEFT:
-            failure.append("the projectile never left the pouch")
-        elif not landing[i] > 0:
-            failure.append("the projectile fell short of the fork")
-        else:
-            failure.append(None)
+            return "the simulation did not converge"
+        if hold_force[i] > max_force:
+            return f"holding takes {hold_force[i]:.1f} N, more than {max_force:g} N"
+        if outcome[i] != Outcome.SEPARATED:
+            return "the projectile never left the pouch"
+        return None if landing[i] > 0 else "the projectile fell short of the fork"
+
+    failure = [reason(i) for i in range(len(lanes))]
     good = np.array([reason is None for reason in failure])
-    speed, angle = np.hypot(vy, vz), np.arctan2(vz, vy)
-    known = [np.where(good, v, np.nan) for v in (landing, speed, angle, time, y, z)]
-    return Launches(known[0], known[1], known[2], hold_force, *known[3:], failure=failure)
+
+    def known(values: np.ndarray) -> np.ndarray:
+        return np.where(good, values, np.nan)
+
+    return Launches(
+        landing_y=known(landing),
+        speed=known(np.hypot(vy, vz)),
+        angle=known(np.arctan2(vz, vy)),
+        hold_force=hold_force,
+        separation_time=known(time),
+        separation_y=known(y),
+        separation_z=known(z),
+        failure=failure,
+    )

@@ -1,13 +1,15 @@
-"""The material law's parameters, and what the native text takes for them.
+"""The material law: its parameters θ, and what the native text takes for them.
 
-The law itself, stress and its derivative by the deformation gradient, is material.h; rod.h adds the
-rod's bending and twist to it.
+A law has three places: its parameters and coefficients here (named in layout.py), its stress and
+their derivative by the deformation gradient in material.h, and the rod's bending and twist in
+rod.h. Whoever adds one writes it a second time in validation/simulator/reference.py.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from pipeline.sling.layout import MATERIAL
 from pipeline.sling.model import Sling
 
 THETA = (
@@ -20,18 +22,20 @@ THETA = (
 
 
 def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
-    """What state.h takes for physical thetas (N, 5): mu, lam, d, s, 2 friction, cb, drag; (N, 7).
+    """Coefficients of the law, records (N,) of layout.MATERIAL, for physical thetas (N, 5).
 
     mu is the shear modulus and lam the volume modulus of the stable neo-Hookean law without its
     logarithm (Smith, de Goes, Kim 2018): first Lame parameter plus mu, so that E and nu are the
-    small-strain ones.
+    small-strain ones. `friction` is that of both pads.
     """
     young, poisson, damping, friction, scale = np.asarray(thetas, float).T
-    mu = young / (2 * (1 + poisson))
-    lam = young * poisson / ((1 + poisson) * (1 - 2 * poisson)) + mu
+    result = np.empty(len(thetas), MATERIAL)
+    result["mu"] = mu = young / (2 * (1 + poisson))
+    result["lam"] = young * poisson / ((1 + poisson) * (1 - 2 * poisson)) + mu
+    result["damping"], result["scale"], result["friction"] = damping, scale, 2 * friction
     if sling.flexural_rigidity is None:
-        bending = (1 + poisson) * sling.radius**2 / 2
+        result["bending"] = (1 + poisson) * sling.radius**2 / 2
     else:
-        bending = sling.flexural_rigidity / (mu * sling.area)
-    drag = np.broadcast_to(sling.air_drag, young.shape)
-    return np.stack([mu, lam, damping, scale, 2 * friction, bending, drag], axis=1)
+        result["bending"] = sling.flexural_rigidity / (mu * sling.area)
+    result["drag"] = sling.air_drag
+    return result

@@ -1,130 +1,110 @@
-"""Runs the native text through Warp: the kernel for a mesh, lanes in rows, steps of a schedule."""
+"""Runs the native text through Warp: a batch of slings through the steps of a schedule."""
 
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.sling import tetrahedra
 from pipeline.sling.initial import fixed_frames
+from pipeline.sling.layout import LANE, OUTPUT, SETTING, numbers, records, width
+from pipeline.sling.material import material
 from pipeline.sling.model import GRAVITY, TETRAHEDRA, Sling
+from pipeline.sling.schedule import Schedule
 
 LANES, TEAM = 16, 10  # slings in a CPU thread's SIMD lanes; GPU threads that share a sling
-NOT_CONVERGED, SLIPPED, LEFT = 1, 2, -1  # lane_state[4] as state.h says
-DIRECTION, PAYLOAD, FAILURE, SEPARATION, HELD_FORCE = slice(0, 3), 3, 4, slice(5, 10), slice(10, 13)
-ITERATIONS, LANE_STATE = 13, 14
+STEP_LIMIT = 0.004  # m, of Newton's method
 
 
-@dataclass
-class Schedule:
-    """The steps that all lanes of a batch take.
+@dataclass(frozen=True)
+class Slings:
+    """N slings before their first step.
 
     Attributes:
-        table: h, c1, c2, beta, mode, hold, target x y z, normal force, blend, time, share of the
-            bending stiffness; shape (S, 13).
-        first_free: Index of the first step after the release.
+        coefficients: Of their material, records (N,) of layout.MATERIAL.
+        state: Cross-sections, shape (N, sections, dofs) or (sections, dofs).
+        lanes: Records (N,) of layout.LANE.
     """
 
-    table: np.ndarray
-    first_free: int
+    coefficients: np.ndarray
+    state: np.ndarray
+    lanes: np.ndarray
+
+    @classmethod
+    def of(cls, sling: Sling, thetas: np.ndarray, state: np.ndarray, **lanes) -> Slings:
+        """With physical thetas (N, 5), at rest; `lanes` are fields of layout.LANE, else 0."""
+        records = np.zeros(len(thetas), LANE)
+        for name, values in lanes.items():
+            records[name] = values
+        shape = len(thetas), sling.sections, sling.dofs
+        return cls(material(sling, thetas), np.broadcast_to(state, shape), records)
+
+    def __len__(self) -> int:
+        return len(self.lanes)
+
+    def __getitem__(self, chosen) -> Slings:
+        return Slings(self.coefficients[chosen], self.state[chosen], self.lanes[chosen])
+
+
+@dataclass(frozen=True)
+class Frames:
+    """What is recorded on the way.
+
+    Attributes:
+        steps, weights: Step in which each frame falls and its place in it, shape (K,).
+        width: Numbers of a cross-section: 3 of its centre, `sling.dofs` for all.
+    """
+
+    steps: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    weights: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    width: int = 3
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a batch is stepped.
+
+    Attributes:
+        device: cpu, or one GPU.
+        workers: Threads, on the CPU; a result does not depend on their number.
+        fetch: Copy what is long from a GPU.
+        launching: The projectile (`payload`) is followed until it separates.
+        double: In double precision.
+        tolerance: Newton's change that is small enough [m].
+    """
+
+    device: str = "cpu"
+    workers: int = 1
+    fetch: bool = True
+    launching: bool = False
+    double: bool = False
+    gravity: float = GRAVITY
+    tolerance: float = 2e-6
+    max_iterations: int = 80
 
     @property
-    def times(self) -> np.ndarray:
-        return self.table[:, 11]
-
-
-RELAX, MOVE = 0, 1
-FREE, HELD, OPENING, POUCH = 0, 1, 2, 3
-
-
-RELAX_STEPS = 40
-
-
-def relaxation(hold: int) -> np.ndarray:
-    """Rows that bring a guess to rest, shape (RELAX_STEPS, 13): steps without speed, ever longer.
-
-    Guesses have kinks. Inertia holds the first steps near them, and the bending stiffness comes in
-    little by little; the last steps are statics.
-    """
-    ramp = RELAX_STEPS - 12
-    sizes = np.concatenate([np.geomspace(2e-3, 0.05, ramp), np.full(12, 0.05)])
-    table = steps(np.concatenate([[0.0], np.cumsum(sizes)]), sizes[0], hold=hold, mode=RELAX)
-    table[:ramp, 12] = np.geomspace(0.01, 1, ramp)
-    return table
-
-
-def steps(times, previous: float, *, hold: int, order: int = 1, mode: int = MOVE) -> np.ndarray:
-    """Rows of a schedule table that end at `times`, shape (S, 13): backward Euler or BDF2.
-
-    Args:
-        previous: Length of the step before the first one [s], for variable-step BDF2.
-    """
-    times = np.asarray(times, float)
-    h = np.diff(times)
-    table = np.zeros((len(h), 13))
-    ratio = h / np.concatenate([[previous], h[:-1]])
-    table[:, 0], table[:, 1], table[:, 3] = h, 1, 1
-    if order == 2:
-        table[:, 1] = (1 + ratio) ** 2 / (1 + 2 * ratio)
-        table[:, 2] = ratio**2 / (1 + 2 * ratio)
-        table[:, 3] = (1 + ratio) / (1 + 2 * ratio)
-    table[:, 4], table[:, 5], table[:, 11], table[:, 12] = mode, hold, times[1:], 1
-    return table
-
-
-def _interleave(rows: np.ndarray, lanes: int, together: int, dtype) -> np.ndarray:
-    """(N, k) -> (blocks, k, lanes); the last row fills up to a multiple of `together` blocks."""
-    blocks = -(-len(rows) // (lanes * together)) * together
-    padded = np.concatenate([rows, np.repeat(rows[-1:], blocks * lanes - len(rows), axis=0)])
-    return np.ascontiguousarray(padded.reshape(blocks, lanes, -1).transpose(0, 2, 1), dtype)
-
-
-def _separate(array: np.ndarray) -> np.ndarray:
-    """(blocks, k, lanes) -> (slings, k)."""
-    blocks, width, lanes = array.shape
-    return array.transpose(0, 2, 1).reshape(blocks * lanes, width)
-
-
-def _widths(
-    sling: Sling, n_steps: int, n_frames: int, frame_width: int, launching: bool, on_gpu: bool
-) -> dict[str, int]:
-    """Numbers that each array holds of one sling."""
-    # of a GPU, a warp's spare threads count
-    columns = -(-32 // (32 // TEAM)) if on_gpu else sling.dofs + 1
-    return {
-        "state": sling.dofs * sling.sections,
-        "lane_state": LANE_STATE,
-        "scratch": 9 * sling.dofs * sling.sections,
-        "saved": (2 * sling.dofs + 1) * sling.sections * columns,
-        "output": 0 if launching else 4 * n_steps,
-        "frames": n_frames * sling.sections * frame_width,
-    }
-
-
-def memory(sling: Sling, schedule: Schedule, n_frames: int, device: str = "cpu") -> int:
-    """Bytes that one rollout takes in single precision while it is simulated."""
-    on_gpu = device.startswith("cuda")
-    return 4 * sum(_widths(sling, len(schedule.table), n_frames, 3, False, on_gpu).values())
+    def on_gpu(self) -> bool:
+        return self.device.startswith("cuda")
 
 
 @dataclass
-class Result:
-    """Of N slings through S steps, K frames recorded.
+class Stepped:
+    """N slings after S steps, K frames recorded.
 
     Attributes:
         state: At the end, shape (N, sections, dofs).
-        lane_state: As documented in state.h, shape (N, LANE_STATE).
-        output: Force on the hand and Newton iterations of each step, shape (N, S, 4); empty for
-            launches.
+        lanes: Records (N,) of layout.LANE.
+        output: Force on the hand and Newton iterations of each step, shape (N, S, 4), in the order
+            of layout.OUTPUT; empty for launches.
         frames: Shape (N, K, sections, width). This and `output` are what is long: from a GPU they
             come as Warp arrays that stay there, if asked for.
     """
 
     state: np.ndarray
-    lane_state: np.ndarray
+    lanes: np.ndarray
     output: np.ndarray
     frames: np.ndarray
 
@@ -132,115 +112,171 @@ class Result:
 def run(
     sling: Sling,
     schedule: Schedule,
-    parameters: np.ndarray,
-    state: np.ndarray,
-    lane_state: np.ndarray,
-    *,
-    frame_steps=(),
-    frame_weights=(),
-    frame_width: int = 3,
-    gravity: float = GRAVITY,
-    launching: bool = False,
-    device: str = "cpu",
-    fetch: bool = True,
-    double: bool = False,
-    workers: int = 1,
-    tolerance: float = 2e-6,
-    max_iterations: int = 80,
-) -> Result:
-    """Step N slings through a schedule.
-
-    Args:
-        parameters: As `model.material` gives them, shape (N, 7).
-        state: Initial sections, shape (N, sections, dofs) or (sections, dofs).
-        lane_state: As documented in state.h, shape (N, LANE_STATE).
-        frame_steps, frame_weights: Step in which each frame falls and its place in it, shape (K,).
-        frame_width: 3 for centre lines, `sling.dofs` for all of each section.
-        launching: The projectile (lane_state[:, PAYLOAD]) is followed until it leaves.
-        fetch: Copy what is long from a GPU.
-        workers: Threads, on the CPU; a result does not depend on their number.
-        tolerance: Newton's change that is small enough [m].
+    slings: Slings,
+    frames: Frames | None = None,
+    options: Options | None = None,
+) -> Stepped:
+    """Step N slings of one geometry through a schedule.
 
     Raises:
         UserError: Tetrahedra on a GPU.
     """
-    import warp as wp
-
-    from pipeline.base.native import launch
-    from pipeline.sling.kernel import sling_kernel
-
-    if lane_state.shape != (len(parameters), LANE_STATE):
-        raise ValueError(f"lane_state: {lane_state.shape} is not ({len(parameters)}, {LANE_STATE})")
-    on_gpu = device.startswith("cuda")
-    if on_gpu and sling.mesh == TETRAHEDRA:
+    frames, options = frames or Frames(), options or Options()
+    if options.on_gpu and sling.mesh == TETRAHEDRA:
         raise UserError("sling.mesh: tetrahedra run on the CPU alone; on a GPU take the rod")
-    dtype, scalar = (np.float64, wp.float64) if double else (np.float32, wp.float32)
-    lanes, team = (1, TEAM) if on_gpu else (LANES // (2 if double else 1), 1)
-    together = 32 // team if on_gpu else 1  # rows of slings that one thread (one warp) steps
-    sections, dofs = sling.sections, sling.dofs
-    count, n_steps, n_frames = len(parameters), len(schedule.table), len(frame_steps)
-    kernel = sling_kernel(sling.mesh, dofs, sections, sling.middle, double, lanes, team)
-
-    mesh, shortest = sling.edge_lengths, sling.edge_lengths.min()
-    if sling.mesh == TETRAHEDRA:
-        mesh = np.concatenate([mesh, tetrahedra.table(sling.radius)])
-        shortest = min(shortest, sling.radius)
-    geometry = [
-        sling.rest_length / sling.edges, sling.area, sling.radius**2,
-        sling.mass / sling.rest_length, gravity, tolerance, 0.004, max_iterations,
-        *sling.clamped, shortest,
-    ]  # fmt: skip
-    first = np.searchsorted(frame_steps, np.arange(n_steps + 1)).astype(np.int32)
-    common = [
-        wp.array(np.ravel(values).astype(dtype), device=device)
-        for values in (geometry, mesh, fixed_frames(sling), schedule.table)
-    ]
-    stamps = [
-        wp.array(first, device=device),
-        wp.array(np.append(frame_weights, 0.0).astype(dtype), device=device),
-    ]
-    state = np.broadcast_to(state, (count, sections, dofs)).swapaxes(1, 2).reshape(count, -1)
-    rows = [
-        _interleave(values, lanes, together, dtype) for values in (parameters, state, lane_state)
-    ]
-
-    widths = _widths(sling, n_steps, n_frames, frame_width, launching, on_gpu)
-
-    def part(begin: int, end: int) -> list:
-        """Step the rows of slings from `begin` to `end`; arrays (slings, width)."""
-        size = end - begin
-        parameter, state, lane = (
-            wp.array(values[begin:end].ravel(), device=device) for values in rows
-        )
-        scratch, saved, output, frames = (
-            wp.empty(size * lanes * widths[name], dtype=scalar, device=device)
-            for name in ("scratch", "saved", "output", "frames")
-        )
-        inputs = [
-            *common, parameter, state, scratch, saved, lane, output, frames, *stamps,
-            n_frames, frame_width, n_steps, schedule.first_free, int(launching),
-        ]  # fmt: skip
-        launch(kernel, size // together, inputs, device)
-        arrays = {"state": state, "lane_state": lane, "output": output, "frames": frames}
-        stays = () if fetch or not on_gpu else ("output", "frames")
-        return [
-            array.reshape((size, widths[name]))
-            if name in stays
-            else _separate(array.numpy().reshape(size, widths[name], lanes))
-            for name, array in arrays.items()
-        ]
-
-    n_rows = len(rows[0])
-    if on_gpu or workers == 1 or n_rows == 1:
-        arrays = part(0, n_rows)
+    work = _Work(sling, schedule, slings, frames, options)
+    if options.on_gpu or options.workers == 1 or work.rows == 1:
+        arrays = work.part(0, work.rows)
     else:
-        with ThreadPoolExecutor(workers) as pool:
-            parts = list(pool.map(lambda row: part(row, row + 1), range(n_rows)))
-        arrays = [np.concatenate(values) for values in zip(*parts, strict=True)]
-    state, lane_state, output, frames = (array[:count] for array in arrays)
-    return Result(
-        state=state.reshape((count, dofs, sections)).swapaxes(1, 2),
-        lane_state=lane_state,
-        output=output.reshape((count, 0 if launching else n_steps, 4)),
-        frames=frames.reshape((count, n_frames, sections, frame_width)),
+        with ThreadPoolExecutor(options.workers) as pool:
+            parts = list(pool.map(lambda row: work.part(row, row + 1), range(work.rows)))
+        arrays = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    count = len(slings)
+    state, lanes, output, recorded = (arrays[name][:count] for name in RETURNED)
+    n_steps = 0 if options.launching else len(schedule.steps)
+    return Stepped(
+        state=state.reshape((count, sling.dofs, sling.sections)).swapaxes(1, 2),
+        lanes=records(lanes, LANE),
+        output=output.reshape((count, n_steps, width(OUTPUT))),
+        frames=recorded.reshape((count, len(frames.steps), sling.sections, frames.width)),
     )
+
+
+def memory(sling: Sling, schedule: Schedule, n_frames: int, options: Options) -> int:
+    """Bytes that one rollout takes in single precision while it is simulated."""
+    frames = Frames(np.zeros(n_frames, int), np.zeros(n_frames))
+    return 4 * sum(_widths(sling, schedule, frames, options).values())
+
+
+RETURNED = ("state", "lanes", "output", "frames")
+LONG = ("output", "frames")
+
+
+def _widths(sling: Sling, schedule: Schedule, frames: Frames, options: Options) -> dict[str, int]:
+    """Numbers that each array which a kernel writes holds of one sling."""
+    # of a GPU, a warp's spare threads count
+    columns = -(-32 // (32 // TEAM)) if options.on_gpu else sling.dofs + 1
+    return {
+        "state": sling.dofs * sling.sections,
+        "lanes": width(LANE),
+        "scratch": 9 * sling.dofs * sling.sections,
+        "work": (2 * sling.dofs + 1) * sling.sections * columns,
+        "output": 0 if options.launching else width(OUTPUT) * len(schedule.steps),
+        "frames": len(frames.steps) * sling.sections * frames.width,
+    }
+
+
+class _Work:
+    """A batch laid out for a device: slings in rows of SIMD lanes, or one each for a GPU's teams.
+
+    Attributes:
+        rows: How many there are.
+    """
+
+    def __init__(
+        self, sling: Sling, schedule: Schedule, slings: Slings, frames: Frames, options: Options
+    ) -> None:
+        from pipeline.sling.kernel import sling_kernel
+
+        on_gpu, self.options = options.on_gpu, options
+        self.lanes = 1 if on_gpu else LANES // (2 if options.double else 1)
+        team = TEAM if on_gpu else 1
+        self.together = 32 // team if on_gpu else 1  # rows that one thread (one warp) steps
+        self.dtype = np.float64 if options.double else np.float32
+        mesh = sling.mesh, sling.dofs, sling.sections, sling.middle
+        self.kernel, self.arrays = sling_kernel(*mesh, options.double, self.lanes, team)
+        self.widths = _widths(sling, schedule, frames, options)
+        self.common = self._common(sling, schedule, frames)
+        state = slings.state.swapaxes(1, 2).reshape(len(slings), -1)
+        self.given = {
+            "coefficients": self._interleave(numbers(slings.coefficients)),
+            "state": self._interleave(state),
+            "lanes": self._interleave(numbers(slings.lanes)),
+        }
+        self.rows = len(self.given["state"])
+
+    def _common(self, sling: Sling, schedule: Schedule, frames: Frames) -> dict:
+        """What all slings share."""
+        mesh, setting = sling.edge_lengths, _setting(sling, self.options)
+        if sling.mesh == TETRAHEDRA:
+            mesh = np.concatenate([mesh, tetrahedra.table(sling.radius)])
+        values = {
+            "setting": numbers(setting),
+            "mesh": mesh,
+            "clamp": fixed_frames(sling),
+            "schedule": numbers(schedule.steps),
+            "frame_weight": np.append(frames.weights, 0.0),
+        }
+        n_steps = len(schedule.steps)
+        first = np.searchsorted(frames.steps, np.arange(n_steps + 1)).astype(np.int32)
+        return {name: self._array(one.astype(self.dtype)) for name, one in values.items()} | {
+            "frame_first": self._array(first),
+            "n_frames": len(frames.steps),
+            "frame_width": frames.width,
+            "steps": n_steps,
+            "first_free": schedule.first_free,
+            "launching": int(self.options.launching),
+        }
+
+    def _array(self, values: np.ndarray):
+        import warp as wp
+
+        return wp.array(np.ravel(values), device=self.options.device)
+
+    def _interleave(self, rows: np.ndarray) -> np.ndarray:
+        """(N, k) -> (rows, k, lanes); the last sling fills up what one thread steps."""
+        count, lanes, together = len(rows), self.lanes, self.together
+        blocks = -(-count // (lanes * together)) * together
+        padded = np.concatenate([rows, np.repeat(rows[-1:], blocks * lanes - count, axis=0)])
+        by_lane = padded.reshape(blocks, lanes, -1).transpose(0, 2, 1)
+        return np.ascontiguousarray(by_lane, self.dtype)
+
+    def part(self, begin: int, end: int) -> dict:
+        """Step the slings of rows from `begin` to `end`; arrays (slings, width) of RETURNED."""
+        import warp as wp
+
+        from pipeline.base.native import launch
+
+        size, device = end - begin, self.options.device
+        scalar = wp.dtype_from_numpy(self.dtype)
+        arrays = self.common | {
+            name: self._array(rows[begin:end]) for name, rows in self.given.items()
+        }
+        for name in self.widths.keys() - arrays.keys():
+            length = size * self.lanes * self.widths[name]
+            arrays[name] = wp.empty(length, dtype=scalar, device=device)
+        given = self.arrays()
+        for name, values in arrays.items():
+            setattr(given, name, values)
+        launch(self.kernel, size // self.together, [given], device)
+        return {name: self._fetched(name, arrays[name], size) for name in RETURNED}
+
+    def _fetched(self, name: str, array, size: int):
+        """A result of each sling, (slings, width); what is long may stay on a GPU."""
+        if name in LONG and self.options.on_gpu and not self.options.fetch:
+            return array.reshape((size, self.widths[name]))
+        values = array.numpy().reshape(size, self.widths[name], self.lanes)
+        return values.transpose(0, 2, 1).reshape(size * self.lanes, self.widths[name])
+
+
+def _setting(sling: Sling, options: Options) -> np.ndarray:
+    """A record of layout.SETTING, shape (1,)."""
+    result = np.zeros(1, SETTING)
+    shortest = sling.edge_lengths.min()
+    if sling.mesh == TETRAHEDRA:
+        shortest = min(shortest, sling.radius)
+    values = {
+        "mean_edge": sling.rest_length / sling.edges,
+        "area": sling.area,
+        "radius2": sling.radius**2,
+        "line_mass": sling.mass / sling.rest_length,
+        "gravity": options.gravity,
+        "tolerance": options.tolerance,
+        "step_limit": STEP_LIMIT,
+        "max_iterations": options.max_iterations,
+        "clamped": sling.clamped,
+        "shortest": shortest,
+    }
+    for name, value in values.items():
+        result[name] = value
+    return result

@@ -2,18 +2,19 @@
 
 const int ROW_LENGTH = (N + 3) / 4 * 4;
 const int SAVED = 2 * N + 1;  // numbers kept of a column for the back substitution: multipliers, coupling, solution
-const SC mean_edge = geometry.data[0], area = geometry.data[1], radius2 = geometry.data[2];
-const SC line_mass = geometry.data[3], gravity = geometry.data[4], node_mass = line_mass * mean_edge;
+#define SET(name) setting.data[SETTING_##name]
+const SC mean_edge = SET(MEAN_EDGE), area = SET(AREA), radius2 = SET(RADIUS2);
+const SC line_mass = SET(LINE_MASS), gravity = SET(GRAVITY), node_mass = line_mass * mean_edge;
 const SC per_edge = (SC)1 / mean_edge;
 const SC* edge = mesh.data;  // rest length of each edge; after them, what else the element wants
-const SC tolerance = geometry.data[5], step_limit = geometry.data[6];
-const SC shortest_edge = geometry.data[10];  // or radius, where that is shorter and meshed
-const int max_iterations = (int)geometry.data[7];
-const bool first_clamped = geometry.data[8] > 0, last_clamped = geometry.data[9] > 0;
+const SC tolerance = SET(TOLERANCE), step_limit = SET(STEP_LIMIT), shortest = SET(SHORTEST);
+const int max_iterations = (int)SET(MAX_ITERATIONS);
+const bool first_clamped = SET(CLAMPED) > 0, last_clamped = setting.data[SETTING_CLAMPED + 1] > 0;
 
 const SC node_shift = node_mass * (SC)2.5e5;  // the inertia of a 2 ms step
-auto PAR = ROW(parameter, 7);
-const real mu = PAR[0], lam = PAR[1], bulk = lam - mu / (SC)3, d = PAR[2], s = PAR[3], friction = PAR[4], drag = PAR[6];
+auto LAW = ROW(coefficients, MATERIAL_SIZE);  // of the material
+const real mu = LAW[MATERIAL_MU], lam = LAW[MATERIAL_LAM], bulk = lam - mu / (SC)3, d = LAW[MATERIAL_DAMPING], s = LAW[MATERIAL_SCALE];
+const real friction = LAW[MATERIAL_FRICTION], bending = LAW[MATERIAL_BENDING], drag = LAW[MATERIAL_DRAG];
 
 // degree of freedom k of cross-section i: now, predicted, the y and xh of step.h, Newton's change, and of the two steps before
 auto INITIAL = ROW(state, N * L);
@@ -28,7 +29,7 @@ auto STATE = ROW(scratch, 9 * N * L);
 #define X2(k, i) FIELD(6, k, i)
 #define V1(k, i) FIELD(7, k, i)
 #define V2(k, i) FIELD(8, k, i)
-auto OUT = ROW(output, 4 * steps);
+auto OUT = ROW(output, OUTPUT_SIZE * steps);
 auto FRAME = ROW(frames, frame_width * L * n_frames);
 auto SAVE_ROWS = SAVE;
 #define KEEP(i, row, q) SAVE_ROWS[((i) * SAVED + (row)) * SAVE_STRIDE + (q)]
@@ -49,13 +50,10 @@ __shared__ __align__(16) SC rows[2 * TEAMS * (N + 1) * ROW_LENGTH];  // a sectio
 #define SHARE(U)
 #endif
 
-// lane state: 0-2 direction of the launch, 3 mass of the projectile, 4 failure (1 not converged, 2 slipped, -1: the
-// projectile has left), 5 leaving time, 6-7 leaving position and 8-9 velocity (y, z), 10-12 force on the hand when it
-// last held, 13 Newton iterations of it and its neighbours
-auto LANE = ROW(lane_state, 14);
-real direction[3], leaving[5], payload = LANE[3], failure = zero;
-UNROLL for (int c = 0; c < 3; ++c) direction[c] = LANE[c];
-UNROLL for (int c = 0; c < 5; ++c) leaving[c] = zero;
+auto LANE = ROW(lanes, LANE_SIZE);
+real direction[3], separation[5], payload = LANE[LANE_PAYLOAD], outcome = zero;
+UNROLL for (int c = 0; c < 3; ++c) direction[c] = LANE[LANE_DIRECTION + c];
+UNROLL for (int c = 0; c < 5; ++c) separation[c] = zero;
 
 // of the step under way
 SC ibh = 0, ibh2 = 0, ct = 0;              // 1 / (beta h), its square; torsion

@@ -7,7 +7,7 @@
 // (backward Euler: beta = c1 = 1, c2 = 0; variable-step BDF2 otherwise) by Newton's method with the exact Hessian;
 // where that is indefinite, its diagonal is shifted.
 
-const SC close = sqrt(0.25 * tolerance * shortest_edge);  // from here on Newton's next change is below the tolerance
+const SC close = sqrt(0.25 * tolerance * shortest);  // from here on Newton's next change is below the tolerance
 // a residual that counts for nothing [N]: by default 3 % of a node's weight, and what a strain of 1e-5 takes
 const real balance = tolerance * (SC)(3.0 / PLACES) * ((SC)1.5e4 * node_mass * gravity + (SC)5 * mu * area);
 real offset[PLACES], pull = zero, held[3] = {zero, zero, zero};  // of the hand; the force on it when it last held
@@ -27,26 +27,26 @@ for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
 }
 SYNC;
 for (int step = 0; step < steps; ++step) {
-  const SC* row = schedule.data + (size_t)step * 13;
-  const SC h = row[0], c1 = row[1], c2 = row[2], bh = row[3] * h;  // beta h
-  const bool relax = row[4] == 0;
-  const int hold = (int)row[5];  // 0 free, 1 held, 2 fingers opening, 3 held in a pouch
-  const SC normal_force = row[9], blend = row[10], time = row[11];
+  const SC* row = schedule.data + (size_t)step * STEP_SIZE;
+  const SC h = row[STEP_H], c1 = row[STEP_C1], c2 = row[STEP_C2], bh = row[STEP_BETA] * h;
+  const bool relax = row[STEP_MODE] == MODE_RELAX;
+  const int grip = (int)row[STEP_GRIP];
+  const SC grip_force = row[STEP_GRIP_FORCE], blend = row[STEP_BLEND], time = row[STEP_TIME];
   ibh = (SC)1 / bh; ibh2 = ibh * ibh;
-  cb = PAR[5] * row[12]; ct = radius2 / 4 * row[12];  // guesses relax with less of them first
+  cb = bending * row[STEP_BENDING]; ct = radius2 / 4 * row[STEP_BENDING];  // guesses relax with less of them first
   dh = d * ibh; dsh = dh * s; air = relax ? zero : drag * ibh;
 
   // ---- the hand takes hold of the band where it is, and leads it to its own path
   const bool was_attached = attached;
-  attached = hold == 1 || hold == 3; gripped = hold == 1; opening = hold == 2;
+  gripped = grip == GRIP_HELD; attached = gripped || grip == GRIP_POUCH; opening = grip == GRIP_OPENING;
   real target[PLACES];
   UNROLL for (int m = 0; m < PLACES; ++m) {
-    const SC place = row[6 + m % 3] + in_hand(m);
+    const SC place = row[STEP_TARGET + m % 3] + in_hand(m);
     if (attached && !was_attached) offset[m] = X1(m, MID) - place;
     target[m] = zero + place + blend * offset[m];
   }
   // what the pads can hold: all of it while they are closed, then less and less of the pull at the release
-  capacity = opening ? maximum(pull - normal_force * friction, zero) : normal_force * friction;
+  capacity = opening ? maximum(pull - grip_force * friction, zero) : grip_force * friction;
 
   // ---- predicted state, and what the step starts from
   for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
@@ -59,7 +59,7 @@ for (int step = 0; step < steps; ++step) {
   SYNC;
 
   // ---- Newton's method; lanes that have settled stay as they are, so that a lane never depends on its neighbours
-  real settled = failure != zero ? one : zero, reaction[3] = {zero, zero, zero};
+  real settled = outcome != zero ? one : zero, reaction[3] = {zero, zero, zero};
   shift = zero;
   int iteration = 0;
   while (iteration < max_iterations) {
@@ -88,7 +88,7 @@ for (int step = 0; step < steps; ++step) {
   iterations += iteration;
   SYNC;
   // a lane that did not converge, or is no number, has failed for good
-  failure = failure != zero ? failure : (settled > zero ? zero : one);
+  outcome = outcome != zero ? outcome : (settled > zero ? zero : zero + (SC)OUTCOME_NOT_CONVERGED);
 
   // ---- the force of the band on the hand, and whether the pads still hold it
   real force[3];
@@ -98,12 +98,12 @@ for (int step = 0; step < steps; ++step) {
   }
   if (gripped) {
     pull = SQRT(dot(force, force));
-    failure = failure != zero ? failure : (pull > capacity ? zero + (SC)2 : zero);  // slipped out of closed fingers
+    outcome = outcome != zero ? outcome : (pull > capacity ? zero + (SC)OUTCOME_SLIPPED : zero);  // slipped out of closed fingers
     UNROLL for (int c = 0; c < 3; ++c) direction[c] = force[c] / maximum(pull, zero + (SC)1e-9);
   }
 
-  // ---- the projectile leaves at the first pull: contact = m (acceleration + gravity) along the launch direction
-  if (hold == 0 && launching) {
+  // ---- the projectile separates at the first pull: contact = m (acceleration + gravity) along the launch direction
+  if (grip == GRIP_FREE && launching) {
     real contact = zero, position[3], velocity[3];
     UNROLL for (int c = 0; c < 3; ++c) {
       position[c] = middle(&X(0, MID), c);
@@ -113,22 +113,22 @@ for (int step = 0; step < steps; ++step) {
     }
     const real before = step > first_free ? contact_before : contact;
     const real w = minimum(maximum(before / maximum(before - contact, zero + (SC)1e-9), zero), one);
-    const real leaves = (payload > zero ? one : zero) * (contact > zero ? zero : one);
+    const real separates = (payload > zero ? one : zero) * (contact > zero ? zero : one);
     UNROLL for (int c = 1; c < 3; ++c) {
       const real x1 = middle(&X1(0, MID), c), v1 = middle(&V1(0, MID), c);
-      leaving[c] = leaves > zero ? x1 + w * (position[c] - x1) : leaving[c];
-      leaving[2 + c] = leaves > zero ? v1 + w * (velocity[c] - v1) : leaving[2 + c];
+      separation[c] = separates > zero ? x1 + w * (position[c] - x1) : separation[c];
+      separation[2 + c] = separates > zero ? v1 + w * (velocity[c] - v1) : separation[2 + c];
     }
-    leaving[0] = leaves > zero ? time - ((SC)1 - w) * h : leaving[0];
-    payload = leaves > zero ? zero : payload;
-    failure = failure != zero ? failure : -leaves;  // done: -1 marks a finished launch
+    separation[0] = separates > zero ? time - ((SC)1 - w) * h : separation[0];
+    payload = separates > zero ? zero : payload;
+    outcome = outcome != zero ? outcome : separates * (SC)OUTCOME_SEPARATED;  // done: a finished launch
     contact_before = contact;
   }
 
   // ---- records: force and iterations; centre lines (with a frame_width of N all degrees of freedom) at the camera's stamps
   if (member == 0 && !launching) {
-    UNROLL for (int c = 0; c < 3; ++c) OUT[4 * step + c] = force[c];
-    OUT[4 * step + 3] = zero + (SC)iteration;
+    UNROLL for (int c = 0; c < 3; ++c) OUT[OUTPUT_SIZE * step + OUTPUT_FORCE + c] = force[c];
+    OUT[OUTPUT_SIZE * step + OUTPUT_ITERATIONS] = zero + (SC)iteration;
   }
   SYNC;
   for (int k = frame_first.data[step]; k < frame_first.data[step + 1]; ++k) {
@@ -142,13 +142,13 @@ for (int step = 0; step < steps; ++step) {
     V2(k, i) = relax ? zero : V1(k, i); V1(k, i) = v;
   }
   SYNC;
-  if (launching && ALL(failure != zero)) break;
+  if (launching && ALL(outcome != zero)) break;
 }
 
 for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) INITIAL[k * L + i] = X1(k, i);
 if (member == 0) {
-  LANE[3] = payload; LANE[4] = failure;
-  UNROLL for (int c = 0; c < 5; ++c) LANE[5 + c] = leaving[c];
-  UNROLL for (int c = 0; c < 3; ++c) LANE[10 + c] = held[c];
-  LANE[13] = zero + (SC)iterations;
+  LANE[LANE_PAYLOAD] = payload; LANE[LANE_OUTCOME] = outcome;
+  UNROLL for (int c = 0; c < 5; ++c) LANE[LANE_SEPARATION + c] = separation[c];
+  UNROLL for (int c = 0; c < 3; ++c) LANE[LANE_HOLD_FORCE + c] = held[c];
+  LANE[LANE_ITERATIONS] = zero + (SC)iterations;
 }

@@ -14,8 +14,7 @@ from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
 from pipeline.params import load
 from pipeline.sling import interact, launch
-
-from .test_interaction import random_thetas
+from tests.sling.bands import random_draws, random_thetas
 
 pytestmark = pytest.mark.skipif(not gpus(), reason="no CUDA device on this machine")
 
@@ -38,8 +37,7 @@ def test_interaction_agrees_with_the_cpu(strong_grip, episode):
 
 def test_launches_agree_with_the_cpu(sling):
     """Landing within 0.1 %."""
-    rng = np.random.default_rng(4)
-    draws = np.column_stack([rng.uniform(-0.45, -0.33, 64), rng.uniform(-0.3, -0.1, 64)])
+    draws = random_draws(64, np.random.default_rng(4))
     theta = [2.5e5, 0.45, 2e-3, 0.5, 1.0]
     cpu, gpu = launch(sling, theta, draws), launch(sling, theta, draws, device="cuda:0")
     assert cpu.failure == gpu.failure

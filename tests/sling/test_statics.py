@@ -8,66 +8,40 @@ import numpy as np
 import pytest
 
 from pipeline.sling import launch
-from pipeline.sling.initial import hanging_guess, sections_of
-from pipeline.sling.material import material
+from pipeline.sling.initial import hanging_guess
 from pipeline.sling.model import GRAVITY
-from pipeline.sling.solver import FREE, LANE_STATE, Schedule, relaxation, run
+from tests.sling.bands import along_x, at_rest, in_line
+from validation.simulator.closed import String, clamped_beam
 from validation.simulator.reference import ReferenceRod
 
 THETA = [5e5, 0.45, 2e-3, 0.5, 1.0]
 
 
-def relaxed(sling, theta, start, double=True):
-    """Sections (L, 9) at rest under gravity, from `start`."""
-    table = relaxation(FREE)
-    result = run(
-        sling,
-        Schedule(table, first_free=0),
-        material(sling, np.array([theta])),
-        start,
-        np.zeros((1, LANE_STATE)),
-        double=double,
-    )
-    assert result.lane_state[0, 4] == 0
-    return result.state[0]
-
-
-@pytest.mark.parametrize("young", [3e4, 5e5, 1e7])
-@pytest.mark.parametrize("poisson", [0.30, 0.45, 0.49])
-def test_pull_force_is_that_of_a_neo_hookean_string(sling, young, poisson):
-    """Within 0.5 % of 2 A mu (l - J/l^2) cos, J = 1 + mu/lam (1 - 1/l), where bending is small."""
+def test_pull_force_is_that_of_a_neo_hookean_string(sling):
+    """Within 0.5 % of two straight strings', where bending is small."""
     light = replace(sling, mass=1e-4, projectile_mass=1e-6)
-    theta = [young, poisson, 2e-3, 0.5, 1.0]
-    mu, lam = material(sling, np.array([theta]))[0, :2]
+    pairs = [(young, poisson) for young in (3e4, 5e5, 1e7) for poisson in (0.30, 0.45, 0.49)]
+    thetas = np.array([[*pair, 2e-3, 0.5, 1.0] for pair in pairs])
     for depth in (0.40, 0.55):
         half = np.hypot(depth, sling.half_width)
-        stretch = 2 * half / sling.rest_length
-        volume = 1 + mu / lam * (1 - 1 / stretch)
-        expected = 2 * sling.area * mu * (stretch - volume / stretch**2) * depth / half
-        force = launch(light, theta, [-depth, 0.0]).hold_force[0]
-        assert force == pytest.approx(expected, rel=5e-3)
+        strings = [String.of(sling, theta) for theta in thetas]
+        pull = np.array([string.force(2 * half / sling.rest_length) for string in strings])
+        force = launch(light, thetas, [-depth, 0.0]).hold_force
+        assert force == pytest.approx(2 * pull * depth / half, rel=5e-3)
 
 
-@pytest.mark.parametrize("poisson", [0.30, 0.45, 0.49])
-def test_clamped_beam_sags_as_euler_bernoulli_says(sling, poisson):
-    """q L^4 / (384 E I) at the middle of a straight clamped band, within 3 %."""
-    beam = replace(
-        sling, half_width=sling.rest_length / 2, clamp_direction=np.array([1.0, 0.0, 0.0])
-    )
-    young = 1e7
-    nodes = np.zeros((beam.sections, 3))
-    nodes[:, 0] = beam.arc - beam.half_width
-    load = beam.mass / 20 * GRAVITY / beam.rest_length  # light: the sag stays small
-    beam = replace(beam, mass=beam.mass / 20)
-    inertia = np.pi * beam.radius**4 / 4
-    expected = load * beam.rest_length**4 / (384 * young * inertia)
-    sections = relaxed(beam, [young, poisson, 2e-3, 0.5, 1.0], sections_of(beam, nodes))
-    assert -sections[beam.middle, 2] == pytest.approx(expected, rel=0.03)
+def test_clamped_beam_sags_as_euler_bernoulli_says(sling):
+    """Within 3 %; light, so that the sag stays small."""
+    beam, young = in_line(sling, mass=sling.mass / 20), 1e7
+    load, inertia = beam.mass * GRAVITY / beam.rest_length, np.pi * beam.radius**4 / 4
+    expected = clamped_beam(load, beam.rest_length, young * inertia)
+    for poisson in (0.30, 0.45, 0.49):
+        sections = at_rest(beam, [young, poisson, 2e-3, 0.5, 1.0], along_x(beam))
+        assert -sections[beam.middle, 2] == pytest.approx(expected, rel=0.03), poisson
 
 
 def test_hanging_band_is_an_equilibrium_of_the_energy(sling):
-    sections = relaxed(sling, THETA, hanging_guess(sling))
-    rod = ReferenceRod(sling, tuple(THETA))
+    sections, rod = at_rest(sling, THETA, hanging_guess(sling)), ReferenceRod(sling, tuple(THETA))
     slope = rod.gradient(sections)
     slope[:, 2] += rod.gravity * rod.mass[:, 2]
     weight = sling.mass / sling.edges * GRAVITY
@@ -77,8 +51,6 @@ def test_hanging_band_is_an_equilibrium_of_the_energy(sling):
 
 
 def test_single_and_double_precision_hold_the_same_force(sling):
-    draw = [-0.4, -0.2]
-    for theta in (THETA, [1e7, 0.49, 1e-3, 0.5, 0.5]):
-        single = launch(sling, theta, draw).hold_force[0]
-        double = launch(sling, theta, draw, double=True).hold_force[0]
-        assert single == pytest.approx(double, rel=1e-4)
+    thetas = np.array([THETA, [1e7, 0.49, 1e-3, 0.5, 0.5]])
+    single, double = (launch(sling, thetas, [-0.4, -0.2], double=d) for d in (False, True))
+    assert single.hold_force == pytest.approx(double.hold_force, rel=1e-4)

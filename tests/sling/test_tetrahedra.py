@@ -10,29 +10,24 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.sling import Sling, interact, launch
 from pipeline.sling.cylinder import cylinder, volumes
-from pipeline.sling.initial import clamp_tangents, drawn_guess, hanging_guess, sections_of
+from pipeline.sling.initial import clamp_tangents, drawn_guess, hanging_guess
 from pipeline.sling.launch import schedule_of
-from pipeline.sling.material import material
+from pipeline.sling.layout import Grip
 from pipeline.sling.model import GRAVITY, TETRAHEDRA
-from pipeline.sling.solver import (
-    FAILURE,
-    FREE,
-    HELD,
-    HELD_FORCE,
-    LANE_STATE,
-    OPENING,
-    PAYLOAD,
-    RELAX_STEPS,
-    Schedule,
-    relaxation,
-    run,
-    steps,
+from pipeline.sling.schedule import RELAX_STEPS, Schedule, relaxation, steps
+from pipeline.sling.solver import Frames, Options, Slings, run
+from tests.sling.bands import (
+    BASE,
+    DRAW,
+    THETA,
+    along_x,
+    at_rest,
+    in_line,
+    random_thetas,
+    stepped,
+    vertex_masses,
 )
-
-from .test_interaction import BASE, random_thetas
-
-THETA = [2.5e5, 0.45, 2e-3, 0.5, 1.0]
-DRAW = [-0.38, -0.2]
+from validation.simulator.closed import String, clamped_beam
 
 
 @pytest.fixture(scope="module")
@@ -41,35 +36,10 @@ def solid(sling, params):
     return replace(sling, mesh=TETRAHEDRA, edges=resolution.tet_edges, steps=resolution)
 
 
-@pytest.fixture(scope="module")
-def straight(solid):
-    return replace(
-        solid, half_width=solid.rest_length / 2, clamp_direction=np.array([1.0, 0.0, 0.0])
-    )
-
-
-def straight_sections(sling, stretch=1.0):
-    nodes = np.zeros((sling.sections, 3))
-    nodes[:, 0] = stretch * (sling.arc - sling.rest_length / 2)
-    return sections_of(sling, nodes)
-
-
-def settled(sling, theta, start):
-    result = run(
-        sling,
-        Schedule(relaxation(FREE), first_free=0),
-        material(sling, np.array([theta])),
-        start,
-        np.zeros((1, LANE_STATE)),
-        double=True,
-    )
-    assert result.lane_state[0, FAILURE] == 0
-    return result.state[0]
-
-
 def forces(sling, theta, sections):
     """Minus the slope of the elastic energy by each vertex, shape (L, 7, 3), in NumPy."""
-    mu, lam = material(sling, np.array([theta]))[0, :2]
+    string = String.of(sling, theta)
+    mu, lam = string.mu, string.lam
     rest, corners = cylinder(sling.arc, 2 * sling.radius)
     before = rest.reshape(-1, 3)[corners]
     inverse = np.linalg.inv(np.swapaxes(before[:, 1:] - before[:, :1], 1, 2))
@@ -93,7 +63,7 @@ def forces(sling, theta, sections):
 
 
 def test_hanging_band_is_an_equilibrium_of_the_energy(solid):
-    sections = settled(solid, THETA, hanging_guess(solid))
+    sections = at_rest(solid, THETA, hanging_guess(solid))
     pull = forces(solid, THETA, sections).sum(axis=1)[1:-1]
     weight = solid.mass / solid.edges * GRAVITY
     assert np.abs(pull - [0.0, 0.0, weight]).max() < 0.02 * weight
@@ -102,17 +72,12 @@ def test_hanging_band_is_an_equilibrium_of_the_energy(solid):
 
 def test_hand_feels_what_the_drawn_band_pulls_with(solid):
     """The force on the hand is that of the energy on the held section, and the sections' weight."""
-    table = schedule_of(solid).table[:RELAX_STEPS]
-    lane = np.zeros((1, LANE_STATE))
-    lane[0, PAYLOAD] = solid.projectile_mass
+    table = schedule_of(solid).steps[:RELAX_STEPS]
     start = drawn_guess(solid, np.array([DRAW]))
-    done = run(
-        solid, Schedule(table, RELAX_STEPS), material(solid, np.array([THETA])), start, lane,
-        double=True,
-    )  # fmt: skip
+    done = stepped(solid, table, THETA, start, payload=solid.projectile_mass)
     held = forces(solid, THETA, done.state[0])[solid.middle].sum(axis=0)
     held[2] -= (solid.projectile_mass + solid.mass / solid.edges) * GRAVITY
-    assert done.lane_state[0, HELD_FORCE] == pytest.approx(held, abs=1e-4 * np.abs(held).max())
+    assert done.lanes["hold_force"][0] == pytest.approx(held, abs=1e-4 * np.abs(held).max())
     assert np.allclose(done.state[0, solid.middle], start[0, solid.middle], atol=1e-6)
 
 
@@ -121,40 +86,32 @@ def test_thin_band_pulls_as_a_string_the_finer_its_mesh(solid):
     gaps = []
     for edges in (52, 104):
         thin = replace(solid, radius=solid.radius / 4, mass=1e-4, projectile_mass=1e-6, edges=edges)
-        mu, lam = material(thin, np.array([THETA]))[0, :2]
         half = np.hypot(0.4, thin.half_width)
-        stretch = 2 * half / thin.rest_length
-        volume = 1 + mu / lam * (1 - 1 / stretch)
-        expected = 2 * thin.area * mu * (stretch - volume / stretch**2) * 0.4 / half
+        pull = String.of(thin, THETA).force(2 * half / thin.rest_length)
+        expected = 2 * pull * 0.4 / half
         gaps.append(launch(thin, THETA, [-0.4, 0.0]).hold_force[0] / expected - 1)
     assert 0 < gaps[0] < 0.02
     assert gaps[1] == pytest.approx(gaps[0] / 2, rel=0.1)
 
 
-def test_coarse_tetrahedra_lock_in_bending(straight):
+def test_coarse_tetrahedra_lock_in_bending(solid):
     """5.4 times Euler-Bernoulli's stiffness at nu 0.45: known of meshes like the paper's."""
-    light = replace(straight, mass=straight.mass / 200)
-    sections = settled(light, [1e7, 0.45, 2e-3, 0.5, 1.0], straight_sections(light))
+    light = in_line(solid, mass=solid.mass / 200)
+    sections = at_rest(light, [1e7, 0.45, 2e-3, 0.5, 1.0], along_x(light))
     load, inertia = light.mass * GRAVITY / light.rest_length, np.pi * light.radius**4 / 4
-    sag = load * light.rest_length**4 / (384 * 1e7 * inertia)
+    sag = clamped_beam(load, light.rest_length, 1e7 * inertia)
     assert sag / -sections[light.middle, 2] == pytest.approx(5.4, rel=0.03)
 
 
-def test_free_band_falls_as_one_mass(straight):
+def test_free_band_falls_as_one_mass(solid):
     """Whatever it does in itself: with backward Euler its centre has fallen g h^2 n (n + 1) / 2."""
-    free = replace(straight, clamped=(False, False))
+    free = in_line(solid, clamped=(False, False))
     h, count = 1e-3, 20
-    table = steps(h * np.arange(count + 1), h, hold=FREE)
-    start = straight_sections(free, 1.3)
-    done = run(
-        free, Schedule(table, count), material(free, np.array([THETA])), start,
-        np.zeros((1, LANE_STATE)), double=True, tolerance=1e-10,
-    )  # fmt: skip
-    rest, corners = cylinder(free.arc, 2 * free.radius)
-    mass = np.bincount(corners.ravel(), np.repeat(volumes(rest, corners), 4)).reshape(-1, 7)
-    mass[[0, -1]] = mass[1] / 2  # by the section, not by which way the diagonals run
+    start = along_x(free, 1.3)
+    done = stepped(free, steps(h * np.arange(count + 1), h, grip=Grip.FREE), THETA, start)
+    mass = vertex_masses(free).ravel()
     before, after = (
-        np.average(x.reshape(-1, 3), axis=0, weights=mass.ravel()) for x in (start, done.state[0])
+        np.average(x.reshape(-1, 3), axis=0, weights=mass) for x in (start, done.state[0])
     )
     assert done.state[0, 0, 0] > start[0, 0] + 0.01  # it does contract
     fall = GRAVITY * h**2 * count * (count + 1) / 2
@@ -215,51 +172,43 @@ def test_mesh_is_chosen_in_params_and_not_for_a_gpu(params):
         launch(solid, THETA, DRAW, device="cuda:0")
 
 
-def held_steps(solid, count=20):
-    """Rows that hold a drawn band at rest, and that move the hand by 1 m/s."""
-    relax = relaxation(HELD)
-    moving = steps(0.005 * np.arange(count + 1), 0.005, hold=HELD)
-    relax[:, 6:9] = 0.0, *DRAW
-    moving[:, 6:9] = np.array([0.0, *DRAW]) - np.outer(np.arange(1, count + 1), [0.0, 5e-3, 0.0])
-    for table in (relax, moving):
-        table[:, 9], table[:, 10] = 1e4, 0.0
+def held_steps(count=20):
+    """Steps that hold a drawn band at rest, and that move the hand by 1 m/s."""
+    relax = relaxation(Grip.HELD)
+    moving = steps(0.005 * np.arange(count + 1), 0.005, grip=Grip.HELD)
+    relax["target"] = 0.0, *DRAW
+    moving["target"] = relax["target"][0] - np.outer(np.arange(1, count + 1), [0.0, 5e-3, 0.0])
+    relax["grip_force"] = moving["grip_force"] = 1e4
     return relax, moving
 
 
-def stepped(solid, table, **options):
-    return run(
-        solid,
-        Schedule(table, first_free=len(table)),
-        material(solid, np.array([THETA])),
-        drawn_guess(solid, np.array([DRAW])),
-        np.zeros((1, LANE_STATE)),
-        frame_steps=np.arange(len(table)),
-        frame_weights=np.ones(len(table)),
-        frame_width=solid.dofs,
-        **options,
-    )
+def recorded(solid, table, **options):
+    """All of the mesh after each step."""
+    count = len(table)
+    slings = Slings.of(solid, THETA[None], drawn_guess(solid, np.array([DRAW])))
+    frames = Frames(np.arange(count), np.ones(count), solid.dofs)
+    return run(solid, Schedule(table, count), slings, frames, Options(**options))
 
 
 def test_force_of_a_moving_hand_is_converged(solid):
     """Within 1e-4 of Newton's method to rounding, though it stops much sooner."""
-    table = np.vstack(held_steps(solid))
-    quick, exact = (stepped(solid, table, double=True, tolerance=t) for t in (2e-6, 1e-12))
+    table = np.concatenate(held_steps())
+    quick, exact = (recorded(solid, table, double=True, tolerance=t) for t in (2e-6, 1e-12))
     force = exact.output[0, RELAX_STEPS:, :3]
     assert exact.output[0, :, 3].sum() > 1.3 * quick.output[0, :, 3].sum()
     assert np.abs(quick.output[0, RELAX_STEPS:, :3] - force).max() < 1e-4 * np.abs(force).max()
 
 
 def test_held_section_is_the_rest_section_across_the_fork(solid):
-    section = stepped(solid, held_steps(solid)[0]).frames[0, -1, solid.middle].reshape(7, 3)
+    section = recorded(solid, held_steps()[0]).frames[0, -1, solid.middle].reshape(7, 3)
     rest = cylinder([0.0, 1.0], 2 * solid.radius)[0][0]
     assert section - section[0] == pytest.approx(rest, abs=1e-6)
 
 
 def test_pads_that_open_without_friction_to_lose_hold_the_band_where_it_is(solid):
     """Friction that makes up for the whole pull, shared by the section's vertices as their mass."""
-    relax, moving = held_steps(solid)
-    opening = moving.copy()
-    opening[:, 0], opening[:, 5], opening[:, 9] = 2.5e-4, OPENING, 0.0
-    frames = stepped(solid, np.vstack([relax, opening])).frames[0, RELAX_STEPS - 1 :]
+    relax, opening = held_steps()
+    opening["h"], opening["grip"], opening["grip_force"] = 2.5e-4, Grip.OPENING, 0.0
+    frames = recorded(solid, np.concatenate([relax, opening])).frames[0, RELAX_STEPS - 1 :]
     shift = frames[:, solid.middle].reshape(-1, 7, 3).mean(axis=1) - frames[0, solid.middle, :3]
     assert np.abs(shift).max() < 1e-3

@@ -32,8 +32,10 @@ from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
 from pipeline.sling.interaction import interact, schedule_of
 from pipeline.sling.launch import launch
+from pipeline.sling.layout import Grip
 from pipeline.sling.model import Sling
-from pipeline.sling.solver import RELAX_STEPS, memory
+from pipeline.sling.schedule import RELAX_STEPS
+from pipeline.sling.solver import Options, memory
 
 BATCHES = {"cpu": (64, 256), "cuda": (64, 1024, 16384)}
 DRAW = 0.35  # m
@@ -88,7 +90,9 @@ def bench(params, device: str = "cpu") -> dict:
         "yardstick": {
             "steps": steps_of(schedule),
             "newton_iterations": round(float(iterations)),
-            "bytes_a_rollout": memory(sling, schedule, len(episode.cloud_time), devices[0]),
+            "bytes_a_rollout": memory(
+                sling, schedule, len(episode.cloud_time), Options(devices[0])
+            ),
         },
         "first_start_s": first_start(devices[0]),
     }
@@ -108,13 +112,13 @@ def shared(devices: Sequence[str], simulate: Callable, thetas: np.ndarray, **opt
 
 def steps_of(schedule) -> dict[str, int]:
     """How many steps each phase of a schedule has."""
-    h, hold = schedule.table[RELAX_STEPS:, 0], schedule.table[RELAX_STEPS:, 5]
-    free = hold == 0
+    h, grip = schedule.steps["h"][RELAX_STEPS:], schedule.steps["grip"][RELAX_STEPS:]
+    free = grip == Grip.FREE
     fine = free & (h <= h[free][0] * 1.001)
     return {
         "relaxation": RELAX_STEPS,
-        "held": int((hold == 1).sum()),
-        "fingers_opening": int((hold == 2).sum()),
+        "held": int((grip == Grip.HELD).sum()),
+        "fingers_opening": int((grip == Grip.OPENING).sum()),
         "recoil": int(fine.sum()),
         "swing": int((free & ~fine).sum()),
     }

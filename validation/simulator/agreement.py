@@ -8,8 +8,9 @@ import numpy as np
 
 from pipeline.objective.space import Space
 from pipeline.sling.initial import drawn_guess, hanging_guess
+from pipeline.sling.layout import Grip
 from pipeline.sling.model import Sling
-from pipeline.sling.solver import FREE, HELD, OPENING, POUCH, relaxation, steps
+from pipeline.sling.schedule import relaxation, steps
 from validation.simulator.check import Bench, Check, Section
 from validation.simulator.experiment import (
     TIGHT,
@@ -43,10 +44,10 @@ class Scene:
     """
 
     sling: Sling
-    table: np.ndarray
+    steps: np.ndarray
     guess: np.ndarray
     before: Sling | None = None
-    hold: int = FREE
+    grip: Grip = Grip.FREE
     payload: float = 0.0
     turned: float = 0.0
 
@@ -62,26 +63,26 @@ def _turned(sling: Sling, sections: np.ndarray, most: float) -> np.ndarray:
 def scenes(sling: Sling) -> dict[str, Scene]:
     """Every way to hold a band, and both orders of steps."""
     path = np.linspace([0.0, 0.0, -0.2], [0.01, -0.03, -0.18], 8)
-    held = steps(0.002 * np.arange(9), 0.002, hold=HELD)
-    held[:, 6:9], held[:, 9], held[:, 10] = path, 1e4, np.linspace(1, 0.3, 8)
-    opening = steps(0.016 + 0.00025 * np.arange(9), 0.002, hold=OPENING, order=2)
-    opening[:, 9] = sling.grip_force * np.linspace(0, 1, 8)
-    free = steps(0.018 + 0.0005 * np.arange(9), 0.00025, hold=FREE, order=2)
+    held = steps(0.002 * np.arange(9), 0.002, grip=Grip.HELD)
+    held["target"], held["grip_force"], held["blend"] = path, 1e4, np.linspace(1, 0.3, 8)
+    opening = steps(0.016 + 0.00025 * np.arange(9), 0.002, grip=Grip.OPENING, order=2)
+    opening["grip_force"] = sling.grip_force * np.linspace(0, 1, 8)
+    free = steps(0.018 + 0.0005 * np.arange(9), 0.00025, grip=Grip.FREE, order=2)
     draw = np.array([[-0.38, -0.2]])
     taut = straight(sling, 1.3 * sling.rest_length)
     loose = replace(taut, clamped=(False, False))
     start = straight_guess(taut)
     return {
         "held, opened and let go": Scene(
-            sling, np.vstack([held, opening, free]), hanging_guess(sling)
+            sling, np.concatenate([held, opening, free]), hanging_guess(sling)
         ),
-        "brought to rest": Scene(sling, relaxation(FREE)[:12], hanging_guess(sling)),
+        "brought to rest": Scene(sling, relaxation(Grip.FREE)[:12], hanging_guess(sling)),
         "launched": Scene(
             sling,
             launched(0.00025, 16),
             drawn_guess(sling, draw)[0],
             before=sling,
-            hold=POUCH,
+            grip=Grip.POUCH,
             payload=sling.projectile_mass,
         ),
         "twisted and let go": Scene(taut, launched(0.0005, 12, 1), start, before=taut, turned=0.3),
@@ -97,14 +98,14 @@ def compare(bench: Bench, thetas: np.ndarray) -> dict[str, tuple[float, float]]:
         for theta in thetas:
             start = scene.guess.copy()
             if scene.before is not None:
-                table = relaxation(scene.hold)
-                table[:, 6:9] = scene.guess[scene.sling.middle, :3]
+                table = relaxation(scene.grip)
+                table["target"] = scene.guess[scene.sling.middle, :3]
                 start = rest(bench, scene.before, theta, start, table=table, double=True)
             start = _turned(scene.sling, start, scene.turned)
             options = {"payload": scene.payload}
-            motion = move(bench, scene.sling, theta, scene.table, start, **options, **TIGHT)
+            motion = move(bench, scene.sling, theta, scene.steps, start, **options, **TIGHT)
             band = ReferenceRod(scene.sling, tuple(theta), **options)
-            expected = march(band, scene.table, start, grip=2 * theta[3])
+            expected = march(band, scene.steps, start, friction=2 * theta[3])
             size, pull = np.abs(expected.x - start).max(), np.abs(expected.force).max()
             states.append(np.abs(motion.x[0] - expected.x).max() / size)
             forces.append(np.abs(motion.force[0] - expected.force).max() / max(pull, 1e-9))

@@ -36,7 +36,7 @@ class String:
 
     @classmethod
     def of(cls, sling: Sling, theta) -> String:
-        return cls(sling, *map(float, material(sling, np.array([theta]))[0, :4]))
+        return cls(sling, *list(material(sling, np.array([theta]))[0].tolist())[:4])
 
     def volume(self, stretch):
         """J at a stretch."""

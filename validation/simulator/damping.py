@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import least_squares
 
+from pipeline.sling.layout import Grip
 from pipeline.sling.model import Sling
-from pipeline.sling.solver import POUCH
 from validation.simulator import figures
 from validation.simulator.agreement import random_thetas
 from validation.simulator.check import Bench, Check, Section, off
@@ -179,9 +179,9 @@ def oscillate(
     moving = mass + sling.mass / 3  # of the halves a third moves along
     target = np.zeros(3)
     target[axis] = amplitude
-    before = settling(POUCH, target)
+    before = settling(Grip.POUCH, target)
     h = 2 * np.pi * np.sqrt(moving / k) / per_period
-    table = np.vstack([before, launched(h, int(periods * per_period))])
+    table = np.concatenate([before, launched(h, int(periods * per_period))])
     start = straight_guess(sling, sling.half_width + (amplitude if axis == 0 else 0.0))
     motion = move(bench, sling, theta, table, start, payload=mass, gravity=0.0, double=True)
     place = motion.x[0, len(before) - 1 :, sling.middle, axis]

@@ -9,19 +9,10 @@ import numpy as np
 from pipeline.sling import Launches, Rollouts, Sling, interact, launch
 from pipeline.sling.initial import sections_of
 from pipeline.sling.interaction import schedule_of
-from pipeline.sling.material import material
+from pipeline.sling.layout import Grip
 from pipeline.sling.model import GRAVITY, ROD, TETRAHEDRA
-from pipeline.sling.solver import (
-    FAILURE,
-    FREE,
-    LANE_STATE,
-    RELAX,
-    Schedule,
-    memory,
-    relaxation,
-    run,
-    steps,
-)
+from pipeline.sling.schedule import Schedule, statics
+from pipeline.sling.solver import Options, Slings, memory, run
 from validation.benchmarks.simulator import pull_and_release, timed
 from validation.simulator.check import Bench, Section
 from validation.simulator.closed import String, clamped_beam
@@ -99,21 +90,18 @@ def bending(sling: Sling, poissons=POISSON) -> np.ndarray:
     young = 1e7
     nodes = np.zeros((beam.sections, 3))
     nodes[:, 0] = beam.arc - beam.half_width
-    last = steps(10.0 ** np.arange(1, 6), 1.0, hold=FREE, mode=RELAX)
-    table = np.vstack([relaxation(FREE), last])
+    table = statics(Grip.FREE)
     thetas = np.array([[young, nu, 2e-3, 0.5, 1.0] for nu in poissons])
     done = run(
         beam,
         Schedule(table, first_free=len(table)),
-        material(beam, thetas),
-        sections_of(beam, nodes),
-        np.zeros((len(thetas), LANE_STATE)),
-        double=True,
+        Slings.of(beam, thetas, sections_of(beam, nodes)),
+        options=Options(double=True),
     )
     load = beam.mass * GRAVITY / beam.rest_length
     expected = clamped_beam(load, beam.rest_length, young * np.pi * beam.radius**4 / 4)
     ratio = expected / -done.state[:, beam.middle, 2]
-    return np.where(done.lane_state[:, FAILURE] == 0, ratio, np.nan)
+    return np.where(done.lanes["outcome"] == 0, ratio, np.nan)
 
 
 def pull(sling: Sling, depths=DEPTHS, poisson: float = 0.45) -> np.ndarray:
@@ -143,7 +131,7 @@ def measure(bench: Bench, sling: Sling, count: int = COUNT) -> Figures:
         rollout_seconds=rollout_seconds / count,
         launches=launches,
         launch_seconds=launch_seconds / count,
-        memory=memory(sling, schedule_of(sling, episode), frames),
+        memory=memory(sling, schedule_of(sling, episode), frames, Options()),
     )
 
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from pipeline.sling.initial import hanging_guess
 from pipeline.sling.interaction import schedule_of
-from pipeline.sling.solver import HELD, OPENING, RELAX_STEPS
+from pipeline.sling.layout import Grip
+from pipeline.sling.schedule import RELAX_STEPS
 from validation.benchmarks import simulator as yardstick
 from validation.simulator import figures
 from validation.simulator.check import Bench, Check, Section
@@ -63,14 +64,14 @@ def balance(bench: Bench, theta=THETA) -> Balance:
     """The bench's pull and release in double precision, every step of it accounted for."""
     sling = band_of(bench)
     episode = yardstick.pull_and_release("band", bench.params.episode, sling)
-    table = schedule_of(sling, episode).table
+    table = schedule_of(sling, episode).steps
     motion = move(bench, sling, theta, table, hanging_guess(sling), double=True)
     first = RELAX_STEPS - 1  # the band hangs
-    rows, hold = table[first + 1 :], table[first + 1 :, 5]
+    rows = table[first + 1 :]
     x1, x = motion.x[0, first:-1], motion.x[0, first + 1 :]
     v1, v, at = motion.v[0, first:-1], motion.v[0, first + 1 :], motion.at[0, first + 1 :]
     v2 = np.concatenate([v1[:1], v1[:-1]])
-    c1, c2, beta = (rows[:, k, None, None] for k in (1, 2, 3))
+    c1, c2, beta = (rows[name][:, None, None] for name in ("c1", "c2", "beta"))
     moved = x - x1
     rod = ReferenceRod(sling, tuple(theta))
 
@@ -79,27 +80,27 @@ def balance(bench: Bench, theta=THETA) -> Balance:
 
     elastic, before, conservative, viscous = (np.empty(len(x)) for _ in range(4))
     for gripped in (False, True):
-        part = (hold == HELD) == gripped
+        part = (rows["grip"] == Grip.HELD) == gripped
         band = replace(rod, gripped=gripped)
         still = np.zeros_like(v[part])
         elastic[part], before[part] = band.elastic(x[part]), band.elastic(x1[part])
         conservative[part] = work(band.internal(x[part], still, at[part]), moved[part])
         viscous[part] = work(band.viscous(v[part], at[part]), moved[part])
-    rate = (v - c1 * v1 + c2 * v2) / (beta * rows[:, 0, None, None])
+    rate = (v - c1 * v1 + c2 * v2) / (beta * rows["h"][:, None, None])
     kinetic = np.append(0.0, rod.kinetic(v))
     integrator = work(rod.mass * rate, moved) - np.diff(kinetic) + conservative - (elastic - before)
     hand = -(motion.force[0, first + 1 :] * moved[:, sling.middle, :3]).sum(-1)
     hanging = rod.elastic(x1[0])
     turning = before - np.append(hanging, elastic[:-1])
     return Balance(
-        time=rows[:, 11],
-        hand=np.cumsum(np.where(hold == HELD, hand, 0.0)),
+        time=rows["time"],
+        hand=np.cumsum(np.where(rows["grip"] == Grip.HELD, hand, 0.0)),
         turning=np.cumsum(turning),
         elastic=elastic - hanging,
         kinetic=kinetic[1:],
         gravity=rod.weight(x) - rod.weight(x1[0]),
         viscous=np.cumsum(viscous),
-        pads=-np.cumsum(np.where(hold == OPENING, hand, 0.0)),
+        pads=-np.cumsum(np.where(rows["grip"] == Grip.OPENING, hand, 0.0)),
         integrator=np.cumsum(integrator),
         release=episode.release_time,
     )

@@ -7,21 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.sling.initial import fixed_frames, sections_of
-from pipeline.sling.material import material
-from pipeline.sling.model import GRAVITY, Sling
-from pipeline.sling.solver import (
-    FAILURE,
-    FREE,
-    HELD,
-    LANE_STATE,
-    PAYLOAD,
-    POUCH,
-    RELAX,
-    Schedule,
-    relaxation,
-    run,
-    steps,
-)
+from pipeline.sling.layout import Grip, Mode
+from pipeline.sling.model import Sling
+from pipeline.sling.schedule import Schedule, statics, steps
+from pipeline.sling.solver import Frames, Options, Slings, run
 from validation.simulator.check import Bench
 
 TIGHT = {"double": True, "tolerance": 1e-12}  # the kernel as exact as it gets
@@ -71,64 +60,47 @@ def straight_guess(sling: Sling, first_half: float | None = None) -> np.ndarray:
     return sections_of(sling, nodes)
 
 
-def launched(h: float, count: int, order: int = 2, hold: int = FREE) -> np.ndarray:
-    """Rows of `count` steps of `h` from rest; second order begins with one of backward Euler."""
-    first = steps([0.0, h], h, hold=hold)
-    return np.vstack([first, steps(h * np.arange(1, count + 1), h, hold=hold, order=order)])
+def launched(h: float, count: int, order: int = 2) -> np.ndarray:
+    """`count` free steps of `h` from rest; second order begins with one of backward Euler."""
+    rest = steps(h * np.arange(1, count + 1), h, grip=Grip.FREE, order=order)
+    return np.concatenate([steps([0.0, h], h, grip=Grip.FREE), rest])
 
 
-def settling(hold: int = FREE, target=(0.0, 0.0, 0.0)) -> np.ndarray:
-    """Rows that bring a guess to rest whatever its own times are, the held node at `target`."""
-    table = relaxation(hold)
-    last = steps(10.0 ** np.arange(1, 6), 1.0, hold=hold, mode=RELAX)
-    table = np.vstack([table, last])
-    table[:, 6:9] = target
-    table[:, 9] = 1e9  # pads that hold anything
-    return table
+def settling(grip: Grip = Grip.FREE, target=(0.0, 0.0, 0.0)) -> np.ndarray:
+    """Steps that bring a guess to rest whatever its own times are, the held node at `target`."""
+    result = statics(grip)
+    result["target"] = target
+    result["grip_force"] = 1e9  # pads that hold anything
+    return result
 
 
 def move(
-    bench: Bench,
-    sling: Sling,
-    thetas,
-    table: np.ndarray,
-    start: np.ndarray,
-    *,
-    payload: float = 0.0,
-    gravity: float = GRAVITY,
-    double: bool = False,
-    tolerance: float = 2e-6,
-) -> Motion:
-    """Step N thetas (N, 5) from `start` (N, L, 9) or (L, 9), at rest, through `table` (S, 13)."""
+    bench: Bench, sling: Sling, thetas, table: np.ndarray, start: np.ndarray, *,
+    payload: float = 0.0, **options,
+) -> Motion:  # fmt: skip
+    """Step N thetas (N, 5) from `start` (N, L, 9) or (L, 9), at rest, through steps (S,).
+
+    Other options are those of the solver.
+    """
     thetas, start = np.atleast_2d(thetas), np.array(start, float)
     start[..., -1, 3:] = fixed_frames(sling)[1].ravel()  # the last clamp's, whatever was before
     count = len(table)
-    lanes = np.zeros((len(thetas), LANE_STATE))
-    lanes[:, PAYLOAD] = payload
-    result = run(
+    done = run(
         sling,
         Schedule(table, first_free=count),
-        material(sling, thetas),
-        start,
-        lanes,
-        frame_steps=np.arange(count),
-        frame_weights=np.ones(count),
-        frame_width=9,
-        gravity=gravity,
-        device=bench.device,
-        workers=bench.workers,
-        double=double,
-        tolerance=tolerance,
+        Slings.of(sling, thetas, start, payload=payload),
+        Frames(np.arange(count), np.ones(count), width=9),
+        Options(bench.device, bench.workers, **options),
     )
-    x = result.frames.astype(float)
+    x = done.frames.astype(float)
     start = np.broadcast_to(start, (len(thetas), *x.shape[2:]))
     return Motion(
         table,
         start,
         x,
         *rates(sling.middle, table, start, x),
-        force=result.output[:, :, :3].astype(float),
-        failed=result.lane_state[:, FAILURE] > 0,
+        force=done.output[:, :, :3].astype(float),
+        failed=done.lanes["outcome"] > 0,
     )
 
 
@@ -139,13 +111,14 @@ def rates(
     v, at = np.empty_like(x), np.empty_like(x)
     x1 = x2 = start
     v1 = np.zeros_like(start)
-    for k, row in enumerate(table):
-        h, c1, c2, beta, mode, hold = row[:6]
+    for k, step in enumerate(table):
+        h, c1, c2, beta = (step[name] for name in ("h", "c1", "c2", "beta"))
+        relax = step["mode"] == Mode.RELAX
         at[:, k] = x1 + h * v1
-        if hold in (HELD, POUCH):  # the hand leads it
+        if step["grip"] in (Grip.HELD, Grip.POUCH):  # the hand leads it
             at[:, k, middle, :3] = x[:, k, middle, :3]
-        v[:, k] = 0.0 if mode == RELAX else (x[:, k] - c1 * x1 + c2 * x2) / (beta * h)
-        x1, x2, v1 = x[:, k], (x[:, k] if mode == RELAX else x1), v[:, k]
+        v[:, k] = 0.0 if relax else (x[:, k] - c1 * x1 + c2 * x2) / (beta * h)
+        x1, x2, v1 = x[:, k], (x[:, k] if relax else x1), v[:, k]
     return v, at
 
 

@@ -10,8 +10,9 @@ from scipy.integrate import solve_ivp
 from pipeline.sling import Launches, Sling, launch
 from pipeline.sling.initial import drawn_guess
 from pipeline.sling.launch import schedule_of
+from pipeline.sling.layout import Grip
 from pipeline.sling.model import GRAVITY
-from pipeline.sling.solver import POUCH, relaxation
+from pipeline.sling.schedule import relaxation
 from validation.simulator.check import Bench, Check, Section, off
 from validation.simulator.experiment import band_of, rest
 from validation.simulator.reference import ReferenceRod
@@ -144,8 +145,8 @@ def physics(bench: Bench, count: int = COUNT) -> list[Check]:
     flights = [_flight(*one, -sling.fork_height) for one in state]
     shares = []
     for k, (theta, draw) in enumerate(zip(thetas, draws, strict=True)):
-        table = relaxation(POUCH)
-        table[:, 7:9] = draw
+        table = relaxation(Grip.POUCH)
+        table["target"] = 0.0, *draw
         drawn = rest(
             bench, sling, theta, drawn_guess(sling, draw[None])[0], table=table, double=True
         )
@@ -177,7 +178,7 @@ def physics(bench: Bench, count: int = COUNT) -> list[Check]:
 def section(bench: Bench, progress=print) -> Section:
     sling = band_of(bench)
     size = sling.steps.launch_step
-    count = len(schedule_of(sling).table)
+    count = len(schedule_of(sling).steps)
     return Section(
         "Launches",
         [*convergence(bench, progress=progress), *order_in_time(bench), *physics(bench)],

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.sling.solver import FREE, HELD, OPENING, POUCH, RELAX
+from pipeline.sling.layout import Grip, Mode
 from validation.simulator.reference import ReferenceRod
 
 SMALL = 1e-30  # imaginary step: derivatives without cancellation
@@ -23,16 +23,16 @@ class March:
 
 def march(
     rod: ReferenceRod,
-    table: np.ndarray,
+    steps: np.ndarray,
     start: np.ndarray,
     *,
-    grip: float = np.inf,
+    friction: float = np.inf,
     direction=(0, 0, 0),
 ) -> March:
-    """Step `start` (L, 9), at rest, through the rows of a schedule (S, 13).
+    """Step `start` (L, 9), at rest, through a schedule's records (S,).
 
     Args:
-        grip: 2 times the coefficient of friction: with the normal force what two pads can hold.
+        friction: 2 times the coefficient of friction: with the normal force what two pads can hold.
         direction: Of the pull that opening pads resist, until a held step says, shape (3,).
     """
     middle = rod.sling.middle
@@ -40,22 +40,23 @@ def march(
     v1 = v2 = np.zeros_like(x1)
     offset, pull, direction = None, 0.0, np.asarray(direction, float)
     xs, vs, forces = [], [], []
-    for row in table:
-        h, c1, c2, beta, mode, hold, *target, limit, blend, _, share = row
-        bh = beta * h
-        band = replace(rod, share=share, gripped=hold == HELD)
+    for step in steps:
+        h, c1, c2, grip, target = (step[name] for name in ("h", "c1", "c2", "grip", "target"))
+        bh = step["beta"] * h
+        band = replace(rod, share=step["bending"], gripped=grip == Grip.HELD)
         free = _free(band)
         at = x1 + h * v1
-        if hold in (HELD, POUCH):
+        if grip in (Grip.HELD, Grip.POUCH):
             offset = x1[middle, :3] - target if offset is None else offset
-            at[middle, :3] = np.asarray(target) + blend * offset
+            at[middle, :3] = target + step["blend"] * offset
             free[middle, :3] = False
         else:
             offset = None
         y = c1 * x1 - c2 * x2
         inertial = y + bh * (c1 * v1 - c2 * v2)
         inertial[:, 2] -= bh**2 * rod.gravity
-        capacity = max(pull - limit * grip, 0.0) if hold == OPENING else 0.0
+        lost = step["grip_force"] * friction
+        capacity = max(pull - lost, 0.0) if grip == Grip.OPENING else 0.0
 
         def residual(
             x, band=band, at=at, y=y, inertial=inertial, bh=bh, held_back=capacity * direction
@@ -66,13 +67,13 @@ def march(
 
         x = solve(residual, at, free)
         force = -residual(x)[middle, :3]
-        if hold == HELD:
+        if grip == Grip.HELD:
             pull = np.linalg.norm(force)
             direction = force / max(pull, 1e-9)
-        if hold in (FREE, OPENING):
+        if grip in (Grip.FREE, Grip.OPENING):
             force = capacity * direction
         v = (x - y) / bh
-        if mode == RELAX:
+        if step["mode"] == Mode.RELAX:
             x1, x2, v1, v2 = x, x, 0 * v, 0 * v
         else:
             x1, x2, v1, v2 = x, x1, v, v1

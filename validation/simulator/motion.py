@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.sling.initial import sections_of
+from pipeline.sling.layout import Grip
 from pipeline.sling.model import GRAVITY, Sling
-from pipeline.sling.solver import FREE, steps
+from pipeline.sling.schedule import steps
 from validation.simulator.check import Bench, Check, Section
 from validation.simulator.experiment import TIGHT, band_of, launched, move, straight, straight_guess
 from validation.simulator.reference import ReferenceRod
@@ -52,8 +53,9 @@ def free_fall(bench: Bench, count: int = 60) -> list[Check]:
     sling, times = loose_band(bench), uneven(count)
     checks = []
     for order, name in ((1, "backward Euler"), (2, "second order, uneven steps")):
-        table = steps(times, times[1], hold=FREE, order=order)
-        table[0, 1:4] = 1, 0, 1
+        table = steps(times, times[1], grip=Grip.FREE, order=order)
+        for name, value in {"c1": 1, "c2": 0, "beta": 1}.items():
+            table[name][0] = value
         motion = move(bench, sling, THETA, table, straight_guess(sling), **TIGHT)
         miss = np.abs(motion.x[0, :, :, 2] - fall_of_a_point(times, order)[1:, None]).max()
         fallen = -motion.x[0, -1, 0, 2]

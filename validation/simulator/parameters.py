@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.sling import Sling, interact
-from pipeline.sling.solver import HELD
+from pipeline.sling.layout import Grip
 from validation.benchmarks import simulator as yardstick
 from validation.simulator.check import Bench, Check, Section, off
 from validation.simulator.closed import String
@@ -57,7 +57,7 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Check]:
     target = (stretch * half - sling.half_width, 0.0, 0.0)
     thetas = [_with(poisson=nu) for nu in (0.30, 0.49)]
     motion = move(
-        bench, sling, thetas, settling(HELD, target), straight_guess(sling, stretch * half),
+        bench, sling, thetas, settling(Grip.HELD, target), straight_guess(sling, stretch * half),
         gravity=0.0, double=True,
     )  # fmt: skip
     strings = [String.of(sling, theta) for theta in thetas]

@@ -60,7 +60,7 @@ class ReferenceRod:
     @property
     def parameters(self) -> tuple[float, ...]:
         """mu, lam, d, s of state.h."""
-        return tuple(material(self.sling, np.array([self.theta]))[0, :4])
+        return material(self.sling, np.array([self.theta]))[0].tolist()[:4]
 
     # ---- edges
 
@@ -121,7 +121,7 @@ class ReferenceRod:
         sizes = np.array([*sizes, *sling.edge_lengths[middle:], 0.0])
         per_length = self.share * sling.area * self.parameters[0] * 2 / (sizes[1:] + sizes[:-1])
         per_length[[0, -1]] *= sling.clamped
-        bending = material(sling, np.array([self.theta]))[0, 5]
+        bending = material(sling, np.array([self.theta]))["bending"]
         return bending * per_length, sling.radius**2 / 4 * per_length
 
     def _joint_forces(self, x, rate, at, bounded: bool) -> np.ndarray:

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.sling import launch
+from pipeline.sling.layout import Grip
 from pipeline.sling.model import GRAVITY
-from pipeline.sling.solver import HELD
 from validation.simulator import figures
 from validation.simulator.check import Bench, Check, Section, off
 from validation.simulator.closed import String, cantilever, clamped_beam
@@ -56,7 +56,7 @@ def straight_pull(
     sling = straight(sling, (stretch + 1) * half)
     target = (stretch * half - sling.half_width, 0.0, 0.0)
     start = straight_guess(sling, stretch * half)
-    motion = move(bench, sling, theta, settling(HELD, target), start, gravity=0.0)
+    motion = move(bench, sling, theta, settling(Grip.HELD, target), start, gravity=0.0)
     measured = np.where(motion.failed, np.nan, -motion.force[:, -1, 0])
     return measured, np.array([float(String.of(sling, one).force(stretch)) for one in theta])
 

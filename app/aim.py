@@ -12,7 +12,7 @@ from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.launches.spread import landing_intervals
 from pipeline.params import expect_known
 from pipeline.sling.theta import law_discrepancy, load_samples, load_theta
-from stages.start import note_unmounted
+from stages.start import unmounted
 
 
 def aim(
@@ -48,11 +48,11 @@ def aim(
     content = load_theta(layout.theta(band, method), band)
     stored = Stored(band, method, layout.root)
     draw = stored.draws(np.array([target]), ROBUST if robust else PLAIN)[0]
+    warnings = []
     if launcher is None:
-        note_unmounted(band, root)
+        warnings += unmounted(band, root)
         launcher = simulator(params, band, content, root=root)
     launched = launcher(draw[None])
-    warnings = []
     low, high = params.policy.targets
     if not low <= target <= high:
         warnings.append(f"the policy was trained for targets from {low:g} to {high:g} m")

@@ -1,4 +1,4 @@
-"""The `sling` command: one small function a subcommand, each calling the library.
+"""The `sling` command: a table of commands, each a small function that calls the library.
 
 Run `sling --help`, or `sling launch --help`. A user's mistake is one line on stderr and exit
 status 1; a command line that cannot be understood is exit status 2.
@@ -8,18 +8,22 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import math
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
+from app import __version__
+from app.arguments import address, count, draw, finite, positive, shown, target
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from stages.start import note_unmounted, run
 
 DEFAULT_METHOD = "sling2sim2real_taut"
-FURTHEST_TARGET, FURTHEST_DRAW = 100.0, 2.0  # m
+FURTHEST_DRAW = 2.0  # m
+Done = str | tuple[str, int]  # what to print, and an exit status that is not 0
+COMMANDS: dict[str, tuple[str, tuple, Callable[[argparse.Namespace], Done]]] = {}
 
 
 def main() -> None:
@@ -29,9 +33,10 @@ def main() -> None:
 
 
 def execute(arguments: argparse.Namespace) -> int:
-    """Run a subcommand and print its text; whatever a library prints goes to stderr."""
+    """Run a command and print its text; whatever a library prints goes to stderr."""
     with contextlib.redirect_stdout(sys.stderr):
-        text, status = arguments.command(arguments)
+        done = arguments.command(arguments)
+    text, status = done if isinstance(done, tuple) else (done, 0)
     print(text)
     return status
 
@@ -50,173 +55,70 @@ def parser() -> argparse.ArgumentParser:
     top = Parser(
         prog="sling", description="From a recording of an elastic band to a slingshot policy."
     )
+    top.add_argument("--version", action="version", version=f"sling2sim2real {__version__}")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
-
-    def command(function, help: str) -> argparse.ArgumentParser:
-        name = function.__name__.removeprefix("run_").replace("_", "-")
+    for name, (help, flags, function) in COMMANDS.items():
         sub = commands.add_parser(name, help=help, description=f"{help}.")
-        sub.set_defaults(command=function)
-        return sub
-
-    sub = command(run_add_band, "check a recording and add its band to params.yaml")
-    sub.add_argument("name", help="what to call the band: small letters, digits and _")
-    sub.add_argument("--recording", type=Path, required=True, metavar="FILE.mcap")
-    sub.add_argument("--mass", type=positive, required=True, metavar="KG", help="on a scale")
-    sub.add_argument("--diameter", type=positive, default=0.010, metavar="M", help="default 0.010")
-    sub.add_argument(
-        "--rest-length", type=positive, default=0.52, metavar="M", help="between the clamps, 0.52"
-    )
-
-    sub = command(run_check, "say what is in a recording, what is missing, whether it can be used")
-    sub.add_argument("recording", type=Path, metavar="FILE.mcap")
-    sub.add_argument("--band", metavar="NAME", help="of params.yaml: its diameter and rest length")
-    sub.add_argument("--diameter", type=positive, metavar="M", help="else 0.010 is assumed")
-    sub.add_argument(
-        "--rest-length", type=positive, metavar="M", help="between the clamps; else 0.52 is assumed"
-    )
-    sub.add_argument("--sheet", type=Path, metavar="OUT.png", help="six moments, force, coverage")
-    sub.add_argument("--rrd", type=Path, metavar="OUT.rrd", help="one timeline for Rerun's viewer")
-    sub.add_argument("--json", action="store_true")
-
-    sub = command(run_plan, "plan the pull that a robot is to record, and check it against limits")
-    sub.add_argument("--band", required=True)
-    sub.add_argument("--draw", type=draw, metavar="Y,Z", help="frame O [m]; default plan.draw")
-    sub.add_argument("--theta", type=Path, metavar="FILE", help="says the force to hold the draw")
-    sub.add_argument(
-        "--recording", type=Path, metavar="FILE.mcap", help="earlier one: robot's base, and force"
-    )
-    sub.add_argument("--out", type=Path, metavar="FOLDER", help="default data/plans/<band>")
-    sub.add_argument("--rate", type=positive, default=100.0, metavar="HZ", help="of the CSV, 100")
-    sub.add_argument("--json", action="store_true")
-
-    sub = command(run_launch, "simulate one launch with identified or hand-written parameters")
-    sub.add_argument("--theta", type=Path, required=True, metavar="FILE", help="data/theta/...json")
-    sub.add_argument("--band", required=True)
-    sub.add_argument(
-        "--draw", type=draw, required=True, metavar="Y,Z", help="frame O [m]: --draw=-0.30,-0.17"
-    )
-    sub.add_argument("--json", action="store_true")
-
-    sub = command(run_aim, "say where to draw for a target, by the trained policy")
-    sub.add_argument("--band", required=True)
-    sub.add_argument("--method", default=DEFAULT_METHOD, help=f"default {DEFAULT_METHOD}")
-    sub.add_argument("--target", type=target, required=True, metavar="M", help="along the floor")
-    sub.add_argument("--robust", action="store_true", help="by the method's second policy")
-    sub.add_argument("--json", action="store_true")
-
-    sub = command(run_flow, "run the stages that are stale in parallel, seen in the Prefect UI")
-    sub.add_argument(
-        "--workers", type=count, metavar="N", help="stages at a time; default all cores"
-    )
-    sub.add_argument("--gpus", type=count, metavar="N", help="GPU stages at a time; default 1")
-    sub.add_argument("--cluster", metavar="ADDRESS", help="of a Dask scheduler: tcp://HOST:8786")
-
-    sub = command(run_ui, "serve the Prefect UI of this project, on this machine's loopback")
-    sub.add_argument("--port", type=count, metavar="N", help="default 4200")
-
-    sub = command(run_verify, "hold the simulator against closed forms, finer steps, other engines")
-    sub.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
-
-    sub = command(run_bench, "measure rollouts and launches a second")
-    sub.add_argument(
-        "--device", default="cpu", help="cpu (default), cuda:0, cuda:0,cuda:1, or cuda: all GPUs"
-    )
-    sub.add_argument(
-        "--scaling",
-        nargs="?",
-        const="",
-        metavar="BAND",
-        help="several GPUs against one, on a band's recording or the yardstick",
-    )
-    sub.add_argument("--peers", action="store_true", help="MuJoCo and Newton beside ours")
-    sub.add_argument(
-        "--recording", type=Path, metavar="FILE.mcap", help="time how it becomes clouds"
-    )
-    sub.add_argument(
-        "--methods",
-        nargs="*",
-        metavar="METHOD",
-        help="time searches, all or of these methods",
-    )
-    sub.add_argument("--budget", choices=("laptop", "large"), default="laptop", help="of --methods")
-    sub.add_argument("--json", action="store_true")
+        for names, options in flags:
+            sub.add_argument(*names, **options)
+        sub.set_defaults(command=function, refuse=sub.error)
     return top
 
 
-def positive(text: str) -> float:
-    """A finite number above 0."""
-    value = number(text)
-    if value <= 0:
-        raise argparse.ArgumentTypeError(f"must be above 0, got {text}")
-    return value
+def flag(*names: str, **options) -> tuple:
+    """An argument of a command, as argparse's `add_argument` takes it."""
+    return names, options
 
 
-def count(text: str) -> int:
-    """A whole number above 0."""
-    if not (text.isascii() and text.isdigit() and int(text) > 0):
-        raise argparse.ArgumentTypeError(f"must be a whole number above 0, got {text!r}")
-    return int(text)
+def command(help: str, *flags: tuple) -> Callable:
+    """Put a function into the table, under its own name."""
+
+    def put(function: Callable) -> Callable:
+        name = function.__name__.replace("_", "-")
+        COMMANDS[name] = help, flags, function
+        return function
+
+    return put
 
 
-def number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"must be a number, got {text!r}")
-    return value
+JSON = flag("--json", action="store_true")
 
 
-def target(text: str) -> float:
-    """A distance along the floor that a slingshot may be asked for [m]."""
-    value = positive(text)
-    if value > FURTHEST_TARGET:
-        raise argparse.ArgumentTypeError(f"must be at most {FURTHEST_TARGET:g} m, got {text}")
-    return value
-
-
-def draw(text: str) -> tuple[float, float]:
-    """A drawn position (y, z), frame O [m]."""
-    parts = text.split(",")
-    if len(parts) != 2:
-        raise argparse.ArgumentTypeError(f"must be Y,Z such as --draw=-0.30,-0.17, got {text!r}")
-    y, z = map(number, parts)
-    if y >= 0:
-        raise argparse.ArgumentTypeError(f"y must be below 0 (behind the fork), got {y:g}")
-    return y, z
-
-
-def shown(content: dict, as_json: bool) -> tuple[str, int]:
-    """A flat result as one JSON object, or one line an entry, with exit status 0."""
-    if as_json:
-        return json.dumps(content, allow_nan=False), 0
-    width = max(map(len, content))
-    return "\n".join(f"{key:{width}}  {readable(value)}" for key, value in content.items()), 0
-
-
-def readable(value: object) -> str:
-    if isinstance(value, float):
-        return f"{value:.4g}"
-    if isinstance(value, list):
-        return " ".join(map(readable, value)) or "-"
-    return "-" if value is None else str(value)
-
-
-def run_add_band(arguments: argparse.Namespace) -> tuple[str, int]:
+@command(
+    "check a recording and add its band to params.yaml",
+    flag("name", help="what to call the band: small letters, digits and _"),
+    flag("--recording", type=Path, required=True, metavar="FILE.mcap"),
+    flag("--mass", type=positive, required=True, metavar="KG", help="on a scale"),
+    flag("--diameter", type=positive, default=0.010, metavar="M", help="default 0.010"),
+    flag(
+        "--rest-length", type=positive, default=0.52, metavar="M", help="between the clamps, 0.52"
+    ),
+)
+def add_band(arguments: argparse.Namespace) -> Done:
     from app.preflight.add_band import add_band
 
-    done = add_band(
+    return add_band(
         arguments.name,
         arguments.recording,
         mass=arguments.mass,
         diameter=arguments.diameter,
         rest_length=arguments.rest_length,
     )
-    return done, 0
 
 
-def run_check(arguments: argparse.Namespace) -> tuple[str, int]:
+@command(
+    "say what is in a recording, what is missing, whether it can be used",
+    flag("recording", type=Path, metavar="FILE.mcap"),
+    flag("--band", metavar="NAME", help="of params.yaml: its diameter and rest length"),
+    flag("--diameter", type=positive, metavar="M", help="else 0.010 is assumed"),
+    flag(
+        "--rest-length", type=positive, metavar="M", help="between the clamps; else 0.52 is assumed"
+    ),
+    flag("--sheet", type=Path, metavar="OUT.png", help="six moments, force, coverage"),
+    flag("--rrd", type=Path, metavar="OUT.rrd", help="one timeline for Rerun's viewer"),
+    JSON,
+)
+def check(arguments: argparse.Namespace) -> Done:
     from app.preflight.command import check
     from pipeline.params import load
 
@@ -232,7 +134,19 @@ def run_check(arguments: argparse.Namespace) -> tuple[str, int]:
     )
 
 
-def run_plan(arguments: argparse.Namespace) -> tuple[str, int]:
+@command(
+    "plan the pull that a robot is to record, and check it against limits",
+    flag("--band", required=True),
+    flag("--draw", type=draw, metavar="Y,Z", help="frame O [m]; default plan.draw"),
+    flag("--theta", type=Path, metavar="FILE", help="says the force to hold the draw"),
+    flag(
+        "--recording", type=Path, metavar="FILE.mcap", help="earlier one: robot's base, and force"
+    ),
+    flag("--out", type=Path, metavar="FOLDER", help="default data/plans/<band>"),
+    flag("--rate", type=positive, default=100.0, metavar="HZ", help="of the CSV, 100"),
+    JSON,
+)
+def plan(arguments: argparse.Namespace) -> Done:
     from app.plan.plan import plan_recording
     from pipeline.params import load
 
@@ -244,10 +158,17 @@ def run_plan(arguments: argparse.Namespace) -> tuple[str, int]:
         recording=arguments.recording,
     )
     files = plan.write(arguments.out or Layout().plans(arguments.band), arguments.rate)
-    return plan.to_json(files) if arguments.json else plan.to_text(files), 0
+    return plan.to_json(files) if arguments.json else plan.to_text(files)
 
 
-def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
+@command(
+    "simulate one launch with identified or hand-written parameters",
+    flag("--theta", type=Path, required=True, metavar="FILE", help="data/theta/...json"),
+    flag("--band", required=True),
+    flag("--draw", type=draw, required=True, metavar="Y,Z", help="frame O [m]: --draw=-0.30,-0.17"),
+    JSON,
+)
+def launch(arguments: argparse.Namespace) -> Done:
     from pipeline.params import expect_known, load
     from pipeline.sling.launch import launch
     from pipeline.sling.theta import calibrated, load_theta, vector
@@ -266,18 +187,24 @@ def run_launch(arguments: argparse.Namespace) -> tuple[str, int]:
     note_unmounted(arguments.band)
     sling = calibrated(params, arguments.band, content)
     result = launch(sling, vector(content), arguments.draw, max_force=params.setup.max_force)
-    return shown(
-        {
-            "landing_y_m": finite(result.landing_y[0]),
-            "speed_m_s": finite(result.speed[0]),
-            "hold_force_n": finite(result.hold_force[0]),
-            "failure": result.failure[0],
-        },
-        arguments.json,
-    )
+    answer = {
+        "landing_y_m": finite(result.landing_y[0]),
+        "speed_m_s": finite(result.speed[0]),
+        "hold_force_n": finite(result.hold_force[0]),
+        "failure": result.failure[0],
+    }
+    return shown(answer, arguments.json)
 
 
-def run_aim(arguments: argparse.Namespace) -> tuple[str, int]:
+@command(
+    "say where to draw for a target, by the trained policy",
+    flag("--band", required=True),
+    flag("--method", default=DEFAULT_METHOD, help=f"default {DEFAULT_METHOD}"),
+    flag("--target", type=target, required=True, metavar="M", help="along the floor"),
+    flag("--robust", action="store_true", help="by the method's second policy"),
+    JSON,
+)
+def aim(arguments: argparse.Namespace) -> Done:
     from app.aim import aim
     from app.pose import posed
     from pipeline.params import load
@@ -288,35 +215,47 @@ def run_aim(arguments: argparse.Namespace) -> tuple[str, int]:
     if arguments.json:
         return shown(answer, True)
     warnings = answer.pop("warnings")
-    text, status = shown(answer, False)
-    return "\n".join([text, *(f"warning: {line}" for line in warnings)]), status
+    return "\n".join([shown(answer, False), *(f"warning: {line}" for line in warnings)])
 
 
-def run_flow(arguments: argparse.Namespace) -> tuple[str, int]:
+@command(
+    "run the stages that are stale in parallel, seen in the Prefect UI",
+    flag("--workers", type=count, metavar="N", help="stages at a time; default all cores"),
+    flag("--gpus", type=count, metavar="N", help="GPU stages at a time; default 1"),
+    flag("--cluster", type=address, metavar="ADDRESS", help="Dask scheduler: tcp://HOST:8786"),
+)
+def flow(arguments: argparse.Namespace) -> Done:
     from app.flow import run as flow
 
     root, workers, gpus = Path.cwd(), arguments.workers, arguments.gpus
     if arguments.cluster is None:
-        return flow.run(root, workers=workers, gpus=gpus), 0
+        return flow.run(root, workers=workers, gpus=gpus)
     from app.cluster.cluster import Cluster
 
     with Cluster(root, arguments.cluster) as cluster:
-        done = flow.run(
+        return flow.run(
             root,
             workers=workers or cluster.slots,
             gpus=gpus or cluster.slots,
             place=cluster.run_stage,
         )
-    return done, 0
 
 
-def run_ui(arguments: argparse.Namespace) -> tuple[str, int]:
+@command(
+    "serve the Prefect UI of this project, on this machine's loopback",
+    flag("--port", type=count, metavar="N", help="default 4200"),
+)
+def ui(arguments: argparse.Namespace) -> Done:
     from app.flow.server import serve
 
-    return serve(Path.cwd(), arguments.port), 0
+    return serve(Path.cwd(), arguments.port)
 
 
-def run_verify(arguments: argparse.Namespace) -> tuple[str, int]:
+@command(
+    "hold the simulator against closed forms, finer steps, other engines",
+    flag("--device", default="cpu", help="cpu (default) or cuda:0"),
+)
+def verify(arguments: argparse.Namespace) -> Done:
     from pipeline.params import load
     from validation.engines import checks as peers
     from validation.simulator.report import summary, verify
@@ -327,53 +266,31 @@ def run_verify(arguments: argparse.Namespace) -> tuple[str, int]:
     return text, int(missed > 0)
 
 
-def run_bench(arguments: argparse.Namespace) -> tuple[str, int]:
-    from pipeline.params import load
-    from validation.benchmarks.simulator import bench, environment, table
+@command(
+    "measure rollouts and launches a second",
+    flag("--device", help="cpu (default), cuda:0, cuda:0,cuda:1, or cuda: all GPUs"),
+    flag(
+        "--scaling",
+        nargs="?",
+        const="",
+        metavar="BAND",
+        help="several GPUs against one, on a band's recording or the yardstick",
+    ),
+    flag("--peers", action="store_const", const=True, help="MuJoCo and Newton beside ours"),
+    flag("--recording", type=Path, metavar="FILE.mcap", help="time how it becomes clouds"),
+    flag("--methods", nargs="*", metavar="METHOD", help="time searches, all or of these methods"),
+    flag("--budget", choices=("laptop", "large"), help="of --methods, default laptop"),
+    JSON,
+)
+def bench(arguments: argparse.Namespace) -> Done:
+    from app.bench import asked, bench
 
-    if arguments.recording:
-        from validation.benchmarks import recording
-
-        result = recording.bench_recording(arguments.recording, load())
-        if arguments.json:
-            return json.dumps(environment("cpu", "sling bench --recording --json") | result), 0
-        return recording.table(result), 0
-    if arguments.scaling is not None:
-        from validation.benchmarks import scaling as several
-
-        band, device, size = arguments.scaling, arguments.device, arguments.budget
-        method = (arguments.methods or ["sling2sim2real"])[0]
-        result = several.bench_scaling(load(), device, band or None, method, size)
-        if arguments.json:
-            command = f"sling bench --scaling {band} --methods {method} --budget {size}"
-            command += f" --device {device} --json"
-            return json.dumps(environment(device, command) | result), 0
-        return several.table(result), 0
-    if arguments.methods is not None:
-        from validation.benchmarks import methods
-
-        result = methods.bench_methods(
-            load(), arguments.device, arguments.budget, arguments.methods
-        )
-        if arguments.json:
-            command = " ".join(["sling bench --methods", *arguments.methods])
-            command += f" --budget {arguments.budget} --device {arguments.device} --json"
-            return json.dumps(environment(arguments.device, command) | result), 0
-        return methods.table(result), 0
-    if arguments.peers:
-        from validation.benchmarks import engines as peers
-
-        entries = peers.bench_peers(load(), arguments.device)
-        if arguments.json:
-            command = f"sling bench --peers --device {arguments.device} --json"
-            return json.dumps(environment(arguments.device, command) | {"peers": entries}), 0
-        return peers.table(entries), 0
-    result = bench(load(), device=arguments.device)
-    if arguments.json:
-        return json.dumps(environment(arguments.device) | result), 0
-    return table(result), 0
+    try:
+        what = asked(arguments)
+    except argparse.ArgumentTypeError as error:
+        arguments.refuse(str(error))
+    return bench(arguments, what)
 
 
-def finite(value: float) -> float | None:
-    """JSON has no NaN: what is not known is null."""
-    return float(value) if math.isfinite(value) else None
+if __name__ == "__main__":
+    main()

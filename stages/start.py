@@ -65,12 +65,18 @@ def remedy(error: NotMade) -> str:
     return " ".join(filter(None, (f"`dvc repro {stage}` makes it", error.condition)))
 
 
-def note_unmounted(band: str, root: str | Path = ".") -> None:
-    """Say on stderr where nothing is known of how a band hangs: simulations go on without."""
+def unmounted(band: str, root: str | Path = ".") -> list[str]:
+    """A warning where nothing is known of how a band hangs: simulations go on without."""
     path = Layout(Path(root)).mounting(band)
-    if not path.exists():
-        print(
-            f"note: {path} is missing, so the band hangs as `setup` says; `dvc repro"
-            f" mounting@{band}` fits it to a recording",
-            file=sys.stderr,
-        )
+    if path.exists():
+        return []
+    return [
+        f"{path} is missing, so the band hangs as `setup` says; `dvc repro mounting@{band}` fits it"
+        " to a recording"
+    ]
+
+
+def note_unmounted(band: str, root: str | Path = ".") -> None:
+    """The same on stderr."""
+    for warning in unmounted(band, root):
+        print(f"note: {warning}", file=sys.stderr)

@@ -72,6 +72,9 @@ class Params(Section):
             ("ablations.methods", self.run.ablations.methods, self.methods),
         ):
             _expect_all(names, known, f"run.{key}")
+        for band in self.run.ablations.bands:
+            if band not in self.run.bands:
+                raise refusal(f"run.ablations.bands: {band} is not one of run.bands")
         _expect_all(self.policy.robust.methods, self.methods, "policy.robust.methods")
         rig = [name for name in self.run.bands if self.bands[name].source == "rig"]
         if list(self.run.rig) != rig:

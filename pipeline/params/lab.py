@@ -57,9 +57,6 @@ class RunParams(Section):
 
     @model_validator(mode="after")
     def _nothing_runs_twice(self) -> RunParams:
-        for band in self.ablations.bands:
-            if band not in self.bands:
-                raise refusal(f"ablations.bands: {band} is not one of run.bands")
         for method in self.ablations.methods:
             if method in self.methods:
                 raise refusal(f"ablations.methods: {method} is one of run.methods already")

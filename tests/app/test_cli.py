@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from app.cli import draw, parser, positive, shown
+from app import __version__, bench, cli
+from app.arguments import address, draw, positive, shown
 from pipeline.sling.material import THETA
 from tests.policy.linear import write_policy
 
@@ -22,20 +23,29 @@ SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 
 def sling(*arguments: str, folder: Path = ROOT) -> subprocess.CompletedProcess:
     """Run `sling` in `folder` as a user would."""
-    command = [sys.executable, "-c", "from app.cli import main; main()", *arguments]
+    command = [sys.executable, "-m", "app.cli", *arguments]
     environment = {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     return subprocess.run(
         command, cwd=folder, env={**os.environ, **environment}, capture_output=True, text=True
     )
 
 
-def refused(done: subprocess.CompletedProcess, status: int) -> str:
-    assert done.returncode == status, done.stderr
-    assert done.stdout == ""
-    lines = done.stderr.splitlines()
-    assert len(lines) == 1, done.stderr
-    assert lines[0].startswith("error: ")
-    return lines[0]
+@pytest.fixture
+def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
+    """Runs a command in this process, and gives the one line with which it refuses."""
+
+    def run(status: int, *arguments: str, folder: Path = ROOT) -> str:
+        monkeypatch.chdir(folder)
+        monkeypatch.setattr(sys, "argv", ["sling", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        out, err = capsys.readouterr()
+        assert (ended.value.code, out) == (status, ""), err
+        (line,) = err.splitlines()
+        assert line.startswith("error: ")
+        return line
+
+    return run
 
 
 def test_draw_is_two_numbers_behind_the_fork() -> None:
@@ -53,7 +63,7 @@ def test_positive_numbers() -> None:
 
 
 def test_the_documented_commands_are_understood() -> None:
-    parse = parser().parse_args
+    parse = cli.parser().parse_args
     band = parse("add-band orange --recording o.mcap --mass 0.0408".split())
     assert (band.name, band.recording, band.mass) == ("orange", Path("o.mcap"), 0.0408)
     assert (band.diameter, band.rest_length) == (0.010, 0.52)
@@ -69,12 +79,20 @@ def test_the_documented_commands_are_understood() -> None:
     assert not aimed.robust and parse("aim --band b --target 2 --robust".split()).robust
     assert parse("aim --band band1 --method m --target 1.925".split()).method == "m"
     assert parse("bench --device cuda:0 --json".split()).device == "cuda:0"
+    assert bench.asked(parse("bench --json".split())) == ""
+    assert bench.asked(parse("bench --scaling orange --methods de --budget large".split())) == (
+        "scaling"
+    )
+    assert bench.asked(parse("bench --methods --device cuda --json".split())) == "methods"
+    assert bench.asked(parse("bench --peers".split())) == "peers"
+    for right in ("tcp://10.0.0.5:8786", "head:8786", "tls://[::1]:8786"):
+        assert address(right) == right
 
 
 def test_results_are_json_or_lines() -> None:
     content = {"landing_y_m": None, "interval_90_m": [1.0, 1.25], "failure": "broke"}
-    assert json.loads(shown(content, True)[0]) == content
-    assert shown(content, False)[0].splitlines() == [
+    assert json.loads(shown(content, True)) == content
+    assert shown(content, False).splitlines() == [
         "landing_y_m    -",
         "interval_90_m  1 1.25",
         "failure        broke",
@@ -83,9 +101,8 @@ def test_results_are_json_or_lines() -> None:
         shown({"x": float("nan")}, True)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "expected"),
-    [
+def test_a_command_line_that_makes_no_sense(refused) -> None:
+    for arguments, expected in (
         ("", "required: COMMAND"),
         ("lunch", "invalid choice: 'lunch'"),
         ("launch --theta t.json --band band1", "required: --draw"),
@@ -98,15 +115,19 @@ def test_results_are_json_or_lines() -> None:
         ("aim --band band1 --target -1.9", "must be above 0"),
         ("aim --band band1", "required: --target"),
         ("add-band new --recording new.mcap --mass 0", "must be above 0"),
-    ],
-)
-def test_a_command_line_that_makes_no_sense(arguments: str, expected: str) -> None:
-    assert expected in refused(sling(*arguments.split()), 2)
+        ("flow --cluster foo", "must be such as tcp://10.0.0.5:8786, got 'foo'"),
+        ("bench --budget large", "argument --budget: used by --methods and --scaling alone"),
+        ("bench --recording a.mcap --device cpu", "argument --device: not used by --recording"),
+        ("bench --recording a.mcap --peers", "argument --peers: not used by --recording"),
+        ("bench --scaling --peers", "argument --peers: not used by --scaling"),
+        ("bench --peers --methods de", "argument --methods: not used by --peers"),
+        ("bench --scaling --methods de bo", "argument --methods: --scaling takes one of them"),
+    ):
+        assert expected in refused(2, *arguments.split())
 
 
-@pytest.mark.parametrize(
-    ("arguments", "expected"),
-    [
+def test_a_users_mistake(refused) -> None:
+    for arguments, expected in (
         ("launch --theta none.json --band band1 --draw=-0.30,-0.17", "none.json: no such file"),
         ("launch --theta none.json --band band9 --draw=-0.30,-0.17", "band band9: not in params"),
         ("launch --theta none.json --band band1 --draw=-0.30,-0.60", "lies below the floor"),
@@ -121,10 +142,16 @@ def test_a_command_line_that_makes_no_sense(arguments: str, expected: str) -> No
         ("plan --band band1 --recording none.mcap", "none.mcap: no such file"),
         ("bench --recording none.mcap", "none.mcap: no such file"),
         ("add-band new --recording none.mcap --mass 0.04", "none.mcap"),
-    ],
-)
-def test_a_users_mistake(arguments: str, expected: str) -> None:
-    assert expected in refused(sling(*arguments.split()), 1)
+    ):
+        assert expected in refused(1, *arguments.split())
+
+
+def test_the_version_and_a_mistake_as_a_process() -> None:
+    done = sling("--version")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == f"sling2sim2real {__version__}\n"
+    done = sling("aim", "--band", "band9", "--target", "1.925")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
 
 
 def test_a_reader_that_has_seen_enough() -> None:
@@ -135,9 +162,9 @@ def test_a_reader_that_has_seen_enough() -> None:
     assert (done.stdout, done.stderr) == ("a line\n", "")
 
 
-def test_a_folder_without_params(tmp_path: Path) -> None:
-    done = sling("aim", "--band", "band1", "--target", "1.9", folder=tmp_path)
-    assert "params.yaml: cannot be read" in refused(done, 1)
+def test_a_folder_without_params(tmp_path: Path, refused) -> None:
+    line = refused(1, "aim", "--band", "band1", "--target", "1.9", folder=tmp_path)
+    assert "params.yaml: cannot be read" in line
 
 
 def aimable(folder: Path) -> None:
@@ -155,7 +182,7 @@ def test_aim_prints_one_json_object(tmp_path: Path) -> None:
     aimable(tmp_path)
     arguments = ("aim", "--band", "band1", "--target", "1.9")
     done = sling(*arguments, "--json", folder=tmp_path)
-    assert done.returncode == 0, done.stderr
+    assert (done.returncode, done.stderr) == (0, "")  # what it warns of is in the answer
     answer = json.loads(done.stdout)
     stable = ["draw_y_m", "draw_z_m", "predicted_landing_m", "interval_90_m", "hold_force_n"]
     pose = ["pitch_rad", "tcp_frame", "tcp_position_m", "tcp_quaternion_xyzw"]
@@ -168,31 +195,29 @@ def test_aim_prints_one_json_object(tmp_path: Path) -> None:
     params = tmp_path / "params.yaml"
     known = "base_to_fork: [0.5, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0]"
     params.write_text(params.read_text().replace("base_to_fork: null", known))
-    lines = sling(*arguments, folder=tmp_path).stdout.splitlines()
+    done = sling(*arguments, folder=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
     shown = dict(line.split(maxsplit=1) for line in lines if not line.startswith("warning: "))
     assert shown["tcp_position_m"] == "0.5 -0.329 0.25"
     assert shown["max_force_n"] == "30"
-    assert any(line.startswith("warning: the interval leaves out") for line in lines)
+    for warning in ("the interval leaves out", "data/mounting/band1.json is missing"):
+        assert any(line.startswith(f"warning: {warning}") for line in lines)
 
 
-def test_aim_by_a_robust_policy_that_is_not_there(tmp_path: Path) -> None:
+def test_aim_names_the_stage_that_makes_what_is_missing(tmp_path: Path, refused) -> None:
     aimable(tmp_path)
-    line = refused(
-        sling("aim", "--band", "band1", "--target", "1.9", "--robust", folder=tmp_path), 1
-    )
+    aim = ("aim", "--band", "band1", "--target", "1.9")
+    line = refused(1, *aim, "--robust", folder=tmp_path)
     assert "robust/policy.onnx: missing" in line
     assert "dvc repro policy@band1-sling2sim2real_taut" in line
-
-
-def test_aim_by_an_ablation_names_its_own_stages(tmp_path: Path) -> None:
-    aimable(tmp_path)
-    aim = ("aim", "--band", "band1", "--method", "de", "--target", "1.9")
-    assert refused(sling(*aim, folder=tmp_path), 1).endswith(
+    aim = (*aim, "--method", "de")
+    assert refused(1, *aim, folder=tmp_path).endswith(
         "de.json: missing; `dvc repro ablation_theta@band1-de` makes it"
     )
     theta = tmp_path / "data/theta/band1"
     shutil.copy(theta / "sling2sim2real_taut.json", theta / "de.json")
-    assert refused(sling(*aim, folder=tmp_path), 1).endswith(
+    assert refused(1, *aim, folder=tmp_path).endswith(
         "policy.onnx: missing; `dvc repro ablation_policy@band1-de` makes it"
     )
 

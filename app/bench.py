@@ -19,7 +19,7 @@ TAKES = {
 def bench(arguments: argparse.Namespace, what: str) -> str:
     """Measure `what`, a key of TAKES; a table, or with --json one object."""
     from pipeline.params import load
-    from validation.benchmarks import simulator
+    from validation.benchmarks import timing
 
     device, budget = arguments.device or "cpu", arguments.budget or "laptop"
     result, table, command = MEASURE[what](arguments, load(), device, budget)
@@ -27,7 +27,7 @@ def bench(arguments: argparse.Namespace, what: str) -> str:
         return table(result)
     device = "cpu" if what == "recording" else device
     command = f"sling bench {command} --json" if command else ""
-    return json.dumps(simulator.environment(device, command) | result)
+    return json.dumps(timing.environment(device, command) | result)
 
 
 def asked(arguments: argparse.Namespace) -> str:
@@ -45,15 +45,15 @@ def asked(arguments: argparse.Namespace) -> str:
 
 
 def _simulator(arguments, params, device, budget):
-    from validation.benchmarks import simulator
+    from validation.benchmarks import throughput
 
-    return simulator.bench(params, device=device), simulator.table, ""
+    return throughput.bench(params, device), throughput.table, ""
 
 
 def _recording(arguments, params, device, budget):
-    from validation.benchmarks import recording
+    from validation.benchmarks import clouds
 
-    return recording.bench_recording(arguments.recording, params), recording.table, "--recording"
+    return clouds.bench_recording(arguments.recording, params), clouds.table, "--recording"
 
 
 def _scaling(arguments, params, device, budget):

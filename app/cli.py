@@ -258,7 +258,7 @@ def ui(arguments: argparse.Namespace) -> Done:
 def verify(arguments: argparse.Namespace) -> Done:
     from pipeline.params import load
     from validation.engines import checks as peers
-    from validation.simulator.report import summary, verify
+    from validation.simulator.verification import summary, verify
 
     text, missed = summary(
         verify(load(), arguments.device, extra={"against MuJoCo": peers.section})

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from tools.closure import CODE, NESTED, ROOT, closure, folders, imports, script_of
+from tools.closure import CODE, NESTED, ROOT, closure, files_of, folders, imports, script_of
 
 STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
 HIDDEN = "pipeline/rig/"
@@ -85,6 +85,43 @@ def test_one_module_knows_where_files_lie_under_data() -> None:
         name = relative(file)
         if name != "pipeline/base/layout.py" and not name.startswith("validation/"):
             assert not spelt.search(file.read_text()), name
+
+
+def test_modules_import_each_other_in_no_circle() -> None:
+    """Imports within functions count; that a package comes with its module does not."""
+    graph = {relative(file): {leaf(other) for other in imported(file)} for file in code()}
+    graph["pipeline/recording/input/account.py"].clear()  # to be rebuilt
+    TopologicalSorter(graph).prepare()  # raises CycleError
+
+
+def imported(file: Path) -> set[str]:
+    """Dotted names that `file` imports."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{relative(file)}: a relative import"
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+def leaf(name: str) -> str:
+    """The project's file that a dotted name lies in; the name itself where it is none of ours."""
+    for module in (name, name.rpartition(".")[0]):
+        if files := files_of(module):
+            return relative(files[-1])
+    return name
+
+
+def test_no_class_name_stands_twice() -> None:
+    seen: dict[str, str] = {}
+    known = {"Camera", "Motion", "Picture", "Prediction", "Report", "Row", "Seen", "Step"}  # yet
+    for file in code():
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef) and node.name not in known:
+                assert node.name not in seen, f"{node.name}: {seen[node.name]}, {relative(file)}"
+                seen[node.name] = relative(file)
 
 
 def test_a_folder_of_folders_holds_no_code() -> None:

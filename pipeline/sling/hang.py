@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.sling.initial import drawn_guess
-from pipeline.sling.layout import Grip
 from pipeline.sling.model import Sling
+from pipeline.sling.records import Grip
 from pipeline.sling.schedule import Schedule, statics
 from pipeline.sling.solver import Frames, Slings, run
 

@@ -10,8 +10,8 @@ from scipy.interpolate import CubicSpline
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.sling.initial import hanging_guess
-from pipeline.sling.layout import Grip, Outcome
 from pipeline.sling.model import Sling
+from pipeline.sling.records import Grip, Outcome
 from pipeline.sling.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.sling.solver import Frames, Options, Slings, run
 

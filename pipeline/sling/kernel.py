@@ -8,7 +8,7 @@ from pathlib import Path
 import warp as wp
 
 from pipeline.base.native import built_once, text_of
-from pipeline.sling.layout import macros
+from pipeline.sling.records import macros
 from pipeline.sling.tetrahedra import CORNERS
 
 

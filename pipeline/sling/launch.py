@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.sling.initial import drawn_guess
-from pipeline.sling.layout import Grip, Outcome
 from pipeline.sling.model import GRAVITY, Sling
+from pipeline.sling.records import Grip, Outcome
 from pipeline.sling.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.sling.solver import Options, Slings, run
 
@@ -100,7 +100,7 @@ def launch(
 
 
 def _outcomes(sling: Sling, lanes: np.ndarray, max_force: float) -> Launches:
-    """Of slings that have been launched, by their records (N,) of layout.LANE."""
+    """Of slings that have been launched, by their records (N,) of records.LANE."""
     outcome = np.round(lanes["outcome"])
     hold_force = np.linalg.norm(lanes["hold_force"], axis=1)
     hold_force[outcome > 0] = np.nan

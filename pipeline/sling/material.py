@@ -1,6 +1,6 @@
 """The material law: its parameters θ, and what the native text takes for them.
 
-A law has three places: its parameters and coefficients here (named in layout.py), its stress and
+A law has three places: its parameters and coefficients here (named in records.py), its stress and
 their derivative by the deformation gradient in material.h, and the rod's bending and twist in
 rod.h. Whoever adds one writes it a second time in validation/simulator/reference.py.
 """
@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.sling.layout import MATERIAL
 from pipeline.sling.model import Sling
+from pipeline.sling.records import MATERIAL
 
 THETA = (
     "youngs_modulus",
@@ -22,7 +22,7 @@ THETA = (
 
 
 def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
-    """Coefficients of the law, records (N,) of layout.MATERIAL, for physical thetas (N, 5).
+    """Coefficients of the law, records (N,) of records.MATERIAL, for physical thetas (N, 5).
 
     mu is the shear modulus and lam the volume modulus of the stable neo-Hookean law without its
     logarithm (Smith, de Goes, Kim 2018): first Lame parameter plus mu, so that E and nu are the

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.sling.layout import STEP, Grip, Mode
+from pipeline.sling.records import STEP, Grip, Mode
 
 RELAX_STEPS = 40
 LONG = 10.0 ** np.arange(1, 6)  # s: steps in which inertia counts for nothing
@@ -17,7 +17,7 @@ class Schedule:
     """Steps of a batch.
 
     Attributes:
-        steps: Records of layout.STEP, shape (S,).
+        steps: Records of records.STEP, shape (S,).
         first_free: Index of the first step after the release.
     """
 

@@ -10,9 +10,9 @@ import numpy as np
 from pipeline.base.errors import UserError
 from pipeline.sling import tetrahedra
 from pipeline.sling.initial import fixed_frames
-from pipeline.sling.layout import LANE, OUTPUT, SETTING, numbers, records, width
 from pipeline.sling.material import material
 from pipeline.sling.model import GRAVITY, TETRAHEDRA, Sling
+from pipeline.sling.records import LANE, OUTPUT, SETTING, numbers, records, width
 from pipeline.sling.schedule import Schedule
 
 LANES, TEAM = 16, 10  # slings in a CPU thread's SIMD lanes; GPU threads that share a sling
@@ -24,9 +24,9 @@ class Slings:
     """N slings before their first step.
 
     Attributes:
-        coefficients: Of their material, records (N,) of layout.MATERIAL.
+        coefficients: Of their material, records (N,) of records.MATERIAL.
         state: Cross-sections, shape (N, sections, dofs) or (sections, dofs).
-        lanes: Records (N,) of layout.LANE.
+        lanes: Records (N,) of records.LANE.
     """
 
     coefficients: np.ndarray
@@ -35,7 +35,7 @@ class Slings:
 
     @classmethod
     def of(cls, sling: Sling, thetas: np.ndarray, state: np.ndarray, **lanes) -> Slings:
-        """With physical thetas (N, 5), at rest; `lanes` are fields of layout.LANE, else 0."""
+        """With physical thetas (N, 5), at rest; `lanes` are fields of records.LANE, else 0."""
         records = np.zeros(len(thetas), LANE)
         for name, values in lanes.items():
             records[name] = values
@@ -96,9 +96,9 @@ class Stepped:
 
     Attributes:
         state: At the end, shape (N, sections, dofs).
-        lanes: Records (N,) of layout.LANE.
+        lanes: Records (N,) of records.LANE.
         output: Force on the hand and Newton iterations of each step, shape (N, S, 4), in the order
-            of layout.OUTPUT; empty for launches.
+            of records.OUTPUT; empty for launches.
         frames: Shape (N, K, sections, width). This and `output` are what is long: from a GPU they
             come as Warp arrays that stay there, if asked for.
     """
@@ -260,7 +260,7 @@ class _Work:
 
 
 def _setting(sling: Sling, options: Options) -> np.ndarray:
-    """A record of layout.SETTING, shape (1,)."""
+    """A record of records.SETTING, shape (1,)."""
     result = np.zeros(1, SETTING)
     shortest = sling.edge_lengths.min()
     if sling.mesh == TETRAHEDRA:

@@ -17,7 +17,7 @@ from pipeline.params import load
 from pipeline.sling.model import Sling
 from tests.objective.own_law import disturbed, own_law_episode
 from tests.project import ROOT
-from validation.benchmarks.simulator import pull_and_release
+from validation.synthetic import pull_and_release
 
 TRUTH = np.array([2.5e5, 0.47, 4e-3, 0.8, 0.6])
 

@@ -17,7 +17,7 @@ from pipeline.objective.space import Space
 from pipeline.params import load
 from pipeline.params.identification import Prior
 from tests.search import toy
-from validation.benchmarks.simulator import recorded_yardstick
+from validation.synthetic import recorded_yardstick
 
 PARAMS = load("params.yaml")
 EPISODE = toy.episode()

@@ -13,7 +13,7 @@ from pipeline.recording import cloud
 from pipeline.recording.masks import masker
 from tests.recording import looks
 from tests.recording.looks import BAND, LOOKS
-from validation.benchmarks import recording as bench
+from validation.benchmarks import clouds as bench
 
 SETTINGS = load("params.yaml").cloud
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.sling.cylinder import cylinder, volumes
 from pipeline.sling.initial import sections_of
-from pipeline.sling.layout import Grip
+from pipeline.sling.records import Grip
 from pipeline.sling.schedule import Schedule, relaxation
 from pipeline.sling.solver import Options, Slings, run
 

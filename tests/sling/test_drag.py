@@ -9,8 +9,8 @@ import pytest
 
 from pipeline.sling.interaction import interact
 from pipeline.sling.launch import launch
-from pipeline.sling.layout import Grip
 from pipeline.sling.model import GRAVITY, ROD, TETRAHEDRA, Sling
+from pipeline.sling.records import Grip
 from pipeline.sling.schedule import steps
 from tests.sling.bands import along_x, stepped, vertex_masses
 

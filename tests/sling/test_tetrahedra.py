@@ -12,8 +12,8 @@ from pipeline.sling import Sling, interact, launch
 from pipeline.sling.cylinder import cylinder, volumes
 from pipeline.sling.initial import clamp_tangents, drawn_guess, hanging_guess
 from pipeline.sling.launch import schedule_of
-from pipeline.sling.layout import Grip
 from pipeline.sling.model import GRAVITY, TETRAHEDRA
+from pipeline.sling.records import Grip
 from pipeline.sling.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.sling.solver import Frames, Options, Slings, run
 from tests.sling.bands import (

@@ -11,11 +11,12 @@ from pipeline.base.errors import UserError
 from pipeline.objective.space import Space
 from pipeline.sling.interaction import interact
 from pipeline.sling.model import Sling
-from validation.benchmarks.simulator import DRAWN, available, pull_and_release, timed, yardstick
+from validation.benchmarks.timing import available, timed
 from validation.engines import mujoco_flex
 from validation.engines.mesh import Tube, hand_path
 from validation.engines.newton_vbd import Bands
 from validation.simulator.closed import String
+from validation.synthetic import DRAWN, pull_and_release, yardstick
 
 THETA = np.array([2.2e5, 0.45, 3e-3, 1.0, 1.0])  # 11 N at a draw of 0.35 m
 PEER_STEP = 0.005  # s: the largest that stays close while gripped; free, it loses launch speed

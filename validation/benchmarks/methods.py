@@ -28,7 +28,8 @@ from pipeline.search.optimizers.multistart import Multistart
 from pipeline.search.regions import regions_asked, regions_of
 from pipeline.sling.material import THETA
 from pipeline.sling.model import Sling
-from validation.benchmarks.simulator import recorded_yardstick, seconds, shared, timed
+from validation.benchmarks.timing import seconds, shared, timed
+from validation.synthetic import recorded_yardstick
 
 LARGE = {"population": 64, "generations": 39, "cma_population": 16, "cma_rollouts": 3200}
 BUDGETS = {"laptop": {}, "large": LARGE}  # laptop: as params.yaml has it

@@ -23,7 +23,8 @@ from pipeline.sling.launch import Launches, launch
 from pipeline.sling.load import load_sling
 from pipeline.sling.material import THETA
 from validation.benchmarks.methods import BUDGETS, evaluator, time_search
-from validation.benchmarks.simulator import DRAW, REPEATS, recorded_yardstick, seconds, timed
+from validation.benchmarks.timing import REPEATS, seconds, timed
+from validation.synthetic import DRAW, recorded_yardstick
 
 GENERATIONS = (64, 80, 1024, 4096, 16384)  # rollouts: the paper's two, and big ones
 LAUNCHES = (1024, 16384)

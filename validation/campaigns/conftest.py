@@ -13,7 +13,7 @@ import pytest
 
 from pipeline.base.files import write_json
 from pipeline.params import load
-from validation.benchmarks.simulator import environment
+from validation.benchmarks.timing import environment
 
 ROOT = Path(__file__).parents[2]
 

@@ -31,7 +31,7 @@ from pipeline.sling.material import THETA
 from pipeline.sling.model import Sling
 from tests.objective.own_law import disturbed, own_law_episode
 from validation.benchmarks.methods import complete
-from validation.benchmarks.simulator import pull_and_release
+from validation.synthetic import pull_and_release
 
 pytestmark = pytest.mark.validation
 

@@ -10,9 +10,9 @@ from pipeline.episode.episode import Episode
 from pipeline.sling.interaction import interact
 from pipeline.sling.launch import launch
 from pipeline.sling.model import ROD, TETRAHEDRA, Sling
-from validation.benchmarks.simulator import ease, unseen
 from validation.engines import mujoco_flex
-from validation.simulator.check import Bench, Check, Section
+from validation.simulator.finding import Bench, Finding, Theme
+from validation.synthetic import ease, unseen
 
 THETA = np.array([2.2e5, 0.30, 3e-3, 1.0, 1.0])
 GRASP, LIFTED, DRAWN, RELEASE = 0.1, 0.7, 1.8, 2.0  # s
@@ -117,12 +117,12 @@ def pull(bench: Bench, theta, step: float = 5e-4, **mesh) -> Pull:
     )
 
 
-def pull_checks(result: Pull, title: str, fine: bool) -> list[Check]:
+def pull_checks(result: Pull, title: str, fine: bool) -> list[Finding]:
     """Force and centre line; without limits where the mesh is known to be too coarse."""
     worst = result.line_errors
     frame = int(worst.argmax())
     return [
-        Check(
+        Finding(
             f"force on the hand while held, of its peak, {title}",
             "MuJoCo 3D flex",
             result.force_error,
@@ -131,7 +131,7 @@ def pull_checks(result: Pull, title: str, fine: bool) -> list[Check]:
             f"{result.held_error:+.2f} % at the end of the hold"
             + ("" if fine else "; its section is too coarse to bend freely"),
         ),
-        Check(
+        Finding(
             f"centre line while held, rms, {title}",
             "MuJoCo 3D flex",
             float(np.sqrt((worst**2).mean())),
@@ -144,7 +144,7 @@ def pull_checks(result: Pull, title: str, fine: bool) -> list[Check]:
 
 def launch_check(
     bench: Bench, cases=LAUNCHES, step: float = 2.5e-4, title: str = "", **mesh
-) -> Check:
+) -> Finding:
     """The largest difference of the landings of `cases`, as listed in LAUNCHES."""
     sling = sling_of(bench)
     thetas = np.array([[young, poisson, d, 1.0, 1.0] for young, poisson, d, _ in cases])
@@ -157,7 +157,7 @@ def launch_check(
     landing = 100 * (np.array([one.landing_y for one in theirs]) / ours.landing_y - 1)
     speed = 100 * (np.array([one.speed for one in theirs]) / ours.speed - 1)
     hold = 100 * (np.array([one.hold_force for one in theirs]) / ours.hold_force - 1)
-    return Check(
+    return Finding(
         f"landing of {len(cases)} launches, the largest difference{title}",
         "MuJoCo 3D flex",
         float(np.abs(landing).max()),
@@ -168,7 +168,7 @@ def launch_check(
     )
 
 
-def section(bench: Bench) -> Section:
+def section(bench: Bench) -> Theme:
     """All comparisons.
 
     Raises:
@@ -193,7 +193,7 @@ def section(bench: Bench) -> Section:
             "The hand's force and the band seen from the side and from the front: ours (lines) and"
             " MuJoCo's (dashes)."
         )
-    return Section("Against MuJoCo", checks, TEXT, pictures)
+    return Theme("Against MuJoCo", checks, TEXT, pictures)
 
 
 def draw(result: Pull, path) -> None:

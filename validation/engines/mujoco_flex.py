@@ -22,7 +22,7 @@ LED = 1e3  # kg: the inertia of what leads a vertex; a step moves it by less tha
 SETTLE_STEP, SETTLE_STEPS = 0.02, 60
 
 
-class Band:
+class FlexBand:
     """A band of MuJoCo, at rest where it hangs from its clamps.
 
     Attributes:
@@ -111,7 +111,7 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Interaction:
+class FlexInteraction:
     """One simulated interaction while the hand holds the band.
 
     Attributes:
@@ -129,7 +129,7 @@ class Interaction:
     arc: np.ndarray
 
 
-def interact(sling: Sling, episode, theta, step: float = 5e-4, **mesh) -> Interaction:
+def interact(sling: Sling, episode, theta, step: float = 5e-4, **mesh) -> FlexInteraction:
     """The episode's grasp, lift and pull with one theta (5,), as sling.interaction makes it.
 
     Args:
@@ -139,7 +139,7 @@ def interact(sling: Sling, episode, theta, step: float = 5e-4, **mesh) -> Intera
         UserError: MuJoCo is not installed.
     """
     tube = Tube.of(sling, **mesh)
-    band = Band(tube, theta, step)
+    band = FlexBand(tube, theta, step)
     band.hold(True)
     count = int(round((episode.release_time - episode.grasp_time) / step))
     times = episode.grasp_time + step * np.arange(1, count + 1)
@@ -156,7 +156,7 @@ def interact(sling: Sling, episode, theta, step: float = 5e-4, **mesh) -> Intera
         for k in np.flatnonzero(frame_steps == i):
             weight = (stamps[k] - times[i] + step) / step
             lines.append(before + weight * (band.center_line - before))
-    return Interaction(times, force, stamps, np.array(lines), tube.arc)
+    return FlexInteraction(times, force, stamps, np.array(lines), tube.arc)
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ def launch(sling: Sling, theta, draw, step: float = 2.5e-4, **mesh) -> Launch:
         UserError: MuJoCo is not installed.
     """
     tube = Tube.of(sling, **mesh)
-    band = Band(tube, theta, step)
+    band = FlexBand(tube, theta, step)
     band.hold(True)
     band.load(sling.projectile_mass)
     place = np.array([0.0, *draw])

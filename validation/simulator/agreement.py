@@ -8,10 +8,9 @@ import numpy as np
 
 from pipeline.objective.space import Space
 from pipeline.sling.initial import drawn_guess, hanging_guess
-from pipeline.sling.layout import Grip
 from pipeline.sling.model import Sling
+from pipeline.sling.records import Grip
 from pipeline.sling.schedule import relaxation, steps
-from validation.simulator.check import Bench, Check, Section
 from validation.simulator.experiment import (
     TIGHT,
     band_of,
@@ -21,6 +20,7 @@ from validation.simulator.experiment import (
     straight,
     straight_guess,
 )
+from validation.simulator.finding import Bench, Finding, Theme
 from validation.simulator.march import march
 from validation.simulator.reference import ReferenceRod
 
@@ -35,7 +35,7 @@ def random_thetas(bench: Bench, count: int, seed: int = SEED) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Scene:
+class Start:
     """A band at rest in one way (`before`, from `guess`), and steps of it in another.
 
     Attributes:
@@ -60,7 +60,7 @@ def _turned(sling: Sling, sections: np.ndarray, most: float) -> np.ndarray:
     return np.hstack([sections[:, :3], *turned])
 
 
-def scenes(sling: Sling) -> dict[str, Scene]:
+def scenes(sling: Sling) -> dict[str, Start]:
     """Every way to hold a band, and both orders of steps."""
     path = np.linspace([0.0, 0.0, -0.2], [0.01, -0.03, -0.18], 8)
     held = steps(0.002 * np.arange(9), 0.002, grip=Grip.HELD)
@@ -73,11 +73,11 @@ def scenes(sling: Sling) -> dict[str, Scene]:
     loose = replace(taut, clamped=(False, False))
     start = straight_guess(taut)
     return {
-        "held, opened and let go": Scene(
+        "held, opened and let go": Start(
             sling, np.concatenate([held, opening, free]), hanging_guess(sling)
         ),
-        "brought to rest": Scene(sling, relaxation(Grip.FREE)[:12], hanging_guess(sling)),
-        "launched": Scene(
+        "brought to rest": Start(sling, relaxation(Grip.FREE)[:12], hanging_guess(sling)),
+        "launched": Start(
             sling,
             launched(0.00025, 16),
             drawn_guess(sling, draw)[0],
@@ -85,8 +85,8 @@ def scenes(sling: Sling) -> dict[str, Scene]:
             grip=Grip.POUCH,
             payload=sling.projectile_mass,
         ),
-        "twisted and let go": Scene(taut, launched(0.0005, 12, 1), start, before=taut, turned=0.3),
-        "stretched and let go at both ends": Scene(loose, launched(0.0005, 12), start, before=taut),
+        "twisted and let go": Start(taut, launched(0.0005, 12, 1), start, before=taut, turned=0.3),
+        "stretched and let go at both ends": Start(loose, launched(0.0005, 12), start, before=taut),
     }
 
 
@@ -113,23 +113,23 @@ def compare(bench: Bench, thetas: np.ndarray) -> dict[str, tuple[float, float]]:
     return result
 
 
-def checks(bench: Bench, count: int = 4) -> list[Check]:
+def checks(bench: Bench, count: int = 4) -> list[Finding]:
     against = "NumPy reference implementation, Newton's method to rounding"
     note = f"{count} random θ of the box, double precision"
     result = []
     for name, (states, forces) in compare(bench, random_thetas(bench, count)).items():
         result.append(
-            Check(f"states of a band {name}", against, states, "of its motion", LIMIT, note)
+            Finding(f"states of a band {name}", against, states, "of its motion", LIMIT, note)
         )
         if forces > 0:
             result.append(
-                Check(f"force of a band {name}", against, forces, "of its peak", LIMIT, note)
+                Finding(f"force of a band {name}", against, forces, "of its peak", LIMIT, note)
             )
     return result
 
 
-def section(bench: Bench) -> Section:
-    return Section(
+def section(bench: Bench) -> Theme:
+    return Theme(
         "The kernel against a reference implementation",
         checks(bench),
         "`validation/simulator/reference.py` is the rod written a second time, in plain NumPy from"

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from pipeline.sling.layout import Grip
 from pipeline.sling.model import Sling
+from pipeline.sling.records import Grip
 from validation.simulator import figures
 from validation.simulator.agreement import random_thetas
-from validation.simulator.check import Bench, Check, Section, off
+from validation.simulator.at_rest import STRING
 from validation.simulator.closed import String, oscillation
 from validation.simulator.experiment import (
     band_of,
@@ -21,8 +21,8 @@ from validation.simulator.experiment import (
     straight,
     straight_guess,
 )
+from validation.simulator.finding import Bench, Finding, Theme, off
 from validation.simulator.reference import ReferenceRod
-from validation.simulator.statics import STRING
 
 SEED = 11
 ROUNDING = 1e-9  # of the largest power, or of the energy at the start
@@ -65,7 +65,7 @@ def power_gain(rod: ReferenceRod, sections: np.ndarray) -> float:
     return float(max(-lowest, 0.0))
 
 
-def dissipation(bench: Bench, count: int = 10) -> list[Check]:
+def dissipation(bench: Bench, count: int = 10) -> list[Finding]:
     """Over `count` random states of each kind, a random theta each."""
     sling, rng = band_of(bench), np.random.default_rng(SEED)
     checks = []
@@ -77,7 +77,7 @@ def dissipation(bench: Bench, count: int = 10) -> list[Check]:
             for theta, x in zip(thetas, states, strict=True)
         ]
         checks.append(
-            Check(
+            Finding(
                 f"power gained in states {kind}",
                 "no rates gain energy: lowest eigenvalue of the dissipation ≥ 0",
                 float(max(gains)),
@@ -111,7 +111,7 @@ def recoil_energies(
     return np.reshape(energies, (-1, steps + 1))
 
 
-def growth(bench: Bench, count: int = 48) -> list[Check]:
+def growth(bench: Bench, count: int = 48) -> list[Finding]:
     """Energy of the kernel's own steps from random states of every kind."""
     size = bench.params.sling
     checks = []
@@ -130,7 +130,7 @@ def growth(bench: Bench, count: int = 48) -> list[Check]:
         kept = ", ".join(f"{len(energy)} {kind}" for kind, energy in energies.items())
         note = f"kept of {2 * count} random states and θ each: {kept}; the others are marked failed"
         checks.append(
-            Check(
+            Finding(
                 f"rise above the start, {label}, {1e3 * h:g} ms",
                 "energy never grows without work",
                 float(np.max(every - 1, initial=0.0)),
@@ -140,7 +140,7 @@ def growth(bench: Bench, count: int = 48) -> list[Check]:
             )
         )
         checks.append(
-            Check(
+            Finding(
                 f"rise in any one step, {label}, {1e3 * h:g} ms",
                 "energy never grows without work",
                 float(np.max(np.diff(every, axis=1), initial=0.0)),
@@ -199,7 +199,7 @@ def oscillate(
     return time, place, modes(fit.x[0] * k, fit.x[1] * c), modes(k, c)
 
 
-def oscillator(bench: Bench, cases=None, per_period: int = 800) -> list[Check]:
+def oscillator(bench: Bench, cases=None, per_period: int = 800) -> list[Finding]:
     """Frequency and decay of the middle, along and across the band.
 
     Args:
@@ -219,11 +219,11 @@ def oscillator(bench: Bench, cases=None, per_period: int = 800) -> list[Check]:
             ("decay", fitted[1], closed[1], DECAY_LIMIT, "/s"),
         ):
             note = f"{one:.4g} {unit}, closed form {other:.4g} {unit}"
-            checks.append(Check(f"{name} {where}", against, off(one, other), "%", limit, note))
+            checks.append(Finding(f"{name} {where}", against, off(one, other), "%", limit, note))
     return checks
 
 
-def section(bench: Bench) -> Section:
+def section(bench: Bench) -> Theme:
     pictures = {}
     if bench.figures:
         cases = {}
@@ -238,7 +238,7 @@ def section(bench: Bench) -> Section:
             "A mass of 0.5 kg at the middle of a stretched band, let go 5 mm off its place along or"
             " across the band, at d 40 ms: simulator (dots) and the damped oscillator (lines)."
         )
-    return Section(
+    return Theme(
         "Damping",
         [*oscillator(bench), *dissipation(bench), *growth(bench)],
         "A heavy middle of a stretched, light string, a band made"

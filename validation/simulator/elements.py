@@ -9,14 +9,15 @@ import numpy as np
 from pipeline.sling import Launches, Rollouts, Sling, interact, launch
 from pipeline.sling.initial import sections_of
 from pipeline.sling.interaction import schedule_of
-from pipeline.sling.layout import Grip
 from pipeline.sling.model import GRAVITY, ROD, TETRAHEDRA
+from pipeline.sling.records import Grip
 from pipeline.sling.schedule import Schedule, statics
 from pipeline.sling.solver import Options, Slings, memory, run
-from validation.benchmarks.simulator import pull_and_release, timed
-from validation.simulator.check import Bench, Section
+from validation.benchmarks.timing import timed
 from validation.simulator.closed import String, clamped_beam
-from validation.simulator.launches import random_launches
+from validation.simulator.finding import Bench, Theme
+from validation.simulator.launching import random_launches
+from validation.synthetic import pull_and_release
 
 COUNT = 16  # thetas, as many as a thread's lanes
 DEPTHS = (0.40, 0.55)  # of draws [m]
@@ -211,7 +212,7 @@ def _known(value: float) -> float | None:
     return float(f"{value:.5g}") if np.isfinite(value) else None
 
 
-def section(bench: Bench) -> Section:
+def section(bench: Bench) -> Theme:
     """On the CPU, whatever the other checks run on."""
     columns = {name: measure(bench, sling) for name, sling in slings(bench.params).items()}
     rod = next(iter(columns.values()))
@@ -227,4 +228,4 @@ def section(bench: Bench) -> Section:
         }
         for name, one in columns.items()
     }
-    return Section("Rod and tetrahedra", [], TEXT + table(columns), details=details)
+    return Theme("Rod and tetrahedra", [], TEXT + table(columns), details=details)

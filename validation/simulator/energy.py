@@ -8,13 +8,13 @@ import numpy as np
 
 from pipeline.sling.initial import hanging_guess
 from pipeline.sling.interaction import schedule_of
-from pipeline.sling.layout import Grip
+from pipeline.sling.records import Grip
 from pipeline.sling.schedule import RELAX_STEPS
-from validation.benchmarks import simulator as yardstick
 from validation.simulator import figures
-from validation.simulator.check import Bench, Check, Section
 from validation.simulator.experiment import band_of, move
+from validation.simulator.finding import Bench, Finding, Theme
 from validation.simulator.reference import ReferenceRod
+from validation.synthetic import pull_and_release
 
 LIMIT = 1.0  # percent of the hand's work
 THETA = (6e5, 0.45, 5e-3, 0.6, 0.8)
@@ -63,7 +63,7 @@ class Balance:
 def balance(bench: Bench, theta=THETA) -> Balance:
     """The bench's pull and release in double precision, every step of it accounted for."""
     sling = band_of(bench)
-    episode = yardstick.pull_and_release("band", bench.params.episode, sling)
+    episode = pull_and_release("band", bench.params.episode, sling)
     table = schedule_of(sling, episode).steps
     motion = move(bench, sling, theta, table, hanging_guess(sling), double=True)
     first = RELAX_STEPS - 1  # the band hangs
@@ -106,7 +106,7 @@ def balance(bench: Bench, theta=THETA) -> Balance:
     )
 
 
-def checks(done: Balance) -> list[Check]:
+def checks(done: Balance) -> list[Finding]:
     held = done.time <= done.release + 1e-9
     total = np.abs(done.hand).max()
     taut = (done.time > done.release) & (done.time < done.release + 0.1)
@@ -118,7 +118,7 @@ def checks(done: Balance) -> list[Check]:
     note = " + ".join(f"{name} {value:.4f}" for name, value in parts.items())
     against = "hand + fingers' turning = elastic + kinetic + gravity + dissipated (viscous, pads)"
     return [
-        Check(
+        Finding(
             "balance of energy, largest miss at any time",
             against,
             done.share(done.miss),
@@ -126,7 +126,7 @@ def checks(done: Balance) -> list[Check]:
             LIMIT,
             "of the hand's work; the steps' own loss is the miss",
         ),
-        Check(
+        Finding(
             "balance of energy, miss at the end",
             against,
             float(100 * np.abs(done.miss[-1]) / total),
@@ -134,7 +134,7 @@ def checks(done: Balance) -> list[Check]:
             LIMIT,
             f"hand {done.hand[-1]:.4f} J and turning {done.turning[-1]:.4f} J = {note} J",
         ),
-        Check(
+        Finding(
             "work of the fingers' turning, largest at any time",
             "—",
             done.share(done.turning),
@@ -144,7 +144,7 @@ def checks(done: Balance) -> list[Check]:
             f" elastic energy; the balance misses {done.share(done.miss - done.turning):.2f} %"
             " without it",
         ),
-        Check(
+        Finding(
             "residual of the kernel's steps by the reference's forces",
             "balance with the steps' loss, by its formula, as an entry",
             done.share(done.remainder),
@@ -152,7 +152,7 @@ def checks(done: Balance) -> list[Check]:
             LIMIT,
             "of the hand's work, largest at any time: every step is solved, no force is missing",
         ),
-        Check(
+        Finding(
             "lost to the steps while held",
             "0 for infinitely short steps",
             done.share(done.integrator[held]),
@@ -160,7 +160,7 @@ def checks(done: Balance) -> list[Check]:
             LIMIT,
             "backward Euler, of the hand's work",
         ),
-        Check(
+        Finding(
             "lost to the steps in the first 0.1 s after the release",
             "0 for infinitely short steps",
             float(100 * np.abs(done.integrator[taut] - done.integrator[held][-1]).max() / total),
@@ -168,7 +168,7 @@ def checks(done: Balance) -> list[Check]:
             LIMIT,
             "second order, of the hand's work",
         ),
-        Check(
+        Finding(
             "lost to the opening pads",
             "their friction at the band's path",
             float(100 * done.pads[-1] / total),
@@ -179,7 +179,7 @@ def checks(done: Balance) -> list[Check]:
     ]
 
 
-def section(bench: Bench) -> Section:
+def section(bench: Bench) -> Theme:
     done = balance(bench)
     pictures = {}
     if bench.figures:
@@ -188,7 +188,7 @@ def section(bench: Bench) -> Section:
             "Where the hand's work goes: a pull of 0.35 m in 4 s, a pause, the release at 8 s, and"
             " (right) the first 100 ms after it."
         )
-    return Section(
+    return Theme(
         "Energy of a pull, hold and release",
         checks(done),
         "The yardstick of `sling bench`, in double precision, each step accounted for with the"

@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.sling.initial import fixed_frames, sections_of
-from pipeline.sling.layout import Grip, Mode
 from pipeline.sling.model import Sling
+from pipeline.sling.records import Grip, Mode
 from pipeline.sling.schedule import Schedule, statics, steps
 from pipeline.sling.solver import Frames, Options, Slings, run
-from validation.simulator.check import Bench
+from validation.simulator.finding import Bench
 
 TIGHT = {"double": True, "tolerance": 1e-12}  # the kernel as exact as it gets
 
 
 @dataclass(frozen=True)
-class Motion:
+class Trajectories:
     """N bands through a schedule.
 
     Attributes:
@@ -77,7 +77,7 @@ def settling(grip: Grip = Grip.FREE, target=(0.0, 0.0, 0.0)) -> np.ndarray:
 def move(
     bench: Bench, sling: Sling, thetas, table: np.ndarray, start: np.ndarray, *,
     payload: float = 0.0, **options,
-) -> Motion:  # fmt: skip
+) -> Trajectories:  # fmt: skip
     """Step N thetas (N, 5) from `start` (N, L, 9) or (L, 9), at rest, through steps (S,).
 
     Other options are those of the solver.
@@ -94,7 +94,7 @@ def move(
     )
     x = done.frames.astype(float)
     start = np.broadcast_to(start, (len(thetas), *x.shape[2:]))
-    return Motion(
+    return Trajectories(
         table,
         start,
         x,

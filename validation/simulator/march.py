@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.sling.layout import Grip, Mode
+from pipeline.sling.records import Grip, Mode
 from validation.simulator.reference import ReferenceRod
 
 SMALL = 1e-30  # imaginary step: derivatives without cancellation

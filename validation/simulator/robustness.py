@@ -10,10 +10,10 @@ import numpy as np
 
 from pipeline.objective.space import Space
 from pipeline.sling import THETA, Sling, interact, launch
-from validation.benchmarks import simulator as yardstick
 from validation.simulator.agreement import random_thetas
-from validation.simulator.check import Bench, Check, Section
 from validation.simulator.experiment import band_of
+from validation.simulator.finding import Bench, Finding, Theme
+from validation.synthetic import pull_and_release
 
 COUNT, LAUNCHES, FACES, BATCH, SEED = 10_000, 2_000, 500, 500, 1
 HELD_FAST = 1e5  # N: at this force of the pads no band slips out
@@ -47,7 +47,7 @@ def ranges(thetas: list[dict[str, float]]) -> str:
 
 def survey(bench: Bench, sling: Sling, thetas: np.ndarray, progress=print) -> dict:
     """Roll all thetas out, batch by batch, and count what comes of them."""
-    episode = yardstick.pull_and_release("band", bench.params.episode, sling)
+    episode = pull_and_release("band", bench.params.episode, sling)
     reasons, bad, farthest, failed = Counter(), 0, 0.0, []
     for first in range(0, len(thetas), BATCH):
         part = thetas[first : first + BATCH]
@@ -95,7 +95,7 @@ def section(
     launches: int = LAUNCHES,
     faces: int = FACES,
     progress=print,
-) -> Section:
+) -> Theme:
     sling, thetas = band_of(bench), random_thetas(bench, count, SEED)
     fast = replace(sling, grip_force=HELD_FAST)
     held = survey(bench, fast, thetas, progress)
@@ -111,12 +111,12 @@ def section(
     def told(reasons: dict) -> str:
         return "; ".join(f"{number} “{reason}”" for reason, number in reasons.items()) or "none"
 
-    def failed(name: str, one: dict) -> Check:
+    def failed(name: str, one: dict) -> Finding:
         total = float(sum(one["reasons"].values()))
-        return Check(name, "—", total, "θ", None, told(one["reasons"]))
+        return Finding(name, "—", total, "θ", None, told(one["reasons"]))
 
     boundary = [
-        Check(
+        Finding(
             f"unconverged, and marked so, of {one['rollouts']} rollouts {where}, held fast",
             "—",
             float(len(one["unconverged"])),
@@ -130,7 +130,7 @@ def section(
         )
     ]
     checks = [
-        Check(
+        Finding(
             f"not finite, though not marked failed, of {count} rollouts, {len(corners(bench))} at"
             f" corners and {faces} on faces of the box, {launches} with the default grip and"
             f" {launches} launches",
@@ -140,7 +140,7 @@ def section(
             0.0,
             f"farthest node {held['farthest_node_m']:.2f} m from the fork",
         ),
-        Check(
+        Finding(
             f"unconverged, and marked so, of {count} rollouts within the box, held fast",
             "0, or marked failed with a reason",
             float(len(held["unconverged"])),
@@ -152,7 +152,7 @@ def section(
         failed(f"failed of {launches} with the default grip", gripped),
         failed(f"failed of {launches} launches from random draws", launched),
     ]
-    return Section(
+    return Theme(
         "Random parameters",
         checks,
         "θ from the box of `params.yaml`, on the pull-and-release of `sling bench`; a rollout that"

@@ -13,7 +13,7 @@ from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
 from pipeline.params import load
 from validation.benchmarks import methods as bench
-from validation.benchmarks.simulator import THETA, recorded_yardstick
+from validation.synthetic import THETA, recorded_yardstick
 
 PARAMS = load(Path(__file__).parents[3] / "params.yaml")
 SMALL = {"population": 6, "generations": 2, "cma_population": 4, "cma_rollouts": 16, "k_top": 2}

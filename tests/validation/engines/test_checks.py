@@ -9,7 +9,7 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.params import load
 from validation.engines import checks
-from validation.simulator.check import Bench
+from validation.simulator.finding import Bench
 
 
 def test_without_mujoco_the_section_says_how_to_get_it(monkeypatch):

@@ -10,8 +10,8 @@ import pytest
 from pipeline.params import load
 from validation.engines import checks
 from validation.engines.mesh import Tube
-from validation.engines.mujoco_flex import Band
-from validation.simulator.check import Bench, unmet
+from validation.engines.mujoco_flex import FlexBand
+from validation.simulator.finding import Bench, unmet
 
 mujoco = pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[validation]'")
 
@@ -28,7 +28,7 @@ def held(bench):
 
 def test_its_law_is_ours(bench):
     tube = Tube.of(checks.sling_of(bench), edges=4)
-    band = Band(tube, checks.THETA, 5e-4)
+    band = FlexBand(tube, checks.THETA, 5e-4)
     moved = tube.rest + 0.002 * np.random.default_rng(1).standard_normal(tube.rest.shape)
     band.data.qpos[:] = (moved - tube.rest).ravel()
     mujoco.mj_forward(band.model, band.data)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.params import load
-from validation.simulator.check import Bench
+from validation.simulator.finding import Bench
 
 
 @pytest.fixture(scope="session")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from validation.simulator.check import Check, unmet
+from validation.simulator.finding import Finding, unmet
 
 
-def assert_kept(checks: Iterable[Check]) -> None:
+def assert_kept(checks: Iterable[Finding]) -> None:
     """Every check keeps its limit; at least one has one."""
     checks = list(checks)
     assert any(check.limit is not None for check in checks)

@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from validation.simulator import launches, robustness
+from validation.simulator import launching, robustness
 
 from .kept import assert_kept
 
 
 def test_launches_are_converged_in_steps(bench):
-    assert_kept(launches.convergence(bench, count=6, meshes=(), progress=str))
+    assert_kept(launching.convergence(bench, count=6, meshes=(), progress=str))
 
 
 def test_launches_converge_at_second_order(bench):
-    assert_kept(launches.order_in_time(bench, count=6))
+    assert_kept(launching.order_in_time(bench, count=6))
 
 
 def test_launches_are_as_many_as_asked_for():
-    for count in (3, launches.COUNT + 5):
-        theta, draws = launches.random_launches(count)
+    for count in (3, launching.COUNT + 5):
+        theta, draws = launching.random_launches(count)
         assert theta.shape == (count, 5) and draws.shape == (count, 2)
 
 
 def test_launches_fly_freely_and_gain_no_more_than_is_stored(bench):
-    assert_kept(launches.physics(bench, count=4))
+    assert_kept(launching.physics(bench, count=4))
 
 
 def test_random_thetas_are_finite_or_fail_by_name(bench):

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from validation.simulator import damping
 from validation.simulator.agreement import random_thetas
-from validation.simulator.check import Bench
 from validation.simulator.damping import ROUNDING, STATES
 from validation.simulator.experiment import band_of
+from validation.simulator.finding import Bench
 from validation.simulator.reference import ReferenceRod
 
 from .kept import assert_kept

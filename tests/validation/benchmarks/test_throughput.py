@@ -9,20 +9,21 @@ import numpy as np
 from pipeline.params import load
 from pipeline.sling.interaction import interact
 from pipeline.sling.model import Sling
-from validation.benchmarks import simulator as bench
+from validation import synthetic
+from validation.benchmarks import throughput as bench
 
 PARAMS = load(Path(__file__).parents[3] / "params.yaml")
 
 
 def test_the_yardstick_is_held_drawn_and_let_go() -> None:
     sling = Sling.of(PARAMS.bands["band1"], PARAMS.setup, PARAMS.sling)
-    episode = bench.pull_and_release("band1", PARAMS.episode, sling)
+    episode = synthetic.pull_and_release("band1", PARAMS.episode, sling)
     rollouts = interact(sling, episode, np.array([[6e5, 0.45, 5e-3, 0.5, 1.0]]))
     assert rollouts.failure == [None]
     at = {t: int(np.argmin(np.abs(rollouts.cloud_time - t))) for t in (7.9, 8.5)}
     middle = rollouts.center_line[0, :, sling.middle, 1]
-    assert abs(middle[at[7.9]] + bench.DRAW) < 1e-3
-    assert middle[at[8.5]] > -bench.DRAW / 2
+    assert abs(middle[at[7.9]] + synthetic.DRAW) < 1e-3
+    assert middle[at[8.5]] > -synthetic.DRAW / 2
     assert rollouts.force[0, rollouts.times < 7.9, 1].max() > 3.0  # N, towards the fork
 
 
@@ -35,7 +36,7 @@ def test_it_counts_rollouts_and_launches(monkeypatch) -> None:
         assert all(np.isfinite(value) and value > 0 for value in entry.values())
         assert entry["rollouts_with_loss_per_s"] < entry["launches_per_s"]
     steps = result["yardstick"]["steps"]
-    assert steps["held"] == round((bench.RELEASE - bench.GRASP) / PARAMS.sling.grip_step)
+    assert steps["held"] == round((synthetic.RELEASE - synthetic.GRASP) / PARAMS.sling.grip_step)
     assert result["yardstick"]["newton_iterations"] >= sum(steps.values())
     assert 0 < result["first_start_s"]["cached"] < result["first_start_s"]["empty_cache"]
     assert str(steps["recoil"]) in bench.table(result)

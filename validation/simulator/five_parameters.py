@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.sling import Sling, interact
-from pipeline.sling.layout import Grip
-from validation.benchmarks import simulator as yardstick
-from validation.simulator.check import Bench, Check, Section, off
+from pipeline.sling.records import Grip
+from validation.simulator.at_rest import STRING
 from validation.simulator.closed import String
 from validation.simulator.damping import oscillate
 from validation.simulator.experiment import band_of, move, settling, straight, straight_guess
-from validation.simulator.statics import STRING
+from validation.simulator.finding import Bench, Finding, Theme, off
+from validation.synthetic import pull_and_release
 
 THETA = (6e5, 0.45, 5e-3, 0.6, 0.8)
 THIN = f"a string {STRING} times thinner than the band"
@@ -27,17 +27,17 @@ def _with(**changes: float) -> list[float]:
 
 def held_force(bench: Bench, sling: Sling, thetas: list, when: float = 7.9) -> np.ndarray:
     """Force (N,) on the hand in the yardstick's pause before the release."""
-    episode = yardstick.pull_and_release("band", bench.params.episode, sling)
+    episode = pull_and_release("band", bench.params.episode, sling)
     done = interact(sling, episode, np.array(thetas), device=bench.device, workers=bench.workers)
     force = np.linalg.norm(done.force[:, np.argmin(np.abs(done.times - when))], axis=1)
     return np.where([reason is None for reason in done.failure], force, np.nan)
 
 
-def young(bench: Bench) -> list[Check]:
+def young(bench: Bench) -> list[Finding]:
     sling = replace(band_of(bench), mass=1e-4, grip_force=1e5)
     one, two = held_force(bench, sling, [_with(), _with(young=2 * THETA[0])])
     return [
-        Check(
+        Finding(
             "held force at 2 E over that at E",
             "2",
             off(two / one, 2.0),
@@ -48,7 +48,7 @@ def young(bench: Bench) -> list[Check]:
     ]
 
 
-def poisson(bench: Bench, stretch: float = 1.5) -> list[Check]:
+def poisson(bench: Bench, stretch: float = 1.5) -> list[Finding]:
     """Volume of a straight, held string, and its pull at given E, from nu 0.30 to 0.49."""
     sling = band_of(bench)
     sling = replace(sling, radius=sling.radius / STRING)
@@ -69,7 +69,7 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Check]:
     pull = -motion.force[:, -1, 0]
     ratio = float(strings[1].force(stretch) / strings[0].force(stretch))
     return [
-        Check(
+        Finding(
             f"volume that a string gains at stretch {stretch:g}, ν 0.30 and 0.49",
             "J − 1 = μ/λ (1 − 1/l)",
             off(volume - 1, expected - 1),
@@ -77,7 +77,7 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Check]:
             1.0,
             f"{100 * (volume[0] - 1):.2f} % and {100 * (volume[1] - 1):.2f} %; {THIN}",
         ),
-        Check(
+        Finding(
             "pull at ν 0.49 over that at ν 0.30, same E",
             "P = μ (l − J/l²)",
             off(pull[1] / pull[0], ratio),
@@ -88,7 +88,7 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Check]:
     ]
 
 
-def damping(bench: Bench) -> list[Check]:
+def damping(bench: Bench) -> list[Finding]:
     """Decay of the heavy middle: d scales it, s its shape part and not its volume part."""
 
     def decay(d: float, s: float) -> tuple[float, float]:
@@ -102,7 +102,7 @@ def damping(bench: Bench) -> list[Check]:
     none, closed_none = decay(1e-2, 0.0)
     volume = closed_none / closed
     return [
-        Check(
+        Finding(
             "decay at 2 d over that at d",
             "2",
             off(twice / base, 2.0),
@@ -110,7 +110,7 @@ def damping(bench: Bench) -> list[Check]:
             1.0,
             f"{twice / base:.4f}; along the band, ν 0.30, s 1; {THIN}",
         ),
-        Check(
+        Finding(
             "decay lost from s = 1 to s = 0.5",
             "half of the shape part",
             off((base - half) / (base - none), 0.5),
@@ -118,7 +118,7 @@ def damping(bench: Bench) -> list[Check]:
             1.0,
             f"{(base - half) / (base - none):.4f} of what is lost from 1 to 0; {THIN}",
         ),
-        Check(
+        Finding(
             "decay that is left at s = 0, over that at s = 1",
             "the volume part, d (λ − μ/3) J'²",
             off(none / base, volume),
@@ -129,10 +129,10 @@ def damping(bench: Bench) -> list[Check]:
     ]
 
 
-def friction(bench: Bench, count: int = 33) -> list[Check]:
+def friction(bench: Bench, count: int = 33) -> list[Finding]:
     """Coulomb: pads with the normal force N hold a pull of 2 mu N; then they open."""
     sling = band_of(bench)
-    episode = yardstick.pull_and_release("band", bench.params.episode, sling)
+    episode = pull_and_release("band", bench.params.episode, sling)
     strong = interact(
         replace(sling, grip_force=1e5), episode, np.array([_with()]), device=bench.device
     )
@@ -162,7 +162,7 @@ def friction(bench: Bench, count: int = 33) -> list[Check]:
     expected = np.maximum(size[first] - rate * times[window], 0)
     miss = 100 * np.abs(size[window] - expected).max() / size[first]
     return [
-        Check(
+        Finding(
             "least friction that holds the pull",
             "Coulomb, F = 2 μ N",
             off(found, least),
@@ -170,7 +170,7 @@ def friction(bench: Bench, count: int = 33) -> list[Check]:
             0.25,
             f"{found:.4f}; {peak:.2f} N, pads of {sling.grip_force:g} N; below it: “{SLIP}”",
         ),
-        Check(
+        Finding(
             "θ below it that do not slip",
             "0",
             float(holds[tries < 0.999 * least].sum()),
@@ -178,7 +178,7 @@ def friction(bench: Bench, count: int = 33) -> list[Check]:
             0.0,
             f"of {int((tries < 0.999 * least).sum())}",
         ),
-        Check(
+        Finding(
             "force while the fingers open",
             f"pull − 2 μ N t / T, T {1e3 * sling.finger_opening_time:g} ms",
             float(miss),
@@ -189,8 +189,8 @@ def friction(bench: Bench, count: int = 33) -> list[Check]:
     ]
 
 
-def section(bench: Bench) -> Section:
-    return Section(
+def section(bench: Bench) -> Theme:
+    return Theme(
         "The five parameters",
         [*young(bench), *poisson(bench), *damping(bench), *friction(bench)],
         "Each changes the episode as its definition says.",

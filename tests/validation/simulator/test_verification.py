@@ -8,17 +8,17 @@ import math
 import pytest
 
 from pipeline.base.errors import UserError
-from validation.simulator import report
-from validation.simulator.check import Check, Section, off
+from validation.simulator import verification as report
+from validation.simulator.finding import Finding, Theme, off
 
-KEPT = Check("pull", "closed form", 0.2, "%", 0.5, "16 pairs")
-MISSED = Check("beam", "Euler–Bernoulli", 3.4, "%", 3.0)
-STATED = Check("cost", "—", 12.0, "s")
+KEPT = Finding("pull", "closed form", 0.2, "%", 0.5, "16 pairs")
+MISSED = Finding("beam", "Euler–Bernoulli", 3.4, "%", 3.0)
+STATED = Finding("cost", "—", 12.0, "s")
 
 
 def test_a_check_is_met_within_its_limit_and_never_without_a_number():
     assert KEPT.met is True and MISSED.met is False and STATED.met is None
-    assert Check("x", "y", math.nan, "%", 1.0).met is False
+    assert Finding("x", "y", math.nan, "%", 1.0).met is False
     assert math.isnan(off([1.0, math.nan], [1.0, 1.0]))
     assert off([1.01, 0.98], [1.0, 1.0]) == pytest.approx(2.0)
 
@@ -29,12 +29,12 @@ def test_report_and_figures(bench, tmp_path, monkeypatch):
 
     def drawn(where):
         (where.figures / "x.png").write_bytes(b"png")
-        return Section("Drawn", [KEPT], "Text.", {"x.png": "a picture"})
+        return Theme("Drawn", [KEPT], "Text.", {"x.png": "a picture"})
 
     monkeypatch.setattr(report, "SECTIONS", {"drawn": drawn})
     monkeypatch.setattr(report, "CAMPAIGNS", {})
     lines = []
-    extra = {"Against MuJoCo": missing, "other": lambda _: Section("Other", [MISSED, STATED])}
+    extra = {"Against MuJoCo": missing, "other": lambda _: Theme("Other", [MISSED, STATED])}
     sections = report.verify(bench.params, progress=lines.append, extra=extra, root=tmp_path)
     text = (tmp_path / "reports/simulator.md").read_text("utf-8")
     assert "| pull | 0.2 % | ≤ 0.5 % | yes | closed form | 16 pairs |" in text

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.sling import launch
-from pipeline.sling.layout import Grip
 from pipeline.sling.model import GRAVITY
+from pipeline.sling.records import Grip
 from validation.simulator import figures
-from validation.simulator.check import Bench, Check, Section, off
 from validation.simulator.closed import String, cantilever, clamped_beam
 from validation.simulator.experiment import (
     TIGHT,
@@ -21,7 +20,8 @@ from validation.simulator.experiment import (
     straight,
     straight_guess,
 )
-from validation.simulator.launches import with_edges
+from validation.simulator.finding import Bench, Finding, Theme, off
+from validation.simulator.launching import with_edges
 from validation.simulator.reference import ReferenceRod
 
 PULL_LIMIT, BEAM_LIMIT, TORSION_LIMIT = 0.5, 3.0, 5.0  # percent
@@ -72,12 +72,12 @@ def drawn_pull(bench: Bench, depth: float, theta: np.ndarray) -> tuple[np.ndarra
     return done.hold_force, np.array(expected)
 
 
-def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> list[Check]:
+def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> list[Finding]:
     """Pull forces in single precision, the default."""
     theta = thetas() if theta is None else theta
     against = "closed form in uniaxial stress, P = μ (λ − J/λ²)"
     checks = [
-        Check(
+        Finding(
             f"pull of a straight string at stretch {stretch:g}, worst of E and ν",
             against,
             off(*straight_pull(bench, stretch, theta, STRING)),
@@ -89,7 +89,7 @@ def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> li
         for stretch in stretches
     ]
     checks.append(
-        Check(
+        Finding(
             f"pull of the band itself at stretch {stretches[0]:g}, worst of E and ν",
             against,
             off(*straight_pull(bench, stretches[0], theta)),
@@ -103,7 +103,7 @@ def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> li
     for stretch in DRAWN:
         depth = np.sqrt((stretch * length / 2) ** 2 - width**2)
         checks.append(
-            Check(
+            Finding(
                 f"hold force of a draw of {depth:.2f} m (stretch {stretch:g}), worst of E and ν",
                 f"two straight strings, {against}",
                 off(*drawn_pull(bench, depth, theta)),
@@ -138,7 +138,7 @@ def _beam(
     return -sections[node, 2] / closed(load, sling.rest_length, rigidity)
 
 
-def beams(bench: Bench, poissons=BEAM_POISSON, double: bool = True) -> list[Check]:
+def beams(bench: Bench, poissons=BEAM_POISSON, double: bool = True) -> list[Finding]:
     """Deflections on the default mesh, and on one of twice as many edges for comparison."""
     edges, checks = band_of(bench).edges, []
     for name, clamped, formula in (
@@ -158,7 +158,7 @@ def beams(bench: Bench, poissons=BEAM_POISSON, double: bool = True) -> list[Chec
                 ),
             )
             checks += [
-                Check(
+                Finding(
                     title,
                     f"Euler–Bernoulli, {formula}",
                     off(one, 1.0),
@@ -188,14 +188,14 @@ def torque_ratio(bench: Bench, angle: float, poisson: float) -> float:
     return (sides[0] - sides[1]) / (2 * step) / expected
 
 
-def torsion(bench: Bench, poissons=BEAM_POISSON) -> list[Check]:
+def torsion(bench: Bench, poissons=BEAM_POISSON) -> list[Finding]:
     against = "torsion of a cylinder, G J θ / L"
     checks = []
     for poisson in poissons:
         ratio = torque_ratio(bench, 0.1, poisson)
         note = f"{ratio:.4f} of it"
         checks.append(
-            Check(
+            Finding(
                 f"torque at a twist of 0.1 rad, ν {poisson:.2f}",
                 against,
                 off(ratio, 1.0),
@@ -206,7 +206,7 @@ def torsion(bench: Bench, poissons=BEAM_POISSON) -> list[Check]:
         )
     ratio = torque_ratio(bench, np.pi, 0.45)
     checks.append(
-        Check(
+        Finding(
             "torque at half a turn, ν 0.45",
             against,
             off(ratio, 1.0),
@@ -229,7 +229,7 @@ def curves(bench: Bench, stretch: np.ndarray) -> dict[str, tuple[np.ndarray, np.
     }
 
 
-def section(bench: Bench) -> Section:
+def section(bench: Bench) -> Theme:
     pictures = {}
     if bench.figures:
         stretch = np.linspace(1.1, 2.2, 12)
@@ -238,7 +238,7 @@ def section(bench: Bench) -> Section:
             f"Pull of a straight string, {STRING} times thinner than the band, over its stretch, in"
             " single precision: simulator (dots) and closed form (lines), and their difference."
         )
-    return Section(
+    return Theme(
         "At rest",
         [*pull(bench), *beams(bench), *torsion(bench)],
         "A straight band, drawn, loaded by its weight, or twisted at a clamp, after it has come to"

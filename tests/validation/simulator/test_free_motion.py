@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from validation.simulator import motion
+from validation.simulator import free_motion as motion
 
 from .kept import assert_kept
 

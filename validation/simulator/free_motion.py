@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.sling.initial import sections_of
-from pipeline.sling.layout import Grip
 from pipeline.sling.model import GRAVITY, Sling
+from pipeline.sling.records import Grip
 from pipeline.sling.schedule import steps
-from validation.simulator.check import Bench, Check, Section
 from validation.simulator.experiment import TIGHT, band_of, launched, move, straight, straight_guess
+from validation.simulator.finding import Bench, Finding, Theme
 from validation.simulator.reference import ReferenceRod
 
 ROUNDING = 1e-11
@@ -49,7 +49,7 @@ def loose_band(bench: Bench) -> Sling:
     return straight(sling, sling.rest_length, clamped=(False, False))
 
 
-def free_fall(bench: Bench, count: int = 60) -> list[Check]:
+def free_fall(bench: Bench, count: int = 60) -> list[Finding]:
     sling, times = loose_band(bench), uneven(count)
     checks = []
     for order, name in ((1, "backward Euler"), (2, "second order, uneven steps")):
@@ -60,7 +60,7 @@ def free_fall(bench: Bench, count: int = 60) -> list[Check]:
         miss = np.abs(motion.x[0, :, :, 2] - fall_of_a_point(times, order)[1:, None]).max()
         fallen = -motion.x[0, -1, 0, 2]
         checks.append(
-            Check(
+            Finding(
                 f"height in free fall, {name}",
                 "the steps' own solution for a point mass",
                 float(miss / fallen),
@@ -122,7 +122,7 @@ def recoil(bench: Bench, h: float, order: int, damping: float, span: float = 0.0
     )
 
 
-def momentum(bench: Bench) -> list[Check]:
+def momentum(bench: Bench) -> list[Finding]:
     """Linear momentum to rounding; angular momentum as far as the steps and the damping keep it."""
     step = bench.params.sling.recoil_step
     checks = []
@@ -130,7 +130,7 @@ def momentum(bench: Bench) -> list[Check]:
         linear, coarse = recoil(bench, step, order, 0.0)
         _, fine = recoil(bench, step / 2, order, 0.0)
         checks.append(
-            Check(
+            Finding(
                 f"linear momentum out of nothing, {name}",
                 "conservation",
                 linear,
@@ -140,7 +140,7 @@ def momentum(bench: Bench) -> list[Check]:
             )
         )
         checks.append(
-            Check(
+            Finding(
                 f"angular momentum out of nothing, {name}, no damping",
                 "conservation",
                 coarse,
@@ -151,7 +151,7 @@ def momentum(bench: Bench) -> list[Check]:
             )
         )
     checks.append(  # of the second order, the last of both
-        Check(
+        Finding(
             "order of angular momentum in time, second order, what it is short of 2",
             "conservation",
             float(np.maximum(2 - np.log2(coarse / fine), 0.0)),
@@ -162,7 +162,7 @@ def momentum(bench: Bench) -> list[Check]:
     )
     damped, finer = (recoil(bench, h, 2, THETA[2])[1] for h in (step, step / 2))
     checks.append(
-        Check(
+        Finding(
             f"angular momentum out of nothing, second order, d {1e3 * THETA[2]:g} ms",
             "conservation",
             damped,
@@ -176,8 +176,8 @@ def momentum(bench: Bench) -> list[Check]:
     return checks
 
 
-def section(bench: Bench) -> Section:
-    return Section(
+def section(bench: Bench) -> Theme:
+    return Theme(
         "Free motion",
         [*free_fall(bench), *momentum(bench)],
         "A band whose ends are free, in double precision.",

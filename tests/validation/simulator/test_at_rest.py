@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from validation.simulator import statics
+from validation.simulator import at_rest as statics
 from validation.simulator.closed import String
 from validation.simulator.experiment import band_of
 

@@ -10,11 +10,11 @@ from scipy.integrate import solve_ivp
 from pipeline.sling import Launches, Sling, launch
 from pipeline.sling.initial import drawn_guess
 from pipeline.sling.launch import schedule_of
-from pipeline.sling.layout import Grip
 from pipeline.sling.model import GRAVITY
+from pipeline.sling.records import Grip
 from pipeline.sling.schedule import relaxation
-from validation.simulator.check import Bench, Check, Section, off
 from validation.simulator.experiment import band_of, rest
+from validation.simulator.finding import Bench, Finding, Theme, off
 from validation.simulator.reference import ReferenceRod
 
 COUNT, SEED, REFINE = 20, 3, 10
@@ -66,7 +66,7 @@ def differences(default: Launches, finer: Launches) -> dict[str, float]:
     }
 
 
-def convergence(bench: Bench, count: int = COUNT, meshes=(2, 4), progress=print) -> list[Check]:
+def convergence(bench: Bench, count: int = COUNT, meshes=(2, 4), progress=print) -> list[Finding]:
     sling, (thetas, draws) = band_of(bench), random_launches(count)
     common = {"device": bench.device, "workers": bench.workers}
     default = launch(sling, thetas, draws, **common)
@@ -90,12 +90,14 @@ def convergence(bench: Bench, count: int = COUNT, meshes=(2, 4), progress=print)
             note += f"; stated: past the {meshes[0]} times finer mesh that the limit is for"
         limit = None if name in stated else LIMIT
         checks.append(
-            Check(f"launch speed, worst of {count} random θ", name, far["speed"], "%", limit, note)
+            Finding(
+                f"launch speed, worst of {count} random θ", name, far["speed"], "%", limit, note
+            )
         )
     return checks
 
 
-def order_in_time(bench: Bench, count: int = COUNT) -> list[Check]:
+def order_in_time(bench: Bench, count: int = COUNT) -> list[Finding]:
     """Observed order of each launch's speed, from the default steps to the finest of REFINED."""
     sling, (thetas, draws) = band_of(bench), random_launches(count)
 
@@ -109,7 +111,7 @@ def order_in_time(bench: Bench, count: int = COUNT) -> list[Check]:
     worst = 100 * errors.max(axis=1)
     orders = np.log2(worst[:-1] / worst[1:])
     return [
-        Check(
+        Finding(
             f"order of the launch speed in time, what it is short of 2 at worst of {count}",
             f"{REFERENCE} times finer steps, double precision",
             float(np.maximum(2 - lowest, 0.0)),
@@ -137,7 +139,7 @@ def _flight(y: float, z: float, speed: float, angle: float, floor: float) -> flo
     return float(path.y_events[0][0][0])
 
 
-def physics(bench: Bench, count: int = COUNT) -> list[Check]:
+def physics(bench: Bench, count: int = COUNT) -> list[Finding]:
     """Ballistic flight, and the energy that the drawn band holds."""
     sling, (thetas, draws) = band_of(bench), random_launches(count)
     done = launch(sling, thetas, draws, device=bench.device, workers=bench.workers)
@@ -156,7 +158,7 @@ def physics(bench: Bench, count: int = COUNT) -> list[Check]:
         shares.append(gained / rod.elastic(drawn))
     named = sum(reason is not None for reason in done.failure)
     return [
-        Check(
+        Finding(
             "landing",
             "flight from where it leaves the pouch, integrated apart",
             off(done.landing_y, flights),
@@ -164,7 +166,7 @@ def physics(bench: Bench, count: int = COUNT) -> list[Check]:
             1e-4,
             f"{count} random θ and draws; {named} failed",
         ),
-        Check(
+        Finding(
             "energy of the projectile",
             "elastic energy of the drawn band",
             float(100 * np.max(shares)),
@@ -175,11 +177,11 @@ def physics(bench: Bench, count: int = COUNT) -> list[Check]:
     ]
 
 
-def section(bench: Bench, progress=print) -> Section:
+def section(bench: Bench, progress=print) -> Theme:
     sling = band_of(bench)
     size = sling.steps.launch_step
     count = len(schedule_of(sling).steps)
-    return Section(
+    return Theme(
         "Launches",
         [*convergence(bench, progress=progress), *order_in_time(bench), *physics(bench)],
         f"Random θ (E 0.1–1 MPa, ν 0.30–0.49, d 0.3–16 ms, s 0–1) and draws. The default takes"

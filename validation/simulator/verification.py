@@ -15,19 +15,19 @@ from pathlib import Path
 
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_json, write_text
-from validation.benchmarks.simulator import available, environment
+from validation.benchmarks.timing import available, environment
 from validation.simulator import (
     agreement,
+    at_rest,
     damping,
     elements,
     energy,
-    launches,
-    motion,
-    parameters,
+    five_parameters,
+    free_motion,
+    launching,
     robustness,
-    statics,
 )
-from validation.simulator.check import Bench, Check, Section, unmet
+from validation.simulator.finding import Bench, Finding, Theme, unmet
 
 HEAD = """\
 # The simulator, held against what is known
@@ -45,16 +45,16 @@ the elastic stress, its shape part times s. Each step, backward Euler in the han
 
 Device {device}, {device_name}; commit {commit}; {seconds:.0f} s in all.
 """
-SECTIONS: dict[str, Callable[..., Section]] = {
-    "at rest": statics.section,
+SECTIONS: dict[str, Callable[..., Theme]] = {
+    "at rest": at_rest.section,
     "the kernel and its reference implementation": agreement.section,
     "damping": damping.section,
-    "free motion": motion.section,
+    "free motion": free_motion.section,
     "energy": energy.section,
-    "the five parameters": parameters.section,
+    "the five parameters": five_parameters.section,
     "rod and tetrahedra": elements.section,
 }
-CAMPAIGNS = {"launches": launches.section, "random parameters": robustness.section}
+CAMPAIGNS = {"launches": launching.section, "random parameters": robustness.section}
 
 
 def verify(
@@ -62,9 +62,9 @@ def verify(
     device: str = "cpu",
     progress: Callable[[str], None] = print,
     *,
-    extra: dict[str, Callable[[Bench], Section]] | None = None,
+    extra: dict[str, Callable[[Bench], Theme]] | None = None,
     root: Path = Path("."),
-) -> list[Section]:
+) -> list[Theme]:
     """Run every check and write the report.
 
     Args:
@@ -90,7 +90,7 @@ def verify(
             try:
                 sections.append(section(bench))
             except UserError as error:
-                sections.append(Section(title, [], not_run=str(error)))
+                sections.append(Theme(title, [], not_run=str(error)))
                 progress(f"  not run: {error}")
             for check in unmet(sections[-1].checks):
                 progress(f"  NOT MET: {check.name}: {figure(check)}, limit {limit(check)}")
@@ -106,7 +106,7 @@ def verify(
     return sections
 
 
-def summary(sections: list[Section]) -> tuple[str, int]:
+def summary(sections: list[Theme]) -> tuple[str, int]:
     """A line for the terminal, and how many limits are not kept."""
     checks = [check for section in sections for check in section.checks]
     missed = unmet(checks)
@@ -117,7 +117,7 @@ def summary(sections: list[Section]) -> tuple[str, int]:
     return "\n".join(lines), len(missed)
 
 
-def markdown(sections: list[Section], about: dict, name: str) -> str:
+def markdown(sections: list[Theme], about: dict, name: str) -> str:
     """The whole page; `name` is that of its pictures' folder and of the JSON beside it."""
     checks = [check for section in sections for check in section.checks]
     missed, limited = len(unmet(checks)), sum(check.met is not None for check in checks)
@@ -131,7 +131,7 @@ def markdown(sections: list[Section], about: dict, name: str) -> str:
     return "\n".join([head, *(_part(section, name) for section in sections)])
 
 
-def _part(section: Section, folder: str) -> str:
+def _part(section: Theme, folder: str) -> str:
     lines = [f"## {section.title}", ""]
     if section.not_run:
         lines += [f"Not run: {section.not_run}.", ""]
@@ -149,17 +149,17 @@ def _part(section: Section, folder: str) -> str:
     return "\n".join(lines)
 
 
-def _row(check: Check) -> str:
+def _row(check: Finding) -> str:
     met = {None: "", True: "yes", False: "**no**"}[check.met]
     cells = (check.name, figure(check), limit(check), met, check.against, check.note)
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def figure(check: Check) -> str:
+def figure(check: Finding) -> str:
     return f"{_short(check.value)} {check.unit}"
 
 
-def limit(check: Check) -> str:
+def limit(check: Finding) -> str:
     return "" if check.limit is None else f"≤ {_short(check.limit)} {check.unit}"
 
 
@@ -169,7 +169,7 @@ def _short(value: float) -> str:
     return "0" if value == 0 else f"{value:.2g}" if abs(value) < 0.1 else f"{value:.4g}"
 
 
-def _entry(section: Section) -> dict:
+def _entry(section: Theme) -> dict:
     return {
         "title": section.title,
         "checks": [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from validation.simulator import parameters
+from validation.simulator import five_parameters as parameters
 
 from .kept import assert_kept
 

@@ -19,7 +19,7 @@ from pipeline.recording.cloud import cloud_of
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.masks import masker
 from pipeline.recording.view import View
-from validation.benchmarks.simulator import timed
+from validation.benchmarks.timing import timed
 
 STEPS = ("decode", "points", "learn", "mask", "cloud")
 

@@ -11,7 +11,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Check:
+class Finding:
     """A figure of the simulator and what it may be at most.
 
     Attributes:
@@ -38,7 +38,7 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Section:
+class Theme:
     """A theme of the report.
 
     Attributes:
@@ -49,7 +49,7 @@ class Section:
     """
 
     title: str
-    checks: list[Check]
+    checks: list[Finding]
     text: str = ""
     pictures: dict[str, str] = field(default_factory=dict)
     details: dict = field(default_factory=dict)
@@ -77,5 +77,5 @@ def off(value, expected) -> float:
     return float(100 * np.abs(ratio).max())
 
 
-def unmet(checks: Iterable[Check]) -> list[Check]:
+def unmet(checks: Iterable[Finding]) -> list[Finding]:
     return [check for check in checks if check.met is False]

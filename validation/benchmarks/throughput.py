@@ -1,0 +1,127 @@
+"""How fast the simulator is: rollouts (with the loss and without) and launches a second."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from functools import partial
+
+import numpy as np
+from scipy.stats import qmc
+
+from pipeline.base.machine import named
+from pipeline.objective.evaluate import Evaluator
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.objective.space import Space
+from pipeline.sling.interaction import interact, schedule_of
+from pipeline.sling.launch import launch
+from pipeline.sling.records import Grip
+from pipeline.sling.schedule import RELAX_STEPS
+from pipeline.sling.solver import Options, memory
+from validation.benchmarks.timing import seconds, shared
+from validation.synthetic import DRAW, recorded_yardstick
+
+BATCHES = {"cpu": (64, 256), "cuda": (64, 1024, 16384)}
+
+
+def bench(params, device: str = "cpu") -> dict:
+    """Time the yardstick.
+
+    Args:
+        device: Or several that share each batch, as SLING_DEVICE names them.
+
+    Returns:
+        `batches`: environments, threads on the CPU, rollouts/s without and with the loss,
+        launches/s; `yardstick`: its steps, the mean of its Newton iterations, bytes a rollout;
+        `first_start_s`: a first rollout with nothing compiled yet, and the next start's.
+
+    Raises:
+        UserError: There is no such device.
+    """
+    devices = named(device, "--device")
+    kind = devices[0].partition(":")[0]
+    sling, episode = recorded_yardstick(params)
+    space = Space.of(params.parameters)
+    loss = EpisodeLoss.of(params, next(iter(params.methods)), episode, sling)
+    simulate = partial(shared, devices, partial(interact, sling, episode, fetch=False))
+    shoot = partial(launch, sling, draws=np.array([[-DRAW, -0.15]]), device=devices)
+
+    batches = []
+    for count in BATCHES[kind]:
+        unit = qmc.LatinHypercube(5, rng=1).random(count)
+        thetas = space.to_physical(unit)
+        for workers in sorted({1, os.cpu_count() or 1} if kind == "cpu" else {1}):
+            evaluate = Evaluator(episode, sling, loss, space, devices=devices, workers=workers)
+            evaluate(unit[: len(devices)]), shoot(thetas[:1])  # what compiles
+            batches.append(
+                {
+                    "environments": count,
+                    "threads": workers,
+                    "rollouts_per_s": count / seconds(partial(simulate, thetas, workers=workers)),
+                    "rollouts_with_loss_per_s": count / seconds(partial(evaluate, unit)),
+                    "launches_per_s": count / seconds(partial(shoot, thetas, workers=workers)),
+                }
+            )
+    iterations = np.mean([part.iterations.mean() for part in simulate(thetas)])
+    schedule = schedule_of(sling, episode)
+    return {
+        "batches": batches,
+        "yardstick": {
+            "steps": steps_of(schedule),
+            "newton_iterations": round(float(iterations)),
+            "bytes_a_rollout": memory(
+                sling, schedule, len(episode.cloud_time), Options(devices[0])
+            ),
+        },
+        "first_start_s": first_start(devices[0]),
+    }
+
+
+def steps_of(schedule) -> dict[str, int]:
+    """How many steps each phase of a schedule has."""
+    h, grip = schedule.steps["h"][RELAX_STEPS:], schedule.steps["grip"][RELAX_STEPS:]
+    free = grip == Grip.FREE
+    fine = free & (h <= h[free][0] * 1.001)
+    return {
+        "relaxation": RELAX_STEPS,
+        "held": int((grip == Grip.HELD).sum()),
+        "fingers_opening": int((grip == Grip.OPENING).sum()),
+        "recoil": int(fine.sum()),
+        "swing": int((free & ~fine).sum()),
+    }
+
+
+def first_start(device: str) -> dict[str, float]:
+    """Seconds that a new process needs for one launch: with an empty kernel cache, and again."""
+    code = (
+        "from pipeline.params import load; from pipeline.sling import Sling, launch; p = load();"
+        "b = next(iter(p.bands.values())); launch(Sling.of(b, p.setup, p.sling),"
+        f" [3e5, 0.45, 2e-3, 0.5, 1.0], [-0.38, -0.2], device={device!r})"
+    )
+    with tempfile.TemporaryDirectory() as cache:
+        start = partial(
+            subprocess.run,
+            [sys.executable, "-c", code],
+            env=os.environ | {"WARP_CACHE_PATH": cache},
+            check=True,
+            capture_output=True,
+        )
+        return {name: round(seconds(start, 1), 2) for name in ("empty_cache", "cached")}
+
+
+def table(result: dict) -> str:
+    """What `bench` found, as lines for people."""
+    rows = result["batches"]
+    lines = ["  ".join(rows[0])]
+    lines += ["  ".join(f"{value:{len(key)}.0f}" for key, value in row.items()) for row in rows]
+    steps, yardstick = result["yardstick"]["steps"], result["yardstick"]
+    lines += [
+        "",
+        "a rollout: " + ", ".join(f"{name} {n}" for name, n in steps.items()) + " steps;",
+        f"{yardstick['newton_iterations']} Newton iterations;"
+        f" {yardstick['bytes_a_rollout'] / 1024:.0f} KiB",
+        "first start {empty_cache:.1f} s, then {cached:.1f} s".format(**result["first_start_s"]),
+    ]
+    return "\n".join(lines)

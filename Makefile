@@ -23,9 +23,12 @@ lint: setup
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 
-validate: setup       # slow campaigns; their results, in reports/, are committed
+validate: setup       # slow campaigns, and tests by other engines and readers; results are committed
+	.venv/bin/pip install --disable-pip-version-check -q -e '.[dev,validation]' -c constraints.txt
 	.venv/bin/sling verify
-	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns
+	.venv/bin/python -m pytest tests/validation/engines tests/validation/benchmarks tests/recording/masks \
+		tests/recording/input/test_kinematics.py tests/app/preflight/test_pictures.py
+	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation
 
 clean:                # all but data, checkpoints and DVC's cache
 	rm -rf .venv build *.egg-info .hypothesis .pytest_cache .ruff_cache

@@ -38,7 +38,7 @@ fi
 # Python compiles what is imported, a small part of it; but where it may keep nothing, it would each time.
 compile=--no-compile
 [ -z "${PYTHONDONTWRITEBYTECODE:-}" ] || compile=--compile
-.venv/bin/pip install --disable-pip-version-check $compile -q -e '.[dev,sam3,validation]' -c constraints.txt
+.venv/bin/pip install --disable-pip-version-check $compile -q -e '.[dev]' -c constraints.txt
 
 needs_libraries() { ! .venv/bin/python -c 'import open3d' >/dev/null 2>.venv/open3d.log; }
 if needs_libraries; then

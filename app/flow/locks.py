@@ -64,13 +64,13 @@ def _cut_back(path: Path) -> None:
 
 def _is_valid(text: str) -> bool:
     """Whether DVC would read this dvc.lock."""
-    from dvc.schema import COMPILED_LOCKFILE_SCHEMA
-    from dvc.utils.serialize import ParseError, parse_yaml
-    from voluptuous import Invalid
+    from dvc.dvcfile import Lockfile
+    from dvc.exceptions import DvcException
+    from dvc.utils.serialize import parse_yaml
 
     try:
-        COMPILED_LOCKFILE_SCHEMA(parse_yaml(text, "dvc.lock"))
-    except (ParseError, Invalid):
+        Lockfile.validate(parse_yaml(text, "dvc.lock"), "dvc.lock")
+    except DvcException:
         return False
     return True
 

@@ -46,7 +46,9 @@ def write_timeline(look: Look, params: object, path: Path) -> str:
     try:
         import rerun
     except ImportError:
-        raise UserError("--rrd: rerun-sdk is missing, `pip install rerun-sdk`") from None
+        raise UserError(
+            "--rrd: Rerun is not installed: .venv/bin/pip install -e '.[rerun]' -c constraints.txt"
+        ) from None
     if look.recording is None:
         return f"{path} was not written: nothing in the recording can be shown"
     with replacing(path) as temporary:

@@ -17,6 +17,11 @@ from app.preflight.timeline import write_timeline
 from pipeline.base.errors import UserError
 
 
+@pytest.fixture
+def with_rerun() -> None:
+    pytest.importorskip("rerun", reason="rerun-sdk: pip install -e '.[rerun]'")
+
+
 def test_the_sheet_shows_six_moments(looked, params, tmp_path) -> None:
     path = tmp_path / "sheet.png"
     assert str(path) in draw_sheet(looked, params, path)
@@ -44,7 +49,7 @@ def test_masks_are_those_of_the_clouds(looked, params) -> None:
     assert counts == looked.done.clouds.pixels.tolist()
 
 
-def test_a_refused_recording_shows_what_it_has(refused, params, tmp_path) -> None:
+def test_a_refused_recording_shows_what_it_has(with_rerun, refused, params, tmp_path) -> None:
     assert not refused.report.usable
     said = draw_sheet(refused, params, tmp_path / "sheet.png")
     assert "all that can be shown" in said
@@ -54,7 +59,7 @@ def test_a_refused_recording_shows_what_it_has(refused, params, tmp_path) -> Non
     assert "/raw_force/x" in entities(tmp_path / "out.rrd")
 
 
-def test_nothing_to_show_is_said(params, tmp_path) -> None:
+def test_nothing_to_show_is_said(with_rerun, params, tmp_path) -> None:
     look = Look(Report("x.mcap", "", "no force", [], []))
     for function, name in ((draw_sheet, "a.png"), (write_timeline, "a.rrd")):
         assert "nothing in the recording" in function(look, params, tmp_path / name)
@@ -75,7 +80,7 @@ def entities(path) -> dict[str, int]:
     }
 
 
-def test_the_timeline_is_read_by_rerun(looked, params, tmp_path) -> None:
+def test_the_timeline_is_read_by_rerun(with_rerun, looked, params, tmp_path) -> None:
     path = tmp_path / "out.rrd"
     assert str(path) in write_timeline(looked, params, path)
     assert path.stat().st_size < 3 * looked.recording.path.stat().st_size
@@ -98,6 +103,6 @@ def test_the_timeline_is_read_by_rerun(looked, params, tmp_path) -> None:
 
 def test_without_rerun_one_line_says_so(looked, params, tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "rerun", None)
-    with pytest.raises(UserError, match="pip install rerun-sdk"):
+    with pytest.raises(UserError, match=r"pip install -e '\.\[rerun\]'"):
         write_timeline(looked, params, tmp_path / "out.rrd")
     assert not list(tmp_path.iterdir())

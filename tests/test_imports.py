@@ -1,0 +1,97 @@
+"""What is imported is declared in pyproject.toml, and what is declared is imported."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+from packaging.requirements import Requirement
+
+from tests.project import ROOT
+
+OURS = {"app", "pipeline", "stages", "tests", "tools", "validation"}
+# By path, extras that come beside what everybody has.
+EXTRAS = {
+    "app/cluster/": "cluster",
+    "app/preflight/timeline.py": "rerun",
+    "pipeline/recording/masks/sam3.py": "sam3",
+    "tests/": "dev",
+    "tests/recording/input/test_kinematics.py": "validation",  # skipped where that is missing
+    "tests/recording/masks/": "validation",
+    "tests/validation/": "validation",
+    "tests/app/preflight/": "validation",
+    "tools/": "dev",
+    "validation/": "validation",
+    "validation/campaigns/": "dev",
+}
+INSTALLED_AS = {"rerun": {"rerun-sdk"}}  # packages of extras whose distribution is called otherwise
+INDIRECT = {
+    "fastapi": "newer ones break Prefect's server",
+    "onnxscript": "torch's ONNX exporter imports it",
+    "pytest-xdist": "a plug-in of pytest's",
+    "ruff": "make lint",
+    "pre-commit": "the same at each commit",
+}
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def normal(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def declared(extra: str = "") -> set[str]:
+    """Distributions of an extra, and of the extras in it; of everybody's by default."""
+    lines = PROJECT["optional-dependencies"][extra] if extra else PROJECT["dependencies"]
+    found = set()
+    for line in map(Requirement, lines):
+        if line.name == PROJECT["name"]:
+            found |= set().union(*map(declared, line.extras))
+        else:
+            found.add(normal(line.name))
+    return found
+
+
+def imported(file: Path) -> Iterator[str]:
+    """Packages of others that a file imports, wherever in it, and asks pytest for."""
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            names = [one.name for one in node.names]
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            names = [node.module]
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "importorskip":
+            names = [node.args[0].value]
+        else:
+            continue
+        tops = {name.split(".")[0] for name in names}
+        yield from tops - OURS - sys.stdlib_module_names
+
+
+PACKAGES = packages_distributions()
+
+
+def distributions(package: str) -> set[str]:
+    """Any of which may be declared for a package; one that is not installed bears its name."""
+    return {normal(one) for one in PACKAGES.get(package, [package])} | INSTALLED_AS.get(
+        package, set()
+    )
+
+
+def test_what_is_imported_is_declared_for_who_imports_it() -> None:
+    """What a stage or a command imports comes by `make setup`, or by an extra that it names."""
+    everybody, used = declared(), set()
+    for file in sorted(file for top in OURS for file in (ROOT / top).rglob("*.py")):
+        name = file.relative_to(ROOT).as_posix()
+        paths = sorted((path for path in EXTRAS if name.startswith(path)), key=len)
+        known = everybody.union(*(declared(EXTRAS[path]) for path in paths))
+        for package in imported(file):
+            found = distributions(package)
+            used |= found
+            assert found & known, f"{name} imports {package}: declare {sorted(found)}"
+    extras = set().union(*map(declared, PROJECT["optional-dependencies"]))
+    idle = (everybody | extras) - used - INDIRECT.keys()
+    assert not idle, "declared, and imported by nobody"

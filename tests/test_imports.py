@@ -35,6 +35,7 @@ INDIRECT = {
     "onnxscript": "torch's ONNX exporter imports it",
     "pytest-xdist": "a plug-in of pytest's",
     "ruff": "make lint",
+    "threadpoolctl": "by the script of a test",
     "pre-commit": "the same at each commit",
 }
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]

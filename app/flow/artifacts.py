@@ -52,7 +52,7 @@ def _theta(root: Path, band: str, method: str) -> Iterator[str]:
 
     from pipeline.params import load
     from pipeline.report.figures import search
-    from pipeline.report.losses import has_another_loss
+    from pipeline.report.results import has_another_loss
     from pipeline.report.styles import styles
     from pipeline.report.tables import parameters
     from pipeline.report.tables.benchmark import PAPER

@@ -43,9 +43,9 @@ class Report:
     def folder(self) -> Path:
         return self.root / "reports"
 
-    def picture(self, name: str, alt: str, draw: Callable[[Path], None]) -> str:
+    def picture(self, name: str, alt: str, draw: Callable[..., None], *arguments) -> str:
         """Have `draw` write reports/figures/<name>.png; return the line that shows it."""
-        draw(self.folder / "figures" / f"{name}.png")
+        draw(self.folder / "figures" / f"{name}.png", *arguments)
         return f"![{alt}](figures/{name}.png)\n"
 
     def draws(self, result: Result, targets: np.ndarray) -> dict[str, np.ndarray]:

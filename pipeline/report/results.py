@@ -7,17 +7,20 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
-from pipeline.base.layout import Layout, made
+from pipeline.base.layout import Layout, NotMade, made
 from pipeline.episode.episode import Episode
 from pipeline.landing.landing_map import LandingMap
 from pipeline.landing.stored import ROBUST, Stored
 from pipeline.launches.measured import file_of, named
 from pipeline.params import pairs
-from pipeline.report.floors import load_floor
 from pipeline.search.regions import Region, load_regions
 from pipeline.sling.theta import load_theta
+
+PRINTED = ("geom", "force", "work")  # the paper's loss is their sum (docs/method.md)
+FLOOR = ("launches", "actuation_error_m", "release_jitter")  # that a floor tells
 
 
 @dataclass(frozen=True)
@@ -125,3 +128,35 @@ def _result(layout: Layout, band: str, method: str) -> Result:
         trials=trials[~robust].reset_index(drop=True),
         robust_trials=trials[robust].reset_index(drop=True),
     )
+
+
+def load_floor(path: Path) -> dict:
+    """Read what stages/floor.py wrote. Raises NotMade."""
+    made(path)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        [float(content[name]) for name in FLOOR]
+        means = [one["mean_error_m"] for one in (content, *content["targets"].values())]
+        [float(mean) for mean in means if mean is not None]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise NotMade(path, "damaged") from error
+    return content
+
+
+def printed(history: pd.DataFrame) -> np.ndarray:
+    """The paper's printed loss of every row, shape (N,), whatever the method minimised."""
+    total = history[list(PRINTED)].sum(axis=1, skipna=False).to_numpy(float)
+    return np.where(np.isfinite(total), total, np.inf)
+
+
+def best_so_far(history: pd.DataFrame) -> np.ndarray:
+    """Row of the least total of the method's own loss among the rows so far, shape (N,)."""
+    total = history.total.to_numpy(float)
+    total = np.where(np.isfinite(total), total, np.inf)
+    better = np.append(True, total[1:] < np.minimum.accumulate(total)[:-1])
+    return np.maximum.accumulate(np.where(better, np.arange(len(total)), 0))
+
+
+def has_another_loss(weights: dict[str, float]) -> bool:
+    """Whether a method's weights are others than the printed loss's."""
+    return any(weight != (name in PRINTED) for name, weight in weights.items())

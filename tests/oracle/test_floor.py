@@ -10,7 +10,7 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.oracle.floor import errors_of, trial_seeds
 from pipeline.params import load
-from pipeline.report.floors import load_floor
+from pipeline.report.results import load_floor
 from tests.project import ROOT
 
 

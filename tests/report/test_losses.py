@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.report.losses import best_so_far, has_another_loss, printed
+from pipeline.report.results import best_so_far, has_another_loss, printed
 
 
 def rows(total, geom, force=0.0, work=0.0) -> pd.DataFrame:

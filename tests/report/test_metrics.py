@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from pipeline.report.metrics import metrics
+from pipeline.report.write import metrics
 from tests.report.tables.toy_results import floor, launches, result, results
 
 

@@ -16,8 +16,8 @@ import pytest
 from pipeline.base.layout import NotMade
 from pipeline.report import report as reporting
 from pipeline.report import write as writing
-from pipeline.report.metrics import metrics
 from pipeline.report.results import gather
+from pipeline.report.write import metrics
 from tests.report.conftest import BAND, METHOD
 from tests.report.toy_replay import toy_replay
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from pipeline.landing.stored import PLAIN, ROBUST
 from pipeline.report.figures import confidence, episode, policy, search
-from pipeline.report.losses import has_another_loss
 from pipeline.report.report import Report
-from pipeline.report.results import Result
+from pipeline.report.results import Result, has_another_loss
 from pipeline.report.styles import Styles, drawn
 from pipeline.report.tables import identified, landings, policies
 from pipeline.report.tables.cells import markdown
@@ -55,8 +53,8 @@ class Band:
     def near_names(self) -> str:
         return " and ".join(self.styles[method].name for method in self.near)
 
-    def picture(self, name: str, alt: str, draw: Callable[[Path], None]) -> str:
-        return self.report.picture(f"{self.name}-{name}", alt, draw)
+    def picture(self, name: str, alt: str, draw: Callable[..., None], *arguments) -> str:
+        return self.report.picture(f"{self.name}-{name}", alt, draw, *arguments)
 
 
 def bands(report: Report) -> str:
@@ -85,11 +83,8 @@ def _predictions(band: Band) -> list[str]:
             text.append(f"### Predicted and {kind} landings\n\n{words} {ERRORS}\n")
             text.append(markdown(table))
     if trials.landing_y.notna().any():
-        shown = band.picture(
-            "landings",
-            "predicted and actual landings",
-            lambda path: policy.landings(path, trials, band.styles, list(band.near)),
-        )
+        drawing = policy.landings, trials, band.styles, list(band.near)
+        shown = band.picture("landings", "predicted and actual landings", *drawing)
         text.append(f"Left: {band.near_names}. Right: every method, a dot a launch.\n\n{shown}")
     for method, result in band.near.items():
         for kind, title in (("measured", "launch by launch"), ("predicted", "predictions")):
@@ -111,17 +106,10 @@ def _recording(band: Band) -> list[str]:
     recorded, replays = report.results.episodes[band.name], report.replays[band.name]
     shown = {method: replays[method] for method in band.near}
     frames, diameter = episode.moments(recorded), report.params.bands[band.name].diameter
-    force = band.picture(
-        "force", "force over time", lambda path: episode.force(path, recorded, shown, styles)
-    )
-    work = band.picture(
-        "work", "work over time", lambda path: episode.work(path, recorded, shown, styles)
-    )
-    clouds = band.picture(
-        "clouds",
-        "point clouds",
-        lambda path: episode.clouds(path, recorded, shown, styles, frames, diameter),
-    )
+    drawing = recorded, shown, styles
+    force = band.picture("force", "force over time", episode.force, *drawing)
+    work = band.picture("work", "work over time", episode.work, *drawing)
+    clouds = band.picture("clouds", "point clouds", episode.clouds, *drawing, frames, diameter)
     text = [
         "### Recording and calibrated simulation\n\n"
         f"Drawn: {band.near_names}. Force of the band on the hand, both through the"
@@ -146,11 +134,8 @@ def _recording(band: Band) -> list[str]:
 def _search(band: Band) -> list[str]:
     params, styles = band.report.params, band.styles
     own = {m for m in band.methods if has_another_loss(dict(params.methods[m].weights))}
-    convergence = band.picture(
-        "convergence",
-        "convergence",
-        lambda path: search.convergence(path, band.methods, styles, own),
-    )
+    drawing = search.convergence, band.methods, styles, own
+    convergence = band.picture("convergence", "convergence", *drawing)
     text = [
         "### Search\n\n"
         "The printed loss (geom + force + work) of the best θ so far, *best* by each method's own"
@@ -159,12 +144,9 @@ def _search(band: Band) -> list[str]:
         " one parameter.\n",
     ]
     for method, result in band.near.items():
-        name = styles[method].name
-
-        def draw(path: Path, result=result, name=name) -> None:
-            search.corner(path, result, params.parameters, name)
-
-        text.append(band.picture(f"{method}-corner", f"every point that {name} evaluated", draw))
+        drawing = search.corner, result, params.parameters, styles[method].name
+        alt = f"every point that {styles[method].name} evaluated"
+        text.append(band.picture(f"{method}-corner", alt, *drawing))
     return text
 
 
@@ -174,16 +156,10 @@ def _confidence(band: Band) -> list[str]:
     if not trusted:
         return []
     boxes, styles = band.report.params.parameters, band.styles
-    profiles = band.picture(
-        "profiles",
-        "profile curves",
-        lambda path: confidence.profiles(path, trusted, styles, boxes),
-    )
-    correlation = band.picture(
-        "correlation",
-        "correlation of the parameters",
-        lambda path: confidence.correlation(path, trusted, styles),
-    )
+    drawing = confidence.profiles, trusted, styles, boxes
+    profiles = band.picture("profiles", "profile curves", *drawing)
+    drawing = confidence.correlation, trusted, styles
+    correlation = band.picture("correlation", "correlation of the parameters", *drawing)
     return [
         "### Confidence\n\n"
         "Least misfit (−2 log likelihood of whitened residuals) with one parameter held, all"
@@ -199,9 +175,7 @@ def _policy(band: Band) -> list[str]:
         for kind, draws in report.draws(result, targets).items():
             name = styles[method].name + (", robust" if kind == ROBUST else "")
             aims[name] = result.landing_map, draws
-    training = band.picture(
-        "training", "training", lambda path: policy.training(path, band.methods, styles)
-    )
+    training = band.picture("training", "training", policy.training, band.methods, styles)
     return [
         f"### Policy\n\n{training}",
         "Draws for the targets of the trials, each in the method's own simulator:\n",
@@ -218,13 +192,11 @@ def _map(band: Band, result: Result, targets: np.ndarray) -> str:
     return band.picture(
         f"{result.method}-map",
         f"landing map of {band.styles[result.method].name}",
-        lambda path: policy.landing_map(
-            path,
-            result,
-            {WHOSE[kind]: draws for kind, draws in path_of.items()},
-            targets,
-            float(result.trials.recorded_stretch.max()),
-            params.setup.fork_width,
-            params.bands[band.name].rest_length,
-        ),
+        policy.landing_map,
+        result,
+        {WHOSE[kind]: draws for kind, draws in path_of.items()},
+        targets,
+        float(result.trials.recorded_stretch.max()),
+        params.setup.fork_width,
+        params.bands[band.name].rest_length,
     )

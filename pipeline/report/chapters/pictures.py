@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.launches.stretch import stretch_of
-from pipeline.report.figures import launches, loaded
+from pipeline.report.figures import episode, launches
 from pipeline.report.replay import LOAD
 from pipeline.report.report import Report, side_by_side
 
@@ -13,24 +13,13 @@ from pipeline.report.report import Report, side_by_side
 def pictures(report: Report) -> str:
     results, styles, setup = report.results, report.styles, report.params.setup
     methods = side_by_side(report.params)
-    trajectories = report.picture(
-        "trajectories",
-        "flights of every band and method",
-        lambda path: launches.trajectories(path, results, methods, styles, setup.fork_height),
-    )
-    scatter = report.picture(
-        "scatter",
-        "landings on the target",
-        lambda path: launches.scatter(path, results, methods, styles),
-    )
+    drawing = launches.trajectories, results, methods, styles, setup.fork_height
+    trajectories = report.picture("trajectories", "flights of every band and method", *drawing)
+    drawing = launches.scatter, results, methods, styles
+    scatter = report.picture("scatter", "landings on the target", *drawing)
     shown = {band: {m: of_band[m] for m in methods} for band, of_band in report.replays.items()}
-    under_load = report.picture(
-        "loaded",
-        "bands under load",
-        lambda path: loaded.loaded(
-            path, results.episodes, shown, styles, setup.fork_width, setup.fork_height
-        ),
-    )
+    drawing = episode.loaded, results.episodes, shown, styles, setup.fork_width, setup.fork_height
+    under_load = report.picture("loaded", "bands under load", *drawing)
     flights = "Flights of the projectile from the pouch to the floor, to scale"
     kinds = set(results.trials.kind)
     marks = "rings of its own" + "; measured landings are hollow" * ("measured" in kinds)

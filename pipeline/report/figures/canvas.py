@@ -6,13 +6,17 @@ Black is what was measured; a method has one colour everywhere (pipeline/report/
 from __future__ import annotations
 
 import io
+from collections.abc import Callable, Iterable
+from functools import wraps
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+from matplotlib.artist import Artist
 from matplotlib.ticker import LogFormatter
 from PIL import Image
 
 from pipeline.base.files import replacing
+from pipeline.report.styles import THEME
 
 PARAMETERS = {  # name and unit on an axis, and the factor from SI to that unit
     "youngs_modulus": ("E [MPa]", 1e-6),
@@ -21,6 +25,22 @@ PARAMETERS = {  # name and unit on an axis, and the factor from SI to that unit
     "dynamic_friction": ("friction", 1.0),
     "damping_scale": ("s", 1.0),
 }
+
+
+def mark(**style) -> plt.Line2D:
+    """A line or a dot for a key."""
+    return plt.Line2D([], [], **style)
+
+
+def patch(color: str, **style) -> plt.Rectangle:
+    """A filled square for a key."""
+    return plt.Rectangle((0, 0), 1, 1, color=color, **style)
+
+
+def key(figure: plt.Figure, entries: Iterable[tuple[str, Artist]], columns: int = 0) -> None:
+    """What is what, below the picture, in one line or in so many columns."""
+    names, marks = zip(*entries, strict=True)
+    figure.legend(marks, names, loc="outside lower center", ncols=columns or len(names))
 
 
 def log_y(ax: plt.Axes) -> None:
@@ -41,7 +61,25 @@ def few_ticks(axis) -> None:
         axis.set_minor_formatter(plt.NullFormatter())
 
 
-def save(figure: plt.Figure, path: Path, dpi: int = 130) -> None:
+def picture(theme: dict | None = None, dpi: int = 130) -> Callable:
+    """Have a function that makes a figure draw it in the theme and save it at a path, given first.
+
+    Args:
+        theme: Settings of matplotlib's besides THEME.
+    """
+
+    def saving(draw: Callable[..., plt.Figure]) -> Callable[..., None]:
+        @wraps(draw)
+        def drawn(path: Path, *arguments) -> None:
+            with plt.rc_context({**THEME, **(theme or {})}):
+                save(draw(*arguments), path, dpi)
+
+        return drawn
+
+    return saving
+
+
+def save(figure: plt.Figure, path: Path, dpi: int) -> None:
     """Write the picture as PNG of 256 colours, a third of the size, and forget it."""
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=dpi)

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.stats import chi2
 
-from pipeline.report.figures.canvas import PARAMETERS, few_ticks, save
+from pipeline.report.figures.canvas import PARAMETERS, few_ticks, key, mark, patch, picture
 from pipeline.report.results import Result
-from pipeline.report.styles import INK, THEME, Styles
+from pipeline.report.styles import INK, Styles
 from pipeline.sling.material import THETA
 
 BINS = 14  # of a marginal, over the span that is shown
 TOP = 3.0  # of the misfit axis, in units of the misfit at the interval's ends
 
 
-def profiles(path: Path, results: dict[str, Result], styles: Styles, boxes) -> None:
+@picture()
+def profiles(results: dict[str, Result], styles: Styles, boxes) -> plt.Figure:
     """Least misfit with one parameter held at each value, and the posterior's marginals.
 
     Args:
@@ -26,52 +25,50 @@ def profiles(path: Path, results: dict[str, Result], styles: Styles, boxes) -> N
     """
     level = next(iter(results.values())).confidence["level"]
     reach = float(chi2.ppf(level, 1))
-    with plt.rc_context(THEME):
-        figure, axes = plt.subplots(2, 3, figsize=(9.6, 5.6), sharey=True)
-        for ax, name in zip(axes.flat, THETA, strict=False):
-            label, unit = PARAMETERS[name]
-            box, marks = getattr(boxes, name), []
-            if box.scale == "log":
-                ax.set_xscale("log")
-            for number, (method, result) in enumerate(results.items()):
-                about = result.confidence["parameters"][name]
-                color, best = styles[method].color, unit * result.theta["theta"][name]
-                if about.get("fixed"):
-                    ax.axvline(best, color=color, lw=1.2, ls=":")
-                    marks.append(f"{styles[method].name}: held fixed")
-                    continue
-                samples = unit * _column(result, name)
-                _marginal(ax, samples, color, reach, log=box.scale == "log")
-                curve = result.posterior["profiles"][name]
-                value = unit * np.array(curve["value"])
-                ax.plot(value, curve["misfit"], "o-", ms=2.5, color=color, lw=1.5)
-                _interval(ax, unit * about["low"], unit * about["high"], best, color, number, reach)
-                if not about["identifiable"]:
-                    marks.append(f"{styles[method].name}: not identifiable")
-            if box.scale == "log":
-                few_ticks(ax.xaxis)
-            else:  # the whole box, so that an interval that fills it is seen to
-                margin = 0.03 * (box.high - box.low)
-                ax.set_xlim(unit * (box.low - margin), unit * (box.high + margin))
-            ax.axhline(reach, color="0.5", lw=0.8, ls="--")
-            ax.set_xlabel(label)
-            words = {"va": "top", "fontsize": 7.5, "zorder": 6}
-            ax.text(0.03, 0.98, "\n".join(marks), transform=ax.transAxes, **words)
-        _product(axes[1, 2], results, styles, reach)
-        axes[0, 0].set_ylim(0, TOP * reach)
-        for ax in axes[:, 0]:
-            ax.set_ylabel("misfit above its least")
-        handles = [plt.Line2D([], [], color=styles[method].color) for method in results]
-        names = [styles[method].name for method in results]
-        handles += [
-            plt.Line2D([], [], color="0.5", ls="--", lw=0.8),
-            plt.Line2D([], [], color="0.4", lw=3),
-            plt.Rectangle((0, 0), 1, 1, color="0.8"),
-        ]
-        names += [f"{100 * level:g} % of a likelihood ratio", f"{100 * level:g} % interval and θ*"]
-        names += ["posterior's marginal"]
-        figure.legend(handles, names, loc="outside lower center", ncols=len(names))
-        save(figure, path)
+    figure, axes = plt.subplots(2, 3, figsize=(9.6, 5.6), sharey=True)
+    for ax, name in zip(axes.flat, THETA, strict=False):
+        label, unit = PARAMETERS[name]
+        box, marks = getattr(boxes, name), []
+        if box.scale == "log":
+            ax.set_xscale("log")
+        for number, (method, result) in enumerate(results.items()):
+            about = result.confidence["parameters"][name]
+            color, best = styles[method].color, unit * result.theta["theta"][name]
+            if about.get("fixed"):
+                ax.axvline(best, color=color, lw=1.2, ls=":")
+                marks.append(f"{styles[method].name}: held fixed")
+                continue
+            samples = unit * _column(result, name)
+            _marginal(ax, samples, color, reach, log=box.scale == "log")
+            curve = result.posterior["profiles"][name]
+            value = unit * np.array(curve["value"])
+            ax.plot(value, curve["misfit"], "o-", ms=2.5, color=color, lw=1.5)
+            _interval(ax, unit * about["low"], unit * about["high"], best, color, number, reach)
+            if not about["identifiable"]:
+                marks.append(f"{styles[method].name}: not identifiable")
+        if box.scale == "log":
+            few_ticks(ax.xaxis)
+        else:  # the whole box, so that an interval that fills it is seen to
+            margin = 0.03 * (box.high - box.low)
+            ax.set_xlim(unit * (box.low - margin), unit * (box.high + margin))
+        ax.axhline(reach, color="0.5", lw=0.8, ls="--")
+        ax.set_xlabel(label)
+        words = {"va": "top", "fontsize": 7.5, "zorder": 6}
+        ax.text(0.03, 0.98, "\n".join(marks), transform=ax.transAxes, **words)
+    _product(axes[1, 2], results, styles, reach)
+    axes[0, 0].set_ylim(0, TOP * reach)
+    for ax in axes[:, 0]:
+        ax.set_ylabel("misfit above its least")
+    key(
+        figure,
+        [
+            *((styles[method].name, mark(color=styles[method].color)) for method in results),
+            (f"{100 * level:g} % of a likelihood ratio", mark(color="0.5", ls="--", lw=0.8)),
+            (f"{100 * level:g} % interval and θ*", mark(color="0.4", lw=3)),
+            ("posterior's marginal", patch("0.8")),
+        ],
+    )
+    return figure
 
 
 def _product(ax: plt.Axes, results: dict[str, Result], styles, reach: float) -> None:
@@ -112,31 +109,31 @@ def _interval(ax, low: float, high: float, best: float, color: str, number: int,
     ax.plot(best, height, "o", ms=6, color=color, mec="w", mew=1)
 
 
-def correlation(path: Path, results: dict[str, Result], styles: Styles) -> None:
+@picture({"axes.grid": False})
+def correlation(results: dict[str, Result], styles: Styles) -> plt.Figure:
     """Correlations of the posterior, a matrix a method."""
     cells = max(len(one.confidence["correlation"]["names"]) for one in results.values())
     inches = max(3.4, 0.47 * cells)
-    with plt.rc_context({**THEME, "axes.grid": False}):
-        size = (len(results) * (inches + 0.9) + 0.7, inches + 0.8)
-        figure, axes = plt.subplots(1, len(results), figsize=size, squeeze=False)
-        for ax, (method, result) in zip(axes.flat, results.items(), strict=True):
-            about = result.confidence["correlation"]
-            matrix = np.array(about["matrix"], float)
-            names = [quantity(name) for name in about["names"]]
-            image = ax.imshow(matrix, cmap="RdBu_r", vmin=-1, vmax=1)
-            for (row, column), value in np.ndenumerate(matrix):
-                small = "1" if row == column else "0"
-                shown = abs(value) >= 0.005 and row != column
-                text = f"{value:+.2f}".replace("-", "−") if shown else small
-                ink = {"color": "w" if abs(value) > 0.6 else INK, "fontsize": 7}
-                ax.text(column, row, text, ha="center", va="center", **ink)
-            ax.set_xticks(range(len(names)), names, rotation=40, ha="right", rotation_mode="anchor")
-            ax.set_yticks(range(len(names)), names)
-            ax.set_title(styles[method].name, fontsize=9, color=styles[method].color)
-            ax.tick_params(length=0)
-            ax.spines[:].set_visible(False)
-        figure.colorbar(image, ax=axes, label="correlation", shrink=0.8)
-        save(figure, path)
+    size = (len(results) * (inches + 0.9) + 0.7, inches + 0.8)
+    figure, axes = plt.subplots(1, len(results), figsize=size, squeeze=False)
+    for ax, (method, result) in zip(axes.flat, results.items(), strict=True):
+        about = result.confidence["correlation"]
+        matrix = np.array(about["matrix"], float)
+        names = [quantity(name) for name in about["names"]]
+        image = ax.imshow(matrix, cmap="RdBu_r", vmin=-1, vmax=1)
+        for (row, column), value in np.ndenumerate(matrix):
+            small = "1" if row == column else "0"
+            shown = abs(value) >= 0.005 and row != column
+            text = f"{value:+.2f}".replace("-", "−") if shown else small
+            ink = {"color": "w" if abs(value) > 0.6 else INK, "fontsize": 7}
+            ax.text(column, row, text, ha="center", va="center", **ink)
+        ax.set_xticks(range(len(names)), names, rotation=40, ha="right", rotation_mode="anchor")
+        ax.set_yticks(range(len(names)), names)
+        ax.set_title(styles[method].name, fontsize=9, color=styles[method].color)
+        ax.tick_params(length=0)
+        ax.spines[:].set_visible(False)
+    figure.colorbar(image, ax=axes, label="correlation", shrink=0.8)
+    return figure
 
 
 def quantity(name: str) -> str:

@@ -1,84 +1,80 @@
-"""The recording beside the calibrated simulation: force, distance, work, clouds."""
+"""The recording beside the calibrated simulation: force, work, clouds, the band under load."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 from pipeline.episode.episode import Episode
 from pipeline.episode.phases import phases, taut_frames
-from pipeline.report.figures.canvas import save
-from pipeline.report.replay import Replay
-from pipeline.report.styles import INK, THEME, Styles
+from pipeline.report.figures.canvas import key, mark, picture
+from pipeline.report.replay import LOAD, Replay
+from pipeline.report.styles import INK, Style, Styles
 
 DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)))  # so that curves that lie on each other are seen
 AROUND = (-0.25, 0.5)  # of the release, magnified [s]
 MOVED = 0.005  # after the release, by which the band is seen to have left the hand [s]
 MOST_RECOIL = 3  # frames of the recoil that are shown
+LOADED = 1.5  # width
+SLACK, MARGIN = 0.05, 0.04  # of the peak force, below which the band is slack; of its draw [m]
 
 
-def force(path: Path, episode: Episode, replays: dict[str, Replay], styles: Styles) -> None:
+@picture()
+def force(episode: Episode, replays: dict[str, Replay], styles: Styles) -> plt.Figure:
     """Force over time, its residual, and the clouds' distance; the release magnified."""
     rows = ("force, y [N]", "force, z [N]", "|residual| [N]", "clouds off by [cm]")
-    with plt.rc_context(THEME):
-        figure, axes = plt.subplots(
-            4, 2, figsize=(9.6, 7.4), width_ratios=(1.9, 1), height_ratios=(1.35, 1, 1, 1),
-            sharex="col", sharey="row",
-        )  # fmt: skip
-        for ax in axes[:, 0], axes[:, 1]:
-            for row, axis in ((0, 1), (1, 2)):
-                ax[row].plot(episode.time, episode.force[:, axis], color=INK, lw=2)
-            for number, (method, replay) in enumerate(replays.items()):
-                style = {"color": styles[method].color, "lw": 1.3, "ls": DASHES[number % 3]}
-                ax[0].plot(episode.time, replay.force[:, 1], **style)
-                ax[1].plot(episode.time, replay.force[:, 2], **style)
-                residual = np.linalg.norm(episode.force - replay.force, axis=1)
-                style["lw"] = 1.1
-                ax[2].plot(episode.time, residual, **style | {"ls": "-"})
-                style |= {"ls": "", "marker": ".", "ms": 6 if number == 0 else 3.5}
-                ax[3].plot(episode.cloud_time, 100 * replay.distance, **style)
-            for one in ax:
-                one.axvline(episode.release_time, color="0.6", lw=0.8, zorder=0)
-        for ax, label in zip(axes[:, 0], rows, strict=True):
-            ax.set_ylabel(label)
-        figure.align_ylabels(axes[:, 0])
-        axes[3, 0].set(xlabel="time [s] (grey line: release)", xlim=episode.time[[0, -1]])
-        axes[3, 1].set_xlabel("time around the release [s]")
-        axes[3, 1].set_xlim(episode.release_time + AROUND[0], episode.release_time + AROUND[1])
-        handles = [plt.Line2D([], [], color=INK, lw=2)]
-        for number, method in enumerate(replays):
-            style = {"color": styles[method].color, "lw": 1.3, "ls": DASHES[number % 3]}
-            handles.append(plt.Line2D([], [], **style))
-        names = ["measured", *(styles[method].name for method in replays)]
-        figure.legend(handles, names, loc="outside lower center", ncols=len(names))
-        save(figure, path)
-
-
-def work(path: Path, episode: Episode, replays: dict[str, Replay], styles: Styles) -> None:
-    """Work of the band on the hand since the start, measured and simulated, and the difference."""
-    with plt.rc_context(THEME):
-        figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 3.3), sharex=True)
-        first = next(iter(replays.values()))
-        left.plot(episode.time, first.measured_work, color=INK, lw=2, label="measured")
+    figure, axes = plt.subplots(
+        4, 2, figsize=(9.6, 7.4), width_ratios=(1.9, 1), height_ratios=(1.35, 1, 1, 1),
+        sharex="col", sharey="row",
+    )  # fmt: skip
+    for ax in axes[:, 0], axes[:, 1]:
+        for row, axis in ((0, 1), (1, 2)):
+            ax[row].plot(episode.time, episode.force[:, axis], color=INK, lw=2)
         for number, (method, replay) in enumerate(replays.items()):
-            style = {"color": styles[method].color, "lw": 1.3, "ls": DASHES[number % 3]}
-            left.plot(episode.time, replay.work, label=styles[method].name, **style)
-            gap = replay.measured_work - replay.work
-            right.plot(episode.time, gap, **style | {"ls": "-"})
-            ending = {"ha": "left", "va": "center", "fontsize": 8, "color": styles[method].color}
-            right.annotate(
-                _signed(gap[-1], ".3f") + " J", (1, gap[-1]), xycoords=("axes fraction", "data"),
-                xytext=(3, 0), textcoords="offset points", annotation_clip=False, **ending,
-            )  # fmt: skip
-        left.set_ylabel("work on the hand, ∫ f·v dt [J]")
-        right.set_ylabel("measured − simulated [J]")
-        for ax in (left, right):
-            ax.axvline(episode.release_time, color="0.6", lw=0.8, zorder=0)
-            ax.set(xlabel="time [s] (grey line: release)", xlim=episode.time[[0, -1]])
-        left.legend()
-        save(figure, path)
+            style = curve(styles[method], number)
+            ax[0].plot(episode.time, replay.force[:, 1], **style)
+            ax[1].plot(episode.time, replay.force[:, 2], **style)
+            residual = np.linalg.norm(episode.force - replay.force, axis=1)
+            style["lw"] = 1.1
+            ax[2].plot(episode.time, residual, **style | {"ls": "-"})
+            style |= {"ls": "", "marker": ".", "ms": 6 if number == 0 else 3.5}
+            ax[3].plot(episode.cloud_time, 100 * replay.distance, **style)
+        for one in ax:
+            one.axvline(episode.release_time, color="0.6", lw=0.8, zorder=0)
+    for ax, label in zip(axes[:, 0], rows, strict=True):
+        ax.set_ylabel(label)
+    figure.align_ylabels(axes[:, 0])
+    axes[3, 0].set(xlabel="time [s] (grey line: release)", xlim=episode.time[[0, -1]])
+    axes[3, 1].set_xlabel("time around the release [s]")
+    axes[3, 1].set_xlim(episode.release_time + AROUND[0], episode.release_time + AROUND[1])
+    curves = [(styles[m].name, mark(**curve(styles[m], n))) for n, m in enumerate(replays)]
+    key(figure, [("measured", mark(color=INK, lw=2)), *curves])
+    return figure
+
+
+@picture()
+def work(episode: Episode, replays: dict[str, Replay], styles: Styles) -> plt.Figure:
+    """Work of the band on the hand since the start, measured and simulated, and the difference."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 3.3), sharex=True)
+    first = next(iter(replays.values()))
+    left.plot(episode.time, first.measured_work, color=INK, lw=2, label="measured")
+    for number, (method, replay) in enumerate(replays.items()):
+        style = curve(styles[method], number)
+        left.plot(episode.time, replay.work, label=styles[method].name, **style)
+        gap = replay.measured_work - replay.work
+        right.plot(episode.time, gap, **style | {"ls": "-"})
+        ending = {"ha": "left", "va": "center", "fontsize": 8, "color": styles[method].color}
+        right.annotate(
+            _signed(gap[-1], ".3f") + " J", (1, gap[-1]), xycoords=("axes fraction", "data"),
+            xytext=(3, 0), textcoords="offset points", annotation_clip=False, **ending,
+        )  # fmt: skip
+    left.set_ylabel("work on the hand, ∫ f·v dt [J]")
+    right.set_ylabel("measured − simulated [J]")
+    for ax in (left, right):
+        ax.axvline(episode.release_time, color="0.6", lw=0.8, zorder=0)
+        ax.set(xlabel="time [s] (grey line: release)", xlim=episode.time[[0, -1]])
+    left.legend()
+    return figure
 
 
 def moments(episode: Episode) -> dict[str, int]:
@@ -104,14 +100,14 @@ def moments(episode: Episode) -> dict[str, int]:
     return chosen | {"swinging": nearest(min(release + 0.5, stamps[-1]))}
 
 
+@picture()
 def clouds(
-    path: Path,
     episode: Episode,
     replays: dict[str, Replay],
     styles: Styles,
     frames: dict[str, int],
     diameter: float,
-) -> None:
+) -> plt.Figure:
     """Measured points and simulated bands at `frames`, from above and along y, at one scale."""
     views = (("from above", 1), ("along y", 2))
     seen = [episode.clouds[frame] for frame in frames.values() if len(episode.clouds[frame])]
@@ -120,43 +116,109 @@ def clouds(
     high = np.max([points.max(0) for points in seen], axis=0) + 0.02
     wide, tall = high[0] - low[0], [high[up] - low[up] for _, up in views]
     inches = (11.0 - 1.2) / len(frames) / wide  # a metre
-    with plt.rc_context(THEME):
-        figure, axes = plt.subplots(
-            2, len(frames), figsize=(11, inches * sum(tall) + 1.6), sharex=True, sharey="row",
-            height_ratios=tall, squeeze=False,
-        )  # fmt: skip
-        for column, (name, frame) in enumerate(frames.items()):
-            since = episode.cloud_time[frame] - episode.release_time
-            axes[0, column].set_title(f"{name}\n{_signed(since, '.3f')} s", fontsize=9)
-            points = episode.clouds[frame]
-            for ax, (_, up) in zip(axes[:, column], views, strict=True):
-                ax.plot(points[:, 0], points[:, up], ".", ms=1.5, color=INK, zorder=2.5)
-                for method, replay in replays.items():
-                    line, color = replay.center_line[frame][:, [0, up]].T, styles[method].color
-                    ax.plot(*line, color=color, lw=1, zorder=3)
-                    ax.plot(*line, color=color, alpha=0.25, zorder=2, gid="tube")
-                ax.set_aspect("equal")
-            for number, (method, replay) in enumerate(reversed(replays.items())):
-                axes[0, column].text(
-                    0.98, 0.02 + 0.05 * number, f"{100 * replay.distance[frame]:.2f} cm",
-                    transform=axes[0, column].transAxes, ha="right", fontsize=8,
-                    color=styles[method].color,
-                )  # fmt: skip
-            axes[1, column].set_xlabel("x [m]")
-        for row, (view, up) in zip(axes, views, strict=True):
-            row[0].set(xlim=(low[0], high[0]), ylim=(low[up], high[up]))
-            row[0].set_ylabel(f"{'xyz'[up]} [m], {view}")
-        dots = [plt.Line2D([], [], ls="", marker=".", color=INK)]
-        lines = [plt.Line2D([], [], color=styles[method].color) for method in replays]
-        names = ["measured points", *(styles[method].name for method in replays)]
-        figure.legend(dots + lines, names, loc="outside lower center", ncols=4)
-        figure.draw_without_rendering()  # the layout decides how many points a metre takes
-        for ax in axes.flat:
-            per_metre = np.diff(ax.transData.transform([[0, 0], [1, 0]])[:, 0])[0]
-            for line in ax.lines:
-                if line.get_gid() == "tube":
-                    line.set_linewidth(diameter * per_metre * 72 / figure.dpi)
-        save(figure, path)
+    figure, axes = plt.subplots(
+        2, len(frames), figsize=(11, inches * sum(tall) + 1.6), sharex=True, sharey="row",
+        height_ratios=tall, squeeze=False,
+    )  # fmt: skip
+    for column, (name, frame) in enumerate(frames.items()):
+        since = episode.cloud_time[frame] - episode.release_time
+        axes[0, column].set_title(f"{name}\n{_signed(since, '.3f')} s", fontsize=9)
+        points = episode.clouds[frame]
+        for ax, (_, up) in zip(axes[:, column], views, strict=True):
+            ax.plot(points[:, 0], points[:, up], ".", ms=1.5, color=INK, zorder=2.5)
+            for method, replay in replays.items():
+                line, color = replay.center_line[frame][:, [0, up]].T, styles[method].color
+                ax.plot(*line, color=color, lw=1, zorder=3)
+                ax.plot(*line, color=color, alpha=0.25, zorder=2, gid="tube")
+            ax.set_aspect("equal")
+        for number, (method, replay) in enumerate(reversed(replays.items())):
+            axes[0, column].text(
+                0.98, 0.02 + 0.05 * number, f"{100 * replay.distance[frame]:.2f} cm",
+                transform=axes[0, column].transAxes, ha="right", fontsize=8,
+                color=styles[method].color,
+            )  # fmt: skip
+        axes[1, column].set_xlabel("x [m]")
+    for row, (view, up) in zip(axes, views, strict=True):
+        row[0].set(xlim=(low[0], high[0]), ylim=(low[up], high[up]))
+        row[0].set_ylabel(f"{'xyz'[up]} [m], {view}")
+    lines = [(styles[method].name, mark(color=styles[method].color)) for method in replays]
+    key(figure, [("measured points", mark(ls="", marker=".", color=INK)), *lines], 4)
+    figure.draw_without_rendering()  # the layout decides how many points a metre takes
+    for ax in axes.flat:
+        per_metre = np.diff(ax.transData.transform([[0, 0], [1, 0]])[:, 0])[0]
+        for line in ax.lines:
+            if line.get_gid() == "tube":
+                line.set_linewidth(diameter * per_metre * 72 / figure.dpi)
+    return figure
+
+
+@picture()
+def loaded(
+    episodes: dict[str, Episode],
+    replays: dict[str, dict[str, Replay]],
+    styles: Styles,
+    fork_width: float,
+    fork_height: float,
+) -> plt.Figure:
+    """A column a band: simulated bands under `LOAD`, to scale, and force against draw.
+
+    Args:
+        replays: By band and method.
+    """
+    shapes = [one.loaded for of_band in replays.values() for one in of_band.values()]
+    deepest = np.nanmin([np.nanmin(shape[:, 2], initial=-0.1) for shape in shapes])
+    low, half = min(deepest, -fork_height) - 0.05, fork_width / 2 + 0.06
+    columns = len(replays)
+    wide = min(4.2, 13.0 / columns)
+    figure, axes = plt.subplots(
+        2, columns, figsize=(columns * wide, 8.2), height_ratios=(1.25, 1), squeeze=False,
+        sharey="row",
+    )  # fmt: skip
+    for (top, bottom), (band, of_band) in zip(axes.T, replays.items(), strict=True):
+        _hanging(top, of_band, styles, fork_width, fork_height)
+        top.set(xlim=(-half - 0.16, half + 0.16), ylim=(low, 0.03), aspect="equal")
+        top.set_title(band, fontsize=10)
+        top.set_xlabel("x [m]")
+        _drawn(bottom, episodes[band], of_band, styles)
+        bottom.set_xlabel("draw: the hand's distance from the fork [m]")
+    axes[0, 0].set_ylabel(f"z [m], {LOAD:g} kg at the middle (simulated)")
+    axes[1, 0].set_ylabel("force of the recorded pull [N]")
+    methods = list(dict.fromkeys(method for of_band in replays.values() for method in of_band))
+    curves = [(styles[m].name, mark(**curve(styles[m], n, LOADED))) for n, m in enumerate(methods)]
+    key(figure, [("measured (the pull alone)", mark(color=INK, lw=2)), *curves], 3)
+    return figure
+
+
+def _hanging(ax, replays: dict[str, Replay], styles, fork_width: float, fork_height: float) -> None:
+    for side in (-1, 1):
+        ax.plot([side * fork_width / 2] * 2, [0, -fork_height], color="0.6", lw=3, zorder=1)
+    for number, (method, replay) in enumerate(replays.items()):
+        style, shape = curve(styles[method], number, LOADED), replay.loaded
+        depth = -shape[len(shape) // 2, 2]
+        if np.isfinite(depth):
+            ax.plot(shape[:, 0], shape[:, 2], **style, zorder=3)
+            ax.plot(0, -depth, "o", ms=7, color=style["color"], mec="w", mew=0.7, zorder=4)
+        said = f"{100 * depth:.1f} cm" if np.isfinite(depth) else "not found"
+        words = {"ha": "right", "va": "top", "fontsize": 8, "color": style["color"]}
+        ax.text(0.99, 0.97 - 0.055 * number, said, transform=ax.transAxes, **words)
+
+
+def _drawn(ax: plt.Axes, episode: Episode, replays: dict[str, Replay], styles) -> None:
+    last = episode.release_time - 2 * episode.sample_period  # later samples mix in the release
+    held = (episode.time >= episode.grasp_time) & (episode.time <= last)
+    draw = np.linalg.norm(episode.position[held, 1:], axis=1)
+    size = np.linalg.norm(episode.force[held], axis=1)
+    ax.plot(draw, size, color=INK, lw=2, zorder=2)
+    taut = draw[size > SLACK * size.max()]
+    ax.set_xlim(max(taut.min() - MARGIN, 0), draw.max() + MARGIN / 4)
+    for number, (method, replay) in enumerate(replays.items()):
+        size = np.linalg.norm(replay.force[held], axis=1)
+        ax.plot(draw, size, **curve(styles[method], number, LOADED), zorder=3)
+
+
+def curve(style: Style, number: int, width: float = 1.3) -> dict:
+    """How the curve of the n-th method is drawn."""
+    return {"color": style.color, "lw": width, "ls": DASHES[number % len(DASHES)]}
 
 
 def _signed(value: float, form: str) -> str:

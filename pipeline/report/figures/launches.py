@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -11,10 +9,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Rectangle
 
 from pipeline.params import TARGET_AREA
-from pipeline.report.figures.canvas import save
+from pipeline.report.figures.canvas import key, mark, patch, picture
 from pipeline.report.noise import landed
 from pipeline.report.results import Results
-from pipeline.report.styles import INK, SIDE_BY_SIDE, THEME, Styles
+from pipeline.report.styles import INK, SIDE_BY_SIDE, Styles
 from pipeline.sling.model import GRAVITY
 
 BEHIND, BEYOND = -0.45, 0.35  # how far a picture reaches behind the fork, and past the target [m]
@@ -33,9 +31,10 @@ def flight(y: float, z: float, speed: float, angle: float, floor: float) -> np.n
     )
 
 
+@picture({"axes.grid": False, "axes.spines.bottom": False})
 def trajectories(
-    path: Path, results: Results, methods: list[str], styles: Styles, fork_height: float
-) -> None:
+    results: Results, methods: list[str], styles: Styles, fork_height: float
+) -> plt.Figure:
     """Flights from the pouch to the floor, a panel a band and method, to scale.
 
     Args:
@@ -53,26 +52,25 @@ def trajectories(
     low, high = -fork_height - 0.13, max(0.1, float(highest) + 0.05)
     wide = min(14.0 / columns, 5.6)
     tall = wide * (high - low) / (view[1] - view[0])
-    with plt.rc_context({**THEME, "axes.grid": False, "axes.spines.bottom": False}):
-        figure, axes = plt.subplots(
-            rows, columns, figsize=(columns * wide, rows * (tall + 0.35) + 0.9),
-            sharex=True, sharey=True, squeeze=False,
-        )  # fmt: skip
-        for ax in axes.flat[len(panels) :]:
-            ax.remove()
-        for number, (ax, (band, method)) in enumerate(zip(axes.flat, panels, strict=False)):
-            rows_of, style = trials[band, method], styles[method]
-            _scenery(ax, fork_height, sorted(set(rows_of.target)), style.color)
-            _flights(ax, rows_of, predicted[band, method], style.color, fork_height)
-            ax.set_title(f"{band}, {style.name}", fontsize=9, color=style.color)
-            ax.set(xlim=view, ylim=(low, high), aspect="equal")
-            if number % columns == 0:
-                ax.set_ylabel("z [m]")
-            if number >= len(panels) - columns:
-                ax.set_xlabel("y [m]")
-        kinds = sorted({kind for one in trials.values() for kind in one.kind} - {"predicted"})
-        _key(figure, kinds)
-        save(figure, path)
+    figure, axes = plt.subplots(
+        rows, columns, figsize=(columns * wide, rows * (tall + 0.35) + 0.9),
+        sharex=True, sharey=True, squeeze=False,
+    )  # fmt: skip
+    for ax in axes.flat[len(panels) :]:
+        ax.remove()
+    for number, (ax, (band, method)) in enumerate(zip(axes.flat, panels, strict=False)):
+        rows_of, style = trials[band, method], styles[method]
+        _scenery(ax, fork_height, sorted(set(rows_of.target)), style.color)
+        _flights(ax, rows_of, predicted[band, method], style.color, fork_height)
+        ax.set_title(f"{band}, {style.name}", fontsize=9, color=style.color)
+        ax.set(xlim=view, ylim=(low, high), aspect="equal")
+        if number % columns == 0:
+            ax.set_ylabel("z [m]")
+        if number >= len(panels) - columns:
+            ax.set_xlabel("y [m]")
+    kinds = sorted({kind for one in trials.values() for kind in one.kind} - {"predicted"})
+    _key(figure, kinds)
+    return figure
 
 
 def _with_target(trials: pd.DataFrame) -> pd.DataFrame:
@@ -143,28 +141,22 @@ def _failed(trials: pd.DataFrame) -> list[str]:
 
 
 def _key(figure: plt.Figure, kinds: list[str]) -> None:
-    line = plt.Line2D
-    entries = []
-    if "virtual" in kinds:
-        entries.append(
-            ("virtual flight, with drag (paler: nearer target)", line([], [], color="0.3"))
-        )
-    if "measured" in kinds:
-        entries.append(("measured landing", line([], [], color="0.3", ls="", marker="x")))
-    predicted = line([], [], color=INK, lw=0.6, ls=(0, (5, 3)))
-    entries += [
-        ("predicted by the calibrated simulator", predicted),
-        ("fork", line([], [], color=INK, lw=2)),
-        ("target on the floor, 1 m", Rectangle((0, 0), 1, 1, color=AREA)),
-        ("aimed at", line([], [], ls="", marker="^", color="0.7", mec=INK, mew=0.5)),
+    known = {
+        "virtual": ("virtual flight, with drag (paler: nearer target)", mark(color="0.3")),
+        "measured": ("measured landing", mark(color="0.3", ls="", marker="x")),
+    }
+    entries = [
+        *(entry for kind, entry in known.items() if kind in kinds),
+        ("predicted by the calibrated simulator", mark(color=INK, lw=0.6, ls=(0, (5, 3)))),
+        ("fork", mark(color=INK, lw=2)),
+        ("target on the floor, 1 m", patch(AREA)),
+        ("aimed at", mark(ls="", marker="^", color="0.7", mec=INK, mew=0.5)),
     ]
-    names, marks = zip(*entries, strict=True)
-    figure.legend(
-        marks, names, loc="outside lower center", ncols=len(names) if len(names) < 4 else 3
-    )
+    key(figure, entries, len(entries) if len(entries) < 4 else 3)
 
 
-def scatter(path: Path, results: Results, methods: list[str], styles: Styles) -> None:
+@picture({"axes.grid": False})
+def scatter(results: Results, methods: list[str], styles: Styles) -> plt.Figure:
     """Landings on the target, seen from above, a panel a band and a strip a method.
 
     Launches go in the plane of the band: nothing is known across it, and nothing is shown.
@@ -178,27 +170,26 @@ def scatter(path: Path, results: Results, methods: list[str], styles: Styles) ->
     kinds = sorted({kind for trials in launched for kind in trials.kind[landed(trials)]})
     more = 0.04 * max([0, *(len(_failed(trials)) - 1 for trials in launched)])  # for words [m]
     inches = min(4.5 * len(strips_of) + 0.6, 13.5), 5.6 + 6 * more
-    with plt.rc_context({**THEME, "axes.grid": False}):
-        figure, axes = plt.subplots(1, len(strips_of), figsize=inches, sharey=True, squeeze=False)
-        for ax, (band, strips) in zip(axes.flat, strips_of.items(), strict=True):
-            width = (far - near) / max(len(strips), 1)
-            ax.add_patch(Rectangle((0, near), far - near, far - near, color=AREA, lw=0, alpha=0.6))
-            for number, (_, color, trials) in enumerate(strips):
-                middle = (number + 0.5) * width
-                if number:
-                    ax.plot([number * width] * 2, TARGET_AREA, color="w", lw=2)
-                _landings(ax, trials, middle, width, color)
-            places = (np.arange(len(strips)) + 0.5) * width
-            names = [name.replace(", ", ",\n") for name, _, _ in strips]
-            ax.set_xticks(places, names, fontsize=8 if len(strips) <= SIDE_BY_SIDE else 6.8)
-            ax.tick_params(axis="x", length=0)
-            ax.set(xlim=(-0.03, 1.03), ylim=(near - 0.02, far + 0.08 + more), aspect="equal")
-            ax.set_title(band, fontsize=10)
-            for label, (_, color, _) in zip(ax.get_xticklabels(), strips, strict=True):
-                label.set_color(color)
-        axes[0, 0].set_ylabel(f"{' and '.join(kinds) or 'no'} landing, y [m]")
-        _key_of_targets(figure, results, kinds)
-        save(figure, path)
+    figure, axes = plt.subplots(1, len(strips_of), figsize=inches, sharey=True, squeeze=False)
+    for ax, (band, strips) in zip(axes.flat, strips_of.items(), strict=True):
+        width = (far - near) / max(len(strips), 1)
+        ax.add_patch(Rectangle((0, near), far - near, far - near, color=AREA, lw=0, alpha=0.6))
+        for number, (_, color, trials) in enumerate(strips):
+            middle = (number + 0.5) * width
+            if number:
+                ax.plot([number * width] * 2, TARGET_AREA, color="w", lw=2)
+            _landings(ax, trials, middle, width, color)
+        places = (np.arange(len(strips)) + 0.5) * width
+        names = [name.replace(", ", ",\n") for name, _, _ in strips]
+        ax.set_xticks(places, names, fontsize=8 if len(strips) <= SIDE_BY_SIDE else 6.8)
+        ax.tick_params(axis="x", length=0)
+        ax.set(xlim=(-0.03, 1.03), ylim=(near - 0.02, far + 0.08 + more), aspect="equal")
+        ax.set_title(band, fontsize=10)
+        for label, (_, color, _) in zip(ax.get_xticklabels(), strips, strict=True):
+            label.set_color(color)
+    axes[0, 0].set_ylabel(f"{' and '.join(kinds) or 'no'} landing, y [m]")
+    _key_of_targets(figure, results, kinds)
+    return figure
 
 
 def _strips(results: Results, band: str, methods: list[str], styles: Styles) -> list:
@@ -216,7 +207,7 @@ def _strips(results: Results, band: str, methods: list[str], styles: Styles) -> 
 def _landings(ax: plt.Axes, trials: pd.DataFrame, middle: float, width: float, color: str) -> None:
     """Rings around the targets and a mark a landing, in the strip about x = `middle`."""
     targets = sorted(set(trials.target))
-    for target, mark in zip(targets, _marks(targets), strict=True):
+    for target, sign in zip(targets, _marks(targets), strict=True):
         for radius in RINGS:
             if radius <= 0.501 * width:
                 ax.add_patch(Circle((middle, target), radius, fill=False, color="w", lw=1.2))
@@ -225,7 +216,7 @@ def _landings(ax: plt.Axes, trials: pd.DataFrame, middle: float, width: float, c
         for kind, some in seen.groupby("kind"):
             hollow = kind == "measured"
             ax.scatter(
-                np.full(len(some), middle), some.landing_y, s=20, marker=mark,
+                np.full(len(some), middle), some.landing_y, s=20, marker=sign,
                 facecolors="none" if hollow else color, edgecolors=color if hollow else "w",
                 linewidths=1.0 if hollow else 0.4, alpha=0.85, zorder=3,
             )  # fmt: skip
@@ -242,16 +233,14 @@ def _marks(targets: list[float]) -> list[str]:
 def _key_of_targets(figure: plt.Figure, results: Results, kinds: list[str]) -> None:
     targets = sorted(set(results.trials.target.dropna()))
     entries = [
-        (f"aimed at {target:g} m", plt.Line2D([], [], ls="", marker=mark, color="0.4", mec="w"))
-        for target, mark in zip(targets, _marks(targets), strict=True)
+        (f"aimed at {target:g} m", mark(ls="", marker=sign, color="0.4", mec="w"))
+        for target, sign in zip(targets, _marks(targets), strict=True)
     ]
     if "measured" in kinds:
-        hollow = plt.Line2D([], [], ls="", marker="o", mfc="none", color="0.4")
+        hollow = mark(ls="", marker="o", mfc="none", color="0.4")
         entries.append(("measured (filled: virtual)", hollow))
-    ring = plt.Line2D([], [], ls="", marker="o", ms=11, mfc=AREA, mec="w", mew=1.2)
     words = " and ".join(f"{100 * radius:g}" for radius in RINGS)
+    ring = mark(ls="", marker="o", ms=11, mfc=AREA, mec="w", mew=1.2)
     entries.append((f"rings of {words} cm around the targets", ring))
-    strip = Rectangle((0, 0), 1, 1, color=AREA, alpha=0.6)
-    entries.append(("target of 1 m × 1 m, a strip a method", strip))
-    names, marks = zip(*entries, strict=True)
-    figure.legend(marks, names, loc="outside lower center", ncols=3)
+    entries.append(("target of 1 m × 1 m, a strip a method", patch(AREA, alpha=0.6)))
+    key(figure, entries, 3)

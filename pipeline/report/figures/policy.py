@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
 from pipeline.landing.landing_map import LandingMap
 from pipeline.launches.stretch import stretch_of
-from pipeline.report.figures.canvas import log_y, save
+from pipeline.report.figures.canvas import key, log_y, mark, patch, picture
 from pipeline.report.results import Result
-from pipeline.report.styles import COLORS, SIDE_BY_SIDE, THEME, Styles, drawn
+from pipeline.report.styles import COLORS, SIDE_BY_SIDE, Styles, drawn
 
 FAIR = 0.05  # of the distance, shaded
 ERRORS = (-80, -50, -20, -10, -5, 0, 5, 10, 20, 50, 100, 200)  # % at the axis
@@ -20,7 +18,8 @@ REACH = 2.0  # of the farthest target, up to which a landing map tells landings 
 LEVEL = 90  # % that the predicted intervals are of
 
 
-def landings(path: Path, trials: pd.DataFrame, styles: Styles, near: list[str]) -> None:
+@picture()
+def landings(trials: pd.DataFrame, styles: Styles, near: list[str]) -> plt.Figure:
     """Landings against predictions of two methods, and the error of every method.
 
     Args:
@@ -29,49 +28,46 @@ def landings(path: Path, trials: pd.DataFrame, styles: Styles, near: list[str]) 
     """
     trials = trials[trials.landing_y.notna() & trials.predicted_y.notna()]
     inside = trials.stretch <= trials.recorded_stretch
-    with plt.rc_context(THEME):
-        tall = max(4.0, 1.6 + 0.3 * len(styles))
-        figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, tall), width_ratios=(1, 1.15))
-        shown = trials[trials.method.isin(near)]
-        both = shown[["landing_y", "predicted_y"]].to_numpy()
-        low, high = (0, 1) if both.size == 0 else (0.95 * both.min(), 1.05 * both.max())
-        line = np.array([low, high])
-        left.fill_between(line, (1 - FAIR) * line, (1 + FAIR) * line, color="0.9", lw=0)
-        left.plot(line, line, color="0.6", lw=1)
-        for method in near:
-            for chosen, face in ((inside, styles[method].color), (~inside, "none")):
-                mine = trials[(trials.method == method) & chosen]
-                _with_intervals(left, mine, styles[method].color, face)
-        kinds = " and ".join(sorted(set(trials.kind))) or "no"
-        left.set(xlabel=f"{kinds} landing [m]", ylabel="predicted landing [m]")
-        left.set(xlim=(low, high), ylim=(low, high), aspect="equal")
-        right.axvspan(-100 * FAIR, 100 * FAIR, color="0.9", lw=0)
-        right.axvline(0, color="0.6", lw=1)
-        for row, (method, style) in enumerate(styles.items()):
-            for chosen, face in ((inside, style.color), (~inside, "none")):
-                mine = trials[(trials.method == method) & chosen]
-                error = 100 * (mine.predicted_y / mine.landing_y - 1)
-                place = np.full(len(mine), row)
-                right.scatter(
-                    error, place, s=20, facecolors=face, edgecolors=style.color, alpha=0.7
-                )
-        right.set_yticks(range(len(styles)), [style.name for style in styles.values()])
-        right.set_ylim(len(styles) - 0.5, -0.5)
-        right.set_xscale("symlog", linthresh=10)
-        right.xaxis.set_major_locator(plt.FixedLocator(ERRORS))
-        right.xaxis.set_major_formatter("{x:g}")
-        right.set_xlabel("predicted / landed − 1 [%], logarithmic beyond ± 10")
-        style = {"ls": "", "marker": "o", "ms": 5, "color": "0.4"}
-        marks = [plt.Line2D([], [], ls="", marker="o", color=styles[m].color) for m in near]
-        marks += [plt.Line2D([], [], **style), plt.Line2D([], [], mfc="none", **style)]
-        marks += [plt.Rectangle((0, 0), 1, 1, color="0.9")]
-        names = [*(styles[m].name for m in near), "inside the recorded stretch", "beyond it"]
-        names += [f"± {100 * FAIR:g} %"]
-        if "predicted_low" in trials and trials.predicted_low.notna().any():
-            marks.append(plt.Line2D([], [], color="0.4", lw=1))
-            names.append(f"{LEVEL} % interval")
-        figure.legend(marks, names, loc="outside lower center", ncols=4)
-        save(figure, path)
+    tall = max(4.0, 1.6 + 0.3 * len(styles))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, tall), width_ratios=(1, 1.15))
+    shown = trials[trials.method.isin(near)]
+    both = shown[["landing_y", "predicted_y"]].to_numpy()
+    low, high = (0, 1) if both.size == 0 else (0.95 * both.min(), 1.05 * both.max())
+    line = np.array([low, high])
+    left.fill_between(line, (1 - FAIR) * line, (1 + FAIR) * line, color="0.9", lw=0)
+    left.plot(line, line, color="0.6", lw=1)
+    for method in near:
+        for chosen, face in ((inside, styles[method].color), (~inside, "none")):
+            mine = trials[(trials.method == method) & chosen]
+            _with_intervals(left, mine, styles[method].color, face)
+    kinds = " and ".join(sorted(set(trials.kind))) or "no"
+    left.set(xlabel=f"{kinds} landing [m]", ylabel="predicted landing [m]")
+    left.set(xlim=(low, high), ylim=(low, high), aspect="equal")
+    right.axvspan(-100 * FAIR, 100 * FAIR, color="0.9", lw=0)
+    right.axvline(0, color="0.6", lw=1)
+    for row, (method, style) in enumerate(styles.items()):
+        for chosen, face in ((inside, style.color), (~inside, "none")):
+            mine = trials[(trials.method == method) & chosen]
+            error = 100 * (mine.predicted_y / mine.landing_y - 1)
+            place = np.full(len(mine), row)
+            right.scatter(error, place, s=20, facecolors=face, edgecolors=style.color, alpha=0.7)
+    right.set_yticks(range(len(styles)), [style.name for style in styles.values()])
+    right.set_ylim(len(styles) - 0.5, -0.5)
+    right.set_xscale("symlog", linthresh=10)
+    right.xaxis.set_major_locator(plt.FixedLocator(ERRORS))
+    right.xaxis.set_major_formatter("{x:g}")
+    right.set_xlabel("predicted / landed − 1 [%], logarithmic beyond ± 10")
+    dot = {"ls": "", "marker": "o"}
+    entries = [(styles[m].name, mark(**dot, color=styles[m].color)) for m in near]
+    entries += [
+        ("inside the recorded stretch", mark(**dot, ms=5, color="0.4")),
+        ("beyond it", mark(**dot, ms=5, color="0.4", mfc="none")),
+        (f"± {100 * FAIR:g} %", patch("0.9")),
+    ]
+    if "predicted_low" in trials and trials.predicted_low.notna().any():
+        entries.append((f"{LEVEL} % interval", mark(color="0.4", lw=1)))
+    key(figure, entries, 4)
+    return figure
 
 
 def _with_intervals(ax: plt.Axes, trials: pd.DataFrame, color: str, face: str) -> None:
@@ -84,35 +80,35 @@ def _with_intervals(ax: plt.Axes, trials: pd.DataFrame, color: str, face: str) -
     )
 
 
-def training(path: Path, results: dict[str, Result], styles: Styles) -> None:
+@picture()
+def training(results: dict[str, Result], styles: Styles) -> plt.Figure:
     """Landing error of the deterministic policy by iteration of PPO, in its own simulator."""
     first = drawn(results, SIDE_BY_SIDE)  # on top where curves lie on each other
-    with plt.rc_context(THEME):
-        figure, ax = plt.subplots(figsize=(7.2, 3.4))
-        for method, result in results.items():
-            curve, own = result.training, styles[method]
-            style = {"lw": 1.6, "zorder": 3} if method in first else {"lw": 0.9, "zorder": 2}
-            error = 100 * curve.mean_error
-            ax.plot(curve.iteration, error, color=own.color, label=own.name, **style)
-        ax.axhline(1, color="0.6", lw=1)
-        ax.set(
-            xlabel="PPO iteration (line: the aim of 1 cm)",
-            ylabel="mean |landing − target| [cm]",
-        )
-        log_y(ax)
-        figure.legend(loc="outside right upper")
-        save(figure, path)
+    figure, ax = plt.subplots(figsize=(7.2, 3.4))
+    for method, result in results.items():
+        curve, own = result.training, styles[method]
+        style = {"lw": 1.6, "zorder": 3} if method in first else {"lw": 0.9, "zorder": 2}
+        error = 100 * curve.mean_error
+        ax.plot(curve.iteration, error, color=own.color, label=own.name, **style)
+    ax.axhline(1, color="0.6", lw=1)
+    ax.set(
+        xlabel="PPO iteration (line: the aim of 1 cm)",
+        ylabel="mean |landing − target| [cm]",
+    )
+    log_y(ax)
+    figure.legend(loc="outside right upper")
+    return figure
 
 
+@picture()
 def landing_map(
-    path: Path,
     result: Result,
     draws: dict[str, np.ndarray],
     targets: np.ndarray,
     recorded: float,
     fork_width: float,
     rest_length: float,
-) -> None:
+) -> plt.Figure:
     """Landing against draw, with the policies' paths over their targets.
 
     Args:
@@ -127,28 +123,27 @@ def landing_map(
     points = np.stack([y.ravel(), z.ravel()], 1)
     landed = chart(points)
     stretch = stretch_of(np.insert(points, 0, 0, axis=1), fork_width, rest_length).reshape(y.shape)
-    with plt.rc_context(THEME):
-        figure, ax = plt.subplots(figsize=(6, 4.6))
-        landing = landed.landing_y.reshape(y.shape)
-        ax.set_facecolor("0.8")
-        ax.grid(False)
-        if np.isfinite(landing).any():
-            levels = _round(landing, REACH * targets.max())
-            filled = ax.contourf(y, z, landing, levels=levels, cmap="viridis", extend="max")
-            figure.colorbar(filled, label="simulated landing [m] (grey: the launch fails)")
-            lines = ax.contour(y, z, landing, levels=np.unique(targets), colors="w", linewidths=0.8)
-            ax.clabel(lines, fmt="%g m", fontsize=7)
-        if stretch.min() < recorded < stretch.max():
-            ax.contour(y, z, stretch, levels=[recorded], colors="k", linestyles=":")
-            ax.plot([], [], "k:", label=f"recorded stretch {recorded:.2f}: beyond is extrapolated")
-        for (whose, path_), color in zip(draws.items(), (COLORS[0], COLORS[6]), strict=False):
-            label = f"{whose} draws, near (dot) to far target"
-            ax.plot(*path_.T, color=color, lw=2.5, label=label)
-            ax.plot(*path_[0], "o", color=color)
-        ax.set(xlabel="draw y [m]", ylabel="draw z [m]")
-        ax.set(xlim=(fine_y[0], fine_y[-1]), ylim=(fine_z[0], fine_z[-1]))
-        figure.legend(loc="outside lower center", ncols=2, fontsize=8)
-        save(figure, path)
+    figure, ax = plt.subplots(figsize=(6, 4.6))
+    landing = landed.landing_y.reshape(y.shape)
+    ax.set_facecolor("0.8")
+    ax.grid(False)
+    if np.isfinite(landing).any():
+        levels = _round(landing, REACH * targets.max())
+        filled = ax.contourf(y, z, landing, levels=levels, cmap="viridis", extend="max")
+        figure.colorbar(filled, label="simulated landing [m] (grey: the launch fails)")
+        lines = ax.contour(y, z, landing, levels=np.unique(targets), colors="w", linewidths=0.8)
+        ax.clabel(lines, fmt="%g m", fontsize=7)
+    if stretch.min() < recorded < stretch.max():
+        ax.contour(y, z, stretch, levels=[recorded], colors="k", linestyles=":")
+        ax.plot([], [], "k:", label=f"recorded stretch {recorded:.2f}: beyond is extrapolated")
+    for (whose, path_), color in zip(draws.items(), (COLORS[0], COLORS[6]), strict=False):
+        label = f"{whose} draws, near (dot) to far target"
+        ax.plot(*path_.T, color=color, lw=2.5, label=label)
+        ax.plot(*path_[0], "o", color=color)
+    ax.set(xlabel="draw y [m]", ylabel="draw z [m]")
+    ax.set(xlim=(fine_y[0], fine_y[-1]), ylim=(fine_z[0], fine_z[-1]))
+    figure.legend(loc="outside lower center", ncols=2, fontsize=8)
+    return figure
 
 
 def _round(values: np.ndarray, most: float) -> np.ndarray:

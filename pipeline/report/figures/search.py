@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Ellipse
 
-from pipeline.report.figures.canvas import PARAMETERS, few_ticks, log_y, save
-from pipeline.report.losses import best_so_far, printed
-from pipeline.report.results import Result
-from pipeline.report.styles import INK, SIDE_BY_SIDE, THEME, Styles, drawn
+from pipeline.report.figures.canvas import PARAMETERS, few_ticks, key, log_y, mark, picture
+from pipeline.report.results import Result, best_so_far, printed
+from pipeline.report.styles import INK, SIDE_BY_SIDE, Styles, drawn
 from pipeline.sling.material import THETA
 
 PATH, STAR = "#e4003a", "#ffd23f"
 NEAR = 0.3  # of the least loss, the part that is magnified
 EDGE = 0.02
+BOXED = dict.fromkeys(["axes.spines.top", "axes.spines.right"], True)
+BOXED |= dict.fromkeys(["axes.grid", "figure.constrained_layout.use"], False)
 SHOWN = 0.9  # share of the evaluated points that the colour scale tells apart
 
 
-def convergence(path: Path, results: dict[str, Result], styles: Styles, own) -> None:
+@picture()
+def convergence(results: dict[str, Result], styles: Styles, own) -> plt.Figure:
     """The printed loss of every method's best so far, against rollouts.
 
     Args:
@@ -30,38 +30,33 @@ def convergence(path: Path, results: dict[str, Result], styles: Styles, own) -> 
     """
     least = min(printed(result.history).min() for result in results.values())
     first = drawn(results, SIDE_BY_SIDE)  # on top where curves lie on each other
-    with plt.rc_context(THEME):
-        figure, axes = plt.subplots(1, 2, figsize=(10.5, 4.2))
-        for method, result in results.items():
-            common = printed(result.history)
-            best = common[best_so_far(result.history)]
-            best = np.where(np.isfinite(best), best, np.nan)
-            rollouts = np.arange(1, len(best) + 1)
-            style = {"color": styles[method].color, "ls": "--" if method in own else "-"}
-            style |= {"lw": 1.6, "zorder": 3} if method in first else {"lw": 1.0, "zorder": 2}
-            label = f"{styles[method].name}: {best[-1]:.3f}"
-            later = np.flatnonzero(result.history.phase.to_numpy() == "cma")[:1]
-            for ax in axes:
-                ax.plot(rollouts, best, drawstyle="steps-post", label=label, **style)
-                ax.plot(rollouts[later], best[later], "o", ms=5, color=style["color"])
-                ax.set_xlabel("rollouts (dot: CMA-ES takes over)")
-        axes[0].set_ylabel("printed loss of the best so far")
-        log_y(axes[0])
-        axes[1].set_ylim(least * (1 - NEAR / 15), least * (1 + NEAR))
-        axes[1].set_title("the same near the least", fontsize=9)
-        handles, names = axes[0].get_legend_handles_labels()
-        order = list(np.argsort([line.get_ydata()[-1] for line in handles], kind="stable"))
-        if own:
-            handles.append(plt.Line2D([], [], color="0.5", ls="--"))
-            names, order = [*names, "dashed: has another loss"], [*order, len(names)]
-        figure.legend(
-            [handles[i] for i in order], [names[i] for i in order],
-            loc="outside lower center", ncols=4,
-        )  # fmt: skip
-        save(figure, path)
+    figure, axes = plt.subplots(1, 2, figsize=(10.5, 4.2))
+    for method, result in results.items():
+        common = printed(result.history)
+        best = common[best_so_far(result.history)]
+        best = np.where(np.isfinite(best), best, np.nan)
+        rollouts = np.arange(1, len(best) + 1)
+        style = {"color": styles[method].color, "ls": "--" if method in own else "-"}
+        style |= {"lw": 1.6, "zorder": 3} if method in first else {"lw": 1.0, "zorder": 2}
+        label = f"{styles[method].name}: {best[-1]:.3f}"
+        later = np.flatnonzero(result.history.phase.to_numpy() == "cma")[:1]
+        for ax in axes:
+            ax.plot(rollouts, best, drawstyle="steps-post", label=label, **style)
+            ax.plot(rollouts[later], best[later], "o", ms=5, color=style["color"])
+            ax.set_xlabel("rollouts (dot: CMA-ES takes over)")
+    axes[0].set_ylabel("printed loss of the best so far")
+    log_y(axes[0])
+    axes[1].set_ylim(least * (1 - NEAR / 15), least * (1 + NEAR))
+    axes[1].set_title("the same near the least", fontsize=9)
+    curves, names = axes[0].get_legend_handles_labels()
+    order = np.argsort([line.get_ydata()[-1] for line in curves], kind="stable")
+    entries = [(names[i], curves[i]) for i in order]
+    key(figure, entries + [("dashed: has another loss", mark(color="0.5", ls="--"))] * bool(own), 4)
+    return figure
 
 
-def corner(path: Path, result: Result, boxes, title: str) -> None:
+@picture(BOXED, dpi=100)
+def corner(result: Result, boxes, title: str) -> plt.Figure:
     """Every evaluated point in the unit cube, each pair of free parameters against each other.
 
     Args:
@@ -80,51 +75,49 @@ def corner(path: Path, result: Result, boxes, title: str) -> None:
     worst = max(np.quantile(total[good], SHOWN), 1.001 * total[best])
     color = {"c": total[good], "cmap": "viridis", "norm": LogNorm(total[best], worst)}
     sizes = np.where(history.phase.to_numpy()[good] == "cma", 5, 14)
-    style = {"axes.spines.top": True, "axes.spines.right": True, "axes.grid": False}
-    with plt.rc_context({**THEME, **style, "figure.constrained_layout.use": False}):
-        inches = 1.4 + 1.55 * max(size, 3)
-        figure, axes = plt.subplots(size, size, figsize=(inches, inches), squeeze=False)
-        figure.subplots_adjust(0.08, 0.07, 0.93, 0.98, wspace=0.08, hspace=0.08)
-        for (row, column), ax in np.ndenumerate(axes):
-            if column > row:
-                ax.remove()
-                continue
-            x = free[column]
-            if row == column:
-                points = ax.scatter(unit[x][good], total[good], s=sizes, lw=0, **color)
-                ax.axvline(unit[x][best], color=PATH, lw=0.8)
-                ax.set(yscale="log", ylim=(0.98 * total[best], 1.3 * worst), ylabel="loss")
-                few_ticks(ax.yaxis)
-                ax.yaxis.tick_right()
-                ax.yaxis.set_label_position("right")
-                ax.tick_params(axis="y", which="both", labelsize=6)
-            else:
-                y = free[row]
-                ax.plot(unit[x][failed], unit[y][failed], "x", ms=3, mew=0.6, color="0.6")
-                ax.scatter(unit[x][good], unit[y][good], s=sizes, lw=0, **color)
-                _regions(ax, result, x, y)
-                ax.plot(
-                    unit[x][best], unit[y][best], "*", ms=12, color=STAR, mec=INK, mew=0.8, zorder=6
-                )
-                ax.set(ylim=(0, 1))
-                ax.set_yticks(*_ticks(y, boxes, history), fontsize=7)
-            ax.set(xlim=(0, 1))
-            ax.set_xticks(*_ticks(x, boxes, history), fontsize=7)
-            if row == size - 1:
-                ax.set_xlabel(_label(x))
-            else:
-                ax.tick_params(labelbottom=False)
-            if column == 0 and row > 0:
-                ax.set_ylabel(_label(free[row]))
-            elif row != column:
-                ax.tick_params(labelleft=False)
-        side = figure.add_axes((0.62, 0.93, 0.31, 0.016))
-        bar = figure.colorbar(points, cax=side, orientation="horizontal", extend="max")
-        bar.set_label(f"loss of {title}")
-        few_ticks(bar.ax.xaxis)
-        bar.ax.tick_params(which="both", labelsize=7)
-        _key(figure, result, failed.any())
-        save(figure, path, dpi=100)
+    inches = 1.4 + 1.55 * max(size, 3)
+    figure, axes = plt.subplots(size, size, figsize=(inches, inches), squeeze=False)
+    figure.subplots_adjust(0.08, 0.07, 0.93, 0.98, wspace=0.08, hspace=0.08)
+    for (row, column), ax in np.ndenumerate(axes):
+        if column > row:
+            ax.remove()
+            continue
+        x = free[column]
+        if row == column:
+            points = ax.scatter(unit[x][good], total[good], s=sizes, lw=0, **color)
+            ax.axvline(unit[x][best], color=PATH, lw=0.8)
+            ax.set(yscale="log", ylim=(0.98 * total[best], 1.3 * worst), ylabel="loss")
+            few_ticks(ax.yaxis)
+            ax.yaxis.tick_right()
+            ax.yaxis.set_label_position("right")
+            ax.tick_params(axis="y", which="both", labelsize=6)
+        else:
+            y = free[row]
+            ax.plot(unit[x][failed], unit[y][failed], "x", ms=3, mew=0.6, color="0.6")
+            ax.scatter(unit[x][good], unit[y][good], s=sizes, lw=0, **color)
+            _regions(ax, result, x, y)
+            ax.plot(
+                unit[x][best], unit[y][best], "*", ms=12, color=STAR, mec=INK, mew=0.8, zorder=6
+            )
+            ax.set(ylim=(0, 1))
+            ax.set_yticks(*_ticks(y, boxes, history), fontsize=7)
+        ax.set(xlim=(0, 1))
+        ax.set_xticks(*_ticks(x, boxes, history), fontsize=7)
+        if row == size - 1:
+            ax.set_xlabel(_label(x))
+        else:
+            ax.tick_params(labelbottom=False)
+        if column == 0 and row > 0:
+            ax.set_ylabel(_label(free[row]))
+        elif row != column:
+            ax.tick_params(labelleft=False)
+    side = figure.add_axes((0.62, 0.93, 0.31, 0.016))
+    bar = figure.colorbar(points, cax=side, orientation="horizontal", extend="max")
+    bar.set_label(f"loss of {title}")
+    few_ticks(bar.ax.xaxis)
+    bar.ax.tick_params(which="both", labelsize=7)
+    _key(figure, result, failed.any())
+    return figure
 
 
 def _regions(ax: plt.Axes, result: Result, x: str, y: str) -> None:
@@ -149,10 +142,6 @@ def _regions(ax: plt.Axes, result: Result, x: str, y: str) -> None:
 
 def _key(figure: plt.Figure, result: Result, failures: bool) -> None:
     """Legend in the empty corner."""
-
-    def mark(**style):
-        return plt.Line2D([], [], **style)
-
     entries = [("evaluated by the exploration", mark(ls="", marker="o", ms=4, color="0.4"))]
     if (result.history.phase == "cma").any():
         entries.append(("evaluated by CMA-ES", mark(ls="", marker="o", ms=2, color="0.4")))

@@ -14,8 +14,7 @@ from pipeline.report.report import Report
 from pipeline.report.results import Results
 from pipeline.report.styles import Styles
 from pipeline.report.tables import benchmark, differences, parameters
-from pipeline.report.tables.cells import markdown, percent
-from pipeline.report.tables.latex import latex
+from pipeline.report.tables.cells import latex, markdown, percent
 
 CAPTIONS = {
     1: "Landing error [cm] by band and method: mean ± deviation of |landing − target|; g in cm.",

@@ -10,8 +10,7 @@ import pandas as pd
 
 from pipeline.objective.space import Space
 from pipeline.report import paper
-from pipeline.report.losses import PRINTED
-from pipeline.report.results import Result, Results
+from pipeline.report.results import PRINTED, Result, Results
 from pipeline.report.styles import Styles
 from pipeline.report.tables.benchmark import APART, NOT_RUN, PAPER, band_name, method_name
 from pipeline.report.tables.cells import NONE, Table, number

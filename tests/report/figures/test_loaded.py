@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.report.figures import loaded as drawing
+from pipeline.report.figures import episode as drawing
 from pipeline.report.styles import styles
 from tests.report.conftest import BAND, METHOD, episode
 from tests.report.toy_replay import toy_replay

@@ -14,15 +14,6 @@ from tests.report.conftest import BAND, METHOD
 
 
 @pytest.fixture
-def kept(monkeypatch) -> list[plt.Figure]:
-    """Figures instead of files."""
-    figures: list[plt.Figure] = []
-    monkeypatch.setattr(search, "save", lambda figure, path, dpi=0: figures.append(figure))
-    yield figures
-    plt.close("all")
-
-
-@pytest.fixture
 def result(root, params):
     return gather(params, root).methods[BAND][METHOD]
 

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.report.styles import KNOWN, styles
 from pipeline.report.tables.benchmark import as_table, benchmark
-from pipeline.report.tables.latex import NAMES, latex, text
+from pipeline.report.tables.cells import NAMES, latex, text
 from tests.report.tables.toy_results import TARGETS, floor, launches, result, results
 
 TABLE = (

@@ -1,7 +1,8 @@
 """The project's own Prefect server: its history is SQLite in .prefect/, it listens on this machine
 alone, and it reports to nobody.
 
-`sling ui` serves until Ctrl-C; `served` is that server, or else one that ends with the caller.
+It is `prefect server start` behind a guard, so that it ends with whoever started it. `sling ui`
+serves until Ctrl-C; `served` is that server, or else one that ends with the caller.
 """
 
 from __future__ import annotations
@@ -9,27 +10,26 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import select
 import socket
 import subprocess
 import sys
-import threading
 import time
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
+from app.flow import guard
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
 
 HOST, PORT = "127.0.0.1", 4200
-STARTING, ENDING, ASKING = 120.0, 15.0, 5.0  # s, that a server may take to do so, and to answer
-ROOT = Path(__file__).parents[2]
-# What the browser may load and ask: the V2 UI would ask a counter of visits for its settings,
-# whether or not telemetry is off.
+STARTING, ASKING = 120.0, 5.0  # s, that a server may take to start, and to answer
+# What a page may load and ask: the V2 UI, to which a user may switch, would ask a counter of visits
+# on the Internet for its settings, whether or not telemetry is off.
 POLICY = (
-    f"default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob: http://{HOST}:* ws://{HOST}:*"
-).encode()
+    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'self' 'unsafe-inline'"
+    f" 'unsafe-eval' data: blob: http://{HOST}:* ws://{HOST}:*\">"
+)
 
 
 def home(root: Path) -> Path:
@@ -101,29 +101,25 @@ def serve(root: Path, port: int | None = None) -> str:
     where = address(root)
     if where:
         return f"the UI of this project runs already: {where}"
-    with _listening(PORT if port is None else port) as listener:
-        note = home(root) / "port"
-
-        def ready(url: str) -> None:
-            write_text(note, str(listener.getsockname()[1]))
-            print(f"Prefect UI: {url} (Ctrl-C ends it)", file=sys.stderr, flush=True)
-
-        _take(clean(root))
+    port = PORT if port is None else port
+    expect_free(port)
+    note = home(root) / "port"
+    with contextlib.suppress(KeyboardInterrupt), _server(root, port) as server:
+        write_text(note, str(port))
         try:
-            _run(listener, ready)
+            print(f"Prefect UI: {_url(port)} (Ctrl-C ends it)", file=sys.stderr, flush=True)
+            server.wait()
         finally:
             note.unlink(missing_ok=True)
+        raise UserError(f"Prefect's server has ended; {_log(root)} says why")
     return "the UI has ended; its history stays in .prefect/"
 
 
-def _listening(port: int) -> socket.socket:
-    """A socket on the loopback alone. Raises UserError, which says who has the port."""
-    listener = socket.socket()
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+def expect_free(port: int) -> None:
+    """Raises UserError, which says who has the port."""
     try:
-        listener.bind((HOST, port))
+        _bound(port).close()
     except OSError as error:
-        listener.close()
         other = _home_at(port)
         who = (
             f"the Prefect server of {other.parent}" if other else (error.strerror or "not allowed")
@@ -132,55 +128,11 @@ def _listening(port: int) -> socket.socket:
             f"port {port} cannot be used ({who}); give another one: sling ui --port {port + 1}"
         ) from error
     except OverflowError as error:
-        listener.close()
         raise UserError(f"--port: must be 1 to 65535, got {port}") from error
-    return listener
 
 
-def _run(
-    listener: socket.socket,
-    ready: Callable[[str], None],
-    ended: Callable[[], None] | None = None,
-) -> None:
-    """Serve on a bound socket until Ctrl-C, SIGTERM, or until `ended` returns in its thread."""
-    url = _url(listener.getsockname()[1])
-    os.environ["PREFECT_UI_API_URL"] = f"{url}/api"
-    import uvicorn
-    from prefect.server.api.server import create_app
-
-    class Server(uvicorn.Server):
-        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-            await super().startup(sockets)
-            ready(url)
-
-    app = _only_here(create_app(final=True))
-    server = Server(uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=3))
-    if ended:
-
-        def end() -> None:
-            ended()
-            server.should_exit = True
-            time.sleep(ENDING)
-            os._exit(1)  # it hangs
-
-        threading.Thread(target=end, daemon=True).start()
-    with contextlib.suppress(KeyboardInterrupt):  # uvicorn has shut down by then
-        server.run(sockets=[listener])
-
-
-def _only_here(app):
-    """An ASGI application whose pages have `POLICY`."""
-
-    async def answer(scope, receive, send) -> None:
-        async def send_on(message) -> None:
-            if message["type"] == "http.response.start":
-                policy = (b"content-security-policy", POLICY)
-                message = {**message, "headers": [*message.get("headers", ()), policy]}
-            await send(message)
-
-        await app(scope, receive, send_on)
-
-    return answer
+def _bound(port: int) -> socket.socket:
+    return socket.create_server((HOST, port))
 
 
 @contextlib.contextmanager
@@ -192,7 +144,11 @@ def served(root: Path) -> Iterator[str]:
     """
     where = address(root)
     with contextlib.ExitStack() as stack:
-        where = where or stack.enter_context(_temporary(root))
+        if not where:
+            with _bound(0) as listener:
+                port = listener.getsockname()[1]
+            stack.enter_context(_server(root, port))
+            where = _url(port)
         before = dict(os.environ)
         _take(clean(root) | {"PREFECT_API_URL": f"{where}/api"})
         try:
@@ -208,53 +164,39 @@ def _take(environment: dict[str, str]) -> None:
     os.environ.update(environment)
 
 
+def _log(root: Path) -> Path:
+    return home(root) / "server.log"
+
+
 @contextlib.contextmanager
-def _temporary(root: Path) -> Iterator[str]:
-    log = home(root) / "server.log"
-    log.parent.mkdir(parents=True, exist_ok=True)
-    with log.open("w", encoding="utf-8") as said:
+def _server(root: Path, port: int) -> Iterator[subprocess.Popen]:
+    """Prefect's server on a free port, from when it answers to the end of the block, or ours."""
+    start = ["-P", "-m", "prefect", "server", "start", "--host", HOST, "--port", str(port)]
+    home(root).mkdir(parents=True, exist_ok=True)
+    with _log(root).open("w", encoding="utf-8") as said:
         process = subprocess.Popen(
-            [sys.executable, "-m", "app.flow.server"],
-            cwd=ROOT,
-            env=clean(root),
+            [sys.executable, "-I", "-S", guard.__file__, sys.executable, *start],
+            env=clean(root) | {"PREFECT_UI_API_URL": f"{_url(port)}/api"},
             stdin=subprocess.PIPE,  # its end is ours: a killed flow leaves no server
-            stdout=subprocess.PIPE,
+            stdout=said,
             stderr=said,
-            text=True,
             start_new_session=True,  # Ctrl-C is ours: the flow's last words are to be kept
         )
     try:
-        yield _first_line(process, log)
+        deadline = time.monotonic() + STARTING
+        while _home_at(port) != home(root):
+            if time.monotonic() > deadline or process.poll() is not None:
+                raise UserError(f"Prefect's server does not start; {_log(root)} says why")
+            time.sleep(0.2)
+        for page in (home(root) / "ui").glob("*/index.html"):
+            text = page.read_text(encoding="utf-8")
+            if POLICY not in text:
+                write_text(page, text.replace("<head>", f"<head>{POLICY}", 1))
+        yield process
     finally:
         process.stdin.close()
         try:
-            process.wait(ENDING)
+            process.wait(guard.GRACE + 5)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-        process.stdout.close()
-
-
-def _first_line(process: subprocess.Popen, log: Path) -> str:
-    deadline = time.monotonic() + STARTING
-    while time.monotonic() < deadline and process.poll() is None:
-        if select.select([process.stdout], [], [], 0.2)[0]:
-            line = process.stdout.readline().strip()
-            if line:
-                return line
-    raise UserError(f"Prefect's server does not start; {log} says why")
-
-
-def main() -> None:
-    """A server on any free port, for as long as stdin is open; stdout gets its URL."""
-    with _listening(0) as listener:
-        _run(listener, lambda url: print(url, flush=True), ended=_until_closed)
-
-
-def _until_closed() -> None:
-    while os.read(0, 1):  # not sys.stdin, whose lock a daemon thread would hold to the end
-        pass
-
-
-if __name__ == "__main__":
-    main()

@@ -14,6 +14,8 @@ from hypothesis import settings
 
 from tests import once
 
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as stages have it; nothing has imported NumPy yet
+
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection():

@@ -11,6 +11,7 @@ import pytest
 from pipeline.episode.episode import Episode
 from pipeline.params import load
 from pipeline.sling import Sling
+from pipeline.sling.model import TETRAHEDRA
 
 
 @pytest.fixture(scope="session")
@@ -22,6 +23,13 @@ def params():
 def sling(params):
     band = SimpleNamespace(mass=0.023, diameter=0.01, rest_length=0.52)
     return Sling.of(band, params.setup, params.sling)
+
+
+@pytest.fixture(scope="session")
+def solid(sling, params):
+    """The same as tetrahedra."""
+    resolution = params.sling.model_copy(update={"mesh": TETRAHEDRA})
+    return replace(sling, mesh=TETRAHEDRA, edges=resolution.tet_edges, steps=resolution)
 
 
 @pytest.fixture(scope="session")

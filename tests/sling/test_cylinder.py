@@ -10,28 +10,20 @@ import pytest
 from pipeline.sling.cylinder import cylinder, section, volumes
 
 
-@pytest.mark.parametrize("rings", [1, 2, 3])
-def test_mesh_fills_the_round_band_and_neighbours_share_faces(rings):
-    vertices, tetrahedra = cylinder(np.linspace(0, 0.55, 21), 0.010, rings)
-    volume = volumes(vertices, tetrahedra)
-    assert volume.min() > 0
-    assert volume.sum() == pytest.approx(np.pi * 0.005**2 * 0.55)
-
-    faces = Counter(
-        tuple(sorted(np.delete(corners, corner))) for corners in tetrahedra for corner in range(4)
-    )
-    outside = 2 * 6 * rings * 20 + 2 * 6 * rings**2  # of the hull and of both ends
-    assert Counter(faces.values()) == {
-        1: outside,
-        2: (4 * len(tetrahedra) - outside) // 2,
-    }
+def test_mesh_fills_the_round_band_and_neighbours_share_faces():
+    for rings in (1, 2, 3):
+        vertices, tets = cylinder(np.linspace(0, 0.55, 21), 0.010, rings)
+        volume = volumes(vertices, tets)
+        assert volume.min() > 0
+        assert volume.sum() == pytest.approx(np.pi * 0.005**2 * 0.55)
+        faces = Counter(tuple(sorted(np.delete(tet, k))) for tet in tets for k in range(4))
+        outside = 2 * 6 * rings * 20 + 2 * 6 * rings**2  # of the hull and of both ends
+        assert Counter(faces.values()) == {1: outside, 2: (4 * len(tets) - outside) // 2}
 
 
-def test_the_papers_mesh_has_900_tetrahedra_in_layers_of_seven():
-    arc = np.linspace(0, 0.55, 51)
-    vertices, tetrahedra = cylinder(arc, 0.010)
-    assert vertices.shape == (51, 7, 3)
-    assert tetrahedra.shape == (900, 4)
+def test_the_papers_mesh_has_900_tetrahedra_in_sections_of_seven():
+    vertices, tetrahedra = cylinder(np.linspace(0, 0.55, 51), 0.010)
+    assert vertices.shape == (51, 7, 3) and tetrahedra.shape == (900, 4)
     assert np.ptp(tetrahedra // 7, axis=1).max() == 1  # each lies between two sections
 
 

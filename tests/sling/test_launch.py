@@ -1,4 +1,7 @@
-"""Launches: ballistics in closed form, convergence, energy, failures by name."""
+"""Launches: ballistics in closed form, what shares them, failures by name.
+
+tests/validation/simulator/test_limits.py holds their steps, flight and energy.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,9 @@ import numpy as np
 import pytest
 
 from pipeline.sling import launch, solver
-from pipeline.sling.initial import drawn_guess
 from pipeline.sling.launch import ballistic_landing
 from pipeline.sling.model import GRAVITY
-from tests.sling.bands import DRAW, THETA, random_draws
-from validation.simulator.reference import ReferenceRod
+from tests.sling.bands import DRAW, THETA
 
 
 def test_ballistic_landing_in_closed_form():
@@ -24,44 +25,13 @@ def test_ballistic_landing_in_closed_form():
     assert landing == pytest.approx(expected, rel=1e-12)
 
 
-def test_landing_is_the_flight_from_the_leaving_state(sling):
-    shot = launch(sling, THETA, DRAW)
-    assert shot.failure == [None]
-    vy = shot.speed[0] * np.cos(shot.angle[0])
-    vz = shot.speed[0] * np.sin(shot.angle[0])
-    y = ballistic_landing(shot.separation_y[0], shot.separation_z[0], vy, vz, -sling.fork_height)
-    assert shot.landing_y[0] == pytest.approx(y, rel=1e-9)
-    assert -0.3 < shot.separation_y[0] < -0.1  # the band goes slack about 0.2 m before the fork
-
-
-def test_launch_is_converged_in_time(sling):
-    rng = np.random.default_rng(5)
-    thetas = np.column_stack(
-        [
-            10 ** rng.uniform(5.2, 6.2, 16),
-            rng.uniform(0.3, 0.49, 16),
-            10 ** rng.uniform(-3.5, -2.2, 16),
-            np.full(16, 0.5),
-            rng.uniform(0, 1, 16),
-        ]
-    )
-    draws = random_draws(16, rng)
-    coarse = launch(sling, thetas, draws, workers=2)
-    fine = launch(sling, thetas, draws, refine=10, double=True, workers=2)
-    assert coarse.failure == fine.failure == [None] * 16
-    assert coarse.speed == pytest.approx(fine.speed, rel=5e-3)
-
-
-def test_projectile_gets_no_more_than_the_stored_energy(sling):
-    """Little damping: most of the energy; much damping: less of it; never more than there is."""
-    rod, drawn = ReferenceRod(sling, tuple(THETA)), drawn_guess(sling, np.array([DRAW]))[0]
-    stored = rod.elastic(drawn) + rod.weight(drawn)
+def test_damping_takes_speed_and_the_projectile_separates_before_the_fork(sling):
     thetas = np.tile(THETA, (3, 1))
     thetas[:, 2] = 1e-4, 5e-3, 2e-2
     shots = launch(sling, thetas, DRAW)
-    lifted = sling.projectile_mass * GRAVITY * (shots.separation_z - DRAW[1])
-    assert np.all(sling.projectile_mass / 2 * shots.speed**2 + lifted < stored)
-    assert np.all(np.diff(shots.speed) < 0)
+    assert shots.failure == [None] * 3 and np.all(np.diff(shots.speed) < 0)
+    # the band goes slack about 0.2 m before the fork
+    assert np.all((-0.3 < shots.separation_y) & (shots.separation_y < -0.1))
 
 
 def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch):

@@ -6,38 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from pipeline.sling import launch
+from pipeline.sling.hang import hang
 from pipeline.sling.initial import hanging_guess
 from pipeline.sling.model import GRAVITY
-from tests.sling.bands import along_x, at_rest, in_line
-from validation.simulator.closed import String, clamped_beam
+from tests.sling.bands import at_rest
+from validation.simulator.closed import String
 from validation.simulator.reference import ReferenceRod
 
 THETA = [5e5, 0.45, 2e-3, 0.5, 1.0]
-
-
-def test_pull_force_is_that_of_a_neo_hookean_string(sling):
-    """Within 0.5 % of two straight strings', where bending is small."""
-    light = replace(sling, mass=1e-4, projectile_mass=1e-6)
-    pairs = [(young, poisson) for young in (3e4, 5e5, 1e7) for poisson in (0.30, 0.45, 0.49)]
-    thetas = np.array([[*pair, 2e-3, 0.5, 1.0] for pair in pairs])
-    for depth in (0.40, 0.55):
-        half = np.hypot(depth, sling.half_width)
-        strings = [String.of(sling, theta) for theta in thetas]
-        pull = np.array([string.force(2 * half / sling.rest_length) for string in strings])
-        force = launch(light, thetas, [-depth, 0.0]).hold_force
-        assert force == pytest.approx(2 * pull * depth / half, rel=5e-3)
-
-
-def test_clamped_beam_sags_as_euler_bernoulli_says(sling):
-    """Within 3 %; light, so that the sag stays small."""
-    beam, young = in_line(sling, mass=sling.mass / 20), 1e7
-    load, inertia = beam.mass * GRAVITY / beam.rest_length, np.pi * beam.radius**4 / 4
-    expected = clamped_beam(load, beam.rest_length, young * inertia)
-    for poisson in (0.30, 0.45, 0.49):
-        sections = at_rest(beam, [young, poisson, 2e-3, 0.5, 1.0], along_x(beam))
-        assert -sections[beam.middle, 2] == pytest.approx(expected, rel=0.03), poisson
+HUNG = np.array([[2e5, 0.47, 2e-3, 0.5, 0.5], [6e5, 0.35, 2e-3, 0.5, 0.5]])
+LOAD = 1.5
 
 
 def test_hanging_band_is_an_equilibrium_of_the_energy(sling):
@@ -54,3 +35,32 @@ def test_single_and_double_precision_hold_the_same_force(sling):
     thetas = np.array([THETA, [1e7, 0.49, 1e-3, 0.5, 0.5]])
     single, double = (launch(sling, thetas, [-0.4, -0.2], double=d) for d in (False, True))
     assert single.hold_force == pytest.approx(double.hold_force, rel=1e-4)
+
+
+def depth_of_strings(sling, theta, load: float) -> float:
+    """Where the pull of two straight weightless strings carries the load [m]."""
+    string, half = String.of(sling, theta), sling.rest_length / 2
+
+    def pull(depth: float) -> float:
+        length = np.hypot(depth, sling.half_width)
+        return 2 * float(string.force(length / half)) * depth / length - load * GRAVITY
+
+    return brentq(pull, np.sqrt(half**2 - sling.half_width**2), 5.0)
+
+
+def test_a_weight_hangs_as_deep_as_two_strings_let_it(sling):
+    light = replace(sling, mass=1e-4)
+    nodes = hang(light, HUNG, LOAD)
+    expected = [depth_of_strings(light, theta, LOAD) for theta in HUNG]
+    assert abs(expected[0] - expected[1]) > 0.1
+    np.testing.assert_allclose(-nodes[:, sling.middle, 2], expected, rtol=0.005)
+    np.testing.assert_allclose(nodes[:, [0, -1]], np.broadcast_to(sling.tips, (2, 2, 3)), atol=1e-6)
+    np.testing.assert_allclose(nodes[:, sling.middle, :2], 0, atol=1e-3)
+
+
+def test_a_heavier_weight_hangs_deeper_and_so_does_a_heavier_band(sling):
+    middle = sling.middle
+    deeper = [-hang(sling, HUNG[0], load)[0, middle, 2] for load in (0.5, 1.0, 1.5)]
+    assert np.all(np.diff(deeper) > 0.02)
+    light = -hang(replace(sling, mass=sling.mass / 10), HUNG[0], LOAD)[0, middle, 2]
+    assert light < deeper[-1] < 1.02 * light

@@ -25,15 +25,8 @@ from tests.sling.bands import (
     in_line,
     random_thetas,
     stepped,
-    vertex_masses,
 )
 from validation.simulator.closed import String, clamped_beam
-
-
-@pytest.fixture(scope="module")
-def solid(sling, params):
-    resolution = params.sling.model_copy(update={"mesh": TETRAHEDRA})
-    return replace(sling, mesh=TETRAHEDRA, edges=resolution.tet_edges, steps=resolution)
 
 
 def forces(sling, theta, sections):
@@ -84,13 +77,13 @@ def test_hand_feels_what_the_drawn_band_pulls_with(solid):
 def test_thin_band_pulls_as_a_string_the_finer_its_mesh(solid):
     """The closed form of test_statics.py; a clamp keeps a slab's length from thinning."""
     gaps = []
-    for edges in (52, 104):
+    for edges in (26, 52):
         thin = replace(solid, radius=solid.radius / 4, mass=1e-4, projectile_mass=1e-6, edges=edges)
         half = np.hypot(0.4, thin.half_width)
         pull = String.of(thin, THETA).force(2 * half / thin.rest_length)
         expected = 2 * pull * 0.4 / half
         gaps.append(launch(thin, THETA, [-0.4, 0.0]).hold_force[0] / expected - 1)
-    assert 0 < gaps[0] < 0.02
+    assert 0 < gaps[1] < 0.02
     assert gaps[1] == pytest.approx(gaps[0] / 2, rel=0.1)
 
 
@@ -101,36 +94,6 @@ def test_coarse_tetrahedra_lock_in_bending(solid):
     load, inertia = light.mass * GRAVITY / light.rest_length, np.pi * light.radius**4 / 4
     sag = clamped_beam(load, light.rest_length, 1e7 * inertia)
     assert sag / -sections[light.middle, 2] == pytest.approx(5.4, rel=0.03)
-
-
-def test_free_band_falls_as_one_mass(solid):
-    """Whatever it does in itself: with backward Euler its centre has fallen g h^2 n (n + 1) / 2."""
-    free = in_line(solid, clamped=(False, False))
-    h, count = 1e-3, 20
-    start = along_x(free, 1.3)
-    done = stepped(free, steps(h * np.arange(count + 1), h, grip=Grip.FREE), THETA, start)
-    mass = vertex_masses(free).ravel()
-    before, after = (
-        np.average(x.reshape(-1, 3), axis=0, weights=mass) for x in (start, done.state[0])
-    )
-    assert done.state[0, 0, 0] > start[0, 0] + 0.01  # it does contract
-    fall = GRAVITY * h**2 * count * (count + 1) / 2
-    assert after - before == pytest.approx([0.0, 0.0, -fall], abs=1e-8)
-
-
-def test_clamps_and_fingers_hold_whole_sections(solid, episode):
-    rollouts = interact(solid, episode, BASE)
-    assert rollouts.failure == [None]
-    held = (rollouts.cloud_time > 1.0) & (rollouts.cloud_time < 2.35)
-    hand = np.stack(
-        [np.interp(rollouts.cloud_time, episode.time, column) for column in episode.position.T], 1
-    )
-    assert np.abs(rollouts.center_line[0, :, solid.middle] - hand)[held].max() < 2e-3
-    assert rollouts.center_line[0, :, [0, -1]] == pytest.approx(
-        np.repeat(solid.tips[:, None], len(rollouts.cloud_time), axis=1), abs=1e-6
-    )
-    clear = episode.release_time + solid.finger_opening_time
-    assert np.all(rollouts.force[0][rollouts.times > clear + 1e-6] == 0)
 
 
 def test_clamps_set_the_sections_across_their_direction(solid):
@@ -153,10 +116,9 @@ def test_pulls_and_launches_nearly_as_the_rod(sling, solid, episode):
 
 
 def test_random_thetas_converge_whatever_their_neighbours(solid, episode):
-    strong = replace(solid, grip_force=1e5)
-    thetas = random_thetas(40, seed=4)
+    strong, thetas = replace(solid, grip_force=1e5), random_thetas(20, seed=4)
     together = interact(strong, episode, thetas, workers=2)
-    assert together.failure == [None] * 40
+    assert together.failure == [None] * 20
     assert np.isfinite(together.force).all() and np.isfinite(together.center_line).all()
     alone = interact(strong, episode, thetas[7])
     assert np.array_equal(together.force[7], alone.force[0])

@@ -1,14 +1,19 @@
-"""The band as both peers take it."""
+"""The band as other engines take it, and the comparison where there is nothing to compare with."""
 
 from __future__ import annotations
+
+import sys
 
 import numpy as np
 import pytest
 
+from pipeline.base.errors import UserError
 from pipeline.params import load
 from pipeline.sling.model import Sling
+from validation.engines import checks
 from validation.engines.mesh import CLAMPED, Tube
 from validation.simulator.closed import String
+from validation.simulator.finding import Bench
 
 THETA = np.array([2.2e5, 0.45, 3e-3, 1.0, 1.0])
 
@@ -45,3 +50,14 @@ def test_its_force_is_the_closed_form_of_a_straight_string(sling, rings):
     ends = force.sum(axis=1)
     assert ends[[0, -1]] == pytest.approx(np.array([[pull, 0, 0], [-pull, 0, 0]]), abs=1e-9)
     assert force[1:-1] == pytest.approx(np.zeros(force[1:-1].shape), abs=1e-9)
+
+
+def test_without_mujoco_the_section_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(UserError, match="pip install"):
+        checks.section(Bench(load()))
+
+
+def test_our_tetrahedra_are_compared_on_the_cpu_whatever_the_device():
+    same = checks.solid(Bench(load(), device="cuda:0"))
+    assert same.device == "cpu" and same.params.sling.mesh == "tetrahedra"

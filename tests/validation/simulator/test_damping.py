@@ -1,4 +1,4 @@
-"""No rates and no steps gain energy; a heavy middle decays as the closed form says, within 2 %."""
+"""No rates gain energy."""
 
 from __future__ import annotations
 
@@ -12,8 +12,6 @@ from validation.simulator.damping import ROUNDING, STATES
 from validation.simulator.experiment import band_of
 from validation.simulator.finding import Bench
 from validation.simulator.reference import ReferenceRod
-
-from .kept import assert_kept
 
 # Where neighbours are turned against each other by half a radian, a joint may gain a little:
 # `sling verify` states how much.
@@ -30,12 +28,3 @@ def test_no_rates_gain_energy_in_random_states(bench: Bench):
         assert damping.power_gain(ReferenceRod(sling, tuple(theta)), sections) <= ROUNDING
 
     gains_nothing()
-
-
-def test_steps_gain_no_energy_from_random_states(bench):
-    assert_kept(damping.growth(bench, count=16))
-
-
-def test_heavy_middle_is_a_damped_oscillator(bench):
-    cases = [(0.30, 1.0, 0), (0.49, 0.5, 0), (0.30, 0.0, 0), (0.45, 0.5, 1)]
-    assert_kept(damping.oscillator(bench, cases))

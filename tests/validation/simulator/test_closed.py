@@ -1,4 +1,4 @@
-"""Pull of a string within 0.5 %, beams within 3 %, torsion within 5 % of their closed forms."""
+"""The closed forms that checks hold the simulator against, held against themselves."""
 
 from __future__ import annotations
 
@@ -6,25 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from validation.simulator import at_rest as statics
 from validation.simulator.closed import String
 from validation.simulator.experiment import band_of
-
-from .kept import assert_kept
-
-
-def test_pull_is_the_closed_form_in_single_precision(bench):
-    theta = statics.thetas((3e4, 1e7), (0.30, 0.49))
-    assert_kept(statics.pull(bench, theta, (1.2, 2.2)))
-
-
-@pytest.mark.parametrize("poisson", statics.BEAM_POISSON)
-def test_beams_bend_as_euler_bernoulli_says(bench, poisson):
-    assert_kept(statics.beams(bench, (poisson,)))
-
-
-def test_cylinder_twists_as_its_polar_moment_says(bench):
-    assert_kept(statics.torsion(bench, (0.45,)))
+from validation.simulator.free_motion import GRAVITY, fall_of_a_point
 
 
 def test_closed_form_has_no_stress_across(bench):
@@ -54,3 +38,13 @@ def test_tangents_are_the_slope_of_the_pull(bench):
     assert k == pytest.approx(4 * slope / string.sling.rest_length, rel=1e-6)
     assert c == pytest.approx(string.damping * k, rel=1e-9)  # s = 1: d times the stiffness
     assert np.isclose(string.force(1.0), 0.0)
+
+
+def test_formulas_fall_as_galileo_says():
+    """First order at the first order, second order at the second."""
+    for order in (1, 2):
+        errors = []
+        for count in (50, 100):
+            times = np.linspace(0, 1, count + 1)
+            errors.append(abs(fall_of_a_point(times, order)[-1] + GRAVITY / 2))
+        assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)

@@ -1,0 +1,87 @@
+"""The checks of `sling verify` keep their limits, at smaller sizes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from validation.simulator import (
+    agreement,
+    at_rest,
+    damping,
+    energy,
+    five_parameters,
+    free_motion,
+    launching,
+    robustness,
+)
+from validation.simulator.finding import unmet
+
+CORNERS = at_rest.thetas((3e4, 1e7), (0.30, 0.49))
+OSCILLATORS = [(0.30, 1.0, 0), (0.49, 0.5, 0), (0.30, 0.0, 0), (0.45, 0.5, 1)]
+CHECKS = {
+    "a string's pull": lambda bench: at_rest.pull(bench, CORNERS, (1.2, 2.2)),
+    "beams": at_rest.beams,
+    "torsion": lambda bench: at_rest.torsion(bench, (0.45,)),
+    "the kernel's steps": lambda bench: agreement.checks(bench, count=2),
+    "growth of energy": lambda bench: damping.growth(bench, count=16),
+    "a heavy middle": lambda bench: damping.oscillator(bench, OSCILLATORS),
+    "free fall": free_motion.free_fall,
+    "momentum": free_motion.momentum,
+    "launches in finer steps": lambda bench: launching.convergence(bench, 6, (), progress=str),
+    "order in time": lambda bench: launching.order_in_time(bench, count=6),
+    "flight and energy": lambda bench: launching.physics(bench, count=4),
+    "E": five_parameters.young,
+    "nu": five_parameters.poisson,
+    "d and s": five_parameters.damping,
+    "friction": five_parameters.friction,
+}
+
+
+def assert_kept(checks) -> None:
+    """Every check keeps its limit; at least one has one."""
+    checks = list(checks)
+    assert any(check.limit is not None for check in checks)
+    missed = unmet(checks)
+    assert not missed, "\n".join(
+        f"{check.name}: {check.value:.4g} {check.unit}, limit {check.limit:g} ({check.note})"
+        for check in missed
+    )
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_limits_are_kept(bench, name):
+    assert_kept(CHECKS[name](bench))
+
+
+def test_the_hands_work_is_accounted_for_and_losses_only_grow(bench):
+    """Damping and pads never give back: power of 1e-9 of the hand's work a step at most."""
+    done = energy.balance(bench)
+    assert_kept(energy.checks(done))
+    total = done.hand[-1]
+    assert np.diff(done.viscous).min() > -1e-6 * total
+    assert np.diff(done.pads).min() > -1e-9 * total
+    assert done.viscous[-1] > 0.8 * total  # at rest again, nothing else is left
+
+
+def test_random_thetas_are_finite_or_fail_by_name(bench):
+    found = robustness.section(bench, count=64, launches=32, faces=20, progress=str)
+    surveys = found.details["surveys"]
+    assert (surveys["held_fast"]["rollouts"], surveys["corners"]["rollouts"]) == (64, 32)
+    assert_kept(found.checks)
+
+
+def test_samples_are_as_many_as_asked_for_and_lie_where_they_should(bench):
+    for count in (3, launching.COUNT + 5):
+        theta, draws = launching.random_launches(count)
+        assert theta.shape == (count, 5) and draws.shape == (count, 2)
+    thetas = robustness.on_faces(bench, 20)
+    for number, name in enumerate(robustness.THETA):
+        bounds = getattr(bench.params.parameters, name)
+        at = np.isclose(thetas[:, number, None], [bounds.low, bounds.high])
+        assert at.sum(0).tolist() == [2, 2]
+
+
+def test_angular_momentum_is_kept_the_better_the_finer_the_steps(bench):
+    coarse, fine = (free_motion.recoil(bench, h, 2, 0.0)[1] for h in (5e-4, 1.25e-4))
+    assert fine < coarse / 12 and fine < 1e-4

@@ -26,6 +26,7 @@ EXTRAS = {
     "tests/validation/": "validation",
     "tests/app/preflight/": "validation",
     "tools/": "dev",
+    "tools/browser.py": "validation",
     "validation/": "validation",
     "validation/campaigns/": "dev",
 }

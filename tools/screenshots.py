@@ -2,8 +2,8 @@
 
     python tools/screenshots.py [FOLDER]        # default docs/flow; some seven minutes on two cores
 
-Needs a Chromium. The UI is opened without a network: a page that asks for anything that is not on
-this machine is an error.
+Needs a Chromium, and the packages of `make validate`. The UI is opened without a network: a page that
+asks for anything that is not on this machine is an error.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ sys.path.insert(0, str(ROOT))
 from pipeline.base import errors  # noqa: E402
 from pipeline.base.errors import UserError  # noqa: E402
 from tests.test_pipeline import Copy  # noqa: E402
-from tools.browser import Browser  # noqa: E402
+from tools.browser import Browser, browsing  # noqa: E402
 
 BUDGET = {  # long enough to be looked at, and to converge
     "sling.edges": 24,
@@ -125,8 +125,7 @@ def shoot(copy: Copy, server: Server, page: Browser, folder: Path) -> None:
         page.open(f"{server.url}/runs/flow-run/{server.run()['id']}", *texts, settling=8.0)
         page.shoot(folder / f"{name}.png", 800)
 
-    light = "localStorage.setItem('color-scheme', '\"light\"')"
-    page("Page.addScriptToEvaluateOnNewDocument", source=light)
+    page.page.add_init_script("localStorage.setItem('color-scheme', '\"light\"')")
     with flow(copy) as running:
 
         def searching() -> bool:
@@ -148,12 +147,12 @@ def shoot(copy: Copy, server: Server, page: Browser, folder: Path) -> None:
             raise UserError("a flow with a damaged file of landings did not fail")
     run("failed", "Failed", "got 'here'")
     if elsewhere := page.elsewhere:
-        raise UserError(f"the UI asked for {', '.join(elsewhere)}")
+        raise UserError(f"the UI asked for {', '.join(sorted(elsewhere))}")
 
 
 def main() -> None:
     folder = Path(sys.argv[1] if sys.argv[1:] else ROOT / "docs" / "flow")
-    with tempfile.TemporaryDirectory() as place, Browser() as page:
+    with tempfile.TemporaryDirectory() as place, browsing() as page:
         copy = Copy(Path(place, "copy"))
         copy.set(BUDGET)
         with serving(copy) as server:

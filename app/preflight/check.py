@@ -7,13 +7,16 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+from pydantic import ValidationError
 
 from app.preflight.coverage import by_phase, coverage, over_time
 from app.preflight.report import Report, Topic
 from app.preflight.tips import Tips, along, measure_tips
 from app.preflight.verdict import cautions_of
 from pipeline.base.errors import UserError
+from pipeline.base.schema import explained
 from pipeline.params import expect_known
+from pipeline.params.lab import BandParams
 from pipeline.recording.build import Processed, process_recording
 from pipeline.recording.delays import Delays, delays_of
 from pipeline.recording.geometry import geometry_of
@@ -90,7 +93,7 @@ def band_of(
     """The band that a command line names, None where it names none, and where it is from.
 
     Raises:
-        UserError: about a name that is not known, or a band too short for the fork.
+        UserError: about a name that is not known, or sizes that no band of this fork can have.
     """
     if name is not None and (diameter or rest_length):
         raise UserError("--band brings its diameter and rest length: leave the other two out")
@@ -99,9 +102,14 @@ def band_of(
         return params.bands[name], f"bands.{name} of params.yaml"
     if diameter is None and rest_length is None:
         return None, ASSUMED
-    band = SimpleNamespace(
-        diameter=diameter or ANY_BAND.diameter, rest_length=rest_length or ANY_BAND.rest_length
-    )
+    sizes = {
+        "diameter": diameter or ANY_BAND.diameter,
+        "rest_length": rest_length or ANY_BAND.rest_length,
+    }
+    try:
+        band = BandParams(source="recording", mass=0.01, **sizes)  # the mass is not asked for
+    except ValidationError as error:
+        raise UserError(f"--{explained(error, BandParams).replace('_', '-', 1)}") from None
     if band.rest_length <= params.setup.fork_width:
         raise UserError(
             f"--rest-length {band.rest_length:g}: must be longer than setup.fork_width"
@@ -164,7 +172,7 @@ def _add_signals(report: Report, recording: Recording, band: object, params: obj
         report.delays = _delays(delays)
         recording = delays.corrected(recording)
         sections = params.episode, params.force, params.setup.tool
-        signals = signals_of(recording, geometry, *sections, delays.felt)
+        signals = signals_of(recording, geometry, *sections, delays.tool_inertia)
     except UserError:  # it is the problem that was reported
         return
     scene = Scene.of(band, params.setup, signals)

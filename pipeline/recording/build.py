@@ -58,7 +58,9 @@ def view_of(recording: Recording, band: object, params: object) -> tuple[View, D
     geometry, setup = geometry_of(recording, params.setup), params.setup
     delays = delays_of(recording, geometry, params)
     recording = delays.corrected(recording)
-    signals = signals_of(recording, geometry, params.episode, params.force, setup.tool, delays.felt)
+    signals = signals_of(
+        recording, geometry, params.episode, params.force, setup.tool, delays.tool_inertia
+    )
     scene = Scene.of(band, setup, signals)
     return View(recording, geometry, scene, params.episode.duration), delays
 

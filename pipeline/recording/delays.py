@@ -9,7 +9,7 @@ from pipeline.base.errors import UserError
 from pipeline.recording.camera_delay import camera_delay
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.input.reader import Recording
-from pipeline.recording.tool_inertia import Felt, felt_tool
+from pipeline.recording.tool_inertia import ToolInertia, estimate_tool_inertia
 
 SIGMAS = 3.0  # what is less sure than this is not corrected
 MOST_ERROR = 0.003  # s: what is not known better counts as not seen
@@ -38,12 +38,12 @@ class Delays:
     """Of pose (and twist) and of the camera's two topics; and the tool that told the pose's.
 
     Attributes:
-        felt: Its `delay` is what `pose` leaves of it, 0 where that is no more than its error.
+        tool_inertia: Its `delay` is what `pose` leaves of it, 0 where no more than its error.
     """
 
     pose: Estimate
     camera: Estimate
-    felt: Felt | None = None
+    tool_inertia: ToolInertia | None = None
 
     def corrected(self, recording: Recording) -> Recording:
         """The recording with the stamps that it should have had."""
@@ -60,18 +60,18 @@ def delays_of(recording: Recording, geometry: Geometry, params: object) -> Delay
     """
     given = params.episode.delays
     try:
-        felt = felt_tool(recording, geometry, params.setup.tool)
+        inertia = estimate_tool_inertia(recording, geometry, params.setup.tool)
     except UserError:  # the recording is refused for it later, in its own words
-        felt = None
-    pose = _judged(given.pose, lambda: felt and (felt.delay, felt.delay_error))
+        inertia = None
+    pose = _judged(given.pose, lambda: inertia and (inertia.delay, inertia.delay_error))
     if pose.applied:
         recording = recording.shifted(pose=pose.value)
-    if felt is not None:
-        left = felt.delay - (pose.value if pose.applied else 0.0)
-        sure = abs(left) > SIGMAS * max(felt.delay_error, LEAST_ERROR)
-        felt = replace(felt, delay=left if sure else 0.0)
+    if inertia is not None:
+        left = inertia.delay - (pose.value if pose.applied else 0.0)
+        sure = abs(left) > SIGMAS * max(inertia.delay_error, LEAST_ERROR)
+        inertia = replace(inertia, delay=left if sure else 0.0)
     camera = _judged(given.camera, lambda: camera_delay(recording, geometry))
-    return Delays(pose, camera, felt)
+    return Delays(pose, camera, inertia)
 
 
 def _judged(given: float | None, estimate: Callable[[], tuple[float, float] | None]) -> Estimate:

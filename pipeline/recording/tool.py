@@ -1,4 +1,4 @@
-"""What the force sensor feels of its own tool: weight that turns with the hand, and inertia."""
+"""The tool's load on the force sensor: weight that turns with the hand, and inertia."""
 
 from __future__ import annotations
 
@@ -76,5 +76,5 @@ def load_per_mass(
         Shape (T, 3), in the wrench's frame.
     """
     point = np.asarray(center) if geometry.sensor_is_fixed else geometry.sensor.apply(center)
-    felt = gravity - motion.acceleration(times, point, jump)
-    return sensor_turns(motion, geometry, times).inv().apply(felt)
+    specific = gravity - motion.acceleration(times, point, jump)
+    return sensor_turns(motion, geometry, times).inv().apply(specific)

@@ -3,7 +3,7 @@
 In free motion the sensor feels its own tool's weight and inertia, which the pose tells but for the
 tool's mass. The band's force is not used: that it leads the path is what damping does, and a delay
 that was taken from it would take the damping away. What of its tool a sensor takes off by itself
-is not felt, and so not taken off again.
+does not show, and so is not taken off again.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from pipeline.recording.tool import load_per_mass
 
 LONGEST = 0.1  # s of either sign
 BLOCK = 0.2  # s in which errors of the smoothed force go together
-LEAST_LOAD = 8.0  # standard deviations by which the tool's mass must be felt
+LEAST_LOAD = 8.0  # standard deviations by which the tool's mass must show
 WINDOW = 0.15  # s of the fits by which the load changes
 STEP = 0.002  # s of the grid on which the load is tabulated
 ROUNDS = 8
 
 
 @dataclass(frozen=True)
-class Felt:
-    """What the force sensor carries, as it feels it.
+class ToolInertia:
+    """The tool that the force sensor carries, as its inertia shows it.
 
     Attributes:
         mass, mass_error: Of the tool, and its standard deviation [kg]; negative where the sensor
@@ -44,7 +44,7 @@ class Felt:
     delay_error: float
     center: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
-    def inertia(
+    def force(
         self, motion: Motion, geometry: Geometry, times: np.ndarray, release: float
     ) -> np.ndarray:
         """Part of the raw force at times (T,) [s] that is the tool's inertia, shape (T, 3) [N].
@@ -59,8 +59,10 @@ class Felt:
         )
 
 
-def felt_tool(recording: Recording, geometry: Geometry, tool: object | None) -> Felt | None:
-    """None where the tool is not felt: the sensor knows it already, or the hand hardly moves.
+def estimate_tool_inertia(
+    recording: Recording, geometry: Geometry, tool: object | None
+) -> ToolInertia | None:
+    """None where the tool does not show: the sensor knows it already, or the hand hardly moves.
 
     Args:
         tool: setup.tool; only its centre of mass is used, the mass is fitted.
@@ -103,7 +105,7 @@ def felt_tool(recording: Recording, geometry: Geometry, tool: object | None) -> 
     if abs(delay) >= LONGEST or abs(mass) < LEAST_LOAD * errors[0]:
         return None
     mass, delay_error = float(mass), float(errors[1] / abs(mass))
-    return Felt(mass, float(errors[0]), delay, delay_error, tuple(center.tolist()))
+    return ToolInertia(mass, float(errors[0]), delay, delay_error, tuple(center.tolist()))
 
 
 def _noise(left: np.ndarray, blocks: np.ndarray, fitted: int) -> float:

@@ -12,7 +12,7 @@ from pipeline.recording.camera_delay import camera_delay
 from pipeline.recording.delays import Estimate, delays_of
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.reader import read_recording
-from pipeline.recording.tool_inertia import felt_tool
+from pipeline.recording.tool_inertia import estimate_tool_inertia
 from tests.recording.bag import Truth
 from tests.recording.played import Played
 
@@ -33,23 +33,23 @@ def replaced(recording, **streams):
 
 
 @pytest.fixture(scope="module")
-def felt():
+def heavy():
     """A recording in which the hand comes and goes, and the sensor feels it."""
     played = Played(mass=0.7, truth=replace(SLOW, noise=0.0))
     return played.recording(), played.geometry()
 
 
 @pytest.mark.parametrize("noise", [0.02, 0.1])
-def test_the_poses_delay_is_found_by_the_tools_inertia(felt, noise) -> None:
+def test_the_poses_delay_is_found_by_the_tools_inertia(heavy, noise) -> None:
     """With an error that is true: 20 recordings of other noise."""
-    recording, geometry = felt
+    recording, geometry = heavy
     off, errors = [], []
     for seed in range(20):
         wrench = recording.wrench
         shaken = np.random.default_rng(seed).normal(0, noise, wrench.values.shape)
         one = replaced(recording, wrench=replace(wrench, values=wrench.values + shaken))
         seconds = INJECTED[seed % 4]
-        found = felt_tool(late(one, "pose", seconds), geometry, None)
+        found = estimate_tool_inertia(late(one, "pose", seconds), geometry, None)
         off.append(found.delay - seconds)
         errors.append(found.delay_error)
         assert found.mass == pytest.approx(0.7, abs=5 * found.mass_error)
@@ -58,9 +58,9 @@ def test_the_poses_delay_is_found_by_the_tools_inertia(felt, noise) -> None:
 
 
 @pytest.mark.parametrize("share", [0.0, 0.2])
-def test_a_slow_pose_that_loses_messages_makes_no_delay_up(felt, share) -> None:
+def test_a_slow_pose_that_loses_messages_makes_no_delay_up(heavy, share) -> None:
     """At 33 Hz, or with every fifth message missing: what is found is true within its error."""
-    recording, geometry = felt
+    recording, geometry = heavy
     for seed in range(6):
         random = np.random.default_rng(seed)
         pose = recording.pose
@@ -69,7 +69,7 @@ def test_a_slow_pose_that_loses_messages_makes_no_delay_up(felt, share) -> None:
         one = replaced(
             recording, pose=replace(pose, stamp=pose.stamp[keep], values=pose.values[keep])
         )
-        found = felt_tool(late(one, "pose", INJECTED[seed % 4]), geometry, None)
+        found = estimate_tool_inertia(late(one, "pose", INJECTED[seed % 4]), geometry, None)
         if found is None:
             continue
         off = found.delay - INJECTED[seed % 4]
@@ -80,7 +80,7 @@ def test_a_force_that_does_not_feel_the_tool_says_nothing_of_the_pose() -> None:
     played = Played(mass=0.0, truth=SLOW)
     for seconds in INJECTED:
         recording = late(played.recording(), "pose", seconds)
-        assert felt_tool(recording, played.geometry(), None) is None
+        assert estimate_tool_inertia(recording, played.geometry(), None) is None
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
 from pipeline.recording.signals import signals_of
-from pipeline.recording.tool_inertia import felt_tool
+from pipeline.recording.tool_inertia import estimate_tool_inertia
 from tests.recording.bag import HAND, SENSOR, START, Truth
 from tests.recording.played import GRAVITY, Played, stream
 
@@ -23,9 +23,9 @@ def tool(mass: float = MASS, center=TOOL) -> SimpleNamespace:
     return SimpleNamespace(mass=mass, center=center)
 
 
-def signals(played: Played, params, tool=None, recording=None, felt=None):
+def signals(played: Played, params, tool=None, recording=None, inertia=None):
     recording = recording or played.recording()
-    return signals_of(recording, played.geometry(), params.episode, params.force, tool, felt)
+    return signals_of(recording, played.geometry(), params.episode, params.force, tool, inertia)
 
 
 def off(played: Played, found) -> np.ndarray:
@@ -84,12 +84,12 @@ def test_the_inertia_of_a_hand_that_does_not_turn(params) -> None:
 def test_a_tool_that_nobody_told_of_is_felt(params) -> None:
     """Its inertia in free motion shows its mass, with which it is gone from the pull, too."""
     played = Played(mass=MASS, truth=Truth(noise=0.005))
-    felt = felt_tool(played.recording(), played.geometry(), None)
-    assert felt.mass == pytest.approx(MASS, rel=0.03)
-    found = signals(played, params, felt=felt)
+    inertia = estimate_tool_inertia(played.recording(), played.geometry(), None)
+    assert inertia.mass == pytest.approx(MASS, rel=0.03)
+    found = signals(played, params, inertia=inertia)
     assert off(played, found).max() < 0.25 and np.median(off(played, found)) < 0.02
     assert found.facts["tool"]["source"] == "its inertia"
-    told = signals(played, params, tool(mass=0.0), felt=felt)
+    told = signals(played, params, tool(mass=0.0), inertia=inertia)
     assert told.facts["tool"] == {
         "mass": 0.0,
         "center": list(TOOL),
@@ -103,9 +103,9 @@ def test_a_sensor_that_takes_off_too_much_or_has_the_other_sign(params) -> None:
         Played(mass=-0.3, truth=Truth(noise=0.005)),
         Played(mass=MASS, truth=Truth(noise=0.005, sign=-1.0)),
     ):
-        felt = felt_tool(played.recording(), played.geometry(), None)
-        assert felt.mass == pytest.approx(played.truth.sign * played.mass, rel=0.03)
-        found = signals(played, params, felt=felt)
+        inertia = estimate_tool_inertia(played.recording(), played.geometry(), None)
+        assert inertia.mass == pytest.approx(played.truth.sign * played.mass, rel=0.03)
+        found = signals(played, params, inertia=inertia)
         assert off(played, found).max() < 0.25 and np.median(off(played, found)) < 0.02
 
 
@@ -116,9 +116,9 @@ def test_a_sensor_that_knows_the_weight_but_not_the_inertia(params) -> None:
     t = recording.wrench.seconds(START)
     weight = (played.orientation(t) * SENSOR).inv().apply(MASS * GRAVITY)
     recording.wrench = replace(recording.wrench, values=recording.wrench.values - weight)
-    felt = felt_tool(recording, played.geometry(), None)
-    assert felt.mass == pytest.approx(MASS, rel=0.05)
-    found = signals(played, params, recording=recording, felt=replace(felt, center=TOOL))
+    inertia = estimate_tool_inertia(recording, played.geometry(), None)
+    assert inertia.mass == pytest.approx(MASS, rel=0.05)
+    found = signals(played, params, recording=recording, inertia=replace(inertia, center=TOOL))
     assert off(played, found).max() < 0.25 and np.median(off(played, found)) < 0.02
 
 
@@ -128,9 +128,9 @@ def test_a_delay_that_is_left_does_not_displace_the_inertia(params) -> None:
     recording = played.recording()
     pose = recording.pose
     recording.pose = replace(pose, stamp=pose.stamp + 20_000_000)
-    felt = felt_tool(recording, played.geometry(), None)
-    assert felt.delay == pytest.approx(0.02, abs=0.002)
-    found = signals(played, params, recording=recording, felt=felt)
+    inertia = estimate_tool_inertia(recording, played.geometry(), None)
+    assert inertia.delay == pytest.approx(0.02, abs=0.002)
+    found = signals(played, params, recording=recording, inertia=inertia)
     assert off(played, found).max() < 0.25 and np.median(off(played, found)) < 0.02
 
 

@@ -74,8 +74,8 @@ def record(
     add_gripper(bag, Clock(rig.clock, clocks[0]), motion)
     late = interp1d(times, happened.hand, axis=0, fill_value="extrapolate")
     add_pose(bag, Clock(rig.clock, clocks[1]), robot, times, late(times - rig.pose_latency))
-    felt = wrench(happened, robot, rig.wrench, sensor_rng)
-    add_wrench(bag, Clock(rig.clock, clocks[2]), times, felt)
+    measured = wrench(happened, robot, rig.wrench, sensor_rng)
+    add_wrench(bag, Clock(rig.clock, clocks[2]), times, measured)
 
     clock = Clock(rig.camera.clock, clocks[3])
     still = camera.see(room(setup.fork_width, setup.fork_height, robot))

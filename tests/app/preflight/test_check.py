@@ -231,6 +231,7 @@ def test_the_band_of_a_command_line(params) -> None:
         (("red", None, None), "--band red: not in params.yaml, which has band1"),
         (("band1", 0.01, None), "leave the other two out"),
         ((None, None, 0.2), "--rest-length 0.2: must be longer"),
+        ((None, None, 520.0), "--rest-length: must be between 0.05 and 3, got 520"),
     ):
         with pytest.raises(UserError, match=words):
             band_of(params, *arguments)

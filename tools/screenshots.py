@@ -2,8 +2,8 @@
 
     python tools/screenshots.py [FOLDER]        # default docs/flow; some seven minutes on two cores
 
-Needs a Chromium, and the packages of `make validate`. The UI is opened without a network: a page that
-asks for anything that is not on this machine is an error.
+Needs a Chromium, and the packages of `make validate`. The UI is opened without a network: a page
+that asks for anything that is not on this machine is an error.
 """
 
 from __future__ import annotations

@@ -1,11 +1,13 @@
-"""Bayesian optimisation: batches of greatest expected improvement by a Gaussian process.
+"""Bayesian optimisation with BoTorch: batches of greatest expected improvement.
 
 One thread and no global random numbers: the same seed asks for the same points, whatever the
-number of cores.
+number of cores. Another kind of CPU may round torch's products otherwise, and after some rounds
+ask for other points.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -25,9 +27,9 @@ POLISH_STEPS = 20  # of L-BFGS on the whole batch
 class Bayes:
     """Each round asks for `population` points, chosen together by qLogExpectedImprovement.
 
-    The model is a Gaussian process with an exponential kernel (Matern 1/2), a length scale an
-    axis: losses are means of norms, whose valley is a kink, and smoother kernels foresee minima
-    where there are none. Losses that lie further above the median than the least lies below it
+    The model is a SingleTaskGP with BoTorch's priors (Hvarfner et al. 2024) and an exponential
+    kernel (Matern 1/2), a length scale an axis: losses are means of norms, whose valley is a kink,
+    and smoother kernels foresee minima where there are none. Losses that lie further above the median than the least lies below it
     count as that far, because a few huge ones (a stiff band, a failure) would hide the rest; then
     they are standardised.
 
@@ -59,7 +61,7 @@ class Bayes:
     def ask(self) -> np.ndarray:
         """The Latin hypercube, then the batch of a round, shape (population, D)."""
         if self._round:
-            with one_thread():
+            with quiet_on_one_thread():
                 self._asked = self._batch()
         return self._asked
 
@@ -71,22 +73,49 @@ class Bayes:
 
     def _batch(self) -> np.ndarray:
         import torch
-
-        from pipeline.search.optimizers.improvement import climbed, normal_samples, root
-        from pipeline.search.optimizers.process import Hyperparameters, Process, fitted
+        from botorch.acquisition.logei import qLogExpectedImprovement
+        from botorch.generation import gen_candidates_scipy
+        from botorch.sampling.normal import SobolQMCNormalSampler
 
         rows = training_rows(self._loss, self._points)
         unit, value = self._unit[rows], -standardised(self._loss[rows])
-        start = self._hyperparameters or Hyperparameters.usual(unit.shape[1])
-        self._hyperparameters = fitted(unit, value, start, FIT_STEPS)
-        process, best = Process(unit, value, self._hyperparameters), value.max()
+        model, best = self._fitted(unit, value), value.max()
         candidates = self._candidates(unit[np.argsort(-value, kind="stable")])
-        guess = process.at(torch.from_numpy(candidates))
-        normal = normal_samples(SAMPLES, CANDIDATES, self._seed, self._round)
-        samples = guess.mean + normal @ root(guess.covariance).mT
-        chosen = greedy(samples.numpy(), best, self._population)
-        normal = normal_samples(SAMPLES, self._population, self._seed, self._round)
-        return climbed(process, candidates[chosen], best, normal, POLISH_STEPS)
+        rng = np.random.default_rng([self._seed, self._round, 1])
+        first, second = (
+            SobolQMCNormalSampler(torch.Size([SAMPLES]), seed=int(seed))
+            for seed in rng.integers(2**31, size=2)
+        )
+        with torch.no_grad():
+            samples = first(model.posterior(torch.from_numpy(candidates)))[..., 0]
+        start = candidates[greedy(samples.numpy(), best, self._population)]
+        batch, _ = gen_candidates_scipy(
+            torch.from_numpy(start)[None],
+            qLogExpectedImprovement(model, best, second),
+            lower_bounds=0.0,
+            upper_bounds=1.0,
+            options={"maxiter": POLISH_STEPS},
+        )
+        return batch[0].numpy().clip(0, 1)
+
+    def _fitted(self, unit: np.ndarray, value: np.ndarray):
+        """BoTorch's model of values (N,) at points (N, D); the fit starts where the last ended."""
+        import torch
+        from botorch.models import SingleTaskGP
+        from botorch.models.utils.gpytorch_modules import get_covar_module_with_dim_scaled_prior
+        from botorch.optim.fit import fit_gpytorch_mll_scipy
+        from gpytorch.mlls import ExactMarginalLogLikelihood
+
+        kernel = get_covar_module_with_dim_scaled_prior(unit.shape[1], use_rbf_kernel=False)
+        kernel.nu = 0.5
+        points, values = torch.from_numpy(unit), torch.from_numpy(value)[:, None]
+        model = SingleTaskGP(points, values, covar_module=kernel, outcome_transform=None)
+        if self._hyperparameters:
+            model.load_state_dict(self._hyperparameters)
+        likelihood = ExactMarginalLogLikelihood(model.likelihood, model)
+        fit_gpytorch_mll_scipy(likelihood, options={"maxiter": FIT_STEPS})
+        self._hyperparameters = model.state_dict()
+        return model.eval()
 
     def _candidates(self, best: np.ndarray) -> np.ndarray:
         """Half from a Sobol sequence, half near the first of `best`, at all scales."""
@@ -134,13 +163,18 @@ def greedy(samples: np.ndarray, best: float, count: int) -> list[int]:
 
 
 @contextmanager
-def one_thread() -> Iterator[None]:
-    """Torch on one thread: with more, sums are rounded in another order."""
+def quiet_on_one_thread() -> Iterator[None]:
+    """Torch without threads, which round sums in another order, and BoTorch without its warnings.
+
+    It warns that an optimisation ends early, as ours mean to, and that points lie close together.
+    """
     import torch
 
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
     finally:
         torch.set_num_threads(threads)

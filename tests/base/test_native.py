@@ -1,10 +1,12 @@
-"""The guard around Warp, which is not made for several threads at its start."""
+"""The guard around Warp, which is not made for several threads at its start, and its compiler."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
+ROOT = Path(__file__).parents[2]
 STARTED_TWICE = """
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -23,17 +25,7 @@ with ThreadPoolExecutor(2) as pool:
     list(pool.map(lambda edges: chamfer_kernel(edges, 4, 1, 4), (4, 6)))
 print(len(starts))
 """
-
-
-def test_warp_starts_once_whoever_comes_first() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", STARTED_TWICE], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.split()[-1] == "1"
-
-
-def test_a_start_without_a_cuda_driver_is_silent_and_hides_nothing_else() -> None:
-    code = """
+SOMETHING_ELSE = """
 import os
 from pipeline.base import native
 
@@ -41,5 +33,45 @@ start = native.wp.init
 native.wp.init = lambda: (start(), os.write(2, b"something else\\n"))
 native.start()
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+SIMULATED = """
+import hashlib, sys
+import numpy as np
+from pipeline.base.native import wp
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.params import load
+from pipeline.sling.interaction import interact
+from pipeline.sling.launch import launch
+from validation.benchmarks.simulator import THETA, recorded_yardstick
+
+wp.config.cpu_compiler_flags = wp.config.cpu_compiler_flags.replace("-march=native", sys.argv[1])
+params = load()
+sling, episode = recorded_yardstick(params)
+thetas = np.array([THETA, THETA]) * [[0.8], [1.1]]
+rollouts = interact(sling, episode, thetas)
+losses = EpisodeLoss.of(params, "sling2sim2real", episode, sling).terms(rollouts)
+shots = launch(sling, thetas=thetas, draws=np.array([[-0.35, -0.15]]))
+numbers = [rollouts.force, rollouts.center_line, *losses.values(), *vars(shots).values()]
+for array in numbers:
+    print(hashlib.sha256(np.asarray(array, float).tobytes()).hexdigest())
+"""
+
+
+def python(code: str, *arguments: str) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-c", code, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+
+
+def test_warp_starts_once_whoever_comes_first() -> None:
+    assert python(STARTED_TWICE).stdout.split()[-1] == "1"
+
+
+def test_a_start_without_a_cuda_driver_is_silent_and_hides_nothing_else() -> None:
+    done = python(SOMETHING_ELSE)
     assert (done.stdout, done.stderr) == ("", "something else\n")
+
+
+def test_results_are_the_same_on_every_x86_64_cpu() -> None:
+    """With this one's vectors, and with the least that there are, without a fused multiply-add."""
+    native, least = python(SIMULATED, "-march=native"), python(SIMULATED, "-target-cpu x86-64-v2")
+    assert len(native.stdout.split()) > 10
+    assert least.stdout == native.stdout

@@ -29,9 +29,9 @@ class Bayes:
 
     The model is a SingleTaskGP with BoTorch's priors (Hvarfner et al. 2024) and an exponential
     kernel (Matern 1/2), a length scale an axis: losses are means of norms, whose valley is a kink,
-    and smoother kernels foresee minima where there are none. Losses that lie further above the median than the least lies below it
-    count as that far, because a few huge ones (a stiff band, a failure) would hide the rest; then
-    they are standardised.
+    and smoother kernels foresee minima where there are none. Losses that lie further above the
+    median than the least lies below it count as that far, because a few huge ones (a stiff band, a
+    failure) would hide the rest; then they are standardised.
 
     A batch is put together greedily from candidates all over the cube and near the best points,
     each next one by what it adds to the expected improvement of those before, and then moves as a

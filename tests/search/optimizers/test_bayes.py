@@ -17,7 +17,7 @@ from pipeline.search.loop import latin_hypercube
 from pipeline.search.optimizers.bayes import Bayes, greedy, standardised, training_rows
 from tests.search.functions import CENTRE, NAMES, Evaluate, alone, changed, correlated, quadratic
 
-ROLLOUTS, POPULATION = 96, 12
+POPULATION = 12
 
 
 def branin(unit: np.ndarray) -> np.ndarray:
@@ -53,33 +53,30 @@ def random_points(count: int, dimension: int, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).random((count, dimension))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize(
-    ("function", "names", "least", "near"),
-    [(branin, NAMES[:2], 0.397887, 0.02), (hartmann, (*NAMES, "f"), -3.32237, 0.4)],
+    ("function", "names", "rollouts", "least", "near"),
+    [(branin, NAMES[:2], 96, 0.397887, 0.02), (hartmann, (*NAMES, "f"), 144, -3.32237, 0.4)],
 )
-def test_it_beats_random_points(function, names, least: float, near: float, seed: int) -> None:
-    history = alone(
-        "bo", Evaluate(function, names), ROLLOUTS, changed(seed=seed, population=POPULATION), names
-    )
-    assert len(history.total) == ROLLOUTS
-    assert least <= history.total.min() < least + near
-    for other in range(10):
-        assert history.total.min() < function(random_points(ROLLOUTS, len(names), other)).min()
+def test_it_beats_random_points(function, names, rollouts: int, least: float, near: float) -> None:
+    """By bounds that it keeps with any seed: another CPU's rounding is like another seed."""
+    for seed in (1, 2):
+        optimizer = changed(seed=seed, population=POPULATION)
+        history = alone("bo", Evaluate(function, names), rollouts, optimizer, names)
+        assert len(history.total) == rollouts
+        assert least <= history.total.min() < least + near
+        for other in range(10):
+            assert history.total.min() < function(random_points(rollouts, len(names), other)).min()
 
 
 def test_it_goes_round_a_part_that_fails() -> None:
-    """A valley of two pairs that trade off, its minimum two tenths from a wall of failures."""
-    evaluate = quadratic(CENTRE, correlated(), fails=lambda unit: unit[:, 3] > 0.9)
-    random = [evaluate(random_points(240, 5, other)).total.min() for other in range(10)]
-    found = []
-    for seed in (1, 2, 3):
-        history = alone("bo", evaluate, 240, changed(population=20, seed=seed))
-        assert np.isinf(history.total).any()
+    """A valley of two pairs that trade off, beside failures that fill more than half of the box."""
+    evaluate = quadratic(CENTRE, correlated(), fails=lambda unit: unit[:, 3] < 0.6)
+    random = [evaluate(random_points(120, 5, other)).total.min() for other in range(10)]
+    for seed in (1, 2):
+        history = alone("bo", evaluate, 120, changed(population=20, seed=seed))
+        assert np.isinf(history.total[:20]).any()
         assert np.isinf(history.total[-60:]).mean() < 0.1
-        found.append(history.total.min())
-    assert np.median(found) < min(random)  # ten times as many points
-    assert max(found) - 1 < (np.median(random) - 1) / 3
+        assert history.total.min() - 1 < (np.median(random) - 1) / 3
 
 
 def test_its_first_batch_is_the_latin_hypercube() -> None:
@@ -89,9 +86,8 @@ def test_its_first_batch_is_the_latin_hypercube() -> None:
 
 def points(seed: int = 1, threads: int = 1) -> np.ndarray:
     torch.set_num_threads(threads)
-    history = alone(
-        "bo", quadratic(CENTRE, correlated()), 60, changed(seed=seed, population=POPULATION)
-    )
+    optimizer = changed(seed=seed, population=POPULATION)
+    history = alone("bo", quadratic(CENTRE, correlated()), 36, optimizer)
     assert torch.get_num_threads() == threads
     return history.unit
 
@@ -113,15 +109,10 @@ def test_the_same_seed_asks_for_the_same_points() -> None:
         torch.set_num_threads(before)
 
 
-def test_it_survives_losses_that_are_all_alike() -> None:
+def test_losses_all_alike_and_an_early_end_are_no_news(recwarn) -> None:
+    """Points that are alike need a jitter, climbs stop after a few steps: none of it is said."""
     history = alone("bo", Evaluate(lambda unit: np.ones(len(unit))), 60, changed(population=20))
     assert len(np.unique(history.unit, axis=0)) > 50
-
-
-def test_a_search_warns_of_nothing(recwarn) -> None:
-    """Though its climbs stop early, and points that are alike need a jitter."""
-    alone("bo", Evaluate(lambda unit: np.ones(len(unit))), 60, changed(population=20))
-    alone("bo", quadratic(CENTRE, correlated()), 48, changed(population=POPULATION))
     assert not recwarn.list
 
 

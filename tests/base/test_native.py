@@ -41,7 +41,7 @@ from pipeline.objective.loss import EpisodeLoss
 from pipeline.params import load
 from pipeline.sling.interaction import interact
 from pipeline.sling.launch import launch
-from validation.benchmarks.simulator import THETA, recorded_yardstick
+from validation.synthetic import THETA, recorded_yardstick
 
 wp.config.cpu_compiler_flags = wp.config.cpu_compiler_flags.replace("-march=native", sys.argv[1])
 params = load()

@@ -21,7 +21,7 @@ import time
 from contextlib import suppress
 
 GRACE = 8.0  # s from the interrupt to the kill
-PR_SET_CHILD_SUBREAPER = 36
+PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36
 
 
 def end_group(
@@ -51,9 +51,15 @@ def main(command: list[str]) -> int:
     """Run `command`; returns its exit status, as a shell has it."""
     for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(one, lambda *_: None)  # ours ends by stdin; the command gets the default
-    with suppress(OSError, AttributeError):
-        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
-    child = subprocess.Popen(command, stdin=subprocess.DEVNULL, process_group=0)
+    _control(PR_SET_CHILD_SUBREAPER, 1)
+    child = subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        process_group=0,
+        preexec_fn=lambda: _control(
+            PR_SET_PDEATHSIG, signal.SIGINT
+        ),  # where we ourselves are killed
+    )
     print(child.pid, flush=True)
 
     def ended_from_above() -> None:
@@ -65,6 +71,12 @@ def main(command: list[str]) -> int:
     status = child.wait()
     end_group(child.pid, first=signal.SIGTERM, reap=True)  # without the words of an interrupt
     return status if status >= 0 else 128 - status
+
+
+def _control(option: int, value: int) -> None:
+    """Linux's prctl; elsewhere nothing."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
 if __name__ == "__main__":

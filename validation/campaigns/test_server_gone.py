@@ -13,8 +13,8 @@ __all__ = ["flow"]  # a fixture
 @pytest.mark.validation
 def test_a_server_that_is_gone_keeps_no_stage(flow) -> None:
     url = flow.stdout.readline().strip()
-    (server,) = psutil.Process(flow.pid).children()
-    server.kill()
+    for one in psutil.Process(flow.pid).children(recursive=True):  # the guard and the server
+        one.kill()
     until(lambda: not alive(url), "the server's end")
     flow.stdin.write("\n")
     flow.stdin.flush()

@@ -7,9 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import psutil
 import pytest
 
 from app.flow import child, guard
+from tests.app.flow.test_child import until
 
 # Orphans go to the nearest subreaper; here to one that looks at none of them but the guard.
 OUTER = """\
@@ -33,6 +35,17 @@ def test_the_guard_reaps_what_its_command_leaves() -> None:
         [sys.executable, "-c", OUTER, *command], capture_output=True, text=True, timeout=60
     )
     assert done.stdout == "5 None\n", done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells children of a parent's death")
+def test_a_command_is_interrupted_where_its_guard_is_killed() -> None:
+    """As Prefect's server, of which nobody else knows the number."""
+    command = [sys.executable, guard.__file__, "sleep", "602"]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    number = int(process.stdout.readline())
+    process.kill()
+    process.communicate()
+    until(lambda: not psutil.pid_exists(number) or psutil.Process(number).status() == "zombie")
 
 
 def test_the_loaders_own_lines_come_before_the_groups_number(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
 from pipeline.oracle.aim import least_sensitive_draw
-from pipeline.oracle.floor import errors_of, trial_seeds
+from pipeline.oracle.floor import errors_of, trial_numbers
 from pipeline.oracle.world import World
 from stages.start import run, started
 
@@ -29,7 +29,7 @@ def main() -> None:
         landing_map = world.landing_map(params.setup, params.floor.map_size)
         starts = [least_sensitive_draw(landing_map, target) for target in targets]
         draws = world.hits(targets, starts)
-        floor = errors_of(draws, world.landings(draws, trial_seeds(params)), params)
+        floor = errors_of(draws, world.landings(draws, trial_numbers(params)), params)
     for target, one in floor["targets"].items():
         if one["mean_error_m"] is None:
             print(

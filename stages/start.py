@@ -9,7 +9,7 @@ from pathlib import Path
 from pipeline.base import errors
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, NotMade, owner
-from pipeline.params import Params, expect_known, load, pairs
+from pipeline.params import Params, expect_known, load
 
 STEPS = {"raw": "record", "episodes": "episode", "confidence": "theta", "policies": "policy"}
 
@@ -54,7 +54,8 @@ def remedy(error: NotMade) -> str:
     step, asked = STEPS.get(folder, folder), load().run
     stage = f"{step}@{band}"
     if method is not None:
-        if (band, method) not in pairs(asked):
+        ablated = asked.ablations.methods if band in asked.ablations.bands else ()
+        if band not in asked.bands or method not in (*asked.methods, *ablated):
             return (
                 f"name {method} under run.methods or run.ablations in params.yaml,"
                 " then `dvc repro` makes it"

@@ -38,7 +38,7 @@ def main() -> None:
     batches = trials.measured(params, band, method, layout.measured)
     if about.source == "rig":
         own = trials.aimed(stored, np.repeat(targets, params.trials.repeats).tolist())
-        batches = trials.launched(own, partial(_launch, band), params.trials) + batches
+        batches = trials.launched(own, partial(_launch, band)) + batches
     batches = batches or trials.aimed(stored, list(targets))
 
     launcher = simulator(params, band, theta)
@@ -59,9 +59,9 @@ def main() -> None:
     print(f"{band} {method}: launches: {', '.join(said)}")
 
 
-def _launch(band: str, draw: np.ndarray, seed: int) -> Trial:
+def _launch(band: str, draw: np.ndarray, number: int) -> Trial:
     """A launch in a process of its own, which reads the parameters: they cannot be sent there."""
-    return launch(band, load(), draw, seed)
+    return launch(band, load(), draw, number)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.base.errors import UserError
-from pipeline.params import TARGET_AREA
+from pipeline.base.target import TARGET_AREA
 
 REQUIRED = ("draw_y_m", "draw_z_m", "landing_y_m")
 OPTIONAL = ("target_m", "method")

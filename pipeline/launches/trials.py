@@ -19,7 +19,6 @@ from pipeline.base.pool import Pool
 from pipeline.landing.stored import Stored
 from pipeline.launches.measured import file_of, read_measured
 from pipeline.launches.spread import landing_intervals
-from pipeline.params.launches import trial_seed
 
 SCHEMA = pa.schema(
     [
@@ -113,23 +112,18 @@ def aimed(stored: Stored, targets: list[float]) -> list[Batch]:
     ]
 
 
-def launched(batches: list[Batch], launch: Callable, trials) -> list[Batch]:
+def launched(batches: list[Batch], launch: Callable) -> list[Batch]:
     """The same launched in a virtual world; launches of equal number have equal errors.
 
     Args:
-        launch: `launch(draw, seed)` gives landing_y [m], NaN where there is none, failure,
+        launch: `launch(draw, number)` gives landing_y [m], NaN where there is none, failure,
             hold_force [N] and flight. It goes to processes of its own: it keeps one core busy.
-        trials: The `trials:` section of params.yaml.
     """
     with Pool() as pool:
         return [
-            _virtual(batch, list(pool.map(launch, batch.draws, _seeds(batch, trials))))
+            _virtual(batch, list(pool.map(launch, batch.draws, range(len(batch.draws)))))
             for batch in batches
         ]
-
-
-def _seeds(batch: Batch, trials) -> list[int]:
-    return trial_seed(trials, np.arange(len(batch.draws))).tolist()
 
 
 def _virtual(batch: Batch, tried: list) -> Batch:

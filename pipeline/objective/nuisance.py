@@ -16,6 +16,14 @@ from __future__ import annotations
 
 import numpy as np
 
+NUISANCES = (  # in the order of their axes
+    "air_drag",
+    "camera_delay",
+    "force_delay",
+    "force_gain",
+    *(f"force_bias_{axis}" for axis in "xyz"),
+    *(f"cloud_shift_{axis}" for axis in "xyz"),
+)
 SPACING = 1e-3  # of the delays at which a simulation is read; between them it is interpolated [s]
 
 

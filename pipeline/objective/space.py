@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.params.identification import NUISANCES, Prior
+from pipeline.objective.nuisance import NUISANCES
+from pipeline.params.identification import Prior
 from pipeline.sling.material import THETA
 
 

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.params.launches import trial_seed
 
-
-def trial_seeds(params) -> np.ndarray:
-    """Seeds of a floor's launches, one row a target: first the trials' own, then others."""
+def trial_numbers(params) -> np.ndarray:
+    """Numbers of a floor's launches, one row a target: first the trials' own, then others."""
     trials, more = params.trials, params.floor.launches
     shape = len(trials.targets), trials.repeats
     own = np.arange(shape[0] * shape[1]).reshape(shape)
     others = own.size + np.arange(shape[0] * more).reshape(shape[0], more)
-    return trial_seed(trials, np.hstack([own, others]))
+    return np.hstack([own, others])
 
 
 def errors_of(draws: np.ndarray, landings: np.ndarray, params) -> dict:
@@ -26,8 +24,8 @@ def errors_of(draws: np.ndarray, landings: np.ndarray, params) -> dict:
 
     Args:
         draws: One a target (y, z) [m], shape (T, 2); NaN where it is out of reach.
-        landings: Of launches from them [m], NaN where one failed, shape (T, N), their seeds those
-            of `trial_seeds`.
+        landings: Of launches from them [m], NaN where one failed, shape (T, N), by number as
+            `trial_numbers` has them.
 
     Returns:
         For all launches, and under "targets" for each target with its "draw": mean_error_m and

@@ -33,17 +33,17 @@ class World:
     def __exit__(self, *error) -> None:
         self._pool.shutdown(cancel_futures=True)
 
-    def trials(self, draws: np.ndarray, seeds: Sequence[int | None]) -> list[Trial]:
-        """Launches from draws (N, 2) [m] with the errors of N trials; None: without errors.
+    def trials(self, draws: np.ndarray, numbers: Sequence[int | None]) -> list[Trial]:
+        """Launches from draws (N, 2) [m] with the errors of trials by number; None: without.
 
         A draw of NaN is not launched: its target is out of reach.
         """
-        return list(self._pool.map(_trial, draws, seeds))
+        return list(self._pool.map(_trial, draws, numbers))
 
-    def landings(self, draws: np.ndarray, seeds: np.ndarray) -> np.ndarray:
+    def landings(self, draws: np.ndarray, numbers: np.ndarray) -> np.ndarray:
         """Where T draws (T, 2) land with the errors of trials (T, N) [m], NaN where one fails."""
-        shape = np.shape(seeds)
-        every = self.trials(np.repeat(draws, shape[1], axis=0), np.ravel(seeds).tolist())
+        shape = np.shape(numbers)
+        every = self.trials(np.repeat(draws, shape[1], axis=0), np.ravel(numbers).tolist())
         landing = [one.landing_y if one.failure is None else np.nan for one in every]
         return np.reshape(landing, shape)
 
@@ -77,10 +77,10 @@ def _begin(band: str, path: Path) -> None:
     _launch = partial(launch, band, load(path))
 
 
-def _trial(draw: np.ndarray, seed: int | None) -> Trial:
+def _trial(draw: np.ndarray, number: int | None) -> Trial:
     if np.isnan(draw).any():
         return Trial(np.nan, "out of reach", np.nan)
-    return _launch(draw, seed)
+    return _launch(draw, number)
 
 
 def _hit(target: float, start: np.ndarray) -> np.ndarray:

@@ -14,8 +14,10 @@ from ruamel.yaml import YAML, YAMLError
 
 from pipeline.base.errors import UserError
 from pipeline.base.schema import FILLED, Name, Section, explained, refusal
+from pipeline.base.target import TARGET_AREA
 from pipeline.params.identification import (
     LossParams,
+    MethodDefaults,
     MethodParams,
     OptimizerParams,
     Parameters,
@@ -23,12 +25,11 @@ from pipeline.params.identification import (
     check_method,
 )
 from pipeline.params.lab import BandName, BandParams, PlanParams, RunParams, SetupParams
-from pipeline.params.launches import TARGET_AREA, FloorParams, PolicyParams, TrialsParams
+from pipeline.params.launches import FloorParams, PolicyParams, TrialsParams
 from pipeline.params.recording import CloudParams, EpisodeParams, ForceParams
 from pipeline.params.virtual_rig import RigArm, RigBand, RigCamera, RigClock, RigParams, RigWrench
 
 __all__ = [
-    "TARGET_AREA",
     "BandParams",
     "Parameters",
     "Params",
@@ -39,9 +40,9 @@ __all__ = [
     "RigCamera",
     "RigClock",
     "RigWrench",
+    "check",
     "expect_known",
     "load",
-    "pairs",
     "parse",
 ]
 
@@ -58,11 +59,27 @@ class Params(Section):
     parameters: Parameters
     loss: LossParams
     optimizer: OptimizerParams
+    method_defaults: MethodDefaults
     methods: Annotated[dict[Name, MethodParams], FILLED]
     policy: PolicyParams
     trials: TrialsParams
     floor: FloorParams
     rig: RigParams
+
+    @model_validator(mode="before")
+    @classmethod
+    def _methods_are_whole(cls, content: object) -> object:
+        """A method's own keys win; what it leaves out is as `method_defaults` says."""
+        if not isinstance(content, dict):
+            return content
+        defaults, methods = content.get("method_defaults"), content.get("methods")
+        if not (isinstance(defaults, dict) and isinstance(methods, dict)):
+            return content
+        whole = {
+            name: {**defaults, **method} if isinstance(method, dict) else method
+            for name, method in methods.items()
+        }
+        return content | {"methods": whole}
 
     @model_validator(mode="after")
     def _names_agree(self) -> Params:
@@ -125,14 +142,6 @@ def _expect_all(names, known, key: str) -> None:
             raise refusal(f"{key}: {name} is not one of {', '.join(known)}")
 
 
-def pairs(run: RunParams) -> list[tuple[str, str]]:
-    """Every band with every method that runs on it, band by band."""
-    ablated = {band: run.ablations.methods for band in run.ablations.bands}
-    return [
-        (band, method) for band in run.bands for method in (*run.methods, *ablated.get(band, ()))
-    ]
-
-
 def expect_known(params: Params, kind: str, name: str, called: str | None = None) -> None:
     """Raises UserError where there is no such `kind`, band or method; `called` names it."""
     known = getattr(params, f"{kind}s")
@@ -161,6 +170,11 @@ def parse(text: str, name: str = "params.yaml") -> Params:
         where = f", line {mark.line + 1}" if mark else ""
         what = getattr(error, "problem", None) or str(error).partition("\n")[0]
         raise UserError(f"{name}{where}: not valid YAML ({what})") from error
+    return check(content, name)
+
+
+def check(content: object, name: str = "params.yaml") -> Params:
+    """Check what a params.yaml holds; `name` stands in error messages. Raises UserError."""
     if not isinstance(content, dict):
         raise UserError(f"{name}: must hold a mapping of sections such as `run:` and `bands:`")
     try:

@@ -167,18 +167,23 @@ class Prior(Section):
     weight: Weight  # of size / mean in the loss, which is no likelihood; the posterior needs none
 
 
-class MethodParams(Section):
-    """What is weighed, what is searched, and how; keys that have a default may be left out."""
+class MethodDefaults(Section):
+    """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
+
+    search: Annotated[str, AfterValidator(_is_search)]
+    settings: dict[str, Setting]
+    fixed: dict[str, Value]
+    bounds: dict[str, Bounds]
+    nuisances: Annotated[dict[str, Bounds], AfterValidator(_reaches)]
+    priors: dict[str, Prior]
+    k_top: KTop | None
+    covariance: bool
+
+
+class MethodParams(MethodDefaults):
+    """What is weighed, what is searched, and how."""
 
     weights: Weights
-    search: Annotated[str, AfterValidator(_is_search)] = "multistart"
-    settings: dict[str, Setting] = {}  # of the optimiser's class, by name
-    fixed: dict[str, Value] = {}  # axes that are not searched
-    bounds: dict[str, Bounds] = {}  # narrower ones than the box: what is known before
-    nuisances: Annotated[dict[str, Bounds], AfterValidator(_reaches)] = {}  # searched besides
-    priors: dict[str, Prior] = {}  # of its nuisances
-    k_top: KTop | None = None  # None: optimizer.k_top
-    covariance: bool = True  # else isotropic starts of the same determinant
 
     @model_validator(mode="after")
     def _keys_belong_to_the_search(self) -> MethodParams:

@@ -6,8 +6,6 @@ from typing import Annotated
 
 from pipeline.base.schema import ASCENDING, FILLED, LIST, UNIQUE, Name, Range, Section, Seed
 
-# y of the paper's fixed target of 1 m by 1 m: a landing outside is a failure, so trials aim inside.
-TARGET_AREA = (1.425, 2.425)
 Distance = Annotated[float, Range(0.1, 20)]  # along the floor, m
 
 
@@ -56,8 +54,3 @@ class TrialsParams(Section):
     targets: Annotated[tuple[Distance, ...], LIST, FILLED, UNIQUE]
     repeats: Annotated[int, Range(1, 10_000)]
     actuation_error: Annotated[float, Range(0, 0.1)]
-
-
-def trial_seed(trials: TrialsParams, number):
-    """Seed of a band's launch by its number, an int or an array; the same for every policy."""
-    return 1_000_000 * trials.seed + number

@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtr, stdtrit
 
-from pipeline.params import TARGET_AREA
+from pipeline.base.target import TARGET_AREA
 
 LEVEL = 0.95
 RESAMPLES = 10_000

@@ -15,7 +15,6 @@ from pipeline.episode.episode import Episode
 from pipeline.landing.landing_map import LandingMap
 from pipeline.landing.stored import ROBUST, Stored
 from pipeline.launches.measured import file_of, named
-from pipeline.params import pairs
 from pipeline.search.regions import Region, load_regions
 from pipeline.sling.theta import load_theta
 
@@ -93,6 +92,14 @@ def gather(params, root: str | Path = ".") -> Results:
     floors = {band: load_floor(layout.floor(band)) for band in params.run.rig}
     unused = {band: _unused(params, layout, band, methods[band]) for band in methods}
     return Results(episodes, methods, floors, {band: n for band, n in unused.items() if n})
+
+
+def pairs(run) -> list[tuple[str, str]]:
+    """Every band of params.yaml's `run` with every method that runs on it, band by band."""
+    ablated = {band: run.ablations.methods for band in run.ablations.bands}
+    return [
+        (band, method) for band in run.bands for method in (*run.methods, *ablated.get(band, ()))
+    ]
 
 
 def _unused(params, layout: Layout, band: str, methods: Collection[str]) -> int:

@@ -39,7 +39,7 @@ class Section:
         if name == "model_dump_json":  # a memory's fingerprint: no result depends on it
             return self._section.model_dump_json
         if name not in type(self._section).model_fields:  # another method may read everything
-            read.add(self._path)
+            note(self._path)
             return getattr(self._section, name)
         return noted(getattr(self._section, name), f"{self._path}.{name}".lstrip("."))
 
@@ -66,12 +66,18 @@ class Entries(Mapping):
 def noted(value: object, path: str) -> object:
     if isinstance(value, dict):
         if not value:
-            read.add(path)
+            note(path)
         return Entries(value, path)
     if hasattr(type(value), "model_fields"):
         return Section(value, path)
-    read.add(path)
+    note(path)
     return value
+
+
+def note(path: str) -> None:
+    read.add(path)
+    if path.startswith("methods."):  # what a method leaves out is as the defaults say
+        read.add(".".join(["method_defaults", *path.split(".")[2:3]]))
 
 
 def shorten(step: str) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.oracle.floor import errors_of, trial_seeds
+from pipeline.oracle.floor import errors_of, trial_numbers
 from pipeline.params import load
 from pipeline.report.results import load_floor
 from tests.project import ROOT
@@ -19,14 +19,14 @@ def params():
     return load(ROOT / "params.yaml")
 
 
-def test_seeds_begin_with_the_trials_own(params) -> None:
+def test_numbers_begin_with_the_trials_own(params) -> None:
     """Those of stages/trials.py: launches are numbered target by target."""
     repeats, count = params.trials.repeats, len(params.trials.targets)
-    seeds = trial_seeds(params)
-    own = 1_000_000 * params.trials.seed + np.arange(count * repeats)
-    assert seeds.shape == (count, repeats + params.floor.launches)
-    assert np.array_equal(seeds[:, :repeats].ravel(), own)
-    assert len(np.unique(seeds)) == seeds.size
+    numbers = trial_numbers(params)
+    own = np.arange(count * repeats)
+    assert numbers.shape == (count, repeats + params.floor.launches)
+    assert np.array_equal(numbers[:, :repeats].ravel(), own)
+    assert len(np.unique(numbers)) == numbers.size
 
 
 def test_a_floor_counts_what_failed_and_averages_the_rest(params) -> None:

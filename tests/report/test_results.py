@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import shutil
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.report.results import gather
+from pipeline.report.results import gather, pairs
 from tests.report.conftest import BAND, METHOD
 
 
@@ -45,6 +46,12 @@ def test_further_methods_run_on_some_bands_only(root, params) -> None:
         copy = file.with_name(file.name.replace(METHOD, "de"))
         shutil.copytree(file, copy) if file.is_dir() else shutil.copy(file, copy)
     assert list(gather(params, root).methods[BAND]) == [METHOD, "de"]
+
+
+def test_ablations_run_on_their_bands_only() -> None:
+    ablations = SimpleNamespace(bands=("b",), methods=("c",))
+    run = SimpleNamespace(bands=("a", "b"), methods=("x", "y"), ablations=ablations)
+    assert pairs(run) == [("a", "x"), ("a", "y"), ("b", "x"), ("b", "y"), ("b", "c")]
 
 
 def test_robust_launches_stand_apart(root, params) -> None:

@@ -19,7 +19,7 @@ from pipeline.landing.simulator import simulator
 from pipeline.landing.stored import Stored
 from pipeline.objective.space import Space
 from pipeline.oracle.aim import hit, least_sensitive_draw
-from pipeline.oracle.floor import errors_of, trial_seeds
+from pipeline.oracle.floor import errors_of, trial_numbers
 from pipeline.oracle.world import World
 from pipeline.params import load
 from pipeline.report.styles import COLORS, INK, THEME
@@ -98,7 +98,7 @@ def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
         known: Draws and landings [m] of the rig without errors, for the oracle's θ.
     """
     band, targets = world.band, np.array(params.trials.targets)
-    seeds = trial_seeds(params)
+    numbers = trial_numbers(params)
     path = root / "data/theta" / band / f"{method}.json"
     stored = Stored(band, method, root)
     content = load_theta(path, band)
@@ -121,7 +121,7 @@ def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
     variants = {}
     for name, each in draws.items():
         clean = world.exact(each).landing_y
-        errors = errors_of(each, world.landings(each, seeds), params)
+        errors = errors_of(each, world.landings(each, numbers), params)
         bias = clean - targets
         variants[name] = errors | {
             "without_noise_m": float(np.abs(bias).mean()),
@@ -159,7 +159,7 @@ def band_figures(params, root: Path, band: str, methods, progress) -> dict:
         landing_map = world.landing_map(params.setup, params.floor.map_size)
         starts = [least_sensitive_draw(landing_map, target) for target in targets]
         draws = world.hits(targets, starts)
-        floor = errors_of(draws, world.landings(draws, trial_seeds(params)), params)
+        floor = errors_of(draws, world.landings(draws, trial_numbers(params)), params)
         tried = shots(params, landing_map)
         landing = world.exact(tried).landing_y
         progress(f"  {band}: floor {100 * floor['mean_error_m']:.2f} cm")
@@ -235,7 +235,7 @@ def test_what_the_error_of_a_landing_is_made_of(tmp_path, progress, record) -> N
         settings={
             "methods": METHODS,
             "targets": params.trials.targets,
-            "launches_a_target": trial_seeds(params).shape[1],
+            "launches_a_target": trial_numbers(params).shape[1],
             "actuation_error_m": params.trials.actuation_error,
             "release_jitter": params.rig.release_jitter,
             "optimizer": params.optimizer.model_dump(),

@@ -45,8 +45,7 @@ def launched(params, band: str) -> tuple[np.ndarray, np.ndarray]:
             [float(row[f"{key}_m"]) for key in ("draw_y", "draw_z", "landing_y")] for row in rows
         ]
         return np.array(table)[:, :2], np.array(table)[:, 2]
-    seeds = [1_000_000 * params.trials.seed + number for number in range(len(DRAWS))]
-    trials = [launch(band, params, draw, seed) for draw, seed in zip(DRAWS, seeds, strict=True)]
+    trials = [launch(band, params, draw, number) for number, draw in enumerate(DRAWS)]
     return DRAWS, np.array([trial.landing_y for trial in trials])
 
 

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Rectangle
 
-from pipeline.params import TARGET_AREA
+from pipeline.base.target import TARGET_AREA
 from pipeline.report.figures.canvas import key, mark, patch, picture
 from pipeline.report.noise import landed
 from pipeline.report.results import Results

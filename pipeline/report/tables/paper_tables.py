@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from pipeline.base.files import replacing, write_text
-from pipeline.params import TARGET_AREA
+from pipeline.base.target import TARGET_AREA
 from pipeline.report import paper
 from pipeline.report.noise import LEVEL, RESAMPLES
 from pipeline.report.report import Report

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pipeline.params import TARGET_AREA
+from pipeline.base.target import TARGET_AREA
 from pipeline.rig.physics.scene import ROD
 from pipeline.rig.physics.string import GRAVITY, ElasticString
 from pipeline.rig.physics.world import bent_at, pulled, string_of
@@ -43,19 +43,17 @@ class Trial:
     flight: np.ndarray | None = field(default=None, compare=False)
 
 
-def launch(
-    band_name: str, params: Params, draw: tuple[float, float], trial_seed: int | None
-) -> Trial:
+def launch(band_name: str, params: Params, draw: tuple[float, float], number: int | None) -> Trial:
     """Launch from the commanded draw (y, z).
 
     Args:
-        trial_seed: Of the actuation error (`trials.actuation_error`, normal in y and z); equal
-            seeds give every method the same error. So does the kick of the opening fingers
-            (`rig.release_jitter`). None: neither.
+        number: Of the trial, by which (with `trials.seed`) go the actuation error
+            (`trials.actuation_error`, normal in y and z) and the kick of the opening fingers
+            (`rig.release_jitter`): equal numbers give every method the same ones. None: neither.
     """
     aim, kick = np.array([0.0, *draw]), np.zeros(3)
-    if trial_seed is not None:
-        rng = np.random.default_rng([params.rig.seed, trial_seed])
+    if number is not None:
+        rng = np.random.default_rng([params.rig.seed, 1_000_000 * params.trials.seed + number])
         aim[1:] += rng.normal(0, params.trials.actuation_error, 2)
         kick[1:] = rng.normal(0, params.rig.release_jitter, 2)
     return launch_from(string_of(params, band_name), params, aim, kick)

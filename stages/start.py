@@ -11,7 +11,13 @@ from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, NotMade, owner
 from pipeline.params import Params, expect_known, load
 
-STEPS = {"raw": "record", "episodes": "episode", "confidence": "theta", "policies": "policy"}
+STEPS = {  # that make a folder of another name
+    "raw": "record",
+    "episodes": "episode",
+    "clusters": "refined",
+    "confidence": "theta",
+    "policies": "policy",
+}
 
 
 def arguments(*names: str) -> list[str]:

@@ -41,7 +41,7 @@ TINY = {
     "rig.tolerance": 1e-3,
     "rig.camera.drop_rate": 0.8,
 }
-SEARCHED = ("history", "clusters", "refined", "theta", "policy", "trials")
+SEARCHED = ("history", "refined", "theta", "policy", "trials")
 METHODS = [f"{step}@band1-sling2sim2real" for step in SEARCHED]
 ABLATIONS = [f"ablation_{step}@band1-de" for step in SEARCHED]
 FROM_HISTORY = {*METHODS, *ABLATIONS, "report"}
@@ -174,6 +174,6 @@ def test_a_variation_of_k_top_keeps_the_history(project: Copy) -> None:
     ran = project.dvc("exp", "run", "-S", "optimizer.k_top=1")
     assert ran <= FROM_HISTORY - HISTORIES
     # What follows them runs only where their outputs differ from the ones before.
-    assert ran >= {f"{step}@band1-sling2sim2real" for step in ("clusters", "refined", "theta")}
+    assert ran >= {f"{step}@band1-sling2sim2real" for step in ("refined", "theta")}
     content = YAML(typ="safe").load(project.folder / "params.yaml")
     assert content["optimizer"]["k_top"] == 1

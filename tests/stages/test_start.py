@@ -23,7 +23,7 @@ from stages.start import remedy
 
 ROOT = Path(__file__).parents[2]
 OF_A_BAND = ("record", "episode", "mounting")
-OF_A_METHOD = ("history", "clusters", "refined", "theta", "policy", "trials")
+OF_A_METHOD = ("history", "refined", "theta", "policy", "trials")
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def test_a_history_that_failed_says_why(stage) -> None:
         Evaluation(unit, theta, nothing, np.full(30, np.inf), reasons), phase="de", generation=0
     )
     history.save(Path("data/history/band1/sling2sim2real.parquet"))
-    status, line = stage("clusters", "band1", "sling2sim2real")
+    status, line = stage("refined", "band1", "sling2sim2real")
     assert status == 1
     assert line.startswith(
         "error: sling2sim2real: each of 30 simulations failed (the band slipped)"
@@ -81,7 +81,7 @@ def test_a_hint_names_the_group_by_which_a_method_runs(stage) -> None:
     path = Path("params.yaml")
     run = load(path).run.ablations
     assert "band1" in run.bands and {"de", "adam"} <= set(run.methods)
-    makes = {"clusters": "history", "refined": "clusters", "theta": "history"}
+    makes = {"refined": "history", "theta": "history"}
     for name, step in makes.items():
         for method, group in (("sling2sim2real", step), ("de", f"ablation_{step}")):
             _, line = stage(name, "band1", method)
@@ -110,8 +110,9 @@ def test_a_file_that_is_missing_or_damaged_says_what_makes_it(stage) -> None:
         "data/policies/band2/sling2sim2real/robust/card.json": "policy@band2-sling2sim2real",
         **{
             f"data/{step}/band1/de.parquet": f"ablation_{step}@band1-de"
-            for step in ("history", "clusters", "refined", "theta", "trials")
+            for step in ("history", "refined", "theta", "trials")
         },
+        "data/clusters/band1/de.json": "ablation_refined@band1-de",
     }
     for path, makes in cases.items():
         assert remedy(NotMade(Path(path))) == f"`dvc repro {makes}` makes it"

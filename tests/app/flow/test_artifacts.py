@@ -75,6 +75,6 @@ def test_the_report_shows_its_tables_without_links_to_files(root) -> None:
     assert shown(root, "report", "") == f"## In short\n\n- good\n\n{tables}"
 
 
-@pytest.mark.parametrize("step", ["record", "mounting", "history", "clusters", "floor"])
+@pytest.mark.parametrize("step", ["record", "mounting", "history", "floor"])
 def test_other_steps_show_nothing(root, step: str) -> None:
     assert shown(root, step) == ""

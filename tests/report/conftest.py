@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from pipeline.landing.landing_map import LandingMap, landscape_of
 from pipeline.params import load
 from pipeline.policy.export import write_onnx
 from pipeline.policy.train import Policy
+from pipeline.report.results import Result, Results, gather
 from pipeline.search.regions import Region, save_regions
 from pipeline.sling.material import THETA as NAMES
 from tests.policy import toy
@@ -137,21 +139,17 @@ def posterior() -> dict:
     }
 
 
-@pytest.fixture
-def root(tmp_path: Path) -> Path:
+@pytest.fixture(scope="session")
+def template(tmp_path_factory) -> Path:
     """A project folder with params.yaml and everything that the report reads."""
-    yaml = YAML()
+    root, yaml = tmp_path_factory.mktemp("report"), YAML()
     content = yaml.load(Path("params.yaml"))
     content["run"].update(bands=[BAND], rig=[], methods=[METHOD])
     content["run"]["ablations"].update(bands=[], methods=[])
-    content["bands"][BAND] = {
-        "source": "recording",
-        "mass": 0.04,
-        "diameter": 0.01,
-        "rest_length": 0.52,
-    }
-    yaml.dump(content, tmp_path / "params.yaml")
-    data = tmp_path / "data"
+    band = {"source": "recording", "mass": 0.04, "diameter": 0.01, "rest_length": 0.52}
+    content["bands"][BAND] = band
+    yaml.dump(content, root / "params.yaml")
+    data = root / "data"
     for name in ("history", "clusters", "refined", "theta", "confidence", "trials"):
         (data / name / BAND).mkdir(parents=True)
     episode().save(data / "episodes" / BAND)
@@ -185,9 +183,25 @@ def root(tmp_path: Path) -> Path:
     network = nn.Sequential(nn.Linear(1, 8), nn.ELU(), nn.Linear(8, 2))
     write_onnx(Policy(network, (1.425, 2.425), landscape_of([chart])), folder / "policy.onnx")
     launches().to_parquet(data / "trials" / BAND / f"{METHOD}.parquet")
-    return tmp_path
+    return root
+
+
+@pytest.fixture
+def root(template: Path, tmp_path: Path) -> Path:
+    """A copy of the template, to change."""
+    return shutil.copytree(template, tmp_path, dirs_exist_ok=True)
 
 
 @pytest.fixture
 def params(root: Path):
     return load(root / "params.yaml")
+
+
+@pytest.fixture
+def results(root: Path, params) -> Results:
+    return gather(params, root)
+
+
+@pytest.fixture
+def result(results: Results) -> Result:
+    return results.methods[BAND][METHOD]

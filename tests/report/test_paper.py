@@ -53,21 +53,18 @@ def numbers(cell: str) -> tuple[float, ...] | None:
     return tuple(float(one) for one in re.findall(r"\d+\.\d+(?:E[+-]\d+)?", cell))
 
 
-@pytest.mark.parametrize(
-    ("label", "methods", "bands"),
-    [
+def test_landing_errors_are_those_of_the_paper() -> None:
+    """Every cell, and the order of the rows."""
+    for label, methods, bands in (
         ("tab:rl_eval", paper.BENCHMARK, 3),
         ("tab:ablation_optimization", paper.OPTIMISERS, 1),
         ("tab:ablation_combined", paper.ABLATIONS, 1),
-    ],
-)
-def test_landing_errors_are_those_of_the_paper(label: str, methods, bands: int) -> None:
-    """Every cell, and the order of the rows."""
-    rows = printed()[label]
-    theirs = [paper.METHODS[method] for method in methods]
-    assert [method for _, method, _ in rows] == theirs * bands
-    for band, method, cells in rows:
-        assert [numbers(cell) for cell in cells] == list(paper.LANDING[band, method])
+    ):
+        rows = printed()[label]
+        theirs = [paper.METHODS[method] for method in methods]
+        assert [method for _, method, _ in rows] == theirs * bands
+        for band, method, cells in rows:
+            assert [numbers(cell) for cell in cells] == list(paper.LANDING[band, method])
 
 
 def test_parameters_are_those_of_the_paper() -> None:
@@ -85,10 +82,10 @@ def test_every_number_stands_in_a_table() -> None:
     assert {band for band, _ in paper.LANDING} == set(paper.BANDS.values()) == set(paper.KINDS)
 
 
-@pytest.mark.parametrize("key", [key for key, cells in paper.LANDING.items() if cells[0]])
-def test_the_papers_rows_average_to_what_it_prints(key) -> None:
+def test_the_papers_rows_average_to_what_it_prints() -> None:
     """One row does not, and the report says so."""
-    *targets, total = paper.LANDING[key]
-    mean = sum(cell[0] for cell in targets) / 3
-    exception = key[1] == "without covariance and multi-start"
-    assert (abs(mean - total[0]) > 0.01) == exception
+    for (_, method), (*targets, total) in paper.LANDING.items():
+        if total:
+            mean = sum(cell[0] for cell in targets) / 3
+            exception = method == "without covariance and multi-start"
+            assert (abs(mean - total[0]) > 0.01) == exception

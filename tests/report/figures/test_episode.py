@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.report.figures import episode as drawing
 from pipeline.report.styles import styles
-from tests.report.conftest import METHOD, episode
+from tests.report.conftest import BAND, METHOD, episode
 from tests.report.toy_replay import toy_replay
 
 STYLES = styles([METHOD])
@@ -26,9 +26,12 @@ def recorded():
     return replace(still, velocity=still.velocity + [0, -0.1, 0], clouds=clouds)
 
 
+def replays(recorded) -> dict:
+    return {METHOD: toy_replay(None, "", METHOD, recorded, {})}
+
+
 def test_force_residual_and_distance_over_time(kept, recorded) -> None:
-    replays = {METHOD: toy_replay(None, "", METHOD, recorded, {})}
-    drawing.force("", recorded, replays, STYLES)
+    drawing.force("", recorded, replays(recorded), STYLES)
     axes = np.array(kept[0].axes).reshape(4, 2)
     for column in (0, 1):
         measured, simulated = axes[0, column].lines[:2]
@@ -42,8 +45,7 @@ def test_force_residual_and_distance_over_time(kept, recorded) -> None:
 
 
 def test_work_and_where_it_ends_apart(kept, recorded) -> None:
-    replays = {METHOD: toy_replay(None, "", METHOD, recorded, {})}
-    drawing.work("", recorded, replays, STYLES)
+    drawing.work("", recorded, replays(recorded), STYLES)
     left, right = kept[0].axes
     # f_y = t until 8 s, v_y = -0.1 m/s: the band does -0.1 * 32 J on the hand; where in its sample
     # the force falls from 8 N, trapezoids cannot know
@@ -67,14 +69,12 @@ def test_a_recording_without_a_frame_in_the_recoil_has_pictures_too(kept, record
     blind = replace(recorded, clouds=[cloud + [0, 1, 0] for cloud in recorded.clouds])
     frames = drawing.moments(blind)
     assert "taut recoil" not in frames and "swinging" in frames
-    replays = {METHOD: toy_replay(None, "", METHOD, blind, {})}
-    drawing.clouds("", blind, replays, STYLES, frames, 0.01)
+    drawing.clouds("", blind, replays(blind), STYLES, frames, 0.01)
     assert len(kept[0].axes) == 2 * len(frames)
 
 
 def test_clouds_are_as_thick_as_the_band_and_at_one_scale(kept, recorded) -> None:
-    replays = {METHOD: toy_replay(None, "", METHOD, recorded, {})}
-    drawing.clouds("", recorded, replays, STYLES, drawing.moments(recorded), 0.01)
+    drawing.clouds("", recorded, replays(recorded), STYLES, drawing.moments(recorded), 0.01)
     figure = kept[0]
     scales = set()
     for ax in figure.axes:
@@ -85,3 +85,34 @@ def test_clouds_are_as_thick_as_the_band_and_at_one_scale(kept, recorded) -> Non
         assert tube.get_linewidth() == pytest.approx(0.01 * per_metre * 72 / figure.dpi)
     assert len(scales) == 1
     assert figure.axes[0].texts[0].get_text() == "1.00 cm"
+
+
+def under_load(recorded, of_band) -> None:
+    drawing.loaded("", {BAND: recorded}, {BAND: of_band}, styles([METHOD, "de"]), 0.275, 0.52)
+
+
+def test_the_weight_hangs_at_the_middle_and_its_depth_is_told(kept) -> None:
+    recorded = episode()
+    one = replays(recorded)[METHOD]
+    lost = replace(one, loaded=np.full((25, 3), np.nan))
+    under_load(recorded, {METHOD: one, "de": lost})
+    top, _ = kept[0].axes
+    shapes = [line for line in top.lines if len(line.get_xdata()) == 25]
+    np.testing.assert_array_equal(shapes[0].get_ydata(), one.loaded[:, 2])
+    (weight,) = (line for line in top.lines if line.get_marker() == "o")
+    assert weight.get_ydata()[0] == pytest.approx(-0.4)
+    assert [text.get_text() for text in top.texts] == ["40.0 cm", "not found"]
+    assert top.get_aspect() == 1 and top.get_ylim()[0] < -0.4
+
+
+def test_force_over_the_hands_draw_from_grasp_to_release(kept) -> None:
+    still = episode()
+    depth = np.clip(still.time / 20, 0, 0.4)
+    recorded = replace(still, position=np.stack([0 * depth, -0.8 * depth, -0.6 * depth], 1))
+    under_load(recorded, replays(recorded))
+    measured, simulated = kept[0].axes[1].lines
+    held = (still.time >= 1) & (still.time <= 8 - 2 * still.sample_period)
+    np.testing.assert_allclose(measured.get_xdata(), depth[held])
+    size = np.hypot(still.time, np.sin(still.time))[held]
+    np.testing.assert_allclose(measured.get_ydata(), size)
+    np.testing.assert_allclose(simulated.get_ydata(), 0.9 * size)

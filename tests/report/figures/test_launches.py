@@ -11,7 +11,6 @@ from matplotlib.patches import Circle
 from scipy.integrate import solve_ivp
 
 from pipeline.report.figures import launches as drawing
-from pipeline.report.results import gather
 from pipeline.report.styles import styles
 from pipeline.sling.model import GRAVITY
 from tests.report.conftest import BAND, METHOD
@@ -21,7 +20,7 @@ LEAVE = {"y": -0.2, "z": -0.08, "speed": 4.3, "angle": 0.4}
 
 
 @pytest.fixture
-def results(root, params):
+def results(results):
     """Two virtual launches at each of two targets; the last one failed and has no flight."""
     one = drawing.flight(*LEAVE.values(), FLOOR)
     trials = pd.DataFrame(
@@ -41,11 +40,10 @@ def results(root, params):
             "predicted_angle": LEAVE["angle"],
         }
     )
-    found = gather(params, root)
-    result = replace(found.methods[BAND][METHOD], trials=trials, robust_trials=trials.iloc[:0])
-    found.methods[BAND][METHOD] = result
-    found.methods[BAND]["de"] = replace(result, trials=trials.iloc[:2])
-    return found
+    of_band = results.methods[BAND]
+    of_band[METHOD] = replace(of_band[METHOD], trials=trials, robust_trials=trials.iloc[:0])
+    of_band["de"] = replace(of_band[METHOD], trials=trials.iloc[:2])
+    return results
 
 
 METHODS = [METHOD, "de"]

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from pipeline.report.figures import policy
-from pipeline.report.results import gather
 from pipeline.report.styles import styles
-from tests.report.conftest import BAND, METHOD, launches
+from tests.report.conftest import METHOD, launches
 
 
 def test_every_method_has_a_row_and_two_have_intervals(kept) -> None:
@@ -34,11 +32,6 @@ def test_launches_without_intervals_are_drawn_too(kept) -> None:
     trials = launches().drop(columns=["predicted_low", "predicted_high"])
     policy.landings("", trials, styles([METHOD]), [METHOD])
     assert "90 % interval" not in [text.get_text() for text in kept[0].legends[0].get_texts()]
-
-
-@pytest.fixture
-def result(root, params):
-    return gather(params, root).methods[BAND][METHOD]
 
 
 def test_the_map_shows_the_paths_of_both_policies(kept, result) -> None:

@@ -8,14 +8,8 @@ import pytest
 from matplotlib.patches import Ellipse
 
 from pipeline.report.figures import search
-from pipeline.report.results import gather
 from pipeline.report.styles import styles
-from tests.report.conftest import BAND, METHOD
-
-
-@pytest.fixture
-def result(root, params):
-    return gather(params, root).methods[BAND][METHOD]
+from tests.report.conftest import METHOD
 
 
 def pairs(figure: plt.Figure) -> list[plt.Axes]:

@@ -20,7 +20,6 @@ from PIL import Image
 
 from pipeline.report.page import write_page
 from pipeline.report.report import Report
-from pipeline.report.results import gather
 from pipeline.report.run import write_run
 from pipeline.report.styles import styles
 from tests.report.conftest import BAND, METHOD
@@ -96,9 +95,8 @@ if BROWSER is None:
 
 
 @pytest.fixture
-def pages(root, params):
+def pages(root, params, results):
     """Two bands, the second with a band half a metre further; the first with two methods."""
-    results = gather(params, root)
     one = toy_replay(None, BAND, METHOD, results.episodes[BAND], {})
     moving = one.center_line + np.linspace(0, 0.3, 90)[:, None, None] * [0, 1, 0]
     one = replace(one, center_line=moving)

@@ -13,7 +13,6 @@ from pipeline.base.errors import UserError
 from pipeline.report.page import replays as packing
 from pipeline.report.page import write_page
 from pipeline.report.report import Report
-from pipeline.report.results import gather
 from pipeline.report.styles import styles
 from tests.report.conftest import BAND, METHOD
 from tests.report.toy_replay import toy_replay
@@ -38,11 +37,6 @@ PICTURE = b"\x89PNG of bytes"
 
 def unpacked(text: str) -> np.ndarray:
     return np.frombuffer(base64.b64decode(text), "<i2").reshape(-1, 3)
-
-
-@pytest.fixture
-def results(root, params):
-    return gather(params, root)
 
 
 @pytest.fixture

@@ -7,16 +7,18 @@ import pytest
 
 from pipeline.report.styles import styles
 from pipeline.report.tables.differences import as_table, claims, compared, records, robust
-from tests.report.tables.toy_results import launches, result, results
+from tests.report.tables.toy_results import launches, ran, result, results
 
 NOISE = np.random.default_rng(0).normal(0, 0.01, (3, 5))
 NAMED = styles(["sling2sim2real", "sling2sim2real_taut", "package_si", "real2sim2real"])
-RAN = results(
-    result("band1", "sling2sim2real", launches(0.05 - NOISE)),
-    result("band1", "sling2sim2real_taut", launches(0.05 + NOISE)),
-    result("band1", "package_si", launches(0.2 + NOISE)),
-    result("band1", "real2sim2real", launches(NOISE, failed=15)),
-    result("orange", "package_si", launches(NOISE, "measured")),
+RAN = ran(
+    {
+        "band1 sling2sim2real": launches(0.05 - NOISE),
+        "band1 sling2sim2real_taut": launches(0.05 + NOISE),
+        "band1 package_si": launches(0.2 + NOISE),
+        "band1 real2sim2real": launches(NOISE, failed=15),
+        "orange package_si": launches(NOISE, "measured"),
+    }
 )
 
 
@@ -40,41 +42,31 @@ def test_no_more_is_said_than_the_intervals_allow() -> None:
     assert "beside **Sling2Sim2Real**" in beside_papers
 
 
-def test_how_few_launches_count_is_said() -> None:
-    """Of the method that is named: a measured reference has another number of its own."""
-    ran = results(
-        result("band1", "sling2sim2real", launches(NOISE, "measured", failed=1)),
-        result("band1", "package_si", launches(0.2 + NOISE, "measured", failed=8)),
-    )
-    assert claims(compared(ran, 1), NAMED)[0].endswith("more error: Package SI (7 launches count).")
-
-
-def test_who_fails_more_is_never_just_better() -> None:
-    """13 of 15 fail, and the two that land are near."""
-    ran = results(
-        result("band1", "sling2sim2real", launches(0.2 + NOISE)),
-        result("band1", "package_si", launches(0.1 + NOISE, failed=13)),
-    )
-    (line,) = claims(compared(ran, 1), NAMED)
-    assert line.endswith(
-        "less error where it lands, but more launches fail: Package SI (2 launches count)."
-    )
-    turned = results(
-        result("band1", "package_si", launches(0.2 + NOISE)),
-        result("band1", "sling2sim2real", launches(0.1 + NOISE, failed=13)),
-    )
-    (line,) = claims(compared(turned, 1), NAMED)
-    assert "more error where both land, but fewer launches fail: Package SI" in line
-
-
-def test_less_error_is_said_too() -> None:
-    ran = results(
-        result("band1", "sling2sim2real", launches(0.2 + NOISE)),
-        result("band1", "package_si", launches(0.1 + NOISE)),
-    )
-    assert claims(compared(ran, 1), NAMED) == [
-        "- Band 1 (soft), virtual, beside **Sling2Sim2Real**: less error: Package SI."
-    ]
+def test_what_is_said_where_launches_fail() -> None:
+    """How few count, of the method that is named; who fails more is never just better."""
+    near, far = 0.1 + NOISE, 0.2 + NOISE
+    for reference, other, verdict in (
+        (launches(far), launches(near), "less error: Package SI."),
+        (
+            launches(NOISE, "measured", failed=1),
+            launches(far, "measured", failed=8),
+            "more error: Package SI (7 launches count).",
+        ),
+        (
+            launches(far),
+            launches(near, failed=13),
+            "less error where it lands, but more launches fail: Package SI (2 launches count).",
+        ),
+        (
+            launches(near, failed=13),
+            launches(far),
+            "more error where both land, but fewer launches fail: Package SI (2 launches count).",
+        ),
+    ):
+        found = ran({"band1 sling2sim2real": reference, "band1 package_si": other})
+        kind = reference.kind[0]
+        beside = f"- Band 1 (soft), {kind}, beside **Sling2Sim2Real**: "
+        assert claims(compared(found, 1), NAMED) == [beside + verdict]
 
 
 def test_machines_read_the_same(tmp_path) -> None:
@@ -85,8 +77,8 @@ def test_machines_read_the_same(tmp_path) -> None:
     assert one.low_95_cm <= 15.001 and one.high_95_cm >= 14.999
     assert ("real2sim2real", "sling2sim2real_taut") not in read.index
     some = launches(NOISE, "measured", failed=3), launches(NOISE, "measured", failed=6)
-    ran = results(result("band1", "sling2sim2real", some[0]), result("band1", "bo", some[1]))
-    (few,) = records(compared(ran, 1)).itertuples()
+    both = ran({"band1 sling2sim2real": some[0], "band1 bo": some[1]})
+    (few,) = records(compared(both, 1)).itertuples()
     assert (few.launches, few.launches_beside) == (9, 10)  # of the two targets that both reach
     assert few.failed_share == pytest.approx(0.4) and few.failed_share_beside == pytest.approx(0.2)
 
@@ -95,8 +87,8 @@ def test_robust_policies_stand_beside_the_plain_ones() -> None:
     """Landings 5 cm beyond and scattered: half the scatter, and the same mean miss."""
     assert robust(RAN, NAMED, 1) is None
     plain, second = launches(0.05 + NOISE), launches(0.05 + 0.5 * NOISE)
-    ran = results(result("band1", "sling2sim2real_taut", plain, robust_trials=second))
-    (row,) = robust(ran, NAMED, 1)[1]
+    both = results(result("band1", "sling2sim2real_taut", plain, robust_trials=second))
+    (row,) = robust(both, NAMED, 1)[1]
     scatter = 100 * np.sqrt(np.mean(np.var(NOISE, axis=1, ddof=1)))
     assert row[5:7] == [f"{scatter:.2f}", f"{scatter / 2:.2f}"]
     far = second.assign(

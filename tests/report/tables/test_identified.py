@@ -7,22 +7,16 @@ from types import SimpleNamespace
 import pytest
 
 from pipeline.params.identification import Prior
-from pipeline.report.results import gather
 from pipeline.report.styles import styles
-from pipeline.report.tables.identified import (
-    derived,
-    held_out,
-    losses,
-    methods,
-    phases,
-)
+from pipeline.report.tables.identified import derived, held_out, losses, methods, phases
+from pipeline.report.tables.policies import policies
 from tests.report.conftest import BAND, METHOD, episode
+from tests.report.tables.toy_results import launches
+from tests.report.tables.toy_results import result as one
+from tests.report.tables.toy_results import results as all_of
 from tests.report.toy_replay import toy_replay
 
-
-@pytest.fixture
-def results(root, params):
-    return gather(params, root)
+MAP = {"target_range": {"draws": 9, "mean_error_m": 3e-4, "max_error_m": None}}
 
 
 @pytest.fixture
@@ -119,3 +113,20 @@ def test_held_out_residuals_stand_beside_the_fitted(params, named) -> None:
     unknown = ["DE_L", "0.200", "–", "–", "0.20", "–", "–"]
     assert held_out(replays, named)[1] == [unknown, *rows]
     assert heads[1:4] == ["force [N], fitted", "force [N], held out", "force [N], ratio"]
+
+
+def card(**training) -> dict:
+    usual = {"converged": True, "mean_error_m": 0.004, "max_error_m": 0.01, "failed_targets": 2}
+    return {"training": usual | training, "landing_map": MAP}
+
+
+def test_a_robust_policy_is_a_row_with_what_both_are_expected_to_miss() -> None:
+    trials, named = launches([[0.0]] * 3), styles(["package_si", "sling2sim2real"])
+    robust = card(converged=False, expected_error_m=0.03, plain_expected_error_m=0.04)
+    ours = one("band1", "sling2sim2real", trials, card=card(), robust_card=robust)
+    theirs = one("band1", "package_si", trials, card=card(mean_error_m=None))
+    _, (plain, second, other) = policies(all_of(ours, theirs), named)
+    assert plain[1:4] == ["Sling2Sim2Real", "plain", "yes"]
+    assert plain[4:] == ["0.40", "1.00", "2", "0.03", "–", "4.00"]
+    assert second[2:4] == ["robust", "**no**"] and second[-1] == "3.00"
+    assert other[3:5] == ["yes", "–"] and other[-1] == "–"

@@ -111,7 +111,3 @@ def test_coverage_of_the_predicted_intervals() -> None:
     assert parts["beyond"] == {"launches": 1, "covered": 1, "width": 0.25}
     assert "| 1.950 – 2.250 |" in markdown(predictions(ranged))
     assert intervals(launched.assign(predicted_low=math.nan, predicted_high=math.nan)) is None
-
-
-def test_markdown_has_one_line_a_row() -> None:
-    assert markdown((["a", "b"], [["1", "2"]])) == "| a | b |\n| --- | --- |\n| 1 | 2 |\n"

@@ -55,6 +55,11 @@ def results(*some: SimpleNamespace, floors: dict | None = None) -> Results:
     return Results({}, methods, floors or {})
 
 
+def ran(trials: dict[str, pd.DataFrame], floors: dict | None = None) -> Results:
+    """Results of methods by "<band> <method>", of which only the trials matter."""
+    return results(*(result(*name.split(), some) for name, some in trials.items()), floors=floors)
+
+
 def floor(means: tuple[float, ...], deviations: tuple[float, ...]) -> dict:
     """An actuation floor of 20 launches a target [m]."""
     return {

@@ -1,4 +1,4 @@
-"""LaTeX tables: well formed, read back, and compiled where there is a LaTeX."""
+"""Tables as markdown and LaTeX: well formed, read back, and compiled where there is a LaTeX."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.report.styles import KNOWN, styles
 from pipeline.report.tables.benchmark import as_table, benchmark
-from pipeline.report.tables.cells import NAMES, latex, text
+from pipeline.report.tables.cells import NAMES, latex, markdown, text
 from tests.report.tables.toy_results import TARGETS, floor, launches, result, results
 
 TABLE = (
@@ -90,3 +90,7 @@ def test_it_compiles(tmp_path) -> None:
     ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stdout[-2000:]
     assert (tmp_path / "toy.pdf").is_file()
+
+
+def test_markdown_has_one_line_a_row() -> None:
+    assert markdown((["a", "b"], [["1", "2"]])) == "| a | b |\n| --- | --- |\n| 1 | 2 |\n"

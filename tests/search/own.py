@@ -1,4 +1,4 @@
-"""An optimiser as a user may write one: uniform random points, whatever they are told."""
+"""Optimisers as users may write them: one that serves, and those that are refused."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import numpy as np
 
 
 class RandomSearch:
+    """Uniform random points, whatever they are told."""
+
     phase = "random"
 
     def __init__(self, dimension: int, *, rollouts: int, seed: int, population: int, batch=7):
@@ -19,71 +21,29 @@ class RandomSearch:
         assert np.isfinite(losses).all()
 
 
-class Outside(RandomSearch):
-    """Asks beyond the cube."""
-
-    def ask(self) -> np.ndarray:
-        return super().ask() + 0.5
+def changed(name: str, **attributes) -> type:
+    return type(name, (RandomSearch,), attributes)
 
 
-class Flat(RandomSearch):
-    """Asks in five dimensions, whatever it was told."""
-
-    def ask(self) -> np.ndarray:
-        return np.zeros((1, 5))
+def lost(self, dimension: int, **settings) -> None:
+    settings["name"]  # was not given
 
 
-class Words(RandomSearch):
-    """Asks for no numbers."""
-
-    def ask(self):
-        return [["here", "there"]]
+def choosy(self, dimension: int, *, name: str = "x", **settings) -> None:
+    raise ValueError(f"no such name,\nsorry: {name}")
 
 
-class Crowd(RandomSearch):
-    """Says of one of its points who asked for it."""
-
-    owner = (0,)
+def deaf(self, dimension: int, **settings) -> None:
+    self.ask = None
 
 
-class Strangers(RandomSearch):
-    """Says by names who asked."""
-
-    @property
-    def owner(self):
-        return ["a"] * 7
-
-
-class Halves(RandomSearch):
-    """Says by halves who asked."""
-
-    @property
-    def owner(self):
-        return np.full(7, 0.5)
-
-
-class Lost(RandomSearch):
-    """Looks for what it was not given."""
-
-    def __init__(self, dimension: int, **settings):
-        settings["name"]
-
-
-class Choosy(RandomSearch):
-    """Does not like what it is given."""
-
-    def __init__(self, dimension: int, *, name: str = "x", **settings):
-        raise ValueError(f"no such name,\nsorry: {name}")
-
-
-class Nameless(RandomSearch):
-    phase = 3
-
-
-class Deaf:
-    """Cannot be told."""
-
-    phase = "deaf"
-
-    def __init__(self, dimension: int, **settings):
-        self.ask = None
+Outside = changed("Outside", ask=lambda self: np.full(self._shape, 1.5))
+Flat = changed("Flat", ask=lambda self: np.zeros((1, 5)))
+Words = changed("Words", ask=lambda self: [["here", "there"]])
+Crowd = changed("Crowd", owner=(0,))  # of one of its points it says who asked
+Strangers = changed("Strangers", owner=["a"] * 7)
+Halves = changed("Halves", owner=np.full(7, 0.5))
+Nameless = changed("Nameless", phase=3)
+Lost = changed("Lost", __init__=lost)
+Choosy = changed("Choosy", __init__=choosy)
+Deaf = type("Deaf", (), {"phase": "deaf", "__init__": deaf})

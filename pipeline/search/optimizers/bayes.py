@@ -173,7 +173,7 @@ def quiet_on_one_thread() -> Iterator[None]:
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(record=True):  # it turns some of them on itself
             warnings.simplefilter("ignore")
             yield
     finally:

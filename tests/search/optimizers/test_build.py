@@ -61,49 +61,44 @@ def test_a_class_beside_params_is_found(tmp_path: Path, monkeypatch: pytest.Monk
     assert one.ask().shape == (7, 4)
 
 
-@pytest.mark.parametrize(
-    ("name", "settings", "expected"),
-    [
-        ("nowhere.at_all:Class", {}, "(ModuleNotFoundError: No module named 'nowhere')"),
-        ("tests.search.own:Absent", {}, "cannot be imported (AttributeError: module 'tests."),
-        ("tests.search.broken:Class", {}, "cannot be imported (ZeroDivisionError: division"),
-        ("tests.search.own:Deaf", {}, "is no optimiser, it lacks ask, tell"),
-        ("tests.search.own:Nameless", {}, "is no optimiser, it lacks phase, a text"),
-        (
-            "tests.search.own:Choosy",
-            {"name": "y"},
-            "does not take its settings: no such name, sorry: y",
-        ),
-        ("tests.search.own:Lost", {}, "does not take its settings: KeyError('name')"),
-        ("math:hypot", {}, "cannot be called as Class(dimension, rollouts, seed, population)"),
-        (OWN, {"rate": 1.0}, "got an unexpected keyword argument 'rate'"),
-        ("de", {"rate": 1.0}, "got an unexpected keyword argument 'rate'"),
-        ("de", {"dimension": 3}, "multiple values for argument 'dimension'"),
-        ("de", {"mutation": 7.0}, "mutation must be from 0 to below 2"),
-        ("de", {"mutation": "much"}, "could not convert string to float"),
-        ("de", {"recombination": True, "mutation": -1}, "got -1 and True"),
-        ("bo", {"points": 1}, "points must be a whole number above 1, got 1"),
-        ("adam", {"step": 0.0}, "rate and step must be above 0"),
-        ("adam", {"rate": "fast"}, "does not take its settings: '>' not supported"),
-    ],
+REFUSED = (
+    ("nowhere.at_all:Class", {}, "(ModuleNotFoundError: No module named 'nowhere')"),
+    ("tests.search.own:Absent", {}, "cannot be imported (AttributeError: module 'tests."),
+    ("tests.search.broken:Class", {}, "cannot be imported (ZeroDivisionError: division"),
+    ("tests.search.own:Deaf", {}, "is no optimiser, it lacks ask, tell"),
+    ("tests.search.own:Nameless", {}, "is no optimiser, it lacks phase, a text"),
+    ("tests.search.own:Choosy", {"name": "y"}, "take its settings: no such name, sorry: y"),
+    ("tests.search.own:Lost", {}, "does not take its settings: KeyError('name')"),
+    ("math:hypot", {}, "cannot be called as Class(dimension, rollouts, seed, population)"),
+    (OWN, {"rate": 1.0}, "got an unexpected keyword argument 'rate'"),
+    ("de", {"rate": 1.0}, "got an unexpected keyword argument 'rate'"),
+    ("de", {"dimension": 3}, "multiple values for argument 'dimension'"),
+    ("de", {"mutation": 7.0}, "mutation must be from 0 to below 2"),
+    ("de", {"mutation": "much"}, "could not convert string to float"),
+    ("de", {"recombination": True, "mutation": -1}, "got -1 and True"),
+    ("bo", {"points": 1}, "points must be a whole number above 1, got 1"),
+    ("adam", {"step": 0.0}, "rate and step must be above 0"),
+    ("adam", {"rate": "fast"}, "does not take its settings: '>' not supported"),
 )
-def test_what_is_no_optimiser_is_refused_in_one_line(
-    name: str, settings: dict, expected: str
-) -> None:
-    with pytest.raises(UserError) as error:
-        build(name, 4, rollouts=60, seed=1, population=20, **settings)
-    assert expected in str(error.value)
-    assert "`search` under `methods` in params.yaml" in str(error.value)
-    assert "\n" not in str(error.value)
 
 
-def test_points_outside_the_cube_are_refused() -> None:
-    with pytest.raises(UserError, match="Outside: ask.. must give points of the unit cube"):
-        alone("tests.search.own:Outside", Evaluate(rosenbrock), 50)
-    with pytest.raises(UserError, match=r"shape \(N, 4\), and gave shape \(1, 5\)"):
-        alone("tests.search.own:Flat", Evaluate(rosenbrock), 50, names=tuple("abcd"))
-    with pytest.raises(UserError, match=r"shape \(N, 5\), and gave no array of numbers"):
-        alone("tests.search.own:Words", Evaluate(rosenbrock), 50)
-    for name in ("Crowd", "Strangers", "Halves"):
-        with pytest.raises(UserError, match=f"{name}: owner must say by a number for each of 7"):
-            alone(f"tests.search.own:{name}", Evaluate(rosenbrock), 50)
+def test_what_is_no_optimiser_is_refused_in_one_line() -> None:
+    for name, settings, expected in REFUSED:
+        with pytest.raises(UserError) as error:
+            build(name, 4, rollouts=60, seed=1, population=20, **settings)
+        assert expected in str(error.value)
+        assert "`search` under `methods` in params.yaml" in str(error.value)
+        assert "\n" not in str(error.value)
+
+
+def test_what_is_asked_for_is_checked() -> None:
+    """Points of the unit cube, and a number for each of who asked, if any."""
+    owner = "{}: owner must say by a number for each of 7"
+    for name, match in (
+        ("Outside", r"Outside: ask\(\) must give points of the unit cube"),
+        ("Flat", r"shape \(N, 4\), and gave shape \(1, 5\)"),
+        ("Words", r"shape \(N, 4\), and gave no array of numbers"),
+        *((name, owner.format(name)) for name in ("Crowd", "Strangers", "Halves")),
+    ):
+        with pytest.raises(UserError, match=match):
+            alone(f"tests.search.own:{name}", Evaluate(rosenbrock), 50, names=tuple("abcd"))

@@ -49,6 +49,7 @@ def test_its_points_are_those_of_scipy(
         expected.append(unit.T.copy())
         return ((unit.T - 0.3) ** 2).sum(axis=1)
 
+    shared = {"mutation": (0.4, 0.9), "recombination": recombination}
     differential_evolution(
         objective,
         [(0, 1)] * dimension,
@@ -56,22 +57,15 @@ def test_its_points_are_those_of_scipy(
         init=latin_hypercube(dimension, population, seed),
         rng=np.random.default_rng([seed, 1]),
         maxiter=generations,
-        mutation=(0.4, 0.9),
-        recombination=recombination,
         vectorized=True,
         updating="deferred",
         polish=False,
         tol=0,
         atol=-1,
+        **shared,
     )
-    one = Evolution(
-        dimension,
-        rollouts=population * (generations + 1),
-        seed=seed,
-        population=population,
-        mutation=(0.4, 0.9),
-        recombination=recombination,
-    )
+    rollouts = population * (generations + 1)
+    one = Evolution(dimension, rollouts=rollouts, seed=seed, population=population, **shared)
     for unit in expected:
         asked = one.ask()
         np.testing.assert_array_equal(asked, unit)
@@ -93,15 +87,19 @@ def test_the_bottom_of_rosenbrocks_valley_is_found() -> None:
     assert history.best()["total"] < 1e-6
 
 
-@pytest.mark.parametrize("told", [0, 1, 3])
-def test_no_thread_is_left(told: int) -> None:
+def small(population: int = 5, **more) -> Evolution:
+    return Evolution(2, rollouts=15, seed=1, population=population, **more)
+
+
+def test_no_thread_is_left() -> None:
     """Dropped before it was asked, in the middle, and after its budget."""
-    one = Evolution(2, rollouts=15, seed=1, population=5)
-    for _ in range(told):
-        one.tell(rosenbrock(one.ask()))
-    assert threads()
-    del one
-    assert not left()
+    for told in (0, 1, 3):
+        one = small()
+        for _ in range(told):
+            one.tell(rosenbrock(one.ask()))
+        assert threads()
+        del one
+        assert not left()
 
 
 @pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
@@ -110,22 +108,17 @@ def test_a_failing_evaluation_surfaces_and_leaves_no_thread(error: type[BaseExce
         raise error
 
     with pytest.raises(error):
-        search(
-            Evolution(2, rollouts=15, seed=1, population=5),
-            broken,
-            History("toy", NAMES[:2]),
-            rollouts=15,
-        )
+        search(small(), broken, History("toy", NAMES[:2]), rollouts=15)
     assert not left()
 
 
 def test_what_scipy_raises_surfaces() -> None:
     with pytest.raises(ValueError, match="mutation"):
-        Evolution(2, rollouts=15, seed=1, population=5, mutation=(0.5, 7.0))
+        small(mutation=(0.5, 7.0))
     with pytest.raises(ValueError, match="population supplied"):
-        Evolution(2, rollouts=15, seed=1, population=3).ask()
-    one = Evolution(2, rollouts=10, seed=1, population=5)
-    for _ in range(3):
+        small(population=3).ask()
+    one = small()
+    for _ in range(4):
         one.tell(rosenbrock(one.ask()))
     with pytest.raises(RuntimeError, match="beyond its budget"):
         one.ask()

@@ -13,14 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.base.errors import UserError
-from pipeline.report.results import (
-    PRINTED,
-    best_so_far,
-    gather,
-    has_another_loss,
-    pairs,
-    printed,
-)
+from pipeline.report.results import PRINTED, best_so_far, gather, has_another_loss, pairs, printed
 from tests.report.conftest import BAND, METHOD
 
 

@@ -106,11 +106,7 @@ def _predicted(trials: pd.DataFrame, floor: float) -> list[np.ndarray]:
 
 
 def _flights(
-    ax: plt.Axes,
-    trials: pd.DataFrame,
-    predicted: list[np.ndarray],
-    color: str,
-    fork_height: float,
+    ax: plt.Axes, trials: pd.DataFrame, predicted: list[np.ndarray], color: str, fork_height: float
 ) -> None:
     shades = _shades(sorted(set(trials.target)), color)
     for one in trials.itertuples():

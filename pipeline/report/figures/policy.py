@@ -91,10 +91,7 @@ def training(results: dict[str, Result], styles: Styles) -> plt.Figure:
         error = 100 * curve.mean_error
         ax.plot(curve.iteration, error, color=own.color, label=own.name, **style)
     ax.axhline(1, color="0.6", lw=1)
-    ax.set(
-        xlabel="PPO iteration (line: the aim of 1 cm)",
-        ylabel="mean |landing − target| [cm]",
-    )
+    ax.set(xlabel="PPO iteration (line: the aim of 1 cm)", ylabel="mean |landing − target| [cm]")
     log_y(ax)
     figure.legend(loc="outside right upper")
     return figure

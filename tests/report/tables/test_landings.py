@@ -8,12 +8,7 @@ import pandas as pd
 import pytest
 
 from pipeline.report.tables.cells import markdown
-from pipeline.report.tables.landings import (
-    intervals,
-    landing_errors,
-    prediction_error,
-    predictions,
-)
+from pipeline.report.tables.landings import intervals, landing_errors, prediction_error, predictions
 
 
 def trials(rows: list[tuple], kind: str = "measured") -> pd.DataFrame:

@@ -6,16 +6,12 @@ The rules are in `container`.
 from __future__ import annotations
 
 import re
-from collections import Counter
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import BinaryIO
 
 from mcap import records as kinds
 from mcap.opcode import Opcode
 
 from pipeline.base.errors import UserError
-from pipeline.recording.input.account import losses_of, notes_of
+from pipeline.recording.input.account import Account, Channel
 from pipeline.recording.input.records import (
     HEAD,
     MESSAGE,
@@ -35,44 +31,8 @@ BULKY = re.compile("PointCloud|LaserScan|OccupancyGrid|CompressedVideo")  # coun
 KEPT = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
 
-@dataclass
-class Channel:
-    """One topic with its raw messages, in the order of the file.
-
-    The payloads of types that no topic needs and that are large (BULKY) are left empty.
-    """
-
-    topic: str
-    schema: kinds.Schema
-    encoding: str
-    log_times: list[int] = field(default_factory=list)  # ns
-    payloads: list[bytes] = field(default_factory=list)
-
-
-class Collector:
-    """Takes one record after the other; then says what it has.
-
-    Attributes:
-        channels: Messages by the number of their channel, not yet named.
-        aside: What may not be believed, until it is known whether the file has checksums.
-    """
-
-    def __init__(self, path: Path, file: BinaryIO):
-        self.path, self.file, self.size = path, file, path.stat().st_size
-        self.schemas: dict[int, kinds.Schema] = {}
-        self.definitions: dict[int, kinds.Channel] = {}
-        self.channels: dict[int, Channel] = {}
-        self.ambiguous: Counter[int] = Counter()  # messages dropped by channel id
-        self.held = 0
-        self.checked = 0  # chunks that have a checksum
-        self.aside: list[Record] = []
-        self.disbelieved = 0
-        self.gaps: list[Record] = []
-        self.private = 0
-        self.dropped: list[tuple[int, int]] = []  # first and last log time of damaged chunks
-        self.data_end: Record | None = None
-        self.footer: Record | None = None
-        self.summary: list[kinds.McapRecord] = []
+class Collector(Account):
+    """Takes one record after the other; then says what it has."""
 
     def collect(self) -> tuple[list[Channel], list[str], list[str]]:
         """Channels that have messages, losses and notes."""
@@ -87,7 +47,7 @@ class Collector:
             elif isinstance(one, kinds.Channel):
                 self.definitions.setdefault(one.id, one)
         channels, orphans = self._joined()
-        return channels, [*losses_of(self, trusted), *orphans], notes_of(self, trusted)
+        return channels, [*self.losses(trusted), *orphans], self.notes(trusted)
 
     # Records
 

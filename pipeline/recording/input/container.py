@@ -23,7 +23,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipeline.base.errors import UserError
-from pipeline.recording.input.collector import Channel, Collector
+from pipeline.recording.input.account import Channel
+from pipeline.recording.input.collector import Collector
 from pipeline.recording.input.records import MAGIC
 
 __all__ = ["Channel", "Container", "expect_file", "read_container", "sha256"]
@@ -59,7 +60,7 @@ def read_container(path: Path) -> Container:
         with path.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:
                 raise UserError(f"{path}: not an MCAP file (ros2 bag record -s mcap writes one)")
-            return Container(path, *Collector(path, file).collect())
+            return Container(path, *Collector(path, file, path.stat().st_size).collect())
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror})") from error
 

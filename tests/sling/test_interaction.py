@@ -70,12 +70,12 @@ def test_result_depends_on_neither_neighbours_nor_workers(sling, episode):
 
 
 def test_random_thetas_converge_or_say_why_not(strong_grip, episode):
-    """1,000 of the whole box: no number that is none, and nearly none that fails."""
-    rollouts = interact(strong_grip, episode, random_thetas(1000, seed=1), workers=2)
+    """480 of the whole box: no number that is none, and nearly none that fails."""
+    rollouts = interact(strong_grip, episode, random_thetas(480, seed=1), workers=2)
     good = np.array([reason is None for reason in rollouts.failure])
     assert np.isfinite(rollouts.force[good]).all()
     assert np.isfinite(rollouts.center_line[good]).all()
-    assert (~good).sum() <= 2
+    assert (~good).sum() <= 1
 
 
 def test_finer_steps_give_the_same_recoil(sling, episode):

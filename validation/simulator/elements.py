@@ -120,7 +120,7 @@ def measure(bench: Bench, sling: Sling, count: int = COUNT) -> Figures:
     episode = pull_and_release(band, bench.params.episode, sling)
     thetas, draws = random_launches(count)
     firm = replace(sling, grip_force=1e6)  # no theta slips out of it
-    interact(firm, episode, thetas[:1])  # compiles
+    launch(sling, thetas[:1], draws[:1])  # compiles
     rollouts, rollout_seconds, _ = timed(lambda: interact(firm, episode, thetas))
     launches, launch_seconds, _ = timed(lambda: launch(sling, thetas, draws))
     frames = len(episode.cloud_time)

@@ -1,13 +1,17 @@
-"""What params.yaml's models are made of: ranges, names, vectors, and violations in one line."""
+"""What models of params.yaml and of JSON files are made of: ranges, names, vectors, and violations
+in one line.
+"""
 
 from __future__ import annotations
 
 import difflib
+import json
 import math
 import re
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, get_args
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import (
     AfterValidator,
@@ -21,12 +25,36 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from pipeline.base.errors import one_line
+from pipeline.base.layout import NotMade
 
 
 class Section(BaseModel):
     """A mapping of params.yaml. Integers pass for floats; nothing else is converted."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class JsonRecord(Section):
+    """A mapping of a JSON file, which may hold more than is read."""
+
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
+
+
+Read = TypeVar("Read", bound=JsonRecord)
+
+
+def read_json(path: Path, model: type[Read]) -> Read:
+    """A JSON file by its model. Raises NotMade: missing, no JSON, or not as the model wants it."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise NotMade(path) from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise NotMade(path, f"cannot be read as JSON ({one_line(error)})") from error
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise NotMade(path, explained(error, model)) from error
 
 
 def refusal(message: str) -> PydanticCustomError:

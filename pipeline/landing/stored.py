@@ -2,15 +2,43 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.base.layout import Layout, NotMade
+from pipeline.base.schema import JsonRecord, read_json
 
 PLAIN, ROBUST = "plain", "robust"  # ROBUST is also the folder of a method's second policy
+
+
+class Training(JsonRecord):
+    """Errors are launched |y_p - g| [m] of the checked targets; None where none lands."""
+
+    converged: bool
+    mean_error_m: float | None
+    max_error_m: float | None
+
+
+class MapError(JsonRecord):
+    """Of reading between simulated launches, on so many random draws [m]; None where none lands."""
+
+    draws: int
+    mean_error_m: float | None
+    max_error_m: float | None
+
+
+class LandingMapErrors(JsonRecord):
+    box: MapError
+    target_range: MapError
+
+
+class Card(JsonRecord):
+    """As much of a policy's card (policy/export.py) as is read."""
+
+    training: Training
+    landing_map: LandingMapErrors
 
 
 @dataclass(frozen=True)
@@ -36,11 +64,7 @@ class Stored:
 
     def card(self, kind: str = PLAIN) -> dict:
         """What a policy's card says (export.card). Raises NotMade: missing, or damaged."""
-        path = self._file(kind, "card.json")
-        try:
-            return json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise NotMade(path, "damaged") from error
+        return read_json(self._file(kind, "card.json"), Card).model_dump()
 
     def draws(self, targets: np.ndarray, kind: str = PLAIN) -> np.ndarray:
         """Draws (y, z) [m], shape (N, 2), for targets [m], (N,).

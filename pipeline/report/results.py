@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,16 +9,29 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from pipeline.base.layout import Layout, NotMade, made
+from pipeline.base.layout import Layout, made
+from pipeline.base.schema import JsonRecord, read_json
 from pipeline.episode.episode import Episode
 from pipeline.landing.landing_map import LandingMap
 from pipeline.landing.stored import ROBUST, Stored
 from pipeline.launches.measured import file_of, named
 from pipeline.search.regions import Region, load_regions
-from pipeline.sling.theta import load_theta
+from pipeline.sling.theta import PosteriorFile, load_theta
 
 PRINTED = ("geom", "force", "work")  # the paper's loss is their sum (docs/method.md)
-FLOOR = ("launches", "actuation_error_m", "release_jitter")  # that a floor tells
+
+
+class FloorOfTarget(JsonRecord):
+    mean_error_m: float | None
+
+
+class Floor(FloorOfTarget):
+    """As much of what stages/floor.py wrote as is shown."""
+
+    launches: int
+    actuation_error_m: float
+    release_jitter: float
+    targets: dict[str, FloorOfTarget]
 
 
 @dataclass(frozen=True)
@@ -112,11 +124,12 @@ def _unused(params, layout: Layout, band: str, methods: Collection[str]) -> int:
 def _result(layout: Layout, band: str, method: str) -> Result:
     steps = layout.history(band, method), layout.refined(band, method)
     history = [pd.read_parquet(made(path)) for path in steps]
-    clusters = made(layout.clusters(band, method))
+    regions, axes = load_regions(layout.clusters(band, method))
     theta = load_theta(layout.theta(band, method), band)
     posterior = None
     if theta.get("confidence"):
-        posterior = json.loads(made(layout.confidence(band, method)).read_text("utf-8"))
+        path = layout.confidence(band, method)
+        posterior = read_json(path, PosteriorFile).model_dump(exclude_unset=True)
     trials = pd.read_parquet(made(layout.trials(band, method)))
     robust = trials.policy == ROBUST
     stored, policy = Stored(band, method, layout.root), layout.policy(band, method)
@@ -125,8 +138,8 @@ def _result(layout: Layout, band: str, method: str) -> Result:
         method=method,
         theta=theta,
         history=pd.concat([part for part in history if len(part)], ignore_index=True),
-        regions=load_regions(clusters),
-        axes=json.loads(clusters.read_text("utf-8"))["names"],
+        regions=regions,
+        axes=axes,
         posterior=posterior,
         card=stored.card(),
         robust_card=stored.card(ROBUST) if ROBUST in stored.kinds() else None,
@@ -139,15 +152,7 @@ def _result(layout: Layout, band: str, method: str) -> Result:
 
 def load_floor(path: Path) -> dict:
     """Read what stages/floor.py wrote. Raises NotMade."""
-    made(path)
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        [float(content[name]) for name in FLOOR]
-        means = [one["mean_error_m"] for one in (content, *content["targets"].values())]
-        [float(mean) for mean in means if mean is not None]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise NotMade(path, "damaged") from error
-    return content
+    return read_json(path, Floor).model_dump()
 
 
 def printed(history: pd.DataFrame) -> np.ndarray:

@@ -5,7 +5,6 @@ Distances are those of the unit cube; failed rows count for nothing.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
+from pipeline.base.schema import JsonRecord, read_json
 
 RIDGE = 1e-3  # of the mean variance, added to every variance
 LEAST_VARIANCE = 1e-6  # a thousandth of the box, where all neighbours are one point
@@ -140,10 +140,23 @@ def save_regions(path: Path, names: tuple[str, ...], regions: list[Region], aske
     write_json(path, {"names": list(names), "asked": asked, "clusters": clusters})
 
 
-def load_regions(path: Path) -> list[Region]:
-    """Read what `save_regions` wrote."""
-    clusters = json.loads(path.read_text(encoding="utf-8"))["clusters"]
-    return [
-        Region(np.array(one["mu"]), np.array(one["Sigma"]), one["loss"], one["members"])
-        for one in clusters
+class RegionEntry(JsonRecord):
+    mu: list[float]
+    Sigma: list[list[float]]
+    loss: float
+    members: list[int]
+
+
+class RegionsFile(JsonRecord):
+    names: list[str]
+    clusters: list[RegionEntry]
+
+
+def load_regions(path: Path) -> tuple[list[Region], list[str]]:
+    """What `save_regions` wrote: the regions, and the names of their axes. Raises NotMade."""
+    read = read_json(path, RegionsFile)
+    regions = [
+        Region(np.array(one.mu), np.array(one.Sigma), one.loss, one.members)
+        for one in read.clusters
     ]
+    return regions, read.names

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
+from typing import Annotated
 
-from pipeline.base.layout import Layout, NotMade
+from pipeline.base.layout import Layout
+from pipeline.base.schema import Direction, JsonRecord, Range, read_json
 from pipeline.sling.model import Sling
 
 
+class Mounting(JsonRecord):
+    """How a band leaves its clamps, and its flexural rigidity [N m^2]."""
+
+    clamp_direction: Direction
+    flexural_rigidity: Annotated[float, Range(0, 1e3)]
+
+
 def load_sling(params, band: str, root: str | Path = ".") -> Sling:
-    """The sling of a band of params.yaml, mounted as its recording shows where that was fitted."""
-    path, mounting = Layout(Path(root)).mounting(band), None
-    if path.exists():
-        try:
-            mounting = json.loads(path.read_text(encoding="utf-8"))
-            mounting["clamp_direction"], mounting["flexural_rigidity"]
-        except (ValueError, KeyError, TypeError) as error:
-            raise NotMade(path, "damaged") from error
+    """The sling of a band of params.yaml, mounted as its recording shows where that was fitted.
+
+    Raises NotMade where the file of the mounting is damaged.
+    """
+    path = Layout(Path(root)).mounting(band)
+    mounting = read_json(path, Mounting).model_dump() if path.exists() else None
     return Sling.of(params.bands[band], params.setup, params.sling, mounting)

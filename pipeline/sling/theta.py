@@ -9,15 +9,16 @@ What its confidence rests on, samples of θ, lies beside in data/confidence/.
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from pydantic import create_model, model_validator
 
 from pipeline.base.errors import UserError
 from pipeline.base.layout import NotMade, owner
-from pipeline.base.schema import Range
+from pipeline.base.schema import JsonRecord, Range, Section, read_json, refusal
 from pipeline.params import Parameters
 from pipeline.params.identification import NUISANCES
 from pipeline.sling.load import load_sling
@@ -31,42 +32,54 @@ def _limits(name: str) -> Range:
     return next(one for one in box.model_fields["low"].metadata if isinstance(one, Range))
 
 
-LIMITS = {name: _limits(name) for name in THETA}
+Theta = create_model(
+    "Theta", __base__=Section, **{name: (Annotated[float, _limits(name)], ...) for name in THETA}
+)
+Nuisances = create_model(
+    "Nuisances",
+    __base__=Section,
+    **{name: (Annotated[float, Range(*ends)], None) for name, ends in NUISANCES.items()},
+)
+
+
+class Discrepancy(JsonRecord):
+    landing: float  # share of a landing by which the law errs
+
+
+class Confidence(JsonRecord):
+    discrepancy: Discrepancy | None = None
+
+
+class ThetaFile(JsonRecord):
+    band: str
+    theta: Theta
+    nuisances: Nuisances = Nuisances()
+    confidence: Confidence | None = None
+
+
+class PosteriorFile(JsonRecord):
+    """What a θ file's confidence rests on; no samples where it has none."""
+
+    names: list[str] = []
+    samples: list[list[float]]
+
+    @model_validator(mode="after")
+    def _a_column_each(self) -> PosteriorFile:
+        known = self.names in (list(THETA), [*THETA, "air_drag"])
+        if self.samples and not (known and {*map(len, self.samples)} == {len(self.names)}):
+            raise refusal("samples: must have a column for each of `names`, which are those of θ")
+        return self
 
 
 def load_theta(path: Path, band: str) -> dict:
     """Read and check a θ file. Raises UserError."""
     path = Path(path)
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        if owner(path):
-            raise NotMade(path) from error
-        raise UserError(
-            f"{path}: no such file; `dvc repro` writes those of data/theta/{band}/"
-        ) from error
-    except (OSError, ValueError, RecursionError) as error:
-        raise UserError(f"{path}: cannot be read as JSON ({error})") from error
-    if not isinstance(content, dict) or content.get("band") != band:
-        raise UserError(f'{path}: must hold an object with "band": "{band}"')
-    theta, nuisances = content.get("theta"), content.get("nuisances", {})
-    if not isinstance(theta, dict) or set(theta) != set(THETA):
-        raise UserError(f'{path}: "theta" must hold exactly {", ".join(THETA)}')
-    for name, value in theta.items():
-        _expect_number(path, f"theta.{name}", value, LIMITS[name].low, LIMITS[name].high)
-    if not isinstance(nuisances, dict) or not set(nuisances) <= set(NUISANCES):
-        raise UserError(f'{path}: "nuisances" may hold {", ".join(NUISANCES)}, and nothing else')
-    for name, value in nuisances.items():
-        _expect_number(path, f"nuisances.{name}", value, *NUISANCES[name])
-    return content
-
-
-def _expect_number(path: Path, key: str, value: object, low: float, high: float) -> None:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not low <= value <= high:
-        raise UserError(
-            f"{path}: {key} must be a number between {low:g} and {high:g}, got {repr(value)[:60]}"
-        )
+    if not (path.exists() or owner(path)):
+        raise UserError(f"{path}: no such file; `dvc repro` writes those of data/theta/{band}/")
+    content = read_json(path, ThetaFile)
+    if content.band != band:
+        raise NotMade(path, f'band: must be "{band}", got "{content.band[:60]}"')
+    return content.model_dump(exclude_unset=True)
 
 
 def load_samples(path: Path) -> np.ndarray | None:
@@ -74,25 +87,14 @@ def load_samples(path: Path) -> np.ndarray | None:
 
     Raises NotMade where the file is damaged.
     """
-    if not path.is_file():
-        return None
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        if content["samples"] == []:
-            return None
-        samples = np.array(content["samples"], float)
-        known = content["names"] in (list(THETA), [*THETA, "air_drag"])
-        if not known or samples.ndim != 2 or samples.shape[1] != len(content["names"]):
-            raise ValueError
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise NotMade(path, "damaged") from error
-    return samples
+    samples = read_json(path, PosteriorFile).samples if path.is_file() else []
+    return np.array(samples, float) if samples else None
 
 
 def law_discrepancy(content: dict) -> float:
     """Share of a landing by which the law errs, as a θ file says it; 0 where it says nothing."""
-    known = content.get("confidence") or {}
-    return float(known.get("discrepancy", {}).get("landing", 0.0))
+    known = (content.get("confidence") or {}).get("discrepancy") or {}
+    return float(known.get("landing", 0.0))
 
 
 def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Sling:

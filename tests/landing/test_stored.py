@@ -12,6 +12,11 @@ from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from tests.policy.linear import write_policy
 
 TARGETS = np.array([1.5, 1.9])
+ERRORS = {"mean_error_m": 0.004, "max_error_m": None}
+CARD = {
+    "training": {**ERRORS, "converged": True},
+    "landing_map": dict.fromkeys(("box", "target_range"), {**ERRORS, "draws": 9}),
+}
 
 
 def stored(root, method: str = "none") -> Stored:
@@ -20,7 +25,7 @@ def stored(root, method: str = "none") -> Stored:
 
 def write(one: Stored, kind: str, draw: tuple[float, float]) -> None:
     write_policy(one.folder(kind) / "policy.onnx", (0, 0), draw)
-    write_json(one.folder(kind) / "card.json", {"kind": kind})
+    write_json(one.folder(kind) / "card.json", CARD | {"kind": kind})
 
 
 def refusal(read, *given) -> str:
@@ -38,7 +43,9 @@ def test_each_policy_has_its_own_draws_and_card(tmp_path) -> None:
     assert one.kinds() == [PLAIN, ROBUST]
     np.testing.assert_allclose(one.draws(TARGETS), [[-0.3, -0.1]] * 2)
     np.testing.assert_allclose(one.draws(TARGETS, ROBUST), [[-0.4, -0.2]] * 2)
-    assert [one.card(kind) for kind in one.kinds()] == [{"kind": PLAIN}, {"kind": ROBUST}]
+    assert [one.card(kind) for kind in one.kinds()] == [
+        CARD | {"kind": kind} for kind in one.kinds()
+    ]
 
 
 def test_a_damaged_policy_is_one_line(tmp_path) -> None:
@@ -51,7 +58,9 @@ def test_a_damaged_policy_is_one_line(tmp_path) -> None:
         assert refusal(one.draws, TARGETS) == f"{file}: damaged"
     for damaged in (b"{", b"\xff"):
         card.write_bytes(damaged)
-        assert refusal(one.card) == f"{card}: damaged"
+        assert refusal(one.card).startswith(f"{card}: cannot be read as JSON (")
+    write_json(card, CARD | {"training": {}})
+    assert refusal(one.card) == f"{card}: training.converged: is missing"
 
 
 def test_a_missing_policy_says_what_it_hangs_on(tmp_path) -> None:

@@ -65,7 +65,7 @@ def test_a_floor_is_read_or_refused_by_its_name(tmp_path, params) -> None:
     assert load_floor(path)["targets"]["1.725"]["mean_error_m"] is None
     for broken in ("", "[]", "{}", json.dumps(content | {"targets": {"1.725": {}}})):
         path.write_text(broken)
-        with pytest.raises(UserError, match="band1.json: damaged"):
+        with pytest.raises(UserError, match="band1.json: "):
             load_floor(path)
 
 

@@ -81,7 +81,8 @@ def test_covariance_is_positive_definite_whatever_the_neighbours() -> None:
 def test_regions_survive_the_file(tmp_path) -> None:
     region = Region(np.full(5, 0.1), np.eye(5) / 3, 1.25, [3, 1])
     save_regions(tmp_path / "a.json", NAMES, [region], 5)
-    (loaded,) = load_regions(tmp_path / "a.json")
+    (loaded,), names = load_regions(tmp_path / "a.json")
+    assert names == list(NAMES)
     np.testing.assert_array_equal(loaded.mu, region.mu)
     np.testing.assert_array_equal(loaded.sigma, region.sigma)
     assert (loaded.loss, loaded.members) == (1.25, [3, 1])

@@ -58,15 +58,9 @@ def episode() -> Episode:
         release_time=4.8,
         camera=np.array([0.8, 0.3, 0.5]),
     )
-    truth = Sling.of(
-        BAND,
-        PARAMS.setup,
-        PARAMS.sling,
-        {
-            "clamp_direction": [np.sin(ANGLE), 0.0, -np.cos(ANGLE)],
-            "flexural_rigidity": RIGIDITY * SOLID,
-        },
-    )
+    clamps = {"clamp_direction": [np.sin(ANGLE), 0.0, -np.cos(ANGLE)]}
+    clamps["flexural_rigidity"] = RIGIDITY * SOLID
+    truth = Sling.of(BAND, PARAMS.setup, PARAMS.sling, clamps)
     rollouts = interact(truth, empty, THETA)
     rng = np.random.default_rng(0)
     grid, force = uniform(rollouts.times, rollouts.force[0], 1000.0)

@@ -73,27 +73,17 @@ def test_priors_of_the_space_are_in_the_total() -> None:
     np.testing.assert_array_equal(with_prior.terms["geom"], found.terms["geom"])
 
 
-def test_the_number_of_workers_changes_nothing() -> None:
-    unit = np.random.default_rng(1).random((67, 2))
-    one, three = evaluator(1)(unit), evaluator(3)(unit)
-    np.testing.assert_array_equal(one.total, three.total)
-    assert one.failure == three.failure
-    for name in TERMS:
-        np.testing.assert_array_equal(one.terms[name], three.terms[name])
-
-
-@pytest.mark.parametrize(("devices", "count"), [(2, 67), (2, 17), (3, 2), (3, 1)])
-def test_nor_does_the_number_of_devices(devices: int, count: int) -> None:
+def test_the_number_of_workers_and_devices_changes_nothing() -> None:
     """Rows in their order, failures too; some devices may find nothing to do."""
-    unit = np.random.default_rng(1).random((count, 2))
-    one, several = evaluator()(unit), evaluator(devices=["cpu"] * devices)(unit)
-    np.testing.assert_array_equal(one.theta, several.theta)
-    np.testing.assert_array_equal(one.total, several.total)
-    assert one.failure == several.failure
-    for name in TERMS:
-        np.testing.assert_array_equal(one.terms[name], several.terms[name])
-    if count == 67:
-        assert 0 < sum(reason is not None for reason in one.failure) < count
+    for count, workers, devices in ((67, 3, 1), (67, 1, 2), (17, 1, 2), (2, 1, 3), (1, 1, 3)):
+        unit = np.random.default_rng(1).random((count, 2))
+        one, several = evaluator()(unit), evaluator(workers, devices=["cpu"] * devices)(unit)
+        np.testing.assert_array_equal(one.theta, several.theta)
+        np.testing.assert_array_equal(one.total, several.total)
+        assert one.failure == several.failure
+        for name in TERMS:
+            np.testing.assert_array_equal(one.terms[name], several.terms[name])
+        assert count < 67 or 0 < sum(reason is not None for reason in one.failure) < count
 
 
 def test_devices_share_a_batch_evenly_and_at_once() -> None:
@@ -120,12 +110,8 @@ def test_what_a_device_raises_is_raised() -> None:
 def test_nor_does_either_where_nuisances_are_searched() -> None:
     """Those of the simulator and those of the loss, in the real ones."""
     sling, recorded = recorded_yardstick(PARAMS)
-    bounds = {
-        "air_drag": (0.0, 8.0),
-        "camera_delay": (-0.003, 0.003),
-        "force_delay": (0.0, 0.004),
-        "cloud_shift_z": (-0.01, 0.01),
-    }
+    bounds = {"air_drag": (0.0, 8.0), "camera_delay": (-0.003, 0.003)}
+    bounds |= {"force_delay": (0.0, 0.004), "cloud_shift_z": (-0.01, 0.01)}
     about = PARAMS.methods["sling2sim2real_taut"].model_copy(update={"nuisances": bounds})
     params = PARAMS.model_copy(update={"methods": {"toy": about}})
     space = Space.of_method(params, "toy")
@@ -161,8 +147,8 @@ def test_a_failure_counts_twice_the_worst_so_far() -> None:
     assert np.isfinite(Penalty()(np.array([np.inf]))).all()
 
 
-@pytest.mark.parametrize(("band", "method"), [("no", "yes"), ("yes", "no")])
-def test_an_unknown_band_or_method_is_refused(band: str, method: str) -> None:
+def test_an_unknown_band_or_method_is_refused() -> None:
     params = SimpleNamespace(bands={"yes": None}, methods={"yes": None})
-    with pytest.raises(UserError, match=r"params.yaml has no (bands|methods)\.no"):
-        session.evaluator(params, band, method)
+    for band, method in (("no", "yes"), ("yes", "no")):
+        with pytest.raises(UserError, match=r"params.yaml has no (bands|methods)\.no"):
+            session.evaluator(params, band, method)

@@ -49,32 +49,31 @@ def test_all_solvers_ask_as_one_batch_and_learn_their_own_losses() -> None:
             solver.tell(rosenbrock(part))
 
 
+def searched(regions: list[Region], evaluate: Evaluate, rollouts: int, population: int) -> History:
+    history = History("toy", evaluate.space.names)
+    search(Multistart(regions, population=population, seed=1), evaluate, history, rollouts=rollouts)
+    return history
+
+
 def test_the_bottom_of_rosenbrocks_valley_is_found() -> None:
-    history = History("toy", NAMES)
-    several = Multistart(balls(0.5, 0.2), population=10, seed=1)
-    search(several, Evaluate(rosenbrock, NAMES), history, rollouts=3000)
-    assert history.best()["total"] < 1e-8
-    np.testing.assert_allclose([history.best()[f"unit_{name}"] for name in NAMES], 0.75, atol=1e-4)
+    best = searched(balls(0.5, 0.2), Evaluate(rosenbrock, NAMES), 3000, population=10).best()
+    assert best["total"] < 1e-8
+    np.testing.assert_allclose([best[f"unit_{name}"] for name in NAMES], 0.75, atol=1e-4)
 
 
-@pytest.mark.parametrize("rollouts", [1, 15, 16, 17, 100])
-def test_the_budget_is_spent_whatever_the_number_of_solvers(rollouts: int) -> None:
-    history = History("toy", NAMES)
-    several = Multistart(balls(0.3, 0.7), population=8, seed=1)
-    search(several, Evaluate(rosenbrock, NAMES), history, rollouts=rollouts)
-    owner = np.tile(np.repeat([0, 1], 8), 7)[:rollouts]
-    assert history.table["solver"].to_pylist() == owner.tolist()
-    generation = history.table["generation"].to_pylist()
-    assert generation == [row // 16 for row in range(rollouts)]
+def test_the_budget_is_spent_whatever_the_number_of_solvers() -> None:
+    for rollouts in (1, 15, 16, 17, 100):
+        table = searched(balls(0.3, 0.7), Evaluate(rosenbrock, NAMES), rollouts, population=8).table
+        owner = np.tile(np.repeat([0, 1], 8), 7)[:rollouts]
+        assert table["solver"].to_pylist() == owner.tolist()
+        assert table["generation"].to_pylist() == [row // 16 for row in range(rollouts)]
 
 
 def test_it_goes_on_where_nothing_is_left_to_gain() -> None:
     """After convergence, and on a plain, CMA-ES asks on for points of the cube."""
     for matrix in (correlated(), np.zeros((5, 5))):
-        history = History("toy", tuple("abcde"))
-        several = Multistart(balls(0.4, dimension=5), population=8, seed=1)
-        search(several, quadratic(CENTRE, matrix), history, rollouts=8000)
-        assert len(history.total) == 8000
+        evaluate, regions = quadratic(CENTRE, matrix), balls(0.4, dimension=5)
+        assert len(searched(regions, evaluate, 8000, population=8).total) == 8000
 
 
 def test_numpys_generator_and_the_folder_are_left_alone(
@@ -83,8 +82,6 @@ def test_numpys_generator_and_the_folder_are_left_alone(
     monkeypatch.chdir(tmp_path)
     np.random.seed(3)
     expected = np.random.RandomState(3).random()
-    history = History("toy", NAMES)
-    several = Multistart(balls(0.5), population=8, seed=0)
-    search(several, Evaluate(rosenbrock, NAMES), history, rollouts=80)
+    searched(balls(0.5), Evaluate(rosenbrock, NAMES), 80, population=8)
     assert np.random.random() == expected
     assert not os.listdir(tmp_path)

@@ -1,4 +1,4 @@
-"""Distances between clouds and tubes, against a slow twin and against shapes with known answers."""
+"""Distances between clouds and tubes, against a slow reference and shapes with known answers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ from tests.search.toy import LENGTH, RADIUS, facing, straight
 CAMERA = np.array([1.0, -0.8, 0.6])
 
 
-def twin(cloud: np.ndarray, line: np.ndarray, symmetric: bool) -> float:
+def chamfer_of(clouds, camera=CAMERA, **more) -> Chamfer:
+    return Chamfer(clouds, camera, radius=RADIUS, rest_length=LENGTH, **more)
+
+
+def reference(cloud: np.ndarray, line: np.ndarray, symmetric: bool) -> float:
     """One frame in float64, point by point as the docstring of chamfer.py says it."""
     line = line.astype(float)
     start, edge = line[:-1], np.diff(line, axis=0)
@@ -34,7 +38,7 @@ def twin(cloud: np.ndarray, line: np.ndarray, symmetric: bool) -> float:
 
 
 @pytest.mark.parametrize("symmetric", [True, False])
-def test_equals_the_twin(symmetric: bool) -> None:
+def test_equals_the_reference(symmetric: bool) -> None:
     rng = np.random.default_rng(1)
     sizes = [1, 15, 16, 17, 100, 33, 1000]
     lines = straight(len(sizes))[None] + rng.normal(0, 0.02, (3, len(sizes), 25, 3))
@@ -43,9 +47,9 @@ def test_equals_the_twin(symmetric: bool) -> None:
         (lines[0, k][rng.integers(0, 25, size)] + rng.normal(0, 0.01, (size, 3))).astype(np.float32)
         for k, size in enumerate(sizes)
     ]
-    chamfer = Chamfer(clouds, CAMERA, radius=RADIUS, rest_length=LENGTH, symmetric=symmetric)
+    chamfer = chamfer_of(clouds, symmetric=symmetric)
     expected = [
-        [twin(cloud, line[k], symmetric) for k, cloud in enumerate(clouds)] for line in lines
+        [reference(cloud, line[k], symmetric) for k, cloud in enumerate(clouds)] for line in lines
     ]
     np.testing.assert_allclose(chamfer(lines), expected, rtol=2e-5, atol=1e-7)
 
@@ -55,25 +59,20 @@ def test_a_stretched_band_is_thinner() -> None:
     line = 2 * straight(1)
     cloud = facing() * [2, 1, 1 / np.sqrt(2)]
     for height, expected in ((0.0, 0.0), (0.01, 0.01)):
-        chamfer = Chamfer(
-            [cloud + [0, 0, height]], CAMERA, radius=RADIUS, rest_length=LENGTH, symmetric=False
-        )
+        chamfer = chamfer_of([cloud + [0, 0, height]], symmetric=False)
         assert chamfer(line[None])[0, 0] == pytest.approx(expected, abs=1e-6)
 
 
 def test_only_the_side_that_the_camera_sees_counts() -> None:
     """The ridge that faces the camera has measured points; seen from below, it is 2 R away."""
     for side, expected in ((1, 0.0), (-1, 2 * RADIUS)):
-        chamfer = Chamfer(
-            [facing()], np.array([0, 0, side * 1e4]), radius=RADIUS, rest_length=LENGTH
-        )
+        chamfer = chamfer_of([facing()], np.array([0, 0, side * 1e4]))
         assert 2 * chamfer(straight(1)[None])[0, 0] == pytest.approx(expected, abs=1e-4)
 
 
 def test_an_empty_frame_is_nan_and_changes_no_other() -> None:
     def distances(clouds):
-        chamfer = Chamfer(clouds, CAMERA, radius=RADIUS, rest_length=LENGTH)
-        return chamfer(np.tile(straight(len(clouds)) + 0.01, (2, 1, 1, 1)))
+        return chamfer_of(clouds)(np.tile(straight(len(clouds)) + 0.01, (2, 1, 1, 1)))
 
     empty = np.zeros((0, 3), np.float32)
     frames = distances([empty, facing(), empty, facing(50)])
@@ -83,6 +82,6 @@ def test_an_empty_frame_is_nan_and_changes_no_other() -> None:
 
 
 def test_a_wrong_number_of_frames_is_refused() -> None:
-    chamfer = Chamfer([facing()], CAMERA, radius=RADIUS, rest_length=LENGTH)
+    chamfer = chamfer_of([facing()])
     with pytest.raises(ValueError, match="2 simulated frames, 1 measured"):
         chamfer(straight(2)[None])

@@ -29,25 +29,16 @@ def recoil(y, release: float = 1.0, step: float = 0.02) -> dict:
     }
 
 
-def test_a_perfect_simulation_costs_nothing() -> None:
+def test_a_perfect_simulation_costs_nothing_and_one_unit_reads_one() -> None:
+    """1 cm away from the camera, by both directions; 1 N in any direction, work along v."""
     episode = toy.episode()
     terms = loss_of(episode).terms(toy.rollouts(episode, count=3))
     for name in ("geom", "force", "work"):
         np.testing.assert_allclose(terms[name], np.zeros(3), atol=1e-2)
-
-
-@pytest.mark.parametrize("symmetric", [True, False])
-def test_one_centimetre_reads_one(symmetric: bool) -> None:
-    """Shifted by 1 cm away from the camera, both directions are 1 cm apart."""
-    episode = toy.episode()
     lines = toy.rollouts(episode, shift=(0, 0, -0.01))
-    terms = loss_of(episode, symmetric=symmetric).terms(lines)
-    assert terms["geom"][0] == pytest.approx(1.0, abs=0.01)
-
-
-def test_one_newton_reads_one() -> None:
-    """In any direction, at irregular steps, through filter and median; work counts along v."""
-    episode = toy.episode()
+    for symmetric in (True, False):
+        terms = loss_of(episode, symmetric=symmetric).terms(lines)
+        assert terms["geom"][0] == pytest.approx(1.0, abs=0.01)
     for force in ((1, 0, 0), (0, -1, 0), (0.6, 0, 0.8)):
         terms = loss_of(episode).terms(toy.rollouts(episode, force=force))
         assert terms["force"][0] == pytest.approx(1.0, abs=1e-9)
@@ -76,8 +67,7 @@ def test_a_simulated_force_goes_the_way_of_a_recorded_one() -> None:
     simulated = toy.rollouts(episode)
     simulated.times, simulated.force = times, raw[None]
     terms = loss_of(episode).terms(simulated)
-    assert terms["force"][0] < 1e-9
-    assert terms["work"][0] < 1e-9
+    assert max(terms["force"][0], terms["work"][0]) < 1e-9
     # The unfiltered force is something else: the filter is not left out on both sides.
     unfiltered = average(times, raw, 0.0, toy.PERIOD, 100)
     other = loss_of(toy.episode(samples=100, force=unfiltered), median_window=1).terms(simulated)
@@ -142,9 +132,7 @@ def test_a_broken_rollout_breaks_no_other() -> None:
     pair.force[1], pair.center_line[1] = np.nan, np.nan
     loss = loss_of(episode)
     terms = loss.terms(pair)
-    total = loss.total(terms)
-    assert np.isfinite(total[0])
-    assert not np.isfinite(total[1])
+    np.testing.assert_array_equal(np.isfinite(loss.total(terms)), [True, False])
 
 
 BLOCKS = np.array([[0.45, 0.75]])  # of the toy's pull, from 0.3 to 1.2 s
@@ -168,11 +156,10 @@ def test_a_held_out_block_counts_in_its_own_terms_alone() -> None:
     assert held["force"][0] == pytest.approx(4 * 0.8, rel=0.05)
     assert held["geom"][0] == pytest.approx(pictures.sum() / loss.held_frames.sum(), rel=0.01)
     assert loss.held_out_terms(late)["force"][0] < 1e-6
-    residuals = loss.residuals(off)
-    assert residuals["force"]["fitted"][0] < 1e-3
-    assert residuals["cloud"]["fitted"][0] < 0.01
-    assert residuals["force"]["held_out"][0] == held["force"][0]
-    assert residuals["cloud"]["held_out"][0] == held["geom"][0]
+    for name, term, least in (("force", "force", 1e-3), ("cloud", "geom", 0.01)):
+        residuals = loss.residuals(off)[name]
+        assert residuals["fitted"][0] < least
+        assert residuals["held_out"][0] == held[term][0]
 
 
 def test_samples_and_frames_are_fitted_or_held_out_and_samples_may_be_guards() -> None:

@@ -66,7 +66,7 @@ def test_other_params_of_the_terms_start_over(evaluators: list[Evaluate]) -> Non
 
 
 def test_another_number_of_gpus_does_not(evaluators: list[Evaluate], monkeypatch) -> None:
-    """But a GPU instead of the CPU does: it rounds differently."""
+    """A GPU instead of the CPU does: it rounds differently."""
     monkeypatch.setattr(machine, "gpus", lambda: ("cuda:0", "cuda:1"))
     for device in ("cpu", "cuda:0", "cuda", "cuda:1,cuda:0"):
         monkeypatch.setenv("SLING_DEVICE", device)

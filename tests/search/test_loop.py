@@ -166,25 +166,24 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path) -> None:
 
 
 def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
-    explored, refined, _ = chain(quadratic(CENTRE, VALLEY))
-    explored.save(tmp_path / "a.parquet")
-    refined.save(tmp_path / "b.parquet")
-    for order, phase in (("ab", "cma"), ("aa", "de")):
-        history = History.load("toy", NAMES, *(tmp_path / f"{name}.parquet" for name in order))
-        content = theta_content(history, "band1")
-        best = np.argmin(history.total)
-        assert content["loss"]["total"] == history.total[best]
-        np.testing.assert_array_equal(list(content["theta"].values()), 10 * history.unit[best])
+    """Nuisances, which are axes of no other name, stand beside it."""
+    paths = tmp_path / "a.parquet", tmp_path / "b.parquet"
+    for path, history in zip(paths, chain(quadratic(CENTRE, VALLEY))[:2], strict=True):
+        history.save(path)
+    for files, phase, names in (
+        (paths, "cma", NAMES),
+        (paths[:1] * 2, "de", NAMES),
+        (paths, "cma", NAMES[:3]),
+    ):
+        history = History.load("toy", names, *files)
+        content, best = theta_content(history, "band1"), history.best()
+        assert best["total"] == content["loss"]["total"] == history.total.min()
+        assert content["theta"] == {name: best[name] for name in names}
+        assert content["nuisances"] == {name: best[name] for name in NAMES[len(names) :]}
+        np.testing.assert_array_equal(
+            list(content["theta"].values()), 10 * history.unit[np.argmin(history.total)]
+        )
         assert content["rollouts"] == len(history.total)
         assert (content["band"], content["method"]) == ("band1", "toy")
         assert content["found"]["phase"] == phase
         assert content["confidence"] is None
-
-
-def test_nuisances_stand_beside_theta(tmp_path: Path) -> None:
-    explored = alone("de", quadratic(CENTRE, np.eye(5)), 60)
-    explored.save(tmp_path / "a.parquet")
-    content = theta_content(History.load("toy", NAMES[:3], tmp_path / "a.parquet"), "band1")
-    assert list(content["theta"]) == ["a", "b", "c"]
-    assert list(content["nuisances"]) == ["d", "e"]
-    assert content["nuisances"]["d"] == explored.best()["d"]

@@ -64,17 +64,16 @@ def landings(trials: pd.DataFrame, styles: Styles, near: list[str]) -> plt.Figur
         ("beyond it", mark(**dot, ms=5, color="0.4", mfc="none")),
         (f"± {100 * FAIR:g} %", patch("0.9")),
     ]
-    if "predicted_low" in trials and trials.predicted_low.notna().any():
+    if trials.predicted_low.notna().any():
         entries.append((f"{LEVEL} % interval", mark(color="0.4", lw=1)))
     key(figure, entries, 4)
     return figure
 
 
 def _with_intervals(ax: plt.Axes, trials: pd.DataFrame, color: str, face: str) -> None:
-    if "predicted_low" in trials:
-        for one in trials[trials.predicted_low.notna()].itertuples():
-            ends = [one.predicted_low, one.predicted_high]
-            ax.plot([one.landing_y] * 2, ends, color=color, lw=1, alpha=0.5)
+    for one in trials[trials.predicted_low.notna()].itertuples():
+        ends = [one.predicted_low, one.predicted_high]
+        ax.plot([one.landing_y] * 2, ends, color=color, lw=1, alpha=0.5)
     ax.scatter(
         trials.landing_y, trials.predicted_y, s=20, facecolors=face, edgecolors=color, alpha=0.8
     )

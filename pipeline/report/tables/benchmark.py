@@ -56,10 +56,7 @@ def benchmark(results: Results, floors: dict[str, dict]) -> list[Row]:
 def ablation(results: Results, methods: tuple[str, ...]) -> list[Row]:
     """Tables 3 and 4: the paper's rows, on its Band 1 and wherever one of them ran."""
     bands = [band for band, ran in results.methods.items() if APART & {*methods} & {*ran}]
-    rows = []
-    for band in dict.fromkeys(["band1", *bands]):
-        rows += _rows(results, band, methods)
-    return rows
+    return [r for band in dict.fromkeys(["band1", *bands]) for r in _rows(results, band, methods)]
 
 
 def _rows(results: Results, band: str, methods: Iterable[str]) -> list[Row]:

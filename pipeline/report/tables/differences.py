@@ -57,18 +57,11 @@ def _aimed(trials: pd.DataFrame, kind: str) -> pd.DataFrame:
 
 def as_table(rows: list[Compared], styles: Styles) -> Table:
     """Differences in cm with their intervals; bold where the interval leaves out zero."""
-    heads = ["band", "method", "launches"]
-    heads += [f"beside {styles[one].name}" for one in REFERENCES if one in styles]
-    lines = [
-        [
-            band_name(band),
-            styles[method].name,
-            kind,
-            *(shown(found[one]) if one in found else NONE for one in REFERENCES if one in styles),
-        ]
-        for band, method, kind, found in rows
-    ]
-    return heads, lines
+    beside, lines = [one for one in REFERENCES if one in styles], []
+    for band, method, kind, found in rows:
+        cells = (shown(found[one]) if one in found else NONE for one in beside)
+        lines.append([band_name(band), styles[method].name, kind, *cells])
+    return ["band", "method", "launches", *(f"beside {styles[m].name}" for m in beside)], lines
 
 
 def shown(one: Difference | None) -> str:
@@ -94,14 +87,12 @@ def claims(rows: list[Compared], styles: Styles) -> list[str]:
             parts = said.setdefault((band, kind, reference), {})
             few = f" ({one.launches[1]} launches count)" if one and one.left_out else ""
             parts.setdefault(_verdict(one), []).append(styles[method].name + few)
-    return [
-        f"- {band_name(band)}, {kind}, beside **{styles[reference].name}**: "
-        + "; ".join(
-            f"{verdict}: {' · '.join(parts[verdict])}" for verdict in VERDICTS if verdict in parts
-        )
-        + "."
-        for (band, kind, reference), parts in said.items()
-    ]
+    lines = []
+    for (band, kind, reference), parts in said.items():
+        words = [f"{one}: {' · '.join(parts[one])}" for one in VERDICTS if one in parts]
+        beside = f"{band_name(band)}, {kind}, beside **{styles[reference].name}**"
+        lines.append(f"- {beside}: {'; '.join(words)}.")
+    return lines
 
 
 def _verdict(one: Difference | None) -> str:
@@ -143,21 +134,13 @@ def robust(results: Results, styles: Styles, seed: int) -> Table | None:
     """Robust policies beside the plain ones of the same method; None where there is none."""
     rows = []
     for result in results:
-        second = _aimed(result.robust_trials, "virtual")
-        first = _aimed(result.trials, "virtual")
-        if second.empty:
+        pair = [_aimed(trials, "virtual") for trials in (result.trials, result.robust_trials)]
+        if pair[1].empty:
             continue
-        errors = [landing_errors(trials)["all"] for trials in (first, second)]
-        rows.append(
-            [
-                band_name(result.band),
-                styles[result.method].name,
-                "virtual",
-                *(spread(one) for one in errors),
-                *(number(100 * _scatter(trials), ".2f") for trials in (first, second)),
-                shown(difference(first, second, seed)),
-            ]
-        )
+        names = band_name(result.band), styles[result.method].name, "virtual"
+        errors = (spread(landing_errors(trials)["all"]) for trials in pair)
+        scatter = (number(100 * _scatter(trials), ".2f") for trials in pair)
+        rows.append([*names, *errors, *scatter, shown(difference(*pair, seed))])
     heads = ["band", "method", "launches", "plain", "robust", "scatter, plain", "scatter, robust"]
     return ([*heads, "robust less plain"], rows) if rows else None
 

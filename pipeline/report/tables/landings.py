@@ -54,7 +54,7 @@ def pooled_std(parts: Iterable[dict]) -> float:
 def predictions(trials: pd.DataFrame) -> Table:
     """Predicted beside measured landing, launch by launch, with the error in % of distance."""
     measured = bool(trials.landing_y.notna().any() or trials.failure.notna().any())
-    ranged = intervals(trials) is not None
+    ranged = trials.predicted_low.notna().any()
     heads = ["draw y, z [m]", "stretch", "hold force, predicted [N]", "predicted [m]"]
     heads += ["90 % interval"] if ranged else []
     heads += ["measured [m]", "error"] if measured else ["target [m]"]
@@ -110,7 +110,7 @@ def intervals(trials: pd.DataFrame) -> dict[str, dict] | None:
     and the median `width` of the intervals as a share of the landing. None where no launch has an
     interval.
     """
-    if not {"predicted_low", "predicted_high"} <= set(trials) or trials.predicted_low.isna().all():
+    if trials.predicted_low.isna().all():
         return None
     both = trials.predicted_low.notna() & trials.landing_y.notna()
     covered = trials.landing_y.between(trials.predicted_low, trials.predicted_high)
@@ -134,15 +134,12 @@ def prediction_summary(results: Results, band: str, kind: str, styles: Styles) -
         if trials.empty:
             continue
         parts, ranges = prediction_error(trials), intervals(trials) or {}
-        rows.append(
-            [
-                styles[method].name,
-                *(_share(parts[name]) for name in ("inside", "beyond", "all")),
-                number(100 * parts["all"]["bias"], "+.1f"),
-                f"{parts['all']['unpredicted']} of {parts['all']['tried']}",
-                *(_coverage(ranges.get(name)) for name in ("inside", "beyond")),
-            ]
-        )
+        everything = parts["all"]
+        shares = (_share(parts[name]) for name in ("inside", "beyond", "all"))
+        bias = number(100 * everything["bias"], "+.1f")
+        unpredicted = f"{everything['unpredicted']} of {everything['tried']}"
+        covered = (_coverage(ranges.get(name)) for name in ("inside", "beyond"))
+        rows.append([styles[method].name, *shares, bias, unpredicted, *covered])
     heads = ["method", "inside the recorded stretch", "beyond it", "all launches", "bias [%]"]
     heads += ["not predicted", "in the 90 % interval, inside", "beyond"]
     return (heads, rows) if rows else None

@@ -20,34 +20,18 @@ def aims(named: dict[str, tuple[LandingMap, np.ndarray]], targets: np.ndarray) -
     rows = []
     for name, (landing_map, draws) in named.items():
         landed = landing_map(draws)
-        reasons = (landing_map.reasons[code] for code in landed.failure)
-        rows += [
-            [
-                name,
-                f"{target:.3f}",
-                f"{y:.4f}, {z:.4f}",
-                number(landing, ".3f", reason),
-                number(force, ".1f"),
-            ]
-            for target, (y, z), landing, force, reason in zip(
-                targets, draws, landed.landing_y, landed.hold_force, reasons, strict=True
-            )
-        ]
+        answers = zip(landed.landing_y, landed.hold_force, landed.failure, strict=True)
+        for target, (y, z), (landing, force, code) in zip(targets, draws, answers, strict=True):
+            predicted = number(landing, ".3f", landing_map.reasons[code])
+            drawn = f"{target:.3f}", f"{y:.4f}, {z:.4f}"
+            rows.append([name, *drawn, predicted, number(force, ".1f")])
     return ["policy", "target [m]", "draw y, z [m]", "predicted [m]", "hold force [N]"], rows
 
 
 def policies(results: Results, styles: Styles) -> Table:
     """How each policy converged in its own simulator, and how well its map interpolates."""
-    heads = [
-        "band",
-        "method",
-        "policy",
-        "converged",
-        "mean error [cm]",
-        "largest",
-        "failed targets",
-    ]
-    heads += ["map error", "largest", "expected [cm]"]
+    heads = ["band", "method", "policy", "converged", "mean error [cm]", "largest"]
+    heads += ["failed targets", "map error", "largest", "expected [cm]"]
     rows = []
     for one in results:
         for name, card in ((PLAIN, one.card), (ROBUST, one.robust_card)):

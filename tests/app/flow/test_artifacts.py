@@ -13,9 +13,9 @@ from PIL import Image
 from app.flow.artifacts import artifact
 from app.flow.graph import Stage
 from pipeline.base.files import write_text
-from tests.report.conftest import BAND, METHOD, root
+from tests.report.conftest import BAND, METHOD, root, template
 
-__all__ = ["root"]  # a fixture
+__all__ = ["root", "template"]  # fixtures
 
 
 def shown(root, step: str, item: str = f"{BAND}-{METHOD}") -> str:

@@ -29,7 +29,7 @@ def test_every_method_has_a_row_and_two_have_intervals(kept) -> None:
 
 
 def test_launches_without_intervals_are_drawn_too(kept) -> None:
-    trials = launches().drop(columns=["predicted_low", "predicted_high"])
+    trials = launches().assign(predicted_low=np.nan, predicted_high=np.nan)
     policy.landings("", trials, styles([METHOD]), [METHOD])
     assert "90 % interval" not in [text.get_text() for text in kept[0].legends[0].get_texts()]
 

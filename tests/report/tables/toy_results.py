@@ -28,6 +28,8 @@ def launches(
             "target": target,
             "trial": np.tile(np.arange(1, errors.shape[1] + 1), len(targets)),
             "predicted_y": target,
+            "predicted_low": np.nan,
+            "predicted_high": np.nan,
             "landing_y": landing,
             "failure": np.where(np.isnan(landing), "too far", None),
             "stretch": 1.4,

@@ -13,6 +13,7 @@ from ruamel.yaml import YAML
 from pipeline.base.errors import UserError
 from tests.report.conftest import BAND, METHOD
 from tests.report.conftest import root as root  # noqa: PLC0414
+from tests.report.conftest import template as template  # noqa: PLC0414
 
 HEAD = "draw_y_m,draw_z_m,landing_y_m,target_m,method"
 

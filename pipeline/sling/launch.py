@@ -107,16 +107,12 @@ def _outcomes(sling: Sling, lanes: np.ndarray, max_force: float) -> Launches:
     time, y, z, vy, vz = lanes["separation"].T
     landing = ballistic_landing(y, z, vy, vz, -sling.fork_height)
 
-    def reason(i: int) -> str | None:
-        if not np.isfinite(hold_force[i]):
-            return "the simulation did not converge"
-        if hold_force[i] > max_force:
-            return f"holding takes {hold_force[i]:.1f} N, more than {max_force:g} N"
-        if outcome[i] != Outcome.SEPARATED:
-            return "the projectile never left the pouch"
-        return None if landing[i] > 0 else "the projectile fell short of the fork"
-
-    failure = [reason(i) for i in range(len(lanes))]
+    failure = np.full(len(lanes), None, object)
+    failure[~(landing > 0)] = "the projectile fell short of the fork"
+    failure[outcome != Outcome.SEPARATED] = "the projectile never left the pouch"
+    for i in np.flatnonzero(hold_force > max_force):
+        failure[i] = f"holding takes {hold_force[i]:.1f} N, more than {max_force:g} N"
+    failure[~np.isfinite(hold_force)] = "the simulation did not converge"
     good = np.array([reason is None for reason in failure])
 
     def known(values: np.ndarray) -> np.ndarray:
@@ -130,5 +126,5 @@ def _outcomes(sling: Sling, lanes: np.ndarray, max_force: float) -> Launches:
         separation_time=known(time),
         separation_y=known(y),
         separation_z=known(z),
-        failure=failure,
+        failure=failure.tolist(),
     )

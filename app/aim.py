@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TypedDict
 
 import numpy as np
 
@@ -15,6 +16,23 @@ from pipeline.sling.theta import law_discrepancy, load_samples, load_theta
 from stages.start import unmounted
 
 
+class Answer(TypedDict):
+    """Where to draw; the keys are those of `sling aim --json`.
+
+    The interval holds 90 % of the landings that samples of θ (data/confidence), the law's own error
+    as the recording shows it, and an error of `trials.actuation_error` in the drawn position give.
+    Landing and interval are None where the launch fails.
+    """
+
+    draw_y_m: float
+    draw_z_m: float
+    predicted_landing_m: float | None
+    interval_90_m: list[float] | None
+    hold_force_n: float | None
+    max_force_n: float  # the arm's limit
+    warnings: list[str]
+
+
 def aim(
     params,
     band: str,
@@ -23,7 +41,7 @@ def aim(
     root: str | Path = ".",
     launcher=None,
     robust: bool = False,
-) -> dict:
+) -> Answer:
     """Where to draw `band` so that the projectile lands at `target` [m].
 
     Args:
@@ -31,13 +49,6 @@ def aim(
         robust: By the policy that was trained over what the identification leaves open.
         launcher: Simulates draws, shape (N, 2) [m], and with a second argument those of other θ,
             as `simulator` does; the calibrated simulator by default.
-
-    Returns:
-        draw_y_m, draw_z_m, predicted_landing_m, interval_90_m, hold_force_n, max_force_n (the
-        arm's limit), warnings. The interval holds 90 % of the landings that samples of θ
-        (data/confidence), the law's own error as the recording shows it, and an error of
-        `trials.actuation_error` in the drawn position give. Landing and interval are None where
-        the launch fails.
 
     Raises:
         UserError: Unknown band or method, or a file that is missing.

@@ -13,20 +13,24 @@ from pathlib import Path
 
 import numpy as np
 
+from app.aim import Answer
 from app.plan.hand import along_pull, quaternion
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.recording.input.frames import Transform
 
 
-def posed(answer: dict, params, band: str, root: str | Path = ".") -> dict:
-    """The answer of `aim` with the hand's pose for its draw.
+class PosedAnswer(Answer):
+    """With the hand's pose for the draw: None, with a warning, where the fork is unknown."""
 
-    Returns:
-        The answer, and before its warnings: pitch_rad of the launch above the horizon; tcp_frame,
-        tcp_position_m and tcp_quaternion_xyzw of the tool centre point in the robot's base. These
-        are None, with a warning, where nothing says where the fork stands in the base.
-    """
+    pitch_rad: float  # of the launch, above the horizon
+    tcp_frame: str | None  # the robot's base
+    tcp_position_m: list[float] | None  # of the tool centre point, there
+    tcp_quaternion_xyzw: list[float] | None
+
+
+def posed(answer: Answer, params, band: str, root: str | Path = ".") -> PosedAnswer:
+    """The answer of `aim` with the hand's pose for its draw, before its warnings."""
     drawn = np.array([0.0, answer["draw_y_m"], answer["draw_z_m"]])
     warnings, frame, position, turn = list(answer["warnings"]), None, None, None
     try:

@@ -19,7 +19,7 @@ import numpy as np
 from pipeline.base.layout import Layout
 from pipeline.base.machine import devices, kind
 from pipeline.base.progress import Progress
-from pipeline.landing.landing_map import LandingMap, landscape_of, validation
+from pipeline.landing.landing_map import LandingMap, surface_of, validation
 from pipeline.landing.simulator import simulator
 from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.policy import robust
@@ -47,7 +47,7 @@ def main() -> None:
     )
     kept = Path(".checkpoints/policy", f"{band}-{method}.pt")
     told = Progress(f"policy-{band}-{method}", params.policy.iterations, "iterations", every=EVERY)
-    plain = train(landscape_of([landing_map]), params.policy, kept, told)
+    plain = train(surface_of([landing_map]), params.policy, kept, told)
     checked = check(plain.policy, launcher, params)
     training = figures(plain, checked)
 
@@ -76,7 +76,7 @@ def _robust(folder: Path, plain: Policy, samples: np.ndarray, launcher, about) -
     maps = robust.robust_maps(launcher, samples, middle, params)
     title = f"policy-{about['band']}-{about['method']}-robust"
     told = Progress(title, robust.STEPS, "steps", every=EVERY)
-    trained = robust.refine(plain, landscape_of(maps, error), params.policy, told)
+    trained = robust.refine(plain, surface_of(maps, error), params.policy, told)
     checked = check(trained.policy, launcher, params)
     expected = [check_expected(one, launcher, samples, params) for one in (trained.policy, plain)]
     training = robust_figures(trained, checked, *expected, len(maps), error)

@@ -1,8 +1,8 @@
 """Landing map: launches over a grid of draws, simulated in one batch, for one θ.
 
 For a fixed θ the landing depends on the draw (y, z) alone, and smoothly. So a grid of launches is
-simulated once, and cubic splines read between them (landscape.py): training then asks for a million
-launches in seconds, and the error of reading between is itself measured on random draws.
+simulated once, and cubic splines read between them (response_surface.py): training then asks for a
+million launches in seconds, and the error of reading between is itself measured on random draws.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.base.files import replacing
-from pipeline.landing.response_surface import NO_FAILURE, Landings, Landscape
+from pipeline.landing.response_surface import NO_FAILURE, Landings, ResponseSurface
 
 # draws (N, 2) [m], and θ (N, P) or none -> object with landing_y (N,) [m], hold_force (N,) [N],
 # failure list[str | None]; without a force limit of its own
@@ -116,16 +116,16 @@ class LandingMap:
     @property
     def reasons(self) -> list[str]:
         """Names of the failure codes; code 0 is success."""
-        return self._landscape.reasons
+        return self._surface.reasons
 
     def __call__(self, draws: np.ndarray) -> Landings:
         """Landings of draws, shape (N, 2) [m], read off the splines: fields of shape (N,)."""
-        several = self._landscape(draws)
+        several = self._surface(draws)
         return Landings(*(getattr(several, one.name)[:, 0] for one in fields(Landings)))
 
     @cached_property
-    def _landscape(self) -> Landscape:
-        return landscape_of([self])
+    def _surface(self) -> ResponseSurface:
+        return surface_of([self])
 
     def validation(self, targets: tuple[float, float]) -> dict:
         """Interpolation error [m] on the random draws: over the box, and where targets lie."""
@@ -175,7 +175,7 @@ class LandingMap:
         )
 
 
-def landscape_of(maps: Sequence[LandingMap], error: float = 0.0) -> Landscape:
+def surface_of(maps: Sequence[LandingMap], error: float = 0.0) -> ResponseSurface:
     """What is read between the launches of maps that share grid and force limit, a θ each.
 
     Args:
@@ -183,7 +183,7 @@ def landscape_of(maps: Sequence[LandingMap], error: float = 0.0) -> Landscape:
     """
     names = ("landing_y", "hold_force", "failure")
     values = (np.stack([getattr(one, name) for one in maps], -1) for name in names)
-    return Landscape((maps[0].draw_y, maps[0].draw_z), *values, maps[0].max_force, error)
+    return ResponseSurface((maps[0].draw_y, maps[0].draw_z), *values, maps[0].max_force, error)
 
 
 def validation(maps: list[LandingMap], targets: tuple[float, float]) -> dict:

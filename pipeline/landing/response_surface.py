@@ -26,7 +26,7 @@ class Landings:
         landing_y: Landing on the floor [m], NaN where failed.
         spread: Standard deviation of it by the error of the draw [m].
         hold_force: Force that the hand holds before the release [N].
-        failure: Index into `Landscape.reasons`, 0 where the launch succeeds.
+        failure: Index into `ResponseSurface.reasons`, 0 where the launch succeeds.
     """
 
     landing_y: np.ndarray
@@ -35,7 +35,7 @@ class Landings:
     failure: np.ndarray
 
 
-class Landscape:
+class ResponseSurface:
     """Landings of draws under S θ.
 
     A draw is a failure, and not interpolated, where the interpolated holding force exceeds the

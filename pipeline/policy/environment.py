@@ -5,8 +5,9 @@
     reward             height * exp(-|y_p - g| / scale), or -penalty for a failed launch
 
 Every step ends the episode, so discounting plays no part. Observations are normalised to [-1, 1]
-over the range of targets. Where the landscape has several θ, or draws have an error, the reward is
-the expected one over both: its gradient is that of rewards of single launches, without their noise.
+over the range of targets. Where the response surface has several θ, or draws have an error, the
+reward is the expected one over both: its gradient is that of rewards of single launches, without
+their noise.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from pipeline.landing.response_surface import Landings, Landscape
+from pipeline.landing.response_surface import Landings, ResponseSurface
 from pipeline.policy.expected import closeness
 
 
@@ -35,7 +36,7 @@ class SlingshotEnv(VecEnv):
 
     def __init__(
         self,
-        landscape: Landscape,
+        surface: ResponseSurface,
         *,
         targets: tuple[float, float],
         num_envs: int,
@@ -48,7 +49,7 @@ class SlingshotEnv(VecEnv):
             targets: Range they are drawn from [m].
             reward: Its height, scale [m] and penalty (`policy.reward` of params.yaml).
         """
-        self.landscape = landscape
+        self.surface = surface
         self.targets = targets
         self.num_envs = num_envs
         self.reward = reward
@@ -57,7 +58,7 @@ class SlingshotEnv(VecEnv):
         self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long)
         self.failures: Counter[str] = Counter()
         self._random = torch.Generator().manual_seed(seed)
-        self._box = draw_box(landscape)
+        self._box = draw_box(surface)
         self._goal = self._new_goals()
 
     def get_observations(self) -> TensorDict:
@@ -71,11 +72,11 @@ class SlingshotEnv(VecEnv):
         center, half = self._box
         draws = center + half * torch.tanh(actions)
         goal = self._goal.double().numpy()
-        reward, launched = rewarded(self.landscape, draws.double().numpy(), goal, self.reward)
+        reward, launched = rewarded(self.surface, draws.double().numpy(), goal, self.reward)
         codes, counts = np.unique(launched.failure, return_counts=True)
         for code, count in zip(codes.tolist(), counts.tolist(), strict=True):
             if code:
-                self.failures[self.landscape.reasons[code]] += count
+                self.failures[self.surface.reasons[code]] += count
         self._goal = self._new_goals()
         # No "time_outs": they would bootstrap a value into a problem that has no next state.
         reward = torch.from_numpy(reward).float()
@@ -102,16 +103,16 @@ class SlingshotEnv(VecEnv):
 
 
 def rewarded(
-    landscape: Landscape, draws: np.ndarray, targets: np.ndarray, reward
+    surface: ResponseSurface, draws: np.ndarray, targets: np.ndarray, reward
 ) -> tuple[np.ndarray, Landings]:
     """Expected rewards, shape (N,), and landings of draws (N, 2) [m] for targets (N,) [m]."""
-    launched = landscape(draws)
+    launched = surface(draws)
     gap = launched.landing_y - targets[:, None]
     hit = reward.height * closeness(gap, launched.spread, reward.scale)
     return np.where(launched.failure > 0, -reward.penalty, hit).mean(1), launched
 
 
-def draw_box(landscape: Landscape) -> tuple[torch.Tensor, torch.Tensor]:
+def draw_box(surface: ResponseSurface) -> tuple[torch.Tensor, torch.Tensor]:
     """Centre and half size of the box of draws [m], each of shape (2,)."""
-    low, high = (torch.tensor(one, dtype=torch.float32) for one in (landscape.low, landscape.high))
+    low, high = (torch.tensor(one, dtype=torch.float32) for one in (surface.low, surface.high))
     return (low + high) / 2, (high - low) / 2

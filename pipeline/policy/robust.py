@@ -16,7 +16,7 @@ import torch
 
 from pipeline.base.progress import Progress
 from pipeline.landing.landing_map import LandingMap, Launcher
-from pipeline.landing.response_surface import Landscape
+from pipeline.landing.response_surface import ResponseSurface
 from pipeline.policy.environment import rewarded
 from pipeline.policy.train import CHECKED_TARGETS, Policy, Trained, earned, one_thread, told
 
@@ -26,12 +26,12 @@ STEEPEST = 3.0  # medians: no target's gradient counts more
 
 
 def refine(
-    plain: Policy, landscape: Landscape, params, progress: Progress | None = None
+    plain: Policy, surface: ResponseSurface, params, progress: Progress | None = None
 ) -> Trained:
     """Ascend the mean expected reward over the checked targets from a policy that hits.
 
     Adam, its rate a half sine of height `params.learning_rate`. The gradient along the draw is the
-    landscape's, by central differences; back-propagation takes it to the weights.
+    surface's, by central differences; back-propagation takes it to the weights.
 
     Args:
         params: The `policy:` section of params.yaml.
@@ -40,7 +40,7 @@ def refine(
     policy = copy.deepcopy(plain).train()
     targets = np.linspace(*params.targets, CHECKED_TARGETS)
     inputs = torch.as_tensor(targets, dtype=torch.float32)[:, None]
-    slope = _Slope(landscape, targets, params.reward, plain.draws(targets))
+    slope = _Slope(surface, targets, params.reward, plain.draws(targets))
     rates = params.learning_rate * np.sin(np.pi * (np.arange(STEPS) + 0.5) / STEPS)
     optimizer = torch.optim.Adam(policy.network.parameters())
     rows, best = [], 0
@@ -48,7 +48,7 @@ def refine(
         for step, rate in enumerate(rates.tolist()):
             draws = policy(inputs)
             at = draws.detach().double().numpy()
-            rows.append((step, *earned(landscape, at, targets, params.reward), rate))
+            rows.append((step, *earned(surface, at, targets, params.reward), rate))
             if step == 0 or rows[step][1] > rows[best][1]:
                 best, weights = step, copy.deepcopy(policy.state_dict())
             optimizer.param_groups[0]["lr"] = rate
@@ -66,17 +66,17 @@ def refine(
 class _Slope:
     """Gradient of the expected reward along draws for fixed targets."""
 
-    def __init__(self, landscape: Landscape, targets: np.ndarray, reward, home: np.ndarray):
+    def __init__(self, surface: ResponseSurface, targets: np.ndarray, reward, home: np.ndarray):
         """Know the plain draws `home`: a draw that fails more often is pulled back to its own."""
-        self.landscape, self.targets, self.reward, self.home = landscape, targets, reward, home
-        self.usual = (landscape(home).failure > 0).mean(1)
+        self.surface, self.targets, self.reward, self.home = surface, targets, reward, home
+        self.usual = (surface(home).failure > 0).mean(1)
 
     def __call__(self, draws: np.ndarray) -> np.ndarray:
         """[1/m], shape (N, 2), within the box."""
         shifts = STEP * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
-        points = np.clip(draws[:, None] + shifts, self.landscape.low, self.landscape.high)
+        points = np.clip(draws[:, None] + shifts, self.surface.low, self.surface.high)
         targets = np.repeat(self.targets, 4)
-        rewards, launched = rewarded(self.landscape, points.reshape(-1, 2), targets, self.reward)
+        rewards, launched = rewarded(self.surface, points.reshape(-1, 2), targets, self.reward)
         rewards = rewards.reshape(-1, 4)
         ways = np.abs(points[:, :2] - points[:, 2:]).sum(2)
         gradient = (rewards[:, :2] - rewards[:, 2:]) / ways

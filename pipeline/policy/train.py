@@ -1,6 +1,6 @@
-"""Train the slingshot policy with PPO (rsl_rl) on a landscape of simulated launches.
+"""Train the slingshot policy with PPO (rsl_rl) on a response surface.
 
-The landscape is the simulator read between simulated launches (landing_map.py), so what the policy
+That is the simulator read between simulated launches (landing_map.py), so what the policy
 learns is the calibrated simulator's own landing. Training keeps the network whose deterministic
 draws earn most over 256 targets spread over the trained range.
 """
@@ -21,7 +21,8 @@ from torch import nn
 
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.progress import Progress
-from pipeline.landing.response_surface import Landscape
+from pipeline.landing import response_surface
+from pipeline.landing.response_surface import ResponseSurface
 from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.environment import SlingshotEnv, draw_box, rewarded
 from pipeline.policy.expected import distance
@@ -29,8 +30,8 @@ from pipeline.policy.expected import distance
 CHECKED_TARGETS = 256
 KEPT_EVERY = 5  # iterations; a checkpoint takes some 10 ms
 SOURCES = [
-    Path(__file__).with_name(f"{name}.py")
-    for name in ("environment", "expected", "landscape", "train")
+    *(Path(__file__).with_name(f"{name}.py") for name in ("environment", "expected", "train")),
+    Path(response_surface.__file__),
 ]
 PACKAGES = ("torch", "rsl-rl-lib", "tensordict", "numpy", "scipy")
 
@@ -38,10 +39,10 @@ PACKAGES = ("torch", "rsl-rl-lib", "tensordict", "numpy", "scipy")
 class Policy(nn.Module):
     """Target in metres to draw in metres; the normalisation of both is part of it."""
 
-    def __init__(self, network: nn.Module, targets: tuple[float, float], landscape: Landscape):
+    def __init__(self, network: nn.Module, targets: tuple[float, float], surface: ResponseSurface):
         super().__init__()
         low, high = targets
-        center, half = draw_box(landscape)
+        center, half = draw_box(surface)
         self.network = network
         self.register_buffer("target_center", torch.tensor([(low + high) / 2]))
         self.register_buffer("target_half", torch.tensor([(high - low) / 2]))
@@ -82,7 +83,7 @@ class Trained:
 
 
 def train(
-    landscape: Landscape, params, kept: Path | None = None, progress: Progress | None = None
+    surface: ResponseSurface, params, kept: Path | None = None, progress: Progress | None = None
 ) -> Trained:
     """Train with the settings of `params` (the `policy:` section of params.yaml).
 
@@ -98,7 +99,7 @@ def train(
     with one_thread():
         torch.manual_seed(params.seed)
         env = SlingshotEnv(
-            landscape,
+            surface,
             targets=tuple(params.targets),
             num_envs=params.envs,
             reward=params.reward,
@@ -106,7 +107,7 @@ def train(
         )
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
             runner = OnPolicyRunner(env, _runner_config(params), log_dir=None, device="cpu")
-        checkpoint = kept and Checkpoint(kept, _stamp(landscape, params))
+        checkpoint = kept and Checkpoint(kept, _stamp(surface, params))
         training = _Training(runner, env, params, checkpoint, progress)
         runner.logger = training
         training.resume()
@@ -127,10 +128,10 @@ def one_thread() -> Iterator[None]:
 
 
 def earned(
-    landscape: Landscape, draws: np.ndarray, targets: np.ndarray, reward
+    surface: ResponseSurface, draws: np.ndarray, targets: np.ndarray, reward
 ) -> tuple[float, float, float]:
     """Mean reward and |y_p - g| [m] (NaN if all fail) of draws for targets, and failed targets."""
-    rewards, launched = rewarded(landscape, draws, targets, reward)
+    rewards, launched = rewarded(surface, draws, targets, reward)
     error = distance(launched.landing_y - targets[:, None], launched.spread)
     failed = launched.failure > 0
     mean = float(error[~failed].mean()) if not failed.all() else float("nan")
@@ -142,10 +143,10 @@ def told(error: float) -> str:
     return "every launch fails" if np.isnan(error) else f"mean error {100 * error:.2f} cm"
 
 
-def _stamp(landscape: Landscape, params) -> str:
+def _stamp(surface: ResponseSurface, params) -> str:
     """Of everything that a training hangs on."""
     versions = (f"{name} {version(name)}" for name in PACKAGES)
-    return fingerprint(*SOURCES, landscape.fingerprint(), repr(params), *versions)
+    return fingerprint(*SOURCES, surface.fingerprint(), repr(params), *versions)
 
 
 class _Training:
@@ -174,7 +175,7 @@ class _Training:
         self.log_std = np.append(schedule, schedule[-1])  # of each iteration, and after the last
         network = runner.alg.get_policy()
         self.distribution = network.distribution
-        self.policy = Policy(network.mlp, env.targets, env.landscape)
+        self.policy = Policy(network.mlp, env.targets, env.surface)
         self.checked = np.linspace(*env.targets, CHECKED_TARGETS)
         self.rewards: list[float] = []
         self.rows: list[dict] = []
@@ -216,7 +217,7 @@ class _Training:
 
     def _check(self) -> tuple[float, float, float]:
         draws = self.policy.draws(self.checked)
-        return earned(self.env.landscape, draws, self.checked, self.env.reward)
+        return earned(self.env.surface, draws, self.checked, self.env.reward)
 
     def _state(self) -> dict:
         return {

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from pipeline.landing.landing_map import LandingMap, landscape_of, validation
+from pipeline.landing.landing_map import LandingMap, surface_of, validation
 from pipeline.landing.response_surface import OUTSIDE, TOO_MUCH_FORCE
 from tests.policy import toy
 
@@ -110,7 +110,7 @@ def test_maps_of_several_theta_are_those_of_each() -> None:
     box = {"draw_y": toy.DRAW_Y, "draw_z": toy.DRAW_Z, "size": (17, 13), "max_force": 1e3}
     maps = LandingMap.simulate_each(launcher, thetas, **box, checks=40)
     draws = random_draws()
-    together = landscape_of(maps)(draws)
+    together = surface_of(maps)(draws)
     assert together.landing_y.shape == (500, 2)
     for column, theta in enumerate(thetas):
 
@@ -127,11 +127,11 @@ def test_maps_of_several_theta_are_those_of_each() -> None:
 
 def test_the_spread_is_the_landings_own_by_the_error_of_the_draw() -> None:
     draws, error = np.array([[-0.35, -0.2], [-0.3, -0.15]]), 0.001
-    landed = landscape_of([simulate()], error)(draws)
+    landed = surface_of([simulate()], error)(draws)
     errors = np.random.default_rng(0).normal(0, error, (20_000, 2))
     truth = [toy.launch(draw + errors).landing_y.std() for draw in draws]
     np.testing.assert_allclose(landed.spread[:, 0], truth, rtol=0.02)
-    assert not landscape_of([simulate()])(draws).spread.any()
+    assert not surface_of([simulate()])(draws).spread.any()
 
 
 def test_a_box_in_which_every_launch_fails() -> None:

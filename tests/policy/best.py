@@ -12,8 +12,8 @@ import sys
 import numpy as np
 
 from pipeline.base.layout import Layout
-from pipeline.landing.landing_map import landscape_of
-from pipeline.landing.response_surface import Landscape
+from pipeline.landing.landing_map import surface_of
+from pipeline.landing.response_surface import ResponseSurface
 from pipeline.landing.simulator import simulator
 from pipeline.landing.stored import Stored
 from pipeline.params import load
@@ -24,11 +24,11 @@ from pipeline.sling.theta import load_samples, load_theta
 NEAR = 0.06  # m: draws whose median landing is further from the target are not looked at
 
 
-def best_draws(landscape: Landscape, targets: np.ndarray, fine: int = 401) -> np.ndarray:
+def best_draws(surface: ResponseSurface, targets: np.ndarray, fine: int = 401) -> np.ndarray:
     """Draws (N, 2) [m] of least expected |y_p - g| for targets (N,), of a fine x fine grid."""
-    axes = (np.linspace(*ends, fine) for ends in zip(landscape.low, landscape.high, strict=True))
+    axes = (np.linspace(*ends, fine) for ends in zip(surface.low, surface.high, strict=True))
     draws = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 2)
-    launched = landscape(draws)
+    launched = surface(draws)
     good = ~(launched.failure > 0).any(1)
     draws, landing, spread = draws[good], launched.landing_y[good], launched.spread[good]
     median, found = np.median(landing, axis=1), []
@@ -39,9 +39,9 @@ def best_draws(landscape: Landscape, targets: np.ndarray, fine: int = 401) -> np
     return np.array(found)
 
 
-def expected_error(landscape: Landscape, draws: np.ndarray, targets: np.ndarray) -> float:
+def expected_error(surface: ResponseSurface, draws: np.ndarray, targets: np.ndarray) -> float:
     """Mean expected |y_p - g| [m] of draws for targets."""
-    launched = landscape(draws)
+    launched = surface(draws)
     return float(np.nanmean(distance(launched.landing_y - targets[:, None], launched.spread)))
 
 
@@ -54,14 +54,14 @@ def main() -> None:
     targets = np.linspace(*params.policy.targets, 64)
     middle = stored.draws(np.mean(params.policy.targets, keepdims=True))[0]
     maps = robust_maps(launcher, samples, middle, params)
-    landscape = landscape_of(maps, params.trials.actuation_error)
+    surface = surface_of(maps, params.trials.actuation_error)
     draws = {
         **{kind: stored.draws(targets, kind) for kind in stored.kinds()},
-        "best": best_draws(landscape, targets),
+        "best": best_draws(surface, targets),
     }
     for name, drawn in draws.items():
-        launched = landscape(drawn)
-        error = 100 * expected_error(landscape, drawn, targets)
+        launched = surface(drawn)
+        error = 100 * expected_error(surface, drawn, targets)
         by_theta = 100 * np.nanstd(launched.landing_y, axis=1).mean()
         by_draw = 100 * launched.spread.mean()
         aside = 100 * np.nanmean(np.nanmedian(launched.landing_y, axis=1) - targets)

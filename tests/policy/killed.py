@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
-from pipeline.landing.landing_map import LandingMap, landscape_of
+from pipeline.landing.landing_map import LandingMap, surface_of
 from pipeline.policy import train as module
 from tests.policy import toy
 from tests.policy.conftest import SETTINGS
@@ -37,7 +37,7 @@ def training(
 
     module._Training.log = log
     try:
-        return module.train(landscape_of([chart], error), SimpleNamespace(**settings), kept)
+        return module.train(surface_of([chart], error), SimpleNamespace(**settings), kept)
     finally:
         module._Training.log = inner
 

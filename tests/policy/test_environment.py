@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.landing.landing_map import LandingMap, landscape_of
-from pipeline.landing.response_surface import TOO_MUCH_FORCE, Landscape
+from pipeline.landing.landing_map import LandingMap, surface_of
+from pipeline.landing.response_surface import TOO_MUCH_FORCE, ResponseSurface
 from pipeline.policy.environment import SlingshotEnv, rewarded
 from tests.policy import toy
 
@@ -19,12 +19,12 @@ REWARD = SimpleNamespace(height=5.0, scale=0.5, penalty=1.0)
 
 @pytest.fixture
 def env(toy_map) -> SlingshotEnv:
-    return make(landscape_of([toy_map]))
+    return make(surface_of([toy_map]))
 
 
-def make(landscape: Landscape, **changes) -> SlingshotEnv:
+def make(surface: ResponseSurface, **changes) -> SlingshotEnv:
     usual = {"num_envs": 400, "seed": 7}
-    return SlingshotEnv(landscape, targets=TARGETS, **{"reward": REWARD, **usual, **changes})
+    return SlingshotEnv(surface, targets=TARGETS, **{"reward": REWARD, **usual, **changes})
 
 
 def targets_of(observations) -> np.ndarray:
@@ -64,7 +64,7 @@ def test_asking_twice_observes_the_same(env) -> None:
 
 
 def test_equal_seeds_give_equal_targets(toy_map, env) -> None:
-    twin, other = (make(landscape_of([toy_map]), seed=seed) for seed in (7, 8))
+    twin, other = (make(surface_of([toy_map]), seed=seed) for seed in (7, 8))
     assert (twin.get_observations()["target"] == env.get_observations()["target"]).all()
     assert (other.get_observations()["target"] != env.get_observations()["target"]).any()
 
@@ -74,7 +74,7 @@ def test_each_part_of_the_reward_counts(toy_map) -> None:
 
     def reward(**changes) -> np.ndarray:
         other = SimpleNamespace(**{**vars(REWARD), **changes})
-        return make(landscape_of([toy_map]), reward=other).step(actions)[1].numpy()
+        return make(surface_of([toy_map]), reward=other).step(actions)[1].numpy()
 
     usual = reward()
     failed = usual == -1
@@ -102,7 +102,7 @@ def test_the_reward_is_the_mean_over_thetas_and_errors_of_the_draw() -> None:
     )
     draws = np.array([[-0.35, -0.2], [-0.3, -0.15], [-0.38, -0.25]])
     targets = toy.launch(draws).landing_y + np.array([0.0, 0.01, -0.05])
-    expected, _ = rewarded(landscape_of(maps, error), draws, targets, REWARD)
+    expected, _ = rewarded(surface_of(maps, error), draws, targets, REWARD)
     errors = np.random.default_rng(0).normal(0, error, (40_000, 2))
     for draw, target, one in zip(draws, targets, expected, strict=True):
         landing = toy.launch(draw + errors).landing_y
@@ -113,7 +113,7 @@ def test_the_reward_is_the_mean_over_thetas_and_errors_of_the_draw() -> None:
 def test_it_goes_on_from_a_state(env, toy_map) -> None:
     env.step(torch.zeros(400, 2))
     state = env.state()
-    twin = make(landscape_of([toy_map]), seed=99)
+    twin = make(surface_of([toy_map]), seed=99)
     twin.restore({name: value.clone() for name, value in state.items()})
     for _ in range(2):
         once, again = (one.step(torch.zeros(400, 2)) for one in (env, twin))

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from pipeline.base.progress import Progress, parse
-from pipeline.landing.landing_map import LandingMap, landscape_of
+from pipeline.landing.landing_map import LandingMap, surface_of
 from pipeline.params import load
 from pipeline.policy import robust
 from pipeline.policy.check import check_expected
@@ -48,13 +48,13 @@ def short(monkeypatch) -> None:
 def plain(settings):
     """Trained where θ is known."""
     small = SimpleNamespace(**{**vars(settings), "envs": 256, "iterations": 40})
-    return train(landscape_of(maps(np.zeros((1, 1)))), small).policy
+    return train(surface_of(maps(np.zeros((1, 1)))), small).policy
 
 
 def test_it_finds_the_draws_that_theta_does_not_move(plain, settings) -> None:
     """The plain policy, which does not know of θ, draws elsewhere."""
     targets = np.linspace(1.6, 2.3, 15)
-    found = refine(plain, landscape_of(maps()), settings)
+    found = refine(plain, surface_of(maps()), settings)
     draws = found.policy.draws(targets)
     assert np.abs(plain.draws(targets)[:, 1] - Z_SAFE).mean() > 0.06
     assert np.abs(draws[:, 1] - Z_SAFE).mean() < 0.02
@@ -64,10 +64,10 @@ def test_it_finds_the_draws_that_theta_does_not_move(plain, settings) -> None:
 
 def test_it_comes_near_the_best_draws_under_an_error_of_the_draw(plain, settings) -> None:
     """Best of all draws of a fine grid; the error alone makes some draws better than others."""
-    landscape, targets = landscape_of(maps(np.zeros((1, 1))), 0.004), np.linspace(1.6, 2.3, 15)
-    found = refine(plain, landscape, settings).policy
-    drawn = (best_draws(landscape, targets), plain.draws(targets), found.draws(targets))
-    best, before, after = (expected_error(landscape, draws, targets) for draws in drawn)
+    surface, targets = surface_of(maps(np.zeros((1, 1))), 0.004), np.linspace(1.6, 2.3, 15)
+    found = refine(plain, surface, settings).policy
+    drawn = (best_draws(surface, targets), plain.draws(targets), found.draws(targets))
+    best, before, after = (expected_error(surface, draws, targets) for draws in drawn)
     assert best - 1e-3 < after < before  # the grid is a millimetre wide
     assert after - best < 0.3 * (before - best)
 
@@ -83,7 +83,7 @@ def test_it_keeps_off_draws_that_fail(plain, settings) -> None:
     force = toy.launch(plain.draws(np.linspace(*settings.targets, 256))).hold_force.max()
     box = {"draw_y": toy.DRAW_Y, "draw_z": toy.DRAW_Z, "size": (17, 13), "max_force": force + 0.1}
     free, limited = (
-        refine(plain, landscape_of(LandingMap.simulate_each(rising, THETAS, **one)), settings)
+        refine(plain, surface_of(LandingMap.simulate_each(rising, THETAS, **one)), settings)
         for one in ({**box, "max_force": 1e3}, box)
     )
     targets = np.linspace(*settings.targets, 256)
@@ -95,8 +95,8 @@ def test_it_keeps_off_draws_that_fail(plain, settings) -> None:
 
 def test_the_refinement_is_the_same_every_time(plain, settings, monkeypatch) -> None:
     monkeypatch.setattr(robust, "STEPS", 40)
-    once, again = (refine(plain, landscape_of(maps()), settings) for _ in range(2))
-    slower = refine(plain, landscape_of(maps()), SimpleNamespace(**{**vars(settings), **SLOWER}))
+    once, again = (refine(plain, surface_of(maps()), settings) for _ in range(2))
+    slower = refine(plain, surface_of(maps()), SimpleNamespace(**{**vars(settings), **SLOWER}))
     assert once.curve == again.curve != slower.curve
     pairs = zip(once.policy.parameters(), again.policy.parameters(), strict=True)
     assert all(torch.equal(a, b) for a, b in pairs)
@@ -166,7 +166,7 @@ def test_the_expected_error_is_that_of_launches_with_both_errors() -> None:
 
 def test_each_step_is_told(plain, settings, tmp_path) -> None:
     told = Progress("x", robust.STEPS, "steps", tmp_path / "log")
-    found = refine(plain, landscape_of(maps()), settings, told)
+    found = refine(plain, surface_of(maps()), settings, told)
     steps = [parse(f"x {line}") for line in (tmp_path / "log").read_text().splitlines()[1:]]
     assert [step.done for step in steps] == list(range(1, robust.STEPS + 1))
     assert [step.facts[0] for step in steps] == list(map(said, found.curve["mean_error"]))

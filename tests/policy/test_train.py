@@ -14,7 +14,7 @@ import pytest
 import torch
 
 from pipeline.base.progress import Progress, parse
-from pipeline.landing.landing_map import LandingMap, landscape_of
+from pipeline.landing.landing_map import LandingMap, surface_of
 from pipeline.policy import train as module
 from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.train import Trained, train
@@ -71,9 +71,9 @@ def same(one: Trained, other: Trained) -> bool:
 def test_the_same_settings_give_the_same_training_and_each_counts(
     toy_map, settings, change: dict
 ) -> None:
-    landscape = landscape_of([toy_map])
-    once, again = (train(landscape, short(settings)) for _ in range(2))
-    other = train(landscape, short(settings, **change))
+    surface = surface_of([toy_map])
+    once, again = (train(surface, short(settings)) for _ in range(2))
+    other = train(surface, short(settings, **change))
     assert same(once, again)
     assert once.curve != other.curve
 
@@ -85,7 +85,7 @@ def test_without_a_launch_that_lands_it_says_so(settings) -> None:
         return SimpleNamespace(landing_y=nan, hold_force=nan, failure=[reason] * len(draws))
 
     box = {"draw_y": toy.DRAW_Y, "draw_z": toy.DRAW_Z, "size": (5, 5), "max_force": 15.0}
-    trained = train(landscape_of([LandingMap.simulate(broken, **box)]), short(settings))
+    trained = train(surface_of([LandingMap.simulate(broken, **box)]), short(settings))
     assert np.isnan(trained.mean_error)
     assert trained.failures == {"the simulation did not converge": 2 * 4 * 64}
     assert trained.curve["failed_targets"] == [256.0, 256.0]
@@ -97,7 +97,7 @@ def test_each_iteration_is_told_and_those_of_an_earlier_run_are_counted(
 ) -> None:
     def train_and_tell(told: Progress) -> Trained:
         some = short(settings, iterations=7)
-        return train(landscape_of([toy_map]), some, tmp_path / "kept.pt", told)
+        return train(surface_of([toy_map]), some, tmp_path / "kept.pt", told)
 
     class Ended(Progress):
         def advance(self, count: int, *facts: str, seconds: float | None = None) -> None:

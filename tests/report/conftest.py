@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from torch import nn
 
 from pipeline.episode.episode import Episode
-from pipeline.landing.landing_map import LandingMap, landscape_of
+from pipeline.landing.landing_map import LandingMap, surface_of
 from pipeline.params import load
 from pipeline.policy.export import write_onnx
 from pipeline.policy.train import Policy
@@ -181,7 +181,7 @@ def template(tmp_path_factory) -> Path:
     (folder / "card.json").write_text(json.dumps(card))
     torch.manual_seed(0)
     network = nn.Sequential(nn.Linear(1, 8), nn.ELU(), nn.Linear(8, 2))
-    write_onnx(Policy(network, (1.425, 2.425), landscape_of([chart])), folder / "policy.onnx")
+    write_onnx(Policy(network, (1.425, 2.425), surface_of([chart])), folder / "policy.onnx")
     launches().to_parquet(data / "trials" / BAND / f"{METHOD}.parquet")
     return root
 

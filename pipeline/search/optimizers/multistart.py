@@ -7,7 +7,6 @@ evaluated point is what the history records.
 
 from __future__ import annotations
 
-import cma
 import numpy as np
 
 from pipeline.objective.space import reflect
@@ -41,6 +40,8 @@ class Solver:
     """CMA-ES of one region, asked and told in the unit cube."""
 
     def __init__(self, region: Region, population: int, seed: int) -> None:
+        import cma  # which imports Matplotlib: half a second that only a start needs
+
         self._mu, self._factor = region.mu, np.linalg.cholesky(region.sigma)
         rng = np.random.default_rng(seed)  # of its own, else solvers share NumPy's global one
         self._cma = cma.CMAEvolutionStrategy(

@@ -100,11 +100,17 @@ def test_taut_counts_only_the_frames_of_the_recoil() -> None:
 
 
 def test_an_episode_without_taut_frames() -> None:
-    """It serves methods that do not weigh them, and is refused by name for those that do."""
+    """It serves methods that do not weigh them, and is refused by name for those that do.
+
+    So is one whose recoil is held out.
+    """
     episode = toy.episode(**recoil([-0.4, 0.1]))
     assert np.isnan(loss_of(episode).terms(toy.rollouts(episode))["taut"][0])
-    with pytest.raises(UserError, match="toy.*taut"):
-        loss_of(episode, weights=ONES)
+    other = toy.episode(**recoil([-0.4, -0.3, -0.1, 0.02, *50 * [0.1]]))
+    loss_of(other, weights=ONES)
+    for one, blocks in ((episode, None), (other, np.array([[0.9, 1.2]]))):
+        with pytest.raises(UserError, match="toy.*taut"):
+            loss_of(one, weights=ONES, held_out=blocks)
 
 
 def test_empty_frames_are_left_out() -> None:
@@ -198,10 +204,3 @@ def test_without_blocks_nothing_is_held_out() -> None:
     for name, value in plain.terms(lines).items():
         np.testing.assert_array_equal(none.terms(lines)[name], value)
     assert all(np.isnan(value).all() for value in plain.held_out_terms(lines).values())
-
-
-def test_the_recoil_cannot_be_held_out_of_a_method_that_weighs_it() -> None:
-    episode = toy.episode(**recoil([-0.4, -0.3, -0.1, 0.02, *50 * [0.1]]))
-    loss_of(episode, weights=ONES)
-    with pytest.raises(UserError, match="toy.*taut"):
-        loss_of(episode, weights=ONES, held_out=np.array([[0.9, 1.2]]))

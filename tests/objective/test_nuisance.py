@@ -178,11 +178,11 @@ def test_arrays_of_a_gpu_are_taken_as_well() -> None:
     space = evaluate.space
     points = space.to_physical(np.random.default_rng(3).random((2, space.dimension)))
     rollouts, values = evaluate.rollouts(points)
-    on_device = SimpleNamespace(
-        times=rollouts.times,
-        force=wp.array(np.ascontiguousarray(rollouts.force), device="cpu"),
-        center_line=wp.array(np.ascontiguousarray(rollouts.center_line), device="cpu"),
-    )
+    arrays = {
+        name: wp.array(np.ascontiguousarray(getattr(rollouts, name)), device="cpu")
+        for name in ("force", "center_line")
+    }
+    on_device = SimpleNamespace(times=rollouts.times, **arrays)
     assert set(values) == set(BOUNDS)
     found, expected = (evaluate.loss.terms(one, values) for one in (on_device, rollouts))
     for name, value in expected.items():

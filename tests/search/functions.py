@@ -49,10 +49,9 @@ class Evaluate:
         low, high, linear = np.zeros(size), np.full(size, 10.0), np.zeros(size, bool)
         self.space = Space(names, low, high, linear, priors or {})
         weights = dict.fromkeys(TERMS, 0.0) | (weights or {"geom": 1.0})
-        self.loss = SimpleNamespace(
-            weights=weights,
-            total=lambda terms: sum(weights[name] * terms[name] for name in TERMS if weights[name]),
-        )
+        weighed = [name for name in TERMS if weights[name]]
+        total = lambda terms: sum(weights[name] * terms[name] for name in weighed)  # noqa: E731
+        self.loss = SimpleNamespace(weights=weights, total=total)
 
     def __call__(self, unit: np.ndarray) -> Evaluation:
         self.count += 1
@@ -96,13 +95,8 @@ def chain(evaluate, optimizer=BUDGET, names=NAMES) -> tuple[History, History, li
     """Explore, find regions, refine: both histories and the regions."""
     first, second = budget(optimizer, "multistart")
     explored = alone("de", evaluate, first, optimizer, names)
-    regions = find_regions(
-        explored.unit,
-        explored.total,
-        k_top=optimizer.k_top,
-        k_nn=optimizer.k_nn,
-        delta=optimizer.delta,
-    )
+    sizes = {name: getattr(optimizer, name) for name in ("k_top", "k_nn", "delta")}
+    regions = find_regions(explored.unit, explored.total, **sizes)
     refined = History("toy", explored.names)
     several = Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed)
     search(several, evaluate, refined, rollouts=second)
@@ -112,13 +106,7 @@ def chain(evaluate, optimizer=BUDGET, names=NAMES) -> tuple[History, History, li
 def alone(name: str, evaluate, rollouts: int, optimizer=BUDGET, names=NAMES, **settings) -> History:
     """The history of a search of one phase by the optimiser of that name."""
     history = History("toy", names)
-    one = build(
-        name,
-        len(history.names),
-        rollouts=rollouts,
-        seed=optimizer.seed,
-        population=optimizer.population,
-        **settings,
-    )
+    settings |= {"seed": optimizer.seed, "population": optimizer.population}
+    one = build(name, len(history.names), rollouts=rollouts, **settings)
     search(one, evaluate, history, rollouts=rollouts)
     return history

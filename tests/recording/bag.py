@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from types import SimpleNamespace as Message
 
 import cv2
 import numpy as np
-from mcap_ros2.writer import Writer
+from mcap.writer import Writer
+from mcap_ros2._dynamic import serialize_dynamic
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
@@ -108,6 +109,19 @@ class Truth:
         return np.vstack(parts)
 
 
+def scores(episode: object, truth: Truth) -> tuple[np.ndarray, float]:
+    """Distances of all points from the band's surface [m], and the covered share of the drawn."""
+    off, covered = [], []
+    for time, cloud in zip(episode.cloud_time, episode.clouds, strict=True):
+        line = truth.center_line(time)
+        gaps = np.linalg.norm(cloud[:, None] - line[None], axis=-1)
+        off.append(gaps.min(axis=1) - RADIUS)
+        if truth.drawn < time < truth.release - 0.01:
+            away = np.linalg.norm(line - truth.hand(time), axis=1) > 0.035
+            covered.append(np.mean(gaps.min(axis=0)[away] < 3 * RADIUS))
+    return np.concatenate(off), float(np.mean(covered))
+
+
 def _ease(x: float) -> float:
     x = min(max(x, 0.0), 1.0)
     return x**3 * (10 - 15 * x + 6 * x * x)
@@ -145,10 +159,15 @@ def write_bag(
     definitions = get_typestore(Stores.ROS2_HUMBLE)
     with path.open("wb") as file:
         writer = Writer(file, **{"chunk_size": 200_000, **options})
-        schemas = {
-            name: writer.register_msgdef(name, definitions.generate_msgdef(name, ros_version=2)[0])
-            for name in sorted(set(TYPES.values()))
-        }
+        writer.start("ros2")
+
+        @cache
+        def channel(topic: str, name: str) -> tuple[int, Callable[[object], bytes]]:
+            text = definitions.generate_msgdef(name, ros_version=2)[0]
+            schema = writer.register_schema(name, "ros2msg", text.encode())
+            return writer.register_channel(topic, "cdr", schema), serialize_dynamic(name, text)[
+                name
+            ]
 
         def write(kind: str, topic: str, t: float, delay: float, body: dict, frame: str) -> None:
             if kind in without:
@@ -157,11 +176,12 @@ def write_bag(
             if kind == "tf":
                 message = Message(**body)
             else:
-                message = Message(header=_header(stamp, frame), **body)
+                message = Message(header=head(stamp, frame), **body)
             message = change(kind, stamp, message)
             if message is not None:
                 late = START + round(receive(kind, t, delay) * 1e9)
-                writer.write_message(topic, schemas[TYPES[kind]], message, late, late)
+                number, encode = channel(topic, TYPES[kind])
+                writer.add_message(number, late, encode(message), late)
 
         write("tf", "/tf_static", 0.0, 0.0, {"transforms": _transforms()}, "")
         events = [(k / rate, "wrench") for k in range(int(truth.end * rate))]
@@ -200,6 +220,28 @@ def write_bag(
                 write("depth", "/camera/depth/compressedDepth", t, 0.016, body, "optical")
         writer.finish()
     return truth
+
+
+def edit(**edits: Callable[[int, object], object]) -> Callable[[str, int, object], object]:
+    """A `change`: what is done to messages (stamp, message) of some kinds; False drops one."""
+
+    def change(kind: str, stamp: int, message: object) -> object:
+        dropped = kind in edits and edits[kind](stamp, message) is False
+        return None if dropped else message
+
+    return change
+
+
+def head(stamp: int, frame: str = "ft_sensor") -> Message:
+    """std_msgs/Header."""
+    return Message(stamp=Message(sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id=frame)
+
+
+def blind_bag(folder: Path, truth: Truth | None = None, **options: object) -> Path:
+    """A recording with black pictures, for what needs no band in them."""
+    path = folder / "bag.mcap"
+    write_bag(path, truth, **{"cameras": False, "rate": 500, **options})
+    return path
 
 
 def render(truth: Truth, t: float, lens: Lens = LENS) -> tuple[np.ndarray, np.ndarray]:
@@ -261,10 +303,6 @@ def _black(lens: Lens) -> tuple[np.ndarray, np.ndarray]:
     return np.zeros((*lens.size[::-1], 3), np.uint8), np.zeros(lens.size[::-1], np.uint16)
 
 
-def _header(stamp: int, frame: str) -> Message:
-    return Message(stamp=Message(sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id=frame)
-
-
 def _vector(v: np.ndarray) -> Message:
     return Message(x=float(v[0]), y=float(v[1]), z=float(v[2]))
 
@@ -281,7 +319,7 @@ def _transforms() -> list[Message]:
 def _transform(parent: str, child: str, rotation: Rotation, place: np.ndarray) -> Message:
     q = Message(**dict(zip("xyzw", rotation.as_quat(), strict=True)))
     return Message(
-        header=_header(START, parent),
+        header=head(START, parent),
         child_frame_id=child,
         transform=Message(translation=_vector(place), rotation=q),
     )
@@ -304,4 +342,4 @@ def _info(lens: Lens) -> dict[str, object]:
     }
 
 
-__all__ = ["Lens", "Truth", "render", "replace", "write_bag"]
+__all__ = ["Lens", "Truth", "blind_bag", "edit", "head", "render", "replace", "scores", "write_bag"]

@@ -1,7 +1,7 @@
 """A ROS 2 recording written again with Foxglove's schemas, in protobuf or JSON, by Foxglove's SDK.
 
-What was recorded is read with mcap-ros2-support; the pipeline reads the result with protobuf's own
-runtime and with json. Foxglove has no wrench schema: here it is a schema of the lab's own.
+What was recorded is read with mcap-ros2-support. Foxglove has no wrench schema: here it is one of
+the lab's own.
 """
 
 from __future__ import annotations
@@ -127,58 +127,37 @@ class _Json:
 
 
 class _Protobuf:
-    """Foxglove's messages are encoded by its SDK, the lab's own by protobuf."""
+    """Schemas of Foxglove's SDK, and the lab's own, written by protobuf's runtime."""
 
     def __init__(self, topic: str, kind: str, raw: bool, context: foxglove.Context) -> None:
-        self.name = _schema(kind, raw).removeprefix("foxglove.")
+        name = _schema(kind, raw)
         if kind == "WrenchStamped":
-            files = FileDescriptorSet(file=[_wrench_file()])
-            pool = DescriptorPool()
-            pool.Add(files.file[0])
-            self.message = GetMessageClass(pool.FindMessageTypeByName(self.name))
-            schema = foxglove.Schema(
-                name=self.name, encoding="protobuf", data=files.SerializeToString()
-            )
+            files = FileDescriptorSet(file=[_wrench_file()]).SerializeToString()
+            schema = foxglove.Schema(name=name, encoding="protobuf", data=files)
         else:
-            self.message = getattr(fox, self.name)
-            schema = self.message.get_schema()
+            schema = getattr(fox, name.removeprefix("foxglove.")).get_schema()
+        pool = DescriptorPool()
+        for file in FileDescriptorSet.FromString(schema.data).file:
+            pool.Add(file)
+        self.message = GetMessageClass(pool.FindMessageTypeByName(name))
         self.channel = foxglove.Channel(
             topic, schema=schema, message_encoding="protobuf", context=context
         )
 
     def log(self, content: dict[str, object], time: int) -> None:
-        if self.name.startswith("lab."):
-            seconds = content["timestamp"]
-            content = {
-                **content,
-                "timestamp": {"seconds": seconds["sec"], "nanos": seconds["nsec"]},
-            }
-            payload = self.message(**content).SerializeToString()
-        else:
-            payload = self.message(**_typed(content)).encode()
-        self.channel.log(payload, log_time=time)
+        self.channel.log(self.message(**_timed(content)).SerializeToString(), log_time=time)
 
 
-def _typed(content: dict[str, object]) -> dict[str, object]:
-    """Nested dicts as the SDK's own types."""
-    types = {
-        "timestamp": fox.Timestamp,
-        "pose": fox.Pose,
-        "position": fox.Vector3,
-        "orientation": fox.Quaternion,
-        "translation": fox.Vector3,
-        "rotation": fox.Quaternion,
-        "joints": fox.JointState,
-        "transforms": fox.FrameTransform,
+def _timed(content: dict[str, object]) -> dict[str, object]:
+    """Stamps as protobuf's have their fields, also of what lies in a list."""
+    timed = {
+        name: [_timed(one) for one in value] if name in ("transforms", "joints") else value
+        for name, value in content.items()
     }
-    typed = dict(content)
-    for name, kind in types.items():
-        value = content.get(name)
-        if isinstance(value, list):
-            typed[name] = [kind(**_typed(one)) for one in value]
-        elif isinstance(value, dict):
-            typed[name] = kind(**_typed(value))
-    return typed
+    if "timestamp" in content:
+        stamp = content["timestamp"]
+        timed["timestamp"] = {"seconds": stamp["sec"], "nanos": stamp["nsec"]}
+    return timed
 
 
 def _wrench_file() -> FileDescriptorProto:

@@ -86,12 +86,8 @@ def test_colours_of_a_camera_apart_belong_to_their_points() -> None:
     assert 0 < hidden < 0.2 * there
 
 
-def test_the_steps_are_timed(tmp_path, params) -> None:
-    from tests.recording.bag import write_bag
-
-    path = tmp_path / "seen.mcap"
-    write_bag(path, rate=500)
-    result = bench.bench_recording(path, params)
+def test_the_steps_are_timed(seen, params) -> None:
+    result = bench.bench_recording(seen[0], params)
     assert result["frames"] == 54 and result["points"] > 100
     assert set(result["per_frame_ms"]) == set(bench.STEPS)
     assert all(value > 0 for value in result["per_frame_ms"].values())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,21 +13,26 @@ from rosbags.typesys import Stores, get_typestore
 class BagWriter:
     """Collects messages and writes them in the order in which they would have been received.
 
-    Equal messages give equal bytes. Message classes hang from `types` by their names, as in
-    `bag.types["std_msgs/msg/Header"]`.
+    Equal messages give equal bytes.
     """
 
     def __init__(self) -> None:
         self.store = get_typestore(Stores.ROS2_HUMBLE)
-        self.types = self.store.types
         self._topics: dict[str, str] = {}
         self._messages: list[tuple[int, int, str, int, bytes]] = []
 
+    def make(self, kind: str, *values: Any, **fields: Any) -> Any:
+        """A message of the type `kind`, package/Type."""
+        return self.store.types[kind.replace("/", "/msg/")](*values, **fields)
+
     def header(self, stamp: int, frame: str) -> Any:
         """std_msgs/Header at `stamp` [ns]."""
-        seconds, rest = divmod(stamp, 1_000_000_000)
-        time = self.types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=rest)
-        return self.types["std_msgs/msg/Header"](stamp=time, frame_id=frame)
+        time = self.make("builtin_interfaces/Time", *divmod(stamp, 1_000_000_000))
+        return self.make("std_msgs/Header", time, frame)
+
+    def vector(self, values: Iterable[float], kind: str = "Vector3") -> Any:
+        """geometry_msgs/Vector3, or another type of numbers alone: Point, Quaternion."""
+        return self.make(f"geometry_msgs/{kind}", *map(float, values))
 
     def add(self, topic: str, message: Any, stamp: int, received: int) -> None:
         """Keep one message; `stamp` and `received` in ns."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -141,76 +142,46 @@ class Clock:
 
 def add_frames(bag: BagWriter, robot: Robot, believed: Camera) -> None:
     """/tf_static: fork to base to camera as calibrated, hand to force sensor."""
-    kinds = bag.types
 
     def transform(parent: str, child: str, position: np.ndarray, rotation: Rotation) -> Any:
-        x, y, z, w = rotation.as_quat(canonical=True)
-        return kinds["geometry_msgs/msg/TransformStamped"](
-            header=bag.header(EPOCH, parent),
-            child_frame_id=child,
-            transform=kinds["geometry_msgs/msg/Transform"](
-                translation=kinds["geometry_msgs/msg/Vector3"](*map(float, position)),
-                rotation=kinds["geometry_msgs/msg/Quaternion"](x, y, z, w),
-            ),
-        )
+        quaternion = bag.vector(rotation.as_quat(canonical=True), "Quaternion")
+        pose = bag.make("geometry_msgs/Transform", bag.vector(position), quaternion)
+        return bag.make("geometry_msgs/TransformStamped", bag.header(EPOCH, parent), child, pose)
 
-    message = kinds["tf2_msgs/msg/TFMessage"](
-        transforms=[
-            transform("fork", "panda_link0", robot.base_position, robot.base),
-            transform(
-                "panda_link0",
-                OPTICAL,
-                robot.in_base(believed.position),
-                robot.base.inv() * believed.rotation,
-            ),
-            transform("panda_hand_tcp", "ft_sensor", [0, 0, -SENSOR_LEVER], robot.sensor_in_tool),
-        ]
-    )
-    bag.add("/tf_static", message, EPOCH, EPOCH)
+    camera = robot.in_base(believed.position), robot.base.inv() * believed.rotation
+    frames = [
+        transform("fork", "panda_link0", robot.base_position, robot.base),
+        transform("panda_link0", OPTICAL, *camera),
+        transform("panda_hand_tcp", "ft_sensor", [0, 0, -SENSOR_LEVER], robot.sensor_in_tool),
+    ]
+    bag.add("/tf_static", bag.make("tf2_msgs/TFMessage", frames), EPOCH, EPOCH)
 
 
 def add_gripper(bag: BagWriter, clock: Clock, motion: Motion) -> None:
     for i in range(round(END * GRIPPER_RATE)):
         time = i / GRIPPER_RATE
         stamp, received = clock(time)
-        message = bag.types["sensor_msgs/msg/JointState"](
-            header=bag.header(stamp, ""),
-            name=FINGERS,
-            position=np.full(2, motion.finger(time)),
-            velocity=np.zeros(2),
-            effort=np.zeros(2),
-        )
+        state = np.full(2, motion.finger(time)), np.zeros(2), np.zeros(2)  # velocity, effort
+        message = bag.make("sensor_msgs/JointState", bag.header(stamp, ""), FINGERS, *state)
         bag.add("/franka_gripper/joint_states", message, stamp, received)
 
 
 def add_pose(
     bag: BagWriter, clock: Clock, robot: Robot, times: np.ndarray, positions: np.ndarray
 ) -> None:
-    kinds = bag.types
-    quaternion = (robot.base.inv() * robot.tool).as_quat(canonical=True)
-    orientation = kinds["geometry_msgs/msg/Quaternion"](*map(float, quaternion))
+    orientation = bag.vector((robot.base.inv() * robot.tool).as_quat(canonical=True), "Quaternion")
     for time, position in zip(times, robot.in_base(positions), strict=True):
         stamp, received = clock(time)
-        message = kinds["geometry_msgs/msg/PoseStamped"](
-            header=bag.header(stamp, "panda_link0"),
-            pose=kinds["geometry_msgs/msg/Pose"](
-                position=kinds["geometry_msgs/msg/Point"](*map(float, position)),
-                orientation=orientation,
-            ),
-        )
+        pose = bag.make("geometry_msgs/Pose", bag.vector(position, "Point"), orientation)
+        message = bag.make("geometry_msgs/PoseStamped", bag.header(stamp, "panda_link0"), pose)
         bag.add("/franka_robot_state_broadcaster/current_pose", message, stamp, received)
 
 
 def add_wrench(bag: BagWriter, clock: Clock, times: np.ndarray, wrenches: np.ndarray) -> None:
-    vector = bag.types["geometry_msgs/msg/Vector3"]
-    for time, row in zip(times, wrenches.tolist(), strict=True):
+    for time, row in zip(times, wrenches, strict=True):
         stamp, received = clock(time)
-        message = bag.types["geometry_msgs/msg/WrenchStamped"](
-            header=bag.header(stamp, "ft_sensor"),
-            wrench=bag.types["geometry_msgs/msg/Wrench"](
-                force=vector(*row[:3]), torque=vector(*row[3:])
-            ),
-        )
+        wrench = bag.make("geometry_msgs/Wrench", bag.vector(row[:3]), bag.vector(row[3:]))
+        message = bag.make("geometry_msgs/WrenchStamped", bag.header(stamp, "ft_sensor"), wrench)
         bag.add("/ft_sensor/wrench", message, stamp, received)
 
 
@@ -235,7 +206,7 @@ def add_picture(
     jpeg = cv2.imencode(".jpg", color, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
     huffman = [cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY]
     png = cv2.imencode(".png", depth, huffman)[1]  # noise holds nothing that a search could find
-    image = bag.types["sensor_msgs/msg/CompressedImage"]
+    image = partial(bag.make, "sensor_msgs/CompressedImage")
     color_topic = f"{COLOR}/image_raw/compressed"
     bag.add(color_topic, image(header, "rgb8; jpeg compressed bgr8", jpeg), stamp, received)
     bag.add(f"{COLOR}/camera_info", info, stamp, received)
@@ -247,7 +218,8 @@ def add_picture(
 
 def camera_info(bag: BagWriter, header: Any, camera: Camera) -> Any:
     (cx, cy), f = camera.center, camera.focal
-    return bag.types["sensor_msgs/msg/CameraInfo"](
+    return bag.make(
+        "sensor_msgs/CameraInfo",
         header=header,
         height=camera.size[1],
         width=camera.size[0],
@@ -258,5 +230,5 @@ def camera_info(bag: BagWriter, header: Any, camera: Camera) -> Any:
         p=np.array([f, 0, cx, 0, 0, f, cy, 0, 0, 0, 1.0, 0]),
         binning_x=0,
         binning_y=0,
-        roi=bag.types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False),
+        roi=bag.make("sensor_msgs/RegionOfInterest", 0, 0, 0, 0, False),
     )

@@ -12,7 +12,7 @@ from app.preflight.check import ASSUMED, band_of, check_recording
 from app.preflight.command import check
 from app.preflight.verdict import cautions_of, pause
 from pipeline.base.errors import UserError
-from tests.recording.bag import RADIUS, Truth, write_bag
+from tests.recording.bag import RADIUS, START, Truth, blind_bag, edit, head, write_bag
 
 
 def abouts(report) -> set[str]:
@@ -70,15 +70,12 @@ def test_a_cloud_without_one_side_covers_half(looked) -> None:
 
 def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
     """No gripper, a slow camera, a lost second of force, a short pause, too much force."""
-    start = []
 
-    def spoil(kind: str, stamp: int, message):
-        start.append(stamp)
-        lost = 1.3 < (stamp - start[0]) * 1e-9 < 1.35
-        return None if kind == "wrench" and lost else message
+    def lose(stamp: int, message) -> bool:
+        return not 1.3 < (stamp - START) * 1e-9 < 1.35
 
     path = tmp_path / "poor.mcap"
-    write_bag(path, Truth(noise=0.6), rate=500, without=("gripper",), change=spoil)
+    write_bag(path, Truth(noise=0.6), rate=500, without=("gripper",), change=edit(wrench=lose))
     weak = params.setup.model_copy(update={"max_force": 15.0})
     report = check_recording(path, params.model_copy(update={"setup": weak}))
     assert report.usable and report.verdict == "can be used, but:"
@@ -139,14 +136,10 @@ def test_times_of_receipt_tell_of_another_clock(looked, params, role, offset, sa
 def test_a_clock_ahead_is_shown_with_its_sign(tmp_path, params) -> None:
     """Stamps of the pose that are 0.2 s too large."""
 
-    def ahead(kind: str, stamp: int, message):
-        if kind == "pose":
-            whole = stamp + 200_000_000
-            message.header.stamp.sec, message.header.stamp.nanosec = divmod(whole, 10**9)
-        return message
+    def ahead(stamp: int, message) -> None:
+        message.header = head(stamp + 200_000_000, message.header.frame_id)
 
-    path = tmp_path / "ahead.mcap"
-    write_bag(path, cameras=False, rate=500, change=ahead)
+    path = blind_bag(tmp_path, change=edit(pose=ahead))
     rows = {row.role: row for row in check_recording(path, params).topics}
     assert rows["pose"].clock_offset == pytest.approx(0.2, abs=0.001)
     assert rows["wrench"].clock_offset == 0
@@ -204,8 +197,7 @@ def test_the_pause_before_the_release(looked, seen) -> None:
 
 
 def test_the_report_of_a_bad_recording(tmp_path, params) -> None:
-    path = tmp_path / "bad.mcap"
-    write_bag(path, cameras=False, rate=500, without=("wrench",))
+    path = blind_bag(tmp_path, without=("wrench",))
     report = check_recording(path, params)
     assert not report.usable
     assert "no force" in json.loads(report.to_json())["problem"]

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from app.preflight.check import look_at
 from app.preflight.tips import measure_tips
 from pipeline.recording.view import Scene
-from tests.recording.bag import BASE, EYE, TIPS, write_bag
+from tests.recording.bag import BASE, EYE, TIPS, edit, write_bag
 
 DIAMETER, REST = 0.010, 0.52
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -157,17 +157,16 @@ def misplaced(shift: np.ndarray, turn: np.ndarray):
     """/tf_static as a calibration that is wrong by so much, frame O, writes it."""
     wrong = Rotation.from_rotvec(turn)
 
-    def change(kind: str, stamp: int, message):
-        for one in message.transforms if kind == "tf" else ():
+    def move(stamp: int, message) -> None:
+        for one in message.transforms:
             if one.child_frame_id == "optical":
                 p, q = one.transform.translation, one.transform.rotation
                 place = wrong.apply(BASE[0].apply([p.x, p.y, p.z]) + BASE[1]) + shift
                 p.x, p.y, p.z = map(float, BASE[0].inv().apply(place - BASE[1]))
                 turned = wrong * BASE[0] * Rotation.from_quat([q.x, q.y, q.z, q.w])
                 q.x, q.y, q.z, q.w = map(float, (BASE[0].inv() * turned).as_quat())
-        return message
 
-    return change
+    return edit(tf=move)
 
 
 def test_a_misplaced_tf_static_is_measured(looked, params, tmp_path) -> None:

@@ -2,14 +2,13 @@
 
     python -m tests.recording.input.mutations FOLDER FIRST COUNT KIND...
 
-prints two lines of JSON a mutation: its recipe before it runs, what came of it after. A timer ends
+prints two lines of JSON a mutation: which it is before it runs, what came of it after. A timer ends
 the process where one hangs; the last line then names the culprit.
 """
 
 from __future__ import annotations
 
 import faulthandler
-import io
 import json
 import resource
 import signal
@@ -19,11 +18,9 @@ import time
 import zlib
 from pathlib import Path
 
-import lz4.frame
 import numpy as np
 import zstandard
-from mcap.reader import make_reader
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
@@ -52,35 +49,10 @@ EXTREMES = [0, 1, 2, 255, 2**16, 2**31 - 1, 2**32 - 1, 2**40, 2**63 - 1, 2**63, 
 
 def write_small(path: Path, kind: str) -> None:
     """About 100 kB that become an episode in about a tenth of a second."""
-    lens, options = Lens(size=(80, 60), focal=62.5, fps=8), KINDS[kind]
-    chunked = options.get("use_chunking", True)
-    options = {"chunk_size": 12_000, **options} if chunked else {}
-    write_bag(path, TRUTH, rate=200, pose_rate=50, lens=lens, **options)
-    if not chunked:
-        rewrite(path, KINDS[kind])
-
-
-def rewrite(path: Path, options: dict[str, object]) -> None:
-    """The same messages with other options of the container's writer."""
-    content = io.BytesIO(path.read_bytes())
-    with path.open("wb") as file:
-        writer = Writer(file, **options)
-        writer.start("ros2")
-        schemas: dict[int, int] = {}
-        channels: dict[int, int] = {}
-        for schema, channel, message in make_reader(content).iter_messages(log_time_order=False):
-            if schema.id not in schemas:
-                schemas[schema.id] = writer.register_schema(
-                    schema.name, schema.encoding, schema.data
-                )
-            if channel.id not in channels:
-                channels[channel.id] = writer.register_channel(
-                    channel.topic, channel.message_encoding, schemas[schema.id]
-                )
-            writer.add_message(
-                channels[channel.id], message.log_time, message.data, message.publish_time
-            )
-        writer.finish()
+    lens = Lens(size=(80, 60), focal=62.5, fps=8)
+    write_bag(
+        path, TRUTH, rate=200, pose_rate=50, lens=lens, **{"chunk_size": 12_000, **KINDS[kind]}
+    )
 
 
 def small_params() -> Params:
@@ -97,15 +69,14 @@ def small_params() -> Params:
     return whole.model_copy(update=sections)
 
 
-def mutated(content: bytes, kind: str, seed: int) -> tuple[bytes, str]:
-    """A damaged copy, and its recipe in words."""
+def mutated(content: bytes, kind: str, seed: int) -> bytes:
+    """A damaged copy."""
     random = np.random.default_rng([seed, *kind.encode()])
     if kind == "garbage":
         return _garbage(content, random)
     ways = [_flip, _bytes, _zeros, _ones, _copy, _cut_out, _insert, _truncate]
     ways += [_swap_records, _again, _without, _field, _field, _opcode]
-    way = ways[random.integers(len(ways))]
-    return way(content, random)
+    return ways[random.integers(len(ways))](content, random)
 
 
 def records(content: bytes) -> list[tuple[int, int, int]]:
@@ -118,6 +89,11 @@ def records(content: bytes) -> list[tuple[int, int, int]]:
     return found
 
 
+def _record(content: bytes, random: np.random.Generator, least: int = 1, most: int = 255):
+    found = [one for one in records(content) if least <= one[0] <= most]
+    return found[random.integers(len(found))][1:]
+
+
 def _place(content: bytes, random: np.random.Generator) -> int:
     return int(random.integers(8, len(content)))
 
@@ -127,79 +103,70 @@ def _span(content: bytes, random: np.random.Generator) -> tuple[int, int]:
     return start, min(len(content), start + int(np.exp(random.uniform(0, np.log(30_000)))))
 
 
-def _flip(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
-    data, bits = bytearray(content), []
+def _flip(content: bytes, random: np.random.Generator) -> bytes:
+    data = bytearray(content)
     for _ in range(random.integers(1, 4)):
-        at, bit = _place(content, random), int(random.integers(8))
-        data[at] ^= 1 << bit
-        bits.append(f"{at}.{bit}")
-    return bytes(data), f"bits {' '.join(bits)} flipped"
+        data[_place(content, random)] ^= 1 << int(random.integers(8))
+    return bytes(data)
 
 
-def _bytes(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
-    data, places = bytearray(content), []
+def _bytes(content: bytes, random: np.random.Generator) -> bytes:
+    data = bytearray(content)
     for _ in range(random.integers(1, 9)):
         at = _place(content, random)
         data[at] = int(random.integers(256))
-        places.append(f"{at}={data[at]}")
-    return bytes(data), f"bytes {' '.join(places)}"
+    return bytes(data)
 
 
-def _zeros(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
+def _zeros(content: bytes, random: np.random.Generator) -> bytes:
     a, b = _span(content, random)
-    return content[:a] + bytes(b - a) + content[b:], f"{a}:{b} zero"
+    return content[:a] + bytes(b - a) + content[b:]
 
 
-def _ones(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
+def _ones(content: bytes, random: np.random.Generator) -> bytes:
     a, b = _span(content, random)
-    return content[:a] + b"\xff" * (b - a) + content[b:], f"{a}:{b} ones"
+    return content[:a] + b"\xff" * (b - a) + content[b:]
 
 
-def _copy(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
+def _copy(content: bytes, random: np.random.Generator) -> bytes:
     (a, b), at = _span(content, random), _place(content, random)
-    return content[:at] + content[a:b] + content[at:], f"{a}:{b} again at {at}"
+    return content[:at] + content[a:b] + content[at:]
 
 
-def _cut_out(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
+def _cut_out(content: bytes, random: np.random.Generator) -> bytes:
     a, b = _span(content, random)
-    return content[:a] + content[b:], f"{a}:{b} cut out"
+    return content[:a] + content[b:]
 
 
-def _insert(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
+def _insert(content: bytes, random: np.random.Generator) -> bytes:
     a, b = _span(content, random)
-    return content[:a] + random.bytes(b - a) + content[a:], f"{b - a} bytes put in at {a}"
+    return content[:a] + random.bytes(b - a) + content[a:]
 
 
-def _truncate(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
-    at = _place(content, random)
-    return content[:at], f"cut off at {at}"
+def _truncate(content: bytes, random: np.random.Generator) -> bytes:
+    return content[: _place(content, random)]
 
 
-def _swap_records(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
+def _swap_records(content: bytes, random: np.random.Generator) -> bytes:
     found = [one for one in records(content) if one[0] in (CHUNK, MESSAGE)]
     i, j = sorted(random.choice(len(found), 2, replace=False))
     (_, a, b), (_, c, d) = found[i], found[j]
-    data = content[:a] + content[c:d] + content[b:c] + content[a:b] + content[d:]
-    return data, f"records {a}:{b} and {c}:{d} swapped"
+    return content[:a] + content[c:d] + content[b:c] + content[a:b] + content[d:]
 
 
-def _again(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
-    found = records(content)
-    _, a, b = found[random.integers(len(found))]
-    at = found[random.integers(len(found))][1]
-    return content[:at] + content[a:b] + content[at:], f"record {a}:{b} again at {at}"
+def _again(content: bytes, random: np.random.Generator) -> bytes:
+    (a, b), (at, _) = _record(content, random), _record(content, random)
+    return content[:at] + content[a:b] + content[at:]
 
 
-def _without(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
-    found = records(content)
-    _, a, b = found[random.integers(len(found))]
-    return content[:a] + content[b:], f"record {a}:{b} left out"
+def _without(content: bytes, random: np.random.Generator) -> bytes:
+    a, b = _record(content, random)
+    return content[:a] + content[b:]
 
 
-def _field(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
+def _field(content: bytes, random: np.random.Generator) -> bytes:
     """A number at the head of a record, where lengths, counts, times and checksums are."""
-    found = records(content)
-    _, a, b = found[random.integers(len(found))]
+    a, b = _record(content, random)
     size = int(random.choice([2, 4, 8]))
     at = a + 1 if random.random() < 0.3 else int(random.integers(a, min(b, a + 60)))
     if random.random() < 0.5:
@@ -207,56 +174,46 @@ def _field(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
     else:
         old = int.from_bytes(content[at : at + size], "little")
         value = max(0, old + int(random.integers(-300, 300)))
-    data = bytearray(content)
-    data[at : at + size] = (value % 2 ** (8 * size)).to_bytes(size, "little")
-    return bytes(data), f"{size} bytes at {at} set to {value}"
+    return content[:at] + _packed(value, size) + content[at + size :]
 
 
-def _opcode(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
-    found = records(content)
-    _, a, _ = found[random.integers(len(found))]
-    data = bytearray(content)
-    data[a] = int(random.integers(256))
-    return bytes(data), f"opcode at {a} is {data[a]}"
+def _packed(value: int, size: int) -> bytes:
+    return (value % 2 ** (8 * size)).to_bytes(size, "little")
 
 
-def _garbage(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
+def _opcode(content: bytes, random: np.random.Generator) -> bytes:
+    a, _ = _record(content, random)
+    return content[:a] + bytes([random.integers(256)]) + content[a + 1 :]
+
+
+def _garbage(content: bytes, random: np.random.Generator) -> bytes:
     """The records of one chunk damaged and its checksum mended: what reads messages must cope."""
-    chunks = [one for one in records(content) if one[0] == CHUNK]
-    _, a, b = chunks[random.integers(len(chunks))]
+    a, b = _record(content, random, CHUNK, CHUNK)
     start, end, _, _, name = struct.unpack_from("<QQQII", content, a + 9)
-    data = zstandard.ZstdDecompressor().decompress(content[a + 9 + 32 + name + 8 : b])
+    data = bytes(8) + zstandard.ZstdDecompressor().decompress(content[a + 9 + 32 + name + 8 : b])
     if random.random() < 0.5:  # one message, and its fields first of all
-        inner = [one for one in records(bytes(8) + data + bytes(8)) if one[0] <= MESSAGE]
-        _, x, y = inner[random.integers(len(inner))]
-        head = bytes(8) + data[x - 8 : y - 8]
-        near = 8 + min(len(head) - 8, 130 if random.random() < 0.5 else len(head))
-        part, recipe = _hurt(head[:near], random)
-        data = data[: x - 8] + part[8:] + head[near:] + data[y - 8 :]
-        recipe = f"in record {x - 8}: {recipe}"
+        x, y = _record(data + bytes(8), random, 1, MESSAGE)
+        near = min(y - x, 130 if random.random() < 0.5 else y - x)
+        hurt = _hurt(bytes(8) + data[x : x + near], random)
+        data = data[:x] + hurt[8:] + data[x + near :]
     else:
-        part, recipe = _hurt(bytes(8) + data, random)
-        data = part[8:]
+        data = _hurt(data, random)
+    data = data[8:]
     packed = zstandard.ZstdCompressor().compress(data)
-    if name == 3:
-        packed = lz4.frame.compress(data)
     fields = struct.pack("<QQQII", start, end, len(data), zlib.crc32(data), 4) + b"zstd"
     body = fields + struct.pack("<Q", len(packed)) + packed
-    whole = content[:a] + HEAD.pack(CHUNK, len(body)) + body + content[b:]
-    return whole, f"chunk at {a}, mended: {recipe}"
+    return content[:a] + HEAD.pack(CHUNK, len(body)) + body + content[b:]
 
 
-def _hurt(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
+def _hurt(content: bytes, random: np.random.Generator) -> bytes:
     ways = [_flip, _bytes, _zeros, _ones, _word]
     return ways[random.integers(len(ways))](content, random)
 
 
-def _word(content: bytes, random: np.random.Generator) -> tuple[bytes, str]:
+def _word(content: bytes, random: np.random.Generator) -> bytes:
     at, size = _place(content, random), int(random.choice([1, 2, 4, 8]))
-    value = EXTREMES[random.integers(len(EXTREMES))] % 2 ** (8 * size)
-    data = bytearray(content)
-    data[at : at + size] = value.to_bytes(size, "little")
-    return bytes(data[: len(content)]), f"{size} bytes at {at} set to {value}"
+    value = EXTREMES[random.integers(len(EXTREMES))]
+    return (content[:at] + _packed(value, size) + content[at + size :])[: len(content)]
 
 
 def same(a: Episode, b: Episode) -> bool:
@@ -320,10 +277,9 @@ def _mutate(folder: Path, kind: str, seeds: range, params: Params) -> None:
     whole, usual = episode_of(done, "band1", params), said(done)
     path = folder / f"{kind}-{seeds.start}-mutated.mcap"
     for seed in seeds:
-        data, recipe = mutated(content, kind, seed)
-        path.write_bytes(data)
+        path.write_bytes(mutated(content, kind, seed))
         about = {"seed": seed, "kind": kind}
-        print(json.dumps({**about, "recipe": recipe}), flush=True)
+        print(json.dumps(about), flush=True)
         signal.setitimer(signal.ITIMER_PROF, HANGS)
         faulthandler.dump_traceback_later(BLOCKS, exit=True)
         start = time.process_time()

@@ -6,8 +6,6 @@ that all topics share.
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,7 +14,7 @@ from hypothesis import strategies as st
 from pipeline.base.errors import UserError
 from pipeline.recording.input import clocks
 from pipeline.recording.input.reader import Recording, read_recording
-from tests.recording.bag import START, write_bag
+from tests.recording.bag import START, blind_bag, edit, head
 
 MS = 1_000_000
 
@@ -138,27 +136,23 @@ def test_stamps_far_from_all_others() -> None:
     np.testing.assert_array_equal(np.flatnonzero(clocks.outliers(stamp)), [100, 500, 501])
 
 
-def read(path, params, **options) -> Recording:
-    write_bag(path, cameras=False, rate=500, **options)
-    return read_recording(path, params.setup)
+def read(folder, params, **options) -> Recording:
+    return read_recording(blind_bag(folder, **options), params.setup)
 
 
 def shift(*kinds: str, by: float, since: float = -1.0, until: float = 1e9):
     """A `change` for write_bag: these topics' stamps, between two times, by so many seconds."""
 
-    def change(kind: str, stamp: int, message):
-        if kind in kinds and since <= (stamp - START) * 1e-9 < until:
-            moved = stamp + round(by * 1e9)
-            time = SimpleNamespace(sec=moved // 10**9, nanosec=moved % 10**9)
-            message.header = SimpleNamespace(stamp=time, frame_id=message.header.frame_id)
-        return message
+    def moved(stamp: int, message) -> None:
+        if since <= (stamp - START) * 1e-9 < until:
+            message.header = head(stamp + round(by * 1e9), message.header.frame_id)
 
-    return change
+    return edit(**dict.fromkeys(kinds, moved))
 
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory, params) -> Recording:
-    return read(tmp_path_factory.mktemp("clock") / "good.mcap", params)
+    return read(tmp_path_factory.mktemp("clock"), params)
 
 
 def test_nothing_is_said_of_a_good_file(good) -> None:
@@ -168,7 +162,7 @@ def test_nothing_is_said_of_a_good_file(good) -> None:
 
 @pytest.mark.parametrize("kind", ["pose", "gripper"])
 def test_another_clock_of_pose_or_gripper_is_put_right(tmp_path, params, good, kind) -> None:
-    found = read(tmp_path / "clock.mcap", params, change=shift(kind, by=-3600.0))
+    found = read(tmp_path, params, change=shift(kind, by=-3600.0))
     mended, true = getattr(found, kind), getattr(good, kind)
     assert np.abs(mended.stamp - true.stamp).max() < 1 * MS
     np.testing.assert_array_equal(mended.values, true.values)
@@ -185,12 +179,12 @@ def test_another_clock_of_pose_or_gripper_is_put_right(tmp_path, params, good, k
 )
 def test_another_clock_of_force_or_camera_is_refused(tmp_path, params, kinds, named) -> None:
     with pytest.raises(UserError, match=named) as caught:
-        read(tmp_path / "clock.mcap", params, change=shift(*kinds, by=-40.0))
+        read(tmp_path, params, change=shift(*kinds, by=-40.0))
     assert "record all topics with one clock" in str(caught.value)
 
 
 def test_log_time_on_a_clock_of_its_own_does_no_harm(tmp_path, params, good) -> None:
-    found = read(tmp_path / "clock.mcap", params, receive=lambda kind, t, delay: t + delay - 1e6)
+    found = read(tmp_path, params, receive=lambda kind, t, delay: t + delay - 1e6)
     np.testing.assert_array_equal(found.wrench.stamp, good.wrench.stamp)
     assert found.losses == []
 
@@ -198,7 +192,7 @@ def test_log_time_on_a_clock_of_its_own_does_no_harm(tmp_path, params, good) -> 
 def test_a_step_of_log_time_does_no_harm(tmp_path, params, good) -> None:
     for step in (0.9, -0.9):
         found = read(
-            tmp_path / "clock.mcap",
+            tmp_path,
             params,
             receive=lambda kind, t, delay, step=step: t + delay + step * (t > 2.0),
         )
@@ -208,9 +202,7 @@ def test_a_step_of_log_time_does_no_harm(tmp_path, params, good) -> None:
 
 
 def test_messages_out_of_order_are_sorted_and_said(tmp_path, params, good) -> None:
-    found = read(
-        tmp_path / "clock.mcap", params, change=shift("pose", by=-0.012, since=2, until=2.005)
-    )
+    found = read(tmp_path, params, change=shift("pose", by=-0.012, since=2, until=2.005))
     assert found.losses == ["/arm/current_pose: 1 message out of order, sorted by stamp"]
     assert np.all(np.diff(found.pose.stamp) > 0)
     assert len(found.pose.stamp) == len(good.pose.stamp)
@@ -218,18 +210,18 @@ def test_messages_out_of_order_are_sorted_and_said(tmp_path, params, good) -> No
 
 @pytest.mark.parametrize("kind", ["wrench", "pose", "gripper", "depth"])
 def test_a_step_in_one_topic(tmp_path, params, good, kind) -> None:
-    found = read(tmp_path / "clock.mcap", params, change=shift(kind, by=1.2, since=2.0))
+    found = read(tmp_path, params, change=shift(kind, by=1.2, since=2.0))
     assert np.abs(getattr(found, kind).stamp - getattr(good, kind).stamp).max() < 0.1 * MS
     assert len(found.losses) == 1
     assert "clock step of +1.2000 s at 2.0" in found.losses[0]
     # Whatever part is longer, the part on the others' clock is right.
-    found = read(tmp_path / "clock.mcap", params, change=shift(kind, by=1.2, until=3.0))
+    found = read(tmp_path, params, change=shift(kind, by=1.2, until=3.0))
     assert np.abs(getattr(found, kind).stamp - getattr(good, kind).stamp).max() < 0.1 * MS
 
 
 def test_a_step_in_all_topics_keeps_them_together(tmp_path, params, good) -> None:
     kinds = ("wrench", "pose", "gripper", "color", "depth", "info")
-    found = read(tmp_path / "clock.mcap", params, change=shift(*kinds, by=0.8, since=2.0))
+    found = read(tmp_path, params, change=shift(*kinds, by=0.8, since=2.0))
     for role, stream in found.streams.items():
         off = stream.stamp - good.streams[role].stamp
         assert np.ptp(off) < 0.1 * MS and abs(np.median(off) - 800 * MS) < 0.1 * MS, role
@@ -239,7 +231,7 @@ def test_a_step_in_all_topics_keeps_them_together(tmp_path, params, good) -> Non
 def test_the_machine_clock_steps_back_in_all_topics(tmp_path, params, good) -> None:
     kinds = ("wrench", "pose", "gripper", "color", "depth", "info")
     found = read(
-        tmp_path / "clock.mcap",
+        tmp_path,
         params,
         change=shift(*kinds, by=-0.80037, since=2.0),
         receive=lambda kind, t, delay: t + delay - 0.80037 * (t >= 2.0),
@@ -250,30 +242,24 @@ def test_the_machine_clock_steps_back_in_all_topics(tmp_path, params, good) -> N
 
 
 def test_an_uneven_topic_with_a_step_is_refused(tmp_path, params) -> None:
-    def change(kind: str, stamp: int, message):
-        if kind == "wrench":
-            uneven = np.random.default_rng(stamp % 2**31).uniform(0, 0.0019)
-            moved = stamp + round(1e9 * (uneven + 0.7 * (stamp > START + 2 * 10**9)))
-            time = SimpleNamespace(sec=moved // 10**9, nanosec=moved % 10**9)
-            message.header = SimpleNamespace(stamp=time, frame_id="ft_sensor")
-        return message
+    def uneven(stamp: int, message) -> None:
+        off = np.random.default_rng(stamp % 2**31).uniform(0, 0.0019)
+        message.header = head(stamp + round(1e9 * (off + 0.7 * (stamp > START + 2 * 10**9))))
 
     with pytest.raises(UserError, match="rate is too uneven to tell by how much exactly"):
-        read(tmp_path / "clock.mcap", params, change=change)
+        read(tmp_path, params, change=edit(wrench=uneven))
 
 
 def test_an_uneven_gripper_with_a_step_is_put_right(tmp_path, params, good) -> None:
     """To the millisecond that log_time is good to, which is enough for it."""
 
-    def change(kind: str, stamp: int, message):
-        if kind == "gripper":
-            uneven = np.random.default_rng(stamp % 2**31).uniform(0, 0.001)
-            message.header.stamp.nanosec += round(1e9 * uneven)
-            message.header.stamp.sec += 7 * (stamp > START + 2 * 10**9)
-        # Every third one is missing.
-        return None if kind == "gripper" and stamp // (20 * MS) % 3 == 0 else message
+    def uneven(stamp: int, message) -> bool:
+        off = np.random.default_rng(stamp % 2**31).uniform(0, 0.001)
+        message.header.stamp.nanosec += round(1e9 * off)
+        message.header.stamp.sec += 7 * (stamp > START + 2 * 10**9)
+        return stamp // (20 * MS) % 3 != 0  # every third one is missing
 
-    found = read(tmp_path / "clock.mcap", params, change=change)
+    found = read(tmp_path, params, change=edit(gripper=uneven))
     (loss,) = found.losses
     assert "/gripper/joint_states: clock step of +6.99" in loss
     near = np.searchsorted(good.gripper.stamp, found.gripper.stamp - 5 * MS)
@@ -282,14 +268,15 @@ def test_an_uneven_gripper_with_a_step_is_put_right(tmp_path, params, good) -> N
 
 
 def test_gaps_and_ends_are_said(tmp_path, params) -> None:
-    def change(kind: str, stamp: int, message):
-        t = (stamp - START) * 1e-9
-        if kind == "wrench" and 0.8 <= t < 0.9:
+    def lose(stamp: int, message) -> None:
+        if 0.8 <= (stamp - START) * 1e-9 < 0.9:
             message.wrench.force.x = float("nan")
-        gone = (kind == "pose" and t > 3.5) or (kind == "color" and 1.0 < t < 1.6)
-        return None if gone or (kind == "gripper" and t < 0.6) else message
 
-    found = read(tmp_path / "gaps.mcap", params, change=change)
+    def outside(low: float, high: float):
+        return lambda stamp, message: not low < (stamp - START) * 1e-9 < high
+
+    gone = {"pose": outside(3.5, 9.0), "color": outside(1.0, 1.6), "gripper": outside(-1.0, 0.6)}
+    found = read(tmp_path, params, change=edit(wrench=lose, **gone))
     words = "\n".join(found.losses)
     assert "/ft/wrench: lost 50 not finite" in words
     assert "/ft/wrench: gap of 0.102 s at 0.80 s" in words
@@ -300,29 +287,28 @@ def test_gaps_and_ends_are_said(tmp_path, params) -> None:
 
 
 def test_stamps_that_are_missing(tmp_path, params, good) -> None:
-    def zero(kind: str, stamp: int, message, part: int):
-        if kind == "wrench" and stamp % 10**9 % part == 0:
-            message.header = SimpleNamespace(
-                stamp=SimpleNamespace(sec=0, nanosec=0), frame_id="ft_sensor"
-            )
-        return message
+    def zero(part: int):
+        def bare(stamp: int, message) -> None:
+            if stamp % 10**9 % part == 0:
+                message.header = head(0)
 
-    some = read(tmp_path / "zero.mcap", params, change=lambda *a: zero(*a, part=100 * MS))
+        return edit(wrench=bare)
+
+    some = read(tmp_path, params, change=zero(100 * MS))
     assert any("without a stamp" in loss for loss in some.losses)
     assert len(some.wrench.stamp) + some.wrench.lost == len(good.wrench.stamp)
     with pytest.raises(UserError, match="/ft/wrench has no header stamps"):
-        read(tmp_path / "zero.mcap", params, change=lambda *a: zero(*a, part=1))
+        read(tmp_path, params, change=zero(1))
 
 
 def test_a_frozen_sensor_is_remarked_on(tmp_path, params) -> None:
     held = {}
 
-    def change(kind: str, stamp: int, message):
-        if kind == "wrench" and 2 * 10**9 <= stamp - START < 2.5e9:
+    def freeze(stamp: int, message) -> None:
+        if 2 * 10**9 <= stamp - START < 2.5e9:
             message.wrench = held.setdefault("wrench", message.wrench)
-        return message
 
-    found = read(tmp_path / "frozen.mcap", params, change=change)
+    found = read(tmp_path, params, change=edit(wrench=freeze))
     assert any("/ft/wrench: the same value 250 times from 2.00 s" in one for one in found.notes)
 
 

@@ -20,23 +20,7 @@ from pipeline.recording.input.readings import WRENCH
 
 NAME = "geometry_msgs/msg/WrenchStamped"
 MSG = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(NAME, ros_version=2)[0]
-ROS1 = """std_msgs/Header header
-geometry_msgs/Wrench wrench
-===
-MSG: std_msgs/Header
-uint32 seq
-time stamp
-string frame_id
-===
-MSG: geometry_msgs/Wrench
-geometry_msgs/Vector3 force
-geometry_msgs/Vector3 torque
-===
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-""".replace("===", "=" * 80)
+ROS1 = get_typestore(Stores.ROS1_NOETIC).generate_msgdef(NAME)[0]
 LINE = "=" * 80
 IDL = f"""{LINE}
 IDL: builtin_interfaces/msg/Time

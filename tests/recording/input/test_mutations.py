@@ -51,13 +51,13 @@ def _run(folder: Path, first: int, count: int, *kinds: str) -> list[dict]:
         found.setdefault((line["kind"], line["seed"]), {}).update(line)
     if done.returncode:  # the last one hung, crashed or raised
         kind, seed = last = next(reversed(found), (kinds[0], first))
-        found.setdefault(last, {"seed": seed, "kind": kind, "recipe": "none"})
+        found.setdefault(last, {"seed": seed, "kind": kind})
         found[last].update(outcome="crashed", words=done.stderr[-3000:], s=HANGS, bytes=0)
     return list(found.values())
 
 
 def failures(results: list[dict]) -> list[dict]:
-    """What may not be, with its recipe."""
+    """What may not be."""
     return [
         one
         for one in results

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mcap.records import Schema
 from mcap_ros2._dynamic import serialize_dynamic
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
@@ -51,60 +52,16 @@ sensor_msgs/JointState measured_joint_state
 geometry_msgs/WrenchStamped o_f_ext_hat_k
 geometry_msgs/PoseStamped o_t_ee
 uint8 robot_mode
-===
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-===
-MSG: sensor_msgs/JointState
-std_msgs/Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-===
-MSG: geometry_msgs/WrenchStamped
-std_msgs/Header header
-geometry_msgs/Wrench wrench
-===
-MSG: geometry_msgs/Wrench
-geometry_msgs/Vector3 force
-geometry_msgs/Vector3 torque
-===
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-===
-MSG: geometry_msgs/PoseStamped
-std_msgs/Header header
-geometry_msgs/Pose pose
-===
-MSG: geometry_msgs/Pose
-geometry_msgs/Point position
-geometry_msgs/Quaternion orientation
-===
-MSG: geometry_msgs/Point
-float64 x
-float64 y
-float64 z
-===
-MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-===
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-""".replace("===", "=" * 80)
+"""
 
 
 def robot_state(topic: str = "/franka_robot_state_broadcaster/robot_state") -> Channel:
     """FrankaRobotState in CDR by mcap-ros2-support; some of its fields."""
     name = "franka_msgs/msg/FrankaRobotState"
-    encode = serialize_dynamic(name, ROBOT_STATE)[name]
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    store.register(get_types_from_msg(ROBOT_STATE, name))
+    text = store.generate_msgdef(name, ros_version=2)[0]
+    encode = serialize_dynamic(name, text)[name]
     payloads = []
     for k in range(COUNT):
         message = {
@@ -117,7 +74,7 @@ def robot_state(topic: str = "/franka_robot_state_broadcaster/robot_state") -> C
         message["measured_joint_state"].update(velocity=[], effort=[])
         payloads.append(encode(_named(message)))
     times = [5_000_000_000 + round(1e9 * t) for t in TIMES]
-    return Channel(topic, Schema(1, ROBOT_STATE.encode(), "ros2msg", name), "cdr", times, payloads)
+    return Channel(topic, Schema(1, text.encode(), "ros2msg", name), "cdr", times, payloads)
 
 
 def _named(value: object) -> object:

@@ -12,13 +12,6 @@ from pipeline.rig.physics.world import bent_at, string_of
 DRAW = (-0.30, -0.15)
 
 
-def test_flight_is_the_parabola() -> None:
-    y, z, vy, vz, floor = -0.1, -0.05, 4.0, 1.5, -0.52
-    time = (vz + np.sqrt(vz**2 + 2 * 9.81 * (z - floor))) / 9.81
-    landing = fly(np.array([y, z]), np.array([vy, vz]), floor, 0.0)
-    assert np.isclose(landing, y + vy * time, rtol=1e-8)
-
-
 def test_drag_shortens_the_flight() -> None:
     """Against small explicit steps."""
     position, velocity, k, step = np.zeros(2), np.array([6.0, 2.0]), 0.02, 2e-5

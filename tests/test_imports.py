@@ -25,6 +25,7 @@ EXTRAS = {
     "tests/recording/masks/": "validation",
     "tests/validation/": "validation",
     "tests/app/preflight/": "validation",
+    "tests/rig/recorder/test_record.py": "validation",
     "tools/": "dev",
     "tools/browser.py": "validation",
     "validation/": "validation",

@@ -165,9 +165,8 @@ def write_bag(
         def channel(topic: str, name: str) -> tuple[int, Callable[[object], bytes]]:
             text = definitions.generate_msgdef(name, ros_version=2)[0]
             schema = writer.register_schema(name, "ros2msg", text.encode())
-            return writer.register_channel(topic, "cdr", schema), serialize_dynamic(name, text)[
-                name
-            ]
+            number = writer.register_channel(topic, "cdr", schema)
+            return number, serialize_dynamic(name, text)[name]
 
         def write(kind: str, topic: str, t: float, delay: float, body: dict, frame: str) -> None:
             if kind in without:

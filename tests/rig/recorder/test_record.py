@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
@@ -39,11 +41,11 @@ def messages(recorded: tuple[Path, Interaction]) -> dict[str, list[Any]]:
 
 def read(path: Path, *only: str) -> dict[str, list[Any]]:
     """Decoded by another library than the one that wrote them; `only` some topics."""
-    from mcap_ros2.reader import read_ros2_messages
-
     topics: dict[str, list[Any]] = {}
-    for message in read_ros2_messages(path, only or None):
-        topics.setdefault(message.channel.topic, []).append(message.ros_msg)
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for _, channel, _, message in reader.iter_decoded_messages(only or None):
+            topics.setdefault(channel.topic, []).append(message)
     return topics
 
 
@@ -76,8 +78,6 @@ def test_topics_and_counts(messages: dict[str, list[Any]], coarse: Params) -> No
 
 
 def test_same_schemas_as_a_lab_writes(recorded: tuple[Path, Interaction], shared: Path) -> None:
-    from mcap.reader import make_reader
-
     def schemas(path: Path) -> dict[str, tuple]:
         with open(path, "rb") as stream:
             summary = make_reader(stream).get_summary()

@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import sys
+import urllib.request
 from pathlib import Path
 
 import pytest
@@ -52,16 +53,19 @@ def nowhere(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def history(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Prefect's empty history, to be copied as a project's .prefect/: a new one takes it seconds.
+    """Prefect's history, to be copied as a project's .prefect/: a new one takes it seconds.
 
-    tests/app/flow/test_server.py has Prefect make one.
+    There is one flow in it, `kept`, and no run.
     """
 
     def make(folder: Path) -> None:
         from app.flow import server
 
-        with server.served(folder):
-            pass
+        with server.served(folder) as url:
+            kept = urllib.request.Request(
+                f"{url}/api/flows/", b'{"name": "kept"}', {"Content-Type": "application/json"}
+            )
+            urllib.request.urlopen(kept).close()
         shutil.rmtree(server.home(folder) / "ui")
 
     return once.folder(tmp_path_factory, "prefect", make) / ".prefect"

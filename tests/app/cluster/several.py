@@ -37,14 +37,13 @@ stages:
     params: [seed]
     outs: ['data/search/${item.band}']
   train:
-    matrix: {band: [a, b]}
-    cmd: python step.py data/train/${item.band} data/search/${item.band}
-    deps: [step.py, 'data/search/${item.band}']
-    outs: ['data/train/${item.band}']
+    cmd: python step.py data/train/b data/search/b
+    deps: [step.py, data/search/b]
+    outs: [data/train/b]
     meta: {gpu: true}
   report:
-    cmd: python step.py report.md data/train/a data/train/b
-    deps: [step.py, data/train]
+    cmd: python step.py report.md data/search/a data/train/b
+    deps: [step.py, data/search/a, data/train]
     outs:
       - report.md: {cache: false}
 """

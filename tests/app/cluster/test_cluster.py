@@ -45,26 +45,23 @@ def test_two_workers_with_copies_of_their_own_make_everything(several: Several) 
         done.result()
     lines = head.errors.splitlines()
     outputs = [one[0] for copy in (several.plain, several.gpu, head) for one in copy.ran]
-    assert sorted(outputs) == sorted(
-        ["data/search/a", "data/search/b", "data/train/a", "data/train/b", "report.md"]
-    )
+    assert sorted(outputs) == ["data/search/a", "data/search/b", "data/train/b", "report.md"]
     assert [one[0] for one in several.plain.ran] in (["data/search/a"], ["data/search/b"])
     trained = [(one[0], one[2]) for one in several.gpu.ran if "train" in one[0]]
-    assert sorted(trained) == [("data/train/a", "cuda:7"), ("data/train/b", "cuda:7")]
+    assert trained == [("data/train/b", "cuda:7")]
     assert [one[0] for one in head.ran] == ["report.md"]  # what Git keeps
-    assert "train@b | makes data/train/b" in lines
+    assert "train | makes data/train/b" in lines
     for copy in (several.plain, several.gpu):
         assert f" in {copy.folder}\n" in "\n".join(lines)
-    # What DVC itself says of the head: nothing to do, and nothing is missing.
+    # What DVC itself says of the head: nothing to do.
     assert "Running stage" not in head("dvc", "repro")
-    assert head("dvc", "status") == "Data and pipelines are up to date.\n"
-    report = "".join(f"seed: 1\ndata/search/{one}\ndata/train/{one}\n" for one in "ab")
-    assert (head.folder / "report.md").read_text() == report + "report.md\n"
+    report = "".join(f"seed: 1\ndata/search/{one}\n" for one in "ab")
+    assert (head.folder / "report.md").read_text() == f"{report}data/train/b\nreport.md\n"
     assert not list((head.folder / ".checkpoints").iterdir())
     # And a third copy can have it all.
     other = head.clone("other")
     (other.folder / "dvc.lock").write_text((head.folder / "dvc.lock").read_text())
-    other("dvc", "pull", "-q", "train@a", "train@b")
+    other("dvc", "pull", "-q", "train")
     assert (other.folder / "data/train/b").read_text() == "seed: 1\ndata/search/b\ndata/train/b\n"
 
 
@@ -152,12 +149,12 @@ def test_in_a_shared_folder_nothing_travels(copies, place, tmp_path: Path) -> No
 def test_what_the_head_alone_has_is_pushed_first(copies, place) -> None:
     head, other = copies
     head("dvc", "repro", "-q", "search@b")
-    ran, lines = run(place(other.folder), "train@b")
+    ran, lines = run(place(other.folder), "train")
     assert ran
     assert [one[0] for one in other.ran] == ["data/train/b"]
     assert any(line.startswith("no worker offers GPU") for line in lines)
     assert (head.folder / "data/train/b").read_text() == "seed: 1\ndata/search/b\ndata/train/b\n"
-    assert "Running stage" not in head("dvc", "repro", "train@b")
+    assert "Running stage" not in head("dvc", "repro", "train")
 
 
 def test_a_copy_with_other_code_is_refused(copies, place) -> None:

@@ -45,9 +45,9 @@ def test_what_differs_in_a_copy_is_named(copies, changes, says) -> None:
 def test_needs_follow_folders(copies) -> None:
     """The report reads the folder in which others write."""
     needs = exchange.needs(copies[0].folder)
-    assert needs["report"].producers == ("train@a", "train@b")
-    assert needs["train@b"].producers == ("search@b",)
-    assert {name for name, one in needs.items() if one.gpu} == {"train@a", "train@b"}
+    assert needs["report"].producers == ("search@a", "train")
+    assert needs["train"].producers == ("search@b",)
+    assert {name for name, one in needs.items() if one.gpu} == {"train"}
     assert {name for name, one in needs.items() if not one.travels} == {"report"}
 
 
@@ -68,11 +68,11 @@ def test_entries_merged_at_once_are_all_there(copies) -> None:
 def test_a_merged_lock_reads_as_one_of_dvcs(copies) -> None:
     """The same bytes, so that Git shows the stages that changed and no others."""
     head = copies[0]
-    head("dvc", "repro", "-q", "train@a", "search@b")
+    head("dvc", "repro", "-q", "train", "search@a")
     lock = head.folder / "dvc.lock"
     before = lock.read_text()
-    entry = exchange.entries(head.folder, ("train@a",))["train@a"]
-    exchange.merge(head.folder, {"train@a": {**entry, "cmd": "another"}})
+    entry = exchange.entries(head.folder, ("train",))["train"]
+    exchange.merge(head.folder, {"train": {**entry, "cmd": "another"}})
     assert lock.read_text() != before
-    exchange.merge(head.folder, {"train@a": entry})
+    exchange.merge(head.folder, {"train": entry})
     assert lock.read_text() == before

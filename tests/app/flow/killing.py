@@ -45,7 +45,7 @@ def main():
     kept = Path(".checkpoints", name)
     count = int(kept.read_text()) if kept.is_file() else 0
     while count < {STEPS}:
-        time.sleep(float(os.environ.get("PACE", 0.1)))
+        time.sleep(float(os.environ.get("PACE", 0.2)))
         count += 1
         write_text(kept, str(count))
         print(f"step {{count}}", flush=True)

@@ -7,12 +7,12 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from threading import Event, Thread
 
 import pytest
 
 from app.flow import child, guard
+from tests.app.flow.serving import until
 from tests.app.flow.toy import Toy, stage
 
 SHELLS = {
@@ -34,13 +34,6 @@ def toy(tmp_path_factory: pytest.TempPathFactory) -> Toy:
 def run(toy: Toy, name: str, lines: list[str] | None = None, **more) -> bool:
     on_line = (lines if lines is not None else []).append
     return child.run_stage(toy.folder, name, environment=toy.environment, on_line=on_line, **more)
-
-
-def until(condition: Callable[[], object], seconds: float = 20.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to pass"
-        time.sleep(0.05)
 
 
 def alive(text: str) -> list[str]:

@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 from app.flow import child, guard
-from tests.app.flow.test_child import until
+from tests.app.flow.serving import until
 
 # Orphans go to the nearest subreaper; here to one that looks at none of them but the guard.
 OUTER = """\

@@ -17,6 +17,7 @@ import pytest
 from app.flow import guard, locks
 from app.flow.child import StageFailed, run_stage
 from tests.app.flow.killing import OUTPUTS, SLING, STEPS, Toy, send, told, wait
+from tests.app.flow.serving import serving
 
 pytestmark = pytest.mark.slow
 READY = 90.0  # s in which a flow must have begun its stages, or ended them, on a busy machine
@@ -47,37 +48,41 @@ def temporaries(toy: Toy) -> list[Path]:
 def test_flows_are_interrupted_and_killed_and_the_next_one_goes_on(toy: Toy, history) -> None:
     """One after the other; of the real stages, to the same bytes: validation/campaigns."""
     shutil.copytree(history, toy.folder / ".prefect")
-    for send_to, number in ((os.killpg, signal.SIGINT), (os.kill, signal.SIGTERM)):
-        before = kept(toy, "a")
-        toy.run.environment["PACE"] = "0.3"
+    interrupted(toy, os.killpg, signal.SIGINT)  # as a terminal does, with a server of its own
+    with serving(toy.folder, {**toy.run.environment, "SLING_TEST_RUN": ""}):
+        interrupted(toy, os.kill, signal.SIGTERM)
+        rng = np.random.default_rng(1)
+        for victim in ("flow", "process"):
+            status = struck(toy, victim, rng)
+            assert toy.run.left() == []
+            assert "Traceback" not in toy.run.said
+            if victim == "flow":
+                assert status == -signal.SIGKILL
+            elif status:  # else it was at its end, or nothing hung on it
+                assert status == 1 and toy.run.said.splitlines()[-1].startswith("error: ")
+        remaining = sum(STEPS - kept(toy, name) for name in "ab")
         flow = toy.run.start(*FLOW)
-        assert wait(lambda: kept(toy, "a") > before + 2, READY), toy.run.said  # noqa: B023
-        send_to(flow.pid, number)  # the first as a terminal does
-        assert flow.wait(guard.GRACE + 25) == 130
-        assert toy.run.left() == []
-        assert "Traceback" not in toy.run.said
-        assert "stages: " not in toy.run.said  # the summary of one that came to its end
-        assert toy.run.said.splitlines()[-1] == "interrupted"
-        rwlock = json.loads((toy.folder / ".dvc/tmp/rwlock").read_text() or "{}")
-        assert not any(rwlock.values())  # so that `dvc repro` goes on too
-        assert kept(toy, "a") > before + 2
-    rng = np.random.default_rng(1)
-    for victim in ("flow", "process"):
-        status = struck(toy, victim, rng)
-        assert toy.run.left() == []
-        assert "Traceback" not in toy.run.said
-        if victim == "flow":
-            assert status == -signal.SIGKILL
-        elif status:  # else it was at its end, or nothing hung on it
-            assert status == 1 and toy.run.said.splitlines()[-1].startswith("error: ")
-    remaining = sum(STEPS - kept(toy, name) for name in "ab")
-    del toy.run.environment["PACE"]
-    flow = toy.run.start(*FLOW)
-    assert flow.wait(READY) == 0, toy.run.said
+        assert flow.wait(READY) == 0, toy.run.said
     assert steps(toy.run.said) == remaining  # from where they were killed
     assert toy.outputs() == OUTPUTS
     assert not temporaries(toy)
     assert "Running stage" not in toy.dvc("repro")
+
+
+def interrupted(toy: Toy, send_to, number: int) -> None:
+    """Start a flow and interrupt it while its stages run."""
+    before = kept(toy, "a")
+    flow = toy.run.start(*FLOW)
+    assert wait(lambda: kept(toy, "a") > before + 1, READY), toy.run.said
+    send_to(flow.pid, number)
+    assert flow.wait(guard.GRACE + 25) == 130
+    assert toy.run.left() == []
+    assert "Traceback" not in toy.run.said
+    assert "stages: " not in toy.run.said  # the summary of one that came to its end
+    assert toy.run.said.splitlines()[-1] == "interrupted"
+    rwlock = json.loads((toy.folder / ".dvc/tmp/rwlock").read_text() or "{}")
+    assert not any(rwlock.values())  # so that `dvc repro` goes on too
+    assert kept(toy, "a") > before + 1
 
 
 def struck(toy: Toy, victim: str, rng: np.random.Generator) -> int:

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
-import signal
-import socket
 import subprocess
 import sys
 import time
-import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,7 +15,7 @@ import pytest
 
 from app.flow import guard, run
 from pipeline.base.errors import UserError
-from tests.app.flow.test_child import until
+from tests.app.flow.serving import ask, serving
 from tests.app.flow.toy import Toy, stage
 
 GPU = {"gpu": True}
@@ -47,31 +43,8 @@ def toy(tmp_path_factory: pytest.TempPathFactory, history: Path) -> Toy:
 @pytest.fixture(scope="module")
 def api(toy: Toy) -> Iterator[str]:
     """The address of Prefect's API, served by `sling ui`."""
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        port = one.getsockname()[1]
-    command = [sys.executable, *SLING, "ui", "--port", str(port)]
-    server = subprocess.Popen(command, cwd=toy.folder, env=toy.environment)
-    address = f"http://127.0.0.1:{port}/api"
-
-    def answers() -> bool:
-        try:
-            return urllib.request.urlopen(f"{address}/health", timeout=5).status == 200
-        except OSError:
-            return False
-
-    until(answers, 90)
-    yield address
-    server.send_signal(signal.SIGINT)
-    server.wait(20)
-
-
-def asked(address: str, body: dict | None = None) -> object:
-    """What Prefect's API answers."""
-    data = None if body is None else json.dumps(body).encode()
-    request = urllib.request.Request(address, data, {"Content-Type": "application/json"})
-    with urllib.request.urlopen(request, timeout=10) as answer:
-        return json.load(answer)
+    with serving(toy.folder, toy.environment) as (url, _):
+        yield f"{url}/api"
 
 
 def sling(toy: Toy, *arguments: str, **exported: str) -> subprocess.CompletedProcess:
@@ -113,9 +86,9 @@ def test_a_whole_flow(toy: Toy, api: str) -> None:
 
     assert toy.dvc("repro") == set()
     assert not (toy.folder / ".gitignore").exists()
-    limit = asked(f"{api}/v2/concurrency_limits/sling-gpu")
+    limit = ask(api, "/v2/concurrency_limits/sling-gpu")
     assert (limit["limit"], limit["active_slots"]) == (1, 0)
-    tasks = asked(f"{api}/task_runs/filter", {})
+    tasks = ask(api, "/task_runs/filter", {})
     assert {one["name"]: one["state_name"] for one in tasks} == dict.fromkeys(NAMES, "Completed")
 
 
@@ -153,7 +126,7 @@ def test_the_next_flow_goes_on_and_an_unchanged_output_ends_it(toy: Toy, api: st
     assert done.stdout.startswith("stages: 1 ran, 3 fresh after all, 0 failed, 0 not run (")
     assert toy.ran() == {"top"}
     assert toy.dvc("repro") == set()
-    tasks = asked(f"{api}/task_runs/filter", {"sort": "EXPECTED_START_TIME_DESC", "limit": 4})
+    tasks = ask(api, "/task_runs/filter", {"sort": "EXPECTED_START_TIME_DESC", "limit": 4})
     assert sorted(one["state_name"] for one in tasks) == ["Completed", "Fresh", "Fresh", "Fresh"]
 
 

@@ -6,14 +6,12 @@ import json
 import os
 import re
 import shutil
-import signal
 import socket
 import subprocess
 import sys
 import time
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
@@ -21,15 +19,10 @@ import pytest
 
 from app.flow import server
 from pipeline.base.errors import UserError
+from tests.app.flow.serving import SECONDS, ask, serving, until
 from tests.project import ROOT
 
 HERE = Path(__file__).parent
-SECONDS = 90.0  # that any wait may last
-SERVE = """
-import sys
-from app.flow.server import serve
-print(serve(sys.argv[1], int(sys.argv[2])))
-"""
 # Prefect's own reading of every setting, in a process that knows only our environment.
 EFFECTIVE = """
 import json, logging, os, sys
@@ -136,54 +129,6 @@ def test_a_port_that_another_program_has_is_refused(tmp_path: Path, monkeypatch)
         server.serve(tmp_path, 70000)
 
 
-def ask(url: str, path: str, content: dict | None = None):
-    """GET, or POST of `content`, as JSON."""
-    data = None if content is None else json.dumps(content).encode()
-    request = urllib.request.Request(
-        f"{url}{path}", data, {"Content-Type": "application/json"} if data else {}
-    )
-    with urllib.request.urlopen(request, timeout=SECONDS) as answer:
-        return json.load(answer)
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as one:
-        return one.getsockname()[1]
-
-
-def until(happens, what: str):
-    """Wait for something true, and give it."""
-    deadline = time.monotonic() + SECONDS
-    while time.monotonic() < deadline:
-        found = happens()
-        if found:
-            return found
-        time.sleep(0.1)
-    raise AssertionError(f"not in time: {what}")
-
-
-@contextmanager
-def serving(root: Path) -> Iterator[tuple[str, subprocess.Popen]]:
-    """`sling ui` in a process that notes its connections, until SIGINT."""
-    with (root / "said").open("w") as said:
-        process = subprocess.Popen(
-            [sys.executable, "-c", SERVE, str(root), str(free_port())],
-            env=environment(CONNECTIONS=str(root / "connections")),
-            stdout=said,
-            stderr=said,
-        )
-    try:
-        url = until(
-            lambda: process.poll() is not None or server.address(root), (root / "said").read_text()
-        )
-        assert isinstance(url, str), (root / "said").read_text()
-        yield url, process
-    finally:
-        process.send_signal(signal.SIGINT)
-        assert process.wait(SECONDS) == 0
-    assert server.address(root) is None and not (root / ".prefect" / "port").exists()
-
-
 def listening(pid: int) -> set[tuple[str, int]]:
     family = [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]
     sockets = [one for process in family for one in process.net_connections("inet")]
@@ -191,10 +136,11 @@ def listening(pid: int) -> set[tuple[str, int]]:
 
 
 @pytest.mark.slow
-def test_the_ui_is_this_projects_alone_and_keeps_its_history(tmp_path: Path) -> None:
+def test_the_ui_is_this_projects_alone_and_keeps_its_history(tmp_path: Path, history) -> None:
     root, other = tmp_path / "mine", tmp_path / "other"
     root.mkdir(), other.mkdir()
-    with serving(root) as (url, process):
+    shutil.copytree(history, root / ".prefect")  # of an earlier server
+    with serving(root, environment(CONNECTIONS=str(root / "connections"))) as (url, process):
         port = int(url.rpartition(":")[2])
         assert listening(process.pid) == {("127.0.0.1", port)}
         assert f"Prefect UI: {url}" in (root / "said").read_text()
@@ -212,11 +158,9 @@ def test_the_ui_is_this_projects_alone_and_keeps_its_history(tmp_path: Path) -> 
             assert text.index(allowed) < text.index("<script") and "Prefect" in text
         settings = ask(url, "/api/admin/settings")["server"]
         assert settings["analytics_enabled"] is settings["ui"]["show_promotional_content"] is False
-        ask(url, "/api/flows/", {"name": "kept"})
+        assert ask(url, "/api/flows/name/kept")["name"] == "kept"
         time.sleep(3)  # Prefect's services begin within a second or two
     assert not (root / "connections").exists(), (root / "connections").read_text()
-    with serving(root) as (url, _):
-        assert ask(url, "/api/flows/name/kept")["name"] == "kept"
 
 
 @pytest.fixture
@@ -248,16 +192,16 @@ def test_a_flows_own_server_shows_it_and_ends_with_it(flow, tmp_path: Path) -> N
         found = ask(url, "/api/artifacts/filter", {})
         return [one for one in found if one["type"] == "progress"]
 
-    (bar,) = until(shown, "progress")
+    (bar,) = until(shown)
     assert (bar["key"], bar["data"]) == ("history-b-m", 50.0)
     assert (
         bar["description"] == "█████░░░░░ · 1/2 rollouts · generation 1 · best 0.5 · 1.0 rollouts/s"
     )
-    said = until(lambda: ask(url, "/api/logs/filter", {}), "logs")
+    said = until(lambda: ask(url, "/api/logs/filter", {}))
     assert "a line of the stage" in {one["message"] for one in said}
     (run,) = ask(url, "/api/flow_runs/filter", {})
     assert run["name"] == "b: m" and bar["flow_run_id"] == run["id"]
     assert listening(flow.pid) == {("127.0.0.1", int(url.rpartition(":")[2]))}
     flow.kill()
-    until(lambda: not alive(url), "the server's end")
+    until(lambda: not alive(url))
     assert not (tmp_path / "connections").exists()

@@ -53,12 +53,13 @@ def test_a_bar_moves_at_most_once_a_second_and_to_its_end(shown, monkeypatch, tm
 
 def test_a_stages_lines_are_logged_and_two_bars_are_told_apart(shown, tmp_path, caplog) -> None:
     seen = reporter.Reporter(STAGE, tmp_path)
-    lines = ["x 1/2 rollouts", "x-robust 1/2 steps", "words"]
+    lines = ["x 1/2 rollouts", "x-robust 1/2 steps", "words", "error: params.yaml: no such file"]
     with caplog.at_level(logging.INFO):
         for line in lines:
             seen(line)
     seen.done()
-    assert [one.message for one in caplog.records if one.name == "task"] == lines
+    said = [(one.levelname, one.message) for one in caplog.records if one.name == "task"]
+    assert said == [*(("INFO", line) for line in lines[:3]), ("ERROR", lines[3])]
     assert [call[:3] for call in shown] == [
         ("create_progress_artifact", 50.0, "x"),
         ("create_progress_artifact", 50.0, "x-robust"),
@@ -69,13 +70,6 @@ def test_what_a_stage_wrote_carries_its_name(shown, monkeypatch, tmp_path) -> No
     monkeypatch.setattr(reporter, "artifact", lambda stage, root: "| a |")
     reporter.Reporter(STAGE, tmp_path).done()
     assert shown == [("create_markdown_artifact", "| a |", "theta-band1-no-work", STAGE.name)]
-
-
-def test_a_clear_line_is_logged_as_an_error(shown, tmp_path, caplog) -> None:
-    reporter.Reporter(STAGE, tmp_path)("error: params.yaml: no such file")
-    assert [(one.levelname, one.message) for one in caplog.records] == [
-        ("ERROR", "error: params.yaml: no such file")
-    ]
 
 
 def test_prefects_failure_is_told_once_and_ends_the_artifacts(
@@ -119,6 +113,7 @@ def test_a_picture_that_cannot_be_drawn_fails_nothing(shown, monkeypatch, tmp_pa
 def test_outside_of_any_task_nothing_is_shown(tmp_path) -> None:
     seen = reporter.Reporter(STAGE, tmp_path)
     seen("x 1/2 rollouts")
+    assert seen._failed
     seen.done()
 
 

@@ -12,9 +12,9 @@ from tests.policy import toy
 SETTINGS = SimpleNamespace(
     seed=1,
     targets=(1.425, 2.425),
-    envs=512,
+    envs=256,
     steps=4,
-    iterations=50,
+    iterations=40,
     hidden=(256, 128, 64),
     learning_rate=1e-3,
     init_std=0.5,

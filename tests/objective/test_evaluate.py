@@ -38,15 +38,11 @@ def simulate(sling, episode, thetas, device):
 
 
 def evaluator(workers: int = 1, **options) -> Evaluator:
-    loss = EpisodeLoss(
-        EPISODE,
-        radius=toy.RADIUS,
-        rest_length=toy.LENGTH,
-        weights={"geom": 1.0, "force": 0.5, "work": 1.0, "taut": 0.0},
-        cutoff=toy.CUTOFF,
-    )
-    options = {"simulate": simulate, **options}
-    return Evaluator(EPISODE, toy.SLING, loss, SPACE, workers=workers, **options)
+    weights = {"geom": 1.0, "force": 0.5, "work": 1.0, "taut": 0.0}
+    sizes = {"radius": toy.RADIUS, "rest_length": toy.LENGTH}
+    loss = EpisodeLoss(EPISODE, weights=weights, cutoff=toy.CUTOFF, **sizes)
+    options = {"workers": workers, "simulate": simulate, **options}
+    return Evaluator(EPISODE, toy.SLING, loss, SPACE, **options)
 
 
 def test_losses_of_a_batch() -> None:
@@ -141,9 +137,8 @@ def test_failures_are_infinite_and_have_a_reason() -> None:
 
 def test_a_failure_counts_twice_the_worst_so_far() -> None:
     penalty = Penalty()
-    np.testing.assert_array_equal(penalty(np.array([1.0, np.inf, 3.0])), [1, 6, 3])
-    np.testing.assert_array_equal(penalty(np.array([2.0, np.inf])), [2, 6])
-    np.testing.assert_array_equal(penalty(np.array([5.0, np.inf])), [5, 10])
+    for total, told in (([1, np.inf, 3], [1, 6, 3]), ([2, np.inf], [2, 6]), ([5, np.inf], [5, 10])):
+        np.testing.assert_array_equal(penalty(np.array(total)), told)
     assert np.isfinite(Penalty()(np.array([np.inf]))).all()
 
 

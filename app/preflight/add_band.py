@@ -13,7 +13,7 @@ from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.representer import RoundTripRepresenter
 
 from app.preflight.check import check_recording
-from app.preflight.report import Report
+from app.preflight.report import CheckReport
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_text
 from pipeline.base.layout import Layout
@@ -91,7 +91,7 @@ def add_band(
     return "\n".join([added, *(f"  - but {caution}" for caution in report.cautions)])
 
 
-def _checked(recording: Path, params: Params, name: str) -> Report:
+def _checked(recording: Path, params: Params, name: str) -> CheckReport:
     report = check_recording(recording, params, params.bands[name])
     if not report.usable:
         raise UserError(f"{recording}: {report.problem}")

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from app.preflight.coverage import by_phase, coverage, over_time
-from app.preflight.report import Report, Topic
+from app.preflight.report import CheckReport, Topic
 from app.preflight.tips import Tips, along, measure_tips
 from app.preflight.verdict import cautions_of
 from pipeline.base.errors import UserError
@@ -36,13 +36,13 @@ ASSUMED = "assumed: give --band, or --diameter and --rest-length"
 class Look:
     """The report, and as much of the recording as could be worked out for those who draw it."""
 
-    report: Report
+    report: CheckReport
     recording: Recording | None = None
     done: Processed | None = None
     tips: Tips | None = None
 
 
-def check_recording(path: Path, params: object, band: object | None = None) -> Report:
+def check_recording(path: Path, params: object, band: object | None = None) -> CheckReport:
     """Look at a recording as far as it can be read.
 
     Args:
@@ -60,7 +60,7 @@ def look_at(path: Path, params: object, band: object | None = None, source: str 
     """As `check_recording`, with what it was told from; `source` says where `band` is from."""
     container = read_container(Path(path))
     about = band or ANY_BAND
-    report = Report(
+    report = CheckReport(
         path=str(path),
         sha256=sha256(path),
         problem=None,
@@ -119,7 +119,7 @@ def band_of(
     return band, f"given, but assumed: {left[0]}" if left else "given"
 
 
-def _whole_look(report: Report, done: Processed, params: object) -> Look:
+def _whole_look(report: CheckReport, done: Processed, params: object) -> Look:
     report.frames = done.geometry.sources
     report.signals = _signal_facts(done.recording, done.signals, done.scene)
     report.delays = _delays(done.delays)
@@ -163,7 +163,7 @@ def _add_roles(topics: list[Topic], recording: Recording) -> None:
         row.notes = list(stream.notes)
 
 
-def _add_signals(report: Report, recording: Recording, band: object, params: object) -> None:
+def _add_signals(report: CheckReport, recording: Recording, band: object, params: object) -> None:
     """What is known of force and motion where only the pictures cannot be used."""
     try:
         geometry = geometry_of(recording, params.setup)

@@ -46,7 +46,7 @@ class Caution:
 
 
 @dataclass
-class Report:
+class CheckReport:
     """Everything `sling check` says; `problem` is None where the recording can be used.
 
     Attributes:

@@ -27,7 +27,7 @@ ROOM = 0.06  # m around the scene
 
 
 @dataclass(frozen=True)
-class Seen:
+class Moment:
     """One moment: seconds since the window's start, the picture, its mask and its cloud."""
 
     name: str
@@ -89,14 +89,14 @@ def moments(scene: Scene) -> dict[str, float]:
     return dict(zip(MOMENTS, when, strict=True))
 
 
-def _seen(look: Look, params: object) -> list[Seen]:
+def _seen(look: Look, params: object) -> list[Moment]:
     done, when = look.done, moments(look.done.scene)
     times = done.clouds.time  # of the pictures that could be decoded
     which = [int(np.argmin(np.abs(times - time))) for time in when.values()]
     numbers = [int(np.argmin(np.abs(done.view.times - times[k]))) for k in which]
     frames = masked_frames(done, params.cloud, numbers)
     return [
-        Seen(name, frame.time, frame.color.copy(), mask, done.clouds.points[k])
+        Moment(name, frame.time, frame.color.copy(), mask, done.clouds.points[k])
         for name, k, (frame, mask) in zip(when, which, frames, strict=True)
     ]
 
@@ -127,7 +127,7 @@ def _overlaid(color: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return cv2.drawContours(large, outlines, -1, MASK, 1)
 
 
-def _cloud(axes: object, done: Processed, one: Seen, a: int, b: int, labels: bool) -> None:
+def _cloud(axes: object, done: Processed, one: Moment, a: int, b: int, labels: bool) -> None:
     scene, hand = done.scene, done.signals.hand(one.time)
     axes.scatter(one.points[:, a], one.points[:, b], s=1.5, color=COLORS[1], linewidths=0)
     for tip in scene.tips:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from app.preflight.report import Caution, Report, Topic
+from app.preflight.report import Caution, CheckReport, Topic
 from pipeline.recording.build import Processed
 from pipeline.recording.signals import Signals
 
@@ -28,7 +28,7 @@ RELEASE = 0.001  # s
 SEEN_AS = {"hanging": "hangs", "drawn": "is drawn", "recoil": "recoils", "swing": "swings"}
 
 
-def cautions_of(report: Report, done: Processed, setup: object) -> list[Caution]:
+def cautions_of(report: CheckReport, done: Processed, setup: object) -> list[Caution]:
     """In the order of a recording's way: file, topics, clocks, force, motion, pictures, frames.
 
     Args:
@@ -48,7 +48,7 @@ def cautions_of(report: Report, done: Processed, setup: object) -> list[Caution]
     ]
 
 
-def _of_file(report: Report) -> Iterator[Caution]:
+def _of_file(report: CheckReport) -> Iterator[Caution]:
     for note in report.notes:
         if "no checksums" in note:
             yield Caution("checksums", note, "let the recorder write chunk CRCs, its default")
@@ -61,7 +61,7 @@ def _of_file(report: Report) -> Iterator[Caution]:
         yield Caution("losses", what, cure)
 
 
-def _of_topics(report: Report, done: Processed) -> Iterator[Caution]:
+def _of_topics(report: CheckReport, done: Processed) -> Iterator[Caution]:
     reliable = "record with reliable QoS to a local disk"
     for row in report.topics:
         if not row.role:
@@ -86,7 +86,7 @@ def _of_rate(row: Topic, roles: list[str]) -> Iterator[Caution]:
         yield Caution("picture_rate", what, "record 30 a second or more")
 
 
-def _of_clocks(report: Report) -> Iterator[Caution]:
+def _of_clocks(report: CheckReport) -> Iterator[Caution]:
     for row in report.topics:
         most = max(SLOW.get(role, BEHIND) for role in (row.role or "").split(", "))
         if row.role and not -most <= row.clock_offset <= AHEAD:
@@ -109,7 +109,7 @@ def _of_clocks(report: Report) -> Iterator[Caution]:
             )
 
 
-def _of_force(report: Report, setup: object) -> Iterator[Caution]:
+def _of_force(report: CheckReport, setup: object) -> Iterator[Caution]:
     facts = report.signals
     hold = float(np.linalg.norm(facts["hold_force_n"]))
     share = facts["noise_n"] / hold
@@ -138,7 +138,7 @@ def _of_force(report: Report, setup: object) -> Iterator[Caution]:
         yield Caution("slip", what, "the band slipped in the pads: grip firmly and record again")
 
 
-def _of_motion(report: Report, signals: Signals, setup: object) -> Iterator[Caution]:
+def _of_motion(report: CheckReport, signals: Signals, setup: object) -> Iterator[Caution]:
     facts = report.signals
     if round(facts["grasp_s"], 2) < LEAD_IN:
         what = f"only {facts['grasp_s']:.2f} s of the empty hand come before the grasp"
@@ -170,7 +170,7 @@ def pause(signals: Signals) -> tuple[float, float]:
     return still, float(abs(0.5 * slope) / max(force.mean(), 1e-9))
 
 
-def _of_pictures(report: Report) -> Iterator[Caution]:
+def _of_pictures(report: CheckReport) -> Iterator[Caution]:
     look = "look at --sheet; nearer camera, more light, another background, or cloud.mask sam3"
     for row in report.phases:
         if row["coverage"] < COVERAGE.get(row["phase"], 0.0):
@@ -206,7 +206,7 @@ def _of_sensor(done: Processed) -> Iterator[Caution]:
         )
 
 
-def _of_frames(report: Report) -> Iterator[Caution]:
+def _of_frames(report: CheckReport) -> Iterator[Caution]:
     facts = report.extrinsics
     if not facts:
         what = "too few pictures of the drawn band tell how far the fork tips are off"

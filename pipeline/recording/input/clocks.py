@@ -42,7 +42,7 @@ TOLERANCE = 0.5  # s between the clocks of two topics
 
 
 @dataclass(frozen=True)
-class Step:
+class Jump:
     """A clock's step.
 
     Attributes:
@@ -80,7 +80,7 @@ def arrival(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
     return np.argsort(log, kind="stable") if disorder else np.arange(len(stamp))
 
 
-def steps(stamp: np.ndarray, log: np.ndarray) -> list[Step]:
+def steps(stamp: np.ndarray, log: np.ndarray) -> list[Jump]:
     """Steps of the stamps' clock alone, in a topic [ns], in the order of arrival."""
     if len(stamp) < 2 * LEAST_AROUND:
         return []
@@ -91,7 +91,7 @@ def steps(stamp: np.ndarray, log: np.ndarray) -> list[Step]:
     delay = log - stamp
     # Messages that had piled up come all at once; their delays say nothing of a clock.
     alone = np.diff(log, prepend=log[0] - period) > PILED * period
-    found: list[Step] = []
+    found: list[Jump] = []
     for i in np.flatnonzero(np.abs(np.diff(delay)) > least) + 1:
         low = max(
             np.searchsorted(arrived, arrived[i] - WINDOW * 1e9), found[-1].index if found else 0
@@ -107,12 +107,12 @@ def steps(stamp: np.ndarray, log: np.ndarray) -> list[Step]:
             continue  # delays, a gap, or log_time's own step
         agrees = abs(leap - size) < max(AGREE * 1e9, period / 4)
         found.append(
-            Step(int(i), int(log[i]), round(leap if agrees else size), period, exact and agrees)
+            Jump(int(i), int(log[i]), round(leap if agrees else size), period, exact and agrees)
         )
     return found
 
 
-def rewinds(stamp: np.ndarray, log: np.ndarray) -> list[Step]:
+def rewinds(stamp: np.ndarray, log: np.ndarray) -> list[Jump]:
     """Steps back of both clocks, in a topic [ns], in the order of the file.
 
     Chunks in another order go back too, but do not cover the same time twice. Nobody sets a clock
@@ -128,18 +128,18 @@ def rewinds(stamp: np.ndarray, log: np.ndarray) -> list[Step]:
             period = _period(stamp)
             size = int(stamp[i] - stamp[i - 1]) - period
             exact = _spread(stamp) < EVEN * period
-            found.append(Step(int(i), int(log[i]), size, period, exact))
+            found.append(Jump(int(i), int(log[i]), size, period, exact))
     return found
 
 
-def without(stamp: np.ndarray, found: list[Step], base: int = 0) -> np.ndarray:
+def without(stamp: np.ndarray, found: list[Jump], base: int = 0) -> np.ndarray:
     """Stamps on the clock that segment `base` (0: before the first step) has."""
     segment = segments(len(stamp), found)
     leaps = np.concatenate([[0], np.cumsum([step.size for step in found], dtype=np.int64)])
     return stamp - (leaps - leaps[base])[segment].astype(np.int64)
 
 
-def segments(count: int, found: list[Step]) -> np.ndarray:
+def segments(count: int, found: list[Jump]) -> np.ndarray:
     """Number of steps before each message, shape (count,)."""
     return np.searchsorted([step.index for step in found], np.arange(count), side="right")
 

@@ -173,7 +173,7 @@ def _take_steps_out(path: Path, raw: dict[str, Raw]) -> None:
         one.late -= sum(step.size < 0 for step in jumps)
 
 
-def _agreed(path: Path, raw: dict[str, Raw], find) -> dict[str, list[clocks.Step]]:
+def _agreed(path: Path, raw: dict[str, Raw], find) -> dict[str, list[clocks.Jump]]:
     """Steps of each role; those at one time have the size that the fastest topic tells."""
     found = {role: find(one.stamp, one.log) for role, one in raw.items()}
     found = {role: steps for role, steps in found.items() if steps}

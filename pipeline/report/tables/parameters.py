@@ -46,7 +46,7 @@ class Value:
 
 
 @dataclass(frozen=True)
-class Row:
+class IdentifiedRow:
     """Parameters of one method on one band in the order of THETA, and the printed loss there."""
 
     band: str
@@ -56,7 +56,7 @@ class Row:
     loss: float
 
 
-def identified(results: Results, params) -> list[Row]:
+def identified(results: Results, params) -> list[IdentifiedRow]:
     """Table 2: the paper's methods and every other that ran, those of tables 3 and 4 last."""
     rows = []
     for band in dict.fromkeys([*paper.BANDS, *results.methods]):
@@ -66,13 +66,17 @@ def identified(results: Results, params) -> list[Row]:
             if method in ran:
                 source = RECORDED[params.bands[band].source]
                 values = [_value(params, ran[method], name) for name in THETA]
-                rows.append(Row(band, method, source, values, printed_loss(ran[method])))
+                rows.append(IdentifiedRow(band, method, source, values, printed_loss(ran[method])))
             else:
-                rows.append(Row(band, method, NOT_RUN, [Value(math.nan)] * len(THETA), math.nan))
+                rows.append(
+                    IdentifiedRow(band, method, NOT_RUN, [Value(math.nan)] * len(THETA), math.nan)
+                )
             cells = paper.THETA.get((paper.BANDS.get(band), paper.METHODS.get(method)))
             if cells:
                 *values, loss = cells
-                rows.append(Row(band, method, PAPER, [Value(value) for value in values], loss))
+                rows.append(
+                    IdentifiedRow(band, method, PAPER, [Value(value) for value in values], loss)
+                )
     return rows
 
 
@@ -103,7 +107,7 @@ def at_edge(value: float, name: str, box: Space) -> bool:
     return not 0.01 <= (value - low) / (high - low) <= 0.99
 
 
-def as_table(rows: list[Row], styles: Styles) -> Table:
+def as_table(rows: list[IdentifiedRow], styles: Styles) -> Table:
     """Parameters with their intervals; bold: the least loss of a band."""
     losses: dict[tuple[str, str], list[float]] = {}
     for row in rows:
@@ -153,7 +157,7 @@ def _physical(name: str, value: float, digits: int = 2) -> str:
     return f"{value:.{digits}f}"
 
 
-def records(rows: list[Row]) -> pd.DataFrame:
+def records(rows: list[IdentifiedRow]) -> pd.DataFrame:
     """The same for machines: a line a row; empty: not known."""
     lines = []
     for row in rows:

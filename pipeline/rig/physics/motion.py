@@ -27,7 +27,7 @@ WANDER_BAND = 0.1, 1.5  # Hz
 
 
 @dataclass(frozen=True)
-class Motion:
+class HandMotion:
     """Path of the tool centre point and state of the fingers.
 
     Attributes:
@@ -49,7 +49,7 @@ class Motion:
         tracking_error: float,
         opening_time: float,
         rng: np.random.Generator,
-    ) -> Motion:
+    ) -> HandMotion:
         """Grasp the middle where it hangs (3,), lift it to the tips, pull, let go, retreat.
 
         Args:

@@ -28,7 +28,7 @@ EDGE = 0.03  # m between neighbours, from which on pixels are unsure
 
 
 @dataclass(frozen=True)
-class Picture:
+class Exposure:
     """RGB from 0 to 1 (H, W, 3), and depth along the optical axis (H, W) [m], inf for nothing.
 
     Where something moved during the exposure, `depth` is what was seen for longest, `nearest` and
@@ -42,7 +42,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Camera:
+class VirtualCamera:
     """A pinhole camera in frame O.
 
     Attributes:
@@ -67,9 +67,9 @@ class Camera:
         size = (round(WIDTH * scale), round(HEIGHT * scale))
         return cls(position, Rotation.from_matrix(axes), focal * scale, size)
 
-    def misplaced(self, settings: RigCamera, rng: np.random.Generator) -> Camera:
+    def misplaced(self, settings: RigCamera, rng: np.random.Generator) -> VirtualCamera:
         """Where a calibration with small errors believes the camera to be."""
-        return Camera(
+        return VirtualCamera(
             self.position + settings.translation_error * direction(rng),
             self.rotation * Rotation.from_rotvec(settings.rotation_error * direction(rng)),
             self.focal,
@@ -91,7 +91,7 @@ class Camera:
         origins = np.broadcast_to(self.position, local.shape)
         return np.concatenate([origins, directions], axis=-1).astype(np.float32)
 
-    def see(self, mesh: Mesh) -> Picture:
+    def see(self, mesh: Mesh) -> Exposure:
         """The mesh alone before nothing."""
         import open3d as o3d
 
@@ -110,7 +110,7 @@ class Camera:
         color = np.zeros((*depth.shape, 3), np.float32)
         depth[window] = reached
         color[window][seen] = albedo * (AMBIENT + (1 - AMBIENT) * bright)[:, None]
-        return Picture(color, depth, depth, depth)
+        return Exposure(color, depth, depth, depth)
 
     def window(self, points: np.ndarray) -> tuple[slice, slice]:
         """Rows and columns that can see what lies between points (V, 3); all if some are behind."""
@@ -123,20 +123,20 @@ class Camera:
         return slice(top, bottom), slice(left, right)
 
 
-def nearer(first: Picture, second: Picture) -> Picture:
+def nearer(first: Exposure, second: Exposure) -> Exposure:
     """Both pictures of one camera as one."""
     hidden = second.depth < first.depth
     depth = np.where(hidden, second.depth, first.depth)
     color = np.where(hidden[..., None], second.color, first.color)
-    return Picture(color, depth, depth, depth)
+    return Exposure(color, depth, depth, depth)
 
 
-def blurred(instants: list[Picture]) -> Picture:
+def blurred(instants: list[Exposure]) -> Exposure:
     """Pictures of equally long parts of one exposure as one."""
     if len(instants) == 1:
         return instants[0]
     depths = np.stack([one.depth for one in instants])
-    return Picture(
+    return Exposure(
         np.mean([one.color for one in instants], axis=0),
         np.sort(depths, axis=0)[len(depths) // 2],
         depths.min(axis=0),
@@ -150,7 +150,7 @@ def exposed(color: np.ndarray, settings: RigCamera, rng: np.random.Generator) ->
     return np.clip(255 * color + noise, 0, 255).astype(np.uint8)
 
 
-def measured_depth(picture: Picture, settings: RigCamera, rng: np.random.Generator) -> np.ndarray:
+def measured_depth(picture: Exposure, settings: RigCamera, rng: np.random.Generator) -> np.ndarray:
     """Millimetres as a time-of-flight camera gives them, 0: none; uint16 (H, W).
 
     Noise grows with the square of the distance; where two surfaces share a pixel, at an edge or

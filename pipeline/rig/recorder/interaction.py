@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.base.errors import UserError
-from pipeline.rig.physics.motion import END, GRASP, OPEN, Motion
+from pipeline.rig.physics.motion import END, GRASP, OPEN, HandMotion
 from pipeline.rig.physics.string import ElasticString
 from pipeline.rig.physics.world import bent_at
 from pipeline.rig.recorder.servo import Servo
@@ -51,7 +51,7 @@ def hang(string: ElasticString, tolerance: float) -> np.ndarray:
 def pull_and_release(
     string: ElasticString,
     hanging: np.ndarray,
-    motion: Motion,
+    motion: HandMotion,
     sensor_times: np.ndarray,
     camera_times: np.ndarray,
     params: Params,

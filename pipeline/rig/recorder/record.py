@@ -12,13 +12,13 @@ from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
 from pipeline.base.files import replacing
-from pipeline.rig.physics.motion import END, Motion
+from pipeline.rig.physics.motion import END, HandMotion
 from pipeline.rig.physics.robot import SENSOR_LEVER, Robot
 from pipeline.rig.physics.scene import arm, joined, room, tube
 from pipeline.rig.physics.string import ElasticString
 from pipeline.rig.physics.world import string_of
 from pipeline.rig.recorder import camera as eye
-from pipeline.rig.recorder.camera import Camera
+from pipeline.rig.recorder.camera import VirtualCamera
 from pipeline.rig.recorder.interaction import Interaction, hang, pull_and_release
 from pipeline.rig.recorder.mcap_writer import BagWriter
 from pipeline.rig.recorder.sensors import wrench
@@ -59,7 +59,7 @@ def record(
 
     hanging = hang(string, rig.tolerance)
     middle = hanging[string.middle]
-    motion = Motion.through(middle, rig.tracking_error, setup.finger_opening_time, motion_rng)
+    motion = HandMotion.through(middle, rig.tracking_error, setup.finger_opening_time, motion_rng)
     times = np.arange(round(END * SENSOR_RATE)) / SENSOR_RATE
     frames = eye.FIRST_FRAME + np.arange(int((END - eye.FIRST_FRAME) * eye.RATE)) / eye.RATE
     frames = frames[camera_rng.random(len(frames)) >= rig.camera.drop_rate]
@@ -69,7 +69,7 @@ def record(
 
     bag = BagWriter()
     look = np.array(rig.camera.position), np.array(rig.camera.target)
-    camera = Camera.looking(*look, rig.camera.focal, picture_scale)
+    camera = VirtualCamera.looking(*look, rig.camera.focal, picture_scale)
     add_frames(bag, robot, camera.misplaced(rig.camera, camera_rng))
     clocks = clock_rng.spawn(4)
     add_gripper(bag, Clock(rig.clock, clocks[0]), motion)
@@ -98,7 +98,7 @@ def record(
     return happened
 
 
-def instants_of(lines: np.ndarray, camera: Camera) -> np.ndarray:
+def instants_of(lines: np.ndarray, camera: VirtualCamera) -> np.ndarray:
     """As many instants of one exposure as it takes that the band moves by two pixels between them.
 
     Args:
@@ -140,7 +140,7 @@ class Clock:
         return self.stamped, self.received
 
 
-def add_frames(bag: BagWriter, robot: Robot, believed: Camera) -> None:
+def add_frames(bag: BagWriter, robot: Robot, believed: VirtualCamera) -> None:
     """/tf_static: fork to base to camera as calibrated, hand to force sensor."""
 
     def transform(parent: str, child: str, position: np.ndarray, rotation: Rotation) -> Any:
@@ -157,7 +157,7 @@ def add_frames(bag: BagWriter, robot: Robot, believed: Camera) -> None:
     bag.add("/tf_static", bag.make("tf2_msgs/TFMessage", frames), EPOCH, EPOCH)
 
 
-def add_gripper(bag: BagWriter, clock: Clock, motion: Motion) -> None:
+def add_gripper(bag: BagWriter, clock: Clock, motion: HandMotion) -> None:
     for i in range(round(END * GRIPPER_RATE)):
         time = i / GRIPPER_RATE
         stamp, received = clock(time)
@@ -188,9 +188,9 @@ def add_wrench(bag: BagWriter, clock: Clock, times: np.ndarray, wrenches: np.nda
 def add_picture(
     bag: BagWriter,
     clock: Clock,
-    camera: Camera,
+    camera: VirtualCamera,
     time: float,
-    picture: eye.Picture,
+    picture: eye.Exposure,
     params: Params,
     rng: np.random.Generator,
 ) -> None:
@@ -216,7 +216,7 @@ def add_picture(
     bag.add(depth_topic, image(header, "16UC1; compressedDepth png", framed), stamp, received)
 
 
-def camera_info(bag: BagWriter, header: Any, camera: Camera) -> Any:
+def camera_info(bag: BagWriter, header: Any, camera: VirtualCamera) -> Any:
     (cx, cy), f = camera.center, camera.focal
     return bag.make(
         "sensor_msgs/CameraInfo",

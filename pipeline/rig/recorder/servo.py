@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pipeline.rig.physics.motion import Motion
+from pipeline.rig.physics.motion import HandMotion
 
 if TYPE_CHECKING:
     from pipeline.params import RigArm
@@ -38,7 +38,7 @@ class Servo:
         damping = 2 * arm.damping_ratio * np.sqrt(arm.stiffness * arm.mass)
         return cls(arm.mass, arm.stiffness, float(damping))
 
-    def following(self, motion: Motion) -> Follower:
+    def following(self, motion: HandMotion) -> Follower:
         return Follower(self, motion)
 
 
@@ -47,7 +47,7 @@ class Follower:
     """The hand on its way along a path."""
 
     servo: Servo
-    motion: Motion
+    motion: HandMotion
 
     def __call__(
         self, time: np.ndarray | float, x: np.ndarray, v: np.ndarray, force: np.ndarray

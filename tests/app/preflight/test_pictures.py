@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from app.preflight.check import Look
-from app.preflight.report import Report
+from app.preflight.report import CheckReport
 from app.preflight.sheet import MOMENTS, draw_sheet, masked_frames, moments
 from app.preflight.timeline import write_timeline
 from pipeline.base.errors import UserError
@@ -60,7 +60,7 @@ def test_a_refused_recording_shows_what_it_has(with_rerun, refused, params, tmp_
 
 
 def test_nothing_to_show_is_said(with_rerun, params, tmp_path) -> None:
-    look = Look(Report("x.mcap", "", "no force", [], []))
+    look = Look(CheckReport("x.mcap", "", "no force", [], []))
     for function, name in ((draw_sheet, "a.png"), (write_timeline, "a.rrd")):
         assert "nothing in the recording" in function(look, params, tmp_path / name)
     assert not list(tmp_path.iterdir())

@@ -11,8 +11,8 @@ from pipeline.rig.physics.scene import Mesh, tube
 from pipeline.rig.recorder.camera import (
     AMBIENT,
     LIGHT,
-    Camera,
-    Picture,
+    Exposure,
+    VirtualCamera,
     blurred,
     measured_depth,
     nearer,
@@ -24,16 +24,16 @@ RADIUS = np.full(30, 0.005)
 
 
 @pytest.fixture
-def camera() -> Camera:
-    return Camera.looking(np.array([0.0, 0.8, 0.3]), np.zeros(3), 495.0)
+def camera() -> VirtualCamera:
+    return VirtualCamera.looking(np.array([0.0, 0.8, 0.3]), np.zeros(3), 495.0)
 
 
-def wall(camera: Camera, distance: float) -> Picture:
+def wall(camera: VirtualCamera, distance: float) -> Exposure:
     depth = np.full(camera.size[::-1], distance, np.float32)
-    return Picture(np.zeros((*depth.shape, 3), np.float32), depth, depth, depth)
+    return Exposure(np.zeros((*depth.shape, 3), np.float32), depth, depth, depth)
 
 
-def test_a_window_sees_what_all_rays_see(camera: Camera) -> None:
+def test_a_window_sees_what_all_rays_see(camera: VirtualCamera) -> None:
     """Every ray that hits lies in it."""
     mesh = tube(LINE, RADIUS, (1.0, 0.0, 0.0))
     rows, columns = camera.window(mesh.vertices)
@@ -53,13 +53,15 @@ def test_light_is_lamberts(angle: float) -> None:
     across = np.cross(normal, [0.0, 0.0, 1.0])
     corners = np.array([across, np.cross(normal, across), -across])
     mesh = Mesh(corners, np.array([[0, 1, 2]]), np.array([[0.8, 0.5, 0.1]]))
-    seen = Camera.looking(0.7 * normal + corners.mean(axis=0), corners.mean(axis=0), 495.0, 0.1)
+    seen = VirtualCamera.looking(
+        0.7 * normal + corners.mean(axis=0), corners.mean(axis=0), 495.0, 0.1
+    )
     color = seen.see(mesh).color[24, 32]
     bright = AMBIENT + (1 - AMBIENT) * max(np.cos(angle), 0)
     np.testing.assert_allclose(color, bright * np.array([0.8, 0.5, 0.1]), rtol=1e-4)
 
 
-def test_a_fast_band_is_smeared_and_loses_depth(camera: Camera, params: Params) -> None:
+def test_a_fast_band_is_smeared_and_loses_depth(camera: VirtualCamera, params: Params) -> None:
     """32 mm of way in one exposure, of a band 10 mm thick: no pixel shows it longer than not."""
     ways = np.linspace(-0.016, 0.016, 9)
     seen = [
@@ -79,7 +81,7 @@ def test_a_fast_band_is_smeared_and_loses_depth(camera: Camera, params: Params) 
     assert 0.05 < flying.mean() < 0.25
 
 
-def test_an_exposure_has_as_many_instants_as_the_band_moves(camera: Camera) -> None:
+def test_an_exposure_has_as_many_instants_as_the_band_moves(camera: VirtualCamera) -> None:
     still = np.repeat(LINE[None], INSTANTS, axis=0)
     assert instants_of(still, camera).shape == (1, 30, 3)
     moving = still + np.linspace(0, 0.03, INSTANTS)[:, None, None] * [0, 0, 1]

@@ -9,10 +9,10 @@ import pytest
 
 from pipeline.params import Params
 from pipeline.rig.physics import launch as launches
-from pipeline.rig.physics.motion import OPEN, Motion
+from pipeline.rig.physics.motion import OPEN, HandMotion
 from pipeline.rig.physics.robot import SENSOR_LEVER, Robot
 from pipeline.rig.physics.world import bent_at, string_of
-from pipeline.rig.recorder.camera import Camera, Picture, measured_depth
+from pipeline.rig.recorder.camera import Exposure, VirtualCamera, measured_depth
 from pipeline.rig.recorder.interaction import Interaction
 from pipeline.rig.recorder.record import radius
 from pipeline.rig.recorder.sensors import TOOL_CENTER, wrench
@@ -48,20 +48,22 @@ def test_depth(params: Params) -> None:
     settings, rng = params.rig.camera, np.random.default_rng(0)
     for distance in (1.0, 2.0):
         flat = np.full((480, 640), distance, np.float32)
-        depth = measured_depth(Picture(np.zeros((480, 640, 3)), flat, flat, flat), settings, rng)
+        depth = measured_depth(Exposure(np.zeros((480, 640, 3)), flat, flat, flat), settings, rng)
         there = depth[depth > 0] / 1000
         deviation = np.hypot(settings.depth_noise * distance**2, 1e-3 / np.sqrt(12))
         assert np.isclose(there.std(), deviation, rtol=0.02)
         assert np.isclose(there.mean(), distance, atol=1e-4)
         assert np.isclose((depth == 0).mean(), settings.dropout, rtol=0.15)
     flat = np.full((480, 640), 1.01 * settings.range, np.float32)
-    beyond = Picture(np.zeros((480, 640, 3)), flat, flat, flat)
+    beyond = Exposure(np.zeros((480, 640, 3)), flat, flat, flat)
     assert not measured_depth(beyond, settings, rng).any()
 
 
 def test_calibration(params: Params) -> None:
     settings = params.rig.camera
-    camera = Camera.looking(np.array(settings.position), np.array(settings.target), settings.focal)
+    camera = VirtualCamera.looking(
+        np.array(settings.position), np.array(settings.target), settings.focal
+    )
     believed = camera.misplaced(settings, np.random.default_rng(0))
     off = np.linalg.norm(believed.position - camera.position)
     turned = (camera.rotation.inv() * believed.rotation).magnitude()
@@ -72,7 +74,7 @@ def test_calibration(params: Params) -> None:
 def test_the_wander_is_as_large_as_stated(params: Params) -> None:
     error = params.rig.tracking_error
     still, wanders = (
-        Motion.through(np.array([0.0, 0.0, -0.2]), size, 0.004, np.random.default_rng(0))
+        HandMotion.through(np.array([0.0, 0.0, -0.2]), size, 0.004, np.random.default_rng(0))
         for size in (0.0, error)
     )
     time = np.linspace(0, 1000, 50_000)  # many turns; the path itself stays where it ends

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 
 from pipeline.params import Params
-from pipeline.rig.physics.motion import END, Motion
+from pipeline.rig.physics.motion import END, HandMotion
 from pipeline.rig.recorder.servo import Servo
 
 MASS, STIFFNESS, DAMPING = 5.0, 12000.0, 200.0
 
 
 @pytest.fixture
-def motion() -> Motion:
+def motion() -> HandMotion:
     rng = np.random.default_rng(0)
-    return Motion.through(np.array([0.0, 0.0, -0.2]), 0.0, 0.004, rng)
+    return HandMotion.through(np.array([0.0, 0.0, -0.2]), 0.0, 0.004, rng)
 
 
-def test_it_swings_back_like_an_oscillator(motion: Motion) -> None:
+def test_it_swings_back_like_an_oscillator(motion: HandMotion) -> None:
     """Let go 1 mm off its path, at rest: the textbook's damped cosine."""
     follow = Servo(MASS, STIFFNESS, DAMPING).following(motion)
     start, offset = 9.4, np.array([1e-3, 2e-3, -1e-3])
@@ -32,7 +32,7 @@ def test_it_swings_back_like_an_oscillator(motion: Motion) -> None:
     np.testing.assert_allclose(found[:, :3] - place, shape * offset, atol=1e-8)
 
 
-def test_without_a_load_it_stays_on_a_path_that_moves(motion: Motion) -> None:
+def test_without_a_load_it_stays_on_a_path_that_moves(motion: HandMotion) -> None:
     follow, times = Servo(MASS, STIFFNESS, DAMPING).following(motion), np.linspace(2.5, 5.5, 40)
     start = np.concatenate([motion.position(2.5), motion.position(2.5, 1)])
     found = follow.alone(start, times, 1e-9)
@@ -40,14 +40,14 @@ def test_without_a_load_it_stays_on_a_path_that_moves(motion: Motion) -> None:
     np.testing.assert_allclose(found[:, 3:], motion.position(times, 1), atol=1e-6)
 
 
-def test_a_steady_load_pushes_it_aside_by_its_stiffness(motion: Motion) -> None:
+def test_a_steady_load_pushes_it_aside_by_its_stiffness(motion: HandMotion) -> None:
     follow = Servo(MASS, STIFFNESS, DAMPING).following(motion)
     load = np.array([0.0, 12.0, -1.0])
     aside = motion.position(7.0) + load / STIFFNESS
     np.testing.assert_allclose(follow(7.0, aside, np.zeros(3), load), 0, atol=1e-9)
 
 
-def test_columns_are_states(motion: Motion) -> None:
+def test_columns_are_states(motion: HandMotion) -> None:
     """Many states at one time, and one state at many times, are each alone."""
     follow, rng = Servo(MASS, STIFFNESS, DAMPING).following(motion), np.random.default_rng(1)
     x, v, load = rng.normal(size=(3, 3, 7))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -16,27 +17,23 @@ def test_the_papers_cutoff_is_the_same_frequency_at_any_rate() -> None:
     assert cutoff_hz(12.0, "Hz") == 12.0
 
 
-@pytest.mark.parametrize("rate", [1000.0, 333.0])
-@pytest.mark.parametrize("frequency", [5.0, 35.65, 80.0])
-def test_lowpass_has_the_gain_of_butterworth_squared_and_no_delay(rate, frequency) -> None:
+def test_lowpass_has_the_gain_of_butterworth_squared_and_no_delay() -> None:
     cutoff = 35.65
-    t = np.arange(0, 4, 1 / rate)
-    # Second order, bilinear transform, forwards and backwards.
-    ratio = math.tan(math.pi * frequency / rate) / math.tan(math.pi * cutoff / rate)
-    gain = 1 / (1 + ratio**4)
-    wave = np.sin(math.tau * frequency * t)
-    middle = slice(len(t) // 4, -len(t) // 4)
-    np.testing.assert_allclose(lowpass(wave, rate, cutoff)[middle], gain * wave[middle], atol=2e-3)
+    for rate, frequency in product((1000.0, 333.0), (5.0, 35.65, 80.0)):
+        t = np.arange(0, 4, 1 / rate)
+        # Second order, bilinear transform, forwards and backwards.
+        ratio = math.tan(math.pi * frequency / rate) / math.tan(math.pi * cutoff / rate)
+        wave = np.sin(math.tau * frequency * t)
+        inside = slice(len(t) // 4, -len(t) // 4)
+        expected = wave[inside] / (1 + ratio**4)
+        np.testing.assert_allclose(lowpass(wave, rate, cutoff)[inside], expected, atol=2e-3)
 
 
-def test_lowpass_treats_each_column_alike_and_keeps_constants() -> None:
+def test_lowpass_treats_columns_alike_and_keeps_what_it_cannot_filter() -> None:
+    """A constant; and everything, where the cutoff lies beyond Nyquist's frequency."""
     x = np.random.default_rng(0).normal(size=(500, 3))
     np.testing.assert_allclose(lowpass(x, 1000, 35)[:, 1], lowpass(x[:, 1], 1000, 35))
     np.testing.assert_allclose(lowpass(np.full(500, 3.0), 1000, 35), 3.0)
-
-
-def test_lowpass_beyond_nyquist_changes_nothing() -> None:
-    x = np.random.default_rng(0).normal(size=50)
     np.testing.assert_array_equal(lowpass(x, 60, 35), x)
 
 

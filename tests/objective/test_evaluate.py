@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.objective import session
-from pipeline.objective.evaluate import Evaluator, Penalty
+from pipeline.objective.evaluate import Evaluator
 from pipeline.objective.loss import TERMS, EpisodeLoss
 from pipeline.objective.space import Space
 from pipeline.params import load
@@ -133,13 +133,6 @@ def test_failures_are_infinite_and_have_a_reason() -> None:
     assert found.failure == ["too far", "the loss is not finite", None]
     np.testing.assert_array_equal(np.isinf(found.total), [True, True, False])
     assert np.isnan(found.terms["geom"][:2]).all()
-
-
-def test_a_failure_counts_twice_the_worst_so_far() -> None:
-    penalty = Penalty()
-    for total, told in (([1, np.inf, 3], [1, 6, 3]), ([2, np.inf], [2, 6]), ([5, np.inf], [5, 10])):
-        np.testing.assert_array_equal(penalty(np.array(total)), told)
-    assert np.isfinite(Penalty()(np.array([np.inf]))).all()
 
 
 def test_an_unknown_band_or_method_is_refused() -> None:

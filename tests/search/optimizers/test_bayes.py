@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import norm
 
-from pipeline.search.loop import latin_hypercube
-from pipeline.search.optimizers.bayes import Bayes, greedy, standardised, training_rows
+from pipeline.search.optimizers.bayes import greedy, standardised, training_rows
 from tests.search.functions import CENTRE, NAMES, Evaluate, alone, changed, correlated, quadratic
 
 POPULATION = 12
@@ -65,11 +64,6 @@ def test_it_goes_round_a_part_that_fails() -> None:
         assert np.isinf(history.total[:20]).any()
         assert np.isinf(history.total[-60:]).mean() < 0.1
         assert history.total.min() - 1 < (np.median(random) - 1) / 3
-
-
-def test_its_first_batch_is_the_latin_hypercube() -> None:
-    optimizer = Bayes(4, rollouts=100, seed=3, population=10)
-    np.testing.assert_array_equal(optimizer.ask(), latin_hypercube(4, 10, 3))
 
 
 def points(seed: int = 1, threads: int = 1) -> np.ndarray:

@@ -44,9 +44,8 @@ def test_the_explorer_moves_as_params_say() -> None:
     assert not np.array_equal(*second)
 
 
-def test_a_class_of_ones_own_spends_its_budget() -> None:
-    history = alone(OWN, Evaluate(rosenbrock), 50)
-    assert len(history.total) == 50
+def test_a_class_of_ones_own_gets_its_settings() -> None:
+    history = alone(OWN, Evaluate(rosenbrock), 20)
     assert set(history.table["phase"].to_pylist()) == {"random"}
     assert explorer(*method(search=OWN, settings={"batch": 3}), 4, 60).ask().shape == (3, 4)
 

@@ -72,10 +72,8 @@ def test_its_points_are_those_of_scipy(
         one.tell(((asked - 0.3) ** 2).sum(axis=1))
 
 
-def test_its_first_generation_is_the_common_latin_hypercube() -> None:
-    """Each of 24 strata of each parameter holds one agent."""
+def test_its_first_generation_has_one_agent_in_each_stratum() -> None:
     asked = Evolution(5, rollouts=48, seed=4, population=24).ask()
-    np.testing.assert_array_equal(asked, latin_hypercube(5, 24, 4))
     strata = np.sort(np.floor(asked * 24).astype(int), axis=0)
     np.testing.assert_array_equal(strata, np.tile(np.arange(24)[:, None], 5))
 

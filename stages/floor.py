@@ -30,8 +30,8 @@ def main() -> None:
         starts = [least_sensitive_draw(landing_map, target) for target in targets]
         draws = world.hits(targets, starts)
         floor = errors_of(draws, world.landings(draws, trial_numbers(params)), params)
-    for target, one in floor["targets"].items():
-        if one["mean_error_m"] is None:
+    for target, error in floor["targets"].items():
+        if error["mean_error_m"] is None:
             print(
                 f"warning: {band}: no launch lands at {target} m, which has no floor; raise"
                 " setup.max_force, widen setup.draw_y and setup.draw_z, or move trials.targets",
@@ -47,8 +47,8 @@ def main() -> None:
     }
     write_json(Layout().floor(band), content)
     mean, landed = floor["mean_error_m"], floor["launches"] - floor["failed"]
-    said = "no launch lands" if mean is None else f"{100 * mean:.2f} cm over {landed} launches"
-    print(f"{band}: floor {said}")
+    summary = "no launch lands" if mean is None else f"{100 * mean:.2f} cm over {landed} launches"
+    print(f"{band}: floor {summary}")
 
 
 if __name__ == "__main__":

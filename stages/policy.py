@@ -46,8 +46,9 @@ def main() -> None:
         seed=params.policy.seed,
     )
     kept = Path(".checkpoints/policy", f"{band}-{method}.pt")
-    told = Progress(f"policy-{band}-{method}", params.policy.iterations, "iterations", every=EVERY)
-    plain = train(surface_of([landing_map]), params.policy, kept, told)
+    title = f"policy-{band}-{method}"
+    progress = Progress(title, params.policy.iterations, "iterations", every=EVERY)
+    plain = train(surface_of([landing_map]), params.policy, kept, progress)
     checked = check(plain.policy, launcher, params)
     training = figures(plain, checked)
 
@@ -75,8 +76,8 @@ def _robust(folder: Path, plain: Policy, samples: np.ndarray, launcher, about) -
     middle = plain.draws(np.mean(params.policy.targets, keepdims=True))[0]
     maps = robust.robust_maps(launcher, samples, middle, params)
     title = f"policy-{about['band']}-{about['method']}-robust"
-    told = Progress(title, robust.STEPS, "steps", every=EVERY)
-    trained = robust.refine(plain, surface_of(maps, error), params.policy, told)
+    progress = Progress(title, robust.STEPS, "steps", every=EVERY)
+    trained = robust.refine(plain, surface_of(maps, error), params.policy, progress)
     checked = check(trained.policy, launcher, params)
     expected = [check_expected(one, launcher, samples, params) for one in (trained.policy, plain)]
     training = robust_figures(trained, checked, *expected, len(maps), error)

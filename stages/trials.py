@@ -55,8 +55,8 @@ def main() -> None:
         recorded=recorded_stretch(episode, fork_width, about.rest_length),
     )
     trials.save(table, layout.trials(band, method))
-    said = [" ".join(filter(None, (g.kind, g.policy, str(len(g.draws))))) for g in batches]
-    print(f"{band} {method}: launches: {', '.join(said)}")
+    counts = [" ".join(filter(None, (b.kind, b.policy, str(len(b.draws))))) for b in batches]
+    print(f"{band} {method}: launches: {', '.join(counts)}")
 
 
 def _launch(band: str, draw: np.ndarray, number: int) -> Trial:

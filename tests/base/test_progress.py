@@ -81,27 +81,13 @@ def test_a_terminal_has_a_bar(clock, capsys, monkeypatch: pytest.MonkeyPatch) ->
     assert whole.startswith(f"x [{'#' * 30}] 2/2 rollouts") and whole.endswith("\n")
 
 
-@pytest.mark.parametrize(
-    "step",
-    [
-        Step("history-band1-de", 4, 12, "rollouts", ("generation 0", "best 0.5", "recalled")),
+def test_what_is_told_is_read_back_and_other_lines_are_no_steps() -> None:
+    facts = ("generation 0", "best 0.5", "recalled")
+    for step in (
+        Step("history-band1-de", 4, 12, "rollouts", facts),
         Step("policy-b-x-robust", 0, 1, "steps"),
-    ],
-)
-def test_what_is_told_is_read_back(step: Step) -> None:
-    assert parse(f"{step}\n") == step
-
-
-@pytest.mark.parametrize(
-    "line",
-    [
-        "",
-        "band1 de: loss 0.3",
-        "picture 3 of 9",
-        "x 3/2 rollouts",
-        "x 0/0 rollouts",
-        "1/2 rollouts",
-    ],
-)
-def test_other_lines_are_no_steps(line: str) -> None:
-    assert parse(line) is None
+    ):
+        assert parse(f"{step}\n") == step
+    for line in ("", "band1 de: loss 0.3", "picture 3 of 9", "x 3/2 rollouts", "x 0/0 rollouts"):
+        assert parse(line) is None
+    assert parse("1/2 rollouts") is None

@@ -7,8 +7,8 @@ setup: .venv/ready
 .venv/ready: pyproject.toml constraints.txt tools/setup.sh
 	@bash tools/setup.sh
 
-run: setup            # everything that is stale, by the budget of params.yaml
-	PATH="$(CURDIR)/.venv/bin:$$PATH" dvc repro
+run: setup            # everything that is stale, as `dvc repro` does it, on all cores
+	PATH="$(CURDIR)/.venv/bin:$$PATH" sling flow
 
 large paper: setup    # the same with ten times the rollouts a method; an hour and more
 	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/python tools/large.py

@@ -21,9 +21,7 @@ SHORT = {  # by stage and module
         "pipeline.confidence.profile": {"POINTS": 3},
     },
     "policy": {"pipeline.policy.robust": {"STEPS": 30}},
-    "report": {
-        "pipeline.report.theme": {"STYLE": {}}
-    },  # a layout that is solved for draws all twice
+    "report": {"pipeline.report.styles": {"THEME": {}}},  # a layout that is solved draws all twice
 }
 read: set[str] = set()
 gc.set_threshold(100_000, 50, 50)  # it is looked for garbage while torch is imported
@@ -77,7 +75,13 @@ def noted(value: object, path: str) -> object:
 def note(path: str) -> None:
     read.add(path)
     if path.startswith("methods."):  # what a method leaves out is as the defaults say
-        read.add(".".join(["method_defaults", *path.split(".")[2:3]]))
+        from pipeline.params.identification import MethodDefaults
+
+        read.update(
+            f"method_defaults.{key}"
+            for key in path.split(".")[2:3] or MethodDefaults.model_fields
+            if key in MethodDefaults.model_fields
+        )
 
 
 def shorten(step: str) -> None:

@@ -27,8 +27,10 @@ validate: setup       # slow campaigns, and tests by other engines and readers; 
 	.venv/bin/pip install --disable-pip-version-check -q -e '.[dev,validation]' -c constraints.txt
 	.venv/bin/sling verify
 	.venv/bin/python -m pytest tests/validation/engines tests/validation/benchmarks tests/recording/masks \
-		tests/recording/input/test_kinematics.py tests/app/preflight/test_pictures.py
-	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation
+		tests/recording/input/test_kinematics.py tests/app/preflight/test_pictures.py \
+		tests/rig/recorder/test_record.py
+	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation \
+		tests/recording/input/test_mutations.py
 
 clean:                # all but data, checkpoints and DVC's cache
 	rm -rf .venv build *.egg-info .hypothesis .pytest_cache .ruff_cache

@@ -14,7 +14,8 @@ from app.flow import child
 from pipeline.base.errors import UserError, one_line
 from pipeline.base.files import write_text
 
-ALWAYS = ("dvc.yaml", "params.yaml")  # what DVC itself reads, whatever the stage
+# What DVC itself reads, whatever the stage, and code of every stage that DVC does not track.
+ALWAYS = ("dvc.yaml", "params.yaml", "pipeline/params", "stages/start.py")
 
 
 @dataclass(frozen=True)

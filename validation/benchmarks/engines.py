@@ -94,18 +94,18 @@ def _newton(sling: Sling, episode, ours: dict, device: str) -> dict:
         one = Bands(tube, THETA, 1, path, **options)
         one.run(4)  # compiles
         _, cpu, wall = timed(lambda: one.run(drawn - 4))
-        per_step, timed = cpu / (drawn - 4), drawn - 4
+        per_step, counted = cpu / (drawn - 4), drawn - 4
         if kind == "cuda":
             many = Bands(tube, THETA, count, path, **options)
             many.run(4)
             _, _, wall = timed(lambda: many.run(TIMED_STEPS))
-            per_step, timed = wall / TIMED_STEPS / count, TIMED_STEPS
+            per_step, counted = wall / TIMED_STEPS / count, TIMED_STEPS
     except UserError as error:
         return {"name": "newton", "device": device, "note": str(error)}
     return _entry(
         "newton", version("newton"), device, per_step * whole,
         f"VBD, {count} x 900 tetrahedra, {VBD_ITERATIONS} iterations, {PEER_STEP:g} s; timed"
-        f" {timed} of {whole} steps",
+        f" {counted} of {whole} steps",
         _force_error(sling, episode, one.forces()[0]),
         ours,
     )  # fmt: skip

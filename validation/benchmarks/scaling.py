@@ -35,7 +35,7 @@ def bench_scaling(
     device: str,
     band: str | None = None,
     method: str = "sling2sim2real",
-    size: str = "paper",
+    size: str = "laptop",
 ) -> dict:
     """Time it on the first of some devices, on two, four, ... and on all.
 

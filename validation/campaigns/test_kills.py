@@ -33,12 +33,12 @@ KEPT = (".checkpoints", "logs", ".dvc/cache", ".dvc/tmp", ".prefect")
 
 
 def contents(folder: Path) -> dict[str, str]:
-    """Digest of every file that a run makes, dvc.lock apart."""
+    """Digest of every file that a run makes, but dvc.lock, and run.js: when and where it ran."""
     files = [file for top in ("data", "reports") for file in (folder / top).rglob("*")]
     return {
         str(file.relative_to(folder)): hashlib.md5(file.read_bytes()).hexdigest()
         for file in files
-        if file.is_file()
+        if file.is_file() and file.name != "run.js"
     }
 
 

@@ -159,7 +159,7 @@ def test_ours_lands_nearest_and_says_why_not_nearer(tmp_path, progress, record) 
         asked=f"On {BAND}, launches inside the recorded stretch, {len(SEEDS)} seeds, default"
         f" budget: {OURS} within {100 * MEAN:g} % of the distance on average and"
         f" {100 * WORST:g} % at worst, better than methods by geometry alone, not"
-        " worse than the others. Landings only score what was identified; those of {BAND} took"
+        f" worse than the others. Landings only score what was identified; those of {BAND} took"
         " part in choosing our method, see docs/identification.md.",
         met=all(met.values()),
         settings={

@@ -23,13 +23,16 @@ def copies(tmp_path: Path) -> tuple[Copy, Copy]:
 def test_what_differs_in_a_copy_is_named(copies, tmp_path: Path) -> None:
     head, other = copies
     needs = exchange.needs(head.folder)["search@a"]
-    assert set(needs.sources) == {"dvc.yaml", "params.yaml", "step.py", "recordings"}
+    untracked = {"pipeline/params", "stages/start.py"}  # by DVC, and yet the code of every stage
+    always = {"dvc.yaml", "params.yaml", *untracked}
+    assert set(needs.sources) == {*always, "step.py", "recordings"}
     digests = exchange.digests(head.folder, needs.sources)
     for number, (changes, says) in enumerate(
         (
             ({}, None),
             ({"params.yaml": "seed: 3\n"}, "params.yaml differs"),
             ({"recordings/b": "more\n"}, "recordings differs"),
+            ({"pipeline/params/lab.py": "more\n"}, "pipeline/params differs"),
             ({"recordings/__pycache__/b.pyc": "more\n", "data/search/a": "old"}, None),
             ({"dvc.yaml": None}, "dvc.yaml is missing"),
             ({"dvc.yaml": None, "step.py": "pass\n"}, "dvc.yaml and 1 more differ"),

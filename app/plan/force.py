@@ -49,9 +49,9 @@ def read_earlier(path: Path, params) -> Earlier:
     geometry = geometry_of(recording, params.setup)
     source, frame = geometry.sources["base_to_fork"], recording.pose.frame
     try:
-        signals = signals_of(recording, geometry, params.episode, params.force, params.setup.tool)
+        signals = signals_of(recording, geometry, params)
     except UserError as error:
-        problem = str(error)
+        problem = f"{path}: {error}"
         return Earlier(path, geometry.base, source, frame, None, None, problem)
     force = float(np.linalg.norm(signals.facts["hold_force"]))
     drawn = signals.hand(signals.release_time)

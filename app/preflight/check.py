@@ -171,8 +171,7 @@ def _add_signals(report: CheckReport, recording: Recording, band: object, params
         delays = delays_of(recording, geometry, params)
         report.delays = _delays(delays)
         recording = delays.corrected(recording)
-        sections = params.episode, params.force, params.setup.tool
-        signals = signals_of(recording, geometry, *sections, delays.tool_inertia)
+        signals = signals_of(recording, geometry, params, delays.tool_inertia)
     except UserError:  # it is the problem that was reported
         return
     scene = Scene.of(band, params.setup, signals)

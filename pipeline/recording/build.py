@@ -55,13 +55,11 @@ def process_recording(recording: Recording, band: object, params: object) -> Pro
 
 def view_of(recording: Recording, band: object, params: object) -> tuple[View, Delays]:
     """What the camera sees, with everything known that the mask needs. Raises UserError."""
-    geometry, setup = geometry_of(recording, params.setup), params.setup
+    geometry = geometry_of(recording, params.setup)
     delays = delays_of(recording, geometry, params)
     recording = delays.corrected(recording)
-    signals = signals_of(
-        recording, geometry, params.episode, params.force, setup.tool, delays.tool_inertia
-    )
-    scene = Scene.of(band, setup, signals)
+    signals = signals_of(recording, geometry, params, delays.tool_inertia)
+    scene = Scene.of(band, params.setup, signals)
     return View(recording, geometry, scene, params.episode.duration), delays
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
 from pipeline.episode import signal
@@ -14,11 +13,10 @@ from pipeline.recording.geometry import Geometry, turned
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.motion import VELOCITY_WINDOW, Motion, expect_dense
 from pipeline.recording.tare import band_force
-from pipeline.recording.tool import Wrench
 from pipeline.recording.tool_inertia import ToolInertia
-from pipeline.recording.window import Window
 
 MOST_TURN = np.deg2rad(5.0)  # of the hand; beyond it the tool's weight has to be known
+MOST_GAP = 0.3  # s over which force and pose may be interpolated
 
 
 @dataclass(frozen=True)
@@ -60,60 +58,49 @@ class Signals:
 
 
 def signals_of(
-    recording: Recording,
-    geometry: Geometry,
-    episode: object,
-    filter: object,
-    tool: object | None = None,
-    inertia: ToolInertia | None = None,
+    recording: Recording, geometry: Geometry, params: object, inertia: ToolInertia | None = None
 ) -> Signals:
-    """Turn raw streams into samples.
+    """Turn raw streams into samples. Raises UserError if the recording cannot be used.
 
     Args:
-        episode, filter: params.episode and params.force.
-        tool: setup.tool, which has mass and center, or None.
-        inertia: The tool as the recording shows it; it is taken off where `tool` is None.
-
-    Raises:
-        UserError: if the recording cannot be used, in one line that begins with its path.
+        params: Of which episode, force and setup.tool are used.
+        inertia: The tool as the recording shows it; taken off where setup.tool does not say it.
     """
+    tool, episode = params.setup.tool, params.episode
     inertia = inertia if tool is None else None
-    try:
-        return _signals(recording, geometry, episode, filter, tool, inertia)
-    except UserError as error:
-        raise UserError(f"{recording.path}: {error}") from None
-
-
-def _signals(
-    recording: Recording,
-    geometry: Geometry,
-    episode: object,
-    filter: object,
-    tool: object | None,
-    inertia: ToolInertia | None,
-) -> Signals:
     expect_dense(recording.wrench)
     origin = int(recording.wrench.stamp[0])
     t, raw = recording.wrench.seconds(origin), recording.wrench.values
     motion = Motion.of(recording.pose, geometry, origin)
     grasp, release = events_of(recording, motion)
-    orientation, turn = _orientation(recording, motion, release.time, tool)
-
+    until = (motion.time >= 0) & (motion.time <= release.time)
+    if until.sum() < 10:
+        raise UserError(f"{recording.pose.topic} stops before the release at {release.time:.3f} s")
+    orientation, turn = turned(motion.turn[until])
+    if turn > MOST_TURN and tool is None:
+        raise UserError(
+            f"the hand turns by {np.degrees(turn):.1f} degrees before the release, and the weight"
+            " of the tool leaks into the force: give its mass and centre of mass as setup.tool in"
+            " params.yaml (mass 0 for a force without it), or keep the hand's orientation"
+        )
     if inertia is not None:
         raw = raw - inertia.force(motion, geometry, t, release.time)
-    wrench = Wrench.of(t, raw, motion, geometry, tool, release.time)
-    band = band_force(wrench, motion.position(release.time), tool, grasp, release)
-    window = Window.of(recording, grasp, release.time, episode)
+    band = band_force(t, raw, motion, geometry, tool, grasp, release)
+
+    start = _start(recording, origin, grasp, release.time, episode)
+    gaps = _gaps(recording, origin, start, start + episode.duration)
+    period = episode.duration / episode.samples
+
+    def means(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+        return signal.average(times, values, start, period, episode.samples)
 
     rate = 1 / recording.wrench.period
-    cutoff = signal.cutoff_hz(filter.cutoff, filter.cutoff_unit)
+    cutoff = signal.cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
     grid, even = signal.uniform(t, band.values, rate)
     smooth = signal.lowpass(even, rate, cutoff)
     pulled = smooth[grid < release.time - MARGIN]
     pose_grid, position, velocity = motion.velocity()
     gripper = opening_of(recording, origin)
-
-    start = window.start
     facts = {
         "bias": band.bias.tolist(),
         "drift": band.drift.tolist(),
@@ -124,7 +111,7 @@ def _signals(
         "turn": turn,
         "tool": _tool_facts(tool, "setup.tool") or _tool_facts(inertia, "its inertia"),
         "rate": rate,
-        "longest_gap": window.gaps,
+        "longest_gap": gaps,
         "cutoff_hz": cutoff,
         "release_error": release.error,
         "release_resolution": release.resolution,
@@ -134,11 +121,11 @@ def _signals(
     }
     return Signals(
         origin=origin + round(start * 1e9),
-        time=(np.arange(window.samples) + 0.5) * window.period,
-        position=window.mean(pose_grid, position),
-        velocity=window.mean(pose_grid, velocity),
-        force=window.mean(grid, smooth),
-        opening=window.mean(*gripper) if gripper else np.full(window.samples, np.nan),
+        time=(np.arange(episode.samples) + 0.5) * period,
+        position=means(pose_grid, position),
+        velocity=means(pose_grid, velocity),
+        force=means(grid, smooth),
+        opening=means(*gripper) if gripper else np.full(episode.samples, np.nan),
         grasp_time=grasp - start,
         release_time=release.time - start,
         facts=facts,
@@ -148,21 +135,48 @@ def _signals(
     )
 
 
-def _orientation(
-    recording: Recording, motion: Motion, release: float, tool: object | None
-) -> tuple[Rotation, float]:
-    """Mean orientation of the hand until the release [s], and how far it turns from it [rad]."""
-    used = (motion.time >= 0) & (motion.time <= release)
-    if used.sum() < 10:
-        raise UserError(f"{recording.pose.topic} stops before the release at {release:.3f} s")
-    orientation, turn = turned(motion.turn[used])
-    if turn > MOST_TURN and tool is None:
+def _start(
+    recording: Recording, origin: int, grasp: float, release: float, episode: object
+) -> float:
+    """Of the window [s]: as much lead-in as the tail after the release leaves room for."""
+    t, pose_t = recording.wrench.seconds(origin), recording.pose.seconds(origin)
+    first, last = max(t[0], pose_t[0]), min(t[-1], pose_t[-1])
+    ends = recording.wrench.topic if t[-1] < pose_t[-1] else recording.pose.topic
+    start = max(first, release + episode.tail - episode.duration)
+    slack = 1.5 * max(recording.wrench.period, recording.pose.period)
+    if start + episode.duration > last + slack:
+        if last < release + episode.tail:
+            side = "after" if last >= release else "before"
+            raise UserError(
+                f"{ends} ends {abs(last - release):.2f} s {side} the release, episode.tail asks"
+                f" for {episode.tail} s after it: record on for longer"
+            )
         raise UserError(
-            f"the hand turns by {np.degrees(turn):.1f} degrees before the release, and the weight"
-            " of the tool leaks into the force: give its mass and centre of mass as setup.tool in"
-            " params.yaml (mass 0 for a force without it), or keep the hand's orientation"
+            f"it is {last - first:.2f} s long, episode.duration asks for {episode.duration} s:"
+            " record for longer"
         )
-    return orientation, turn
+    if start > grasp - MARGIN:
+        raise UserError(
+            f"from grasp to release it takes {release - grasp:.2f} s, more than episode.duration"
+            f" {episode.duration} s less episode.tail {episode.tail} s: pull faster, or set them"
+        )
+    return start
+
+
+def _gaps(recording: Recording, origin: int, start: float, end: float) -> dict[str, float]:
+    """Longest time without a message in the window [s], by topic: values are interpolated."""
+    found = {}
+    for stream in (recording.wrench, recording.pose):
+        times = stream.seconds(origin)
+        inside = times[(times > start) & (times < end)]
+        gap = float(np.diff(inside).max()) if len(inside) > 1 else end - start
+        if gap > MOST_GAP:
+            raise UserError(
+                f"{stream.topic} is missing for {gap:.2f} s between the lead-in and the end: more"
+                f" than {MOST_GAP:g} s cannot be filled in, record again"
+            )
+        found[stream.topic] = gap
+    return found
 
 
 def _tool_facts(tool: object | None, source: str) -> dict | None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
 from pipeline.recording.events import LEAD_IN, MARGIN, SETTLE, Release
-from pipeline.recording.tool import Wrench
+from pipeline.recording.geometry import Geometry
+from pipeline.recording.motion import Motion
 
+GRAVITY = np.array([0.0, 0.0, -9.81])  # m/s^2, frame O
 MOST_ASKEW = np.deg2rad(30.0)  # between the held force and the way to the fork
 MOST_DRIFT = 0.05  # of the held force: more is no drift of the sensor
 STRAIGHT = np.deg2rad(1.0)  # of a hand whose weight, if unknown, may be compared with the lead-in's
@@ -34,25 +37,62 @@ class BandForce:
 
 
 def band_force(
-    wrench: Wrench, hand: np.ndarray, tool: object | None, grasp: float, release: Release
+    t: np.ndarray,
+    raw: np.ndarray,
+    motion: Motion,
+    geometry: Geometry,
+    tool: object | None,
+    grasp: float,
+    release: Release,
 ) -> BandForce:
     """Take the tool, the bias and the drift from a raw force, and find its sign.
 
+    Taken away are the tool's load, then, in the sensor's frame, the lead-in's mean and the drift
+    until the free hand at the end.
+
     Args:
-        hand: Where it lets go, frame O, shape (3,).
-        tool: setup.tool, whose load `wrench` has, or None.
+        t: Times [s], shape (S,).
+        raw: The wrench's frame, shape (S, 3) [N].
+        tool: setup.tool, or None where it is not known.
+        grasp: Time [s].
 
     Raises:
         UserError: where the lead-in is too short, or the held force does not point to the fork.
     """
-    t = wrench.time
+    load = np.zeros_like(raw)
+    if tool is not None:
+        center = np.array(tool.center)
+        load = tool.mass * load_per_mass(motion, geometry, t, center, jump=release.time)
+    turn, hand = sensor_turns(motion, geometry, t), motion.position(release.time)
     held = (t > release.time - 0.5) & (t < release.time - MARGIN / 5)
+    lead_in, end = t < grasp - MARGIN, t > release.time + SETTLE
     if not held.any():
         raise UserError(f"no force in the half second before the release at {release.time:.3f} s")
-    force, bias, drift = _tared(wrench, 1.0, grasp, release)
+    if lead_in.sum() < 20 or grasp - MARGIN - t[0] < LEAD_IN:
+        raise UserError(
+            f"the band is grasped {grasp - t[0]:.2f} s after the start: record at least"
+            f" {LEAD_IN + MARGIN:.2f} s of the empty hand before, to tare the force"
+        )
+    usual = turn[lead_in].mean()
+
+    def tared(sign: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The force in frame O (S, 3), with the sensor's sign, and the bias and drift in it."""
+        rest = raw - sign * load
+        bias, late = rest[lead_in].mean(axis=0), end
+        if not load.any():
+            late = late & ((usual.inv() * turn).magnitude() < STRAIGHT)
+        drift = np.zeros(3)
+        if late.sum() >= 20:
+            change = rest[late].mean(axis=0) - bias
+            if np.linalg.norm(change) < MOST_DRIFT * release.drop:
+                drift = change / (t[late].mean() - t[lead_in].mean())
+        force = rest - bias - drift * (t - t[lead_in].mean())[:, None]
+        return turn.apply(force), usual.apply(bias), usual.apply(drift)
+
+    force, bias, drift = tared(1.0)
     sign = _sign(force[held].mean(axis=0), hand)
     if sign < 0 and tool is not None:  # the sensor feels its tool with the other sign, too
-        force, bias, drift = _tared(wrench, sign, grasp, release)
+        force, bias, drift = tared(sign)
         if _sign(force[held].mean(axis=0), hand) > 0:
             raise UserError(
                 f"a tool of {tool.mass:.3g} kg hides which sign the force has: check setup.tool and"
@@ -60,34 +100,6 @@ def band_force(
             )
     force = sign * force
     return BandForce(force, sign < 0, force[held].mean(axis=0), bias, drift)
-
-
-def _tared(
-    wrench: Wrench, sign: float, grasp: float, release: Release
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The band's force in frame O (S, 3), with the sensor's sign, and the bias and drift in it.
-
-    Taken away are the tool's load, then, in the sensor's frame, the lead-in's mean and the drift
-    until the free hand at the end.
-    """
-    t, rest = wrench.time, wrench.raw - sign * wrench.load
-    lead_in = t < grasp - MARGIN
-    if lead_in.sum() < 20 or grasp - MARGIN - t[0] < LEAD_IN:
-        raise UserError(
-            f"the band is grasped {grasp - t[0]:.2f} s after the start: record at least"
-            f" {LEAD_IN + MARGIN:.2f} s of the empty hand before, to tare the force"
-        )
-    bias = rest[lead_in].mean(axis=0)
-    turn, end = wrench.turn[lead_in].mean(), t > release.time + SETTLE
-    if not wrench.load.any():
-        end &= (turn.inv() * wrench.turn).magnitude() < STRAIGHT
-    drift = np.zeros(3)
-    if end.sum() >= 20:
-        late = rest[end].mean(axis=0) - bias
-        if np.linalg.norm(late) < MOST_DRIFT * release.drop:
-            drift = late / (t[end].mean() - t[lead_in].mean())
-    force = rest - bias - drift * (t - t[lead_in].mean())[:, None]
-    return wrench.turn.apply(force), turn.apply(bias), turn.apply(drift)
 
 
 def _sign(hold: np.ndarray, hand: np.ndarray) -> float:
@@ -104,3 +116,36 @@ def _sign(hold: np.ndarray, hand: np.ndarray) -> float:
             " frame of the wrench and its transform to the hand in /tf_static"
         )
     return 1.0 if cosine > 0 else -1.0
+
+
+def sensor_turns(motion: Motion, geometry: Geometry, times: np.ndarray) -> Rotation:
+    """The wrench's frame into frame O at times (T,): T rotations."""
+    if geometry.sensor_is_fixed:
+        return Rotation.from_quat(np.tile(geometry.sensor.rotation.as_quat(), (len(times), 1)))
+    return motion.orientation(times) * geometry.sensor.rotation
+
+
+def load_per_mass(
+    motion: Motion,
+    geometry: Geometry,
+    times: np.ndarray,
+    center: np.ndarray,
+    *,
+    gravity: np.ndarray = GRAVITY,
+    jump: float | None = None,
+) -> np.ndarray:
+    """Force on the sensor of each kilogram of tool, gravity less acceleration [N/kg].
+
+    Args:
+        times: Shape (T,) [s].
+        center: Of mass, in the wrench's frame [m], shape (3,); in the hand's frame where the
+            wrench is given in one that does not move with the hand.
+        gravity: Frame O [m/s^2]; 0 leaves the inertia alone.
+        jump: When the acceleration may jump, because the hand starts back [s].
+
+    Returns:
+        Shape (T, 3), in the wrench's frame.
+    """
+    point = np.asarray(center) if geometry.sensor_is_fixed else geometry.sensor.apply(center)
+    specific = gravity - motion.acceleration(times, point, jump)
+    return sensor_turns(motion, geometry, times).inv().apply(specific)

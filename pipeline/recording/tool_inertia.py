@@ -17,7 +17,7 @@ from pipeline.recording.events import MARGIN, SETTLE, events_of
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.motion import Motion
-from pipeline.recording.tool import load_per_mass
+from pipeline.recording.tare import load_per_mass
 
 LONGEST = 0.1  # s of either sign
 BLOCK = 0.2  # s in which errors of the smoothed force go together

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
-from pipeline.recording.build import build_episode, episode_of, process_recording
+from pipeline.recording.build import build_episode, episode_of, process, process_recording
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.signals import signals_of
@@ -24,7 +24,7 @@ def episode(seen, params) -> Episode:
 def signals(path, params):
     recording = read_recording(path, params.setup)
     geometry = geometry_of(recording, params.setup)
-    return signals_of(recording, geometry, params.episode, params.force)
+    return signals_of(recording, geometry, params)
 
 
 def test_force_and_motion(episode, seen) -> None:
@@ -82,7 +82,7 @@ def test_clouds_lie_on_the_band_and_cover_it(look, episode, seen, params, tmp_pa
 def test_recordings_that_cannot_be_used(tmp_path, params, truth, words) -> None:
     path = blind_bag(tmp_path, truth)
     with pytest.raises(UserError, match=words) as caught:
-        signals(path, params)
+        process(path, params.bands["band1"], params)
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
 
 

@@ -51,7 +51,7 @@ def instead_of_the_pose(blind, params, usual, kind: str, rows, fields, **setup) 
 
 def signals(recording: Recording, params):
     geometry = geometry_of(recording, params.setup)
-    return signals_of(recording, geometry, params.episode, params.force)
+    return signals_of(recording, geometry, params)
 
 
 def test_joint_states_through_a_urdf(blind, params, usual, tmp_path, monkeypatch) -> None:

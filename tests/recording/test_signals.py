@@ -25,7 +25,9 @@ def tool(mass: float = MASS, center=TOOL) -> SimpleNamespace:
 
 def signals(played: Played, params, tool=None, recording=None, inertia=None):
     recording = recording or played.recording()
-    return signals_of(recording, played.geometry(), params.episode, params.force, tool, inertia)
+    setup = params.setup.model_copy(update={"tool": tool})
+    params = params.model_copy(update={"setup": setup})
+    return signals_of(recording, played.geometry(), params, inertia)
 
 
 def off(played: Played, found) -> np.ndarray:

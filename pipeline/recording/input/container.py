@@ -19,15 +19,38 @@ No index is needed, and a damaged one costs nothing. https://mcap.dev/spec
 from __future__ import annotations
 
 import hashlib
+import re
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from mcap import records as kinds
+from mcap.opcode import Opcode
 
 from pipeline.base.errors import UserError
-from pipeline.recording.input.account import Channel
-from pipeline.recording.input.collector import Collector
-from pipeline.recording.input.records import MAGIC
+from pipeline.recording.input import records as of
+from pipeline.recording.input.records import Damaged, Record
+from pipeline.recording.input.words import counted, few
 
-__all__ = ["Channel", "Container", "expect_file", "read_container", "sha256"]
+MOST = 2**30  # bytes of messages that are held at once
+OVERHEAD = 256  # bytes that a message costs beside its payload
+BULKY = re.compile("PointCloud|LaserScan|OccupancyGrid|CompressedVideo")  # counted, not kept
+LONGEST = 86_400 * 10**9  # ns that a recording lasts
+KEPT = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+NAMED = 5  # places or topics named in one line
+
+
+@dataclass
+class Channel:
+    """One topic with its raw messages, in the order of the file; bulky ones are left empty."""
+
+    topic: str
+    schema: kinds.Schema
+    encoding: str
+    log_times: list[int] = field(default_factory=list)  # ns
+    payloads: list[bytes] = field(default_factory=list)
 
 
 @dataclass
@@ -58,9 +81,9 @@ def read_container(path: Path) -> Container:
     try:
         expect_file(path)
         with path.open("rb") as file:
-            if file.read(len(MAGIC)) != MAGIC:
+            if file.read(len(of.MAGIC)) != of.MAGIC:
                 raise UserError(f"{path}: not an MCAP file (ros2 bag record -s mcap writes one)")
-            return Container(path, *Collector(path, file, path.stat().st_size).collect())
+            return _Contents(path, file, path.stat().st_size).container()
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror})") from error
 
@@ -68,3 +91,244 @@ def read_container(path: Path) -> Container:
 def sha256(path: Path) -> str:
     with Path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@dataclass
+class _Contents:
+    """The records of a file, sorted."""
+
+    path: Path
+    file: BinaryIO
+    size: int
+    schemas: dict[int, kinds.Schema] = field(default_factory=dict)
+    definitions: dict[int, kinds.Channel] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)  # by number, not yet named
+    ambiguous: Counter[int] = field(default_factory=Counter)  # dropped of numbers with two topics
+    held: int = 0  # bytes of messages
+    checked: int = 0  # chunks that have a checksum
+    aside: list[Record] = field(default_factory=list)  # believed only where there are no checksums
+    disbelieved: int = 0
+    gaps: list[Record] = field(default_factory=list)
+    private: int = 0
+    dropped: list[tuple[int, int]] = field(default_factory=list)  # log times of damaged chunks
+    data_end: Record | None = None
+    footer: Record | None = None
+    summary: list[kinds.McapRecord] = field(default_factory=list)
+
+    def container(self) -> Container:
+        for record in of.walk(self.file, self.size):
+            self._take(record)
+        for record in self.aside:
+            self._settle(record)
+        trusted = self._summary_holds()
+        for one in self.summary if trusted else ():
+            if isinstance(one, kinds.Schema):
+                self.schemas.setdefault(one.id, one)
+            elif isinstance(one, kinds.Channel):
+                self.definitions.setdefault(one.id, one)
+        channels, orphans = self._joined()
+        losses = [*self._losses(), *(self._compared() if trusted else ()), *orphans]
+        return Container(self.path, channels, losses, self._notes(trusted))
+
+    # Records
+
+    def _take(self, record: Record) -> None:
+        """One record outside of chunks."""
+        opcode, content = record.opcode, record.content
+        if not opcode:
+            self.gaps.append(record)
+        elif opcode == Opcode.CHUNK and content.uncompressed_crc:
+            self.checked += 1
+            self._use(opcode, content)
+        elif opcode == Opcode.DATA_END:
+            self.data_end = record
+        elif opcode == Opcode.FOOTER:
+            self.footer = record
+        elif self.data_end and opcode not in (Opcode.CHUNK, Opcode.MESSAGE):
+            self.summary.append(content)
+        elif opcode == Opcode.CHUNK or (self.gaps and opcode in KEPT):
+            self.aside.append(record._replace(content=None))
+        elif opcode >= of.PRIVATE:
+            self.private += 1
+        else:
+            self._use(opcode, content)
+
+    def _settle(self, record: Record) -> None:
+        """A record that was put aside: believed only where nothing has a checksum."""
+        start = record.at + of.HEAD.size
+        content = of.read(self.file, start, record.end - start)
+        if record.opcode != Opcode.MESSAGE:
+            content = of.parse(record.opcode, content)
+        if not self.checked:
+            self._use(record.opcode, content)
+        elif record.opcode == Opcode.CHUNK:
+            self.dropped.append((content.message_start_time, content.message_end_time))
+        else:
+            self.disbelieved += 1
+
+    def _use(self, opcode: int, content: bytes | kinds.McapRecord) -> None:
+        if opcode == Opcode.MESSAGE:
+            self._message(content, 0, len(content))
+        elif opcode == Opcode.SCHEMA:
+            self.schemas.setdefault(content.id, content)
+        elif opcode == Opcode.CHANNEL:
+            known = self.definitions.setdefault(content.id, content)
+            if _meaning(known) != _meaning(content):
+                self.ambiguous.setdefault(content.id, 0)
+        elif opcode == Opcode.CHUNK:
+            try:
+                self._open(of.unpack(content))
+            except Damaged:
+                self.dropped.append((content.message_start_time, content.message_end_time))
+
+    def _open(self, data: bytes) -> None:
+        """The records of a chunk. Raises Damaged."""
+        for opcode, start, end in of.inside(data):
+            if opcode == Opcode.MESSAGE:
+                self._message(data, start, end)
+            elif opcode in KEPT:
+                self._use(opcode, of.parse(opcode, data[start:end]))
+            else:
+                self._hold(OVERHEAD)  # no end of tiny records either
+
+    def _message(self, data: bytes, start: int, end: int) -> None:
+        if end - start < of.MESSAGE.size:
+            raise Damaged("a message that is too short")
+        number, _, log_time, _ = of.MESSAGE.unpack_from(data, start)
+        if number in self.ambiguous:
+            self.ambiguous[number] += 1
+            return
+        known = self.definitions.get(number)
+        schema = self.schemas.get(known.schema_id) if known else None
+        bulky = schema and BULKY.search(schema.name)
+        payload = b"" if bulky else data[start + of.MESSAGE.size : end]
+        self._hold(len(payload) + OVERHEAD)
+        channel = self.channels.setdefault(number, Channel("", None, ""))
+        channel.log_times.append(log_time)
+        channel.payloads.append(payload)
+
+    def _hold(self, size: int) -> None:
+        self.held += size
+        if self.held > MOST:
+            raise UserError(
+                f"{self.path}: holds more than {MOST / 2**30:.0f} GiB of messages: record only the"
+                " topics that are needed, for the time of the pull, pictures compressed"
+            )
+
+    # What they amount to
+
+    def _joined(self) -> tuple[list[Channel], list[str]]:
+        """Channels by topic, and in words what could not be joined."""
+        found: dict[tuple, Channel] = {}
+        losses = []
+        for number, channel in self.channels.items():
+            known, count = self.definitions.get(number), counted(len(channel.payloads))
+            if known is None:
+                losses.append(f"{count} of channel {number} dropped: no record says what it is")
+                continue
+            schema = self.schemas.get(known.schema_id)
+            if schema is None and known.schema_id:
+                losses.append(f"{count} of {known.topic} dropped: its schema is missing")
+                continue
+            schema = schema or kinds.Schema(id=0, data=b"", encoding="", name="")
+            key = (known.topic, schema.name, schema.encoding, schema.data, known.message_encoding)
+            one = found.setdefault(key, Channel(known.topic, schema, known.message_encoding))
+            one.log_times += channel.log_times
+            one.payloads += channel.payloads
+        for number, count in self.ambiguous.items():
+            topic = self.definitions[number].topic
+            losses.append(
+                f"channel {number} is {topic} and then another: {counted(count)} dropped since"
+            )
+        return list(found.values()), losses
+
+    def _summary_holds(self) -> bool:
+        """Whether the summary can be believed."""
+        if self.data_end is None or self.footer is None:
+            return False
+        start, wanted = self.data_end.end, self.footer.content.summary_crc
+        if not wanted:
+            return not any(gap.at >= start for gap in self.gaps)
+        return of.crc(self.file, start, self.footer.end - 4) == wanted
+
+    def _losses(self) -> list[str]:
+        """What may have cost messages."""
+        losses = []
+        data_end = self.data_end.at if self.data_end else self.size
+        times = self._log_times()
+
+        def seconds(log_time: float) -> str:
+            """Since the first message."""
+            return f"{(log_time - min(times, default=log_time)) * 1e-9:.2f}"
+
+        if self.data_end is None:
+            last = seconds(max(times, default=0.0))
+            losses.append(f"the file has no end: cut off after {last} s")
+        if self.dropped:
+            count = len(self.dropped)
+            where = [f"{seconds(a)} to {seconds(b)} s" for a, b in self.dropped]
+            losses.append(f"{counted(count, 'damaged chunk')} dropped: {few(where, NAMED)}")
+        # What a file that was cut off ends with is no loss of its own.
+        lost = [gap for gap in self.gaps if gap.at < data_end and gap.end < self.size]
+        if lost:
+            where = [f"{gap.end - gap.at} at {gap.at}" for gap in lost]
+            losses.append(f"unreadable bytes of {self.size} in the file: {few(where, NAMED)}")
+        if self.disbelieved:
+            losses.append(f"{self.disbelieved} record(s) behind them dropped: without a checksum")
+        if self.private:  # a damaged chunk may look like one
+            losses.append(f"{self.private} record(s) of kinds that are not MCAP's own passed over")
+        if self.data_end and not self.dropped and not lost:
+            wanted = self.data_end.content.data_section_crc
+            if wanted and of.crc(self.file, 0, self.data_end.at) != wanted:
+                losses.append(
+                    "the checksum of all messages together does not hold: what is damaged is not"
+                    " known"
+                )
+        return losses
+
+    def _notes(self, trusted: bool) -> list[str]:
+        """What costs none; `trusted`: whether the file's summary can be believed."""
+        notes = []
+        crcs = self.checked or (self.data_end and self.data_end.content.data_section_crc)
+        if not crcs:
+            notes.append("no checksums in the file: damage to its messages would not be noticed")
+        if self.data_end and not trusted:
+            notes.append("the summary at the file's end is damaged: its counts were not compared")
+        elif self.data_end:
+            behind = [gap.end - gap.at for gap in self.gaps if gap.at >= self.data_end.end]
+            if behind:
+                notes.append(f"{sum(behind)} unreadable bytes behind the last message")
+        return notes
+
+    def _compared(self) -> list[str]:
+        """Where the file's own end speaks of another length or of other numbers than were read."""
+        start = self.footer.content.summary_start
+        far = start and start - self.data_end.end
+        what = "missing from" if far > 0 else "too many in"
+        losses = [f"{abs(far)} bytes are {what} the file"] if far else []
+        statistics = [one for one in self.summary if isinstance(one, kinds.Statistics)]
+        if not statistics:
+            return losses
+        wanted = statistics[-1].channel_message_counts
+        read = {number: len(channel.payloads) for number, channel in self.channels.items()}
+        off = []
+        for number in sorted({*wanted, *read}) if wanted else ():
+            a, b = wanted.get(number, 0), read.get(number, 0)
+            known = self.definitions.get(number)
+            if a != b:
+                off.append(f"{b} of {a} of {known.topic if known else f'channel {number}'}")
+        total = sum(read.values())
+        if not off and total != statistics[-1].message_count:
+            off.append(f"{total} of {statistics[-1].message_count}")
+        if off:
+            losses.append(f"messages read of those that the file counts: {few(off, NAMED)}")
+        return losses
+
+    def _log_times(self) -> np.ndarray:
+        """log_times [ns] without those that are damage."""
+        times = np.array([t for one in self.channels.values() for t in one.log_times], float)
+        return times[np.abs(times - np.median(times)) < LONGEST] if len(times) else times
+
+
+def _meaning(channel: kinds.Channel) -> tuple:
+    return channel.topic, channel.message_encoding, channel.schema_id

@@ -5,16 +5,12 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from functools import lru_cache
 from types import SimpleNamespace
 
+from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
-from rosbags.typesys import (
-    Stores,
-    get_types_from_idl,
-    get_types_from_msg,
-    get_typestore,
-)
-from rosbags.typesys.store import Typestore
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from pipeline.base.errors import UserError
 from pipeline.recording.input.container import Channel
@@ -29,8 +25,7 @@ def decoder(channel: Channel) -> Decoder:
         UserError: where the encoding is not known or the schema is bad, in one line.
     """
     schema = channel.schema
-    make = DECODERS.get((schema.encoding, channel.encoding))
-    if make is None:
+    if (schema.encoding, channel.encoding) not in DECODERS:
         known = ", ".join(f"{a} with {b}" for a, b in DECODERS)
         what = f"schema {schema.encoding!r}" if schema.encoding else "no schema"
         raise UserError(
@@ -38,29 +33,21 @@ def decoder(channel: Channel) -> Decoder:
             f" record one of: {known}"
         )
     try:
-        return make(channel)
+        return _compiled(schema.encoding, channel.encoding, schema.name, schema.data)
     except Exception as error:  # the parsers raise many kinds
         reason = str(error).partition("\n")[0]
         raise UserError(f"topic {channel.topic}: bad schema {schema.name} ({reason})") from error
 
 
-def _ros2(channel: Channel) -> Decoder:
-    store, name = _store(channel)
-    return lambda payload: store.deserialize_cdr(payload, name)
+@lru_cache(64)
+def _compiled(kind: str, encoding: str, name: str, data: bytes) -> Decoder:
+    return DECODERS[kind, encoding](Schema(id=1, name=name, encoding=kind, data=data))
 
 
-def _ros1(channel: Channel) -> Decoder:
-    store, name = _store(channel)
-    return lambda payload: store.deserialize_ros1(payload, name)
-
-
-def _store(channel: Channel) -> tuple[Typestore, str]:
-    """The schema's types, for this channel alone, because recordings may mix versions of a type.
-
-    Also its name as rosbags has it: with the `msg` that ROS 1 leaves out.
-    """
-    schema = channel.schema
+def _ros(schema: Schema) -> Decoder:
+    """By types of this schema alone, because recordings may mix versions of a type."""
     text = schema.data.decode()
+    # As rosbags has it: with the `msg` that ROS 1 leaves out.
     name = re.sub("^([^/:]+)(/|::)([^/:]+)$", r"\1/msg/\3", schema.name).replace("::", "/")
     store = get_typestore(Stores.EMPTY)
     if schema.encoding == "ros2idl":  # one file a type: mcap.dev/spec/registry#ros2idl
@@ -71,22 +58,24 @@ def _store(channel: Channel) -> tuple[Typestore, str]:
     else:
         store.register(get_types_from_msg(text, name))
     store.get_msgdef(name)
-    return store, name
+    ros1 = schema.encoding == "ros1msg"
+    read = store.deserialize_ros1 if ros1 else store.deserialize_cdr
+    return lambda payload: read(payload, name)
 
 
-def _protobuf(channel: Channel) -> Decoder:
-    return DecoderFactory().decoder_for(channel.encoding, channel.schema)
+def _protobuf(schema: Schema) -> Decoder:
+    return DecoderFactory().decoder_for("protobuf", schema)
 
 
-def _json(channel: Channel) -> Decoder:
+def _json(schema: Schema) -> Decoder:
     """By the schema's name alone: fields are found by name, bytes are base64."""
     return lambda payload: json.loads(payload, object_hook=lambda fields: SimpleNamespace(**fields))
 
 
-DECODERS: dict[tuple[str, str], Callable[[Channel], Decoder]] = {
-    ("ros2msg", "cdr"): _ros2,
-    ("ros2idl", "cdr"): _ros2,
-    ("ros1msg", "ros1"): _ros1,
+DECODERS: dict[tuple[str, str], Callable[[Schema], Decoder]] = {
+    ("ros2msg", "cdr"): _ros,
+    ("ros2idl", "cdr"): _ros,
+    ("ros1msg", "ros1"): _ros,
     ("protobuf", "protobuf"): _protobuf,
     ("jsonschema", "json"): _json,
 }

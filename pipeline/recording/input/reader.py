@@ -16,7 +16,7 @@ from pipeline.recording.input.container import Container, read_container, sha256
 from pipeline.recording.input.frames import TransformTree
 from pipeline.recording.input.stream import Stream
 from pipeline.recording.input.streams import streams_of
-from pipeline.recording.input.topics import Choice, camera_of, choose
+from pipeline.recording.input.topics import camera_of, choose
 from pipeline.recording.input.transforms import transforms_of
 
 SHOWN = 3  # losses in an error
@@ -106,13 +106,9 @@ def recording_of(container: Container, setup: Setup) -> Recording:
         transforms=transforms_of(container),
         losses=[*container.losses, *lost],
         notes=[*container.notes, *remarks],
-        choices=_reasons(chosen),
+        choices={role: choice.why for role, choice in chosen.items()},
         sha256=sha256(container.path),
     )
-
-
-def _reasons(chosen: dict[str, Choice]) -> dict[str, str]:
-    return {role: choice.why for role, choice in chosen.items()}
 
 
 def explained(error: UserError, path: Path, losses: list[str]) -> UserError:

@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-MISSING = object()
 LATEST = 2**62  # ns; a stamp beyond it is damage
 FRANKA_BASE = "franka_base"  # frame of Franka states whose header names none, as franka_ros writes
 
@@ -73,9 +72,8 @@ def kind_of(schema: str) -> str:
 def first_of(message: object, *names: str) -> object:
     """The first of these fields that the message has. Raises AttributeError."""
     for name in names:
-        value = getattr(message, name, MISSING)
-        if value is not MISSING:
-            return value
+        if hasattr(message, name):
+            return getattr(message, name)
     raise AttributeError(f"none of the fields {', '.join(names)}")
 
 
@@ -101,19 +99,16 @@ def frame_of(message: object) -> str:
 
 
 def read_wrench(message: object) -> Reading:
-    wrench = getattr(message, "wrench", message)
-    return _reading(message, _vector(wrench.force))
+    return _reading(message, _vector(getattr(message, "wrench", message).force))
 
 
 def read_pose(message: object) -> Reading:
-    pose = message.pose
-    pose = getattr(pose, "pose", pose)  # PoseWithCovariance
+    pose = getattr(message.pose, "pose", message.pose)  # PoseWithCovariance
     return _reading(message, pose_of(pose))
 
 
 def read_twist(message: object) -> Reading:
-    twist = message.twist
-    twist = getattr(twist, "twist", twist)  # TwistWithCovariance
+    twist = getattr(message.twist, "twist", message.twist)  # TwistWithCovariance
     return _reading(message, (*_vector(twist.linear), *_vector(twist.angular)))
 
 
@@ -144,12 +139,7 @@ def read_state_wrench(message: object) -> Reading:
 def opening_reader(names: tuple[str, ...]) -> Callable[[object], Reading]:
     """Sum of these joints: two fingers that each move half the opening, or one value."""
     read = joints_reader(names, "")
-
-    def read_opening(message: object) -> Reading:
-        stamp, _, positions = read(message)
-        return Reading(stamp, frame_of(message), (sum(positions),))
-
-    return read_opening
+    return lambda message: _reading(message, (sum(read(message).value),))
 
 
 def joints_reader(names: tuple[str, ...], frame: str) -> Callable[[object], Reading]:
@@ -187,12 +177,12 @@ def joints_of(message: object) -> dict[str, float]:
 
 
 def pose_of(pose: object) -> tuple[float, ...]:
-    """x y z qx qy qz qw of a Pose. Raises ValueError for a quaternion without length."""
-    place, turn = pose.position, pose.orientation
-    return (*_vector(place), *quaternion_of(turn))
+    """x y z qx qy qz qw of a Pose."""
+    return (*_vector(pose.position), *quaternion_of(pose.orientation))
 
 
 def quaternion_of(turn: object) -> tuple[float, ...]:
+    """x y z w. Raises ValueError where it has no length."""
     quaternion = tuple(float(getattr(turn, axis)) for axis in "xyzw")
     if not sum(x * x for x in quaternion) > 1e-12:
         raise ValueError("the quaternion has no length")
@@ -214,14 +204,3 @@ def _bytes(data: object) -> np.ndarray:
     if isinstance(data, bytes | bytearray | memoryview):
         return np.frombuffer(data, np.uint8)
     return np.asarray(data, np.uint8)
-
-
-POSE = dict.fromkeys(("PoseStamped", "PoseInFrame", "PoseWithCovarianceStamped"), read_pose)
-STATES = ("FrankaRobotState", "FrankaState")
-JOINTS = ("JointState", "JointStates")
-IMAGES = dict.fromkeys(("Image", "RawImage", "CompressedImage"), read_image)
-TWIST = dict.fromkeys(("TwistStamped", "TwistWithCovarianceStamped"), read_twist)
-INFOS = ("CameraInfo", "CameraCalibration")
-WRENCH = {"WrenchStamped": read_wrench}
-STATE_POSE = dict.fromkeys(STATES, read_state_pose)
-STATE_WRENCH = dict.fromkeys(STATES, read_state_wrench)

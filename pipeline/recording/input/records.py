@@ -69,6 +69,11 @@ class _Whole(ReadDataStream):
         return data
 
 
+def read(file: BinaryIO, at: int, length: int) -> bytes:
+    file.seek(at)
+    return file.read(length)
+
+
 def parse(opcode: int, content: bytes) -> kinds.McapRecord:
     """What a record says. Raises Damaged."""
     stream = _Whole(BytesIO(content))
@@ -94,7 +99,7 @@ def walk(file: BinaryIO, size: int) -> Iterator[Record]:
         yield record
         at = record.end
         if record.opcode == Opcode.FOOTER:
-            if not _is_magic(file, at):
+            if read(file, at, len(MAGIC)) != MAGIC:
                 yield Record(at, size, 0)
             elif at + len(MAGIC) < size:
                 yield Record(at + len(MAGIC), size, 0)
@@ -158,7 +163,7 @@ def _decompressed(compression: str, packed: bytes, size: int) -> bytes:
 
 def _record(file: BinaryIO, at: int, size: int) -> Record | None:
     """The record at a place, None where there cannot be one."""
-    head = _read(file, at, HEAD.size)
+    head = read(file, at, HEAD.size)
     if len(head) < HEAD.size:
         return None
     opcode, length = HEAD.unpack(head)
@@ -169,9 +174,9 @@ def _record(file: BinaryIO, at: int, size: int) -> Record | None:
         return Record(at, end, opcode)  # of no use, and of any size
     if opcode > max(Opcode) or length > CHUNK_LIMIT:
         return None
-    if opcode == Opcode.CHUNK and not _is_chunk(_read(file, start, CHUNK.size + 12), length):
+    if opcode == Opcode.CHUNK and not _is_chunk(read(file, start, CHUNK.size + 12), length):
         return None
-    content = _read(file, start, length)
+    content = read(file, start, length)
     if opcode == Opcode.MESSAGE:
         return Record(at, end, opcode, content) if length >= MESSAGE.size else None
     if opcode == Opcode.MESSAGE_INDEX:  # there are many, and no need of what they say
@@ -205,7 +210,7 @@ def _resume(file: BinaryIO, at: int, size: int) -> int:
     """The next place at which a chunk, or a message followed by a record, can begin."""
     length = LEAST_BLOCK  # most damage is small, and there may be much of it
     while at < size:
-        block = _read(file, at, length + HEAD.size)
+        block = read(file, at, length + HEAD.size)
         for match in DATA.finditer(block):
             first = match.start()
             if first < length and _begins(file, at + first, size, *HEAD.unpack_from(block, first)):
@@ -220,20 +225,11 @@ def _begins(file: BinaryIO, at: int, size: int, opcode: int, length: int) -> boo
     if end > size:
         return False
     if opcode == Opcode.CHUNK:
-        return _is_chunk(_read(file, at + HEAD.size, CHUNK.size + 12), length)
+        return _is_chunk(read(file, at + HEAD.size, CHUNK.size + 12), length)
     if length < MESSAGE.size:
         return False
-    after = _read(file, end, HEAD.size)
+    after = read(file, end, HEAD.size)
     if len(after) < HEAD.size:
         return False
     opcode, length = HEAD.unpack(after)
     return 0 < opcode <= max(Opcode) and end + HEAD.size + length <= size
-
-
-def _is_magic(file: BinaryIO, at: int) -> bool:
-    return _read(file, at, len(MAGIC)) == MAGIC
-
-
-def _read(file: BinaryIO, at: int, length: int) -> bytes:
-    file.seek(at)
-    return file.read(length)

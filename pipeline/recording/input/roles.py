@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -47,14 +48,7 @@ class Choice:
         Args:
             key: What is alike in messages that are alike; None: frame and kind of picture.
         """
-        found, reason = [], "all are damaged"
-        for payload in self.channel.payloads:
-            try:
-                found.append(self.read(payload))
-            except Exception as error:  # whatever damaged bytes do to the decoder
-                reason = str(error).partition("\n")[0] or reason
-            if len(found) == TRIES:
-                break
+        found, reason = readable(self.read, self.channel.payloads)
         if not found:
             raise UserError(f"{self.channel.topic} has fewer than two readable messages ({reason})")
         key = key or (lambda one: (one.frame, getattr(one.value, "kind", None)))
@@ -62,70 +56,88 @@ class Choice:
         return found[kinds.index(Counter(kinds).most_common(1)[0][0])]
 
 
+def readable(
+    read: Callable[[bytes], object], payloads: Iterable[bytes], most: int = TRIES
+) -> tuple[list, str]:
+    """What the first messages say that can be read, and why the last of the others cannot be."""
+    reasons = ["all are damaged"]
+
+    def readings():
+        for payload in payloads:
+            try:
+                yield read(payload)
+            except Exception as error:  # whatever damaged bytes do to the decoder
+                reasons.append(str(error).partition("\n")[0] or reasons[-1])
+
+    return list(islice(readings(), most)), reasons[-1]
+
+
 @dataclass(frozen=True)
 class Role:
     """What a topic must be, and words in its name that speak for (+) or against (-) it.
 
     Attributes:
+        what: It, in messages.
         readers: How each kind of schema is read, the best kinds first; None where it depends on
             the recording and on params (`sources`).
-        what: It, in messages.
         rate: Below it, a topic of the right type is not likely to be it [Hz].
         spare: Kinds that serve only where there is no other.
     """
 
-    readers: dict[str, Read | None]
     what: str
+    readers: dict[str, Read | None]
     hints: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     rate: float = 0.0
     spare: tuple[str, ...] = ()
 
 
-INFO = dict.fromkeys(of.INFOS, read_calibration)
+STATES = ("FrankaRobotState", "FrankaState")
+JOINTS = dict.fromkeys(("JointState", "JointStates"))
+POSE = dict.fromkeys(("PoseStamped", "PoseInFrame", "PoseWithCovarianceStamped"), of.read_pose)
+TWIST = dict.fromkeys(("TwistStamped", "TwistWithCovarianceStamped"), of.read_twist)
+IMAGES = dict.fromkeys(("Image", "RawImage", "CompressedImage"), of.read_image)
+INFO = dict.fromkeys(("CameraInfo", "CameraCalibration"), read_calibration)
+HAND = {
+    "hints": ("current", "ee", "eef", "tcp", "end_effector", "measured"),
+    "doubts": (*COMMANDS, *THINGS),
+    "rate": 10,
+}
 ROLES = {
     "wrench": Role(
-        {**of.WRENCH, **of.STATE_WRENCH},
         "force (a geometry_msgs/WrenchStamped topic)",
+        {"WrenchStamped": of.read_wrench, **dict.fromkeys(STATES, of.read_state_wrench)},
         hints=("ft", "force", "wrench"),
         doubts=(*COMMANDS, "estimated", "external", "filtered"),
         rate=50,
-        spare=of.STATES,  # they estimate the force from the motors' torques
+        spare=STATES,  # they estimate the force from the motors' torques
     ),
     "pose": Role(
-        {**of.POSE, **of.STATE_POSE, **dict.fromkeys(of.JOINTS), **dict.fromkeys(of.TWIST)},
         "end-effector pose (a geometry_msgs/PoseStamped topic)",
-        hints=("current", "ee", "eef", "tcp", "end_effector", "measured"),
-        doubts=(*COMMANDS, *THINGS),
-        rate=10,
+        {**POSE, **dict.fromkeys(STATES, of.read_state_pose), **JOINTS, **dict.fromkeys(TWIST)},
+        **HAND,
     ),
-    "twist": Role(
-        of.TWIST,
-        "end-effector twist (a geometry_msgs/TwistStamped topic)",
-        hints=("current", "ee", "eef", "tcp", "end_effector", "measured"),
-        doubts=(*COMMANDS, *THINGS),
-        rate=10,
-    ),
+    "twist": Role("end-effector twist (a geometry_msgs/TwistStamped topic)", TWIST, **HAND),
     "gripper": Role(
-        dict.fromkeys(of.JOINTS),
         "gripper (a sensor_msgs/JointState topic)",
+        JOINTS,
         hints=("gripper", "finger", "hand"),
         doubts=COMMANDS,
     ),
     "color": Role(
-        of.IMAGES,
         "colour images (a sensor_msgs/Image or CompressedImage topic)",
+        IMAGES,
         hints=("color", "colour", "rgb"),
         doubts=("infra", "ir", "left", "right", "depth", "mask", "debug"),
     ),
     "depth": Role(
-        of.IMAGES,
         "depth images (16UC1 or 32FC1, raw or compressedDepth)",
+        IMAGES,
         hints=("aligned", "registered", "depth"),
         doubts=("mask", "debug"),
     ),
-    "color_info": Role(INFO, "camera info of the colour images"),
-    "depth_info": Role(INFO, "camera info of the depth images"),
+    "color_info": Role("camera info of the colour images", INFO),
+    "depth_info": Role("camera info of the depth images", INFO),
 }
 
 

@@ -10,22 +10,22 @@ from pipeline.recording.input import readings as of
 from pipeline.recording.input.container import Channel
 from pipeline.recording.input.decode import Decoder
 from pipeline.recording.input.kinematics import chain_of, integrated
-from pipeline.recording.input.roles import ROLES, Convert, Read
+from pipeline.recording.input.roles import JOINTS, ROLES, TWIST, Convert, Read, readable
 
 TRIES = 50  # messages that are looked at to know a topic; some share it with other publishers
 TOOLS = {"tcp", "ee", "eef", "tool", "tool0", "hand", "flange", "gripper"}
 FINGERS = ("finger", "gripper", "knuckle")
 SHOWN = 12  # joints named in a message
 
-
-class NotIt(Exception):
-    """The channel is of the right type, but something else, which is no news to anybody."""
+Source = tuple[Read, Convert | None]
 
 
 def source_of(
     role: str, channel: Channel, decode: Decoder, setup: object, named: bool
-) -> tuple[Read, Convert | None]:
+) -> Source | None:
     """How to read a channel for a role, and how to convert what was read.
+
+    None where it is of the right type, but something else, which is no news to anybody.
 
     Args:
         role: One of ROLES; the channel's schema is among those of its readers.
@@ -34,37 +34,37 @@ def source_of(
         named: Whether params name the topic.
 
     Raises:
-        NotIt: where it is not what the role asks for.
         UserError: where it would be if params said more, or if it could be read.
     """
     kind = of.kind_of(channel.schema.name)
     if role == "gripper":
-        return _gripper(channel, decode, named), None
-    if role == "pose" and kind in of.JOINTS:
+        return _gripper(channel, decode, named)
+    if role == "pose" and kind in JOINTS:
         return _arm(channel, decode, setup)
-    if role == "pose" and kind in of.TWIST:
-        return _motion(channel, decode, setup, of.TWIST[kind])
+    if role == "pose" and kind in TWIST:
+        return _motion(channel, decode, setup, TWIST[kind])
     return ROLES[role].readers[kind], None
 
 
-def _gripper(channel: Channel, decode: Decoder, named: bool) -> Read:
+def _gripper(channel: Channel, decode: Decoder, named: bool) -> Source | None:
     """The joints of a gripper, not of an arm; all joints where params name the topic."""
     by_topic = named or _has(FINGERS, channel.topic)
     for names in _joint_names(channel, decode):
         fingers = tuple(name for name in names if _has(FINGERS, name))
         if fingers or by_topic:
             only = tuple(name for name in fingers if "finger" in name.lower())
-            return of.opening_reader(only or fingers or names)
-    raise NotIt
+            return of.opening_reader(only or fingers or names), None
+    return None
 
 
-def _arm(channel: Channel, decode: Decoder, setup: object) -> tuple[Read, Convert]:
+def _arm(channel: Channel, decode: Decoder, setup: object) -> Source | None:
     """Joint states through params' URDF."""
     known = _joint_names(channel, decode)
-    names = next((some for some in known if not _fingers_only(some)), ())
+    arms = [some for some in known if not all(_has(FINGERS, name) for name in some)]
+    if not arms:
+        return None
+    names = arms[0]
     has = ", ".join(names[:SHOWN])
-    if not names:
-        raise NotIt
     if setup.urdf is None:
         raise UserError(
             f"{channel.topic} has the joints {has}: put the robot's URDF into robots/ and name it"
@@ -81,9 +81,10 @@ def _arm(channel: Channel, decode: Decoder, setup: object) -> tuple[Read, Conver
     return read, lambda stamps, values: chain.poses(values)
 
 
-def _motion(channel: Channel, decode: Decoder, setup: object, read: Read) -> tuple[Read, Convert]:
+def _motion(channel: Channel, decode: Decoder, setup: object, read: Read) -> Source:
     """A twist alone, integrated from params' start pose."""
-    frames = Counter(of.frame_of(message) for message in _messages(channel, decode))
+    messages, _ = readable(decode, channel.payloads[:TRIES], TRIES)
+    frames = Counter(of.frame_of(message) for message in messages)
     frame = max(frames, key=frames.get, default="")
     if set(frame.lower().split("_")) & TOOLS:
         raise UserError(
@@ -98,33 +99,15 @@ def _motion(channel: Channel, decode: Decoder, setup: object, read: Read) -> tup
     return read, partial(integrated, start=setup.start_pose)
 
 
-def _fingers_only(names: tuple[str, ...]) -> bool:
-    return all(_has(FINGERS, name) for name in names)
-
-
 def _joint_names(channel: Channel, decode: Decoder) -> list[tuple[str, ...]]:
     """Names in the first messages, the most frequent first. Raises UserError if there are none."""
-    found: Counter[tuple[str, ...]] = Counter()
-    for message in _messages(channel, decode):
-        try:
-            found[tuple(of.joints_of(message))] += 1
-        except Exception:  # no positions, or whatever damaged bytes decode to
-            continue
-    names = [some for some, _ in found.most_common() if some]
+    messages, _ = readable(
+        lambda payload: tuple(of.joints_of(decode(payload))), channel.payloads[:TRIES], TRIES
+    )
+    names = [some for some, _ in Counter(messages).most_common() if some]
     if not names:
         raise UserError(f"{channel.topic} has fewer than two readable messages (no positions)")
     return names
-
-
-def _messages(channel: Channel, decode: Decoder) -> list[object]:
-    """Those of the first messages that can be decoded."""
-    found = []
-    for payload in channel.payloads[:TRIES]:
-        try:
-            found.append(decode(payload))
-        except Exception:  # whatever damaged bytes do to the decoder
-            continue
-    return found
 
 
 def _has(words: tuple[str, ...], name: str) -> bool:

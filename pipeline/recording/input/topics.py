@@ -11,14 +11,13 @@ from pipeline.recording.input import images
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import Camera, camera_from
 from pipeline.recording.input.container import Channel, Container
-from pipeline.recording.input.decode import Decoder, decoder
+from pipeline.recording.input.decode import decoder
 from pipeline.recording.input.readings import Picture
-from pipeline.recording.input.roles import OPTIONAL, ROLES, TRIES, Candidate, Choice
-from pipeline.recording.input.sources import NotIt, source_of
+from pipeline.recording.input.roles import OPTIONAL, ROLES, Candidate, Choice, readable
+from pipeline.recording.input.sources import source_of
+from pipeline.recording.input.words import few
 
 SHOWN = 12  # topics named in a message
-
-__all__ = ["Choice", "camera_of", "choose"]
 
 
 def choose(container: Container, setup: object) -> dict[str, Choice]:
@@ -56,7 +55,6 @@ class _Chooser:
     def __init__(self, container: Container, setup: object) -> None:
         self.container, self.setup = container, setup
         self.problems: list[str] = []  # why channels of the right type could not be used
-        self.decoders: dict[int, Decoder] = {}
 
     def choice(self, role: str, chosen: dict[str, Choice]) -> Choice | None:
         self.problems = []
@@ -81,10 +79,9 @@ class _Chooser:
         if not self.container.channels:
             return UserError(f"{path}: no {what}; the file has no messages at all: record it again")
         has = sorted({f"{c.topic} ({of.kind_of(_type(c))})" for c in self.container.channels})
-        more = f" and {len(has) - SHOWN} more" if len(has) > SHOWN else ""
         return UserError(
-            f"{path}: no {what}; the file has {', '.join(has[:SHOWN])}"
-            f"{more}: record it, or name its topic in setup.topics.{role}"
+            f"{path}: no {what}; the file has {few(has, SHOWN)}: record it, or name its topic in"
+            f" setup.topics.{role}"
         )
 
     def _named(self, role: str, name: str) -> Choice:
@@ -113,14 +110,13 @@ class _Chooser:
         if of.kind_of(channel.schema.name) not in ROLES[role].readers or not channel.payloads:
             return None
         try:
-            if id(channel) not in self.decoders:
-                self.decoders[id(channel)] = decoder(channel)
-            decode = self.decoders[id(channel)]
-            read, convert = source_of(role, channel, decode, self.setup, named)
+            decode = decoder(channel)
+            source = source_of(role, channel, decode, self.setup, named)
+            if source is None:
+                return None
+            read, convert = source
             choice = Choice(channel, lambda payload: read(decode(payload)), "", convert)
             return Candidate(ROLES[role], choice, choice.typical())
-        except NotIt:
-            return None
         except UserError as error:
             self.problems.append(str(error))
             return None
@@ -178,14 +174,9 @@ def _type(channel: Channel) -> str:
 
 def _size(image: Choice) -> tuple[int, int] | None:
     """Width and height that most of the first pictures tell."""
-    sizes = []
-    for payload in image.channel.payloads:
-        try:
-            sizes.append(images.size_of(image.read(payload).value))
-        except Exception:  # whatever damaged bytes do to the decoder
-            continue
-        if len(sizes) == TRIES:
-            break
+    sizes, _ = readable(
+        lambda payload: images.size_of(image.read(payload).value), image.channel.payloads
+    )
     known = Counter(size for size in sizes if size is not None)
     return known.most_common(1)[0][0] if known else None
 

@@ -26,7 +26,6 @@ from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.params import Params, load
 from pipeline.recording.build import Processed, episode_of, process
-from pipeline.recording.input import decode
 from tests.recording.bag import Lens, Truth, write_bag
 
 KINDS = {
@@ -249,23 +248,8 @@ def said(done: Processed) -> list[str]:
     return words
 
 
-def _compile_once() -> None:
-    """Schemas that are not damaged are the same in every run, and slow to compile."""
-    compiled, build = {}, decode._store
-
-    def store(channel):
-        schema = channel.schema
-        key = (schema.name, schema.encoding, schema.data)
-        if key not in compiled:
-            compiled[key] = build(channel)
-        return compiled[key]
-
-    decode._store = store
-
-
 def main(folder: Path, first: int, count: int, kinds: list[str]) -> None:
     params = small_params()
-    _compile_once()
     for kind in kinds:
         _mutate(folder, kind, range(first, first + count), params)
 

@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 from pipeline.base.errors import UserError
 from pipeline.recording.input.container import Channel
 from pipeline.recording.input.decode import decoder
-from pipeline.recording.input.readings import WRENCH
+from pipeline.recording.input.readings import read_wrench
 
 NAME = "geometry_msgs/msg/WrenchStamped"
 MSG = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(NAME, ros_version=2)[0]
@@ -58,7 +58,7 @@ def channel(name: str, encoding: str, data: bytes, messages: str) -> Channel:
 
 
 def reading(one: Channel, payload: bytes):
-    return WRENCH["WrenchStamped"](decoder(one)(payload))
+    return read_wrench(decoder(one)(payload))
 
 
 def cdr() -> bytes:

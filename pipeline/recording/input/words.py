@@ -1,0 +1,13 @@
+"""How messages count and list things."""
+
+from __future__ import annotations
+
+
+def counted(count: int, what: str = "message") -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
+def few(words: list[str], most: int) -> str:
+    """The first of the words, and how many more there are."""
+    more = len(words) - most
+    return ", ".join(words[:most]) + (f" and {more} more" if more > 0 else "")

@@ -55,7 +55,7 @@ def main() -> None:
     stored = Stored(band, method)
     landing_map.save(stored.folder() / "map.parquet", {"band": band, "method": method})
     about = {"params": params, "band": band, "method": method, "theta": theta, "device": kind()}
-    validated = landing_map.validation(params.policy.targets)
+    validated = validation([landing_map], params.policy.targets)
     export(plain, stored.folder(), kind=PLAIN, training=training, landing_map=validated, **about)
     print(f"{band} {method}: {verdict(training, checked.failures)}", flush=True)
 

@@ -70,11 +70,9 @@ class LandingMap:
             checks: Number of random draws that validate the interpolation.
             seed: Seed of those draws.
         """
-        grid = [np.linspace(*draw_y, size[0]), np.linspace(*draw_z, size[1])]
-        low, high = np.array([draw_y, draw_z]).T
-        random = np.random.default_rng(seed).uniform(low, high, (checks, 2))
-        launched = launcher(np.concatenate([_nodes(*grid), random]))
-        return cls._of(grid, random, max_force, *_columns(launched))
+        box = {"draw_y": draw_y, "draw_z": draw_z, "size": size, "max_force": max_force}
+        more = {"checks": checks, "seed": seed}
+        return cls.simulate_each(lambda draws, _: launcher(draws), [None], **box, **more)[0]
 
     @classmethod
     def simulate_each(
@@ -93,25 +91,18 @@ class LandingMap:
         grid = [np.linspace(*draw_y, size[0]), np.linspace(*draw_z, size[1])]
         low, high = np.array([draw_y, draw_z]).T
         random = np.random.default_rng(seed).uniform(low, high, (checks, 2))
-        draws = np.concatenate([_nodes(*grid), random])
+        nodes = np.stack(np.meshgrid(*grid, indexing="ij"), -1).reshape(-1, 2)  # y slowest
+        draws = np.concatenate([nodes, random])
         launched = launcher(np.tile(draws, (len(thetas), 1)), np.repeat(thetas, len(draws), axis=0))
-        each = (np.split(column, len(thetas)) for column in _columns(launched))
-        return [cls._of(grid, random, max_force, *one) for one in zip(*each, strict=True)]
-
-    @classmethod
-    def _of(cls, grid, random, max_force, landing, force, failure) -> LandingMap:
-        """Of launches of the nodes, then of random draws."""
-        shape = (len(grid[0]), len(grid[1]))
-        count = shape[0] * shape[1]
-        return cls(
-            draw_y=grid[0],
-            draw_z=grid[1],
-            landing_y=landing[:count].reshape(shape),
-            hold_force=force[:count].reshape(shape),
-            failure=failure[:count].reshape(shape),
-            max_force=float(max_force),
-            checks=np.column_stack([random, landing[count:], force[count:]]),
-        )
+        failure = np.array([reason or NO_FAILURE for reason in launched.failure], object)
+        landing = np.where(failure == NO_FAILURE, launched.landing_y, np.nan)
+        columns = landing, np.asarray(launched.hold_force, float), failure
+        maps = []
+        for one in zip(*(np.split(column, len(thetas)) for column in columns), strict=True):
+            at_nodes = (column[: len(nodes)].reshape(size) for column in one)
+            beside = (column[len(nodes) :] for column in one[:2])
+            maps.append(cls(*grid, *at_nodes, float(max_force), np.column_stack([random, *beside])))
+        return maps
 
     @property
     def reasons(self) -> list[str]:
@@ -126,10 +117,6 @@ class LandingMap:
     @cached_property
     def _surface(self) -> ResponseSurface:
         return surface_of([self])
-
-    def validation(self, targets: tuple[float, float]) -> dict:
-        """Interpolation error [m] on the random draws: over the box, and where targets lie."""
-        return validation([self], targets)
 
     def save(self, path: Path, header: dict | None = None) -> None:
         """Write one row a launch: grid nodes first (y slowest), then the validation draws."""
@@ -204,15 +191,3 @@ def validation(maps: list[LandingMap], targets: tuple[float, float]) -> dict:
         }
 
     return {"box": summary(known), "target_range": summary(near)}
-
-
-def _nodes(grid_y: np.ndarray, grid_z: np.ndarray) -> np.ndarray:
-    """Draws of a grid, y slowest, shape (Y * Z, 2)."""
-    return np.stack(np.meshgrid(grid_y, grid_z, indexing="ij"), -1).reshape(-1, 2)
-
-
-def _columns(launched) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Landing [m], NaN where failed, force [N] and reason of each launch, "" where none."""
-    failure = np.array([reason or NO_FAILURE for reason in launched.failure], object)
-    landing = np.where(failure == NO_FAILURE, launched.landing_y, np.nan)
-    return landing, np.asarray(launched.hold_force, float), failure

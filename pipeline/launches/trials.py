@@ -53,7 +53,7 @@ SCHEMA = pa.schema(
 
 @dataclass(frozen=True)
 class Batch:
-    """N launches of one kind and policy; a cell is None where there is nothing to tell.
+    """N launches of one kind and policy; a cell, or all, is None where there is nothing to tell.
 
     Attributes:
         draws: As commanded (y, z) [m], shape (N, 2).
@@ -68,21 +68,15 @@ class Batch:
     policy: str | None
     draws: np.ndarray
     targets: list[float | None]
-    landing: list[float | None]
-    failure: list[str | None]
-    hold_force: list[float | None]
-    flight: list[np.ndarray | None]
+    landing: list[float | None] | None = None
+    failure: list[str | None] | None = None
+    hold_force: list[float | None] | None = None
+    flight: list[np.ndarray | None] | None = None
 
-    @classmethod
-    def without_flight(
-        cls, kind: str, policy: str | None, draws, targets, landing=None, failure=None
-    ) -> Batch:
-        """Launches of which nobody saw more than the landing, if that."""
-        nothing = [None] * len(draws)
-        return cls(
-            kind, policy, np.asarray(draws, float), list(targets),
-            landing or nothing, failure or nothing, nothing, nothing,
-        )  # fmt: skip
+    def every(self, name: str) -> list:
+        """What an attribute tells of each launch."""
+        told = getattr(self, name)
+        return [None] * len(self.draws) if told is None else list(told)
 
 
 def measured(params, band: str, method: str, folder: Path) -> list[Batch]:
@@ -99,15 +93,16 @@ def measured(params, band: str, method: str, folder: Path) -> list[Batch]:
     launches = read_measured(path, method, params.methods) if path else []
     if not launches:
         return []
-    draws, landing, targets = zip(*((o.draw, o.landing, o.target) for o in launches), strict=True)
+    landing = [one.landing for one in launches]
     failure = [None if y is not None else "did not land" for y in landing]
-    return [Batch.without_flight("measured", None, draws, targets, list(landing), failure)]
+    draws, targets = np.array([o.draw for o in launches]), [o.target for o in launches]
+    return [Batch("measured", None, draws, targets, landing, failure)]
 
 
 def aimed(stored: Stored, targets: list[float]) -> list[Batch]:
     """What each of the method's policies would launch at the targets [m]. Raises UserError."""
     return [
-        Batch.without_flight("predicted", kind, stored.draws(np.array(targets), kind), targets)
+        Batch("predicted", kind, stored.draws(np.array(targets), kind), list(targets))
         for kind in stored.kinds()
     ]
 
@@ -127,14 +122,10 @@ def launched(batches: list[Batch], launch: Callable) -> list[Batch]:
 
 
 def _virtual(batch: Batch, tried: list) -> Batch:
-    return replace(
-        batch,
-        kind="virtual",
-        landing=[one.landing_y if np.isfinite(one.landing_y) else None for one in tried],
-        failure=[one.failure for one in tried],
-        hold_force=[one.hold_force for one in tried],
-        flight=[one.flight for one in tried],
-    )
+    landing = [one.landing_y if np.isfinite(one.landing_y) else None for one in tried]
+    names = ("failure", "hold_force", "flight")
+    told = {name: [getattr(one, name) for one in tried] for name in names}
+    return replace(batch, kind="virtual", landing=landing, **told)
 
 
 def predict(
@@ -195,7 +186,7 @@ def table(
     """
 
     def every(name: str) -> list:
-        return [value for batch in batches for value in getattr(batch, name)]
+        return [value for batch in batches for value in batch.every(name)]
 
     def each(name: str) -> list:
         return [getattr(batch, name) for batch in batches for _ in batch.draws]

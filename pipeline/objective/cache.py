@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base.files import replacing
-from pipeline.objective.evaluate import NOT_FINITE, Evaluation, Evaluator
+from pipeline.objective.evaluate import NOT_FINITE, Evaluation, Evaluator, weighed
 from pipeline.objective.loss import TERMS
 
 
@@ -74,21 +74,9 @@ class EvaluationCache:
                     return None
                 terms = {name: arrays[f"term_{name}"] for name in TERMS}
                 failure = [str(reason) or None for reason in arrays["failure"]]
-                weighed = arrays["weighed"].tolist()
+                kept = arrays["weighed"].tolist()
         except Exception:
             return None  # not there, or damaged: a zip file can be in many ways
-        if NOT_FINITE in failure and weighed != self._weighed:
+        if NOT_FINITE in failure and kept != self._weighed:
             return None
-        total = self.evaluate.loss.total(terms) + self.evaluate.space.cost(theta)
-        failure = [
-            reason or (None if finite else NOT_FINITE)
-            for reason, finite in zip(failure, np.isfinite(total), strict=True)
-        ]
-        failed = np.array([reason is not None for reason in failure])
-        return Evaluation(
-            unit=unit,
-            theta=theta,
-            terms={name: np.where(failed, np.nan, values) for name, values in terms.items()},
-            total=np.where(failed, np.inf, total),
-            failure=failure,
-        )
+        return weighed(self.evaluate.loss, self.evaluate.space, unit, terms, failure)

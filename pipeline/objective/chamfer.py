@@ -61,7 +61,7 @@ class Chamfer:
         if frames != self.frames:
             raise ValueError(f"{frames} simulated frames, {self.frames} measured")
         lanes = LANES["cuda" if device.startswith("cuda") else "cpu"]
-        kernel = chamfer_kernel(nodes - 1, SAMPLES, self.symmetric, lanes)
+        kernel, kind = chamfer_kernel(nodes - 1, SAMPLES, self.symmetric, lanes)
         with self._lock:
             if device not in self._packed:
                 arrays = _pack(self.clouds, lanes)
@@ -70,15 +70,16 @@ class Chamfer:
         if isinstance(center_line, np.ndarray):
             center_line = np.ascontiguousarray(center_line, np.float32)
             center_line = wp.array(center_line, device=device)
-        line = center_line.flatten()
         errors = wp.zeros(count * frames * 2, dtype=wp.float32, device=device)
         rest = self.rest_length
         if rest.ndim == 0:
             rest = np.full(nodes - 1, rest / (nodes - 1), np.float32)
-        rest = wp.array(rest, device=device)
-        camera = wp.vec3(*self.camera)
-        inputs = [line, *packed, frames, self.radius, rest, camera, errors]
-        launch(kernel, count * frames, inputs, device)
+        arrays = kind()
+        arrays.line, arrays.errors, arrays.frames = center_line.flatten(), errors, frames
+        arrays.points, arrays.frame_blocks = packed
+        arrays.radius, arrays.camera = self.radius, wp.vec3(*self.camera)
+        arrays.rest_edges = wp.array(rest, device=device)
+        launch(kernel, count * frames, [arrays], device)
         both = errors.numpy().reshape(count, frames, 2).astype(float)
         return both.mean(axis=2) if self.symmetric else both[:, :, 0]
 

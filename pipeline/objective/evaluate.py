@@ -92,15 +92,8 @@ class Evaluator:
         parts = [part for each in begun for part in each]
         terms = {name: np.concatenate([part[0][name] for part in parts]) for name in TERMS}
         failure = [reason for part in parts for reason in part[1]]
-        failed = np.array([reason is not None for reason in failure])
-        return Evaluation(
-            unit=unit,
-            theta=theta,
-            terms={name: np.where(failed, np.nan, values) for name, values in terms.items()},
-            total=np.where(failed, np.inf, self.loss.total(terms) + self.space.cost(theta)),
-            failure=failure,
-            seconds=time.perf_counter() - start,
-        )
+        seconds = time.perf_counter() - start
+        return weighed(self.loss, self.space, unit, terms, failure, seconds)
 
     def rollouts(
         self, theta: np.ndarray, device: str | None = None
@@ -126,13 +119,29 @@ class Evaluator:
     ) -> tuple[dict[str, np.ndarray], list[str | None]]:
         rollouts, nuisances = self.rollouts(theta, device)
         with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
-            terms = self.loss.terms(rollouts, nuisances)
-            finite = np.isfinite(self.loss.total(terms))
-        failure = [
-            reason or (None if good else NOT_FINITE)
-            for reason, good in zip(rollouts.failure, finite, strict=True)
-        ]
-        return terms, failure
+            return self.loss.terms(rollouts, nuisances), rollouts.failure
+
+
+def weighed(
+    loss: EpisodeLoss,
+    space: Space,
+    unit: np.ndarray,
+    terms: dict[str, np.ndarray],
+    failure: list[str | None],
+    seconds: float = 0.0,
+) -> Evaluation:
+    """The evaluation of points (N, D) whose terms are known; a loss not finite is a failure."""
+    theta = space.to_physical(unit)
+    with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
+        total = loss.total(terms)
+    failure = [
+        reason or (None if finite else NOT_FINITE)
+        for reason, finite in zip(failure, np.isfinite(total), strict=True)
+    ]
+    failed = np.array([reason is not None for reason in failure])
+    terms = {name: np.where(failed, np.nan, values) for name, values in terms.items()}
+    total = np.where(failed, np.inf, total + space.cost(theta))
+    return Evaluation(unit, theta, terms, total, failure, seconds)
 
 
 class Penalty:

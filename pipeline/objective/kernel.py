@@ -10,35 +10,33 @@ TEXT = Path(__file__).with_name("chamfer.h")
 
 
 @built_once
-def chamfer_kernel(edges: int, samples: int, both: bool, lanes: int):
-    """Compile chamfer.h for a mesh; Warp keeps the binary in its cache."""
-    floats, integers = wp.array(dtype=wp.float32), wp.array(dtype=wp.int32)
-    text = text_of(TEXT, EDGES=edges, SAMPLES=samples, BOTH=int(both), CPU_LANES=lanes)
+def chamfer_kernel(edges: int, samples: int, both: bool, lanes: int) -> tuple[wp.Kernel, type]:
+    """Compile chamfer.h for a mesh; Warp keeps the binary in its cache.
+
+    Returns:
+        The kernel, and the structure of arrays that it takes.
+    """
+    floats = wp.array(dtype=wp.float32)
+
+    @wp.struct
+    class CloudArrays:
+        line: floats
+        points: floats
+        frame_blocks: wp.array(dtype=wp.int32)
+        frames: int
+        radius: float
+        rest_edges: floats
+        camera: wp.vec3
+        errors: floats
+
+    text = "".join(f"\nconst auto {name} = arrays.{name};" for name in CloudArrays.vars)
+    text += text_of(TEXT, EDGES=edges, SAMPLES=samples, BOTH=int(both), CPU_LANES=lanes)
 
     @wp.func_native(text)
-    def distances(
-        tid: int,
-        line: floats,
-        points: floats,
-        frame_blocks: integers,
-        frames: int,
-        radius: float,
-        rest_edges: floats,
-        camera: wp.vec3,
-        errors: floats,
-    ): ...
+    def distances(tid: int, arrays: CloudArrays): ...
 
     @wp.kernel(module="unique")
-    def run(
-        line: floats,
-        points: floats,
-        frame_blocks: integers,
-        frames: int,
-        radius: float,
-        rest_edges: floats,
-        camera: wp.vec3,
-        errors: floats,
-    ):
-        distances(wp.tid(), line, points, frame_blocks, frames, radius, rest_edges, camera, errors)
+    def run(arrays: CloudArrays):
+        distances(wp.tid(), arrays)
 
-    return run
+    return run, CloudArrays

@@ -27,24 +27,7 @@ from pipeline.params.identification import (
 from pipeline.params.lab import BandName, BandParams, PlanParams, RunParams, SetupParams
 from pipeline.params.launches import FloorParams, PolicyParams, TrialsParams
 from pipeline.params.recording import CloudParams, EpisodeParams, ForceParams
-from pipeline.params.virtual_rig import RigArm, RigBand, RigCamera, RigClock, RigParams, RigWrench
-
-__all__ = [
-    "BandParams",
-    "Parameters",
-    "Params",
-    "PlanParams",
-    "RigParams",
-    "RigArm",
-    "RigBand",
-    "RigCamera",
-    "RigClock",
-    "RigWrench",
-    "check",
-    "expect_known",
-    "load",
-    "parse",
-]
+from pipeline.params.virtual_rig import RigParams
 
 
 class Params(Section):

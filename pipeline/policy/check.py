@@ -78,24 +78,24 @@ def _checked(launched, targets: np.ndarray, max_force: float) -> Check:
 
 
 def figures(trained: Trained, checked: Check) -> dict:
-    """What a card tells of a training (export.TRAINING)."""
+    """What a card tells of a training; errors are |y_p - g| of the deterministic policy [m]."""
     return {
         "converged": not checked.failures and checked.mean_error <= CONVERGED,
         "criterion": CRITERION,
-        "iteration": trained.iteration,
+        "iteration": trained.iteration,  # that the policy comes from
         "iterations": len(trained.curve["iteration"]),
-        "mean_error_m": checked.mean_error,
+        "mean_error_m": checked.mean_error,  # launched in the calibrated simulator
         "max_error_m": checked.max_error,
         "failed_targets": sum(checked.failures.values()),
-        "map_mean_error_m": trained.mean_error,
-        "failed_launches": trained.failures,
+        "map_mean_error_m": trained.mean_error,  # the same by the interpolated landing map
+        "failed_launches": trained.failures,  # exploring ones, by reason
     }
 
 
 def robust_figures(
     trained: Trained, checked: Check, expected: Check, plain: Check, samples: int, error: float
 ) -> dict:
-    """The same of a robust policy (export.ROBUST_TRAINING).
+    """The same of a robust policy.
 
     Args:
         expected, plain: Of the robust and the plain policy's `check_expected`.

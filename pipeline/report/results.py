@@ -98,20 +98,14 @@ def gather(params, root: str | Path = ".") -> Results:
     """Read the outputs of every band and method of params.run. Raises UserError."""
     layout = Layout(Path(root))
     episodes = {band: Episode.load(layout.episode(band)) for band in params.run.bands}
-    methods = {band: {} for band in episodes}
-    for band, method in pairs(params.run):
-        methods[band][method] = _result(layout, band, method)
+    methods = {}
+    for band in params.run.bands:
+        ablations = params.run.ablations.methods if band in params.run.ablations.bands else ()
+        ran = dict.fromkeys([*params.run.methods, *ablations])
+        methods[band] = {method: _result(layout, band, method) for method in ran}
     floors = {band: load_floor(layout.floor(band)) for band in params.run.rig}
     unused = {band: _unused(params, layout, band, methods[band]) for band in methods}
     return Results(episodes, methods, floors, {band: n for band, n in unused.items() if n})
-
-
-def pairs(run) -> list[tuple[str, str]]:
-    """Every band of params.yaml's `run` with every method that runs on it, band by band."""
-    ablated = {band: run.ablations.methods for band in run.ablations.bands}
-    return [
-        (band, method) for band in run.bands for method in (*run.methods, *ablated.get(band, ()))
-    ]
 
 
 def _unused(params, layout: Layout, band: str, methods: Collection[str]) -> int:

@@ -37,11 +37,6 @@ class History:
         solver: np.ndarray | None = None,
     ) -> None:
         """Append a batch; `solver` says who asked for each point, shape (N,)."""
-        self._parts.append(self._rows(evaluation, phase, generation, solver))
-
-    def _rows(
-        self, evaluation: Evaluation, phase: str, generation: int, solver: np.ndarray | None
-    ) -> pa.Table:
         count = len(evaluation.total)
         columns = {
             "method": pa.array([self.method] * count, pa.string()),
@@ -56,16 +51,15 @@ class History:
             columns[name] = pa.array(evaluation.terms[name], pa.float64())
         columns["total"] = pa.array(evaluation.total, pa.float64())
         columns["failure"] = pa.array(evaluation.failure, pa.string())
-        return pa.table(columns)
+        self._parts.append(pa.table(columns))
 
     @property
     def table(self) -> pa.Table:
-        return pa.concat_tables(self._parts or [self._no_rows()]).combine_chunks()
-
-    def _no_rows(self) -> pa.Table:
-        points, values = np.zeros((0, len(self.names))), np.zeros(0)
-        nothing = Evaluation(points, points, dict.fromkeys(TERMS, values), values, [])
-        return self._rows(nothing, "", 0, None)
+        if not self._parts:  # the columns of no rows
+            points, values = np.zeros((0, len(self.names))), np.zeros(0)
+            nothing = Evaluation(points, points, dict.fromkeys(TERMS, values), values, [])
+            self.add(nothing, phase="", generation=0)
+        return pa.concat_tables(self._parts).combine_chunks()
 
     @property
     def unit(self) -> np.ndarray:

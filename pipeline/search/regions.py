@@ -51,16 +51,9 @@ def regions_of(about, optimizer, history) -> tuple[list[Region], int]:
     Raises:
         UserError: As `find_regions`.
     """
-    asked = regions_asked(about, optimizer)
-    regions = find_regions(
-        history.unit,
-        history.total,
-        k_top=asked,
-        k_nn=optimizer.k_nn,
-        delta=optimizer.delta,
-        covariance=about.covariance,
-    )
-    return regions, asked
+    settings = {name: getattr(optimizer, name) for name in ("k_nn", "delta")}
+    settings |= {"k_top": regions_asked(about, optimizer), "covariance": about.covariance}
+    return find_regions(history.unit, history.total, **settings), settings["k_top"]
 
 
 def find_regions(
@@ -85,18 +78,12 @@ def find_regions(
             " check the recording, and the box under `parameters` in params.yaml"
         )
     regions = []
-    for centre in suppress(unit[good], total[good], delta, k_top):
-        distance = np.linalg.norm(unit[good] - unit[good][centre], axis=1)
+    for centre in good[suppress(unit[good], total[good], delta, k_top)]:
+        distance = np.linalg.norm(unit[good] - unit[centre], axis=1)
         members = good[np.argsort(distance, kind="stable")[:k_nn]]
         sigma = regularised(np.cov(unit[members], rowvar=False))
-        regions.append(
-            Region(
-                mu=unit[good[centre]],
-                sigma=sigma if covariance else isotropic(sigma),
-                loss=float(total[good[centre]]),
-                members=members.tolist(),
-            )
-        )
+        sigma = sigma if covariance else isotropic(sigma)
+        regions.append(Region(unit[centre], sigma, float(total[centre]), members.tolist()))
     return regions
 
 
@@ -126,21 +113,9 @@ def isotropic(covariance: np.ndarray) -> np.ndarray:
     return np.exp(log_determinant / dimension) * np.eye(dimension)
 
 
-def save_regions(path: Path, names: tuple[str, ...], regions: list[Region], asked: int) -> None:
-    """Write JSON; mu and Sigma are in the unit cube, in the order of `names`."""
-    clusters = [
-        {
-            "mu": region.mu.tolist(),
-            "Sigma": region.sigma.tolist(),
-            "loss": region.loss,
-            "members": region.members,
-        }
-        for region in regions
-    ]
-    write_json(path, {"names": list(names), "asked": asked, "clusters": clusters})
-
-
 class RegionEntry(JsonRecord):
+    """A region; mu and Sigma are in the unit cube."""
+
     mu: list[float]
     Sigma: list[list[float]]
     loss: float
@@ -152,8 +127,18 @@ class RegionsFile(JsonRecord):
     clusters: list[RegionEntry]
 
 
+def save_regions(path: Path, names: tuple[str, ...], regions: list[Region], asked: int) -> None:
+    """Write a `RegionsFile` with its axes' `names`, and how many regions were asked for."""
+    clusters = [
+        {"mu": one.mu.tolist(), "Sigma": one.sigma.tolist(), "loss": one.loss}
+        | {"members": one.members}
+        for one in regions
+    ]
+    write_json(path, {"names": list(names), "asked": asked, "clusters": clusters})
+
+
 def load_regions(path: Path) -> tuple[list[Region], list[str]]:
-    """What `save_regions` wrote: the regions, and the names of their axes. Raises NotMade."""
+    """The regions of such a file, and the names of their axes. Raises NotMade."""
     read = read_json(path, RegionsFile)
     regions = [
         Region(np.array(one.mu), np.array(one.Sigma), one.loss, one.members)

@@ -77,9 +77,9 @@ def test_refuses_draws_outside_the_box() -> None:
 
 def test_validation_sees_an_error_of_the_map() -> None:
     chart = simulate()
-    good = chart.validation((1.425, 2.425))
-    shifted = dataclasses.replace(chart, landing_y=chart.landing_y + 0.05).validation(
-        (1.425, 2.425)
+    good = validation([chart], (1.425, 2.425))
+    shifted = validation(
+        [dataclasses.replace(chart, landing_y=chart.landing_y + 0.05)], (1.425, 2.425)
     )
     assert good["box"]["draws"] == 128 and 5 < good["target_range"]["draws"] < 128
     assert good["box"]["max_error_m"] < 1e-4
@@ -93,7 +93,7 @@ def test_survives_the_file(tmp_path) -> None:
     draws = random_draws()
     np.testing.assert_array_equal(loaded(draws).landing_y, chart(draws).landing_y)
     np.testing.assert_array_equal(loaded(draws).failure, chart(draws).failure)
-    assert loaded.validation((1.4, 2.4)) == chart.validation((1.4, 2.4))
+    assert validation([loaded], (1.4, 2.4)) == validation([chart], (1.4, 2.4))
 
 
 def test_maps_of_several_theta_are_those_of_each() -> None:
@@ -121,7 +121,7 @@ def test_maps_of_several_theta_are_those_of_each() -> None:
         np.testing.assert_array_equal(together.landing_y[:, column], single.landing_y)
         np.testing.assert_array_equal(together.failure[:, column], single.failure)
     both = validation(maps, (1.4, 2.4))["box"]
-    assert both["draws"] == sum(one.validation((1.4, 2.4))["box"]["draws"] for one in maps)
+    assert both["draws"] == sum(validation([one], (1.4, 2.4))["box"]["draws"] for one in maps)
     assert both["draws"] > 20 and both["mean_error_m"] < 5e-3
 
 
@@ -144,7 +144,7 @@ def test_a_box_in_which_every_launch_fails() -> None:
     chart = simulate(broken)
     landed = chart(random_draws(20))
     assert {chart.reasons[code] for code in landed.failure} == {"it broke"}
-    assert chart.validation((1.4, 2.4))["box"] == {
+    assert validation([chart], (1.4, 2.4))["box"] == {
         "draws": 0,
         "mean_error_m": None,
         "max_error_m": None,

@@ -72,9 +72,9 @@ def test_batches_follow_each_other_and_count_anew() -> None:
     """Plain, robust and measured launches in one table, each with trials of its own."""
     rows = made(
         [
-            Batch.without_flight("predicted", "plain", DRAWS[:1], [1.9]),
-            Batch.without_flight("predicted", "robust", DRAWS[1:2], [1.9]),
-            Batch.without_flight("measured", None, DRAWS[2:], [None], [2.2]),
+            Batch("predicted", "plain", DRAWS[:1], [1.9]),
+            Batch("predicted", "robust", DRAWS[1:2], [1.9]),
+            Batch("measured", None, DRAWS[2:], [None], [2.2]),
         ]
     )
     assert rows["kind"] == ["predicted", "predicted", "measured"]
@@ -124,15 +124,12 @@ def landed(draw: np.ndarray, number: int) -> SimpleNamespace:
 
 def test_landings_outside_the_area_stand_beside_their_failure() -> None:
     """Launches of two batches are numbered alike; what else is known of a launch stays."""
-    drawn = {"plain": [[-0.3, -0.1]] * 3, "robust": [[-0.4, -0.2]] * 3}
-    aimed = [
-        Batch.without_flight("predicted", policy, draws, [1.9, 1.9, 2.1])
-        for policy, draws in drawn.items()
-    ]
+    drawn = {"plain": np.tile([-0.3, -0.1], (3, 1)), "robust": np.tile([-0.4, -0.2], (3, 1))}
+    aimed = [Batch("predicted", policy, draws, [1.9, 1.9, 2.1]) for policy, draws in drawn.items()]
     plain, robust = launched(aimed, landed)
     for one, policy in ((plain, "plain"), (robust, "robust")):
         assert (one.kind, one.policy, one.targets) == ("virtual", policy, [1.9, 1.9, 2.1])
-        assert one.draws.tolist() == drawn[policy]
+        assert one.draws.tolist() == drawn[policy].tolist()
         assert one.landing == [1.9, 3.0, None]
         assert one.failure == [None, "failed", "failed"]
     assert plain.hold_force == [300, 301, 302] and robust.hold_force == [400, 401, 402]

@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from torch import nn
 
 from pipeline.episode.episode import Episode
-from pipeline.landing.landing_map import LandingMap, surface_of
+from pipeline.landing.landing_map import LandingMap, surface_of, validation
 from pipeline.params import load
 from pipeline.policy.export import write_onnx
 from pipeline.policy.train import Policy
@@ -176,7 +176,7 @@ def template(tmp_path_factory) -> Path:
     )
     card = {
         "training": {"converged": True, "mean_error_m": 0.004, "max_error_m": 0.01},
-        "landing_map": chart.validation((1.425, 2.425)),
+        "landing_map": validation([chart], (1.425, 2.425)),
     }
     (folder / "card.json").write_text(json.dumps(card))
     torch.manual_seed(0)

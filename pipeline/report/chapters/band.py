@@ -33,21 +33,23 @@ WHOSE = {PLAIN: "the policy's", ROBUST: "the robust policy's"}
 
 @dataclass(frozen=True)
 class Band:
-    """What ran on a band; `near`: the methods that its own pictures have room for."""
+    """What ran on a band."""
 
     report: Report
     name: str
-    methods: dict[str, Result]
-    near: dict[str, Result]
-    styles: Styles
 
-    @classmethod
-    def of(cls, report: Report, name: str) -> Band:
-        methods = report.results.methods[name]
-        near = {method: methods[method] for method in drawn(methods)}
-        return cls(
-            report, name, methods, near, {method: report.styles[method] for method in methods}
-        )
+    @property
+    def methods(self) -> dict[str, Result]:
+        return self.report.results.methods[self.name]
+
+    @property
+    def near(self) -> dict[str, Result]:
+        """The methods that its own pictures have room for."""
+        return {method: self.methods[method] for method in drawn(self.methods)}
+
+    @property
+    def styles(self) -> Styles:
+        return {method: self.report.styles[method] for method in self.methods}
 
     @property
     def near_names(self) -> str:
@@ -59,7 +61,7 @@ class Band:
 
 def bands(report: Report) -> str:
     """A chapter a band."""
-    return "\n".join(_chapter(Band.of(report, name)) for name in report.params.run.bands)
+    return "\n".join(_chapter(Band(report, name)) for name in report.params.run.bands)
 
 
 def _chapter(band: Band) -> str:

@@ -26,22 +26,18 @@ position (y, z) of the projectile, y < 0; a *target* g is a distance along y on 
 def summary(report: Report) -> str:
     """A line a band of the rig, one a method where launches were measured, and what went wrong."""
     results, styles = report.results, report.styles
+    named = [(one, f"{one.band}, {styles[one.method].name}") for one in results]
     lines = [INTRODUCTION, "## In short\n"]
     lines += [line for band in results.methods for line in _virtual(results, band, styles)]
-    for one in results:
-        said = measured(one.trials)
-        if said:
-            lines.append(f"- **{_name(one, styles)}**: {'; '.join(said)}.")
-    lines += [f"- {line}" for one in results for line in _doubts(one, _name(one, styles))]
+    for one, name in named:
+        if said := measured(one.trials):
+            lines.append(f"- **{name}**: {'; '.join(said)}.")
+    lines += [f"- {line}" for one, name in named for line in _doubts(one, name)]
     lines += [
         f"- {band}: {count} measured launches name a method that does not run on this band."
         for band, count in results.unused.items()
     ]
     return "\n".join(lines) + "\n"
-
-
-def _name(result: Result, styles: Styles) -> str:
-    return f"{result.band}, {styles[result.method].name}"
 
 
 def _virtual(results: Results, band: str, styles: Styles) -> list[str]:

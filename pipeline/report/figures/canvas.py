@@ -37,10 +37,11 @@ def patch(color: str, **style) -> plt.Rectangle:
     return plt.Rectangle((0, 0), 1, 1, color=color, **style)
 
 
-def key(figure: plt.Figure, entries: Iterable[tuple[str, Artist]], columns: int = 0) -> None:
-    """What is what, below the picture, in one line or in so many columns."""
+def key(figure: plt.Figure, entries: Iterable[tuple[str, Artist]], columns: int = 0, **more):
+    """What is what, below the picture or where `more` says, in one line or in so many columns."""
     names, marks = zip(*entries, strict=True)
-    figure.legend(marks, names, loc="outside lower center", ncols=columns or len(names))
+    more = {"loc": "outside lower center", "ncols": columns or len(names)} | more
+    figure.legend(marks, names, **more)
 
 
 def log_y(ax: plt.Axes) -> None:

@@ -29,61 +29,54 @@ def profiles(results: dict[str, Result], styles: Styles, boxes) -> plt.Figure:
     for ax, name in zip(axes.flat, THETA, strict=False):
         label, unit = PARAMETERS[name]
         box, marks = getattr(boxes, name), []
-        if box.scale == "log":
-            ax.set_xscale("log")
+        log = box.scale == "log"
+        ax.set(xlabel=label, xscale="log" if log else "linear")
         for number, (method, result) in enumerate(results.items()):
             about = result.confidence["parameters"][name]
-            color, best = styles[method].color, unit * result.theta["theta"][name]
+            color, best = styles[method].color, result.theta["theta"][name]
             if about.get("fixed"):
-                ax.axvline(best, color=color, lw=1.2, ls=":")
+                ax.axvline(unit * best, color=color, lw=1.2, ls=":")
                 marks.append(f"{styles[method].name}: held fixed")
                 continue
-            samples = unit * _column(result, name)
-            _marginal(ax, samples, color, reach, log=box.scale == "log")
+            _marginal(ax, unit * _column(result, name), color, reach, log=log)
             curve = result.posterior["profiles"][name]
             value = unit * np.array(curve["value"])
             ax.plot(value, curve["misfit"], "o-", ms=2.5, color=color, lw=1.5)
-            _interval(ax, unit * about["low"], unit * about["high"], best, color, number, reach)
+            _interval(ax, about, unit, best, color, number, reach)
             if not about["identifiable"]:
                 marks.append(f"{styles[method].name}: not identifiable")
-        if box.scale == "log":
+        if log:
             few_ticks(ax.xaxis)
         else:  # the whole box, so that an interval that fills it is seen to
             margin = 0.03 * (box.high - box.low)
             ax.set_xlim(unit * (box.low - margin), unit * (box.high + margin))
         ax.axhline(reach, color="0.5", lw=0.8, ls="--")
-        ax.set_xlabel(label)
         words = {"va": "top", "fontsize": 7.5, "zorder": 6}
         ax.text(0.03, 0.98, "\n".join(marks), transform=ax.transAxes, **words)
     _product(axes[1, 2], results, styles, reach)
     axes[0, 0].set_ylim(0, TOP * reach)
     for ax in axes[:, 0]:
         ax.set_ylabel("misfit above its least")
-    key(
-        figure,
-        [
-            *((styles[method].name, mark(color=styles[method].color)) for method in results),
-            (f"{100 * level:g} % of a likelihood ratio", mark(color="0.5", ls="--", lw=0.8)),
-            (f"{100 * level:g} % interval and θ*", mark(color="0.4", lw=3)),
-            ("posterior's marginal", patch("0.8")),
-        ],
-    )
+    entries = [(styles[method].name, mark(color=styles[method].color)) for method in results]
+    entries += [
+        (f"{100 * level:g} % of a likelihood ratio", mark(color="0.5", ls="--", lw=0.8)),
+        (f"{100 * level:g} % interval and θ*", mark(color="0.4", lw=3)),
+        ("posterior's marginal", patch("0.8")),
+    ]
+    key(figure, entries)
     return figure
 
 
 def _product(ax: plt.Axes, results: dict[str, Result], styles, reach: float) -> None:
     """Marginal of s·d, the damping that a recording can see."""
     for number, (method, result) in enumerate(results.items()):
-        about = result.confidence["derived"].get("damping_product")
-        if about is None:
-            continue
-        samples = 1e3 * _column(result, "damping_scale") * _column(result, "elasticity_damping")
-        color = styles[method].color
-        _marginal(ax, samples, color, reach, log=False)
-        theta = result.theta["theta"]
-        low, high = 1e3 * about["low"], 1e3 * about["high"]
-        best = 1e3 * theta["damping_scale"] * theta["elasticity_damping"]
-        _interval(ax, low, high, best, color, number, reach)
+        about, color = result.confidence["derived"].get("damping_product"), styles[method].color
+        if about is not None:
+            samples = _column(result, "damping_scale") * _column(result, "elasticity_damping")
+            _marginal(ax, 1e3 * samples, color, reach, log=False)
+            theta = result.theta["theta"]
+            best = theta["damping_scale"] * theta["elasticity_damping"]
+            _interval(ax, about, 1e3, best, color, number, reach)
     ax.set_xlabel("s·d [ms] (marginal alone)")
 
 
@@ -102,11 +95,12 @@ def _marginal(ax: plt.Axes, samples: np.ndarray, color: str, reach: float, *, lo
     ax.stairs(counts / counts.max() * TOP * reach * 2 / 3, edges, fill=True, color=color, alpha=0.2)
 
 
-def _interval(ax, low: float, high: float, best: float, color: str, number: int, reach) -> None:
-    """A bar near the top of the panel, one line a method, with a dot at θ*."""
+def _interval(ax, about: dict, unit: float, best, color: str, number: int, reach: float) -> None:
+    """A bar near the top of the panel, one line a method, with a dot at θ*; SI times `unit`."""
     height = (0.80 - 0.06 * number) * TOP * reach
-    ax.plot([low, high], [height, height], color=color, lw=3, solid_capstyle="butt")
-    ax.plot(best, height, "o", ms=6, color=color, mec="w", mew=1)
+    ends = unit * about["low"], unit * about["high"]
+    ax.plot(ends, [height, height], color=color, lw=3, solid_capstyle="butt")
+    ax.plot(unit * best, height, "o", ms=6, color=color, mec="w", mew=1)
 
 
 @picture({"axes.grid": False})

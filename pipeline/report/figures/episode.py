@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -22,34 +24,37 @@ SLACK, MARGIN = 0.05, 0.04  # of the peak force, below which the band is slack; 
 @picture()
 def force(episode: Episode, replays: dict[str, Replay], styles: Styles) -> plt.Figure:
     """Force over time, its residual, and the clouds' distance; the release magnified."""
-    rows = ("force, y [N]", "force, z [N]", "|residual| [N]", "clouds off by [cm]")
+    labels = ("force, y [N]", "force, z [N]", "|residual| [N]", "clouds off by [cm]")
     figure, axes = plt.subplots(
         4, 2, figsize=(9.6, 7.4), width_ratios=(1.9, 1), height_ratios=(1.35, 1, 1, 1),
         sharex="col", sharey="row",
     )  # fmt: skip
-    for ax in axes[:, 0], axes[:, 1]:
-        for row, axis in ((0, 1), (1, 2)):
-            ax[row].plot(episode.time, episode.force[:, axis], color=INK, lw=2)
+    for ax in axes.T:
+        for axis in (1, 2):
+            ax[axis - 1].plot(episode.time, episode.force[:, axis], color=INK, lw=2)
         for number, (method, replay) in enumerate(replays.items()):
             style = curve(styles[method], number)
-            ax[0].plot(episode.time, replay.force[:, 1], **style)
-            ax[1].plot(episode.time, replay.force[:, 2], **style)
+            for axis in (1, 2):
+                ax[axis - 1].plot(episode.time, replay.force[:, axis], **style)
             residual = np.linalg.norm(episode.force - replay.force, axis=1)
-            style["lw"] = 1.1
-            ax[2].plot(episode.time, residual, **style | {"ls": "-"})
-            style |= {"ls": "", "marker": ".", "ms": 6 if number == 0 else 3.5}
-            ax[3].plot(episode.cloud_time, 100 * replay.distance, **style)
+            ax[2].plot(episode.time, residual, **style | {"lw": 1.1, "ls": "-"})
+            dots = style | {"ls": "", "marker": ".", "ms": 6 if number == 0 else 3.5}
+            ax[3].plot(episode.cloud_time, 100 * replay.distance, **dots)
         for one in ax:
             one.axvline(episode.release_time, color="0.6", lw=0.8, zorder=0)
-    for ax, label in zip(axes[:, 0], rows, strict=True):
+    for ax, label in zip(axes[:, 0], labels, strict=True):
         ax.set_ylabel(label)
     figure.align_ylabels(axes[:, 0])
     axes[3, 0].set(xlabel="time [s] (grey line: release)", xlim=episode.time[[0, -1]])
-    axes[3, 1].set_xlabel("time around the release [s]")
-    axes[3, 1].set_xlim(episode.release_time + AROUND[0], episode.release_time + AROUND[1])
-    curves = [(styles[m].name, mark(**curve(styles[m], n))) for n, m in enumerate(replays)]
-    key(figure, [("measured", mark(color=INK, lw=2)), *curves])
+    around = np.add(episode.release_time, AROUND)
+    axes[3, 1].set(xlabel="time around the release [s]", xlim=around)
+    key(figure, [("measured", mark(color=INK, lw=2)), *_curves(replays, styles)])
     return figure
+
+
+def _curves(methods: Iterable[str], styles: Styles, *width: float) -> list[tuple[str, plt.Line2D]]:
+    """What the curves of methods are, for a key."""
+    return [(styles[m].name, mark(**curve(styles[m], n, *width))) for n, m in enumerate(methods)]
 
 
 @picture()
@@ -65,7 +70,7 @@ def work(episode: Episode, replays: dict[str, Replay], styles: Styles) -> plt.Fi
         right.plot(episode.time, gap, **style | {"ls": "-"})
         ending = {"ha": "left", "va": "center", "fontsize": 8, "color": styles[method].color}
         right.annotate(
-            _signed(gap[-1], ".3f") + " J", (1, gap[-1]), xycoords=("axes fraction", "data"),
+            _signed(gap[-1]) + " J", (1, gap[-1]), xycoords=("axes fraction", "data"),
             xytext=(3, 0), textcoords="offset points", annotation_clip=False, **ending,
         )  # fmt: skip
     left.set_ylabel("work on the hand, ∫ f·v dt [J]")
@@ -122,8 +127,8 @@ def clouds(
     )  # fmt: skip
     for column, (name, frame) in enumerate(frames.items()):
         since = episode.cloud_time[frame] - episode.release_time
-        axes[0, column].set_title(f"{name}\n{_signed(since, '.3f')} s", fontsize=9)
-        points = episode.clouds[frame]
+        top, points = axes[0, column], episode.clouds[frame]
+        top.set_title(f"{name}\n{_signed(since)} s", fontsize=9)
         for ax, (_, up) in zip(axes[:, column], views, strict=True):
             ax.plot(points[:, 0], points[:, up], ".", ms=1.5, color=INK, zorder=2.5)
             for method, replay in replays.items():
@@ -132,11 +137,9 @@ def clouds(
                 ax.plot(*line, color=color, alpha=0.25, zorder=2, gid="tube")
             ax.set_aspect("equal")
         for number, (method, replay) in enumerate(reversed(replays.items())):
-            axes[0, column].text(
-                0.98, 0.02 + 0.05 * number, f"{100 * replay.distance[frame]:.2f} cm",
-                transform=axes[0, column].transAxes, ha="right", fontsize=8,
-                color=styles[method].color,
-            )  # fmt: skip
+            off, words = f"{100 * replay.distance[frame]:.2f} cm", {"ha": "right", "fontsize": 8}
+            words |= {"transform": top.transAxes, "color": styles[method].color}
+            top.text(0.98, 0.02 + 0.05 * number, off, **words)
         axes[1, column].set_xlabel("x [m]")
     for row, (view, up) in zip(axes, views, strict=True):
         row[0].set(xlim=(low[0], high[0]), ylim=(low[up], high[up]))
@@ -183,8 +186,8 @@ def loaded(
         bottom.set_xlabel("draw: the hand's distance from the fork [m]")
     axes[0, 0].set_ylabel(f"z [m], {LOAD:g} kg at the middle (simulated)")
     axes[1, 0].set_ylabel("force of the recorded pull [N]")
-    methods = list(dict.fromkeys(method for of_band in replays.values() for method in of_band))
-    curves = [(styles[m].name, mark(**curve(styles[m], n, LOADED))) for n, m in enumerate(methods)]
+    methods = dict.fromkeys(method for of_band in replays.values() for method in of_band)
+    curves = _curves(methods, styles, LOADED)
     key(figure, [("measured (the pull alone)", mark(color=INK, lw=2)), *curves], 3)
     return figure
 
@@ -221,5 +224,5 @@ def curve(style: Style, number: int, width: float = 1.3) -> dict:
     return {"color": style.color, "lw": width, "ls": DASHES[number % len(DASHES)]}
 
 
-def _signed(value: float, form: str) -> str:
-    return f"{value:+{form}}".replace("-", "−")
+def _signed(value: float) -> str:
+    return f"{value:+.3f}".replace("-", "−")

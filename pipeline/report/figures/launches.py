@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -68,8 +70,19 @@ def trajectories(
             ax.set_ylabel("z [m]")
         if number >= len(panels) - columns:
             ax.set_xlabel("y [m]")
-    kinds = sorted({kind for one in trials.values() for kind in one.kind} - {"predicted"})
-    _key(figure, kinds)
+    known = {
+        "virtual": ("virtual flight, with drag (paler: nearer target)", mark(color="0.3")),
+        "measured": ("measured landing", mark(color="0.3", ls="", marker="x")),
+    }
+    kinds = {kind for one in trials.values() for kind in one.kind}
+    entries = [
+        *(entry for kind, entry in known.items() if kind in kinds),
+        ("predicted by the calibrated simulator", mark(color=INK, lw=0.6, ls=(0, (5, 3)))),
+        ("fork", mark(color=INK, lw=2)),
+        ("target on the floor, 1 m", patch(AREA)),
+        ("aimed at", mark(ls="", marker="^", color="0.7", mec=INK, mew=0.5)),
+    ]
+    key(figure, entries, len(entries) if len(entries) < 4 else 3)
     return figure
 
 
@@ -77,14 +90,11 @@ def _with_target(trials: pd.DataFrame) -> pd.DataFrame:
     return trials[trials.target.notna()]
 
 
-def _shades(targets: list[float], color: str) -> dict[float, tuple]:
+def _shades(targets: list[float], color: str) -> dict[float, np.ndarray]:
     """Of a method's colour, by target: the near one palest."""
-    count = max(len(targets) - 1, 1)
-    white = [0.5 * (1 - number / count) for number in range(len(targets))]
-    return {
-        target: tuple(np.array(to_rgb(color)) * (1 - pale) + pale)
-        for target, pale in zip(targets, white, strict=True)
-    }
+    pale = 0.5 * (1 - np.arange(len(targets)) / max(len(targets) - 1, 1))
+    shades = np.array(to_rgb(color)) * (1 - pale[:, None]) + pale[:, None]
+    return dict(zip(targets, shades, strict=True))
 
 
 def _scenery(ax: plt.Axes, fork_height: float, targets: list[float], color: str) -> None:
@@ -94,8 +104,7 @@ def _scenery(ax: plt.Axes, fork_height: float, targets: list[float], color: str)
     ax.add_patch(Rectangle((near, floor - 0.04), far - near, 0.04, color=AREA, zorder=1, lw=0))
     ax.plot([0, 0], [floor, 0], color=INK, lw=2, solid_capstyle="butt", zorder=2)
     for target, shade in _shades(targets, color).items():
-        style = {"color": shade, "mec": INK, "mew": 0.5, "zorder": 4}
-        ax.plot(target, floor - 0.08, "^", ms=5, **style)
+        ax.plot(target, floor - 0.08, "^", ms=5, color=shade, mec=INK, mew=0.5, zorder=4)
 
 
 def _predicted(trials: pd.DataFrame, floor: float) -> list[np.ndarray]:
@@ -116,13 +125,10 @@ def _flights(
             ax.plot(one.landing_y, -fork_height, "x", color=shades[one.target], ms=5, zorder=3)
     for points in predicted:
         ax.plot(*points.T, color=INK, lw=0.6, ls=(0, (5, 3)), zorder=5)
-    failed = _failed(trials)
-    said = ",\n".join(failed) + " failed" if failed else ""
-    behind = {"facecolor": "w", "edgecolor": "none", "alpha": 0.8, "pad": 1}
-    ax.text(
-        0.99, 0.97, said, transform=ax.transAxes, ha="right", va="top", fontsize=8, zorder=6,
-        bbox=behind if said else None,
-    )  # fmt: skip
+    if failed := _failed(trials):
+        behind = {"facecolor": "w", "edgecolor": "none", "alpha": 0.8, "pad": 1}
+        style = {"ha": "right", "va": "top", "fontsize": 8, "zorder": 6, "bbox": behind}
+        ax.text(0.99, 0.97, ",\n".join(failed) + " failed", transform=ax.transAxes, **style)
 
 
 def _failed(trials: pd.DataFrame) -> list[str]:
@@ -134,21 +140,6 @@ def _failed(trials: pd.DataFrame) -> list[str]:
         for kind, failed in (~landed(launched)).groupby(launched.kind)
         if failed.any()
     ]
-
-
-def _key(figure: plt.Figure, kinds: list[str]) -> None:
-    known = {
-        "virtual": ("virtual flight, with drag (paler: nearer target)", mark(color="0.3")),
-        "measured": ("measured landing", mark(color="0.3", ls="", marker="x")),
-    }
-    entries = [
-        *(entry for kind, entry in known.items() if kind in kinds),
-        ("predicted by the calibrated simulator", mark(color=INK, lw=0.6, ls=(0, (5, 3)))),
-        ("fork", mark(color=INK, lw=2)),
-        ("target on the floor, 1 m", patch(AREA)),
-        ("aimed at", mark(ls="", marker="^", color="0.7", mec=INK, mew=0.5)),
-    ]
-    key(figure, entries, len(entries) if len(entries) < 4 else 3)
 
 
 @picture({"axes.grid": False})
@@ -194,43 +185,38 @@ def _strips(results: Results, band: str, methods: list[str], styles: Styles) -> 
     for method in methods:
         result, style = results.methods[band][method], styles[method]
         strips.append((style.name, style.color, _with_target(result.trials)))
-        if len(result.robust_trials):
-            robust = _with_target(result.robust_trials)
+        if len(robust := _with_target(result.robust_trials)):
             strips.append((f"{style.name}, robust", style.color, robust))
     return strips
 
 
 def _landings(ax: plt.Axes, trials: pd.DataFrame, middle: float, width: float, color: str) -> None:
     """Rings around the targets and a mark a landing, in the strip about x = `middle`."""
-    targets = sorted(set(trials.target))
-    for target, sign in zip(targets, _marks(targets), strict=True):
+    for target, sign in _marks(trials).items():
         for radius in RINGS:
             if radius <= 0.501 * width:
                 ax.add_patch(Circle((middle, target), radius, fill=False, color="w", lw=1.2))
         ax.plot([middle - 0.015, middle + 0.015], [target] * 2, color=INK, lw=0.8)
-        seen = trials[(trials.target == target) & landed(trials)]
-        for kind, some in seen.groupby("kind"):
-            hollow = kind == "measured"
-            ax.scatter(
-                np.full(len(some), middle), some.landing_y, s=20, marker=sign,
-                facecolors="none" if hollow else color, edgecolors=color if hollow else "w",
-                linewidths=1.0 if hollow else 0.4, alpha=0.85, zorder=3,
-            )  # fmt: skip
-    failed = _failed(trials)
-    if failed:
+        for kind, some in trials[(trials.target == target) & landed(trials)].groupby("kind"):
+            style = {"facecolors": color, "edgecolors": "w", "linewidths": 0.4}
+            if kind == "measured":  # hollow
+                style = {"facecolors": "none", "edgecolors": color, "linewidths": 1.0}
+            style |= {"s": 20, "marker": sign, "alpha": 0.85, "zorder": 3}
+            ax.scatter([middle] * len(some), some.landing_y, **style)
+    if failed := _failed(trials):
         text = "\n".join([*failed, "failed"])
         ax.text(middle, TARGET_AREA[1] + 0.01, text, ha="center", va="bottom", fontsize=6)
 
 
-def _marks(targets: list[float]) -> list[str]:
-    return [MARKS[number % len(MARKS)] for number in range(len(targets))]
+def _marks(trials: pd.DataFrame) -> dict[float, str]:
+    """A mark a target, near to far."""
+    return dict(zip(sorted(set(trials.target.dropna())), cycle(MARKS)))
 
 
 def _key_of_targets(figure: plt.Figure, results: Results, kinds: list[str]) -> None:
-    targets = sorted(set(results.trials.target.dropna()))
     entries = [
         (f"aimed at {target:g} m", mark(ls="", marker=sign, color="0.4", mec="w"))
-        for target, sign in zip(targets, _marks(targets), strict=True)
+        for target, sign in _marks(results.trials).items()
     ]
     if "measured" in kinds:
         hollow = mark(ls="", marker="o", mfc="none", color="0.4")

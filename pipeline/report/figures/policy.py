@@ -36,10 +36,6 @@ def landings(trials: pd.DataFrame, styles: Styles, near: list[str]) -> plt.Figur
     line = np.array([low, high])
     left.fill_between(line, (1 - FAIR) * line, (1 + FAIR) * line, color="0.9", lw=0)
     left.plot(line, line, color="0.6", lw=1)
-    for method in near:
-        for chosen, face in ((inside, styles[method].color), (~inside, "none")):
-            mine = trials[(trials.method == method) & chosen]
-            _with_intervals(left, mine, styles[method].color, face)
     kinds = " and ".join(sorted(set(trials.kind))) or "no"
     left.set(xlabel=f"{kinds} landing [m]", ylabel="predicted landing [m]")
     left.set(xlim=(low, high), ylim=(low, high), aspect="equal")
@@ -48,9 +44,12 @@ def landings(trials: pd.DataFrame, styles: Styles, near: list[str]) -> plt.Figur
     for row, (method, style) in enumerate(styles.items()):
         for chosen, face in ((inside, style.color), (~inside, "none")):
             mine = trials[(trials.method == method) & chosen]
+            if method in near:
+                _with_intervals(left, mine, style.color, face)
             error = 100 * (mine.predicted_y / mine.landing_y - 1)
-            place = np.full(len(mine), row)
-            right.scatter(error, place, s=20, facecolors=face, edgecolors=style.color, alpha=0.7)
+            right.scatter(
+                error, [row] * len(mine), s=20, facecolors=face, edgecolors=style.color, alpha=0.7
+            )
     right.set_yticks(range(len(styles)), [style.name for style in styles.values()])
     right.set_ylim(len(styles) - 0.5, -0.5)
     right.set_xscale("symlog", linthresh=10)
@@ -113,14 +112,12 @@ def landing_map(
         recorded: Largest stretch of the recording; what lies beyond is extrapolated.
     """
     chart: LandingMap = result.landing_map
-    fine_y = np.linspace(chart.draw_y[0], chart.draw_y[-1], 161)
-    fine_z = np.linspace(chart.draw_z[0], chart.draw_z[-1], 161)
+    fine_y, fine_z = (np.linspace(a[0], a[-1], 161) for a in (chart.draw_y, chart.draw_z))
     y, z = np.meshgrid(fine_y, fine_z, indexing="ij")
     points = np.stack([y.ravel(), z.ravel()], 1)
-    landed = chart(points)
+    landing = chart(points).landing_y.reshape(y.shape)
     stretch = stretch_of(np.insert(points, 0, 0, axis=1), fork_width, rest_length).reshape(y.shape)
     figure, ax = plt.subplots(figsize=(6, 4.6))
-    landing = landed.landing_y.reshape(y.shape)
     ax.set_facecolor("0.8")
     ax.grid(False)
     if np.isfinite(landing).any():
@@ -132,10 +129,9 @@ def landing_map(
     if stretch.min() < recorded < stretch.max():
         ax.contour(y, z, stretch, levels=[recorded], colors="k", linestyles=":")
         ax.plot([], [], "k:", label=f"recorded stretch {recorded:.2f}: beyond is extrapolated")
-    for (whose, path_), color in zip(draws.items(), (COLORS[0], COLORS[6]), strict=False):
-        label = f"{whose} draws, near (dot) to far target"
-        ax.plot(*path_.T, color=color, lw=2.5, label=label)
-        ax.plot(*path_[0], "o", color=color)
+    for (whose, way), color in zip(draws.items(), (COLORS[0], COLORS[6]), strict=False):
+        ax.plot(*way.T, color=color, lw=2.5, label=f"{whose} draws, near (dot) to far target")
+        ax.plot(*way[0], "o", color=color)
     ax.set(xlabel="draw y [m]", ylabel="draw z [m]")
     ax.set(xlim=(fine_y[0], fine_y[-1]), ylim=(fine_z[0], fine_z[-1]))
     figure.legend(loc="outside lower center", ncols=2, fontsize=8)

@@ -75,6 +75,7 @@ def corner(result: Result, boxes, title: str) -> plt.Figure:
     worst = max(np.quantile(total[good], SHOWN), 1.001 * total[best])
     color = {"c": total[good], "cmap": "viridis", "norm": LogNorm(total[best], worst)}
     sizes = np.where(history.phase.to_numpy()[good] == "cma", 5, 14)
+    star = {"color": STAR, "mec": INK}
     inches = 1.4 + 1.55 * max(size, 3)
     figure, axes = plt.subplots(size, size, figsize=(inches, inches), squeeze=False)
     figure.subplots_adjust(0.08, 0.07, 0.93, 0.98, wspace=0.08, hspace=0.08)
@@ -96,9 +97,7 @@ def corner(result: Result, boxes, title: str) -> plt.Figure:
             ax.plot(unit[x][failed], unit[y][failed], "x", ms=3, mew=0.6, color="0.6")
             ax.scatter(unit[x][good], unit[y][good], s=sizes, lw=0, **color)
             _regions(ax, result, x, y)
-            ax.plot(
-                unit[x][best], unit[y][best], "*", ms=12, color=STAR, mec=INK, mew=0.8, zorder=6
-            )
+            ax.plot(unit[x][best], unit[y][best], "*", ms=12, mew=0.8, zorder=6, **star)
             ax.set(ylim=(0, 1))
             ax.set_yticks(*_ticks(y, boxes, history), fontsize=7)
         ax.set(xlim=(0, 1))
@@ -123,14 +122,13 @@ def corner(result: Result, boxes, title: str) -> plt.Figure:
 def _regions(ax: plt.Axes, result: Result, x: str, y: str) -> None:
     """Centres of the regions, their covariances at one deviation, and the paths of CMA-ES."""
     refined = result.history[result.history.phase == "cma"]
-    for number, region in enumerate(result.regions):
-        if not {x, y} <= set(result.axes):
-            continue
+    searched = {x, y} <= set(result.axes)
+    for number, region in enumerate(result.regions if searched else ()):
         index = [result.axes.index(x), result.axes.index(y)]
         centre, sigma = region.mu[index], region.sigma[np.ix_(index, index)]
         spread, turn = np.linalg.eigh(sigma)
         angle = np.degrees(np.arctan2(turn[1, 1], turn[0, 1]))
-        wide, tall = 2 * np.sqrt(spread[1]), 2 * np.sqrt(spread[0])
+        tall, wide = 2 * np.sqrt(spread)
         ax.add_patch(Ellipse(centre, wide, tall, angle=angle, fill=False, ec=INK, lw=0.7, zorder=4))
         mine = refined[refined.solver == number]
         way = mine.groupby("generation")[[f"unit_{x}", f"unit_{y}"]].mean().to_numpy()
@@ -155,8 +153,7 @@ def _key(figure: plt.Figure, result: Result, failures: bool) -> None:
             ("mean of its CMA-ES by iteration", mark(color=PATH, lw=0.9)),
         ]
     entries.append(("θ*, the best of all", mark(ls="", marker="*", ms=11, color=STAR, mec=INK)))
-    names, marks = zip(*entries, strict=True)
-    figure.legend(marks, names, loc="upper right", bbox_to_anchor=(0.95, 0.87), fontsize=8)
+    key(figure, entries, 1, loc="upper right", bbox_to_anchor=(0.95, 0.87), fontsize=8)
 
 
 def _label(name: str) -> str:

@@ -32,14 +32,15 @@ def write_page(report: Report, markdown: str) -> None:
     from plotly.offline import get_plotlyjs
 
     body, chapters = _rendered(markdown, report.folder)
-    first, _, rest = body.partition(chapters[1][2]) if len(chapters) > 1 else (body, "", "")
-    links = [("replay", "The replay"), *(chapter[:2] for chapter in chapters)]
+    links = [("replay", "The replay"), *chapters]
+    begins = [match.start() for match in re.finditer("<h2 ", body)]
+    second = begins[1] if len(begins) > 1 else len(body)  # the replay comes before it
     data = json.dumps(content(report), separators=(",", ":"))
     page = Template((HERE / "page.html").read_text("utf-8")).substitute(
         style=(HERE / "page.css").read_text("utf-8"),
         navigation="\n".join(f'<a href="#{name}">{title}</a>' for name, title in links),
-        first=first,
-        rest=(chapters[1][2] if len(chapters) > 1 else "") + rest,
+        first=body[:second],
+        rest=body[second:],
         data=data.replace("</", "<\\/"),
         plotly=get_plotlyjs(),
         script=(HERE / "replay.js").read_text("utf-8"),
@@ -47,28 +48,23 @@ def write_page(report: Report, markdown: str) -> None:
     write_text(report.folder / "index.html", page)
 
 
-def _rendered(markdown: str, folder: Path) -> tuple[str, list[tuple[str, str, str]]]:
-    """HTML with its pictures inside; id, title and opening tag of each chapter."""
+def _rendered(markdown: str, folder: Path) -> tuple[str, list[tuple[str, str]]]:
+    """HTML with its pictures inside; id and title of each chapter."""
     from markdown_it import MarkdownIt
 
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
-    tokens = parser.parse(markdown)
-    chapters: list[tuple[str, str, str]] = []
+    tokens, chapters = parser.parse(markdown), []
     for token, inline in zip(tokens, [*tokens[1:], None], strict=True):
         if token.type == "heading_open" and token.tag == "h2":
             title = parser.renderer.render(inline.children, parser.options, {})
-            name = f"chapter-{len(chapters) + 1}-{_slug(inline.content)}"
-            token.attrSet("id", name)
-            chapters.append((name, title, f'<h2 id="{name}">'))
+            slug = re.sub(r"[^a-z0-9]+", "-", inline.content.lower()).strip("-")
+            token.attrSet("id", f"chapter-{len(chapters) + 1}-{slug}")
+            chapters.append((token.attrGet("id"), title))
         for child in token.children or []:
             if child.type == "image":
                 child.attrSet("src", _inside(folder / str(child.attrGet("src"))))
                 child.attrSet("loading", "lazy")
     return parser.renderer.render(tokens, parser.options, {}), chapters
-
-
-def _slug(title: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
 
 
 def _inside(picture: Path) -> str:

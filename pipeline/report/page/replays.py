@@ -29,11 +29,9 @@ def content(report: Report) -> dict:
 def _band(report: Report, band: str) -> dict:
     episode, replays, named = report.results.episodes[band], report.replays[band], report.styles
     clouds = [thinned(cloud) for cloud in episode.clouds]
-    chosen = drawn(replays, SIDE_BY_SIDE)
-    everything = np.concatenate(
-        [*clouds, *(replays[method].center_line.reshape(-1, 3) for method in chosen)]
-    )
-    shown = drawn(replays)
+    chosen = {method: replays[method] for method in drawn(replays, SIDE_BY_SIDE)}
+    lines = [replay.center_line.reshape(-1, 3) for replay in chosen.values()]
+    everything, shown = np.concatenate([*clouds, *lines]), drawn(replays)
     return {
         "name": band,
         "times": [round(float(time), 4) for time in episode.cloud_time],
@@ -47,14 +45,14 @@ def _band(report: Report, band: str) -> dict:
                 "name": named[method].name,
                 "color": named[method].color,
                 "shown": method in shown,
-                "nodes": replays[method].center_line.shape[1],
-                "line": millimetres(replays[method].center_line),
+                "nodes": replay.center_line.shape[1],
+                "line": millimetres(replay.center_line),
                 "distance": [
                     round(1000 * float(value), 1) if np.isfinite(value) else None
-                    for value in replays[method].distance
+                    for value in replay.distance
                 ],
             }
-            for method in chosen
+            for method, replay in chosen.items()
         ],
     }
 

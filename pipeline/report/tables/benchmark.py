@@ -41,15 +41,23 @@ class Row:
     errors: dict
 
 
-def benchmark(results: Results, floors: dict[str, dict]) -> list[Row]:
+def ordered(results: Results) -> dict[str, list[str]]:
+    """Methods of tables 1 and 2 by band: the paper's, and all that ran, those of APART last."""
+    order = {}
+    for band in dict.fromkeys([*paper.BANDS, *results.methods]):
+        ran = results.methods.get(band, {})
+        theirs = [m for m in paper.BENCHMARK if band in paper.BANDS or m in ran]
+        order[band] = list(dict.fromkeys([*theirs, *sorted(ran, key=APART.__contains__)]))
+    return order
+
+
+def benchmark(results: Results) -> list[Row]:
     """Table 1: the paper's methods and all that stand in no other table, on every band."""
     rows = []
-    for band in dict.fromkeys([*paper.BANDS, *results.methods]):
-        ran = [method for method in results.methods.get(band, {}) if method not in APART]
-        theirs = [m for m in paper.BENCHMARK if band in paper.BANDS or m in ran]
-        rows += _rows(results, band, dict.fromkeys([*theirs, *ran]))
-        if band in floors:
-            rows.append(Row(band, FLOOR, ORACLE, _floor(floors[band])))
+    for band, methods in ordered(results).items():
+        rows += _rows(results, band, (method for method in methods if method not in APART))
+        if band in results.floors:
+            rows.append(Row(band, FLOOR, ORACLE, _floor(results.floors[band])))
     return rows
 
 
@@ -66,7 +74,7 @@ def _rows(results: Results, band: str, methods: Iterable[str]) -> list[Row]:
         found = [] if result is None else _launched(result.trials)
         nothing = NOT_RUN if result is None else NOT_LAUNCHED
         rows += [Row(band, method, kind, errors) for kind, errors in found or [(nothing, {})]]
-        cells = paper.LANDING.get((paper.BANDS.get(band), paper.METHODS.get(method)))
+        cells = paper.LANDING.get((band, method))
         if cells:
             rows.append(Row(band, method, PAPER, _papers(cells)))
     return rows
@@ -80,25 +88,22 @@ def _launched(trials: pd.DataFrame) -> list[tuple[str, dict]]:
 
 def _papers(cells: tuple) -> dict:
     """The paper's cells, as `landing_errors` would give them; its total's ± is what it prints."""
-
-    def errors(cell: tuple[float, float] | None, launches: int) -> dict:
-        mean, deviation = (math.nan, math.nan) if cell is None else (c / 100 for c in cell)
-        return {"launches": launches, "failed": None, "mean": mean, "std": deviation}
-
-    *targets, total = cells
-    result = {g: errors(c, paper.REPEATS) for g, c in zip(paper.TARGETS, targets, strict=True)}
-    everything = errors(total, paper.REPEATS * len(targets))
-    return result | {"all": everything | {"pooled_std": everything["std"], "std": math.nan}}
+    result = {}
+    for key, cell in zip((*paper.TARGETS, "all"), cells, strict=True):
+        mean, std = (math.nan, math.nan) if cell is None else (c / 100 for c in cell)
+        result[key] = {"launches": paper.REPEATS, "failed": None, "mean": mean, "std": std}
+    launches, total = paper.REPEATS * len(paper.TARGETS), result["all"]
+    result["all"] = total | {"launches": launches, "pooled_std": total["std"], "std": math.nan}
+    return result
 
 
 def _floor(floor: dict) -> dict:
     """The oracle's launches (pipeline/oracle/floor.py), as `landing_errors` would give them."""
 
     def errors(one: dict) -> dict:
-        names = {"mean": "mean_error_m", "std": "std_m", "bias": "bias_m"}
-        known = {ours: one.get(theirs) for ours, theirs in names.items()}
-        counts = {"launches": one["launches"], "failed": one.get("failed", 0)}
-        return counts | {n: math.nan if value is None else value for n, value in known.items()}
+        known = {"mean": one["mean_error_m"], "std": one.get("std_m"), "bias": one.get("bias_m")}
+        known = {name: math.nan if value is None else value for name, value in known.items()}
+        return known | {"launches": one["launches"], "failed": one.get("failed", 0)}
 
     result = {float(g): errors(one) for g, one in floor["targets"].items()}
     return result | {"all": errors(floor) | {"pooled_std": pooled_std(result.values())}}
@@ -114,9 +119,9 @@ def as_table(rows: list[Row], targets: Iterable[float], styles: Styles) -> Table
         cells = []
         for key in keys:
             one = row.errors.get(key)
-            best = one and not one["failed"]
-            best = best and one["mean"] == lowest[key].get((row.band, row.source))
-            cells.append(f"**{spread(one)}**" if best else spread(one))
+            least = lowest[key].get((row.band, row.source))
+            bold = "**" if one and not one["failed"] and one["mean"] == least else ""
+            cells.append(bold + spread(one) + bold)
         total = row.errors.get("all", NOTHING)
         failed = NONE if total["failed"] is None else f"{total['failed']} of {total['launches']}"
         names = band_name(row.band), method_name(row.method, styles), row.source
@@ -148,8 +153,7 @@ def spread(one: dict | None) -> str:
 
 def band_name(band: str) -> str:
     """As the paper calls the band that ours imitates, or its own name."""
-    theirs = paper.BANDS.get(band)
-    return f"{theirs} ({paper.KINDS[theirs]})" if theirs else band
+    return paper.BANDS.get(band, band)
 
 
 def method_name(method: str, styles: Styles) -> str:
@@ -159,22 +163,20 @@ def method_name(method: str, styles: Styles) -> str:
 
 def records(rows: list[Row]) -> pd.DataFrame:
     """The same for machines: a line a cell, for every target that was tried; empty: not known."""
-    lines = []
-    for row in rows:
-        for key, one in row.errors.items():
-            counts = np.isfinite(one["mean"])
-            lines.append(
-                {
-                    "band": row.band,
-                    "method": row.method,
-                    "source": row.source,
-                    "target_m": key,
-                    "launches": one["launches"],
-                    "failed": one["failed"],
-                    "mean_error_cm": f"{100 * one['mean']:.4g}" if counts else "N/A",
-                    "std_cm": 100 * one["std"],
-                    "std_within_targets_cm": 100 * one.get("pooled_std", one["std"]),
-                    "bias_cm": 100 * one.get("bias", math.nan),
-                }
-            )
+    lines = (
+        {
+            "band": row.band,
+            "method": row.method,
+            "source": row.source,
+            "target_m": key,
+            "launches": one["launches"],
+            "failed": one["failed"],
+            "mean_error_cm": number(100 * one["mean"], ".4g", "N/A"),
+            "std_cm": 100 * one["std"],
+            "std_within_targets_cm": 100 * one.get("pooled_std", one["std"]),
+            "bias_cm": 100 * one.get("bias", math.nan),
+        }
+        for row in rows
+        for key, one in row.errors.items()
+    )
     return pd.DataFrame(lines).astype({"failed": "Int64"})

@@ -42,11 +42,10 @@ def compared(results: Results, seed: int) -> list[Compared]:
     for band, of_band in results.methods.items():
         for kind in LAUNCHED:
             aimed = {method: _aimed(one.trials, kind) for method, one in of_band.items()}
-            aimed = {method: trials for method, trials in aimed.items() if len(trials)}
             for method, trials in aimed.items():
-                others = [one for one in REFERENCES if one in aimed and one != method]
-                found = {one: difference(aimed[one], trials, seed) for one in others}
-                if found:
+                others = [m for m in REFERENCES if m in aimed and m != method and len(aimed[m])]
+                found = {other: difference(aimed[other], trials, seed) for other in others}
+                if found and len(trials):
                     rows.append(Compared(band, method, kind, found))
     return rows
 

@@ -64,22 +64,22 @@ def derived(results: Results, styles: Styles) -> Table | None:
     shown = [result for result in results if result.confidence]
     if not shown:
         return None
-    found = {name for one in shown for name in one.confidence["derived"]}
-    names = [*(name for name in DERIVED if name in found), *sorted(found - DERIVED.keys())]
-    units = {n: one["unit"] for r in shown for n, one in r.confidence["derived"].items()}
-    titles = {n: DERIVED.get(n, (f"{n.replace('_', ' ')} [{units[n]}]", 1.0)) for n in names}
+    found = {name: one for r in shown for name, one in r.confidence["derived"].items()}
+    titles = {name: title for name, title in DERIVED.items() if name in found}
+    for name in sorted(found.keys() - titles):
+        titles[name] = f"{name.replace('_', ' ')} [{found[name]['unit']}]", 1.0
     rows = []
     for result in shown:
-        cells = []
-        for name in names:
-            about, factor = result.confidence["derived"].get(name), titles[name][1]
-            cells.append(NONE if about is None else _range(about, factor))
+        own = result.confidence["derived"]
+        cells = [_range(own.get(name), factor) for name, (_, factor) in titles.items()]
         rows.append([result.band, styles[result.method].name, *cells])
     return ["band", "method", *(title for title, _ in titles.values())], rows
 
 
-def _range(about: dict, factor: float) -> str:
+def _range(about: dict | None, factor: float) -> str:
     """A value and its interval, with as many digits as the interval's width deserves."""
+    if about is None:
+        return NONE
     value, low, high = (factor * about[key] for key in ("value", "low", "high"))
     width = high - low
     if width <= 0:

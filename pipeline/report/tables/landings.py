@@ -11,7 +11,7 @@ import pandas as pd
 from pipeline.report.noise import landed
 from pipeline.report.results import Results
 from pipeline.report.styles import Styles
-from pipeline.report.tables.cells import Table, number, percent
+from pipeline.report.tables.cells import NONE, Table, number, percent
 
 AIM = 0.05  # mean error of predicted landings inside the recorded stretch, share of the distance
 
@@ -61,12 +61,9 @@ def predictions(trials: pd.DataFrame) -> Table:
     rows = []
     for trial in trials.itertuples():
         beyond = "" if trial.stretch <= trial.recorded_stretch else " (beyond)"
-        row = [
-            f"{trial.draw_y:.3f}, {trial.draw_z:.3f}",
-            f"{trial.stretch:.2f}{beyond}",
-            number(trial.hold_force, ".1f"),
-            number(trial.predicted_y, ".3f", trial.predicted_failure),
-        ]
+        row = [f"{trial.draw_y:.3f}, {trial.draw_z:.3f}", f"{trial.stretch:.2f}{beyond}"]
+        row.append(number(trial.hold_force, ".1f"))
+        row.append(number(trial.predicted_y, ".3f", trial.predicted_failure))
         if ranged:
             low, high = number(trial.predicted_low, ".3f"), number(trial.predicted_high, ".3f")
             row.append(f"{low} – {high}")
@@ -74,9 +71,15 @@ def predictions(trials: pd.DataFrame) -> Table:
             error = trial.predicted_y / trial.landing_y - 1
             row += [number(trial.landing_y, ".3f", trial.failure), number(error, "+.1%")]
         else:
-            row += [number(trial.target, ".3f", "")]
+            row.append(number(trial.target, ".3f", ""))
         rows.append(row)
     return heads, rows
+
+
+def _parts(trials: pd.DataFrame) -> dict[str, pd.Series]:
+    """Which launches stretch the band no further than the recording did, which do, and all."""
+    inside = trials.stretch <= trials.recorded_stretch
+    return {"inside": inside, "beyond": ~inside, "all": inside | ~inside}
 
 
 def prediction_error(trials: pd.DataFrame) -> dict[str, dict]:
@@ -88,8 +91,6 @@ def prediction_error(trials: pd.DataFrame) -> dict[str, dict]:
     """
     signed = trials.predicted_y / trials.landing_y - 1
     error = signed.abs()
-    inside = trials.stretch <= trials.recorded_stretch
-    parts = {"inside": inside, "beyond": ~inside, "all": pd.Series(True, index=trials.index)}
     return {
         name: {
             "launches": int((chosen & error.notna()).sum()),
@@ -99,14 +100,14 @@ def prediction_error(trials: pd.DataFrame) -> dict[str, dict]:
             "tried": int(chosen.sum()),
             "unpredicted": int((chosen & trials.predicted_y.isna()).sum()),
         }
-        for name, chosen in parts.items()
+        for name, chosen in _parts(trials).items()
     }
 
 
 def intervals(trials: pd.DataFrame) -> dict[str, dict] | None:
     """How often landings lie in their predicted 90 % intervals, inside and beyond the recording.
 
-    Keys "inside", "beyond", each with `launches` (those that have both), how many are `covered`,
+    Keys as above, each with `launches` (those that have both), how many are `covered`,
     and the median `width` of the intervals as a share of the landing. None where no launch has an
     interval.
     """
@@ -115,14 +116,13 @@ def intervals(trials: pd.DataFrame) -> dict[str, dict] | None:
     both = trials.predicted_low.notna() & trials.landing_y.notna()
     covered = trials.landing_y.between(trials.predicted_low, trials.predicted_high)
     width = (trials.predicted_high - trials.predicted_low) / trials.landing_y
-    inside = trials.stretch <= trials.recorded_stretch
     return {
         name: {
             "launches": int((chosen & both).sum()),
             "covered": int((chosen & both & covered).sum()),
             "width": float(width[chosen & both].median()),
         }
-        for name, chosen in (("inside", inside), ("beyond", ~inside))
+        for name, chosen in _parts(trials).items()
     }
 
 
@@ -134,8 +134,7 @@ def prediction_summary(results: Results, band: str, kind: str, styles: Styles) -
         if trials.empty:
             continue
         parts, ranges = prediction_error(trials), intervals(trials) or {}
-        everything = parts["all"]
-        shares = (_share(parts[name]) for name in ("inside", "beyond", "all"))
+        everything, shares = parts["all"], map(_share, parts.values())
         bias = number(100 * everything["bias"], "+.1f")
         unpredicted = f"{everything['unpredicted']} of {everything['tried']}"
         covered = (_coverage(ranges.get(name)) for name in ("inside", "beyond"))
@@ -148,12 +147,11 @@ def prediction_summary(results: Results, band: str, kind: str, styles: Styles) -
 def _share(part: dict) -> str:
     if not part["launches"]:
         return "no launches"
-    return f"{percent(part['mean'], '.1f')} (max {percent(part['max'], '.1f')},\
- {part['launches']} launches)"
+    mean, most = percent(part["mean"], ".1f"), percent(part["max"], ".1f")
+    return f"{mean} (max {most}, {part['launches']} launches)"
 
 
 def _coverage(part: dict | None) -> str:
     if not part or not part["launches"]:
-        return "–"
-    width = percent(part["width"], ".0f")
-    return f"{part['covered']} of {part['launches']} (median width {width})"
+        return NONE
+    return f"{part['covered']} of {part['launches']} (median width {percent(part['width'])})"

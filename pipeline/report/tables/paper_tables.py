@@ -98,11 +98,11 @@ interval as above, which again holds for launches and not for another identifica
 def paper_tables(report: Report) -> str:
     """The chapter; writes table1.csv, table1.tex, ... table4.tex and differences.csv."""
     params, results, named = report.params, report.results, report.styles
-    folder, floors = report.folder / "tables", results.floors
+    folder = report.folder / "tables"
     found = parameters.identified(results, params)
     tables = {2: (parameters.as_table(found, named), parameters.records(found))}
     for count, rows in (
-        (1, benchmark.benchmark(results, floors)),
+        (1, benchmark.benchmark(results)),
         (3, benchmark.ablation(results, paper.OPTIMISERS)),
         (4, benchmark.ablation(results, paper.ABLATIONS)),
     ):
@@ -114,7 +114,7 @@ def paper_tables(report: Report) -> str:
         _write_csv(folder / f"{name}.csv", records)
         write_text(folder / f"{name}.tex", latex(table, CAPTIONS[count], f"tab:{name}", over))
         text += [_titled(count, name, folder), BEFORE[count], markdown(table, repeats=False)]
-        text += [FLOOR] if count == 1 and floors else []
+        text += [FLOOR] if count == 1 and results.floors else []
         text += _doubt(results, found, named) if count == 2 else []
     return "\n".join([*text, *_noise(params, results, named, folder)])
 
@@ -124,7 +124,7 @@ def _titled(count: int, name: str, folder: Path) -> str:
     return f"### Table {count}\n\n{CAPTIONS[count]} [CSV]({csv}), [LaTeX]({tex})\n"
 
 
-def _doubt(results: Results, found: list[parameters.Row], named: Styles) -> list[str]:
+def _doubt(results: Results, found: list[parameters.IdentifiedRow], named: Styles) -> list[str]:
     """How to read table 2."""
     edges = any(value.at_edge for row in found for value in row.values)
     trusted = any(result.confidence for result in results)

@@ -12,7 +12,7 @@ from pipeline.objective.space import Space
 from pipeline.report import paper
 from pipeline.report.results import PRINTED, Result, Results
 from pipeline.report.styles import Styles
-from pipeline.report.tables.benchmark import APART, NOT_RUN, PAPER, band_name, method_name
+from pipeline.report.tables.benchmark import NOT_RUN, PAPER, band_name, method_name, ordered
 from pipeline.report.tables.cells import NONE, Table, number
 from pipeline.sling.material import THETA
 
@@ -59,24 +59,17 @@ class IdentifiedRow:
 def identified(results: Results, params) -> list[IdentifiedRow]:
     """Table 2: the paper's methods and every other that ran, those of tables 3 and 4 last."""
     rows = []
-    for band in dict.fromkeys([*paper.BANDS, *results.methods]):
-        ran = results.methods.get(band, {})
-        theirs = [m for m in paper.BENCHMARK if band in paper.BANDS or m in ran]
-        for method in dict.fromkeys([*theirs, *sorted(ran, key=lambda method: method in APART)]):
-            if method in ran:
+    for band, methods in ordered(results).items():
+        for method in methods:
+            source, values, loss = NOT_RUN, [Value(math.nan)] * len(THETA), math.nan
+            if result := results.methods.get(band, {}).get(method):
                 source = RECORDED[params.bands[band].source]
-                values = [_value(params, ran[method], name) for name in THETA]
-                rows.append(IdentifiedRow(band, method, source, values, printed_loss(ran[method])))
-            else:
-                rows.append(
-                    IdentifiedRow(band, method, NOT_RUN, [Value(math.nan)] * len(THETA), math.nan)
-                )
-            cells = paper.THETA.get((paper.BANDS.get(band), paper.METHODS.get(method)))
-            if cells:
-                *values, loss = cells
-                rows.append(
-                    IdentifiedRow(band, method, PAPER, [Value(value) for value in values], loss)
-                )
+                values = [_value(params, result, name) for name in THETA]
+                loss = printed_loss(result)
+            rows.append(IdentifiedRow(band, method, source, values, loss))
+            if cells := paper.THETA.get((band, method)):
+                *numbers, loss = cells
+                rows.append(IdentifiedRow(band, method, PAPER, [*map(Value, numbers)], loss))
     return rows
 
 
@@ -118,9 +111,8 @@ def as_table(rows: list[IdentifiedRow], styles: Styles) -> Table:
         cells = [_cell(name, one) for name, one in zip(THETA, row.values, strict=True)]
         loss = number(row.loss, ".4f")
         loss = f"**{loss}**" if row.loss == least[row.band, row.source] else loss
-        lines.append(
-            [band_name(row.band), method_name(row.method, styles), row.source, *cells, loss]
-        )
+        names = band_name(row.band), method_name(row.method, styles), row.source
+        lines.append([*names, *cells, loss])
     return ["band", "method", "source", *HEADS.values(), "loss"], lines
 
 
@@ -163,12 +155,9 @@ def records(rows: list[IdentifiedRow]) -> pd.DataFrame:
     for row in rows:
         line = {"band": row.band, "method": row.method, "source": row.source}
         for name, one in zip(THETA, row.values, strict=True):
-            head, unit = name, UNITS.get(name, "")
-            line |= {
-                f"{head}{unit}": one.value,
-                f"{head}_low{unit}": one.low,
-                f"{head}_high{unit}": one.high,
-                f"{head}_state": one.state or None,
-            }
+            unit = UNITS.get(name, "")
+            for part, value in (("", one.value), ("_low", one.low), ("_high", one.high)):
+                line[f"{name}{part}{unit}"] = value
+            line[f"{name}_state"] = one.state or None
         lines.append(line | {"loss": row.loss})
     return pd.DataFrame(lines)

@@ -36,20 +36,24 @@ def policies(results: Results, styles: Styles) -> Table:
     for one in results:
         for name, card in ((PLAIN, one.card), (ROBUST, one.robust_card)):
             if card is not None:
-                names = one.band, styles[one.method].name, name
-                rows.append([*names, *_converged(card), _expected(one, name)])
+                training, near = card["training"], card["landing_map"]["target_range"]
+                rows.append(
+                    [
+                        one.band,
+                        styles[one.method].name,
+                        name,
+                        "yes" if training["converged"] else "**no**",
+                        *_errors(training),
+                        str(training.get("failed_targets", NONE)),
+                        *_errors(near),
+                        _expected(one, name),
+                    ]
+                )
     return heads, rows
 
 
-def _converged(card: dict) -> list[str]:
-    training, near = card["training"], card["landing_map"]["target_range"]
-    own, by_map = (
-        [centimetres(source.get(name)) for name in ("mean_error_m", "max_error_m")]
-        for source in (training, near)
-    )
-    failed = training.get("failed_targets")
-    said = "yes" if training["converged"] else "**no**"
-    return [said, *own, NONE if failed is None else str(failed), *by_map]
+def _errors(about: dict) -> list[str]:
+    return [centimetres(about[name]) for name in ("mean_error_m", "max_error_m")]
 
 
 def _expected(result: Result, policy: str) -> str:

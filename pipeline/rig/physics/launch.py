@@ -93,18 +93,17 @@ def launch_from(
     way = flight(position, velocity, floor, drag)
     landing = float(way[-1, 0])
     speed, angle = float(np.hypot(*velocity)), float(np.arctan2(velocity[1], velocity[0]))
-    if not landing > 0:
-        reason = "too short: the projectile fell before the fork"
-        return Trial(float("nan"), reason, hold_force, speed, angle, way)
-    if fly(position, velocity, floor + FOOT, drag) < 0:
-        reason = "hits the fork: too low where it passes"
-        return Trial(float("nan"), reason, hold_force, speed, angle, way[way[:, 0] < 0])
     low, high = TARGET_AREA
-    if not low <= landing <= high:
+    reason = None
+    if not landing > 0:
+        landing, reason = float("nan"), "too short: the projectile fell before the fork"
+    elif fly(position, velocity, floor + FOOT, drag) < 0:
+        landing, reason = float("nan"), "hits the fork: too low where it passes"
+        way = way[way[:, 0] < 0]
+    elif not low <= landing <= high:
         where = "too short" if landing < low else "beyond the area"
         reason = f"{where}: lands at {landing:.3f} m, not within {low:g} to {high:g} m"
-        return Trial(landing, reason, hold_force, speed, angle, way)
-    return Trial(landing, None, hold_force, speed, angle, way)
+    return Trial(landing, reason, hold_force, speed, angle, way)
 
 
 def fly(position: np.ndarray, velocity: np.ndarray, floor: float, drag: float) -> float:

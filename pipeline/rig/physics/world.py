@@ -12,7 +12,8 @@ from pipeline.rig.physics.rubber import Rubber, nominal_stress
 from pipeline.rig.physics.string import ElasticString
 
 if TYPE_CHECKING:
-    from pipeline.params import BandParams, Params, RigBand
+    from pipeline.params import BandParams, Params
+    from pipeline.params.virtual_rig import RigBand
 
 HISTORY_STEP = 0.01
 

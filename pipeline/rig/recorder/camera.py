@@ -16,7 +16,7 @@ from pipeline.rig.physics.scene import Mesh
 from pipeline.rig.recorder.sensors import direction
 
 if TYPE_CHECKING:
-    from pipeline.params import RigCamera
+    from pipeline.params.virtual_rig import RigCamera
 
 WIDTH, HEIGHT = 640, 480
 RATE = 30.0  # Hz

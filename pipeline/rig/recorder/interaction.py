@@ -68,7 +68,7 @@ def pull_and_release(
     """
     rig = params.rig
     holding = 2 * rig.pad_friction * params.setup.grip_force  # two pads
-    follow = Servo.of(rig.arm).following(motion)
+    follow = Servo.of(rig.arm, motion)
 
     def margin(time: float, y: np.ndarray) -> float:
         grip = holding * float(motion.grip(time))

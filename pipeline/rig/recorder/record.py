@@ -24,7 +24,8 @@ from pipeline.rig.recorder.mcap_writer import BagWriter
 from pipeline.rig.recorder.sensors import wrench
 
 if TYPE_CHECKING:
-    from pipeline.params import Params, RigClock
+    from pipeline.params import Params
+    from pipeline.params.virtual_rig import RigClock
 
 EPOCH = 1_760_000_000_000_000_000  # ns, when the recording starts
 SENSOR_RATE, GRIPPER_RATE = 1000, 50  # Hz

@@ -10,7 +10,7 @@ from pipeline.rig.physics.robot import SENSOR_LEVER, Robot
 from pipeline.rig.physics.string import GRAVITY
 
 if TYPE_CHECKING:
-    from pipeline.params import RigWrench
+    from pipeline.params.virtual_rig import RigWrench
     from pipeline.rig.recorder.interaction import Interaction
 
 TOOL_CENTER = 0.4  # of the way from the sensor to the tool centre point

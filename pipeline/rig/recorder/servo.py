@@ -16,51 +16,42 @@ from scipy.integrate import solve_ivp
 from pipeline.rig.physics.motion import HandMotion
 
 if TYPE_CHECKING:
-    from pipeline.params import RigArm
+    from pipeline.params.virtual_rig import RigArm
 
 
 @dataclass(frozen=True)
 class Servo:
-    """The arm as its hand shows it, alike in every direction.
+    """The arm as its hand shows it, alike in every direction, on its way along a path.
 
     Attributes:
         mass: That the hand seems to have [kg].
         stiffness: Of the controller [N/m].
         damping: Of the controller [N s/m].
+        motion: The path.
     """
 
     mass: float
     stiffness: float
     damping: float
+    motion: HandMotion
 
     @classmethod
-    def of(cls, arm: RigArm) -> Servo:
+    def of(cls, arm: RigArm, motion: HandMotion) -> Servo:
         damping = 2 * arm.damping_ratio * np.sqrt(arm.stiffness * arm.mass)
-        return cls(arm.mass, arm.stiffness, float(damping))
-
-    def following(self, motion: HandMotion) -> Follower:
-        return Follower(self, motion)
-
-
-@dataclass(frozen=True)
-class Follower:
-    """The hand on its way along a path."""
-
-    servo: Servo
-    motion: HandMotion
+        return cls(arm.mass, arm.stiffness, float(damping), motion)
 
     def __call__(
         self, time: np.ndarray | float, x: np.ndarray, v: np.ndarray, force: np.ndarray
     ) -> np.ndarray:
         """Acceleration at `time` (T,) or one, of places, velocities and loads (3, ...)."""
-        servo, rest = self.servo, (1,) * (x.ndim - 1 - np.ndim(time))
+        rest = (1,) * (x.ndim - 1 - np.ndim(time))
 
         def path(derivative: int) -> np.ndarray:
             along = np.moveaxis(self.motion.position(time, derivative), -1, 0)
             return along.reshape(*along.shape, *rest)
 
-        astray = servo.stiffness * (x - path(0)) + servo.damping * (v - path(1))
-        return path(2) + (force - astray) / servo.mass
+        astray = self.stiffness * (x - path(0)) + self.damping * (v - path(1))
+        return path(2) + (force - astray) / self.mass
 
     def alone(self, state: np.ndarray, times: np.ndarray, tolerance: float) -> np.ndarray:
         """Place and velocity (T, 6) at `times` of the free hand that starts with `state` (6,)."""

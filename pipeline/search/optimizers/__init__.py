@@ -10,6 +10,12 @@ from pathlib import Path
 from pipeline.base.errors import UserError, one_line
 from pipeline.search.loop import Optimizer
 
+OURS = {
+    "de": f"{__name__}.evolution:Evolution",
+    "bo": f"{__name__}.bayes:Bayes",
+    "adam": f"{__name__}.adam:Adam",
+}
+
 
 def explorer(method, optimizer, dimension: int, rollouts: int) -> Optimizer:
     """The optimiser that searches the whole box for a method.
@@ -28,14 +34,8 @@ def explorer(method, optimizer, dimension: int, rollouts: int) -> Optimizer:
     if name == "de":
         moves = {"mutation": optimizer.mutation, "recombination": optimizer.recombination}
         settings = moves | settings
-    return build(
-        name,
-        dimension,
-        rollouts=rollouts,
-        seed=optimizer.seed,
-        population=optimizer.population,
-        **settings,
-    )
+    settings |= {"seed": optimizer.seed, "population": optimizer.population}
+    return build(name, dimension, rollouts=rollouts, **settings)
 
 
 def build(
@@ -84,19 +84,7 @@ def _refusal(name: str, what: str) -> UserError:
 
 
 def _class(name: str) -> type:
-    if name == "de":
-        from pipeline.search.optimizers.evolution import Evolution
-
-        return Evolution
-    if name == "bo":
-        from pipeline.search.optimizers.bayes import Bayes
-
-        return Bayes
-    if name == "adam":
-        from pipeline.search.optimizers.adam import Adam
-
-        return Adam
     if str(Path.cwd()) not in sys.path:  # a command's is where it is installed
         sys.path.append(str(Path.cwd()))
-    module, _, attribute = name.partition(":")
+    module, _, attribute = OURS.get(name, name).partition(":")
     return getattr(importlib.import_module(module), attribute)

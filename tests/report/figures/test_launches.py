@@ -80,7 +80,7 @@ def test_flights_end_where_they_land_and_targets_stand_on_the_floor(kept, result
     np.testing.assert_allclose(ends, expected + np.array([-0.02, 0.04, 0.21]))
     targets = [line.get_xdata()[0] for line in first.lines if line.get_marker() == "^"]
     assert targets == [1.725, 1.925]
-    assert first.texts[0].get_text() == "1 of 4 failed" and second.texts[0].get_text() == ""
+    assert first.texts[0].get_text() == "1 of 4 failed" and not second.texts
     assert first.get_aspect() == 1 and second.get_title().endswith("DE_L")
 
 

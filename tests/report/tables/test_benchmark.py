@@ -25,7 +25,7 @@ def lines(rows, targets=TARGETS) -> dict[tuple[str, str, str], list[str]]:
 
 def test_cells_by_hand() -> None:
     """|miss| 1 and 3, 2 and 2, 4 and 4 cm: deviations 1.41, 0 and 0 within targets."""
-    rows = benchmark(ran({"band1 sling2sim2real": CLOSE}), {})
+    rows = benchmark(ran({"band1 sling2sim2real": CLOSE}))
     found = lines(rows)["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
     pooled = math.sqrt(2 / 3)
     over_all = np.std([1, 3, 2, 2, 4, 4], ddof=1)
@@ -35,7 +35,7 @@ def test_cells_by_hand() -> None:
 
 def test_the_papers_rows_stand_below_ours_in_its_order() -> None:
     methods = "mine", "sling2sim2real", "package_si"
-    rows = benchmark(ran({f"band1 {method}": CLOSE for method in methods}), {})
+    rows = benchmark(ran({f"band1 {method}": CLOSE for method in methods}))
     first = [(row.method, row.source) for row in rows if row.band == "band1"]
     assert first == [
         ("real2sim2real", "not run"),
@@ -61,7 +61,7 @@ def test_partial_failures_are_counted_and_total_ones_are_not_available() -> None
         "band1 package_si": launches([[0.1] * 5] * 3, failed=15),
         "band1 real2sim2real": launches([[0.9] * 5] * 3),  # never within the target area
     }
-    found = lines(benchmark(ran(trials), {}))
+    found = lines(benchmark(ran(trials)))
     ours = found["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
     assert ours[2:4] == ["10.00 ± 0.00, 2 failed"] * 2 and ours[4:] == ["0.00", "2 of 15"]
     for method in ("Package SI", "Real2Sim2Real"):
@@ -72,7 +72,7 @@ def test_partial_failures_are_counted_and_total_ones_are_not_available() -> None
 def test_bold_is_the_lowest_of_equals_that_all_landed() -> None:
     some = launches([[0.0, 0.0]] * 3, failed=1)
     trials = {"band1 sling2sim2real": CLOSE, "band1 package_si": FAR, "band1 mine": some}
-    found = lines(benchmark(ran(trials), {"band1": floor((0.001,) * 3, (0.001,) * 3)}))
+    found = lines(benchmark(ran(trials, {"band1": floor((0.001,) * 3, (0.001,) * 3)})))
     ours = found["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
     assert all(cell.startswith("**") == (i in (2, 3)) for i, cell in enumerate(ours))
     assert found["Band 1 (soft)", "mine", "virtual"][0] == "**0.00 ± 0.00**"
@@ -86,7 +86,7 @@ def test_virtual_and_measured_launches_of_a_band_stand_apart() -> None:
     plain = launches([[0.5]], "measured", targets=[math.nan])  # aimed at nothing
     only = launches([[math.nan]] * 3, "predicted")
     trials = {"band1 sling2sim2real": both, "orange sling2sim2real": plain, "orange mine": only}
-    found = lines(benchmark(ran(trials), {}))
+    found = lines(benchmark(ran(trials)))
     assert found["Band 1 (soft)", "Sling2Sim2Real", "virtual"][5] == "0 of 6"
     assert found["Band 1 (soft)", "Sling2Sim2Real", "measured"][:4] == ["5.00"] * 3 + ["5.00"]
     assert found["orange", "Sling2Sim2Real", "no launch yet"] == ["–"] * 6
@@ -96,7 +96,7 @@ def test_virtual_and_measured_launches_of_a_band_stand_apart() -> None:
 
 def test_the_floor_is_a_row_of_its_band() -> None:
     floors = {"band2": floor((0.01, 0.02, 0.03), (0.003, 0.004, 0.005))}
-    rows = benchmark(ran({"band2 sling2sim2real": CLOSE}), floors)
+    rows = benchmark(ran({"band2 sling2sim2real": CLOSE}, floors))
     found = lines(rows)["Band 2 (medium)", "actuation floor", "virtual, oracle"]
     pooled = math.sqrt((9 + 16 + 25) / 3) / 10
     assert found[:3] == ["1.00 ± 0.30", "2.00 ± 0.40", "3.00 ± 0.50"]
@@ -106,7 +106,7 @@ def test_the_floor_is_a_row_of_its_band() -> None:
 def test_ablations_stand_in_tables_of_their_own() -> None:
     trials = dict.fromkeys(["band1 de", "band1 no_work", "orange no_work"], FAR)
     trials |= dict.fromkeys(["band1 sling2sim2real", "band2 sling2sim2real"], CLOSE)
-    assert {row.method for row in benchmark(ran(trials), {})} == set(paper.BENCHMARK)
+    assert {row.method for row in benchmark(ran(trials))} == set(paper.BENCHMARK)
     third, fourth = (ablation(ran(trials), ms) for ms in (paper.OPTIMISERS, paper.ABLATIONS))
     assert {row.band for row in third} == {"band1"}
     assert {row.band for row in fourth} == {"band1", "orange"}
@@ -119,7 +119,7 @@ def test_ablations_stand_in_tables_of_their_own() -> None:
 
 
 def test_other_targets_have_columns_beside_the_papers() -> None:
-    rows = benchmark(ran({"band1 sling2sim2real": launches([[0.01, 0.03]], targets=[1.6])}), {})
+    rows = benchmark(ran({"band1 sling2sim2real": launches([[0.01, 0.03]], targets=[1.6])}))
     heads, _ = as_table(rows, [1.6], NAMED)
     assert heads[3:8] == ["g = 160.0", "g = 172.5", "g = 192.5", "g = 212.5", "all targets"]
     found = lines(rows, [1.6])["Band 1 (soft)", "Sling2Sim2Real", "virtual"]
@@ -128,8 +128,8 @@ def test_other_targets_have_columns_beside_the_papers() -> None:
 
 def test_machines_read_the_same(tmp_path) -> None:
     failing = launches([[0.1] * 5] * 3, failed=5)
-    found = ran({"band1 sling2sim2real": CLOSE, "band1 package_si": failing})
-    rows = benchmark(found, {"band1": floor((0.01,) * 3, (0.002,) * 3)})
+    trials = {"band1 sling2sim2real": CLOSE, "band1 package_si": failing}
+    rows = benchmark(ran(trials, {"band1": floor((0.01,) * 3, (0.002,) * 3)}))
     records(rows).to_csv(tmp_path / "table1.csv", index=False)
     read = pd.read_csv(tmp_path / "table1.csv", dtype={"target_m": str})
     assert not (read.source == "not run").any()  # nothing to tell

@@ -68,9 +68,8 @@ def test_every_name_that_is_no_ascii_is_known() -> None:
 def table_1() -> str:
     trials = launches([[0.01, 0.03]] * 3, failed=1)
     ran = [result("band1", method, trials) for method in KNOWN]
-    rows = benchmark(
-        results(*ran, result("my_band", "de", trials)), {"band1": floor(*[(0.01,) * 3] * 2)}
-    )
+    floors = {"band1": floor(*[(0.01,) * 3] * 2)}
+    rows = benchmark(results(*ran, result("my_band", "de", trials), floors=floors))
     table = as_table(rows, TARGETS, styles(KNOWN))
     return latex(table, "Mean ± deviation of |landing − target|.", "tab:1", ("error [cm]", 4, 8))
 

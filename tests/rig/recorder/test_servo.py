@@ -20,7 +20,7 @@ def motion() -> HandMotion:
 
 def test_it_swings_back_like_an_oscillator(motion: HandMotion) -> None:
     """Let go 1 mm off its path, at rest: the textbook's damped cosine."""
-    follow = Servo(MASS, STIFFNESS, DAMPING).following(motion)
+    follow = Servo(MASS, STIFFNESS, DAMPING, motion)
     start, offset = 9.4, np.array([1e-3, 2e-3, -1e-3])
     times = np.linspace(start, END, 50)
     place = motion.position(start)
@@ -33,7 +33,7 @@ def test_it_swings_back_like_an_oscillator(motion: HandMotion) -> None:
 
 
 def test_without_a_load_it_stays_on_a_path_that_moves(motion: HandMotion) -> None:
-    follow, times = Servo(MASS, STIFFNESS, DAMPING).following(motion), np.linspace(2.5, 5.5, 40)
+    follow, times = Servo(MASS, STIFFNESS, DAMPING, motion), np.linspace(2.5, 5.5, 40)
     start = np.concatenate([motion.position(2.5), motion.position(2.5, 1)])
     found = follow.alone(start, times, 1e-9)
     np.testing.assert_allclose(found[:, :3], motion.position(times), atol=1e-7)
@@ -41,7 +41,7 @@ def test_without_a_load_it_stays_on_a_path_that_moves(motion: HandMotion) -> Non
 
 
 def test_a_steady_load_pushes_it_aside_by_its_stiffness(motion: HandMotion) -> None:
-    follow = Servo(MASS, STIFFNESS, DAMPING).following(motion)
+    follow = Servo(MASS, STIFFNESS, DAMPING, motion)
     load = np.array([0.0, 12.0, -1.0])
     aside = motion.position(7.0) + load / STIFFNESS
     np.testing.assert_allclose(follow(7.0, aside, np.zeros(3), load), 0, atol=1e-9)
@@ -49,7 +49,7 @@ def test_a_steady_load_pushes_it_aside_by_its_stiffness(motion: HandMotion) -> N
 
 def test_columns_are_states(motion: HandMotion) -> None:
     """Many states at one time, and one state at many times, are each alone."""
-    follow, rng = Servo(MASS, STIFFNESS, DAMPING).following(motion), np.random.default_rng(1)
+    follow, rng = Servo(MASS, STIFFNESS, DAMPING, motion), np.random.default_rng(1)
     x, v, load = rng.normal(size=(3, 3, 7))
     together = follow(3.3, x, v, load)
     times = np.linspace(1, 9, 7)
@@ -60,7 +60,7 @@ def test_columns_are_states(motion: HandMotion) -> None:
         np.testing.assert_allclose(over_time[:, i], follow(times[i], *alone))
 
 
-def test_damping_ratio(params: Params) -> None:
+def test_damping_ratio(params: Params, motion: HandMotion) -> None:
     critical = params.rig.arm.model_copy(update={"damping_ratio": 1.0})
-    servo = Servo.of(critical)
+    servo = Servo.of(critical, motion)
     assert np.isclose(servo.damping**2, 4 * servo.mass * servo.stiffness)

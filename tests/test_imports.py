@@ -37,6 +37,7 @@ INDIRECT = {
     "onnxscript": "torch's ONNX exporter imports it",
     "pytest-xdist": "a plug-in of pytest's",
     "ruff": "make lint",
+    "uv": "tools/setup.sh",
     "threadpoolctl": "by the script of a test",
     "pre-commit": "the same at each commit",
 }

@@ -1,7 +1,5 @@
 """What all tests share."""
 
-from __future__ import annotations
-
 import gc
 import os
 import shutil
@@ -13,7 +11,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from pipeline.params import Params, load
 from tests import once
+from tests.project import ROOT
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as stages have it; nothing has imported NumPy yet
 
@@ -49,6 +49,11 @@ def nowhere(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("nowhere"))
         yield
+
+
+@pytest.fixture(scope="session")
+def params() -> Params:
+    return load(ROOT / "params.yaml")
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,5 @@
 """What one process of a test run makes and all of them use: xdist has several side by side."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import pickle

@@ -1,14 +1,21 @@
-"""A copy of the project for tests that run its pipeline."""
-
-from __future__ import annotations
+"""Commands, copies of the project and processes, for tests that run them."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
+import psutil
+
+from pipeline.params import Params
+
 ROOT = Path(__file__).parents[1]
+SLING = ("-c", "from app.cli import main; main()")  # after `python`
+ROUGH = {"edges": 16, "grip_step": 0.01, "recoil_step": 5e-4, "swing_step": 2e-3}  # a sling's
 
 
 def copy_project(folder: Path) -> None:
@@ -26,30 +33,66 @@ def copy_project(folder: Path) -> None:
             shutil.copy(ROOT / name, folder / name)
 
 
-class Copy:
-    """A folder in which a test runs commands, with this Python first and `more` around them."""
+def environment(**more: str) -> dict[str, str]:
+    """Ours, with this Python and this project first, one thread a process, and `more`."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    ours = {"PATH": path, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    return {**os.environ, **ours, **more}
 
-    timeout: float | None = None  # s, of a command
+
+def python(*arguments: str | Path, folder: Path = ROOT, **more: str) -> subprocess.CompletedProcess:
+    """Run Python in `folder`, with `more` in its environment."""
+    command, about = [sys.executable, *map(str, arguments)], {"capture_output": True, "text": True}
+    return subprocess.run(command, cwd=folder, env=environment(**more), timeout=240, **about)
+
+
+def with_(params: Params, section: str, **values: object) -> Params:
+    """`params` with other values in a section, such as policy.robust."""
+    first, _, rest = section.partition(".")
+    inner = getattr(params, first)
+    inner = with_(inner, rest, **values) if rest else inner.model_copy(update=values)
+    return params.model_copy(update={first: inner})
+
+
+class Copy:
+    """A folder in which a test runs commands, with `more` in their environment."""
 
     def __init__(self, folder: Path, **more: str) -> None:
         self.folder = folder
-        self.environment = {
-            **os.environ,
-            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-            "OMP_NUM_THREADS": "1",
-            **more,
-        }
+        site = str(folder.parent / f"site-{folder.name}")
+        self.environment = environment(DVC_SITE_CACHE_DIR=site, **more)
 
     def __call__(self, *command: str) -> str:
         """What a command prints; the test fails where that fails."""
-        done = subprocess.run(
-            command,
-            cwd=self.folder,
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            timeout=self.timeout,
-        )
+        about = {"cwd": self.folder, "env": self.environment, "capture_output": True}
+        done = subprocess.run(command, text=True, timeout=1200, **about)
         assert done.returncode == 0, f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}"
         self.errors = done.stderr
         return done.stdout
+
+    def dvc(self, *arguments: str) -> set[str]:
+        """Run DVC; the stages that really ran."""
+        return set(re.findall(r"^Running stage '(.+)':$", self("dvc", *arguments), re.MULTILINE))
+
+
+def wait(happens: Callable[[], object], seconds: float):
+    """What it gives once that is true, or after so long."""
+    latest = time.monotonic() + seconds
+    while not (found := happens()) and time.monotonic() < latest:
+        time.sleep(0.05)
+    return found
+
+
+def until(happens: Callable[[], object], seconds: float = 90.0):
+    """The same, where the test fails after so long."""
+    found = wait(happens, seconds)
+    assert found, f"it did not come to pass within {seconds} s"
+    return found
+
+
+def alive(pid: int) -> bool:
+    """A zombie is not: it waits for a parent to look at it."""
+    try:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False

@@ -1,7 +1,5 @@
 """What README and docs point at is there."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 

@@ -1,7 +1,5 @@
 """Aiming with a toy policy: the closed form says where the draw lands."""
 
-from __future__ import annotations
-
 import json
 from types import SimpleNamespace
 

@@ -1,10 +1,7 @@
 """The command line: what it accepts, and that every mistake is one line without a traceback."""
 
-from __future__ import annotations
-
 import argparse
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -16,18 +13,9 @@ from app import __version__, bench, cli
 from app.arguments import address, draw, positive, shown
 from pipeline.sling.material import THETA
 from tests.policy.linear import write_policy
+from tests.project import ROOT, python
 
-ROOT = Path(__file__).parents[2]
 SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
-
-
-def sling(*arguments: str, folder: Path = ROOT) -> subprocess.CompletedProcess:
-    """Run `sling` in `folder` as a user would."""
-    command = [sys.executable, "-m", "app.cli", *arguments]
-    environment = {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    return subprocess.run(
-        command, cwd=folder, env={**os.environ, **environment}, capture_output=True, text=True
-    )
 
 
 @pytest.fixture
@@ -126,7 +114,9 @@ def test_a_command_line_that_makes_no_sense(refused) -> None:
         assert expected in refused(2, *arguments.split())
 
 
-def test_a_users_mistake(refused) -> None:
+def test_a_users_mistake(tmp_path: Path, refused) -> None:
+    aim = "aim --band band1 --target 1.9".split()
+    assert "params.yaml: cannot be read" in refused(1, *aim, folder=tmp_path)
     for arguments, expected in (
         ("launch --theta none.json --band band1 --draw=-0.30,-0.17", "none.json: no such file"),
         ("launch --theta none.json --band band9 --draw=-0.30,-0.17", "band band9: not in params"),
@@ -147,10 +137,10 @@ def test_a_users_mistake(refused) -> None:
 
 
 def test_the_version_and_a_mistake_as_a_process() -> None:
-    done = sling("--version")
+    done = python("-m", "app.cli", "--version")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == f"sling2sim2real {__version__}\n"
-    done = sling("aim", "--band", "band9", "--target", "1.925")
+    done = python("-m", "app.cli", "aim", "--band", "band9", "--target", "1.925")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
 
 
@@ -160,11 +150,6 @@ def test_a_reader_that_has_seen_enough() -> None:
     command = ["bash", "-c", f'"{sys.executable}" -c "{endless}" | head -n 1']
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
     assert (done.stdout, done.stderr) == ("a line\n", "")
-
-
-def test_a_folder_without_params(tmp_path: Path, refused) -> None:
-    line = refused(1, "aim", "--band", "band1", "--target", "1.9", folder=tmp_path)
-    assert "params.yaml: cannot be read" in line
 
 
 def aimable(folder: Path) -> None:
@@ -181,7 +166,7 @@ def test_aim_prints_one_json_object(tmp_path: Path) -> None:
     """The keys that scripts rely on, and the pose in the robot's base; the text has them too."""
     aimable(tmp_path)
     arguments = ("aim", "--band", "band1", "--target", "1.9")
-    done = sling(*arguments, "--json", folder=tmp_path)
+    done = python("-m", "app.cli", *arguments, "--json", folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")  # what it warns of is in the answer
     answer = json.loads(done.stdout)
     stable = ["draw_y_m", "draw_z_m", "predicted_landing_m", "interval_90_m", "hold_force_n"]
@@ -195,7 +180,7 @@ def test_aim_prints_one_json_object(tmp_path: Path) -> None:
     params = tmp_path / "params.yaml"
     known = "base_to_fork: [0.5, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0]"
     params.write_text(params.read_text().replace("base_to_fork: null", known))
-    done = sling(*arguments, folder=tmp_path)
+    done = python("-m", "app.cli", *arguments, folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
     shown = dict(line.split(maxsplit=1) for line in lines if not line.startswith("warning: "))
@@ -227,13 +212,13 @@ def test_launch_prints_one_json_object(tmp_path: Path) -> None:
     theta = tmp_path / "theta.json"
     theta.write_text(json.dumps({"band": "band1", "theta": SOFT}))
     arguments = ("launch", "--theta", str(theta), "--band", "band1", "--json")
-    done = sling(*arguments, "--draw=-0.30,-0.17")
+    done = python("-m", "app.cli", *arguments, "--draw=-0.30,-0.17")
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert set(result) == {"landing_y_m", "speed_m_s", "hold_force_n", "failure"}
     assert result["failure"] is None
     assert 0.5 < result["landing_y_m"] < 6.0
     assert 1.0 < result["hold_force_n"] < 30.0
-    broken = json.loads(sling(*arguments, "--draw=-0.45,-0.30").stdout)
+    broken = json.loads(python("-m", "app.cli", *arguments, "--draw=-0.45,-0.30").stdout)
     assert broken["landing_y_m"] is None
     assert "N, more than" in broken["failure"]

@@ -1,7 +1,5 @@
 """Whole files or none, and nothing left of processes that were killed."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Where simulations run, as the environment says it."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

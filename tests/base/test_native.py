@@ -1,12 +1,7 @@
 """The guard around Warp, which is not made for several threads at its start, and its compiler."""
 
-from __future__ import annotations
+from tests.project import python
 
-import subprocess
-import sys
-from pathlib import Path
-
-ROOT = Path(__file__).parents[2]
 STARTED_TWICE = """
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -56,22 +51,18 @@ for array in numbers:
 """
 
 
-def python(code: str, *arguments: str) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-c", code, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
-
-
 def test_warp_starts_once_whoever_comes_first() -> None:
-    assert python(STARTED_TWICE).stdout.split()[-1] == "1"
+    assert python("-c", STARTED_TWICE).stdout.split()[-1] == "1"
 
 
 def test_a_start_without_a_cuda_driver_is_silent_and_hides_nothing_else() -> None:
-    done = python(SOMETHING_ELSE)
+    done = python("-c", SOMETHING_ELSE)
     assert (done.stdout, done.stderr) == ("", "something else\n")
 
 
 def test_results_are_the_same_on_every_x86_64_cpu() -> None:
     """With this one's vectors, and with the least that there are, without a fused multiply-add."""
-    native, least = python(SIMULATED, "-march=native"), python(SIMULATED, "-target-cpu x86-64-v2")
+    targets = ("-march=native", "-target-cpu x86-64-v2")
+    native, least = (python("-c", SIMULATED, target) for target in targets)
     assert len(native.stdout.split()) > 10
     assert least.stdout == native.stdout

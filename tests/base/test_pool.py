@@ -1,10 +1,7 @@
 """Processes of a pool end with the one that started them, and leave Ctrl-C to it."""
 
-from __future__ import annotations
-
 import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
@@ -12,8 +9,8 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.base.pool import Pool
-from tests.app.flow.killing import Run, wait
-from tests.project import ROOT
+from tests.app.flow.killing import Run
+from tests.project import python, wait
 
 CODE = """\
 import os, sys, time
@@ -62,11 +59,4 @@ def test_a_killed_worker_is_one_line() -> None:
 
 def test_a_pool_is_as_wide_as_the_environment_says() -> None:
     told = "from pipeline.base.pool import Pool; print(Pool()._max_workers)"
-    done = subprocess.run(
-        [sys.executable, "-c", told],
-        cwd=ROOT,
-        env={**os.environ, "SLING_WORKERS": "3"},
-        capture_output=True,
-        text=True,
-    )
-    assert done.stdout == "3\n"
+    assert python("-c", told, SLING_WORKERS="3").stdout == "3\n"

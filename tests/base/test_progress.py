@@ -1,7 +1,5 @@
 """Lines of long things: what they say, that they are read back, and that they are not too many."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

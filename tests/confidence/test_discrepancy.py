@@ -1,7 +1,5 @@
 """What a recording says of the law's error: gaps of known size come back."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Posterior and profiles of a linear toy, whose Gaussian is known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

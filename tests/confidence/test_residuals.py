@@ -1,7 +1,5 @@
 """Signed residuals of a straight band, where every offset is known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Surrogate, sampler and intervals against linear algebra and known distributions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

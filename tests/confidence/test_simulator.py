@@ -1,7 +1,5 @@
 """A posterior on the simulator itself: one band with known parameters, a few seconds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +14,7 @@ from pipeline.objective.space import Space
 from pipeline.params import load
 from pipeline.sling.model import Sling
 from tests.objective.own_law import disturbed, own_law_episode
-from tests.project import ROOT
+from tests.project import ROOT, ROUGH
 from validation.synthetic import pull_and_release
 
 TRUTH = np.array([2.5e5, 0.47, 4e-3, 0.8, 0.6])
@@ -28,9 +26,7 @@ def test_truth_is_found_through_wrong_clocks_and_extrinsics(monkeypatch) -> None
     Coarse edges and steps, and fewer rounds, for the sake of time.
     """
     params = load(ROOT / "params.yaml")
-    coarse = params.sling.model_copy(
-        update={"edges": 16, "recoil_step": 5e-4, "swing_step": 2e-3, "grip_step": 0.01}
-    )
+    coarse = params.sling.model_copy(update=ROUGH)
     band = next(iter(params.bands))
     sling = Sling.of(params.bands[band], params.setup, coarse)
     plan = pull_and_release(band, params.episode, sling)

@@ -1,7 +1,5 @@
 """The stage theta where simulations around θ* fail: θ* all the same, without a confidence."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

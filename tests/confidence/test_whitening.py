@@ -1,7 +1,5 @@
 """Effective numbers of correlated residuals, where theory has them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter

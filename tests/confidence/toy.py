@@ -1,7 +1,5 @@
 """A simulator with residuals linear in the even coordinates: its posterior is known."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """JSON schema (draft 2020-12) of the card beside an exported policy."""
 
-from __future__ import annotations
-
 TEXT = {"type": "string", "minLength": 1}
 COUNT = {"type": "integer", "minimum": 0}
 NUMBER = {"type": "number"}

@@ -3,8 +3,6 @@
 python -m tests.policy.killed CHECKPOINT ITERATION
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """A policy for tests that need a file and no network: draw = slope target + offset."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

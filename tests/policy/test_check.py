@@ -1,7 +1,5 @@
 """What a policy is told to be worth: by launches, with failures counted and never averaged in."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

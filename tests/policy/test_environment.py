@@ -1,7 +1,5 @@
 """The environment's contract: one step, the paper's reward, failures penalised and counted."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Expectations over a normal landing against SciPy's folded normal and numerical integration."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

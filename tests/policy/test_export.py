@@ -1,11 +1,7 @@
 """The exported files against the trained network, in processes that know nothing of us."""
 
-from __future__ import annotations
-
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import jsonschema
@@ -22,7 +18,7 @@ from pipeline.policy.export import card, write_onnx, write_torchscript
 from pipeline.sling.material import THETA
 from tests.policy import toy
 from tests.policy.card_schema import SCHEMA
-from tests.project import ROOT
+from tests.project import ROOT, python
 
 TARGETS = np.random.default_rng(0).uniform(1.425, 2.425, (1000, 1)).astype(np.float32)
 
@@ -42,13 +38,7 @@ def folder(stored):
 
 def apart(code: str, folder: Path, **environment: str) -> str:
     """What another process prints that runs `code` in `folder`, with the project out of reach."""
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=folder,
-        env={**os.environ, "OMP_NUM_THREADS": "1", **environment},
-        capture_output=True,
-        text=True,
-    )
+    done = python("-c", code, folder=folder, **{"PYTHONPATH": "", **environment})
     assert done.returncode == 0, done.stderr
     return done.stdout
 

@@ -1,7 +1,5 @@
 """The second policy on toys whose least sensitive draw is known, and which samples it looks at."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,8 +15,8 @@ from pipeline.policy.robust import refine, representative, robust_maps
 from pipeline.policy.train import told as said
 from pipeline.policy.train import train
 from tests.policy import toy
-from tests.policy.best import best_draws, expected_error
-from tests.project import ROOT
+from tests.project import ROOT, with_
+from validation.benchmarks.best_draws import best_draws, expected_error
 
 Z_SAFE = -0.22  # m, the height of draws that θ does not move
 SLOWER = {"learning_rate": 1e-4}
@@ -122,14 +120,8 @@ def test_few_samples_stand_for_many() -> None:
 
 
 def params_with(samples: int = 4, map_size=(9, 7), error: float = 0.002):
-    params = load(ROOT / "params.yaml")
-    robust = params.policy.robust.model_copy(update={"samples": samples, "map_size": map_size})
-    return params.model_copy(
-        update={
-            "policy": params.policy.model_copy(update={"robust": robust}),
-            "trials": params.trials.model_copy(update={"actuation_error": error}),
-        }
-    )
+    params = with_(load(ROOT / "params.yaml"), "trials", actuation_error=error)
+    return with_(params, "policy.robust", samples=samples, map_size=map_size)
 
 
 def test_samples_and_map_size_say_what_is_launched() -> None:

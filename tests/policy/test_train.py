@@ -1,12 +1,6 @@
 """Training on the toy slingshot, whose landing is known in closed form."""
 
-from __future__ import annotations
-
-import os
 import signal
-import subprocess
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,8 +13,8 @@ from pipeline.policy import train as module
 from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.train import Trained, train
 from tests.policy import killed, toy
+from tests.project import python
 
-ROOT = Path(__file__).parents[2]
 CHANGES = {
     "seed": [2],
     "targets": [(1.5, 2.0)],
@@ -75,13 +69,8 @@ def test_the_same_settings_give_the_same_training_and_each_counts(toy_map, setti
 
 
 def test_without_a_launch_that_lands_it_says_so(settings) -> None:
-    def broken(draws: np.ndarray) -> SimpleNamespace:
-        nan = np.full(len(draws), np.nan)
-        reason = "the simulation did not converge"
-        return SimpleNamespace(landing_y=nan, hold_force=nan, failure=[reason] * len(draws))
-
     box = {"draw_y": toy.DRAW_Y, "draw_z": toy.DRAW_Z, "size": (5, 5), "max_force": 15.0}
-    trained = train(surface_of([LandingMap.simulate(broken, **box)]), short(settings))
+    trained = train(surface_of([LandingMap.simulate(toy.broken, **box)]), short(settings))
     assert np.isnan(trained.mean_error)
     assert trained.failures == {"the simulation did not converge": 2 * 4 * 64}
     assert trained.curve["failed_targets"] == [256.0, 256.0]
@@ -116,13 +105,7 @@ def test_each_iteration_is_told_and_those_of_an_earlier_run_are_counted(
 
 def test_sigkill_and_on_to_the_same_training(tmp_path) -> None:
     """Killed in the eighth iteration of twelve, it goes on after the fifth."""
-    run = subprocess.run(
-        [sys.executable, "-m", "tests.policy.killed", str(tmp_path / "kept.pt"), "8"],
-        cwd=ROOT,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-    )
+    run = python("-m", "tests.policy.killed", tmp_path / "kept.pt", "8")
     assert run.returncode == -signal.SIGKILL, run.stderr
     left = torch.load(tmp_path / "kept.pt", weights_only=True)
     assert len(left["state"]["rows"]) == 5

@@ -4,8 +4,6 @@ A linear spring gives all its energy to a projectile that leaves at the origin, 
 the draw, and falls freely to the floor.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,3 +23,9 @@ def launch(draws: np.ndarray) -> SimpleNamespace:
     flight = (up + np.sqrt(up**2 + 2 * GRAVITY * FORK_HEIGHT)) / GRAVITY
     force = 4 * STIFFNESS * stretch * distance / length
     return SimpleNamespace(landing_y=across * flight, hold_force=force, failure=[None] * len(draws))
+
+
+def broken(draws: np.ndarray, thetas: np.ndarray | None = None) -> SimpleNamespace:
+    """Nothing lands."""
+    nan, reasons = np.full(len(draws), np.nan), ["the simulation did not converge"] * len(draws)
+    return SimpleNamespace(landing_y=nan, hold_force=nan, failure=reasons)

@@ -1,28 +1,20 @@
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 
-from pipeline.params import Params, load
+from pipeline.params import Params
 from pipeline.rig.recorder.interaction import Interaction
 from pipeline.rig.recorder.record import record
 from tests import once
+from tests.project import ROOT, with_
 
-ROOT = Path(__file__).parents[2]
 SCALE = 0.4  # of the pictures
-
-
-@pytest.fixture(scope="session")
-def params() -> Params:
-    return load(ROOT / "params.yaml")
 
 
 @pytest.fixture(scope="session")
 def coarse(params: Params) -> Params:
     """The same world, integrated quickly."""
-    rig = params.rig.model_copy(update={"edges": 40, "tolerance": 1e-4})
-    return params.model_copy(update={"rig": rig})
+    return with_(params, "rig", edges=40, tolerance=1e-4)
 
 
 @pytest.fixture(scope="session")

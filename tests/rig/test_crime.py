@@ -1,7 +1,5 @@
 """Not the inverse crime: the rig's rubber is not the simulator's, and the loss shows it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +15,7 @@ from pipeline.rig.recorder.record import EPOCH
 from pipeline.sling.material import THETA
 from pipeline.sling.model import Sling
 from tests.objective.own_law import own_law_episode, visible
+from tests.project import ROUGH, with_
 from validation.benchmarks.methods import complete
 
 METHOD = "sling2sim2real"
@@ -34,11 +33,8 @@ def best_loss(params, sling, episode) -> tuple[float, np.ndarray]:
 @pytest.fixture(scope="module")
 def quick(coarse):
     """Its search, and a simulator of half the edges and steps for both rubbers."""
-    sling = {"edges": 16, "grip_step": 0.01, "recoil_step": 5e-4, "swing_step": 2e-3}
     budget = {"generations": 12, "population": 20, "k_top": 2, "cma_rollouts": 960}
-    optimizer = coarse.optimizer.model_copy(update=budget)
-    sling = coarse.sling.model_copy(update=sling)
-    return coarse.model_copy(update={"optimizer": optimizer, "sling": sling})
+    return with_(with_(coarse, "optimizer", **budget), "sling", **ROUGH)
 
 
 def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorded) -> None:

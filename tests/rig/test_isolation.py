@@ -1,7 +1,5 @@
 """Nothing of the rig reaches the identification but the recording, `setup:` and `bands:`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -13,7 +11,7 @@ from pipeline.params import Params
 from pipeline.recording.build import build_episode
 from pipeline.rig.recorder.interaction import Interaction
 from pipeline.sling.model import Sling
-from tests.rig.conftest import ROOT
+from tests.project import ROOT
 
 STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
 WORLD = {"record", "trials", "ablation_trials", "floor"}

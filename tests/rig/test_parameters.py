@@ -1,7 +1,5 @@
 """Each number under `rig:` changes the recording, and just those topics that it should."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Searches of known functions of the unit cube."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import SimpleNamespace
 

@@ -3,8 +3,6 @@
 python -m tests.search.killed OPTIMISER MEMORY OUTPUT BATCH
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """Optimisers as users may write them: one that serves, and those that are refused."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,11 +1,10 @@
 """The loop around optimisers, and the whole chain, on functions with known minima."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -126,14 +125,28 @@ def test_every_search_has_the_same_budget() -> None:
     assert explore + refine == 600
 
 
-def test_an_optimiser_is_deterministic_and_spends_its_budget() -> None:
-    """And starts, if it is ours, from the common Latin hypercube."""
+@pytest.fixture
+def torch_threads():
+    before = torch.get_num_threads()
+    yield torch.set_num_threads
+    torch.set_num_threads(before)
+
+
+def test_an_optimiser_is_deterministic_and_spends_its_budget(torch_threads) -> None:
+    """Whatever the threads and global generators, which it leaves alone.
+
+    It starts, if it is ours, from the common Latin hypercube.
+    """
     for name in ("de", "bo", "adam", "tests.search.own:RandomSearch"):
         runs = []
         for number, seed in enumerate((1, 1, 2)):
-            np.random.seed(number)
+            np.random.seed(number), torch.manual_seed(number), torch_threads(1 + number)
+            states = np.random.get_state()[1].copy(), torch.random.get_rng_state()
             optimizer = changed(seed=seed, population=8)
             runs.append(alone(name, quadratic(CENTRE, VALLEY), 29, optimizer))
+            np.testing.assert_array_equal(np.random.get_state()[1], states[0])
+            assert torch.equal(torch.random.get_rng_state(), states[1])
+            assert torch.get_num_threads() == 1 + number
             assert len(runs[-1].total) == 29
             assert runs[-1].unit.min() >= 0 and runs[-1].unit.max() <= 1
         assert runs[0].table.equals(runs[1].table)

@@ -1,7 +1,5 @@
 """Regions of a history: non-maximum suppression, covariances of neighbours."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from types import SimpleNamespace
 

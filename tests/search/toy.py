@@ -1,7 +1,5 @@
 """Toys in closed form: a straight band, moved and pulled."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What tests of the simulator share: parameters, a straight band, a band at rest."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A sling for the tests: the default resolution, a band of 10 mm and 23 g."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -9,14 +7,8 @@ import numpy as np
 import pytest
 
 from pipeline.episode.episode import Episode
-from pipeline.params import load
 from pipeline.sling import Sling
 from pipeline.sling.model import TETRAHEDRA
-
-
-@pytest.fixture(scope="session")
-def params():
-    return load("params.yaml")
 
 
 @pytest.fixture(scope="session")

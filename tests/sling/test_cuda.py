@@ -1,7 +1,5 @@
 """One source for both: on a GPU the simulator does what it does on the CPU."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from importlib import import_module
 

@@ -1,7 +1,5 @@
 """The tetrahedral mesh fills the cylinder once, without gaps."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np

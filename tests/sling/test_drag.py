@@ -1,7 +1,5 @@
 """The air's drag on the band: a force for mass and speed, which the projectile does not feel."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

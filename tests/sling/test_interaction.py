@@ -1,7 +1,5 @@
 """The recorded interaction: parameters, friction, robustness, independence of the batch."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 tests/validation/simulator/test_limits.py holds their steps, flight and energy.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from importlib import import_module
 

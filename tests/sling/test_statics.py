@@ -1,7 +1,5 @@
 """The simulator at rest against closed forms and against its own energy in NumPy."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

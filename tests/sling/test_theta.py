@@ -1,7 +1,5 @@
 """θ files: read as written, and every mistake in them is one line that names it."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

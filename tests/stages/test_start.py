@@ -1,11 +1,7 @@
 """Stage scripts as a user calls them: every mistake is one line."""
 
-from __future__ import annotations
-
-import os
 import pickle
 import runpy
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -20,8 +16,8 @@ from pipeline.objective.space import Space
 from pipeline.params import load
 from pipeline.search.history import History
 from stages.start import remedy
+from tests.project import ROOT, python
 
-ROOT = Path(__file__).parents[2]
 OF_A_BAND = ("record", "episode", "mounting")
 OF_A_METHOD = ("history", "refined", "theta", "policy", "trials")
 
@@ -43,13 +39,12 @@ def stage(tmp_path: Path, monkeypatch, capsys) -> Callable[..., tuple[int, str]]
     return run
 
 
-@pytest.mark.parametrize("name", [*OF_A_BAND, *OF_A_METHOD, "report"])
-def test_wrong_arguments_are_answered_by_the_usage(name: str, stage) -> None:
-    words = {"report": ""}.get(name, " BAND" if name in OF_A_BAND else " BAND METHOD")
-    expected = (2, f"usage: python -m stages.{name}{words}")
-    assert stage(name, "a", "b", "c") == expected
-    if words:
-        assert stage(name) == expected
+def test_wrong_arguments_are_answered_by_the_usage(stage) -> None:
+    for words, names in ((" BAND", OF_A_BAND), (" BAND METHOD", OF_A_METHOD), ("", ["report"])):
+        for name in names:
+            expected = (2, f"usage: python -m stages.{name}{words}")
+            assert stage(name, "a", "b", "c") == expected
+            assert not words or stage(name) == expected
 
 
 def test_unknown_names(stage) -> None:
@@ -90,13 +85,13 @@ def test_a_hint_names_the_group_by_which_a_method_runs(stage) -> None:
         assert "missing; name adam under run.methods or run.ablations" in line
 
 
-@pytest.mark.parametrize("name", [*OF_A_BAND[1:], *OF_A_METHOD, "report"])
-def test_missing_inputs(name: str, stage) -> None:
-    method = ("sling2sim2real",) if name in OF_A_METHOD else ()
-    band = ("band1",) if name != "report" else ()
-    status, line = stage(name, *band, *method)
-    assert status == 1 and line.startswith("error: data/"), line
-    assert "missing; `dvc repro " in line or "no such file" in line, line
+def test_missing_inputs(stage) -> None:
+    both = "band1", "sling2sim2real"
+    for item, names in ((both[:1], OF_A_BAND[1:]), (both, OF_A_METHOD), ((), ["report"])):
+        for name in names:
+            status, line = stage(name, *item)
+            assert status == 1 and line.startswith("error: data/"), line
+            assert "missing; `dvc repro " in line or "no such file" in line, line
 
 
 def test_a_file_that_is_missing_or_damaged_says_what_makes_it(stage) -> None:
@@ -131,9 +126,7 @@ def test_a_stage_has_one_thread_of_blas_whatever_the_machine() -> None:
     """Several round otherwise: theta's confidence differed in its last digits."""
     code = "import stages, numpy, threadpoolctl as t;"
     code += "print([one['num_threads'] for one in t.threadpool_info()])"
-    environment = os.environ | {"OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"}
-    asked = [sys.executable, "-c", code]
-    done = subprocess.run(asked, cwd=ROOT, env=environment, capture_output=True, text=True)
+    done = python("-c", code, OMP_NUM_THREADS="2", OPENBLAS_NUM_THREADS="2")
     assert done.stdout == "[1]\n", done.stderr
 
 
@@ -150,6 +143,5 @@ def test_a_stage_imports_no_library_that_it_does_not_use() -> None:
     ):
         code = f"import sys, {', '.join(f'stages.{name}' for name in stages)}\n"
         code += f"print(*set({heavy.split()}) & sys.modules.keys())"
-        asked = [sys.executable, "-c", code]
-        done = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True)
+        done = python("-c", code)
         assert (done.returncode, done.stdout.strip()) == (0, ""), (stages, done)

@@ -18,7 +18,8 @@ import psutil
 import pytest
 from ruamel.yaml import YAML
 
-from tests.app.flow.killing import PROMPT, SLING, Run, told, wait
+from tests.app.flow.killing import PROMPT, SLING, Run, told
+from tests.project import wait
 from tests.test_pipeline import TINY, Copy
 
 pytestmark = pytest.mark.validation
@@ -125,7 +126,7 @@ def test_a_flow_killed_again_and_again_ends_in_the_same_bytes(tmp_path, progress
     rng, kills, rounds, faults = np.random.default_rng(SEED), [], [], []
     start = time.monotonic()
     while len(kills) < KILLS or not rounds:
-        run = Run(copy.folder, DVC_SITE_CACHE_DIR=str(copy.folder.parent / "site"))
+        run = Run(copy.folder, DVC_SITE_CACHE_DIR=copy.environment["DVC_SITE_CACHE_DIR"])
         victims = islice(cycle(VICTIMS), len(kills), KILLS)
         status, blows = struck(run, victims, rng)
         kills += blows

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 from tests import project
-from tests.project import ROOT
+from tests.project import until
 
 STEP = """\
 import os, pathlib, sys, time
@@ -61,12 +58,6 @@ CONFIG = """\
 class Copy(project.Copy):
     """A working copy of the toy project."""
 
-    timeout = 240
-
-    def __init__(self, folder: Path) -> None:
-        site = str(folder.parent / f"site-{folder.name}")
-        super().__init__(folder, DVC_SITE_CACHE_DIR=site, PYTHONPATH=str(ROOT))
-
     def clone(self, name: str) -> Copy:
         self("git", "clone", "-q", ".", str(self.folder.parent / name))
         return Copy(self.folder.parent / name)
@@ -99,24 +90,6 @@ def toy(folder: Path) -> Copy:
     copy("git", "add", "--all")
     copy("git", "commit", "-q", "-m", "toy")
     return copy
-
-
-def until(true: Callable[[], object], seconds: float = 30.0):
-    """What `true` returns, once it is; the test fails where that takes longer."""
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        if answer := true():
-            return answer
-        time.sleep(0.05)
-    raise AssertionError(f"not true within {seconds} s")
-
-
-def alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return "zombie" not in Path(f"/proc/{pid}/status").read_text()
 
 
 class Dask:

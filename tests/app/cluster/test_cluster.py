@@ -1,7 +1,5 @@
 """Stages on Dask workers: a toy project in working copies of its own, a scheduler, a DVC remote."""
 
-from __future__ import annotations
-
 import shutil
 import signal
 import subprocess
@@ -15,7 +13,8 @@ import pytest
 from app.cluster import cluster, exchange, worker
 from app.flow import child
 from pipeline.base.errors import UserError
-from tests.app.cluster.several import Copy, Several, alive, toy, until
+from tests.app.cluster.several import Copy, Several, toy
+from tests.project import alive, until
 
 
 @pytest.fixture(scope="module")

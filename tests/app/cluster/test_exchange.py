@@ -1,7 +1,5 @@
 """What a stage needs, how copies differ, and how entries come into dvc.lock."""
 
-from __future__ import annotations
-
 import shutil
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path

@@ -1,7 +1,5 @@
 """DVC's transfers run behind a guard, as stages do: they hear an interrupt, and say one line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -9,7 +7,8 @@ import pytest
 from app.cluster import exchange
 from app.flow import child
 from pipeline.base.errors import UserError
-from tests.app.cluster.several import Copy, alive, toy
+from tests.app.cluster.several import Copy, toy
+from tests.project import alive
 
 # Python reads it at its start: notes its number and waits, as a transfer of many files does.
 WAITS = """\

@@ -1,37 +1,33 @@
 """Toy stages that take their time, and all processes of a run, whoever their parents are by now."""
 
-from __future__ import annotations
-
-import os
 import signal
 import subprocess
 import sys
-import time
 import uuid
-from collections.abc import Callable
 from pathlib import Path
 
 import psutil
 
-from tests.project import ROOT
+from tests import project
+from tests.app.flow import toy
+from tests.project import environment, wait
 
-SLING = [sys.executable, "-c", "from app.cli import main; main()"]
-DVC = [sys.executable, "-m", "dvc"]
+SLING = [sys.executable, *project.SLING]
 PROMPT = 10.0  # s after which nothing of a run may live
-STEPS = 12
-
-DVC_YAML = """\
-stages:
-  count:
-    matrix: {item: [a, b]}
-    cmd: python work.py ${item.item}
-    deps: [work.py]
-    outs: ['out/${item.item}.txt']
-  both:
-    cmd: cat out/a.txt out/b.txt > out/both.txt
-    deps: [out/a.txt, out/b.txt]
-    outs: [out/both.txt]
-"""
+STEPS = 16
+STAGES = {
+    "count": {
+        "matrix": {"item": ["a", "b"]},
+        "cmd": "python work.py ${item.item}",
+        "deps": ["work.py"],
+        "outs": ["out/${item.item}.txt"],
+    },
+    "both": {
+        "cmd": "cat out/a.txt out/b.txt > out/both.txt",
+        "deps": ["out/a.txt", "out/b.txt"],
+        "outs": ["out/both.txt"],
+    },
+}
 # Counts in tenths of a second from where it was killed; a process of its own waits beside it.
 WORK = f"""\
 import os, signal, subprocess, sys, time
@@ -61,46 +57,26 @@ OUTPUTS = {f"out/{name}.txt": f"{name * 100}\n" for name in "ab"}
 OUTPUTS["out/both.txt"] = "".join(OUTPUTS.values())
 
 
-class Toy:
+class Toy(toy.Toy):
     """A project of three stages in a folder, and all that runs there."""
 
     def __init__(self, folder: Path) -> None:
-        (folder / ".dvc").mkdir(parents=True)
-        (folder / ".dvc/config").write_text("[core]\n no_scm = true\n analytics = false\n")
-        (folder / "dvc.yaml").write_text(DVC_YAML)
-        (folder / "work.py").write_text(WORK)
+        super().__init__(folder, STAGES, WORK)
         (folder / "out").mkdir()
-        self.folder = folder
-        self.run = Run(folder)
+        self.run = Run(folder, DVC_SITE_CACHE_DIR=self.environment["DVC_SITE_CACHE_DIR"])
+        self.environment = self.run.environment
 
     def outputs(self) -> dict[str, str]:
         files = (self.folder / "out").iterdir()
         return {str(file.relative_to(self.folder)): file.read_text() for file in files}
 
-    def dvc(self, *arguments: str) -> str:
-        """Run DVC as a user would; what it says."""
-        done = subprocess.run(
-            [*DVC, *arguments], cwd=self.folder, env=self.run.environment, timeout=120,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stdout
-        return done.stdout
-
 
 class Run:
     """Commands in a folder, whose processes all bear a mark in their environment."""
 
-    def __init__(self, folder: Path, **environment: str) -> None:
+    def __init__(self, folder: Path, **more: str) -> None:
         self.folder, self.mark = folder, uuid.uuid4().hex
-        self.environment = {
-            **os.environ,
-            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-            "PYTHONPATH": str(ROOT),
-            "OMP_NUM_THREADS": "1",
-            "DVC_SITE_CACHE_DIR": str(folder.parent / "site"),
-            "SLING_TEST_RUN": self.mark,
-            **environment,
-        }
+        self.environment = environment(SLING_TEST_RUN=self.mark, **more)
 
     def start(self, *command: str) -> subprocess.Popen:
         """In a session of its own; its lines, errors among them, go to `folder`/../said.txt."""
@@ -137,10 +113,7 @@ class Run:
         left = self.alive()
         said = [told(process) for process in left]
         for process in left:
-            try:
-                process.kill()
-            except psutil.NoSuchProcess:
-                pass
+            send(process)
         return said
 
 
@@ -150,16 +123,6 @@ def told(process: psutil.Process) -> str:
         return " ".join(process.cmdline())
     except psutil.NoSuchProcess:
         return ""
-
-
-def wait(condition: Callable[[], bool], seconds: float) -> bool:
-    """Whether the condition came true in time."""
-    latest = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > latest:
-            return False
-        time.sleep(0.05)
-    return True
 
 
 def send(process: psutil.Process, number: int = signal.SIGKILL) -> None:

@@ -1,33 +1,20 @@
 """A project's Prefect server by `sling ui`, and what its API answers."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
 import socket
 import subprocess
 import sys
-import time
 import urllib.request
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 from app.flow import server
-from tests.project import ROOT
+from tests.project import ROOT, until
 
 SECONDS = 90.0  # that any wait may last
-
-
-def until(happens: Callable[[], object], seconds: float = SECONDS):
-    """Wait for something true, and give it."""
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        if found := happens():
-            return found
-        time.sleep(0.05)
-    raise AssertionError("it did not come to pass in time")
 
 
 def ask(url: str, path: str, content: dict | None = None):

@@ -1,7 +1,5 @@
 """What is shown of each step's outputs, against a finished run whose figures are known."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re

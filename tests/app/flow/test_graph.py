@@ -1,7 +1,5 @@
 """The graph against what DVC itself says and does."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

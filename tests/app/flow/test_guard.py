@@ -1,17 +1,14 @@
 """The guard where others do not do as they should: process 1, the loader, the guard itself."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
 from pathlib import Path
 
-import psutil
 import pytest
 
 from app.flow import child, guard
-from tests.app.flow.serving import until
+from tests.project import alive, python, until
 
 # Orphans go to the nearest subreaper; here to one that looks at none of them but the guard.
 OUTER = """\
@@ -31,9 +28,7 @@ print(status, dead)
 def test_the_guard_reaps_what_its_command_leaves() -> None:
     """Zombies count as members of the group: each stage would cost the whole grace."""
     command = [sys.executable, guard.__file__, "sh", "-c", "sleep 600 & sleep 601 & exit 5"]
-    done = subprocess.run(
-        [sys.executable, "-c", OUTER, *command], capture_output=True, text=True, timeout=60
-    )
+    done = python("-c", OUTER, *command)
     assert done.stdout == "5 None\n", done.stderr
 
 
@@ -45,7 +40,7 @@ def test_a_command_is_interrupted_where_its_guard_is_killed() -> None:
     number = int(process.stdout.readline())
     process.kill()
     process.communicate()
-    until(lambda: not psutil.pid_exists(number) or psutil.Process(number).status() == "zombie")
+    until(lambda: not alive(number))
 
 
 def test_the_loaders_own_lines_come_before_the_groups_number(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """What killed DVC commands leave: locks, half of dvc.lock; see test_killed.py too."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

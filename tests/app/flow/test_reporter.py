@@ -1,7 +1,5 @@
 """What is shown of a stage's lines, how often, and that trouble with showing reaches nobody."""
 
-from __future__ import annotations
-
 import logging
 import threading
 import time

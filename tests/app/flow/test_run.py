@@ -1,12 +1,9 @@
 """Flows of a small project as a user starts them, shown by one Prefect server."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +14,7 @@ from app.flow import guard, run
 from pipeline.base.errors import UserError
 from tests.app.flow.serving import ask, serving
 from tests.app.flow.toy import Toy, stage
+from tests.project import SLING, python
 
 GPU = {"gpu": True}
 STAGES = {
@@ -30,7 +28,6 @@ STAGES = {
     "bottom": stage("bottom", "side-left.out", "side-right.out"),
 }
 NAMES = {"top", "side@left", "side@right", "free-a", "free-b", "bottom"}
-SLING = ["-c", "from app.cli import main; main()"]
 
 
 @pytest.fixture(scope="module")
@@ -49,14 +46,7 @@ def api(toy: Toy) -> Iterator[str]:
 
 def sling(toy: Toy, *arguments: str, **exported: str) -> subprocess.CompletedProcess:
     """`sling flow`."""
-    return subprocess.run(
-        [sys.executable, *SLING, "flow", *arguments],
-        cwd=toy.folder,
-        env={**toy.environment, **exported},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    return python(*SLING, "flow", *arguments, folder=toy.folder, **{**toy.environment, **exported})
 
 
 def overlap(toy: Toy, *names: str) -> bool:
@@ -98,9 +88,8 @@ def test_what_is_fresh_needs_no_prefect(toy: Toy, api: str) -> None:
         "import sys; from pathlib import Path; from app.flow.run import run\n"
         "print(run(Path.cwd())); assert 'prefect' not in sys.modules"
     )
-    done = toy("-c", script)
-    assert done.returncode == 0, done.stderr
-    assert re.fullmatch(r"all 6 stages are fresh \(.* s\)\n", done.stdout)
+    said = toy("python", "-c", script)
+    assert re.fullmatch(r"all 6 stages are fresh \(.* s\)\n", said)
 
 
 @pytest.mark.slow

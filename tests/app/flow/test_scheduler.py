@@ -1,7 +1,5 @@
 """Order, limits and failures, without anything that runs."""
 
-from __future__ import annotations
-
 from app.flow.graph import Stage
 from app.flow.scheduler import Scheduler, width
 from pipeline.base.errors import UserError

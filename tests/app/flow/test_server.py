@@ -1,7 +1,5 @@
 """The project's Prefect server: settings as Prefect reads them, where it listens, its history."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -19,8 +17,8 @@ import pytest
 
 from app.flow import server
 from pipeline.base.errors import UserError
-from tests.app.flow.serving import SECONDS, ask, serving, until
-from tests.project import ROOT
+from tests.app.flow.serving import SECONDS, ask, serving
+from tests.project import ROOT, until
 
 HERE = Path(__file__).parent
 # Prefect's own reading of every setting, in a process that knows only our environment.
@@ -179,7 +177,7 @@ def flow(tmp_path: Path, history: Path) -> Iterator[subprocess.Popen]:
     process.communicate(timeout=SECONDS)
 
 
-def alive(url: str) -> bool:
+def listens(url: str) -> bool:
     with socket.socket() as one:
         return one.connect_ex(("127.0.0.1", int(url.rpartition(":")[2]))) == 0
 
@@ -203,5 +201,5 @@ def test_a_flows_own_server_shows_it_and_ends_with_it(flow, tmp_path: Path) -> N
     assert run["name"] == "b: m" and bar["flow_run_id"] == run["id"]
     assert listening(flow.pid) == {("127.0.0.1", int(url.rpartition(":")[2]))}
     flow.kill()
-    until(lambda: not alive(url))
+    until(lambda: not listens(url))
     assert not (tmp_path / "connections").exists()

@@ -1,7 +1,5 @@
 """What becomes of a flow that Prefect ends before its time; the rest is in test_run.py."""
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace

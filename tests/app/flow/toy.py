@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import copy
 import json
-import os
-import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 from ruamel.yaml import YAML
+
+from tests import project
 
 # Writes the first line of everything it reads, so that another second line changes nothing.
 WORK = """
@@ -49,25 +47,18 @@ def stage(name: str, *sources: str, seconds: float | str = 0.0, **more) -> dict:
     return {"cmd": command, "deps": ["work.py", *sources], "outs": [f"{name}.out"], **more}
 
 
-class Toy:
+class Toy(project.Copy):
     """The project in `folder`; its inputs are files with one word a line."""
 
-    def __init__(self, folder: Path, stages: dict, **inputs: str) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, stages: dict, work: str = WORK, **inputs: str) -> None:
+        super().__init__(folder)
         (folder / ".dvc").mkdir(parents=True)
         settings = "[core]\n analytics = false\n check_update = false\n no_scm = true\n"
-        (folder / ".dvc" / "config").write_text(settings)
-        (folder / ".dvc" / ".gitignore").write_text("/config.local\n/tmp\n/cache\n")
-        (folder / "work.py").write_text(WORK)
-        for name, text in inputs.items():
+        (folder / ".dvc/config").write_text(settings)
+        (folder / ".dvc/.gitignore").write_text("/config.local\n/tmp\n/cache\n")
+        for name, text in {"work.py": work, **inputs}.items():
             (folder / name).write_text(text)
         YAML().dump({"stages": stages}, folder / "dvc.yaml")
-        self.environment = {
-            **os.environ,
-            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-            "DVC_SITE_CACHE_DIR": str(folder.parent / f"{folder.name}-site"),
-            "PYTHONPATH": str(Path(__file__).parents[3]),
-        }
 
     def copy(self, folder: Path) -> Toy:
         """The project as it is, in another folder."""
@@ -75,22 +66,6 @@ class Toy:
         other = copy.copy(self)
         other.folder = folder
         return other
-
-    def __call__(self, *command: str) -> subprocess.CompletedProcess:
-        return subprocess.run(
-            [sys.executable, *command],
-            cwd=self.folder,
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            timeout=120,
-        )
-
-    def dvc(self, *arguments: str) -> set[str]:
-        """Run DVC; the stages that really ran."""
-        done = self("-m", "dvc", *arguments)
-        assert done.returncode == 0, done.stdout + done.stderr
-        return set(re.findall(r"^Running stage '(.+)':$", done.stdout, re.MULTILINE))
 
     def note(self, name: str) -> dict:
         """When a stage began and ended last, and in which environment."""

@@ -1,11 +1,6 @@
 """The calibration of docs/recording.md, run as it stands there."""
 
-from __future__ import annotations
-
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 from ruamel.yaml import YAML
@@ -13,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from app.plan.plan import plan_recording
 from pipeline.params import load
+from tests.project import ROOT, python, with_
 
-ROOT = Path(__file__).parents[3]
 HEADS = "cannot be used", "can be used, but"
 
 
@@ -26,17 +21,15 @@ def test_two_touched_tips_give_the_fork_in_the_base() -> None:
     code = page.split("```python\n")[1].split("```")[0]
     given = code[code.index("left, right =") : code.index("up =")]
     touched = f"left, right = np.array({left.tolist()}), np.array({right.tolist()})\n"
-    command = [sys.executable, "-c", code.replace(given, touched)]
-    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    found = YAML(typ="safe").load(printed)
+    found = YAML(typ="safe").load(python("-c", code.replace(given, touched)).stdout)
     assert found["fork_width"] == 0.275
     np.testing.assert_allclose(found["base_to_fork"][:3], stands[1], atol=1e-5)
     turn = Rotation.from_quat(found["base_to_fork"][3:])
     assert (turn.inv() * stands[0]).magnitude() < 1e-4
 
     params = load(ROOT / "params.yaml")
-    setup = params.setup.model_copy(update={"base_to_fork": tuple(found["base_to_fork"])})
-    plan = plan_recording(params.model_copy(update={"setup": setup}), "band1")
+    stood = with_(params, "setup", base_to_fork=tuple(found["base_to_fork"]))
+    plan = plan_recording(stood, "band1")
     drawn = plan.base.apply(np.array([0.0, -0.4, 0.0]))
     np.testing.assert_allclose(drawn, stands[0].apply([0, -0.4, 0]) + stands[1], atol=1e-4)
 

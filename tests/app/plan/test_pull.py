@@ -1,7 +1,5 @@
 """The catenary against its length, and the phases of any plan that params.yaml allows."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

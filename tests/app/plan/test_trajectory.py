@@ -1,7 +1,5 @@
 """Splines held against finite differences, dense samples and the closed forms of a leg."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The recordings of tests/recording, looked at once."""
 
-from __future__ import annotations
-
 import pytest
 
 from app.preflight.check import Look, look_at

@@ -1,7 +1,5 @@
 """`sling add-band`: all of it or nothing."""
 
-from __future__ import annotations
-
 import difflib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What `sling check` says of recordings whose truth is a formula."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 
@@ -12,6 +10,7 @@ from app.preflight.check import ASSUMED, band_of, check_recording
 from app.preflight.command import check
 from app.preflight.verdict import cautions_of, pause
 from pipeline.base.errors import UserError
+from tests.project import with_
 from tests.recording.bag import RADIUS, START, Truth, blind_bag, edit, head, write_bag
 
 
@@ -76,8 +75,7 @@ def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
 
     path = tmp_path / "poor.mcap"
     write_bag(path, Truth(noise=0.6), rate=500, without=("gripper",), change=edit(wrench=lose))
-    weak = params.setup.model_copy(update={"max_force": 15.0})
-    report = check_recording(path, params.model_copy(update={"setup": weak}))
+    report = check_recording(path, with_(params, "setup", max_force=15.0))
     assert report.usable and report.verdict == "can be used, but:"
     said = {"gripper", "picture_rate", "force_rate", "gap", "pause", "max_force", "noise"}
     assert said <= abouts(report)

@@ -1,7 +1,5 @@
 """The sheet and the timeline, read back by others than those who wrote them."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

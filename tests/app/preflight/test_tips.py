@@ -1,7 +1,5 @@
 """The measured calibration against clouds and recordings that are misplaced by known amounts."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from app.preflight.check import look_at
 from app.preflight.tips import measure_tips
 from pipeline.recording.view import Scene
+from tests.project import with_
 from tests.recording.bag import BASE, EYE, TIPS, edit, write_bag
 
 DIAMETER, REST = 0.010, 0.52
@@ -183,6 +182,5 @@ def test_a_misplaced_tf_static_is_measured(looked, params, tmp_path) -> None:
 
     # What the report proposes for params.yaml brings the clouds back.
     pose = tuple(look.report.extrinsics["camera_to_fork"])
-    setup = params.setup.model_copy(update={"camera_to_fork": pose})
-    again = look_at(path, params.model_copy(update={"setup": setup}))
+    again = look_at(path, with_(params, "setup", camera_to_fork=pose))
     assert np.abs(again.tips.offsets).max() < 0.0007

@@ -1,7 +1,5 @@
 """The rig's camera: what an exposure smears, and what a window leaves out."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +14,7 @@ from pipeline.params import Params
 from pipeline.rig.recorder import camera
 from pipeline.rig.recorder.interaction import Interaction
 from pipeline.rig.recorder.record import INSTANTS, record
+from tests.project import with_
 from tests.rig.conftest import SCALE
 
 COUNTS = {
@@ -230,8 +229,7 @@ def test_same_seed_same_bytes(
 
 
 def test_a_slippery_band_is_refused(coarse: Params, tmp_path: Path) -> None:
-    rig = coarse.rig.model_copy(update={"pad_friction": 0.1})
-    slippery = coarse.model_copy(update={"rig": rig})
+    slippery = with_(coarse, "rig", pad_friction=0.1)
     with pytest.raises(UserError, match="pad_friction"):
         record(slippery, "band1", tmp_path / "no.mcap", picture_scale=SCALE)
     assert not list(tmp_path.iterdir())

@@ -1,7 +1,5 @@
 """Flaws are as large as params.yaml says, and what is felt is what statics says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

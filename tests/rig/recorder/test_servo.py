@@ -1,7 +1,5 @@
 """The arm that gives way: a damped oscillator, whose answers are closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,14 +1,12 @@
 """Adam by forward differences: closed gradients, torch's own steps, walls of failures."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.search.optimizers.adam import Adam
-from tests.search.functions import CENTRE, NAMES, Evaluate, alone, changed, correlated, quadratic
+from tests.search.functions import CENTRE, Evaluate, alone, changed, correlated, quadratic
 
 D = 5
 MATRIX = correlated()
@@ -104,16 +102,3 @@ def test_the_budget_is_spent_and_losses_alike_move_nothing() -> None:
     history = alone("adam", Evaluate(lambda unit: np.ones(len(unit))), 100, changed(population=20))
     assert len(history.total) == 100
     assert len(np.unique(history.unit[20:], axis=0)) == 3 * (D + 1)
-
-
-def test_the_same_seed_asks_for_the_same_points() -> None:
-    before, units = torch.get_num_threads(), []
-    try:
-        for seed, threads in ((1, 1), (1, 2), (2, 1)):
-            torch.set_num_threads(threads)
-            optimizer = changed(seed=seed, population=20)
-            units.append(alone("adam", quadratic(CENTRE, MATRIX), 200, optimizer, NAMES).unit)
-    finally:
-        torch.set_num_threads(before)
-    np.testing.assert_array_equal(units[0], units[1])
-    assert not np.array_equal(units[0], units[2])

@@ -1,7 +1,5 @@
 """Optimisers by their names: the built-in ones, a user's own, and what is refused."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Differential evolution behind ask and tell is SciPy's, and leaves no thread behind."""
 
-from __future__ import annotations
-
 import gc
 import threading
 import time
@@ -15,7 +13,7 @@ from scipy.optimize import differential_evolution
 from pipeline.search.history import History
 from pipeline.search.loop import latin_hypercube, search
 from pipeline.search.optimizers.evolution import Evolution
-from tests.search.functions import NAMES, Evaluate, rosenbrock
+from tests.search.functions import NAMES, rosenbrock
 
 
 def threads() -> list[threading.Thread]:
@@ -76,13 +74,6 @@ def test_its_first_generation_has_one_agent_in_each_stratum() -> None:
     asked = Evolution(5, rollouts=48, seed=4, population=24).ask()
     strata = np.sort(np.floor(asked * 24).astype(int), axis=0)
     np.testing.assert_array_equal(strata, np.tile(np.arange(24)[:, None], 5))
-
-
-def test_the_bottom_of_rosenbrocks_valley_is_found() -> None:
-    history = History("toy", NAMES[:3])
-    one = Evolution(3, rollouts=6000, seed=1, population=30)
-    search(one, Evaluate(rosenbrock, NAMES[:3]), history, rollouts=6000)
-    assert history.best()["total"] < 1e-6
 
 
 def small(population: int = 5, **more) -> Evolution:

@@ -1,7 +1,5 @@
 """CMA-ES side by side: where it starts, who asked, and that it leaves other generators alone."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
@@ -55,12 +53,6 @@ def searched(regions: list[Region], evaluate: Evaluate, rollouts: int, populatio
     return history
 
 
-def test_the_bottom_of_rosenbrocks_valley_is_found() -> None:
-    best = searched(balls(0.5, 0.2), Evaluate(rosenbrock, NAMES), 3000, population=10).best()
-    assert best["total"] < 1e-8
-    np.testing.assert_allclose([best[f"unit_{name}"] for name in NAMES], 0.75, atol=1e-4)
-
-
 def test_the_budget_is_spent_whatever_the_number_of_solvers() -> None:
     for rollouts in (1, 15, 16, 17, 100):
         table = searched(balls(0.3, 0.7), Evaluate(rosenbrock, NAMES), rollouts, population=8).table
@@ -73,7 +65,8 @@ def test_it_goes_on_where_nothing_is_left_to_gain() -> None:
     """After convergence, and on a plain, CMA-ES asks on for points of the cube."""
     for matrix in (correlated(), np.zeros((5, 5))):
         evaluate, regions = quadratic(CENTRE, matrix), balls(0.4, dimension=5)
-        assert len(searched(regions, evaluate, 8000, population=8).total) == 8000
+        total = searched(regions, evaluate, 8000, population=8).total
+        assert len(total) == 8000 and total.min() - 1 < 1e-8
 
 
 def test_numpys_generator_and_the_folder_are_left_alone(

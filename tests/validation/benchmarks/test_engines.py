@@ -1,7 +1,5 @@
 """`sling bench --peers`: what is missing is said; what is there is timed and compared."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest

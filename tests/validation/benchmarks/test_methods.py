@@ -1,7 +1,5 @@
 """`sling bench --methods` times what the stages do, and its yardstick is met by its own theta."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

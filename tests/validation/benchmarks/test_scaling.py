@@ -1,7 +1,5 @@
 """One device against several: what is timed, and that a difference is seen."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The yardstick of `sling bench` is an interaction that the simulator carries through."""
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 from pathlib import Path
 

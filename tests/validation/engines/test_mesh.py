@@ -1,7 +1,5 @@
 """The band as other engines take it, and the comparison where there is nothing to compare with."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Our simulator against MuJoCo's 3D flex, at the tolerances of the report; shorter runs of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

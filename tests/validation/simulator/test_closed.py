@@ -1,7 +1,5 @@
 """The closed forms that checks hold the simulator against, held against themselves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq

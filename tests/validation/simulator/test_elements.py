@@ -1,7 +1,5 @@
 """The comparison of both elements says what it should of each."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -15,10 +13,11 @@ def columns(bench):
 
 
 def test_tetrahedra_lock_the_more_the_closer_nu_is_to_a_half(columns):
-    """The rod does not; statics.py limits how far it is off."""
+    """5.4 times at nu 0.45: known of meshes like the paper's. The rod does not lock."""
     assert columns["rod"].bending == pytest.approx(np.ones(3), rel=0.05)
     solid = columns["tetrahedra"].bending
     assert solid[0] > 2 and np.all(np.diff(solid) > 1)
+    assert solid[1] == pytest.approx(5.4, rel=0.03)
 
 
 def test_taut_both_say_nearly_the_same_and_the_rod_says_it_sooner(columns):
@@ -26,7 +25,7 @@ def test_taut_both_say_nearly_the_same_and_the_rod_says_it_sooner(columns):
     far = elements.compare(solid, rod)
     assert rod.pull == pytest.approx(np.ones(2), rel=5e-3)
     assert solid.pull == pytest.approx(np.ones(2), rel=0.02)
-    assert 0 < abs(far["launch speed, worst [%]"]) < 4
+    assert 0 < far["launch speed, worst [%]"] < 4  # held sections and locking stiffen it
     assert 0 < far["peak force of the yardstick's pull [%]"] < 4
     assert far["centre line in the hand, rms [mm]"] < 10
     assert set(elements.compare(rod, rod).values()) == {0.0}

@@ -1,7 +1,5 @@
 """The checks of `sling verify` keep their limits, at smaller sizes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The reference's forces are its energy's slope; test_limits.py holds the kernel against it."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The report says what is kept and what is not, and why something was not run."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -2,8 +2,6 @@
 lies on PYTHONPATH.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 

@@ -1,6 +1,6 @@
 """How near a robust policy comes to the best draws that there are, on the maps it was trained on.
 
-    python -m tests.policy.best BAND METHOD        # reads data/, prints a line for each error
+    python -m validation.benchmarks.best_draws BAND METHOD   # reads data/, a line for each error
 
 The best draws are found by trying all of a fine grid: slow, and no policy, but the truth.
 """

@@ -72,41 +72,34 @@ def build_episode(path: Path, band_name: str, params: object) -> Episode:
 def episode_of(done: Processed, band_name: str, params: object) -> Episode:
     """The episode, with everything in its metadata that was chosen on the way."""
     signals, clouds, recording = done.signals, done.clouds, done.recording
-    setup, band = params.setup, params.bands[band_name]
+
+    def of_streams(name: str) -> dict:
+        return {role: getattr(stream, name) for role, stream in recording.streams.items()}
+
+    removal = "statistical_neighbors", "statistical_ratio", "radius", "radius_neighbors"
     metadata = {
         "setup": {
-            "fork_width": setup.fork_width,
-            "fork_height": setup.fork_height,
-            "band": {
-                "mass": band.mass,
-                "diameter": band.diameter,
-                "rest_length": band.rest_length,
-            },
+            **_named(params.setup, "fork_width", "fork_height"),
+            "band": _named(params.bands[band_name], "mass", "diameter", "rest_length"),
         },
         "input": {
             "sha256": recording.sha256,
             "start_ns": signals.origin,
-            "topics": {role: stream.topic for role, stream in recording.streams.items()},
+            "topics": of_streams("topic"),
             "choices": recording.choices,
             "frames": done.geometry.sources,
-            "delays": {role: stream.delay for role, stream in recording.streams.items()},
-            "lost": {role: stream.lost for role, stream in recording.streams.items()},
-            "missing": {role: stream.missing for role, stream in recording.streams.items()},
+            "delays": of_streams("delay"),
+            "lost": of_streams("lost"),
+            "missing": of_streams("missing"),
             "losses": recording.losses,
             "notes": recording.notes,
         },
         "preprocessing": {
             **signals.facts,
             "delays": asdict(done.delays),
-            "cutoff": params.force.cutoff,
-            "cutoff_unit": params.force.cutoff_unit,
-            "mask": params.cloud.mask,
+            **_named(params.force, "cutoff", "cutoff_unit"),
+            **_named(params.cloud, "mask", "points", *removal),
             "mask_colors": clouds.color_counts,
-            "points": params.cloud.points,
-            "statistical_neighbors": params.cloud.statistical_neighbors,
-            "statistical_ratio": params.cloud.statistical_ratio,
-            "radius": params.cloud.radius,
-            "radius_neighbors": params.cloud.radius_neighbors,
             "empty_clouds": clouds.empty,
             "damaged_frames": clouds.damaged,
             "unpaired_frames": clouds.unpaired,
@@ -126,3 +119,7 @@ def episode_of(done: Processed, band_name: str, params: object) -> Episode:
         camera=done.geometry.camera.translation,
         metadata=metadata,
     )
+
+
+def _named(section: object, *names: str) -> dict:
+    return {name: getattr(section, name) for name in names}

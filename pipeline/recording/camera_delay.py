@@ -13,7 +13,6 @@ from scipy.spatial import cKDTree
 
 from pipeline.recording.events import events_of
 from pipeline.recording.geometry import Geometry
-from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.motion import Motion
 from pipeline.recording.tool_inertia import LONGEST
@@ -46,12 +45,16 @@ def camera_delay(recording: Recording, geometry: Geometry) -> tuple[float, float
     if len(used) < 2 * BLOCKS:
         return None
     used = used[np.linspace(0, len(used) - 1, min(FRAMES, len(used))).round().astype(int)]
-    look = _Look(recording, geometry, motion)
-    pictures = [(stamps[k], look.hand(k, stamps[k])) for k in used]
-    pictures = [(time, points) for time, points in pictures if len(points) >= FEWEST]
+    rays, random = recording.depth_camera.rays().astype(np.float32), np.random.default_rng(0)
+    times, pictures = [], []
+    for k in used:
+        points = random.permutation(_hand(recording, geometry, motion, rays, k, stamps[k]))
+        if len(points) >= FEWEST:
+            times.append(stamps[k])
+            pictures.append(points)
     if len(pictures) < 2 * BLOCKS:
         return None
-    times = np.array([time for time, _ in pictures])
+    times = np.array(times)
     grid, _, velocity = motion.velocity()
     delay = 0.0
     for _ in range(ROUNDS):
@@ -60,7 +63,7 @@ def camera_delay(recording: Recording, geometry: Geometry) -> tuple[float, float
         speed = np.stack([np.interp(at, grid, axis) for axis in velocity.T], axis=-1)
         points = [
             _behind(turn.inv().apply(seen - hand))
-            for turn, hand, (_, seen) in zip(turns, hands, pictures, strict=True)
+            for turn, hand, seen in zip(turns, hands, pictures, strict=True)
         ]
         first = np.arange(len(at)) < len(at) / 2
         found = [_step(points, turns, hands, speed, part) for part in (first, ~first)]
@@ -75,40 +78,36 @@ def camera_delay(recording: Recording, geometry: Geometry) -> tuple[float, float
     return delay, float(np.hypot(errors.max(), np.ptp(steps) / 2))
 
 
-class _Look:
-    """Points around the hand in single pictures."""
+def _hand(
+    recording: Recording,
+    geometry: Geometry,
+    motion: Motion,
+    rays: np.ndarray,
+    k: int,
+    time: float,
+) -> np.ndarray:
+    """Points around the hand in picture k, frame O, (P, 3); none where it does not show the hand.
 
-    def __init__(self, recording: Recording, geometry: Geometry, motion: Motion):
-        self.recording, self.geometry, self.motion = recording, geometry, motion
-        self.rays = recording.depth_camera.rays().astype(np.float32)
-        self.random = np.random.default_rng(0)
-
-    def hand(self, k: int, time: float) -> np.ndarray:
-        """Of picture k in frame O, shape (P, 3); none where it does not show the hand."""
-        camera, nothing = self.recording.depth_camera, np.zeros((0, 3))
-        palm = self.motion.position(time)
-        palm = palm + self.motion.orientation(time).apply([0, 0, -PALM])
-        middle = self.geometry.camera.inverse().apply(palm)
-        if middle[2] < 2 * REACH:
-            return nothing
-        size = np.array([camera.width, camera.height])
-        half = 1.3 * REACH * np.diag(camera.matrix)[:2] / middle[2]
-        pixel = camera.project(middle[None])[0]
-        low, high = (np.clip(pixel + side * half, 0, size).astype(int) for side in (-1, 1))
-        window = slice(low[1], high[1]), slice(low[0], high[0])
-        try:
-            depth = images.depth(self.recording.depth.values[k])
-        except images.Undecodable:
-            return nothing
-        if depth.shape != (camera.height, camera.width):
-            return nothing
-        depth = depth[window]
-        seen = (self.rays[window] * depth[..., None])[depth > 0]
-        if not len(seen):
-            return nothing
-        points = self.geometry.camera.apply(seen)
-        near = np.linalg.norm(points - palm, axis=1) < 1.3 * REACH
-        return self.random.permutation(points[near].astype(float))
+    Args:
+        rays: Of the depth camera, shape (H, W, 3).
+    """
+    camera, nothing = recording.depth_camera, np.zeros((0, 3))
+    palm = motion.position(time) + motion.orientation(time).apply([0, 0, -PALM])
+    middle = geometry.camera.inverse().apply(palm)
+    if middle[2] < 2 * REACH:
+        return nothing
+    size = np.array([camera.width, camera.height])
+    half = 1.3 * REACH * np.diag(camera.matrix)[:2] / middle[2]
+    pixel = camera.project(middle[None])[0]
+    low, high = (np.clip(pixel + side * half, 0, size).astype(int) for side in (-1, 1))
+    window = slice(low[1], high[1]), slice(low[0], high[0])
+    depth = recording.depth_picture(k)
+    if depth is None:
+        return nothing
+    depth = depth[window]
+    points = geometry.camera.apply((rays[window] * depth[..., None])[depth > 0])
+    near = np.linalg.norm(points - palm, axis=1) < 1.3 * REACH
+    return points[near].astype(float)
 
 
 def _behind(points: np.ndarray) -> np.ndarray:

@@ -107,9 +107,6 @@ class Scene:
         """No point of the held band is further from its tip and the hand together than this [m]."""
         return self.rest_length * (max(self.stretch(time), 1.0) / 2 + SPARE) + 2 * self.diameter
 
-    def furthest_reach(self) -> float:
-        return max(self.reach(t) for t in (0.0, *self.signals.time))
-
 
 class View:
     """Decodes the frames of a recording within the window, one at a time.
@@ -151,18 +148,15 @@ class View:
         """
         window = (slice(None), slice(None)) if whole else self.window
         for number in range(len(self.index)) if numbers is None else numbers:
-            frame = self._frame(number, window)
-            if frame is not None:
-                yield number, frame
+            depth, color = self.depth(number), self.color(number)
+            if depth is None or color is None:
+                self.damaged.add(number)
+            else:
+                yield number, self.frame_of(number, depth, color, window)
 
     def depth(self, number: int) -> np.ndarray | None:
         """A depth picture [m], 0 where unknown, of the camera's size; None where it is damaged."""
-        camera = self.recording.depth_camera
-        try:
-            depth = images.depth(self.recording.depth.values[self.index[number][0]])
-        except images.Undecodable:
-            return None
-        return depth if depth.shape == (camera.height, camera.width) else None
+        return self.recording.depth_picture(self.index[number][0])
 
     def color(self, number: int) -> np.ndarray | None:
         """A colour picture as it was recorded, BGR; None where it is damaged."""
@@ -170,13 +164,6 @@ class View:
             return images.color(self.recording.color.values[self.index[number][1]])
         except images.Undecodable:
             return None
-
-    def _frame(self, number: int, window: tuple[slice, slice]) -> Frame | None:
-        depth, color = self.depth(number), self.color(number)
-        if depth is None or color is None:
-            self.damaged.add(number)
-            return None
-        return self.frame_of(number, depth, color, window)
 
     def frame_of(
         self,
@@ -240,7 +227,8 @@ class View:
 
     def _window(self) -> tuple[slice, slice]:
         """The rectangle of the depth image that sees where the band can be."""
-        camera, reach = self.recording.depth_camera, self.scene.furthest_reach()
+        camera = self.recording.depth_camera
+        reach = max(self.scene.reach(t) for t in (0.0, *self.scene.signals.time))
         half, foci = reach / 2, np.linalg.norm(self.scene.tips[1] - self.scene.tips[0]) / 2
         minor = np.sqrt(max(half**2 - foci**2, 1e-6))
         sphere = np.random.default_rng(0).normal(size=(2000, 3))

@@ -8,7 +8,7 @@ pipeline reads it with rosbags.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
 from types import SimpleNamespace as Message
@@ -199,12 +199,8 @@ def write_bag(
                 write(kind, "/arm/current_pose", t, 0.0003, {"pose": pose}, "base")
             elif kind == "gripper":
                 finger = 0.008 if truth.grasp <= t < truth.release + 0.03 else 0.04
-                joints = {
-                    "name": ["finger_joint1", "finger_joint2"],
-                    "position": [finger, finger],
-                    "velocity": [],
-                    "effort": [],
-                }
+                joints = {"name": ["finger_joint1", "finger_joint2"], "position": [finger] * 2}
+                joints |= {"velocity": [], "effort": []}
                 write(kind, "/gripper/joint_states", t, 0.0002, joints, "")
             else:
                 color, depth = render(truth, t, lens) if cameras else _black(lens)
@@ -339,6 +335,3 @@ def _info(lens: Lens) -> dict[str, object]:
         "binning_y": 0,
         "roi": Message(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
     }
-
-
-__all__ = ["Lens", "Truth", "blind_bag", "edit", "head", "render", "replace", "scores", "write_bag"]

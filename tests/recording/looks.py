@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -19,8 +18,8 @@ from scipy.spatial.transform import Rotation
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.frames import Transform
+from pipeline.recording.input.reader import Recording, Stream
 from pipeline.recording.input.readings import Picture
-from pipeline.recording.input.streams import Stream
 from pipeline.recording.view import Scene, View
 from tests.recording import strand
 from tests.recording.strand import GRASP, RELEASE, REST, TIPS
@@ -62,9 +61,10 @@ class Look:
     offset: tuple[float, float, float] | None = None
 
 
+WHITE = {"band": (222, 226, 228), "finger": (220, 222, 222)}
 LOOKS = {
     "orange on grey, white arm": Look(),
-    "near white beside a white arm": Look(band=(222, 226, 228), finger=(220, 222, 222)),
+    "near white beside a white arm": Look(**WHITE),
     "dark in shadow, dark floor and arm": Look(
         band=(38, 36, 34),
         floor=(45, 47, 50),
@@ -79,19 +79,13 @@ LOOKS = {
         band=(150, 155, 152), fork=(150, 155, 152), wall=(150, 155, 152), arm=(160, 160, 160)
     ),
     "4 mm thin": Look(diameter=0.004),
-    "4 mm thin, white, white arm": Look(
-        diameter=0.004, band=(222, 226, 228), finger=(220, 222, 222)
-    ),
+    "4 mm thin, white, white arm": Look(diameter=0.004, **WHITE),
     "blue, blue glove": Look(
         band=(150, 80, 35), finger=(150, 82, 38), arm=(145, 85, 40), floor=(160, 165, 168)
     ),
-    "white, from the other side": Look(
-        band=(222, 226, 228), finger=(220, 222, 222), eye=(-0.55, 0.62, 0.30)
-    ),
+    "white, from the other side": Look(eye=(-0.55, 0.62, 0.30), **WHITE),
     "orange, colour camera apart": Look(offset=(0.06, 0.01, 0.0)),
-    "white, from behind and above": Look(
-        band=(222, 226, 228), finger=(220, 222, 222), eye=(0.62, -0.75, 0.55)
-    ),
+    "white, from behind and above": Look(eye=(0.62, -0.75, 0.55), **WHITE),
 }
 
 
@@ -236,16 +230,8 @@ def _seen(time: float, diameter: float, eye: tuple, from_: tuple | None = None):
 
 def _jpeg(look: Look, part: np.ndarray, bright: np.ndarray, random) -> Picture:
     tile = tuple(0.8 * np.array(look.floor))
-    colors = (
-        look.floor,
-        tile,
-        look.wall,
-        look.fork,
-        (52, 50, 50),
-        look.arm,
-        look.finger,
-        look.band,
-    )
+    base = (52, 50, 50)
+    colors = (look.floor, tile, look.wall, look.fork, base, look.arm, look.finger, look.band)
     shade = (1 - look.light) + look.light * bright
     color = np.array(colors, np.float32)[part] * shade[..., None]
     color += random.normal(0, 1.5, color.shape)
@@ -311,8 +297,9 @@ def assemble(look: Look, stamps: np.ndarray, colors: list, depths: list) -> View
     """A view of these pictures, as if they had been read of a recording."""
     nanoseconds = np.round(stamps * 1e9).astype(np.int64)
     apart = look.offset is not None
-    recording = SimpleNamespace(
+    recording = Recording(
         path=Path("look.mcap"),
+        **dict.fromkeys(("wrench", "pose", "gripper", "transforms")),
         depth=Stream("/depth", "depth", nanoseconds, depths, 0.0, 0),
         color=Stream("/color", "color" if apart else "depth", nanoseconds, colors, 0.0, 0),
         depth_camera=camera(),

@@ -66,9 +66,8 @@ def test_a_slow_pose_that_loses_messages_makes_no_delay_up(heavy, share) -> None
         pose = recording.pose
         keep = np.arange(seed, len(pose.stamp), 15)
         keep = keep[random.random(len(keep)) >= share]
-        one = replaced(
-            recording, pose=replace(pose, stamp=pose.stamp[keep], values=pose.values[keep])
-        )
+        fewer = replace(pose, stamp=pose.stamp[keep], values=pose.values[keep])
+        one = replaced(recording, pose=fewer)
         found = estimate_tool_inertia(late(one, "pose", INJECTED[seed % 4]), geometry, None)
         if found is None:
             continue
@@ -130,9 +129,8 @@ def test_what_is_applied(looked_at, params) -> None:
 def test_given_delays_are_used_as_they_are(looked_at, params) -> None:
     recording, geometry = looked_at
     delays = params.episode.delays.model_copy(update={"pose": -0.004, "camera": 0.0})
-    given = params.model_copy(
-        update={"episode": params.episode.model_copy(update={"delays": delays})}
-    )
+    episode = params.episode.model_copy(update={"delays": delays})
+    given = params.model_copy(update={"episode": episode})
     found = delays_of(recording, geometry, given)
     assert found.pose == Estimate(-0.004, 0.0, "setup", True)
     assert found.camera == Estimate(0.0, 0.0, "setup", False)

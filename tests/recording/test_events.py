@@ -53,11 +53,10 @@ def test_a_fall_within_one_sample_is_put_between_the_two() -> None:
     assert found.error == pytest.approx(1e-3 / np.sqrt(12), rel=0.15)
 
 
-@pytest.mark.parametrize("fall", [0.0, 0.002, 0.005, 0.02])
-@pytest.mark.parametrize("noise", [0.005, 0.05, 0.15])
-def test_release_is_found_to_a_millisecond(fall, noise) -> None:
-    for seed in range(10):
-        release = 7.5 + 0.00037 * seed
+@pytest.mark.parametrize("noise", [0.005, 0.15])
+def test_release_is_found_to_a_millisecond(noise) -> None:
+    for seed in range(12):
+        release, fall = 7.5 + 0.00037 * seed, (0.0, 0.002, 0.005, 0.02)[seed % 4]
         found = find_release(*pull(release, fall, noise, seed))
         assert abs(found.time - release) <= 1e-3
         assert found.drop == pytest.approx(12, rel=0.02)
@@ -111,15 +110,10 @@ def test_a_knock_in_the_lead_in_is_no_release() -> None:
     assert abs(found.time - 7.5) <= 1e-3 and found.slips == []
 
 
-def twice():
+def test_two_pulls_are_refused_unless_the_fingers_tell() -> None:
     t, force = pull(4.0, 0.0, 0.03, 3)
     again = pull(7.5, 0.0, 0.03, 4)[1]
     force[t > 5.5] = again[t > 5.5]  # caught again at 12 N
-    return t, force
-
-
-def test_two_pulls_are_refused_unless_the_fingers_tell() -> None:
-    t, force = twice()
     with pytest.raises(UserError, match=r"let go at 4\.0 and 7\.5 s"):
         find_release(t, force)
     assert abs(find_release(t, force, gripper(1.0, 7.53)).time - 7.5) <= 1e-3
@@ -134,12 +128,9 @@ def gripper(closes: float, opens: float):
     return t, np.where((t >= closes) & (t < opens), 0.016, 0.08)
 
 
-def test_grasp_is_when_the_fingers_have_closed() -> None:
+def test_grasp_is_when_the_fingers_have_closed_for_good() -> None:
     t, opening = gripper(1.0, 7.53)
     assert find_grasp((t, opening), resting(t), 7.5) == pytest.approx(1.0)
-
-
-def test_an_earlier_try_to_grasp_does_not_count() -> None:
     t, opening = gripper(1.5, 7.53)
     opening[(t > 0.5) & (t < 0.8)] = 0.016
     assert find_grasp((t, opening), resting(t), 7.5) == pytest.approx(1.5, abs=0.021)

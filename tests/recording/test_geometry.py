@@ -42,6 +42,14 @@ def test_a_sensor_on_the_hand() -> None:
     np.testing.assert_allclose(found.camera.translation, [np.cos(np.pi / 6), -0.5, 0], atol=1e-12)
 
 
+def test_a_depth_camera_of_its_own() -> None:
+    apart = {**JOINED, **ON_HAND, ("optical", "depth_optical"): [-0.015, 0, 0]}
+    found = geometry_of(recording(apart, depth="depth_optical"), SETUP)
+    np.testing.assert_allclose(found.color.translation, [-0.015, 0, 0])
+    registered = geometry_of(recording({**JOINED, **ON_HAND}), SETUP).camera
+    np.testing.assert_allclose(found.camera.apply([0, 0, 1]), registered.apply([-0.015, 0, 1]))
+
+
 def test_the_tip_link_is_the_frame_that_moves() -> None:
     """Where params name it, and the sensor sits on it, whatever else sounds like a tool."""
     joins = {**JOINED, **ON_HAND, ("ft", "pointed"): [0, 0, 0.2]}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -106,12 +105,11 @@ def read_calibration(message: object) -> Reading:
 
 
 def camera_from(
-    path: Path, topic: str, calibration: Calibration, image: str, size: tuple[int, int] | None
+    topic: str, calibration: Calibration, image: str, size: tuple[int, int] | None
 ) -> Camera:
     """The camera that took these images.
 
     Args:
-        path: The recording, for messages.
         topic: Of the calibration.
         calibration: As it was read there.
         image: Topic of the images. The camera of rectified ones is P, without distortion.
@@ -124,11 +122,9 @@ def camera_from(
     camera, model = calibration.camera, calibration.model.lower()
     numbers = (*camera.matrix.flat, *camera.distortion, *calibration.rectified.flat)
     if min(camera.matrix[0, 0], camera.matrix[1, 1]) <= 0 or not np.isfinite(numbers).all():
-        raise UserError(
-            f"{path}: {topic} is not calibrated (focal length 0, or no numbers), calibrate it"
-        )
+        raise UserError(f"{topic} is not calibrated (focal length 0, or no numbers), calibrate it")
     if not 0 < camera.width * camera.height <= LARGEST:
-        raise UserError(f"{path}: {topic} is of {camera.width} x {camera.height} pixels")
+        raise UserError(f"{topic} is of {camera.width} x {camera.height} pixels")
     if RECTIFIED.search(image) and calibration.rectified[0, 0] > 0:
         camera = replace(camera, matrix=calibration.rectified, distortion=np.zeros(0))
     if not camera.distortion.any():
@@ -140,21 +136,10 @@ def camera_from(
         model not in PINHOLE + FISHEYE or count not in ((4,) if camera.fisheye else COUNTS)
     ):
         raise UserError(
-            f"{path}: {topic} has distortion model {calibration.model!r} with {count}"
+            f"{topic} has distortion model {calibration.model!r} with {count}"
             " coefficients, publish plumb_bob (5), rational_polynomial (8) or equidistant (4)"
         )
-    return _sized(path, topic, camera, calibration, image, size)
-
-
-def _sized(
-    path: Path,
-    topic: str,
-    camera: Camera,
-    calibration: Calibration,
-    image: str,
-    size: tuple[int, int] | None,
-) -> Camera:
-    """Of the images' size: cut to the region of interest and binned, as the calibration says."""
+    # Of the images' size: cut to the region of interest and binned, as the calibration says.
     if size is None or size == (camera.width, camera.height):
         return camera
     x, y, width, height = calibration.region
@@ -162,7 +147,7 @@ def _sized(
     across, down = calibration.binning
     if size != (width // across, height // down):
         raise UserError(
-            f"{path}: images of {image} are {size[0]} x {size[1]} pixels, {topic} is of"
+            f"images of {image} are {size[0]} x {size[1]} pixels, {topic} is of"
             f" {camera.width} x {camera.height}: publish the camera info of the images' own size"
         )
     matrix = camera.matrix.copy()

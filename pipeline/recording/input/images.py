@@ -42,7 +42,7 @@ def is_depth(picture: Picture) -> bool:
     """Whether a picture says that it holds depth; a grey PNG of 16 bits is taken to."""
     if picture.encoding or "compressedDepth" in picture.format:
         return picture.encoding in ("16UC1", "32FC1") or "compressedDepth" in picture.format
-    return picture.format.startswith(("16UC1", "32FC1")) or _header(picture)[1] == "I;16"
+    return picture.format.startswith(("16UC1", "32FC1")) or _header(picture.data)[1] == "I;16"
 
 
 def color(picture: Picture) -> np.ndarray:
@@ -76,10 +76,8 @@ def depth(picture: Picture) -> np.ndarray:
         raise Undecodable("compressedDepth without a picture")
     _, scale, offset = DEPTH_HEADER.unpack_from(picture.data)
     body = picture.data[DEPTH_HEADER.size :]
-    if "rvl" in picture.format.lower():
-        packed = rvl(body)
-    else:
-        packed = _unpacked(body, cv2.IMREAD_UNCHANGED, picture.format)
+    is_rvl = "rvl" in picture.format.lower()
+    packed = rvl(body) if is_rvl else _unpacked(body, cv2.IMREAD_UNCHANGED, picture.format)
     if not picture.format.startswith("32FC1"):
         return _metres(packed)
     with np.errstate(all="ignore"):
@@ -96,7 +94,7 @@ def size_of(picture: Picture) -> tuple[int, int] | None:
         data = data[DEPTH_HEADER.size :]
         if "rvl" in picture.format.lower():
             return RVL_SIZE.unpack_from(data) if len(data) >= RVL_SIZE.size else None
-    return _header(Picture("", picture.format, data))[0]
+    return _header(data)[0]
 
 
 def rvl(data: np.ndarray) -> np.ndarray:
@@ -153,17 +151,17 @@ def _within(firsts: list[int], counts: list[int], size: int) -> np.ndarray:
     return np.cumsum(begins - ends)[:size] > 0
 
 
-def _header(picture: Picture) -> tuple[tuple[int, int] | None, str]:
+def _header(data: np.ndarray) -> tuple[tuple[int, int] | None, str]:
     """Size and Pillow's mode of a JPEG or PNG, by its header alone; (None, "") for others."""
     try:
-        with Image.open(io.BytesIO(picture.data), formats=("JPEG", "PNG")) as image:
+        with Image.open(io.BytesIO(data), formats=("JPEG", "PNG")) as image:
             return image.size, image.mode
     except Exception:  # damaged bytes raise many kinds
         return None, ""
 
 
 def _unpacked(data: np.ndarray, flags: int, kind: str) -> np.ndarray:
-    size, _ = _header(Picture("", kind, data))
+    size, _ = _header(data)
     if size is None or size[0] * size[1] > LARGEST:
         raise Undecodable(f"damaged image, or neither JPEG nor PNG ({kind})")
     if data[0] == 0xFF and b"\xff\xd9" not in data[-4096:].tobytes():

@@ -6,7 +6,7 @@ and viewers that URDF packages come with. Conventions: wiki.ros.org/urdf/XML/joi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -91,18 +91,17 @@ def chain_of(file: str, tip: str | None = None) -> Chain:
     tip = tip or _tip(path, links, parents)
     if tip not in links:
         raise UserError(f"setup.tip_link: {path} has no link {tip!r}, it has {', '.join(links)}")
+    by_name = {joint.name: joint for joint in joints}
     chain: list[Joint] = []
     link = tip
     while link in parents:
+        joint = parents[link]
         if len(chain) > len(joints):
             raise UserError(f"{path}: the joints above {tip} go round in a loop")
-        chain.insert(0, parents[link])
-        link = parents[link].parent
-    by_name = {joint.name: joint for joint in joints}
-    for joint in chain:
         if joint.kind not in (*TURNING, *SLIDING, "fixed"):
             raise UserError(f"{path}: joint {joint.name} is {joint.kind}, which is not supported")
-    chain = [_resolved(path, joint, by_name) for joint in chain]
+        chain.insert(0, _resolved(path, joint, by_name))
+        link = joint.parent
     moving = [joint.source for joint in chain if joint.kind != "fixed"]
     if not moving:
         raise UserError(f"{path}: no joint moves {tip}, set setup.tip_link to the hand")
@@ -188,8 +187,7 @@ def _resolved(path: Path, joint: Joint, by_name: dict[str, Joint]) -> Joint:
         offset += multiplier * other.offset
         multiplier *= other.multiplier
         source = other.source
-    values = {**vars(joint), "source": source, "multiplier": multiplier, "offset": offset}
-    return Joint(**values)
+    return replace(joint, source=source, multiplier=multiplier, offset=offset)
 
 
 def _tip(path: Path, links: list[str], parents: dict[str, Joint]) -> str:

@@ -8,30 +8,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol
+
+import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.recording.input import images
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.container import Container, read_container, sha256
 from pipeline.recording.input.frames import TransformTree
-from pipeline.recording.input.stream import Stream
-from pipeline.recording.input.streams import streams_of
+from pipeline.recording.input.streams import Stream, streams_of
 from pipeline.recording.input.topics import camera_of, choose
 from pipeline.recording.input.transforms import transforms_of
 
 SHOWN = 3  # losses in an error
-ROLES = ("wrench", "pose", "twist", "gripper", "color", "depth")
-
-__all__ = ["Recording", "Stream", "explained", "read_recording", "recording_of"]
-
-
-class Setup(Protocol):
-    """What reading needs of params.setup."""
-
-    topics: object
-    urdf: str | None
-    tip_link: str | None
-    start_pose: tuple[float, ...] | None
+CAMERAS = ("color", "depth")
+ROLES = ("wrench", "pose", "twist", "gripper", *CAMERAS)
 
 
 @dataclass(frozen=True)
@@ -72,6 +63,14 @@ class Recording:
         found = {role: getattr(self, role) for role in ROLES}
         return {role: stream for role, stream in found.items() if stream}
 
+    def depth_picture(self, number: int) -> np.ndarray | None:
+        """In metres, 0 where unknown, of the camera's size (H, W); None where it is damaged."""
+        try:
+            depth = images.depth(self.depth.values[number])
+        except images.Undecodable:
+            return None
+        return depth if depth.shape == (self.depth_camera.height, self.depth_camera.width) else None
+
     def shifted(self, pose: float = 0.0, camera: float = 0.0) -> Recording:
         """With stamps that are late by so many seconds put right: pose and twist; pictures."""
         return replace(
@@ -83,26 +82,25 @@ class Recording:
         )
 
 
-def read_recording(path: Path, setup: Setup) -> Recording:
+def read_recording(path: Path, setup: object) -> Recording:
     """Read and check a recording. Raises UserError with one line about what is missing or wrong."""
     return recording_of(read_container(Path(path)), setup)
 
 
-def recording_of(container: Container, setup: Setup) -> Recording:
+def recording_of(container: Container, setup: object) -> Recording:
     """As `read_recording`, from a file that was read already."""
     try:
         chosen = choose(container, setup)
-        cameras = {role: camera_of(container, chosen, role) for role in ("color", "depth")}
+        cameras = {f"{role}_camera": camera_of(chosen, role) for role in CAMERAS}
         found = {role: chosen[role] for role in ROLES if role in chosen}
-        streams, remarks = streams_of(container.path, found)
+        streams, remarks = streams_of(found)
     except UserError as error:
         raise explained(error, container.path, container.losses) from None
     lost = [f"{stream.topic}: {note}" for stream in streams.values() for note in stream.notes]
     return Recording(
         path=container.path,
         **{role: streams.get(role) for role in ROLES},
-        color_camera=cameras["color"],
-        depth_camera=cameras["depth"],
+        **cameras,
         transforms=transforms_of(container),
         losses=[*container.losses, *lost],
         notes=[*container.notes, *remarks],

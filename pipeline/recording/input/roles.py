@@ -1,4 +1,4 @@
-"""The roles that topics play, and how well a topic would play one."""
+"""The roles that topics play, how well a topic would play one, and how it is read for it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -14,15 +15,22 @@ from pipeline.base.errors import UserError
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import read_calibration
 from pipeline.recording.input.container import Channel
+from pipeline.recording.input.decode import Decoder
+from pipeline.recording.input.kinematics import chain_of, integrated
 from pipeline.recording.input.readings import Reading
 
 TRIES = 9  # messages that are looked at to know a topic
+JOINT_TRIES = 50  # of joints and twists: some share their topic with other publishers
+JOINTS_SHOWN = 12  # joints named in a message
+TOOLS = {"tcp", "ee", "eef", "tool", "tool0", "hand", "flange", "gripper"}
+FINGERS = ("finger", "gripper", "knuckle")
 OPTIONAL = ("twist", "gripper")
 COMMANDS = ("goal", "desired", "command", "commanded", "cmd", "target", "reference", "setpoint")
 THINGS = ("camera", "object", "tag", "marker")
 
 Read = Callable[[object], Reading]
 Convert = Callable[[np.ndarray, np.ndarray], np.ndarray]
+Source = tuple[Read, Convert | None]
 
 
 @dataclass(frozen=True)
@@ -42,22 +50,17 @@ class Choice:
     why: str = ""
     convert: Convert | None = None
 
-    def typical(self, key: Callable[[Reading], object] | None = None) -> Reading:
-        """One of the first messages that can be read, like most of them. Raises UserError.
-
-        Args:
-            key: What is alike in messages that are alike; None: frame and kind of picture.
-        """
+    def typical(self) -> Reading:
+        """The first message of the frame and kind that most have. Raises UserError."""
         found, reason = readable(self.read, self.channel.payloads)
         if not found:
             raise UserError(f"{self.channel.topic} has fewer than two readable messages ({reason})")
-        key = key or (lambda one: (one.frame, getattr(one.value, "kind", None)))
-        kinds = [key(one) for one in found]
+        kinds = [(one.frame, getattr(one.value, "kind", None)) for one in found]
         return found[kinds.index(Counter(kinds).most_common(1)[0][0])]
 
 
 def readable(
-    read: Callable[[bytes], object], payloads: Iterable[bytes], most: int = TRIES
+    read: Callable[[bytes], object], payloads: Iterable[bytes], most: int | None = TRIES
 ) -> tuple[list, str]:
     """What the first messages say that can be read, and why the last of the others cannot be."""
     reasons = ["all are damaged"]
@@ -79,7 +82,7 @@ class Role:
     Attributes:
         what: It, in messages.
         readers: How each kind of schema is read, the best kinds first; None where it depends on
-            the recording and on params (`sources`).
+            the recording and on params (`source_of`).
         rate: Below it, a topic of the right type is not likely to be it [Hz].
         spare: Kinds that serve only where there is no other.
     """
@@ -190,3 +193,96 @@ class Candidate:
             len(self.choice.channel.payloads),
             [-ord(c) for c in self.topic],
         )
+
+
+def source_of(
+    role: str, channel: Channel, decode: Decoder, setup: object, named: bool
+) -> Source | None:
+    """How to read a channel for a role, and how to convert what was read.
+
+    None where it is of the right type, but something else, which is no news to anybody.
+
+    Args:
+        role: One of ROLES; the channel's schema is among those of its readers.
+        channel, decode: The topic.
+        setup: params.setup.
+        named: Whether params name the topic.
+
+    Raises:
+        UserError: where it would be if params said more, or if it could be read.
+    """
+    kind = of.kind_of(channel.schema.name)
+    if role == "gripper":
+        return _gripper(channel, decode, named)
+    if role == "pose" and kind in JOINTS:
+        return _arm(channel, decode, setup)
+    if role == "pose" and kind in TWIST:
+        return _motion(channel, decode, setup, TWIST[kind])
+    return ROLES[role].readers[kind], None
+
+
+def _gripper(channel: Channel, decode: Decoder, named: bool) -> Source | None:
+    """The joints of a gripper, not of an arm; all joints where params name the topic."""
+    by_topic = named or _has(FINGERS, channel.topic)
+    for names in _joint_names(channel, decode):
+        fingers = tuple(name for name in names if _has(FINGERS, name))
+        if fingers or by_topic:
+            only = tuple(name for name in fingers if "finger" in name.lower())
+            return of.opening_reader(only or fingers or names), None
+    return None
+
+
+def _arm(channel: Channel, decode: Decoder, setup: object) -> Source | None:
+    """Joint states through params' URDF."""
+    known = _joint_names(channel, decode)
+    arms = [some for some in known if not all(_has(FINGERS, name) for name in some)]
+    if not arms:
+        return None
+    names = arms[0]
+    has = ", ".join(names[:JOINTS_SHOWN])
+    if setup.urdf is None:
+        raise UserError(
+            f"{channel.topic} has the joints {has}: put the robot's URDF into robots/ and name it"
+            " in setup.urdf"
+        )
+    chain = chain_of(setup.urdf, setup.tip_link)
+    if not any(set(chain.names) <= set(some) for some in known):
+        lacks = ", ".join([name for name in chain.names if name not in names][:JOINTS_SHOWN])
+        raise UserError(
+            f"{channel.topic} lacks joint {lacks} of {setup.urdf}, it has {has}: check setup.urdf"
+            " and setup.tip_link"
+        )
+    read = of.joints_reader(chain.names, chain.root)
+    return read, lambda stamps, values: chain.poses(values)
+
+
+def _motion(channel: Channel, decode: Decoder, setup: object, read: Read) -> Source:
+    """A twist alone, integrated from params' start pose."""
+    messages, _ = readable(decode, channel.payloads[:JOINT_TRIES], None)
+    frames = Counter(of.frame_of(message) for message in messages)
+    frame = max(frames, key=frames.get, default="")
+    if set(frame.lower().split("_")) & TOOLS:
+        raise UserError(
+            f"the twist on {channel.topic} is along the axes of the hand ({frame}), publish it"
+            " along those of the robot's base"
+        )
+    if setup.start_pose is None:
+        raise UserError(
+            f"{channel.topic} has a twist: give the hand's pose in the base at its first message"
+            " in setup.start_pose"
+        )
+    return read, partial(integrated, start=setup.start_pose)
+
+
+def _joint_names(channel: Channel, decode: Decoder) -> list[tuple[str, ...]]:
+    """Names in the first messages, the most frequent first. Raises UserError if there are none."""
+    messages, _ = readable(decode, channel.payloads[:JOINT_TRIES], None)
+    found, _ = readable(lambda message: tuple(of.joints_of(message)), messages, None)
+    names = [some for some, _ in Counter(found).most_common() if some]
+    if not names:
+        raise UserError(f"{channel.topic} has fewer than two readable messages (no positions)")
+    return names
+
+
+def _has(words: tuple[str, ...], name: str) -> bool:
+    return any(word in name.lower() for word in words)

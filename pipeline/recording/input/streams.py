@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -17,16 +16,65 @@ from scipy.ndimage import median_filter
 from pipeline.base.errors import UserError
 from pipeline.recording.input import clocks
 from pipeline.recording.input.readings import Picture
-from pipeline.recording.input.roles import OPTIONAL
-from pipeline.recording.input.stream import Stream, frozen, gaps
-from pipeline.recording.input.topics import Choice
+from pipeline.recording.input.roles import OPTIONAL, Choice
+from pipeline.recording.input.words import counted, few
 
 ABSURD = 1e6  # N, m, m/s, rad: nothing here is as large
 # What a lone message may be off the four around it: a knock or a fall lasts for more than one.
 LONE = {"wrench": 30.0, "pose": 0.05}  # N, m
 FASTEST = 2.0  # m/s of the hand
 TIMED = ("gripper",)  # roles for which log_time will do where there are no stamps
+LONG_GAP, LONG_GAP_S = 5.0, 0.02  # periods and seconds from which a gap is named
+ENDS = 0.3  # s by which a topic may start later or stop earlier than the others
+FROZEN = 0.25  # s of one and the same value of a sensor that has noise
+FROZEN_FRAMES = 3  # pictures that are the same, byte for byte
+NAMED = 3  # places named in one line
 CORRECTABLE = ("pose", "twist", "gripper")  # by log_time, if they have a clock of their own
+
+
+@dataclass(frozen=True)
+class Stream:
+    """One topic, sorted by stamp.
+
+    Attributes:
+        topic: Its name.
+        frame: frame_id of its messages.
+        stamp: header.stamp, ns, shape (S,), strictly increasing.
+        values: One column a quantity, shape (S, C), or `Picture`s, length S.
+        delay: Median of log_time - stamp [s].
+        lost: Messages that are not in it, for whatever reason.
+        notes: What was lost or mended, in words.
+    """
+
+    topic: str
+    frame: str
+    stamp: np.ndarray
+    values: np.ndarray | list[Picture]
+    delay: float
+    lost: int
+    notes: list[str] = field(default_factory=list)
+
+    def seconds(self, origin: int) -> np.ndarray:
+        return (self.stamp - origin) * 1e-9
+
+    @property
+    def period(self) -> float:
+        """Median time between messages [s]."""
+        return float(np.median(np.diff(self.stamp))) * 1e-9
+
+    @property
+    def longest_gap(self) -> float:
+        return float(np.max(np.diff(self.stamp))) * 1e-9
+
+    @property
+    def missing(self) -> int:
+        """Messages that a constant rate would have had in the gaps."""
+        gaps = np.diff(self.stamp) * 1e-9 / self.period
+        return int(np.sum(np.maximum(np.round(gaps) - 1, 0)))
+
+    def shifted(self, seconds: float) -> Stream:
+        """With `seconds` subtracted from every stamp."""
+        return replace(self, stamp=self.stamp - round(seconds * 1e9)) if seconds else self
 
 
 @dataclass
@@ -59,11 +107,10 @@ class Raw:
             self.keep(~which)
 
 
-def streams_of(path: Path, chosen: dict[str, Choice]) -> tuple[dict[str, Stream], list[str]]:
+def streams_of(chosen: dict[str, Choice]) -> tuple[dict[str, Stream], list[str]]:
     """All topics on the wrench's clock, and remarks on what costs nothing.
 
     Args:
-        path: The recording, for messages.
         chosen: Choices of wrench, pose, color, depth, and of twist and gripper if there are.
 
     Raises:
@@ -72,28 +119,28 @@ def streams_of(path: Path, chosen: dict[str, Choice]) -> tuple[dict[str, Stream]
     raw, notes = {}, []
     for role, choice in chosen.items():
         try:
-            raw[role] = _read(path, role, choice)
+            raw[role] = _read(role, choice)
         except UserError as error:
             if role not in OPTIONAL:
                 raise
-            notes.append(f"{str(error).removeprefix(f'{path}: ')}: done without it")
-    _take_rewinds_out(path, raw)
+            notes.append(f"{error}: done without it")
+    _take_rewinds_out(raw)
     for one in raw.values():
         one.late = int(np.count_nonzero(np.diff(one.stamp) < 0))
         one.keep(clocks.arrival(one.stamp, one.log))
         one.drop(clocks.outliers(one.stamp), "far off in time")
-    _take_steps_out(path, raw)
-    _on_one_clock(path, raw)
-    streams = {role: _sorted(path, one) for role, one in raw.items()}
+    _take_steps_out(raw)
+    _on_one_clock(raw)
+    streams = {role: _sorted(one) for role, one in raw.items()}
     origin = int(streams["wrench"].stamp[0])
     first = min(stream.stamp[0] for stream in streams.values())
     last = max(stream.stamp[-1] for stream in streams.values())
     for stream in streams.values():
-        stream.notes.extend(gaps(stream, origin, first, last))
-    return streams, notes + frozen(streams, origin)
+        stream.notes.extend(_gaps(stream, origin, first, last))
+    return streams, notes + _frozen(streams, origin)
 
 
-def _read(path: Path, role: str, choice: Choice) -> Raw:
+def _read(role: str, choice: Choice) -> Raw:
     stamps, logs, values, frames, lost = [], [], [], [], Counter()
     seen, bare = set(), 0
     channel = choice.channel
@@ -123,37 +170,33 @@ def _read(path: Path, role: str, choice: Choice) -> Raw:
     raw = Raw(role, choice, frame, stamp, log, values, lost)
     if bare == len(stamps) > 0:
         if role not in TIMED:
-            raise UserError(
-                f"{path}: topic {raw.topic} has no header stamps, record with time stamps"
-            )
+            raise UserError(f"topic {raw.topic} has no header stamps, record with time stamps")
         raw.stamp = log.copy()
         raw.notes.append("no header stamps: log_time is used")
     raw.drop(np.array([one != frame for one in frames], bool), "in another frame")
     raw.drop(raw.stamp == 0, "without a stamp")
     if len(raw.stamp) < 2:
         reasons = f" ({_words(raw.lost)})" if raw.lost else ""
-        raise UserError(f"{path}: topic {raw.topic} has fewer than two readable messages{reasons}")
+        raise UserError(f"topic {raw.topic} has fewer than two readable messages{reasons}")
     return raw
 
 
-def _take_rewinds_out(path: Path, raw: dict[str, Raw]) -> None:
+def _take_rewinds_out(raw: dict[str, Raw]) -> None:
     """Steps back of the machine's clock, stamps and log_time alike."""
-    for one, found in _agreed(path, raw, clocks.rewinds).items():
+    for one, found in _agreed(raw, clocks.rewinds).items():
         role = raw[one]
         role.stamp = clocks.without(role.stamp, found)
         role.log = clocks.without(role.log, found)
-        start = int(role.log[0])
         for step in found:
-            at = (int(role.log[step.index]) - start) * 1e-9
-            size = step.size * 1e-9
+            at, size = (role.log[step.index] - role.log[0]) * 1e-9, step.size * 1e-9
             role.notes.append(
                 f"step of its machine's clock of {size:+.4f} s at {at:.2f} s taken out"
             )
 
 
-def _take_steps_out(path: Path, raw: dict[str, Raw]) -> None:
+def _take_steps_out(raw: dict[str, Raw]) -> None:
     """Steps of the stamps' clock alone; the segment that fits the other topics is right."""
-    found = _agreed(path, raw, clocks.steps)
+    found = _agreed(raw, clocks.steps)
     start = min(one.log.min() for one in raw.values())
     usual = {}
     for role, one in raw.items():
@@ -173,7 +216,7 @@ def _take_steps_out(path: Path, raw: dict[str, Raw]) -> None:
         one.late -= sum(step.size < 0 for step in jumps)
 
 
-def _agreed(path: Path, raw: dict[str, Raw], find) -> dict[str, list[clocks.Jump]]:
+def _agreed(raw: dict[str, Raw], find) -> dict[str, list[clocks.Jump]]:
     """Steps of each role; those at one time have the size that the fastest topic tells."""
     found = {role: find(one.stamp, one.log) for role, one in raw.items()}
     found = {role: steps for role, steps in found.items() if steps}
@@ -189,7 +232,7 @@ def _agreed(path: Path, raw: dict[str, Raw], find) -> dict[str, list[clocks.Jump
             best = min(twins, key=lambda one: (not one.exact, one.period))
             if not best.exact and role not in CORRECTABLE:
                 raise UserError(
-                    f"{path}: the clock of {raw[role].topic} steps by {step.size * 1e-9:+.3f} s,"
+                    f"the clock of {raw[role].topic} steps by {step.size * 1e-9:+.3f} s,"
                     " and its rate is too uneven to tell by how much exactly: record again without"
                     " setting clocks"
                 )
@@ -197,22 +240,19 @@ def _agreed(path: Path, raw: dict[str, Raw], find) -> dict[str, list[clocks.Jump
     return found
 
 
-def _on_one_clock(path: Path, raw: dict[str, Raw]) -> None:
+def _on_one_clock(raw: dict[str, Raw]) -> None:
     wrench = raw["wrench"]
     offsets = {
         role: clocks.offset(one.stamp, one.log, wrench.stamp, wrench.log)
         for role, one in raw.items()
     }
     middle = float(np.median(list(offsets.values())))
-    needed = [role for role in offsets if role not in CORRECTABLE]
-    if (
-        max(offsets[role] for role in needed) - min(offsets[role] for role in needed)
-        > clocks.TOLERANCE
-    ):
-        worst = max(needed, key=lambda role: abs(offsets[role] - middle))
+    needed = {role: middle - offsets[role] for role in offsets if role not in CORRECTABLE}
+    if np.ptp(list(needed.values())) > clocks.TOLERANCE:
+        worst, off = max(needed.items(), key=lambda one: abs(one[1]))
         raise UserError(
-            f"{path}: the stamps of {raw[worst].topic} are {middle - offsets[worst]:+.3f} s off the"
-            " other topics' clock, record all topics with one clock"
+            f"the stamps of {raw[worst].topic} are {off:+.3f} s off the other topics'"
+            " clock, record all topics with one clock"
         )
     for role in CORRECTABLE:
         if role in raw and abs(offsets[role]) > clocks.TOLERANCE:
@@ -223,13 +263,13 @@ def _on_one_clock(path: Path, raw: dict[str, Raw]) -> None:
             )
 
 
-def _sorted(path: Path, raw: Raw) -> Stream:
+def _sorted(raw: Raw) -> Stream:
     if raw.late > 0:
-        raw.notes.append(f"{_count(raw.late)} out of order, sorted by stamp")
+        raw.notes.append(f"{counted(raw.late)} out of order, sorted by stamp")
     raw.keep(np.argsort(raw.stamp, kind="stable"))
     raw.drop(np.diff(raw.stamp, prepend=raw.stamp[0] - 1) == 0, "with the stamp of another")
     if len(raw.stamp) < 2:
-        raise UserError(f"{path}: topic {raw.topic} has fewer than two readable messages")
+        raise UserError(f"topic {raw.topic} has fewer than two readable messages")
     values = raw.values
     if not isinstance(values[0], Picture):
         values = np.array(values, float)
@@ -257,9 +297,51 @@ def _without_lone(raw: Raw, values: np.ndarray) -> np.ndarray:
     return values[~lone]
 
 
-def _count(messages: int) -> str:
-    return f"{messages} message{'s' * (messages != 1)}"
-
-
 def _words(lost: Counter[str]) -> str:
     return ", ".join(f"{count} {why}" for why, count in sorted(lost.items()))
+
+
+def _gaps(stream: Stream, origin: int, first: int, last: int) -> list[str]:
+    """Long gaps, and ends that lack what the other topics have."""
+    notes, ways = [], np.diff(stream.stamp) * 1e-9
+    late, early = (stream.stamp[0] - first) * 1e-9, (last - stream.stamp[-1]) * 1e-9
+    least = max(ENDS, LONG_GAP * stream.period)
+    if late > least:
+        notes.append(f"starts {late:.2f} s after the others")
+    if early > least:
+        notes.append(f"stops {early:.2f} s before the others")
+    long = np.flatnonzero(ways > max(LONG_GAP * stream.period, LONG_GAP_S))
+    if len(long):
+        at = stream.seconds(origin)
+        named = [f"{ways[i]:.3f} s at {at[i]:.2f} s" for i in long[np.argsort(-ways[long])]]
+        notes.append(f"gap{'s' * (len(long) > 1)} of {few(named, NAMED)}")
+    return notes
+
+
+def _frozen(streams: dict[str, Stream], origin: int) -> list[str]:
+    """Sensors that repeat themselves, which those with noise do not."""
+    remarks = []
+    for role in ("wrench", "color", "depth"):
+        stream = streams[role]
+        if role == "wrench":
+            same = np.all(np.diff(stream.values, axis=0) == 0, axis=1)
+            least = max(FROZEN_FRAMES, round(FROZEN / stream.period))
+        else:
+            data = [picture.data for picture in stream.values]
+            same = np.array([np.array_equal(a, b) for a, b in zip(data, data[1:], strict=False)])
+            least = FROZEN_FRAMES - 1
+        run = _longest_run(same)
+        if run and run[1] >= least:
+            at = stream.seconds(origin)[run[0]]
+            remarks.append(
+                f"{stream.topic}: the same value {run[1] + 1} times from {at:.2f} s on: was the"
+                " sensor frozen?"
+            )
+    return remarks
+
+
+def _longest_run(same: np.ndarray) -> tuple[int, int] | None:
+    """Start and length of the longest run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]])))
+    starts, lengths = edges[::2], edges[1::2] - edges[::2]
+    return (int(starts[np.argmax(lengths)]), int(lengths.max())) if len(lengths) else None

@@ -13,8 +13,14 @@ from pipeline.recording.input.camera import Camera, camera_from
 from pipeline.recording.input.container import Channel, Container
 from pipeline.recording.input.decode import decoder
 from pipeline.recording.input.readings import Picture
-from pipeline.recording.input.roles import OPTIONAL, ROLES, Candidate, Choice, readable
-from pipeline.recording.input.sources import source_of
+from pipeline.recording.input.roles import (
+    OPTIONAL,
+    ROLES,
+    Candidate,
+    Choice,
+    readable,
+    source_of,
+)
 from pipeline.recording.input.words import few
 
 SHOWN = 12  # topics named in a message
@@ -42,11 +48,11 @@ def choose(container: Container, setup: object) -> dict[str, Choice]:
     return chosen
 
 
-def camera_of(container: Container, chosen: dict[str, Choice], role: str) -> Camera:
+def camera_of(chosen: dict[str, Choice], role: str) -> Camera:
     """The camera of the images of `role`, color or depth. Raises UserError."""
     info, image = chosen[f"{role}_info"], chosen[role]
-    calibration, topic = info.typical(key=repr).value, image.channel.topic
-    return camera_from(container.path, info.channel.topic, calibration, topic, _size(image))
+    calibration, topic = info.typical().value, image.channel.topic
+    return camera_from(info.channel.topic, calibration, topic, _size(image))
 
 
 class _Chooser:
@@ -73,20 +79,20 @@ class _Chooser:
         return replace(best.choice, why=_why(best, found))
 
     def lacking(self, role: str) -> UserError:
-        what, path = ROLES[role].what, self.container.path
+        what = ROLES[role].what
         if self.problems:
-            return UserError(f"{path}: no {what}; {'; or '.join(self.problems[:2])}")
+            return UserError(f"no {what}; {'; or '.join(self.problems[:2])}")
         if not self.container.channels:
-            return UserError(f"{path}: no {what}; the file has no messages at all: record it again")
+            return UserError(f"no {what}; the file has no messages at all: record it again")
         has = sorted({f"{c.topic} ({of.kind_of(_type(c))})" for c in self.container.channels})
         return UserError(
-            f"{path}: no {what}; the file has {few(has, SHOWN)}: record it, or name its topic in"
+            f"no {what}; the file has {few(has, SHOWN)}: record it, or name its topic in"
             f" setup.topics.{role}"
         )
 
     def _named(self, role: str, name: str) -> Choice:
         channels = [c for c in self.container.channels if c.topic == name]
-        where = f"{self.container.path}: setup.topics.{role}"
+        where = f"setup.topics.{role}"
         if not channels:
             has = ", ".join(sorted({c.topic for c in self.container.channels})[:SHOWN])
             raise UserError(f"{where}: no topic {name}, the file has {has or 'none'}")

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 
 from pipeline.base.errors import UserError
-from pipeline.recording.input.container import Channel, Container
+from pipeline.recording.input.container import Container
 from pipeline.recording.input.decode import decoder
 from pipeline.recording.input.frames import Transform, TransformTree
 from pipeline.recording.input.readings import kind_of, quaternion_of
+from pipeline.recording.input.roles import readable
 
+Edge = tuple[str, str]
 FOXGLOVE = ("FrameTransform", "FrameTransforms")
 STILL = 1e-9  # m and quaternion: a transform that changes by more is no static one
 
@@ -21,14 +23,22 @@ def transforms_of(container: Container) -> TransformTree:
 
     Messages that cannot be read are left out: a transform that is missed is asked for later.
     """
-    poses: dict[tuple[str, str], np.ndarray] = {}
-    moving: set[tuple[str, str]] = set()
+    poses: dict[Edge, np.ndarray] = {}
+    moving: set[Edge] = set()
     for channel in container.channels:
         static = channel.topic.rsplit("/", 1)[-1] == "tf_static"
         if not static and kind_of(channel.schema.name) not in FOXGLOVE:
             continue
-        for parent, child, pose in _edges(channel):
-            edge = (parent, child)
+        try:
+            decode = decoder(channel)
+        except UserError:
+            continue
+
+        def read(payload: bytes, decode=decode) -> list[tuple[Edge, np.ndarray]]:
+            return _edges(decode(payload))
+
+        found, _ = readable(read, channel.payloads, None)
+        for edge, pose in chain.from_iterable(found):
             if not static and np.abs(poses.setdefault(edge, pose) - pose).max() > STILL:
                 moving.add(edge)
             poses[edge] = pose
@@ -39,29 +49,19 @@ def transforms_of(container: Container) -> TransformTree:
     return tree
 
 
-def _edges(channel: Channel) -> Iterator[tuple[str, str, np.ndarray]]:
-    """Parent, child, and pose of the child in the parent: x y z qx qy qz qw."""
-    try:
-        decode = decoder(channel)
-    except UserError:
-        return
-    for payload in channel.payloads:
+def _edges(message: object) -> list[tuple[Edge, np.ndarray]]:
+    """Parent and child, and pose of the child in the parent: x y z qx qy qz qw."""
+    found = []
+    for one in getattr(message, "transforms", [message]):
+        if hasattr(one, "transform"):
+            edge, pose = (one.header.frame_id, one.child_frame_id), one.transform
+        else:
+            edge, pose = (one.parent_frame_id, one.child_frame_id), one
+        place = pose.translation
         try:
-            message = decode(payload)
-            edges = [_edge(one) for one in getattr(message, "transforms", [message])]
-        except Exception:  # whatever damaged bytes do to the decoder
+            numbers = np.array([place.x, place.y, place.z, *quaternion_of(pose.rotation)], float)
+        except ValueError:  # some publishers leave the quaternion at zero
             continue
-        yield from (edge for edge in edges if edge is not None)
-
-
-def _edge(one: object) -> tuple[str, str, np.ndarray] | None:
-    if hasattr(one, "transform"):
-        parent, child, pose = one.header.frame_id, one.child_frame_id, one.transform
-    else:
-        parent, child, pose = one.parent_frame_id, one.child_frame_id, one
-    place = pose.translation
-    try:
-        numbers = np.array([place.x, place.y, place.z, *quaternion_of(pose.rotation)], float)
-    except ValueError:  # some publishers leave the quaternion at zero
-        return None
-    return (str(parent), str(child), numbers) if np.isfinite(numbers).all() else None
+        if np.isfinite(numbers).all():
+            found.append((tuple(map(str, edge)), numbers))
+    return found

@@ -5,22 +5,15 @@ A backend is made for one view, learns once from its frames, and then masks each
 
 from __future__ import annotations
 
-from typing import Protocol
-
-import numpy as np
-
 from pipeline.base.errors import UserError
 from pipeline.recording.masks.ridge import RidgeMask
-from pipeline.recording.view import Frame, View
+from pipeline.recording.view import View
 
 
-class Masker(Protocol):
-    def mask(self, frame: Frame) -> np.ndarray:
-        """Pixels of the band, shape (H, W), bool."""
+def masker(name: str, view: View, sam3: object | None = None) -> object:
+    """The backend of params.cloud.mask, with `mask(frame)`: pixels of the band (H, W), bool.
 
-
-def masker(name: str, view: View, sam3: object | None = None) -> Masker:
-    """The backend of params.cloud.mask; `sam3` is params.cloud.sam3.
+    `sam3` is params.cloud.sam3.
 
     Raises:
         UserError: There is no such backend, or it lacks something.

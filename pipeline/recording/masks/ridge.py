@@ -6,8 +6,7 @@ import cv2
 import numpy as np
 
 from pipeline.base.errors import UserError
-from pipeline.recording.masks.colors import Colors
-from pipeline.recording.masks.hand import REACH, Shape
+from pipeline.recording.masks.hand import REACH, Colors, Shape
 from pipeline.recording.view import Frame, Scene, View, length
 
 LEARNING_FRAMES = 48
@@ -51,9 +50,13 @@ class RidgeMask:
             raise UserError(f"{view.recording.path}: no camera frame in the window can be decoded")
         self.background, self.noise = _background(np.stack(depths))
         scene = self.scene
-        taut = _some([k for k, time in enumerate(view.times) if scene.taut(time)])
-        after = scene.signals.release_time + SETTLED
-        free = _some([k for k, time in enumerate(view.times) if time > after])
+
+        def some(of_time) -> list[int]:
+            numbers = [k for k, time in enumerate(view.times) if of_time(time)]
+            return numbers[:: max(1, len(numbers) // HAND_FRAMES)]
+
+        taut = some(scene.taut)
+        free = some(lambda time: time > scene.signals.release_time + SETTLED)
         hand = [self._around_hand(frame) for _, frame in view.frames(taut, whole=True)]
         if scene.signals.facts["turn"] > MOST_TURN:  # then it has no one shape in frame O
             self.closed = self.open = None
@@ -63,7 +66,7 @@ class RidgeMask:
                 self._around_hand(frame)[0] for _, frame in view.frames(free, whole=True)
             )
         self.swept = Shape.swept(self.closed, self.open)
-        still = _some([k for k, time in enumerate(view.times) if self._hangs(time)])
+        still = some(self._hangs)
         self.hanging = Shape.learn(
             (self._from_middle(f.points[self._candidates(f)]) for _, f in view.frames(still)),
             often=MOSTLY,
@@ -158,10 +161,6 @@ class RidgeMask:
         if self._hangs(time) and self.hanging is not None:
             found |= (length(away) < REACH) & ~self.hanging.holds(self._from_middle(points))
         return found
-
-
-def _some(numbers: list[int]) -> list[int]:
-    return numbers[:: max(1, len(numbers) // HAND_FRAMES)]
 
 
 def _background(depths: np.ndarray) -> tuple[np.ndarray, float]:

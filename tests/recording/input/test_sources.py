@@ -101,30 +101,23 @@ def test_a_franka_robot_state_is_pose_and_for_lack_of_a_sensor_force(params) -> 
     assert named["wrench"].why == "setup.topics.wrench"
 
 
-@pytest.mark.parametrize("names", [("O_T_EE", "O_F_ext_hat_K"), ("o_t_ee", "o_f_ext_hat_k")])
-def test_a_franka_state_has_column_major_matrices(params, names) -> None:
-    messages = []
-    for k in range(COUNT):
-        matrix = np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = TURNS[k].as_matrix(), PLACES[k]
-        messages.append(
-            {**head(k, "link0"), names[0]: list(matrix.T.ravel()), names[1]: [1, 2, 3] * 2}
-        )
-    roles = chosen(params, channel("/state", "franka_msgs/FrankaState", messages))
-    assert_poses(played(roles["pose"])[1])
-    assert played(roles["wrench"])[0] == "link0"
-    np.testing.assert_array_equal(played(roles["wrench"])[1], [[1, 2, 3]] * COUNT)
-
-
-def test_a_franka_state_without_a_frame_is_in_the_base(params) -> None:
-    """As franka_ros publishes it: pose and force are both given there."""
-    matrix = list(np.eye(4).ravel())
-    messages = [
-        {**head(k, ""), "O_T_EE": matrix, "O_F_ext_hat_K": [1, 2, 3] * 2} for k in range(COUNT)
-    ]
-    roles = chosen(params, channel("/state", "franka_msgs/FrankaState", messages))
-    frames = {played(roles[role])[0] for role in ("pose", "wrench")}
-    assert len(frames) == 1 and "" not in frames
+def test_a_franka_state_has_column_major_matrices_and_may_lack_a_frame(params) -> None:
+    """Pose and force are then both in the base, as franka_ros publishes them."""
+    for names, frame, base in (
+        (("O_T_EE", "O_F_ext_hat_K"), "", "franka_base"),
+        (("o_t_ee", "o_f_ext_hat_k"), "link0", "link0"),
+    ):
+        messages = []
+        for k in range(COUNT):
+            matrix = np.eye(4)
+            matrix[:3, :3], matrix[:3, 3] = TURNS[k].as_matrix(), PLACES[k]
+            state = dict(zip(names, (list(matrix.T.ravel()), [1, 2, 3] * 2), strict=True))
+            messages.append({**head(k, frame), **state})
+        roles = chosen(params, channel("/state", "franka_msgs/FrankaState", messages))
+        (of_pose, poses), (of_force, forces) = (played(roles[r]) for r in ("pose", "wrench"))
+        assert of_pose == of_force == base
+        assert_poses(poses)
+        np.testing.assert_array_equal(forces, [[1, 2, 3]] * COUNT)
 
 
 GANTRY = [("x", "prismatic", "1 0 0"), ("y", "prismatic", "0 1 0"), ("z", "prismatic", "0 0 1")]
@@ -213,4 +206,4 @@ def test_a_missing_pose_says_what_would_do(params, gantry, channel, setup, words
     with pytest.raises(UserError, match=words) as caught:
         chosen(params, wrench("/ft"), channel, **setup)
     text = str(caught.value)
-    assert text.startswith("f.mcap: no end-effector pose") and "\n" not in text
+    assert text.startswith("no end-effector pose") and "\n" not in text

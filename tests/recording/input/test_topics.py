@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from mcap.records import Schema
 
 from pipeline.base.errors import UserError
-from pipeline.recording.input.container import Channel, Container
+from pipeline.recording.input.container import Channel
 from pipeline.recording.input.topics import camera_of
 from tests.recording.input.messages import (
     CAMERA,
@@ -79,9 +78,8 @@ def test_the_topics_of_a_realsense(params) -> None:
 
 
 def cameras(params, *channels: Channel, **topics: str):
-    file = Container(Path("f.mcap"), list(channels), [])
     roles = chosen(params, wrench("/ft"), pose(), camera=channels, topics=topics)
-    focals = [camera_of(file, roles, role).matrix[0, 0] for role in ("color", "depth")]
+    focals = [camera_of(roles, role).matrix[0, 0] for role in ("color", "depth")]
     return roles, focals
 
 

@@ -8,9 +8,7 @@ import numpy as np
 
 from pipeline.recording.input.container import Container
 from pipeline.recording.input.transforms import transforms_of
-from tests.recording.input.messages import (
-    channel,
-)
+from tests.recording.input.messages import channel
 
 
 def edge(parent: str, child: str, x: float, k: int) -> dict:
@@ -27,14 +25,8 @@ def test_foxglove_transforms_that_keep_still_are_static() -> None:
     moving = [edge("base", "hand", 0.1 * k, k) for k in range(5)]
     still = [edge("base", "fork", 0.5, k) for k in range(5)]
     once = {"transforms": [edge("fork", "camera", 0.25, 0)]}
-    file = Container(
-        Path("f.mcap"),
-        [
-            channel("/tf", "foxglove.FrameTransform", [*moving, *still]),
-            channel("/tf2", "foxglove.FrameTransforms", [once]),
-        ],
-        [],
-    )
-    tree = transforms_of(file)
+    many = channel("/tf", "foxglove.FrameTransform", [*moving, *still])
+    one = channel("/tf2", "foxglove.FrameTransforms", [once])
+    tree = transforms_of(Container(Path("f.mcap"), [many, one], []))
     np.testing.assert_allclose(tree.between("base", "camera").translation, [0.75, 0, 0])
     assert tree.between("base", "hand") is None

@@ -12,8 +12,7 @@ from pipeline.base.errors import UserError
 from pipeline.params import load
 from pipeline.recording.cloud import clouds_of
 from pipeline.recording.input.frames import Transform
-from pipeline.recording.masks.colors import Colors
-from pipeline.recording.masks.hand import Shape
+from pipeline.recording.masks.hand import Colors, Shape
 from pipeline.recording.masks.ridge import RidgeMask
 from pipeline.recording.view import View
 from tests.recording import looks, strand
@@ -129,12 +128,3 @@ def test_what_is_said_to_touch_the_lens_is_nowhere(cloud) -> None:
     depth[::40, ::40] = 0.003
     frame = close.frame_of(0, depth, view.color(0))
     assert not frame.near[frame.depth < 0.1].any() and frame.near.any()
-
-
-def test_the_same_pictures_give_the_same_mask(cloud) -> None:
-    first, second = (
-        clouds_of(looks.view_of(LOOKS["orange on grey, white arm"], looks.times(8))[0], cloud)
-        for _ in range(2)
-    )
-    for one, other in zip(first.points, second.points, strict=True):
-        np.testing.assert_array_equal(one, other)

@@ -49,30 +49,9 @@ class LandingMap:
     checks: np.ndarray
 
     @classmethod
-    def simulate(
-        cls,
-        launcher: Launcher,
-        *,
-        draw_y: tuple[float, float],
-        draw_z: tuple[float, float],
-        size: tuple[int, int],
-        max_force: float,
-        checks: int = 128,
-        seed: int = 0,
-    ) -> LandingMap:
-        """Simulate a grid of `size` draws over the box, and `checks` random ones, in one batch.
-
-        Args:
-            launcher: Simulates draws, shape (N, 2) [m], without a force limit of its own.
-            draw_y, draw_z: Bounds of the box [m].
-            size: Number of nodes along y and z.
-            max_force: Limit of the holding force [N].
-            checks: Number of random draws that validate the interpolation.
-            seed: Seed of those draws.
-        """
-        box = {"draw_y": draw_y, "draw_z": draw_z, "size": size, "max_force": max_force}
-        more = {"checks": checks, "seed": seed}
-        return cls.simulate_each(lambda draws, _: launcher(draws), [None], **box, **more)[0]
+    def simulate(cls, launcher: Launcher, *, checks: int = 128, **box) -> LandingMap:
+        """The map of a launcher that knows its θ; the rest as `simulate_each` has it."""
+        return cls.simulate_each(lambda at, _: launcher(at), [None], checks=checks, **box)[0]
 
     @classmethod
     def simulate_each(
@@ -87,7 +66,16 @@ class LandingMap:
         checks: int = 16,
         seed: int = 0,
     ) -> list[LandingMap]:
-        """A map for each of several θ, shape (S, P), all launched in one batch, checked alike."""
+        """A map for each of several θ, shape (S, P): a grid and random draws, all in one batch.
+
+        Args:
+            launcher: Simulates draws, shape (N, 2) [m], without a force limit of its own.
+            draw_y, draw_z: Bounds of the box [m].
+            size: Number of nodes along y and z.
+            max_force: Limit of the holding force [N].
+            checks: Number of random draws that validate the interpolation of each map.
+            seed: Seed of those draws.
+        """
         grid = [np.linspace(*draw_y, size[0]), np.linspace(*draw_z, size[1])]
         low, high = np.array([draw_y, draw_z]).T
         random = np.random.default_rng(seed).uniform(low, high, (checks, 2))

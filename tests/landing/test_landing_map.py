@@ -25,6 +25,18 @@ def random_draws(count: int = 500, seed: int = 11) -> np.ndarray:
     return np.random.default_rng(seed).uniform(low, high, (count, 2))
 
 
+def broken_beyond(least: float):
+    """The toy, but that launches fail from draws whose sum is above `least` [m]."""
+
+    def launch(draws: np.ndarray):
+        launched, bad = toy.launch(draws), draws.sum(1) > least
+        launched.landing_y[bad] = launched.hold_force[bad] = np.nan
+        launched.failure = ["it broke" if one else None for one in bad]
+        return launched
+
+    return launch
+
+
 def test_reads_the_closed_form_between_the_nodes() -> None:
     draws = random_draws()
     landed, truth = simulate()(draws), toy.launch(draws)
@@ -46,17 +58,7 @@ def test_fails_exactly_the_draws_above_the_force_limit() -> None:
 
 def test_does_not_read_across_failed_launches() -> None:
     """Launches fail in a corner of the box: no answer there, and full accuracy elsewhere."""
-    reason = "the simulation did not converge"
-
-    def broken(draws: np.ndarray):
-        launched = toy.launch(draws)
-        bad = draws.sum(1) > -0.45
-        launched.landing_y[bad] = np.nan
-        launched.hold_force[bad] = np.nan
-        launched.failure = [reason if one else None for one in bad]
-        return launched
-
-    chart, draws = simulate(broken), random_draws()
+    chart, draws = simulate(broken_beyond(-0.45)), random_draws()
     landed = chart(draws)
     cell = (0.2 / 32 + 0.2 / 24) * 1.001
     beyond = draws.sum(1) > -0.45
@@ -64,7 +66,7 @@ def test_does_not_read_across_failed_launches() -> None:
     assert beyond.sum() > 20 and safe.sum() > 300
     assert (landed.failure[beyond] > 0).all() and np.isnan(landed.landing_y[beyond]).all()
     assert not landed.failure[safe].any()
-    assert chart.reasons[landed.failure[beyond][0]] == reason
+    assert chart.reasons[landed.failure[beyond][0]] == "it broke"
     error = np.abs(landed.landing_y - toy.launch(draws).landing_y)[safe]
     assert error.max() < 0.02 and np.median(error) < 1e-4
 
@@ -135,17 +137,8 @@ def test_the_spread_is_the_landings_own_by_the_error_of_the_draw() -> None:
 
 
 def test_a_box_in_which_every_launch_fails() -> None:
-    def broken(draws: np.ndarray):
-        launched = toy.launch(draws)
-        launched.landing_y[:] = launched.hold_force[:] = np.nan
-        launched.failure = ["it broke"] * len(draws)
-        return launched
-
-    chart = simulate(broken)
+    chart = simulate(broken_beyond(-np.inf))
     landed = chart(random_draws(20))
     assert {chart.reasons[code] for code in landed.failure} == {"it broke"}
-    assert validation([chart], (1.4, 2.4))["box"] == {
-        "draws": 0,
-        "mean_error_m": None,
-        "max_error_m": None,
-    }
+    nothing = {"draws": 0, "mean_error_m": None, "max_error_m": None}
+    assert validation([chart], (1.4, 2.4))["box"] == nothing

@@ -78,14 +78,6 @@ def test_an_unknown_method_stops_the_stage_and_leaves_what_was_there(tried) -> N
     assert Path("data/trials", BAND, f"{METHOD}.parquet").read_bytes() == before
 
 
-def test_a_measured_file_of_no_band_stops_the_stage(tried) -> None:
-    file = Path("data/trials/measured/orange.csv")
-    file.parent.mkdir(exist_ok=True)
-    file.write_text(f"{HEAD}\n")
-    with pytest.raises(UserError, match=r"orange.csv: no band of params.yaml .* call it band1.csv"):
-        tried()
-
-
 def test_a_rig_band_is_launched_with_equal_errors_for_both_policies(tried) -> None:
     """Plain and robust draws are equal here, so their launches are; measured ones stand apart."""
     yaml = YAML()

@@ -111,7 +111,7 @@ def test_nor_does_either_where_nuisances_are_searched() -> None:
     about = PARAMS.methods["sling2sim2real_taut"].model_copy(update={"nuisances": bounds})
     params = PARAMS.model_copy(update={"methods": {"toy": about}})
     space = Space.of_method(params, "toy")
-    unit = np.random.default_rng(1).random((40, space.dimension))
+    unit = np.random.default_rng(1).random((20, space.dimension))  # more than a slice
     unit[1:3] = unit[0]
     unit[1, space.names.index("air_drag")] += 0.1
     unit[2, space.names.index("cloud_shift_z")] += 0.1

@@ -14,15 +14,11 @@ from pipeline.objective.evaluate import Evaluator
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.nuisance import Delay, DelayedFrames
 from pipeline.objective.space import Space
-from pipeline.params import load
-from pipeline.sling.model import Sling
 from tests.objective.flaws import flawed_episode
+from tests.objective.pulls import PARAMS, pulled, sling_of
 from tests.search import toy
 
-PARAMS = load("params.yaml")
-SLING = Sling.of(
-    SimpleNamespace(mass=0.023, diameter=0.01, rest_length=0.52), PARAMS.setup, PARAMS.sling
-)
+SLING = sling_of(0.023)
 CUTOFF = 35.65
 TRUTH = np.array([3e5, 0.45, 4e-3, 1.0, 1.0])
 BOUNDS = {
@@ -46,30 +42,10 @@ INJECTED = {  # and how near it must be found with theta known
 }
 
 
-def pulled() -> Episode:
-    """Hang, grasp at 0.5 s, pull to 0.4 m by 2.6 s, hold, release at 3.1 s, swing."""
-    time = 0.015 + 0.03 * np.arange(133)
-    part = np.clip((time - 0.7) / 1.9, 0, 1)
-    part = part**3 * (10 - 15 * part + 6 * part**2)
-    position = np.stack([0 * time, -0.4 * part, -0.2 * (1 - part) ** 2], axis=1)
-    return Episode(
-        band="known",
-        time=time,
-        position=position,
-        velocity=np.gradient(position, 0.03, axis=0),
-        force=np.zeros((133, 3)),
-        opening=np.full(133, np.nan),
-        cloud_time=np.arange(118) / 30 + 0.004,
-        clouds=[np.zeros((0, 3), np.float32)] * 118,
-        grasp_time=0.5,
-        release_time=3.1,
-        camera=np.array([0.8, 0.3, 0.5]),
-    )
-
-
 def recorded(flaws: dict[str, float]) -> Episode:
     """What instruments with these flaws record of the band that TRUTH is of."""
-    return flawed_episode(SLING, pulled(), TRUTH, flaws, cutoff=CUTOFF)
+    clean = pulled(133, 118, 0.5, (0.7, 2.6), (0.7, 2.6), 3.1, first_frame=0.004)
+    return flawed_episode(SLING, clean, TRUTH, flaws, cutoff=CUTOFF)
 
 
 def loss_of(episode: Episode, sling, taut: float = 0.0, **more) -> EpisodeLoss:
@@ -150,8 +126,8 @@ def test_what_a_sensor_makes_of_a_ramp() -> None:
     episode = toy.episode(samples=100)
     lines = toy.rollouts(episode, count=2)
     lines.force[..., 1] = 2 * lines.times
-    loss = loss_of(episode, toy.SLING, nuisances={"force_delay": (-0.02, 0.02)})
-    delay, gain, bias = np.array([0.0123, -0.02]), np.array([1.5, 0.8]), np.array([0.3, -0.2])
+    loss = loss_of(episode, toy.SLING, nuisances={"force_delay": (-0.005, 0.005)})
+    delay, gain, bias = np.array([0.0033, -0.005]), np.array([1.5, 0.8]), np.array([0.3, -0.2])
     values = {"force_delay": delay, "force_gain": gain, "force_bias_y": bias}
     inside = slice(10, -10)
     found = loss.filtered(lines, values)[:, inside]

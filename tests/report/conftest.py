@@ -65,34 +65,19 @@ def history(phase: str, totals: list[float], solver: int | None = None) -> pd.Da
 
 
 def launches() -> pd.DataFrame:
-    rows = [(1.725, 1.745), (1.725, 1.695), (1.925, 1.965), (2.125, None)]
-    return pd.DataFrame(
-        {
-            "band": BAND,
-            "method": METHOD,
-            "kind": "measured",
-            "policy": None,
-            "target": [target for target, _ in rows],
-            "trial": [1, 2, 1, 1],
-            "draw_y": -0.3,
-            "draw_z": -0.2,
-            "predicted_y": [1.725, 1.725, 1.925, 2.125],
-            "predicted_failure": None,
-            "predicted_leave_y": -0.05,
-            "predicted_leave_z": -0.03,
-            "predicted_speed": 4.5,
-            "predicted_angle": 0.5,
-            "flight_y": None,
-            "flight_z": None,
-            "predicted_low": [1.7, 1.7, 1.9, 2.1],
-            "predicted_high": [1.75, 1.75, 1.95, 2.15],
-            "landing_y": [landing for _, landing in rows],
-            "hold_force": 9.0,
-            "failure": [None, None, None, "did not land"],
-            "stretch": [1.4, 1.4, 1.7, 1.8],
-            "recorded_stretch": 1.63,
-        }
+    rows = pd.DataFrame(
+        [(1.725, 1.745), (1.725, 1.695), (1.925, 1.965), (2.125, None)],
+        columns=["target", "landing_y"],
     )
+    failure = [None, None, None, "did not land"]
+    return rows.assign(
+        band=BAND, method=METHOD, kind="measured", policy=None, trial=[1, 2, 1, 1],
+        draw_y=-0.3, draw_z=-0.2, hold_force=9.0, failure=failure, flight_y=None, flight_z=None,
+        stretch=[1.4, 1.4, 1.7, 1.8], recorded_stretch=1.63, predicted_y=rows.target,
+        predicted_failure=None, predicted_speed=4.5, predicted_angle=0.5,
+        predicted_leave_y=-0.05, predicted_leave_z=-0.03,
+        predicted_low=rows.target - 0.025, predicted_high=rows.target + 0.025,
+    )  # fmt: skip
 
 
 def confidence(fixed: str | None = None) -> dict:

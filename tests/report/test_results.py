@@ -26,11 +26,6 @@ def test_a_search_of_one_phase_has_no_refinement(root, params, result) -> None:
     assert alone.history.solver.isna().all()
 
 
-def test_intervals_are_those_of_the_theta_file(result) -> None:
-    low = result.confidence["parameters"]["poissons_ratio"]["low"]
-    assert low == pytest.approx(0.9 * 0.45) and len(result.posterior["samples"]) == 41
-
-
 def test_further_methods_run_on_some_bands_only(root, params) -> None:
     more = params.run.ablations.model_copy(update={"bands": (BAND,), "methods": ("de",)})
     run = params.run.model_copy(update={"ablations": more})

@@ -82,23 +82,6 @@ def test_the_report_is_complete_and_equal_in_another_process(root, params) -> No
     assert committed(root) == first
 
 
-def test_intervals_stand_beside_what_was_identified(root, params, text_alone) -> None:
-    text = written(root, params)
-    assert "3.00E+5 (2.70E+5 – 3.30E+5)" in text and "0.50, not identifiable" in text
-    assert "2.10 (1.90 – 2.30)" in text  # s·d in ms
-    # 1.745 lies in 1.70 - 1.75, 1.695 does not; the third lies beyond the recorded stretch
-    assert "1 of 2 measured landings inside the recorded stretch lie in their 90 % interval" in text
-
-
-def test_a_posterior_that_has_not_settled_is_named(root, params, text_alone) -> None:
-    assert "not settled" not in written(root, params)
-    theta = json.loads((root / THETA_FILE).read_text())
-    theta["confidence"] |= {"moved": 4.37, "settled": False}
-    (root / THETA_FILE).write_text(json.dumps(theta))
-    text = written(root, params)
-    assert f"posterior of {BAND}, Sling2Sim2Real had **not settled**" in text and "4.4" in text
-
-
 def test_a_theta_by_hand_needs_no_confidence(root, params, text_alone) -> None:
     theta = json.loads((root / THETA_FILE).read_text())
     (root / THETA_FILE).write_text(json.dumps({"band": BAND, "theta": theta["theta"]}))
@@ -113,6 +96,8 @@ def test_a_failed_prediction_is_named(root, params, text_alone) -> None:
     good = pd.read_parquet(file)
     text = written(root, params)
     assert "could not be predicted" not in text and "stretch, is met" in text
+    # 1.745 lies in 1.70 - 1.75, 1.695 does not; the third lies beyond the recorded stretch
+    assert "1 of 2 measured landings inside the recorded stretch lie in their 90 % interval" in text
     bad = good.assign(
         predicted_y=[1.725, None, 1.925, 2.125],
         predicted_failure=[None, "the simulation did not converge", None, None],

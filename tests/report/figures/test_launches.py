@@ -13,32 +13,25 @@ from scipy.integrate import solve_ivp
 from pipeline.report.figures import launches as drawing
 from pipeline.report.styles import styles
 from pipeline.sling.model import GRAVITY
-from tests.report.conftest import BAND, METHOD
+from tests.report.conftest import BAND, METHOD, launches
 
 FLOOR = -0.52
-LEAVE = {"y": -0.2, "z": -0.08, "speed": 4.3, "angle": 0.4}
+LEAVE = {"leave_y": -0.2, "leave_z": -0.08, "speed": 4.3, "angle": 0.4}
 
 
 @pytest.fixture
 def results(results):
     """Two virtual launches at each of two targets; the last one failed and has no flight."""
     one = drawing.flight(*LEAVE.values(), FLOOR)
-    trials = pd.DataFrame(
-        {
-            "band": BAND,
-            "method": METHOD,
-            "kind": "virtual",
-            "target": [1.725, 1.725, 1.925, 1.925],
-            "trial": [1, 2, 1, 2],
-            "landing_y": [1.70, 1.76, 1.93, None],
-            "failure": [None, None, None, "hits the fork"],
-            "flight_y": [one[:, 0] + off for off in (-0.02, 0.04, 0.21)] + [None],
-            "flight_z": [one[:, 1]] * 3 + [None],
-            "predicted_leave_y": LEAVE["y"],
-            "predicted_leave_z": LEAVE["z"],
-            "predicted_speed": [4.3, 4.3, None, None],
-            "predicted_angle": LEAVE["angle"],
-        }
+    trials = launches().assign(
+        kind="virtual",
+        target=[1.725, 1.725, 1.925, 1.925],
+        trial=[1, 2, 1, 2],
+        landing_y=[1.70, 1.76, 1.93, None],
+        failure=[None, None, None, "hits the fork"],
+        flight_y=[one[:, 0] + off for off in (-0.02, 0.04, 0.21)] + [None],
+        flight_z=[one[:, 1]] * 3 + [None],
+        **{f"predicted_{name}": [value] * 2 + [None] * 2 for name, value in LEAVE.items()},
     )
     of_band = results.methods[BAND]
     of_band[METHOD] = replace(of_band[METHOD], trials=trials, robust_trials=trials.iloc[:0])
@@ -57,13 +50,13 @@ def test_a_predicted_flight_is_that_of_a_falling_point() -> None:
         return state[1] - FLOOR
 
     landed.terminal = True
-    start = [LEAVE["y"], LEAVE["z"], *velocity]
+    start = [LEAVE["leave_y"], LEAVE["leave_z"], *velocity]
     fall = solve_ivp(
         lambda _, s: [s[2], s[3], 0, -GRAVITY], (0, 5), start, events=landed, rtol=1e-10, atol=1e-10
     )
-    np.testing.assert_allclose(points[0], [LEAVE["y"], LEAVE["z"]])
+    np.testing.assert_allclose(points[0], [LEAVE["leave_y"], LEAVE["leave_z"]])
     np.testing.assert_allclose(points[-1], fall.y_events[0][0][:2], atol=1e-8)
-    assert points[:, 1].max() > LEAVE["z"]
+    assert points[:, 1].max() > LEAVE["leave_z"]
 
 
 def test_flights_end_where_they_land_and_targets_stand_on_the_floor(kept, results) -> None:

@@ -83,11 +83,6 @@ def test_the_page_asks_for_nothing_but_run_js(page: str) -> None:
     assert asked == ['<script src="run.js">'] and "@import" not in outside
 
 
-def test_equal_inputs_give_equal_bytes(page: str, report: Report) -> None:
-    write_page(report, MARKDOWN)
-    assert (report.folder / "index.html").read_text("utf-8") == page
-
-
 def test_the_replays_numbers_are_whole_millimetres(page: str, results, replays) -> None:
     data = json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL)[1])
     (band,) = data["bands"]

@@ -45,23 +45,14 @@ def test_no_more_is_said_than_the_intervals_allow() -> None:
 def test_what_is_said_where_launches_fail() -> None:
     """How few count, of the method that is named; who fails more is never just better."""
     near, far = 0.1 + NOISE, 0.2 + NOISE
+    better, worse = launches(near), launches(far)
+    half, count = launches(near, failed=13), "Package SI (2 launches count)."
+    few = launches(NOISE, "measured", failed=1), launches(far, "measured", failed=8)
     for reference, other, verdict in (
-        (launches(far), launches(near), "less error: Package SI."),
-        (
-            launches(NOISE, "measured", failed=1),
-            launches(far, "measured", failed=8),
-            "more error: Package SI (7 launches count).",
-        ),
-        (
-            launches(far),
-            launches(near, failed=13),
-            "less error where it lands, but more launches fail: Package SI (2 launches count).",
-        ),
-        (
-            launches(near, failed=13),
-            launches(far),
-            "more error where both land, but fewer launches fail: Package SI (2 launches count).",
-        ),
+        (worse, better, "less error: Package SI."),
+        (*few, "more error: Package SI (7 launches count)."),
+        (worse, half, f"less error where it lands, but more launches fail: {count}"),
+        (half, worse, f"more error where both land, but fewer launches fail: {count}"),
     ):
         found = ran({"band1 sling2sim2real": reference, "band1 package_si": other})
         kind = reference.kind[0]

@@ -21,21 +21,11 @@ def launches(
     target = np.repeat(targets, errors.shape[1])
     landing = target + errors.ravel()
     landing[len(landing) - failed :] = np.nan
-    return pd.DataFrame(
-        {
-            "kind": kind,
-            "policy": "plain",
-            "target": target,
-            "trial": np.tile(np.arange(1, errors.shape[1] + 1), len(targets)),
-            "predicted_y": target,
-            "predicted_low": np.nan,
-            "predicted_high": np.nan,
-            "landing_y": landing,
-            "failure": np.where(np.isnan(landing), "too far", None),
-            "stretch": 1.4,
-            "recorded_stretch": 1.6,
-        }
-    )
+    return pd.DataFrame({"target": target, "landing_y": landing}).assign(
+        kind=kind, policy="plain", trial=np.tile(np.arange(errors.shape[1]) + 1, len(targets)),
+        predicted_y=target, predicted_low=np.nan, predicted_high=np.nan,
+        failure=np.where(np.isnan(landing), "too far", None), stretch=1.4, recorded_stretch=1.6,
+    )  # fmt: skip
 
 
 def result(band: str, method: str, trials: pd.DataFrame, **more) -> SimpleNamespace:

@@ -79,4 +79,5 @@ def history(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files with slow tests come first, so that the processes which share them end together."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: item.path not in slow)
+    longest = "test_pipeline.py"
+    items.sort(key=lambda item: (item.path.name != longest, item.path not in slow))

@@ -55,16 +55,6 @@ def test_covariance_is_that_of_the_nearest_successes() -> None:
         np.testing.assert_allclose(region.sigma, expected, atol=0.06 * expected.max())
 
 
-def test_covariance_is_positive_definite_whatever_the_neighbours() -> None:
-    """One point many times over, a line, two points."""
-    line = np.outer(np.linspace(0, 1, 9), np.ones(5))
-    for points in (np.full((9, 5), 0.5), line, line[:2]):
-        sigma = regularised(np.cov(points, rowvar=False))
-        np.testing.assert_allclose(sigma, sigma.T)
-        assert np.linalg.eigvalsh(sigma).min() > 0
-        np.linalg.cholesky(sigma)
-
-
 def test_regions_survive_the_file(tmp_path) -> None:
     region = Region(np.full(5, 0.1), np.eye(5) / 3, 1.25, [3, 1])
     module.save_regions(tmp_path / "a.json", NAMES, [region], 5)

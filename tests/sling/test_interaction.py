@@ -67,15 +67,6 @@ def test_result_depends_on_neither_neighbours_nor_workers(sling, episode):
     assert np.array_equal(together.center_line[7], alone.center_line[0])
 
 
-def test_random_thetas_converge_or_say_why_not(strong_grip, episode):
-    """480 of the whole box: no number that is none, and nearly none that fails."""
-    rollouts = interact(strong_grip, episode, random_thetas(480, seed=1), workers=2)
-    good = np.array([reason is None for reason in rollouts.failure])
-    assert np.isfinite(rollouts.force[good]).all()
-    assert np.isfinite(rollouts.center_line[good]).all()
-    assert (~good).sum() <= 1
-
-
 def test_finer_steps_give_the_same_recoil(sling, episode):
     coarse = interact(sling, episode, BASE)
     fine = interact(sling, episode, BASE, refine=5, double=True)

@@ -1,7 +1,7 @@
 """Records of an MCAP file, one after the other, with nothing in them taken on trust.
 
 `mcap.stream_reader` believes the lengths that it reads and stops at the first wrong one: of 600
-damaged files (tests/recording/input/mutations.py) it loses 109 that here become an episode. Here a
+damaged files (validation/campaigns/mutations.py) it loses 109 that here become an episode. Here a
 record that cannot be is stepped over to the next one that can, and no size field, of a record, a
 chunk or a compressed frame, asks for more memory than CHUNK_LIMIT. What the records hold is read by
 the library, from a stream that does not hand out less than was asked for.

@@ -1,21 +1,29 @@
 """A small recording, damaged in thousands of seeded ways, each run from file to episode.
 
-    python -m tests.recording.input.mutations FOLDER FIRST COUNT KIND...
+    python -m validation.campaigns.mutations FOLDER FIRST COUNT KIND...
 
 prints two lines of JSON a mutation: which it is before it runs, what came of it after. A timer ends
 the process where one hangs; the last line then names the culprit.
+
+The episode of a damaged file equals the undamaged one's, or the recording says what it lost. Where
+checksums were mended after the damage, or never were, nobody can ask for that; what remains is no
+traceback, no hang, no memory over 2 GB.
 """
 
 from __future__ import annotations
 
 import faulthandler
 import json
+import os
 import resource
 import signal
 import struct
+import subprocess
 import sys
 import time
 import zlib
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +49,7 @@ HANGS = 10.0  # s of the processor, which others may share
 BLOCKS = 120.0  # s on the clock
 MOST = 2 * 2**30  # bytes
 TRUTH = Truth(grasp=0.4, lifted=0.6, drawn=1.1, release=1.6003, end=2.2, radius=0.012)
+ROOT = Path(__file__).parents[2]
 HEAD = struct.Struct("<BQ")
 CHUNK, MESSAGE = 6, 5
 EXTREMES = [0, 1, 2, 255, 2**16, 2**31 - 1, 2**32 - 1, 2**40, 2**63 - 1, 2**63, 2**64 - 1]
@@ -66,6 +75,57 @@ def small_params() -> Params:
         "bands": {"band1": band},
     }
     return whole.model_copy(update=sections)
+
+
+def campaign(folder: Path, tasks: list[tuple], jobs: int) -> list[dict]:
+    """Results of all tasks, a process each: first seed, how many of each kind, the kinds.
+
+    Args:
+        jobs: Processes at once.
+    """
+    for kind in KINDS:
+        write_small(folder / f"{kind}.mcap", kind)
+    with ThreadPoolExecutor(jobs) as pool:
+        return [line for part in pool.map(lambda task: _run(folder, *task), tasks) for line in part]
+
+
+def _run(folder: Path, first: int, count: int, *kinds: str) -> list[dict]:
+    command = [sys.executable, "-m", "validation.campaigns.mutations"]
+    done = subprocess.run(
+        [*command, *map(str, (folder, first, count, *kinds))],
+        cwd=ROOT,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+    )
+    found: dict[tuple[str, int], dict] = {}
+    for line in map(json.loads, done.stdout.splitlines()):
+        found.setdefault((line["kind"], line["seed"]), {}).update(line)
+    if done.returncode:  # the last one hung, crashed or raised
+        kind, seed = last = next(reversed(found), (kinds[0], first))
+        found.setdefault(last, {"seed": seed, "kind": kind})
+        found[last].update(outcome="crashed", words=done.stderr[-3000:], s=HANGS, bytes=0)
+    return list(found.values())
+
+
+def failures(results: list[dict]) -> list[dict]:
+    """What may not be."""
+    return [
+        one
+        for one in results
+        if one["outcome"] in ("crashed", "unclear")
+        or (one["outcome"] == "silent" and one["kind"] in CHECKED)
+        or one["bytes"] > MOST
+    ]
+
+
+def counts(results: list[dict]) -> dict[str, dict[str, int]]:
+    return {
+        kind: dict(
+            sorted(Counter(one["outcome"] for one in results if one["kind"] == kind).items())
+        )
+        for kind in KINDS
+    }
 
 
 def mutated(content: bytes, kind: str, seed: int) -> bytes:

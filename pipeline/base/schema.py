@@ -7,7 +7,6 @@ from __future__ import annotations
 import difflib
 import json
 import math
-import re
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,23 +85,6 @@ class Range:
             return number
 
         return core_schema.no_info_wrap_validator_function(check, handler(source))
-
-
-@dataclass(frozen=True)
-class Pattern:
-    """A text of one form, which is a regular expression."""
-
-    form: str
-
-    def __get_pydantic_core_schema__(
-        self, source: type, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        def check(text: str) -> str:
-            if not re.fullmatch(self.form, text):
-                raise refusal(f"must match {self.form}, got {_shown(text)}")
-            return text
-
-        return core_schema.no_info_after_validator_function(check, handler(source))
 
 
 def _is_name(text: str) -> str:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.base.errors import UserError
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.layout import Layout
 from pipeline.base.machine import devices, kind, workers
@@ -70,9 +69,6 @@ def service(stage: str, band: str, method: str, params, rollouts: int) -> Loggin
 
 def evaluator(params, band: str, method: str) -> Evaluator:
     """The evaluator of a recorded band, on the devices that the environment names."""
-    for section, key in (("bands", band), ("methods", method)):
-        if key not in getattr(params, section):
-            raise UserError(f"params.yaml has no {section}.{key}")
     episode = load_episode(band)
     sling = load_sling(params, band)
     return Evaluator(

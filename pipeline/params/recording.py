@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, Literal
 
-from pydantic import model_validator
+from pydantic import AfterValidator, model_validator
 
-from pipeline.base.schema import FILLED, Pattern, Range, Section, refusal
+from pipeline.base.schema import FILLED, Range, Section, refusal
 
 Delay = Annotated[float, Range(-0.5, 0.5)]
 
@@ -41,10 +42,16 @@ class ForceParams(Section):
         return self
 
 
+def _is_device(text: str) -> str:
+    if not re.fullmatch("cuda(:[0-9]+)?|cpu", text):
+        raise refusal(f"must be cpu, cuda, or one GPU such as cuda:0, got {text!r:.60}")
+    return text
+
+
 class Sam3(Section):
     weights: Annotated[str, FILLED]
     prompt: Annotated[str, FILLED]
-    device: Annotated[str, Pattern("cuda(:[0-9]+)?|cpu")]
+    device: Annotated[str, AfterValidator(_is_device)]
 
 
 class CloudParams(Section):

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from threading import Barrier
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.objective import session
 from pipeline.objective.evaluate import Evaluator
 from pipeline.objective.loss import TERMS, EpisodeLoss
 from pipeline.objective.space import Space
@@ -133,10 +131,3 @@ def test_failures_are_infinite_and_have_a_reason() -> None:
     assert found.failure == ["too far", "the loss is not finite", None]
     np.testing.assert_array_equal(np.isinf(found.total), [True, True, False])
     assert np.isnan(found.terms["geom"][:2]).all()
-
-
-def test_an_unknown_band_or_method_is_refused() -> None:
-    params = SimpleNamespace(bands={"yes": None}, methods={"yes": None})
-    for band, method in (("no", "yes"), ("yes", "no")):
-        with pytest.raises(UserError, match=r"params.yaml has no (bands|methods)\.no"):
-            session.evaluator(params, band, method)

@@ -171,34 +171,24 @@ def _confidence(band: Band) -> list[str]:
 
 
 def _policy(band: Band) -> list[str]:
-    report, styles = band.report, band.styles
-    targets, aims = np.array(report.params.trials.targets), {}
+    """How policies were trained, their draws, and where each draw of the box lands."""
+    report, styles, params = band.report, band.styles, band.report.params
+    targets, aims, maps = np.array(params.trials.targets), {}, []
+    path = np.linspace(*params.policy.targets, 101)  # from near to far
     for method, result in band.near.items():
+        name = styles[method].name
         for kind, draws in report.draws(result, targets).items():
-            name = styles[method].name + (", robust" if kind == ROBUST else "")
-            aims[name] = result.landing_map, draws
+            aims[name + (", robust" if kind == ROBUST else "")] = result.landing_map, draws
+        paths = {WHOSE[kind]: draws for kind, draws in report.draws(result, path).items()}
+        sizes = params.setup.fork_width, params.bands[band.name].rest_length
+        drawing = result, paths, targets, float(result.trials.recorded_stretch.max()), *sizes
+        alt = f"landing map of {name}"
+        maps.append(band.picture(f"{method}-map", alt, policy.landing_map, *drawing))
     training = band.picture("training", "training", policy.training, band.methods, styles)
     return [
         f"### Policy\n\n{training}",
         "Draws for the targets of the trials, each in the method's own simulator:\n",
         markdown(policies.aims(aims, targets)),
         "Where each draw of the box lands there, and the policy's path over it:\n",
-        *(_map(band, result, targets) for result in band.near.values()),
+        *maps,
     ]
-
-
-def _map(band: Band, result: Result, targets: np.ndarray) -> str:
-    """The picture of where each draw lands, and of the policies' draws from near to far target."""
-    params = band.report.params
-    path_of = band.report.draws(result, np.linspace(*params.policy.targets, 101))
-    return band.picture(
-        f"{result.method}-map",
-        f"landing map of {band.styles[result.method].name}",
-        policy.landing_map,
-        result,
-        {WHOSE[kind]: draws for kind, draws in path_of.items()},
-        targets,
-        float(result.trials.recorded_stretch.max()),
-        params.setup.fork_width,
-        params.bands[band.name].rest_length,
-    )

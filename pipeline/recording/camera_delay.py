@@ -79,12 +79,7 @@ def camera_delay(recording: Recording, geometry: Geometry) -> tuple[float, float
 
 
 def _hand(
-    recording: Recording,
-    geometry: Geometry,
-    motion: Motion,
-    rays: np.ndarray,
-    k: int,
-    time: float,
+    recording: Recording, geometry: Geometry, motion: Motion, rays: np.ndarray, k: int, time: float
 ) -> np.ndarray:
     """Points around the hand in picture k, frame O, (P, 3); none where it does not show the hand.
 

@@ -13,14 +13,7 @@ from pipeline.recording.input.camera import Camera, camera_from
 from pipeline.recording.input.container import Channel, Container
 from pipeline.recording.input.decode import decoder
 from pipeline.recording.input.readings import Picture
-from pipeline.recording.input.roles import (
-    OPTIONAL,
-    ROLES,
-    Candidate,
-    Choice,
-    readable,
-    source_of,
-)
+from pipeline.recording.input.roles import OPTIONAL, ROLES, Candidate, Choice, readable, source_of
 from pipeline.recording.input.words import few
 
 SHOWN = 12  # topics named in a message

@@ -190,19 +190,22 @@ class ElasticString:
         """
         shape = y.shape
         reach = 2 * shape[1] + 5  # two nodes on, from the first of x to the last of v
-        colours = np.arange(y.size) % (2 * reach + 1)
-        tint = np.equal.outer(colours, np.arange(2 * reach + 1))
+        columns, width = np.arange(y.size), 2 * reach + 1
+        nudges = NUDGE * np.equal.outer(columns % width, np.arange(width))
+        rows = columns + np.arange(-reach, reach + 1)[:, None]  # (band, column)
+        outside = (rows < 0) | (rows >= y.size)
+        places = np.where(outside, 0, rows * width + columns % width)
 
         def rates(t: float, flat: np.ndarray) -> np.ndarray:
             return self.rates(flat.reshape(shape), t, hand).ravel()
 
         def jacobian(t: float, flat: np.ndarray) -> np.ndarray:
             """Banded, by differences: columns of one colour share no row."""
-            moved = (flat[:, None] + NUDGE * tint).reshape(*shape, -1)
+            moved = (flat[:, None] + nudges).reshape(*shape, -1)
             change = self.rates(moved, t, hand).reshape(y.size, -1) - rates(t, flat)[:, None]
-            rows = np.arange(y.size) + np.arange(-reach, reach + 1)[:, None]  # (band, column)
-            inside = (rows >= 0) & (rows < y.size)
-            return np.where(inside, change[rows.clip(0, y.size - 1), colours], 0.0) / NUDGE
+            found = change.take(places)
+            found[outside] = 0.0
+            return found / NUDGE
 
         if event is not None:
             stop = lambda t, flat: event(t, flat.reshape(shape))  # noqa: E731

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import cycle
 
 import matplotlib
 
@@ -54,14 +55,8 @@ Styles = dict[str, Style]  # by method
 
 def styles(methods: Iterable[str]) -> Styles:
     """A style for each method; one that the paper and we do not have keeps its own name."""
-    methods = list(methods)
-    others = [method for method in methods if method not in KNOWN]
-    return {
-        method: Style(*KNOWN[method])
-        if method in KNOWN
-        else Style(method, SPARE[others.index(method) % len(SPARE)])
-        for method in methods
-    }
+    spare = cycle(SPARE)
+    return {m: Style(*(KNOWN.get(m) or (m, next(spare)))) for m in methods}
 
 
 def drawn(methods: Iterable[str], count: int = FEW) -> list[str]:
@@ -70,6 +65,6 @@ def drawn(methods: Iterable[str], count: int = FEW) -> list[str]:
     In the order of `methods`.
     """
     methods = list(methods)
-    first = [method for method in DRAWN if method in methods]
-    chosen = (first + [method for method in methods if method not in first])[:count]
+    order = [*DRAWN, *methods]
+    chosen = sorted(methods, key=order.index)[:count]
     return [method for method in methods if method in chosen]

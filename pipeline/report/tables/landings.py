@@ -134,10 +134,10 @@ def prediction_summary(results: Results, band: str, kind: str, styles: Styles) -
         if trials.empty:
             continue
         parts, ranges = prediction_error(trials), intervals(trials) or {}
-        everything, shares = parts["all"], map(_share, parts.values())
-        bias = number(100 * everything["bias"], "+.1f")
-        unpredicted = f"{everything['unpredicted']} of {everything['tried']}"
+        bias = number(100 * parts["all"]["bias"], "+.1f")
+        unpredicted = f"{parts['all']['unpredicted']} of {parts['all']['tried']}"
         covered = (_coverage(ranges.get(name)) for name in ("inside", "beyond"))
+        shares = map(_share, parts.values())
         rows.append([styles[method].name, *shares, bias, unpredicted, *covered])
     heads = ["method", "inside the recorded stretch", "beyond it", "all launches", "bias [%]"]
     heads += ["not predicted", "in the 90 % interval, inside", "beyond"]

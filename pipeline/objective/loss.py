@@ -16,6 +16,7 @@ Blocks of the recording can be held out: they count in `held_out_terms` alone. N
 from __future__ import annotations
 
 import threading
+from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -29,6 +30,7 @@ from pipeline.objective.chamfer import Chamfer
 from pipeline.objective.nuisance import Delay, DelayedFrames, along_axes
 
 TERMS = ("geom", "force", "work", "taut")
+LOCK = threading.Lock()  # while a filter is made, which takes a second
 
 Nuisances = dict[str, np.ndarray] | None
 
@@ -108,8 +110,6 @@ class EpisodeLoss:
                 f"episode of {episode.band}: no camera frame between the release and the fork"
                 " plane; choose a method whose weights.taut is 0"
             )
-        self._cached: tuple[np.ndarray, list[csr_array]] | None = None
-        self._lock = threading.Lock()
 
     @classmethod
     def of(cls, params, method: str, episode: Episode, sling) -> EpisodeLoss:
@@ -248,24 +248,30 @@ class EpisodeLoss:
         return 100 * frames.compress(chosen, axis=1).mean(axis=1)
 
     def _filters(self, times: np.ndarray) -> list[csr_array]:
-        """Matrices (T, S) from forces at simulated times (S,) to the episode's filtered samples.
+        """Of forces at simulated times (S,), one for every simulated delay."""
+        starts = tuple((self.time[0] - self.period / 2 - self._force_delay.values).tolist())
+        with LOCK:
+            return [
+                _recording_filter(times.tobytes(), self.cutoff, start, self.period, len(self.time))
+                for start in starts
+            ]
 
-        Each is the recorded force's way (interpolation, low-pass, averages), which is linear, and
-        forgets: weights that no rounding would show are left out. One for every simulated delay.
-        """
-        with self._lock:
-            if self._cached is None or not np.array_equal(self._cached[0], times):
-                start = self.time[0] - self.period / 2 - self._force_delay.values
-                columns = [[] for _ in start]
-                for first in range(0, len(times), 32):
-                    pulses = np.eye(len(times), min(32, len(times) - first), -first)
-                    for begin, part in zip(start, columns, strict=True):
-                        sampling = begin, self.period, len(self.time)
-                        part.append(as_recorded(times, pulses, self.cutoff, *sampling))
-                weights = [np.hstack(part) for part in columns]
-                weights = [csr_array(np.where(np.abs(one) > 1e-18, one, 0)) for one in weights]
-                self._cached = times, weights
-            return self._cached[1]
+
+@lru_cache(maxsize=128)  # shared by all losses of an episode, such as the report's replays
+def _recording_filter(
+    times: bytes, cutoff: float, start: float, period: float, samples: int
+) -> csr_array:
+    """Matrix (T, S) from forces at simulated times (S,) to the episode's T filtered samples.
+
+    It is the recorded force's way (interpolation, low-pass, averages), which is linear, and
+    forgets: weights that no rounding would show are left out.
+    """
+    times, parts = np.frombuffer(times), []
+    for first in range(0, len(times), 32):
+        pulses = np.eye(len(times), min(32, len(times) - first), -first)
+        parts.append(as_recorded(times, pulses, cutoff, start, period, samples))
+    weights = np.hstack(parts)
+    return csr_array(np.where(np.abs(weights) > 1e-18, weights, 0))
 
 
 def _through(matrix: csr_array, force: np.ndarray) -> np.ndarray:

@@ -19,9 +19,7 @@ def test_a_failure_leaves_what_was_there(tmp_path: Path) -> None:
     assert [one.name for one in tmp_path.iterdir()] == ["a.txt"] and file.read_text() == "old"
 
 
-def test_a_file_is_on_the_disk_before_it_bears_its_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_is_on_the_disk_before_it_bears_its_name(tmp_path, monkeypatch) -> None:
     file, synced = tmp_path / "a.txt", []
 
     def sync(number: int) -> None:

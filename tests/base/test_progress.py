@@ -48,9 +48,7 @@ def test_hours_left_have_minutes(clock, capsys: pytest.CaptureFixture) -> None:
     assert capsys.readouterr().err.endswith("2:46:30 left\n")
 
 
-def test_an_earlier_runs_units_count_as_done_but_not_for_the_rate(
-    clock, capsys: pytest.CaptureFixture
-) -> None:
+def test_an_earlier_runs_units_count_as_done_but_not_for_the_rate(clock, capsys) -> None:
     told = Progress("x", 100, "iterations")
     told.done = 80
     clock.now += 1.0
@@ -58,9 +56,7 @@ def test_an_earlier_runs_units_count_as_done_but_not_for_the_rate(
     assert capsys.readouterr().err == "x 90/100 iterations  10.0 iterations/s  0:01 left\n"
 
 
-def test_lines_are_told_no_more_often_than_asked_but_the_last_is(
-    clock, capsys: pytest.CaptureFixture
-) -> None:
+def test_lines_are_told_no_more_often_than_asked_but_the_last_is(clock, capsys) -> None:
     told = Progress("x", 26, "iterations", every=1.0)
     for _ in range(26):
         clock.now += 0.125

@@ -7,7 +7,6 @@ from mcap.reader import make_reader
 from ruamel.yaml import YAML
 
 from pipeline.objective.loss import EpisodeLoss
-from pipeline.params import Params
 from pipeline.recording.build import build_episode
 from pipeline.rig.recorder.interaction import Interaction
 from pipeline.sling.model import Sling
@@ -23,9 +22,7 @@ class Hidden:
         raise AssertionError(f"rig.{name} was read")
 
 
-def test_an_episode_and_its_loss_are_made_without_the_world(
-    coarse: Params, recorded: tuple[Path, Interaction]
-) -> None:
+def test_an_episode_and_its_loss_are_made_without_the_world(coarse, recorded) -> None:
     """What knows nothing of `rig:` gives the same numbers."""
     blind = coarse.model_copy(update={"rig": Hidden()})
     with pytest.raises(AssertionError, match=r"rig\.seed was read"):

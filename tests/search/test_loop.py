@@ -166,18 +166,6 @@ def test_a_history_without_rows_can_be_kept(tmp_path: Path) -> None:
     assert len(History.load("toy", NAMES, tmp_path / "empty.parquet").total) == 0
 
 
-def test_the_same_seed_gives_the_same_bytes(tmp_path) -> None:
-    """And another seed does not; NumPy's global generator has no part in it."""
-    files = []
-    for number, seed in enumerate((1, 1, 2)):
-        np.random.seed(number)
-        for history in chain(quadratic(CENTRE, VALLEY), changed(seed=seed))[:2]:
-            history.save(tmp_path / "history.parquet")
-            files.append((tmp_path / "history.parquet").read_bytes())
-    assert files[:2] == files[2:4]
-    assert files[0] != files[4] and files[1] != files[5]
-
-
 def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
     """Nuisances, which are axes of no other name, stand beside it."""
     paths = tmp_path / "a.parquet", tmp_path / "b.parquet"

@@ -1,4 +1,4 @@
-"""What a stage needs, how copies differ, and how entries come into dvc.lock."""
+"""What a stage needs, how copies differ, transfers, and how entries come into dvc.lock."""
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor
@@ -8,13 +8,30 @@ import pytest
 from ruamel.yaml import YAML
 
 from app.cluster import exchange
+from app.flow import child
+from pipeline.base.errors import UserError
 from tests.app.cluster.several import Copy, toy
+from tests.project import alive
+
+# Python reads it at its start: notes its number and waits, as a transfer of many files does.
+WAITS = """\
+import os, pathlib, sys, time
+if "push" in sys.argv and "repro" not in sys.argv and not sys.flags.isolated:
+    pathlib.Path("pid").write_text(str(os.getpid()))
+    time.sleep(600)
+"""
 
 
 @pytest.fixture
-def copies(tmp_path: Path) -> tuple[Copy, Copy]:
-    """The head and a worker's copy."""
+def head(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Copy:
     head = toy(tmp_path / "head")
+    monkeypatch.setenv("DVC_SITE_CACHE_DIR", head.environment["DVC_SITE_CACHE_DIR"])
+    return head
+
+
+@pytest.fixture
+def copies(head: Copy) -> tuple[Copy, Copy]:
+    """The head and a worker's copy."""
     return head, head.clone("worker")
 
 
@@ -44,18 +61,17 @@ def test_what_differs_in_a_copy_is_named(copies, tmp_path: Path) -> None:
         assert answer is None if says is None else answer.startswith(says)
 
 
-def test_needs_follow_folders(copies) -> None:
+def test_needs_follow_folders(head: Copy) -> None:
     """The report reads the folder in which others write."""
-    needs = exchange.needs(copies[0].folder)
+    needs = exchange.needs(head.folder)
     assert needs["report"].producers == ("search@a", "train")
     assert needs["train"].producers == ("search@b",)
     assert {name for name, one in needs.items() if one.gpu} == {"train"}
     assert {name for name, one in needs.items() if not one.travels} == {"report"}
 
 
-def test_entries_merged_at_once_are_all_there(copies) -> None:
+def test_entries_merged_at_once_are_all_there(head: Copy) -> None:
     """By threads of this process and beside DVC's own writes: dvc.lock keeps them all."""
-    head = copies[0]
     names = [f"search@{number}" for number in range(8)]
     entry = {"cmd": "yes", "outs": [{"path": "on", "md5": "0" * 32, "size": 1}]}
     with ThreadPoolExecutor(4) as pool:
@@ -67,9 +83,8 @@ def test_entries_merged_at_once_are_all_there(copies) -> None:
     assert all(found[name] == entry for name in names)
 
 
-def test_a_merged_lock_reads_as_one_of_dvcs(copies) -> None:
+def test_a_merged_lock_reads_as_one_of_dvcs(head: Copy) -> None:
     """The same bytes, so that Git shows the stages that changed and no others."""
-    head = copies[0]
     head("dvc", "repro", "-q", "train", "search@a")
     lock = head.folder / "dvc.lock"
     before = lock.read_text()
@@ -78,3 +93,28 @@ def test_a_merged_lock_reads_as_one_of_dvcs(copies) -> None:
     assert lock.read_text() != before
     exchange.merge(head.folder, {"train": entry})
     assert lock.read_text() == before
+
+
+# Transfers run behind a guard, as stages do: they hear an interrupt, and say one line.
+
+
+def test_a_cancelled_transfer_leaves_nothing(head, tmp_path, monkeypatch) -> None:
+    (tmp_path / "sitecustomize.py").write_text(WAITS)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    pid = head.folder / "pid"
+    with pytest.raises(child.Cancelled):
+        exchange.transfer(
+            head.folder, "push", ("search@a",), lambda: pid.exists() and bool(pid.read_text())
+        )
+    assert not alive(int(pid.read_text()))
+
+
+def test_a_cancelled_transfer_does_not_begin(head: Copy) -> None:
+    with pytest.raises(child.Cancelled):
+        exchange.transfer(head.folder, "push", ("search@a",), lambda: True)
+    assert not (head.folder / ".dvc/tmp").exists()
+
+
+def test_a_transfer_that_fails_says_why_in_one_line(head: Copy) -> None:
+    with pytest.raises(UserError, match="^[^\n]*: dvc push nothing: [^\n]*'nothing'[^\n]*$"):
+        exchange.transfer(head.folder, "push", ("nothing",), lambda: False)

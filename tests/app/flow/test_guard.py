@@ -51,9 +51,7 @@ def test_the_loaders_own_lines_come_before_the_groups_number(tmp_path: Path) -> 
     assert process.returncode == 3
 
 
-def test_a_guard_that_says_no_number_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_guard_that_says_no_number_leaves_nothing(tmp_path, monkeypatch) -> None:
     mute = tmp_path / "mute.py"
     mute.write_text("import sys\nprint('no number', flush=True)\nsys.stdin.read()\n")
     monkeypatch.setattr(guard, "__file__", str(mute))

@@ -119,9 +119,7 @@ def test_the_next_flow_goes_on_and_an_unchanged_output_ends_it(toy: Toy, api: st
     assert sorted(one["state_name"] for one in tasks) == ["Completed", "Fresh", "Fresh", "Fresh"]
 
 
-def test_two_flows_in_one_folder_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_two_flows_in_one_folder_are_refused(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(guard, "GRACE", -4.0)
     toy = Toy(tmp_path / "toy", {"one": stage("one", "word")}, word="one\n")
     with run.alone(toy.folder):

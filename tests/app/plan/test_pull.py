@@ -1,7 +1,5 @@
 """The catenary against its length, and the phases of any plan that params.yaml allows."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,8 +9,9 @@ from scipy.optimize import brentq
 
 from app.plan.pull import SPARE, TICK, catenary_sag, hanging_middle, trajectory_of
 from pipeline.params import PlanParams, load
+from tests.project import ROOT
 
-PARAMS = load(Path(__file__).parents[3] / "params.yaml")
+PARAMS = load(ROOT / "params.yaml")
 AHEAD = np.array([0.0, 1.0, 0.0])
 
 

@@ -5,16 +5,13 @@ import pytest
 
 from pipeline.params import Params
 from pipeline.rig.physics import string as dynamics
-from pipeline.rig.physics.launch import launch_from
 from pipeline.rig.physics.world import bent_at, string_of
 
 DRAW = np.array([0.0, -0.30, -0.15])
 
 
 @pytest.mark.parametrize("length", [0.24, 0.54])
-def test_a_held_band_rests_where_damped_motion_brings_it(
-    coarse: Params, monkeypatch, length: float
-) -> None:
+def test_a_held_band_rests_where_damped_motion_brings_it(coarse, monkeypatch, length) -> None:
     """Barely taut, and at the corner of the box; LSODA is the reader from outside."""
     string = string_of(coarse, "band1")
     at = bent_at(string, length * DRAW / np.linalg.norm(DRAW))
@@ -33,10 +30,3 @@ def test_nothing_moves_it_any_more(params: Params) -> None:
     force = elastic.forces(state)[0]
     force[[0, elastic.middle, -1]] = 0.0
     assert np.abs(force).max() < 1e-7 * np.linalg.norm(elastic.at_middle(state))
-
-
-def test_a_launch_is_the_same(coarse: Params, monkeypatch) -> None:
-    string = string_of(coarse, "band1")
-    found = launch_from(string, coarse, DRAW).landing_y
-    monkeypatch.setattr(dynamics, "balanced", lambda *arguments: None)
-    assert np.isclose(launch_from(string, coarse, DRAW).landing_y, found, atol=2e-4)

@@ -149,9 +149,7 @@ def test_force_peaks_as_the_papers_and_the_same_seed_gives_the_same_bytes(
         assert smooth[7900] < 0.995 * smooth.max()  # it relaxes in the pause
 
 
-def test_the_tool_swings_back_into_the_wrench(
-    messages: dict[str, list[Any]], recorded: tuple[Path, Interaction], coarse: Params
-) -> None:
+def test_the_tool_swings_back_into_the_wrench(messages, recorded, coarse) -> None:
     """What the sensor feels beyond the band is the tool's weight and inertia, and a drifting bias.
 
     Let go, the hand starts back with F / M, so that the sensor feels m F / M.
@@ -167,9 +165,7 @@ def test_the_tool_swings_back_into_the_wrench(
     assert np.abs(rest - rest.mean(axis=0)).max() < rig.wrench.drift + 6 * rig.wrench.noise
 
 
-def test_the_hand_goes_where_it_should_and_its_pose_is_late(
-    messages: dict[str, list[Any]], recorded: tuple[Path, Interaction], coarse: Params
-) -> None:
+def test_the_hand_goes_where_it_should_and_its_pose_is_late(messages, recorded, coarse) -> None:
     base = transforms(messages)["panda_link0"]
     poses = messages["/franka_robot_state_broadcaster/current_pose"]
     position = np.array([vector(m.pose.position) for m in poses])
@@ -184,9 +180,7 @@ def test_the_hand_goes_where_it_should_and_its_pose_is_late(
         np.testing.assert_allclose(position[round(1000 * time)], expected, atol=1.5e-3)
 
 
-def test_pictures_show_the_band_where_it_is(
-    messages: dict[str, list[Any]], recorded: tuple[Path, Interaction]
-) -> None:
+def test_pictures_show_the_band_where_it_is(messages, recorded) -> None:
     """Blue pixels with depth, through the camera's info and /tf_static, lie on the true band."""
     import cv2
 

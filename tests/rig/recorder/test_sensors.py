@@ -1,7 +1,5 @@
 """Flaws are as large as params.yaml says, and what is felt is what statics says."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -94,9 +92,7 @@ def test_errors_of_launches(params: Params, monkeypatch: pytest.MonkeyPatch) -> 
         np.testing.assert_allclose(errors[:, 1:].std(axis=0), size, rtol=0.05)
 
 
-def test_the_band_slips_when_its_force_is_coulombs(
-    coarse: Params, recorded: tuple[Path, Interaction]
-) -> None:
+def test_the_band_slips_when_its_force_is_coulombs(coarse, recorded) -> None:
     """Two pads whose force dies linearly: 2 mu N (1 - t / t_open) = F."""
     happened, setup = recorded[1], coarse.setup
     pull = np.linalg.norm(happened.force[round(1000 * OPEN)])
@@ -105,9 +101,7 @@ def test_the_band_slips_when_its_force_is_coulombs(
     assert np.isclose(happened.slip_time - OPEN, expected, atol=1e-5)
 
 
-def test_a_launch_holds_what_the_recording_held(
-    coarse: Params, recorded: tuple[Path, Interaction]
-) -> None:
+def test_a_launch_holds_what_the_recording_held(coarse, recorded) -> None:
     """The same draw after the same pause: relaxed alike; the arm gives by a millimetre."""
     held = np.linalg.norm(recorded[1].force[round(1000 * OPEN)])
     launched = launches.launch("band1", coarse, (-0.40, 0.0), None).hold_force

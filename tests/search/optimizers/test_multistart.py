@@ -1,10 +1,8 @@
 """CMA-ES side by side: where it starts, who asked, and that it leaves other generators alone."""
 
 import os
-from pathlib import Path
 
 import numpy as np
-import pytest
 
 from pipeline.search.history import History
 from pipeline.search.loop import search
@@ -69,9 +67,7 @@ def test_it_goes_on_where_nothing_is_left_to_gain() -> None:
         assert len(total) == 8000 and total.min() - 1 < 1e-8
 
 
-def test_numpys_generator_and_the_folder_are_left_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_numpys_generator_and_the_folder_are_left_alone(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     np.random.seed(3)
     expected = np.random.RandomState(3).random()

@@ -1,7 +1,5 @@
 """`sling bench --methods` times what the stages do, and its yardstick is met by its own theta."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,10 +8,11 @@ from pipeline.objective.evaluate import Evaluator
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
 from pipeline.params import load
+from tests.project import ROOT
 from validation.benchmarks import methods as bench
 from validation.synthetic import THETA, recorded_yardstick
 
-PARAMS = load(Path(__file__).parents[3] / "params.yaml")
+PARAMS = load(ROOT / "params.yaml")
 SMALL = {"population": 6, "generations": 2, "cma_population": 4, "cma_rollouts": 16, "k_top": 2}
 
 

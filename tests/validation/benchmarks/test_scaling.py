@@ -1,15 +1,14 @@
 """One device against several: what is timed, and that a difference is seen."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.params import load
+from tests.project import ROOT
 from validation.benchmarks import scaling as bench
 
-PARAMS = load(Path(__file__).parents[3] / "params.yaml")
+PARAMS = load(ROOT / "params.yaml")
 SMALL = {"population": 6, "generations": 1, "cma_population": 4, "cma_rollouts": 4, "k_top": 1}
 
 

@@ -9,10 +9,11 @@ from pipeline.base.native import start, wp
 from pipeline.params import load
 from pipeline.sling.interaction import interact
 from pipeline.sling.model import Sling
+from tests.project import ROOT
 from validation import synthetic
 from validation.benchmarks import throughput as bench
 
-PARAMS = load(Path(__file__).parents[3] / "params.yaml")
+PARAMS = load(ROOT / "params.yaml")
 
 
 def test_the_yardstick_is_held_drawn_and_let_go() -> None:

@@ -9,12 +9,13 @@ import warp as wp
 
 from pipeline.base.native import built_once, text_of
 from pipeline.sling.records import macros
+from pipeline.sling.rubber import RUBBER, memories
 from pipeline.sling.tetrahedra import CORNERS
 
 
 @built_once
 def sling_kernel(
-    element: str, dofs: int, sections: int, middle: int, double: bool, lanes: int, team: int
+    element: str, law: str, dofs: int, sections: int, middle: int, double: bool, lanes: int, team: int
 ) -> tuple[wp.Kernel, type]:
     """Compile the native text for a mesh; Warp keeps the binary in its cache.
 
@@ -45,7 +46,7 @@ def sling_kernel(
         first_free: int
         launching: int
 
-    parts = ("lanes.h", "state.h", "material.h", f"{element}.h", "solve.h", "step.h")
+    parts = ("lanes.h", "state.h", "material.h", "rubber.h", f"{element}.h", "solve.h", "step.h")
     tetrahedra = {} if element == "rod" else {"TETS": len(CORNERS), "CORNERS": _braced(CORNERS)}
     text = "".join(f"\nconst auto {name} = arrays.{name};" for name in Arrays.vars) + text_of(
         *(Path(__file__).with_name(part) for part in parts),
@@ -55,6 +56,8 @@ def sling_kernel(
         N=dofs,
         L=sections,
         MID=middle,
+        RUBBER=int(law == RUBBER),
+        MEMORIES=memories(law),
         **tetrahedra,
         **macros(),
     )

@@ -38,4 +38,5 @@ def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
     else:
         result["bending"] = sling.flexural_rigidity / (mu * sling.area)
     result["drag"] = sling.air_drag
+    result["mooney"], result["relaxation"] = sling.mooney_share, sling.relaxation
     return result

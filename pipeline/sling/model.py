@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.sling import tetrahedra
+from pipeline.sling.rubber import NEO_HOOKEAN
 
 GRAVITY = 9.81
 ROD, TETRAHEDRA = "rod", "tetrahedra"  # meshes: rod.h, tetrahedra.h
@@ -32,6 +33,10 @@ class Sling:
         clamp_twist: Of the last clamp about the band, against the first [rad].
         air_drag: Of the moving band: force for its mass and speed [1/s], one or one a theta. It is
             the drag of a cylinder across the wind, linear about the speeds of a recoil.
+        law: NEO_HOOKEAN, or RUBBER (rubber.h), which the rod alone knows.
+        mooney_share: Of `rubber`: Mooney's second constant over the sum of both, one or one a
+            theta. The shear modulus is that sum.
+        relaxation: Of `rubber`: weight of each branch (rubber.py), one or one a theta.
         mesh: ROD, or TETRAHEDRA: a solid cylinder, whose edges are equally long. What of the band
             is inside the clamps does not deform there, so that the mesh ends at them.
     """
@@ -52,6 +57,9 @@ class Sling:
     clamp_twist: float = 0.0
     mesh: str = ROD
     air_drag: float | np.ndarray = 0.0
+    law: str = NEO_HOOKEAN
+    mooney_share: float | np.ndarray = 0.0
+    relaxation: float | np.ndarray = 0.0
 
     @classmethod
     def of(

@@ -10,6 +10,10 @@ from enum import IntEnum
 
 import numpy as np
 
+from pipeline.sling.rubber import TIMES
+
+BRANCHES = len(TIMES)
+
 
 def _record(*fields: str | tuple[str, int]) -> np.dtype:
     """Of numbers, and vectors of so many of them."""
@@ -42,17 +46,22 @@ SETTING = _record(
     "max_iterations", ("clamped", 2), "shortest",
 )  # fmt: skip
 # of a sling's law: material.py computes them, state.h takes them to material.h and rod.h
-MATERIAL = _record("mu", "lam", "damping", "scale", "friction", "bending", "drag")
+MATERIAL = _record(
+    "mu", "lam", "damping", "scale", "friction", "bending", "drag", "mooney", "relaxation"
+)
 # of a step that ends at `time` and is `h` long: c1, c2, beta as in step.h; Mode, Grip; where the
 # hand is; its normal force (for opening pads, how much of it is gone); how much of the way from
-# where it grasped the band to its own path is left; share of the bending stiffness
+# where it grasped the band to its own path is left; share of the bending stiffness; rubber.update
 STEP = _record(
-    "h", "c1", "c2", "beta", "mode", "grip", ("target", 3), "grip_force", "blend", "time", "bending"
+    "h", "c1", "c2", "beta", "mode", "grip", ("target", 3), "grip_force", "blend", "time", "bending",
+    ("forget", BRANCHES), ("follow", BRANCHES),
 )  # fmt: skip
 # of a sling on its way: direction of the launch, mass of the projectile, Outcome; time, y, z, vy,
-# vz at the separation; force on the hand when it last held; Newton iterations, its neighbours' too
+# vz at the separation; force on the hand when it last held; Newton iterations, its neighbours' too;
+# what share of a stress at rest the branches carry besides
 LANE = _record(
-    ("direction", 3), "payload", "outcome", ("separation", 5), ("hold_force", 3), "iterations"
+    ("direction", 3), "payload", "outcome", ("separation", 5), ("hold_force", 3), "iterations",
+    ("unrelaxed", BRANCHES),
 )  # fmt: skip
 # what is put out of a step
 OUTPUT = _record(("force", 3), "iterations")

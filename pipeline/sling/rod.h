@@ -86,7 +86,12 @@ auto stage_section = [&](int i) {
       x[k][c] = now; xp[k][c] = predicted; xt[k][c] = (now - y) * ibh;
     }
     real stress[3][3], K[6][3][3];
-    material(x, xp, xt, (SC)-1.5, (SC)0.25, stress, K);
+#if RUBBER
+    material(x, xp, xt, (SC)-1.5, (SC)0.25, steeper(xp[0]), stress, K);
+    add_rubber(i, x[0], stress[0], K[0]);
+#else
+    material(x, xp, xt, (SC)-1.5, (SC)0.25, one, stress, K);
+#endif
     UNROLL for (int c = 0; c < 3; ++c) {
       f_next[c] = volume * stress[0][c] * per_ds; f[c] -= f_next[c];
       f[3 + c] += volume * stress[1][c]; f[6 + c] += volume * stress[2][c];

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.sling.records import STEP, Grip, Mode
+from pipeline.sling.rubber import update
 
 RELAX_STEPS = 40
 LONG = 10.0 ** np.arange(1, 6)  # s: steps in which inertia counts for nothing
@@ -41,6 +42,7 @@ def steps(times, previous: float, *, grip: Grip, order: int = 1, mode: Mode = Mo
         result["c2"] = ratio**2 / (1 + 2 * ratio)
         result["beta"] = (1 + ratio) / (1 + 2 * ratio)
     result["mode"], result["grip"], result["time"], result["bending"] = mode, grip, times[1:], 1
+    result["forget"], result["follow"] = update(h)
     return result
 
 

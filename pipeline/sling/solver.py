@@ -13,6 +13,7 @@ from pipeline.sling.initial import fixed_frames
 from pipeline.sling.material import material
 from pipeline.sling.model import GRAVITY, TETRAHEDRA, Sling
 from pipeline.sling.records import LANE, OUTPUT, SETTING, numbers, records, width
+from pipeline.sling.rubber import RUBBER, memories
 from pipeline.sling.schedule import Schedule
 
 LANES, TEAM = 16, 10  # slings in a CPU thread's SIMD lanes; GPU threads that share a sling
@@ -119,11 +120,13 @@ def run(
     """Step N slings of one geometry through a schedule.
 
     Raises:
-        UserError: Tetrahedra on a GPU.
+        UserError: Tetrahedra on a GPU, or of the law `rubber`.
     """
     frames, options = frames or Frames(), options or Options()
     if options.on_gpu and sling.mesh == TETRAHEDRA:
         raise UserError("sling.mesh: tetrahedra run on the CPU alone; on a GPU take the rod")
+    if sling.law == RUBBER and sling.mesh == TETRAHEDRA:
+        raise UserError("sling.mesh: tetrahedra do not know the law `rubber`; take the rod")
     work = _Work(sling, schedule, slings, frames, options)
     if options.on_gpu or options.workers == 1 or work.rows == 1:
         arrays = work.part(0, work.rows)
@@ -159,7 +162,7 @@ def _widths(sling: Sling, schedule: Schedule, frames: Frames, options: Options) 
     return {
         "state": sling.dofs * sling.sections,
         "lanes": width(LANE),
-        "scratch": 9 * sling.dofs * sling.sections,
+        "scratch": (9 * sling.dofs + memories(sling.law)) * sling.sections,
         "work": (2 * sling.dofs + 1) * sling.sections * columns,
         "output": 0 if options.launching else width(OUTPUT) * len(schedule.steps),
         "frames": len(frames.steps) * sling.sections * frames.width,
@@ -183,7 +186,7 @@ class _Work:
         team = TEAM if on_gpu else 1
         self.together = 32 // team if on_gpu else 1  # rows that one thread (one warp) steps
         self.dtype = np.float64 if options.double else np.float32
-        mesh = sling.mesh, sling.dofs, sling.sections, sling.middle
+        mesh = sling.mesh, sling.law, sling.dofs, sling.sections, sling.middle
         self.kernel, self.arrays = sling_kernel(*mesh, options.double, self.lanes, team)
         self.widths = _widths(sling, schedule, frames, options)
         self.common = self._common(sling, schedule, frames)

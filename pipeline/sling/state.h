@@ -18,7 +18,7 @@ const real friction = LAW[MATERIAL_FRICTION], bending = LAW[MATERIAL_BENDING], d
 
 // degree of freedom k of cross-section i: now, predicted, the y and xh of step.h, Newton's change, and of the two steps before
 auto INITIAL = ROW(state, N * L);
-auto STATE = ROW(scratch, 9 * N * L);
+auto STATE = ROW(scratch, (9 * N + MEMORIES) * L);
 #define FIELD(f, k, i) STATE[((f) * N + (k)) * L + (i)]
 #define X(k, i) FIELD(0, k, i)
 #define XP(k, i) FIELD(1, k, i)

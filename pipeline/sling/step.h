@@ -26,6 +26,9 @@ for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
   X1(k, i) = x; X2(k, i) = x; V1(k, i) = zero; V2(k, i) = zero; X(k, i) = x;
 }
 SYNC;
+#if RUBBER
+start_relaxed();
+#endif
 for (int step = 0; step < steps; ++step) {
   const SC* row = schedule.data + (size_t)step * STEP_SIZE;
   const SC h = row[STEP_H], c1 = row[STEP_C1], c2 = row[STEP_C2], bh = row[STEP_BETA] * h;
@@ -56,6 +59,9 @@ for (int step = 0; step < steps; ++step) {
     X(k, i) = x; XP(k, i) = x; Y(k, i) = y;
     XH(k, i) = y + bh * (c1 * v1 - c2 * V2(k, i)) - (k < PLACES && k % 3 == 2 ? gravity * bh * bh : (SC)0);
   }
+#if RUBBER
+  recall(row, relax);
+#endif
   SYNC;
 
   // ---- Newton's method; lanes that have settled stay as they are, so that a lane never depends on its neighbours
@@ -136,6 +142,9 @@ for (int step = 0; step < steps; ++step) {
     for (int i = member; i < L; i += T) for (int c = 0; c < frame_width; ++c)
       FRAME[(k * L + i) * frame_width + c] = X1(c, i) + w * (X(c, i) - X1(c, i));
   }
+#if RUBBER
+  remember(row, relax);
+#endif
   for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
     const real now = X(k, i), v = relax ? zero : (now - Y(k, i)) * ibh;
     X2(k, i) = relax ? now : X1(k, i); X1(k, i) = now;

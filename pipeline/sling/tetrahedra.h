@@ -74,7 +74,7 @@ auto stage_slab = [&](int i) {
       }
     }
     // locked tetrahedra have pressures of either sign
-    material(F, Fp, Ft, (SC)-20, (SC)20, stress, K);
+    material(F, Fp, Ft, (SC)-20, (SC)20, one, stress, K);
     const SC volume = volumes[t] * ds;
     for (int b = 0; b < 4; ++b) {
       const int vb = corners[t][b] % VERTICES, above_b = corners[t][b] / VERTICES;

@@ -76,7 +76,7 @@ def settling(grip: Grip = Grip.FREE, target=(0.0, 0.0, 0.0)) -> np.ndarray:
 
 def move(
     bench: Bench, sling: Sling, thetas, table: np.ndarray, start: np.ndarray, *,
-    payload: float = 0.0, **options,
+    payload: float = 0.0, unrelaxed=0.0, **options,
 ) -> Trajectories:  # fmt: skip
     """Step N thetas (N, 5) from `start` (N, L, 9) or (L, 9), at rest, through steps (S,).
 
@@ -88,7 +88,7 @@ def move(
     done = run(
         sling,
         Schedule(table, first_free=count),
-        Slings.of(sling, thetas, start, payload=payload),
+        Slings.of(sling, thetas, start, payload=payload, unrelaxed=unrelaxed),
         Frames(np.arange(count), np.ones(count), width=9),
         Options(bench.device, bench.workers, **options),
     )

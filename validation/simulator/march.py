@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.sling.records import Grip, Mode
+from pipeline.sling.rubber import TIMES
 from validation.simulator.reference import ReferenceRod
 
 SMALL = 1e-30  # imaginary step: derivatives without cancellation
@@ -14,11 +15,13 @@ SMALL = 1e-30  # imaginary step: derivatives without cancellation
 
 @dataclass(frozen=True)
 class March:
-    """States x and rates v after each step, shape (S, L, 9), and the force on the hand (S, 3)."""
+    """States x and rates v after each step, shape (S, L, 9), the force on the hand (S, 3), and
+    what the branches of the law `rubber` carry (S, E, 8) [Pa]."""
 
     x: np.ndarray
     v: np.ndarray
     force: np.ndarray
+    overstress: np.ndarray
 
 
 def march(
@@ -28,22 +31,35 @@ def march(
     *,
     friction: float = np.inf,
     direction=(0, 0, 0),
+    unrelaxed=np.zeros(len(TIMES)),  # noqa: B008 (nobody writes it)
 ) -> March:
     """Step `start` (L, 9), at rest, through a schedule's records (S,).
 
     Args:
         friction: 2 times the coefficient of friction: with the normal force what two pads can hold.
         direction: Of the pull that opening pads resist, until a held step says, shape (3,).
+        unrelaxed: What share of a stress at rest the branches carry besides, shape (8,).
     """
     middle = rod.sling.middle
     x1 = x2 = np.array(start, float)
     v1 = v2 = np.zeros_like(x1)
     offset, pull, direction = None, 0.0, np.asarray(direction, float)
-    xs, vs, forces = [], [], []
+    xs, vs, forces, carried = [], [], [], []
+    overstress = np.zeros((rod.sling.edges, len(TIMES)))
+    stress = rod.uniaxial(rod.stretch(rod.columns(x1)))  # at the last step's end
     for step in steps:
         h, c1, c2, grip, target = (step[name] for name in ("h", "c1", "c2", "grip", "target"))
         bh = step["beta"] * h
-        band = replace(rod, share=step["bending"], gripped=grip == Grip.HELD)
+        forget, follow = step["forget"], step["follow"]
+        if step["mode"] == Mode.RELAX:  # from rest, whatever was before
+            forget, follow, overstress, stress = 0.0, unrelaxed, 0 * overstress, 0 * stress
+        band = replace(
+            rod,
+            share=step["bending"],
+            gripped=grip == Grip.HELD,
+            carried=rod.sling.relaxation * (forget * overstress - np.outer(stress, follow)).sum(-1),
+            following=rod.sling.relaxation * np.sum(follow),
+        )
         free = _free(band)
         at = x1 + h * v1
         if grip in (Grip.HELD, Grip.POUCH):
@@ -77,8 +93,10 @@ def march(
             x1, x2, v1, v2 = x, x, 0 * v, 0 * v
         else:
             x1, x2, v1, v2 = x, x1, v, v1
-        xs.append(x), vs.append(v1), forces.append(force)
-    return March(np.array(xs), np.array(vs), np.array(forces))
+        before, stress = stress, rod.uniaxial(rod.stretch(rod.columns(x)))
+        overstress = forget * overstress + np.outer(stress - before, follow)
+        xs.append(x), vs.append(v1), forces.append(force), carried.append(overstress)
+    return March(*map(np.array, (xs, vs, forces, carried)))
 
 
 def _free(rod: ReferenceRod) -> np.ndarray:

@@ -18,6 +18,9 @@ import numpy as np
 from pipeline.sling.initial import fixed_frames
 from pipeline.sling.material import material
 from pipeline.sling.model import GRAVITY, Sling
+from pipeline.sling.rubber import RUBBER, TIMES
+
+STRAIGHT = 0.7  # stretch below which the law `rubber` is a straight line
 
 
 def cofactor(f: np.ndarray) -> np.ndarray:
@@ -48,6 +51,8 @@ class ReferenceRod:
         payload: Mass at the middle node [kg].
         gripped: The fingers hold the direction of the middle.
         share: Of the bending and twisting stiffness; guesses relax with less first.
+        carried, following: Of the law `rubber` in a step: stress [Pa] that its branches add
+            whatever the step's end is, shape (E,), and what they add of p there.
     """
 
     sling: Sling
@@ -56,6 +61,8 @@ class ReferenceRod:
     payload: float = 0.0
     gripped: bool = False
     share: float = 1.0
+    carried: np.ndarray | float = 0.0
+    following: float = 0.0
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -84,7 +91,52 @@ class ReferenceRod:
         f = self.columns(x)
         cof = cofactor(f)
         p = lam * ((f[..., 0, :] * cof[..., 0, :]).sum(-1) - 1) - mu
-        return self.sling.area * (mu * f + p[..., None, None] * cof)
+        stress = mu * f + p[..., None, None] * cof
+        if self.sling.law == RUBBER:
+            stretch = self.stretch(f)
+            pull = self.uniaxial(stretch) - self.uniaxial(stretch, share=0.0)
+            pull = pull + self.carried + self.following * self.uniaxial(stretch)
+            stress[..., 0, :] += (pull / stretch)[..., None] * f[..., 0, :]
+        return self.sling.area * stress
+
+    # ---- the law `rubber`: an edge's stretch, and the stress along it
+
+    def stretch(self, columns: np.ndarray) -> np.ndarray:
+        return np.sqrt((columns[..., 0, :] ** 2).sum(-1))
+
+    def uniaxial(self, stretch: np.ndarray, order: int = 0, share=None) -> np.ndarray:
+        """Relaxed nominal stress [Pa], its slope (order 1), or its work from rest (order -1).
+
+        Mooney and Rivlin's; below STRAIGHT the stress goes on straight.
+        """
+        mu, share = self.parameters[0], self.sling.mooney_share if share is None else share
+        at = np.where(np.real(stretch) > STRAIGHT, stretch, STRAIGHT)
+        past = stretch - at
+        stress = (at - at**-2) * (1 - share + share / at)
+        slope = (1 + 2 * at**-3) * (1 - share + share / at) - (at - at**-2) * share / at**2
+        work = (1 - share) * (at**2 / 2 + 1 / at - 1.5) + share * (at + at**-2 / 2 - 1.5)
+        both = work + stress * past + slope * past**2 / 2, stress + slope * past, slope
+        return mu * both[order + 1]
+
+    def stretch_at(self, stress: np.ndarray) -> np.ndarray:
+        """Where the relaxed stress is `stress` [Pa], by bisection: it grows with the stretch."""
+        low, high = np.full_like(stress, -50.0), np.full_like(stress, 50.0)
+        for _ in range(80):
+            middle = (low + high) / 2
+            above = self.uniaxial(middle) > stress
+            low, high = np.where(above, low, middle), np.where(above, middle, high)
+        return (low + high) / 2
+
+    def branches(self, overstress: np.ndarray, columns: np.ndarray) -> tuple[float, float]:
+        """Free energy [J] of branches with overstress (..., E, 8), and the power they lose [W]."""
+        stretch = self.stretch(columns)[..., None]
+        stress = self.uniaxial(stretch)
+        kept = stress - overstress
+        q = self.stretch_at(kept)
+        free = self.uniaxial(stretch, -1) - self.uniaxial(q, -1) - kept * (stretch - q)
+        lost = overstress * (stretch - q) / TIMES
+        volume = self.sling.relaxation * self.sling.area * self.sling.edge_lengths
+        return tuple((one.sum(-1) * volume).sum(-1) for one in (free, lost))
 
     def viscous_stress(self, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
         """d times the rate of the nominal stress at state `at`, shape part scaled by s, times A."""
@@ -98,6 +150,10 @@ class ReferenceRod:
         j = (f[..., 0, :] * cof[..., 0, :]).sum(-1)
         least = -bound * (1 + np.clip(j, 0, 1) ** 2) / 2
         p = np.clip(lam * (j - 1) - mu, least, 0.7 * bound)
+        if self.sling.law == RUBBER:  # as the relaxed stress grows against the neo-Hookean
+            stretch = np.maximum(self.stretch(f), STRAIGHT)
+            s = s * (self.uniaxial(stretch, 1) / self.uniaxial(stretch, 1, share=0.0))
+            s = s[..., None, None]
         shape = mu * turn + p[..., None, None] * cofactor_rate(f, turn) + mu / 3 * volume_rate * cof
         return self.sling.area * d * ((lam - mu / 3) * volume_rate * cof + s * shape)
 
@@ -152,6 +208,9 @@ class ReferenceRod:
         f = self.columns(x)
         j = np.linalg.det(f)
         density = mu / 2 * (_sum(f**2) - 3) - mu * (j - 1) + lam / 2 * (j - 1) ** 2
+        if self.sling.law == RUBBER:
+            stretch = self.stretch(f)
+            density += self.uniaxial(stretch, -1) - self.uniaxial(stretch, -1, share=0.0)
         edges = (density * self.sling.area * self.sling.edge_lengths).sum(-1)
         bend, torsion = self._stiffness()
         frames = self._frames(x, 1)

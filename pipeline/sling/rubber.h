@@ -1,0 +1,86 @@
+// What the law `rubber` adds along an edge to the neo-Hookean material: Mooney's share m and relaxation.
+//
+// Of an edge at stretch l = |g|, incompressible and pulled along, the relaxed nominal stress is Mooney-Rivlin's
+//
+//   p(l) = mu (l - l^-2) (1 - m + m/l),   of which material.h gives mu (l - l^-2) and `extra` the rest
+//
+// Below l = 0.7, where a thin band buckles, p goes on straight, so that it grows with l for every -1 <= m <= 1.
+//
+// Branch k adds w (p(l) - p(q)), q' p'(q) = (p(l) - p(q))/t: it forgets the stress over its time t. Its free energy is
+// w [W(l) - W(q) - p(q) (l - q)], p = W': never negative, as W is convex; and it loses w (l - q) (p(l) - p(q))/t of it,
+// never negative either, as p grows. With the overstress o = p(l) - p(q) this is o' = p' - o/t: linear, and exact over a
+// step in which p is linear in time,
+//
+//   o = forget o_before + follow (p - p_before),   forget = exp(-h/t),  follow = (1 - forget) t/h
+//
+// Memory is one number an edge and branch. It knows the stretch alone: a rigid turn changes nothing.
+
+#if RUBBER
+const int BRANCHES = STEP_FOLLOW - STEP_FORGET;
+const real mooney = LAW[MATERIAL_MOONEY], weight = LAW[MATERIAL_RELAXATION];
+real following = zero;  // what a step adds of p's change: w times the sum of `follow`
+#define MEMORY(k, i) STATE[(9 * N + (k)) * L + (i)]  // overstress of the branches, then:
+#define STRESS_BEFORE BRANCHES
+#define CARRIED (BRANCHES + 1)                       // what a step adds whatever its end is
+
+// p and `extra` at a stretch, with their slopes by it
+auto uniaxial = [&](real l, real &p, real &slope, real &extra, real &extra_slope) {
+  const real at = maximum(l, zero + (SC)0.7), i = one / at, i3 = i * i * i, beyond = l - at;
+  const real neo = at - i * i, neo_slope = one + (SC)2 * i3;
+  extra_slope = mu * mooney * ((SC)3 * i3 * i - neo_slope);
+  extra = mu * mooney * (i - one) * neo + extra_slope * beyond;
+  slope = mu * neo_slope + extra_slope;
+  p = mu * (neo + neo_slope * beyond) + extra;
+};
+// how much steeper p is than the neo-Hookean: damping follows the rate of the stress
+auto steeper = [&](const real* predicted) -> real {
+  const real i = one / maximum(SQRT(dot(predicted, predicted)), zero + (SC)0.7), i3 = i * i * i;
+  return one + mooney * ((SC)3 * i3 * i / (one + (SC)2 * i3) - one);
+};
+// to the stress of a stretch g and its derivative
+auto add_rubber = [&](int i, const real (&g)[3], real (&stress)[3], real (&K)[3][3]) {
+  const real l = SQRT(dot(g, g) + (SC)1e-12);
+  real p, slope, extra, extra_slope;
+  uniaxial(l, p, slope, extra, extra_slope);
+  const real pull = extra + MEMORY(CARRIED, i) + following * p, across = pull / l;
+  const real along = (extra_slope + following * slope - across) / (l * l);
+  UNROLL for (int m = 0; m < 3; ++m) {
+    stress[m] += across * g[m];
+    UNROLL for (int n = 0; n < 3; ++n) K[m][n] += along * g[m] * g[n] + (m == n ? across : zero);
+  }
+};
+// of a step; one that relaxes begins with branches that have forgotten part of whatever stress there will be
+auto follow_of = [&](const SC* row, bool relax, int k) -> real { return relax ? LANE[LANE_UNRELAXED + k] : zero + row[STEP_FOLLOW + k]; };
+auto recall = [&](const SC* row, bool relax) {
+  real follow = zero;
+  UNROLL for (int k = 0; k < BRANCHES; ++k) follow += follow_of(row, relax, k);
+  following = weight * follow;
+  for (int i = member; i < L - 1; i += T) {
+    real carried = relax ? zero : -follow * MEMORY(STRESS_BEFORE, i);
+    if (!relax) UNROLL for (int k = 0; k < BRANCHES; ++k) carried += row[STEP_FORGET + k] * MEMORY(k, i);
+    MEMORY(CARRIED, i) = weight * carried;
+  }
+};
+auto stress_at = [&](int i) -> real {
+  real square = zero, p, slope, extra, extra_slope;
+  UNROLL for (int c = 0; c < 3; ++c) { const real gap = X(c, i + 1) - X(c, i); square += gap * gap; }
+  uniaxial(SQRT(square) / edge[i], p, slope, extra, extra_slope);
+  return p;
+};
+auto start_relaxed = [&]() {
+  for (int i = member; i < L - 1; i += T) {
+    UNROLL for (int k = 0; k < BRANCHES; ++k) MEMORY(k, i) = zero;
+    MEMORY(STRESS_BEFORE, i) = stress_at(i);
+  }
+};
+auto remember = [&](const SC* row, bool relax) {
+  for (int i = member; i < L - 1; i += T) {
+    const real p = stress_at(i), change = relax ? p : p - MEMORY(STRESS_BEFORE, i);
+    UNROLL for (int k = 0; k < BRANCHES; ++k) {
+      const real before = relax ? zero : row[STEP_FORGET + k] * MEMORY(k, i);
+      MEMORY(k, i) = before + follow_of(row, relax, k) * change;
+    }
+    MEMORY(STRESS_BEFORE, i) = p;
+  }
+};
+#endif

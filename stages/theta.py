@@ -18,10 +18,13 @@ from pipeline.base.layout import Layout, made
 from pipeline.base.machine import workers
 from pipeline.confidence.rounds import NoConfidence
 from pipeline.confidence.summary import confidence
+from pipeline.episode.pull import launch_history
 from pipeline.objective.session import load_episode
+from pipeline.params.identification import LAWS
 from pipeline.search.history import History, theta_content
 from pipeline.sling.load import load_sling
 from pipeline.sling.material import THETA
+from pipeline.sling.rubber import RUBBER
 from stages.start import run, started
 
 
@@ -29,8 +32,10 @@ def main() -> None:
     params, band, method = started("band", "method")
     layout = Layout()
     sources = made(layout.history(band, method)), made(layout.refined(band, method))
-    content = theta_content(History.load(method, THETA, *sources), band)
-    episode, sling = load_episode(band), load_sling(params, band)
+    law, episode = params.methods[method].law, load_episode(band)
+    about = {"law": law, "history": launch_history(episode)} if law == RUBBER else {}
+    history = History.load(method, (*THETA, *LAWS[law]), *sources)
+    content, sling = theta_content(history, band, **about), load_sling(params, band, law=law)
     try:
         known, kept = confidence(params, method, episode, sling, content, workers=workers())
     except NoConfidence as error:  # θ* is what it is, and all that follows does without

@@ -141,13 +141,14 @@ def predict(
 
 def _simulated(params, band: str, drawn: np.ndarray, path: Path) -> float:
     from pipeline.sling.launch import launch
-    from pipeline.sling.load import load_sling
-    from pipeline.sling.theta import load_theta, vector
+    from pipeline.sling.theta import calibrated, load_theta, vector
     from stages.start import note_unmounted
 
-    theta = vector(load_theta(path, band))
+    content = load_theta(path, band)
     note_unmounted(band)
-    force = float(launch(load_sling(params, band), theta, drawn[1:]).hold_force[0])
+    force = float(
+        launch(calibrated(params, band, content), vector(content), drawn[1:]).hold_force[0]
+    )
     if not np.isfinite(force):
         raise UserError(
             f"{path}: the simulated hold of draw [{drawn[1]:g}, {drawn[2]:g}] does not converge:"

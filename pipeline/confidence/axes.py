@@ -1,9 +1,10 @@
-"""Coordinates in which a rollout changes nearly evenly: log E, ν, log s d, 1/friction, s, drag.
+"""Coordinates in which a rollout changes nearly evenly: log E, ν, log s d, 1/friction, s, others.
 
 Damping acts through the product s d while the band is taut, and friction through the time that the
 opening fingers need to let go, which goes with 1/friction. The prior stays that of the search's
-box, uniform on its axes, times the method's own. The air's drag is one of them where the method
-searches it, because launches feel it and a recoil hardly tells it from damping.
+box, uniform on its axes, times the method's own. What the law adds is linear, and so is the
+air's drag, which is one of them where the method searches it, because launches feel it and a recoil
+hardly tells it from damping.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.objective.space import Space
-from pipeline.sling.theta import vector
+from pipeline.sling.theta import point
 
-YOUNG, POISSON, DAMPING, FRICTION, SCALE, DRAG = range(6)
+YOUNG, POISSON, DAMPING, FRICTION, SCALE = range(5)
 LEAST_SCALE = 1e-3  # of damping: below it nothing is damped, and the product has no logarithm
 LEAST_FRICTION = 1e-3
 
@@ -29,7 +30,7 @@ class Axes:
         least_friction: float = 0.0,
     ) -> None:
         """Args:
-        space: Box of the five parameters, and of air_drag where it is searched: P axes.
+        space: Box of θ, what its law adds, and air_drag where it is searched: P axes.
         theta: Values of the fixed ones are taken from here, shape (P,).
         least_friction: Below it the band slips out of the closed fingers.
         """
@@ -50,22 +51,22 @@ class Axes:
         """
         about = params.methods[method]
         drag = {name: ends for name, ends in about.nuisances.items() if name == "air_drag"}
-        space = Space.of(params.parameters, drag, about.bounds, about.priors)
-        theta = [*vector(content), *(content["nuisances"][name] for name in drag)]
+        space = Space.of(params.parameters, drag, about.bounds, about.priors, about.law)
+        theta = [*point(content), *(content["nuisances"][name] for name in drag)]
         return cls(space, np.array(theta), set(about.fixed), least_friction)
 
     def even(self, theta: np.ndarray) -> np.ndarray:
         """Coordinates (N, D) of physical parameters (N, P)."""
-        young, poisson, damping, friction, scale, *drag = np.asarray(theta, float).T
+        young, poisson, damping, friction, scale, *others = np.asarray(theta, float).T
         product = damping * np.maximum(scale, LEAST_SCALE)
-        columns = [np.log(young), poisson, np.log(product), 1 / friction, scale, *drag]
+        columns = [np.log(young), poisson, np.log(product), 1 / friction, scale, *others]
         return np.stack(columns, axis=1)[:, self.free]
 
     def physical(self, even: np.ndarray) -> np.ndarray:
         """Physical parameters (N, P) of coordinates (N, D)."""
         theta = np.tile(self.theta, (len(even), 1))
         columns = dict(zip(self.free.tolist(), np.asarray(even, float).T, strict=True))
-        for i in (POISSON, SCALE, DRAG):
+        for i in (POISSON, *range(SCALE, len(self.theta))):
             if i in columns:
                 theta[:, i] = columns[i]
         if YOUNG in columns:

@@ -22,7 +22,7 @@ from pipeline.confidence.residuals import Residuals
 from pipeline.confidence.whitening import noise_variance
 from pipeline.episode.episode import Episode
 from pipeline.sling.interaction import interact
-from pipeline.sling.theta import in_air
+from pipeline.sling.theta import at_points
 
 
 def discrepancy(
@@ -34,7 +34,7 @@ def discrepancy(
         cutoff: Of the low-pass that the recorded force went through [Hz].
         theta: θ*, and the air's drag where it is searched, shape (5,) or (6,).
     """
-    windy, thetas = in_air(sling, theta[None])
+    windy, thetas = at_points(sling, theta[None])
     rollouts = interact(windy, episode, thetas)
     line = rollouts.center_line[0]
     residuals = Residuals(episode, sling, cutoff, line)

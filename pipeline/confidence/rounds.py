@@ -15,7 +15,7 @@ from pipeline.confidence.surrogate import Surrogate, monomials
 from pipeline.confidence.whitening import weights
 from pipeline.episode.episode import Episode
 from pipeline.sling.interaction import Rollouts, interact
-from pipeline.sling.theta import in_air
+from pipeline.sling.theta import at_points
 
 LANES = 16  # rollouts that cost as much as one
 REACH = 3.0  # of the surrogate, in spreads of its design
@@ -144,7 +144,7 @@ class Rounds:
                 release_time=self.episode.release_time + shift[0],
                 cloud_time=self.episode.cloud_time + shift[1],
             )
-            sling, theta = in_air(self.sling, theta)
+            sling, theta = at_points(self.sling, theta)
             return interact(sling, shifted, theta)
 
         self.rollouts += len(theta)

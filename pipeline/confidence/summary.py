@@ -14,7 +14,6 @@ from pipeline.confidence.profile import profiles
 from pipeline.confidence.residuals import PHASES
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import cutoff_hz
-from pipeline.sling.material import THETA
 
 SAMPLES = 200  # that are kept
 UNITS = {
@@ -73,7 +72,7 @@ def corrected(episode: Episode, nuisances: dict[str, float]) -> Episode:
 def summary(posterior: Posterior, curves: dict) -> dict:
     """Intervals, correlations and residuals, ready for JSON."""
     axes, parameters = posterior.rounds.axes, {}
-    for name in THETA:
+    for name in (name for name in axes.space.names if name != "air_drag"):
         column = axes.space.names.index(name)
         low, high = interval(posterior.samples[:, column])
         entry = {"low": low, "high": high}

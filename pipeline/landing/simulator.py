@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.base.machine import cores
 from pipeline.sling.launch import launch
-from pipeline.sling.theta import calibrated, in_air, vector
+from pipeline.sling.theta import at_points, calibrated, vector
 
 
 def simulator(
@@ -22,14 +22,13 @@ def simulator(
 ):
     """Function that launches draws, shape (N, 2) [m], in the simulator calibrated by a θ file.
 
-    A second argument gives each launch a θ of its own, shape (N, 5), or with a sixth column a drag
-    of the air as well.
+    A second argument gives each launch a point of its own, shape (N, P), as `at_points` has them.
     """
     sling, best = calibrated(params, band, content, root), vector(content)[None]
     threads = cores()
 
     def launcher(draws: np.ndarray, thetas: np.ndarray | None = None):
-        moving, thetas = in_air(sling, best if thetas is None else thetas)
-        return launch(moving, thetas, draws, max_force=max_force, device=device, workers=threads)
+        own, theta = (sling, best) if thetas is None else at_points(sling, thetas)
+        return launch(own, theta, draws, max_force=max_force, device=device, workers=threads)
 
     return launcher

@@ -14,7 +14,10 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.objective.loss import TERMS, EpisodeLoss
 from pipeline.objective.space import Space
+from pipeline.params.identification import LAWS
 from pipeline.sling.interaction import Rollouts, interact
+from pipeline.sling.material import THETA
+from pipeline.sling.rubber import RUBBER
 
 NOT_FINITE = "the loss is not finite"  # the one failure that depends on the weights
 SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
@@ -103,13 +106,14 @@ class Evaluator:
         Args:
             device: The one that simulates them all; None: the first.
         """
-        first = self.space.dimension - len(self.space.nuisances)
-        nuisances = dict(zip(self.space.nuisances, theta[:, first:].T, strict=True))
-        sling = self._sling
-        if "air_drag" in nuisances:
-            sling = replace(sling, air_drag=nuisances["air_drag"])
-        device = device or self._devices[0]
-        return self._simulate(sling, thetas=theta[:, :first], device=device), nuisances
+        values = dict(zip(self.space.names, theta.T, strict=True))
+        extra = {name: values[name] for name in (*LAWS[RUBBER], "air_drag") if name in values}
+        rollouts = self._simulate(
+            replace(self._sling, **extra),
+            thetas=theta[:, : len(THETA)],
+            device=device or self._devices[0],
+        )
+        return rollouts, {name: values[name] for name in self.space.nuisances}
 
     def _slices(self, theta: np.ndarray) -> Iterator[np.ndarray]:
         return (theta[i : i + self._slice] for i in range(0, len(theta), self._slice))

@@ -70,7 +70,7 @@ def service(stage: str, band: str, method: str, params, rollouts: int) -> Loggin
 def evaluator(params, band: str, method: str) -> Evaluator:
     """The evaluator of a recorded band, on the devices that the environment names."""
     episode = load_episode(band)
-    sling = load_sling(params, band)
+    sling = load_sling(params, band, law=params.methods[method].law)
     return Evaluator(
         episode,
         sling,

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.objective.nuisance import NUISANCES
-from pipeline.params.identification import Prior
+from pipeline.params.identification import LAWS, Prior
 from pipeline.sling.material import THETA
+from pipeline.sling.rubber import NEO_HOOKEAN
 
 
 @dataclass(frozen=True)
@@ -35,20 +36,22 @@ class Space:
         nuisances: dict[str, tuple[float, float]] | None = None,
         bounds: dict[str, tuple[float, float]] | None = None,
         priors: dict[str, Prior] | None = None,
+        law: str = NEO_HOOKEAN,
     ) -> Space:
-        """Make it from params.yaml's `parameters`, in the simulator's order.
+        """Make it from params.yaml's `parameters`, in the simulator's order: θ, then its law's.
 
         Of a method's `nuisances`, bounds by name, each adds a linear axis, in NUISANCES' order. Its
         `bounds` take the place of a parameter's own. `priors` of other nuisances are left out.
         """
-        boxes = [getattr(parameters, name) for name in THETA]
+        inner = (*THETA, *LAWS[law])
+        boxes = [getattr(parameters, name) for name in inner]
         bounds = bounds or {}
         known = [
-            bounds.get(name, (box.low, box.high)) for name, box in zip(THETA, boxes, strict=True)
+            bounds.get(name, (box.low, box.high)) for name, box in zip(inner, boxes, strict=True)
         ]
         others = {name: nuisances[name] for name in NUISANCES if name in (nuisances or {})}
         return cls(
-            names=(*THETA, *others),
+            names=(*inner, *others),
             low=np.array([low for low, _ in (*known, *others.values())], float),
             high=np.array([high for _, high in (*known, *others.values())], float),
             log=np.array([*(box.scale == "log" for box in boxes), *(False for _ in others)]),
@@ -59,7 +62,7 @@ class Space:
     def of_method(cls, params, method: str) -> Space:
         """The box that a method of params.yaml searches: within its bounds, with its nuisances."""
         about = params.methods[method]
-        return cls.of(params.parameters, about.nuisances, about.bounds, about.priors)
+        return cls.of(params.parameters, about.nuisances, about.bounds, about.priors, about.law)
 
     @property
     def dimension(self) -> int:

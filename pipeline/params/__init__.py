@@ -25,7 +25,7 @@ from pipeline.params.identification import (
     check_method,
 )
 from pipeline.params.lab import BandName, BandParams, PlanParams, RunParams, SetupParams
-from pipeline.params.launches import FloorParams, PolicyParams, TrialsParams
+from pipeline.params.launches import FloorParams, LaunchParams, PolicyParams, TrialsParams
 from pipeline.params.recording import CloudParams, EpisodeParams, ForceParams
 from pipeline.params.virtual_rig import RigParams
 
@@ -45,6 +45,7 @@ class Params(Section):
     method_defaults: MethodDefaults
     methods: Annotated[dict[Name, MethodParams], FILLED]
     policy: PolicyParams
+    launch: LaunchParams
     trials: TrialsParams
     floor: FloorParams
     rig: RigParams

@@ -12,6 +12,10 @@ from pipeline.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound")
 KTop = Annotated[int, Range(1, 50)]
+LAWS = {  # of the band's material: the parameters that each has beside the five
+    "neo_hookean": (),
+    "rubber": ("mooney_share", "relaxation"),
+}
 SEARCHES = ("multistart", "de", "bo", "adam")
 NUISANCES = {  # how far the box of each may reach: 1/s, s, 1, N, m
     "air_drag": (0.0, 50.0),
@@ -65,6 +69,8 @@ class Parameters(Section):
     elasticity_damping: Box[Annotated[float, Range(1e-6, 1)]]
     dynamic_friction: Box[Annotated[float, Range(0, 5)]]
     damping_scale: Box[Annotated[float, Range(0, 1)]]
+    mooney_share: Box[Annotated[float, Range(-1, 1)]]
+    relaxation: Box[Annotated[float, Range(0, 0.2)]]
 
 
 class HeldOut(Section):
@@ -170,6 +176,7 @@ class Prior(Section):
 class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
+    law: Literal[tuple(LAWS)]
     search: Annotated[str, AfterValidator(_is_search)]
     settings: dict[str, Setting]
     fixed: dict[str, Value]
@@ -216,7 +223,8 @@ def check_method(
     method: MethodParams, path: str, parameters: Parameters, optimizer: OptimizerParams
 ) -> None:
     """Refuse what a method, whose key ends with `path`, asks for outside the box or the budget."""
-    boxes = {name: (box.low, box.high) for name, box in parameters}
+    others = {*LAWS["rubber"]} - {*LAWS[method.law]}
+    boxes = {name: (box.low, box.high) for name, box in parameters if name not in others}
     for name, (low, high) in method.bounds.items():
         if name not in boxes:
             raise refusal(f"{path}bounds: {name} is not one of {', '.join(boxes)}")

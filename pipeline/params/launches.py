@@ -9,6 +9,13 @@ from pipeline.base.schema import ASCENDING, FILLED, LIST, UNIQUE, Name, Range, S
 Distance = Annotated[float, Range(0.1, 20)]  # along the floor, m
 
 
+class LaunchParams(Section):
+    """How a hand draws the band for a launch; None: as for the recording."""
+
+    pull_time: Annotated[float, Range(0.01, 1000)] | None
+    pause: Annotated[float, Range(0, 1e5)] | None
+
+
 class Reward(Section):
     height: Annotated[float, Range(1e-3, 1e3)]
     scale: Annotated[float, Range(1e-3, 10)]

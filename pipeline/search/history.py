@@ -92,8 +92,8 @@ class History:
         return self.table.slice(int(np.argmin(total)), 1).to_pylist()[0]
 
 
-def theta_content(history: History, band: str) -> dict:
-    """What a theta file holds: the best of everything that was evaluated.
+def theta_content(history: History, band: str, **about) -> dict:
+    """What a theta file holds: the best of everything that was evaluated, and what else is known.
 
     Its nuisances are the searched axes that are none of `history.names`.
     """
@@ -103,6 +103,7 @@ def theta_content(history: History, band: str) -> dict:
     return {
         "band": band,
         "method": history.method,
+        **about,
         "theta": {name: best[name] for name in history.names},
         "nuisances": {name: best[name] for name in nuisances},
         "loss": terms,

@@ -15,7 +15,14 @@ from pipeline.sling.tetrahedra import CORNERS
 
 @built_once
 def sling_kernel(
-    element: str, law: str, dofs: int, sections: int, middle: int, double: bool, lanes: int, team: int
+    element: str,
+    law: str,
+    dofs: int,
+    sections: int,
+    middle: int,
+    double: bool,
+    lanes: int,
+    team: int,
 ) -> tuple[wp.Kernel, type]:
     """Compile the native text for a mesh; Warp keeps the binary in its cache.
 

@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.sling.initial import drawn_guess
 from pipeline.sling.model import GRAVITY, Sling
 from pipeline.sling.records import Grip, Outcome
+from pipeline.sling.rubber import unrelaxed
 from pipeline.sling.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.sling.solver import Options, Slings, run
 
@@ -84,7 +85,7 @@ def launch(
     direction = np.column_stack([np.zeros(count), -draws / np.maximum(distance, 1e-9)])
     slings = Slings.of(
         sling, thetas, drawn_guess(sling, draws),
-        direction=direction, payload=sling.projectile_mass,
+        direction=direction, payload=sling.projectile_mass, unrelaxed=unrelaxed(sling, draws),
     )  # fmt: skip
     schedule = schedule_of(sling, refine)
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from pipeline.base.layout import Layout
 from pipeline.base.schema import Direction, JsonRecord, Range, read_json
 from pipeline.sling.model import Sling
+from pipeline.sling.rubber import NEO_HOOKEAN
 
 
 class Mounting(JsonRecord):
@@ -17,11 +19,12 @@ class Mounting(JsonRecord):
     flexural_rigidity: Annotated[float, Range(0, 1e3)]
 
 
-def load_sling(params, band: str, root: str | Path = ".") -> Sling:
+def load_sling(params, band: str, root: str | Path = ".", law: str = NEO_HOOKEAN) -> Sling:
     """The sling of a band of params.yaml, mounted as its recording shows where that was fitted.
 
     Raises NotMade where the file of the mounting is damaged.
     """
     path = Layout(Path(root)).mounting(band)
     mounting = read_json(path, Mounting).model_dump() if path.exists() else None
-    return Sling.of(params.bands[band], params.setup, params.sling, mounting)
+    sling = Sling.of(params.bands[band], params.setup, params.sling, mounting)
+    return replace(sling, law=law)

@@ -14,6 +14,19 @@ ROD, TETRAHEDRA = "rod", "tetrahedra"  # meshes: rod.h, tetrahedra.h
 
 
 @dataclass(frozen=True)
+class LaunchHistory:
+    """How a hand draws the band for a launch: straight from the fork, at rest at both ends.
+
+    Attributes:
+        pull_time: That the way takes, a cubic in time [s].
+        pause: From there to the release [s].
+    """
+
+    pull_time: float
+    pause: float
+
+
+@dataclass(frozen=True)
 class Sling:
     """Geometry and mass of a clamped band, and the resolution it is simulated with.
 
@@ -37,6 +50,7 @@ class Sling:
         mooney_share: Of `rubber`: Mooney's second constant over the sum of both, one or one a
             theta. The shear modulus is that sum.
         relaxation: Of `rubber`: weight of each branch (rubber.py), one or one a theta.
+        history: Of `rubber`: what a band remembers that is launched; None: it has forgotten all.
         mesh: ROD, or TETRAHEDRA: a solid cylinder, whose edges are equally long. What of the band
             is inside the clamps does not deform there, so that the mesh ends at them.
     """
@@ -60,6 +74,7 @@ class Sling:
     law: str = NEO_HOOKEAN
     mooney_share: float | np.ndarray = 0.0
     relaxation: float | np.ndarray = 0.0
+    history: LaunchHistory | None = None
 
     @classmethod
     def of(

@@ -1,6 +1,8 @@
 """θ files: the identified parameters of a band as JSON, or the same written by hand.
 
-{"band": "...", "theta": {"youngs_modulus": ..., ... all five}}  and, where a stage wrote it,
+{"band": "...", "theta": {"youngs_modulus": ..., ... all five}}  is of the neo-Hookean law; with
+"law": "rubber", θ has its parameters too and "history" {"pull_time", "pause"} says in how many
+seconds the recording's hand drew the band and how long it waited. Where a stage wrote it, also
 "method", "nuisances": {"air_drag": ...}, "loss": {"geom", "force", "work", "total"}, "rollouts",
 "confidence"
 
@@ -11,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import create_model, model_validator
@@ -20,10 +22,11 @@ from pipeline.base.errors import UserError
 from pipeline.base.layout import NotMade, owner
 from pipeline.base.schema import JsonRecord, Range, Section, read_json, refusal
 from pipeline.params import Parameters
-from pipeline.params.identification import NUISANCES
+from pipeline.params.identification import LAWS, NUISANCES
 from pipeline.sling.load import load_sling
 from pipeline.sling.material import THETA
-from pipeline.sling.model import Sling
+from pipeline.sling.model import LaunchHistory, Sling
+from pipeline.sling.rubber import NEO_HOOKEAN, RUBBER
 
 
 def _limits(name: str) -> Range:
@@ -33,7 +36,10 @@ def _limits(name: str) -> Range:
 
 
 Theta = create_model(
-    "Theta", __base__=Section, **{name: (Annotated[float, _limits(name)], ...) for name in THETA}
+    "Theta",
+    __base__=Section,
+    **{name: (Annotated[float, _limits(name)], ...) for name in THETA},
+    **{name: (Annotated[float, _limits(name)], None) for name in LAWS[RUBBER]},
 )
 Nuisances = create_model(
     "Nuisances",
@@ -50,11 +56,28 @@ class Confidence(JsonRecord):
     discrepancy: Discrepancy | None = None
 
 
+class History(Section):
+    pull_time: Annotated[float, Range(0.01, 1000)]
+    pause: Annotated[float, Range(0, 1e5)]
+
+
 class ThetaFile(JsonRecord):
     band: str
+    law: Literal[NEO_HOOKEAN, RUBBER] = NEO_HOOKEAN
     theta: Theta
+    history: History | None = None
     nuisances: Nuisances = Nuisances()
     confidence: Confidence | None = None
+
+    @model_validator(mode="after")
+    def _keys_of_its_law(self) -> ThetaFile:
+        wanted, given = set(LAWS[self.law]), self.theta.model_fields_set - {*THETA}
+        if wanted != given:
+            names = ", ".join((*THETA, *LAWS[self.law]))
+            raise refusal(f"theta: of the law {self.law} it must have exactly {names}")
+        if self.law == RUBBER and self.history is None:
+            raise refusal("history: {pull_time, pause} is missing, which the law rubber needs")
+        return self
 
 
 class PosteriorFile(JsonRecord):
@@ -65,7 +88,9 @@ class PosteriorFile(JsonRecord):
 
     @model_validator(mode="after")
     def _a_column_each(self) -> PosteriorFile:
-        known = self.names in (list(THETA), [*THETA, "air_drag"])
+        known = self.names in [
+            [*THETA, *law, *drag] for law in LAWS.values() for drag in ([], ["air_drag"])
+        ]
         if self.samples and not (known and {*map(len, self.samples)} == {len(self.names)}):
             raise refusal("samples: must have a column for each of `names`, which are those of θ")
         return self
@@ -83,7 +108,7 @@ def load_theta(path: Path, band: str) -> dict:
 
 
 def load_samples(path: Path) -> np.ndarray | None:
-    """Samples of θ, and of the air's drag if searched, (M, 5) or (M, 6); None where there are none.
+    """Samples of θ, what its law adds, and the air's drag if searched, (M, P); None without any.
 
     Raises NotMade where the file is damaged.
     """
@@ -98,16 +123,30 @@ def law_discrepancy(content: dict) -> float:
 
 
 def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Sling:
-    """The sling of a band in the air that a θ file's content has identified beside θ."""
-    drag = content.get("nuisances", {}).get("air_drag", 0.0)
-    return replace(load_sling(params, band, root), air_drag=drag)
+    """The sling of a band with all that a θ file's content says beside the five of θ.
+
+    Its launches have the history of params.yaml's `launch`, or else the recording's.
+    """
+    law = content.get("law", NEO_HOOKEAN)
+    extra = {name: content["theta"][name] for name in LAWS[law]}
+    extra["air_drag"] = content.get("nuisances", {}).get("air_drag", 0.0)
+    if law == RUBBER:
+        asked = params.launch.model_dump(exclude_none=True)
+        extra["history"] = LaunchHistory(**content["history"] | asked)
+    return replace(load_sling(params, band, root, law), **extra)
 
 
-def in_air(sling: Sling, points: np.ndarray) -> tuple[Sling, np.ndarray]:
-    """A sling and θ (N, 5) of points (N, 5) or (N, 6), whose last column is the air's drag."""
-    if points.shape[-1] == len(THETA):
-        return sling, points
-    return replace(sling, air_drag=points[:, -1]), points[:, :-1]
+def at_points(sling: Sling, points: np.ndarray) -> tuple[Sling, np.ndarray]:
+    """A sling and θ (N, 5) of points (N, P): θ, what the sling's law adds, perhaps the drag."""
+    names = (*LAWS[sling.law], "air_drag")
+    extra = dict(zip(names, points[:, len(THETA) :].T, strict=False))
+    return replace(sling, **extra), points[:, : len(THETA)]
+
+
+def point(content: dict) -> np.ndarray:
+    """θ and what its law adds, in the order of `at_points`, shape (5,) or (7,)."""
+    names = (*THETA, *LAWS[content.get("law", NEO_HOOKEAN)])
+    return np.array([content["theta"][name] for name in names], float)
 
 
 def vector(content: dict) -> np.ndarray:

@@ -16,7 +16,8 @@ SMALL = 1e-30  # imaginary step: derivatives without cancellation
 @dataclass(frozen=True)
 class March:
     """States x and rates v after each step, shape (S, L, 9), the force on the hand (S, 3), and
-    what the branches of the law `rubber` carry (S, E, 8) [Pa]."""
+    what the branches of the law `rubber` carry (S, E, 8) [Pa].
+    """
 
     x: np.ndarray
     v: np.ndarray

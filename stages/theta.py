@@ -35,7 +35,7 @@ def main() -> None:
     law, episode = params.methods[method].law, load_episode(band)
     about = {"law": law, "history": launch_history(episode)} if law == RUBBER else {}
     history = History.load(method, (*THETA, *LAWS[law]), *sources)
-    content, sling = theta_content(history, band, **about), load_sling(params, band, law=law)
+    content, sling = theta_content(history, band, about), load_sling(params, band, law=law)
     try:
         known, kept = confidence(params, method, episode, sling, content, workers=workers())
     except NoConfidence as error:  # θ* is what it is, and all that follows does without

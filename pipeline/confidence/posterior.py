@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm, qmc
 
-from pipeline.confidence.axes import DAMPING, DRAG, SCALE, Axes
+from pipeline.confidence.axes import DAMPING, SCALE, Axes
 from pipeline.confidence.ensemble import sample
 from pipeline.confidence.rounds import LANES, Place, Round, Rounds, Tolerances
 from pipeline.episode.episode import Episode
@@ -113,10 +113,11 @@ def fit(
             sure = np.sqrt(np.diag(certain)[:2]) * place.steps
             steps = np.clip(2 * sure, SHRINK * steps, steps)
     theta = axes.physical(flat)
+    drag = {"air_drag": theta[:, -1]} if axes.space.names[-1] == "air_drag" else {}
     return Posterior(
         samples=theta,
         mean=course[-1],
-        derived=_derived(found, drawn, theta, episode, rng),
+        derived=_derived(found, drawn, theta, episode, rng) | drag,
         last=found,
         moved=moved,
         rounds=rounds,
@@ -159,11 +160,9 @@ def _derived(
     mean, covariance = found.surrogate.nuisances(drawn)
     noise = rng.multivariate_normal(np.zeros(2), covariance[:2, :2], len(drawn))
     shifts = found.place.times + (mean[:, :2] + noise) * found.place.steps
-    drag = {"air_drag": theta[:, DRAG]} if theta.shape[1] > DRAG else {}
     return {
         "damping_product": theta[:, DAMPING] * theta[:, SCALE],
         "hold_force": found.hold_force(drawn),
         "release_time": episode.release_time + shifts[:, 0],
         "camera_delay": -shifts[:, 1],
-        **drag,
     }

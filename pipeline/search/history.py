@@ -92,8 +92,8 @@ class History:
         return self.table.slice(int(np.argmin(total)), 1).to_pylist()[0]
 
 
-def theta_content(history: History, band: str, **about) -> dict:
-    """What a theta file holds: the best of everything that was evaluated, and what else is known.
+def theta_content(history: History, band: str, about: dict | None = None) -> dict:
+    """What a theta file holds: the best of everything that was evaluated, and `about`.
 
     Its nuisances are the searched axes that are none of `history.names`.
     """
@@ -103,7 +103,7 @@ def theta_content(history: History, band: str, **about) -> dict:
     return {
         "band": band,
         "method": history.method,
-        **about,
+        **(about or {}),
         "theta": {name: best[name] for name in history.names},
         "nuisances": {name: best[name] for name in nuisances},
         "loss": terms,

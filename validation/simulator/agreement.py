@@ -90,10 +90,12 @@ def scenes(sling: Sling) -> dict[str, Start]:
     }
 
 
-def compare(bench: Bench, thetas: np.ndarray) -> dict[str, tuple[float, float]]:
+def compare(
+    bench: Bench, thetas: np.ndarray, sling: Sling | None = None
+) -> dict[str, tuple[float, float]]:
     """Largest difference of a scene's states and forces, by what the reference says they do."""
     result = {}
-    for name, scene in scenes(band_of(bench)).items():
+    for name, scene in scenes(sling or band_of(bench)).items():
         states, forces = [], []
         for theta in thetas:
             start = scene.guess.copy()
@@ -113,11 +115,11 @@ def compare(bench: Bench, thetas: np.ndarray) -> dict[str, tuple[float, float]]:
     return result
 
 
-def checks(bench: Bench, count: int = 4) -> list[Finding]:
+def checks(bench: Bench, count: int = 4, sling: Sling | None = None) -> list[Finding]:
     against = "NumPy reference implementation, Newton's method to rounding"
     note = f"{count} random θ of the box, double precision"
     result = []
-    for name, (states, forces) in compare(bench, random_thetas(bench, count)).items():
+    for name, (states, forces) in compare(bench, random_thetas(bench, count), sling).items():
         result.append(
             Finding(f"states of a band {name}", against, states, "of its motion", LIMIT, note)
         )

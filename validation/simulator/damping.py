@@ -161,6 +161,7 @@ def oscillate(
     mass: float = 0.5,
     periods: float = 4.0,
     per_period: int = 800,
+    sling: Sling | None = None,
 ) -> tuple[np.ndarray, np.ndarray, tuple[float, float], tuple[float, float]]:
     """A heavy middle of a thin, light band, let go 1 % of the rest length off its place.
 
@@ -170,7 +171,7 @@ def oscillate(
     Returns:
         Time and displacement (S,), (frequency [1/s], decay [1/s]) as fitted and in closed form.
     """
-    sling = band_of(bench)
+    sling = sling or band_of(bench)
     sling = replace(sling, radius=sling.radius / STRING, mass=sling.mass / 20)
     sling = straight(sling, sling.rest_length * stretch)
     amplitude = 0.01 * sling.rest_length

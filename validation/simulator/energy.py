@@ -8,7 +8,8 @@ import numpy as np
 
 from pipeline.sling.initial import hanging_guess
 from pipeline.sling.interaction import schedule_of
-from pipeline.sling.records import Grip
+from pipeline.sling.model import Sling
+from pipeline.sling.records import Grip, Mode
 from pipeline.sling.schedule import RELAX_STEPS
 from validation.simulator import figures
 from validation.simulator.experiment import band_of, move
@@ -29,6 +30,8 @@ class Balance:
         turning: Work of the fingers as they take and leave the direction of the middle.
         pads: Lost to the pads while they open.
         viscous: Lost to damping.
+        branches: Free energy of the law `rubber`'s memory.
+        relaxed: Lost as it forgets.
         integrator: Lost to the steps: what inertia and elastic forces do in a step is not quite
             the change of their energies.
     """
@@ -40,6 +43,8 @@ class Balance:
     kinetic: np.ndarray
     gravity: np.ndarray
     viscous: np.ndarray
+    branches: np.ndarray
+    relaxed: np.ndarray
     pads: np.ndarray
     integrator: np.ndarray
     release: float
@@ -52,17 +57,53 @@ class Balance:
     @property
     def miss(self) -> np.ndarray:
         """What the hand and the fingers put in, less what is stored and physically dissipated."""
-        stored = self.elastic + self.kinetic + self.gravity
-        return self.hand + self.turning - stored - self.viscous - self.pads
+        stored = self.elastic + self.branches + self.kinetic + self.gravity
+        lost = self.viscous + self.relaxed + self.pads
+        return self.hand + self.turning - stored - lost
 
     def share(self, energy: np.ndarray) -> float:
         """In percent of all of the hand's work, at its largest."""
         return float(100 * np.abs(energy).max() / np.abs(self.hand).max())
 
 
-def balance(bench: Bench, theta=THETA) -> Balance:
+@dataclass(frozen=True)
+class Remembered:
+    """Of the law `rubber` over steps (S,): what a step's forces need, and where energy is.
+
+    Attributes:
+        carried, following: As ReferenceRod has them, shape (S, E), (S, 1).
+        free: Free energy of the branches at the steps' ends [J], shape (S,).
+        lost: What they lose in each step, from the power at its ends [J], shape (S,).
+    """
+
+    carried: np.ndarray
+    following: np.ndarray
+    free: np.ndarray
+    lost: np.ndarray
+
+
+def remembered(
+    rod: ReferenceRod, table: np.ndarray, start: np.ndarray, x: np.ndarray
+) -> Remembered:
+    """Of states (S, L, 9) after steps from `start`, relaxed; steps at rest forget all."""
+    columns = rod.columns(np.concatenate([start[None], x]))
+    stress = rod.uniaxial(rod.stretch(columns))
+    weight, carried = rod.sling.relaxation, np.zeros((len(x), rod.sling.edges))
+    overstress = np.zeros((len(x) + 1, rod.sling.edges, table["forget"].shape[1]))
+    moving = table["mode"] == Mode.MOVE
+    follow = np.where(moving[:, None], table["follow"], 0.0)
+    for k in np.flatnonzero(moving):
+        kept = table["forget"][k] * overstress[k]
+        carried[k] = weight * (kept - np.outer(stress[k], follow[k])).sum(-1)
+        overstress[k + 1] = kept + np.outer(stress[k + 1] - stress[k], follow[k])
+    free, power = rod.branches(overstress, columns)
+    lost = np.where(moving, table["h"] * (power[1:] + power[:-1]) / 2, 0.0)
+    return Remembered(carried, weight * follow.sum(-1)[:, None], free[1:], lost)
+
+
+def balance(bench: Bench, theta=THETA, sling: Sling | None = None) -> Balance:
     """The bench's pull and release in double precision, every step of it accounted for."""
-    sling = band_of(bench)
+    sling = sling or band_of(bench)
     episode = pull_and_release("band", bench.params.episode, sling)
     table = schedule_of(sling, episode).steps
     motion = move(bench, sling, theta, table, hanging_guess(sling), double=True)
@@ -74,6 +115,9 @@ def balance(bench: Bench, theta=THETA) -> Balance:
     c1, c2, beta = (rows[name][:, None, None] for name in ("c1", "c2", "beta"))
     moved = x - x1
     rod = ReferenceRod(sling, tuple(theta))
+    memory = remembered(rod, table, motion.start[0], motion.x[0])
+    carried, following = memory.carried[first + 1 :], memory.following[first + 1 :]
+    free, lost = memory.free[first + 1 :], memory.lost[first + 1 :]
 
     def work(force: np.ndarray, moved: np.ndarray) -> np.ndarray:
         return (force * moved).sum((-2, -1))
@@ -81,7 +125,7 @@ def balance(bench: Bench, theta=THETA) -> Balance:
     elastic, before, conservative, viscous = (np.empty(len(x)) for _ in range(4))
     for gripped in (False, True):
         part = (rows["grip"] == Grip.HELD) == gripped
-        band = replace(rod, gripped=gripped)
+        band = replace(rod, gripped=gripped, carried=carried[part], following=following[part])
         still = np.zeros_like(v[part])
         elastic[part], before[part] = band.elastic(x[part]), band.elastic(x1[part])
         conservative[part] = work(band.internal(x[part], still, at[part]), moved[part])
@@ -89,6 +133,7 @@ def balance(bench: Bench, theta=THETA) -> Balance:
     rate = (v - c1 * v1 + c2 * v2) / (beta * rows["h"][:, None, None])
     kinetic = np.append(0.0, rod.kinetic(v))
     integrator = work(rod.mass * rate, moved) - np.diff(kinetic) + conservative - (elastic - before)
+    integrator -= np.diff(free, prepend=0.0) + lost
     hand = -(motion.force[0, first + 1 :] * moved[:, sling.middle, :3]).sum(-1)
     hanging = rod.elastic(x1[0])
     turning = before - np.append(hanging, elastic[:-1])
@@ -100,6 +145,8 @@ def balance(bench: Bench, theta=THETA) -> Balance:
         kinetic=kinetic[1:],
         gravity=rod.weight(x) - rod.weight(x1[0]),
         viscous=np.cumsum(viscous),
+        branches=free,
+        relaxed=np.cumsum(lost),
         pads=-np.cumsum(np.where(rows["grip"] == Grip.OPENING, hand, 0.0)),
         integrator=np.cumsum(integrator),
         release=episode.release_time,
@@ -112,11 +159,14 @@ def checks(done: Balance) -> list[Finding]:
     taut = (done.time > done.release) & (done.time < done.release + 0.1)
     parts = {
         name: getattr(done, name)[-1]
-        for name in ("elastic", "kinetic", "gravity", "viscous", "pads")
+        for name in ("elastic", "branches", "kinetic", "gravity", "viscous", "relaxed", "pads")
     }
     parts["steps"] = done.miss[-1]
     note = " + ".join(f"{name} {value:.4f}" for name, value in parts.items())
-    against = "hand + fingers' turning = elastic + kinetic + gravity + dissipated (viscous, pads)"
+    against = (
+        "hand + fingers' turning = elastic + branches + kinetic + gravity + dissipated (viscous,"
+        " relaxed, pads)"
+    )
     return [
         Finding(
             "balance of energy, largest miss at any time",

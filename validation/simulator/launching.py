@@ -66,8 +66,10 @@ def differences(default: Launches, finer: Launches) -> dict[str, float]:
     }
 
 
-def convergence(bench: Bench, count: int = COUNT, meshes=(2, 4), progress=print) -> list[Finding]:
-    sling, (thetas, draws) = band_of(bench), random_launches(count)
+def convergence(
+    bench: Bench, count: int = COUNT, meshes=(2, 4), progress=print, sling: Sling | None = None
+) -> list[Finding]:
+    sling, (thetas, draws) = sling or band_of(bench), random_launches(count)
     common = {"device": bench.device, "workers": bench.workers}
     default = launch(sling, thetas, draws, **common)
     finer = {f"{REFINE} times finer steps": (sling, {"refine": REFINE})}

@@ -9,7 +9,9 @@ from itertools import product
 import numpy as np
 
 from pipeline.objective.space import Space
+from pipeline.params.identification import LAWS
 from pipeline.sling import THETA, Sling, interact, launch
+from pipeline.sling.theta import at_points
 from validation.simulator.agreement import random_thetas
 from validation.simulator.experiment import band_of
 from validation.simulator.finding import Bench, Finding, Theme
@@ -35,14 +37,14 @@ def on_faces(bench: Bench, count: int) -> np.ndarray:
     return Space.of(bench.params.parameters).to_physical(unit)
 
 
-def ranges(thetas: list[dict[str, float]]) -> str:
+def ranges(thetas: list[dict[str, float]], names=THETA) -> str:
     """Between what bounds the parameters of thetas lie; one that all share is named as such."""
 
     def told(name: str) -> str:
         low, high = (f"{f([one[name] for one in thetas]):.3g}" for f in (min, max))
         return f"{name} {low}" if low == high else f"{name} {low}–{high}"
 
-    return ", ".join(told(name) for name in THETA)
+    return ", ".join(told(name) for name in names)
 
 
 def survey(bench: Bench, sling: Sling, thetas: np.ndarray, progress=print) -> dict:
@@ -51,14 +53,15 @@ def survey(bench: Bench, sling: Sling, thetas: np.ndarray, progress=print) -> di
     reasons, bad, farthest, failed = Counter(), 0, 0.0, []
     for first in range(0, len(thetas), BATCH):
         part = thetas[first : first + BATCH]
-        done = interact(sling, episode, part, device=bench.device, workers=bench.workers)
+        own, theta = at_points(sling, part)
+        done = interact(own, episode, theta, device=bench.device, workers=bench.workers)
         good = np.array([reason is None for reason in done.failure])
         reasons.update(reason for reason in done.failure if reason is not None)
         lines, force = done.center_line[good], done.force[good]
         bad += int(np.sum(~np.isfinite(lines).all((1, 2, 3)) | ~np.isfinite(force).all((1, 2))))
         farthest = max(farthest, float(np.linalg.norm(lines, axis=3).max(initial=0)))
         failed += [
-            dict(zip(THETA, map(float, part[k]), strict=True))
+            dict(zip((*THETA, *LAWS[sling.law]), map(float, part[k]), strict=True))
             for k in np.flatnonzero(~good)
             if done.failure[k] == UNCONVERGED
         ]

@@ -26,6 +26,7 @@ from validation.simulator import (
     free_motion,
     launching,
     robustness,
+    rubber,
 )
 from validation.simulator.finding import Bench, Finding, Theme, unmet
 
@@ -54,7 +55,11 @@ SECTIONS: dict[str, Callable[..., Theme]] = {
     "the five parameters": five_parameters.section,
     "rod and tetrahedra": elements.section,
 }
-CAMPAIGNS = {"launches": launching.section, "random parameters": robustness.section}
+CAMPAIGNS = {
+    "launches": launching.section,
+    "random parameters": robustness.section,
+    "the law rubber": rubber.section,
+}
 
 
 def verify(

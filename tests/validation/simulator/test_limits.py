@@ -12,6 +12,7 @@ from validation.simulator import (
     free_motion,
     launching,
     robustness,
+    rubber,
 )
 from validation.simulator.finding import unmet
 
@@ -33,6 +34,19 @@ CHECKS = {
     "nu": five_parameters.poisson,
     "d and s": five_parameters.damping,
     "friction": five_parameters.friction,
+    "rubber: a string's pull": lambda bench: rubber.pull(bench, (2.2,)),
+    "rubber: relaxation": rubber.relaxation,
+    "rubber: a heavy middle": rubber.oscillator,
+    "rubber: the kernel's steps": lambda bench: agreement.checks(
+        bench, 1, sling=rubber.rubber_of(bench, -0.3, 0.04)
+    ),
+    "rubber: growth of energy": lambda bench: rubber.growth(bench, 4),
+    "rubber: slack again": rubber.slack,
+    "rubber: a launch's history": rubber.histories,
+    "rubber: random points": lambda bench: rubber.survey(bench, 64, progress=str)[0],
+    "rubber: energy": lambda bench: energy.checks(
+        energy.balance(bench, sling=rubber.rubber_of(bench))
+    ),
 }
 
 

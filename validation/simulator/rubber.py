@@ -1,0 +1,333 @@
+"""The law `rubber`: Mooney and Rivlin's string, relaxation by its integral, energy, finer steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.integrate import quad
+from scipy.linalg import expm
+from scipy.optimize import least_squares
+
+from pipeline.objective.space import Space
+from pipeline.params.identification import LAWS
+from pipeline.sling.initial import drawn_guess
+from pipeline.sling.material import THETA
+from pipeline.sling.model import LaunchHistory, Sling
+from pipeline.sling.records import Grip
+from pipeline.sling.rubber import RUBBER, TIMES
+from pipeline.sling.schedule import steps
+from validation.simulator import agreement, energy, launching, robustness
+from validation.simulator.at_rest import STRING
+from validation.simulator.closed import oscillation
+from validation.simulator.damping import STATES, oscillate, random_states
+from validation.simulator.experiment import (
+    band_of,
+    launched,
+    move,
+    settling,
+    straight,
+    straight_guess,
+)
+from validation.simulator.finding import Bench, Finding, Theme, off
+from validation.simulator.reference import ReferenceRod
+
+SHARES = (-0.3, 0.3, 0.9)
+WEIGHT = 0.02
+PULL_LIMIT, INTEGRAL_LIMIT, FREQUENCY_LIMIT, DECAY_LIMIT = 0.1, 2.0, 1.0, 2.0  # percent
+THIN = 40  # times thinner than the band: no beam any more
+FULL = 0.4999  # Poisson's ratio of a volume that hardly changes
+ROUNDING = 1e-9
+HISTORY = LaunchHistory(pull_time=4.0, pause=2.0)
+SEED = 5
+
+
+def rubber_of(bench: Bench, share: float = 0.3, weight: float = WEIGHT) -> Sling:
+    sling = band_of(bench)
+    return replace(sling, law=RUBBER, mooney_share=share, relaxation=weight, history=HISTORY)
+
+
+def stress(stretch, share: float):
+    """Mooney (1940) and Rivlin (1948), over the shear modulus, incompressible."""
+    return (stretch - stretch**-2) * (1 - share + share / stretch)
+
+
+def slope(stretch: float, share: float) -> float:
+    return (1 - share) * (1 + 2 * stretch**-3) + 3 * share * stretch**-4
+
+
+def _string(bench: Bench, share: float, weight: float, lighter: float = 1.0) -> Sling:
+    """A straight, thin, light band at its rest length, to be drawn across at its middle."""
+    sling = rubber_of(bench, share, weight)
+    sling = replace(sling, radius=sling.radius / THIN, mass=sling.mass / THIN**2 / lighter)
+    return straight(sling, sling.rest_length)
+
+
+def drawn_across(
+    bench: Bench, sling: Sling, stretch: np.ndarray, times: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pull along the band [N] over A mu as its middle is drawn to stretches (T,), and the times."""
+    theta = np.array([1e6, FULL, 2e-4, 0.5, 1.0])
+    depth = sling.rest_length / 2 * np.sqrt(np.maximum(stretch**2 - 1, 0))
+    table = steps(times, np.diff(times)[0], grip=Grip.POUCH)
+    table["target"][:, 1] = -depth[1:]
+    motion = move(bench, sling, theta, table, straight_guess(sling), gravity=0.0, double=True)
+    half = np.hypot(depth[1:], sling.half_width)
+    pull = motion.force[0, :, 1] * half / depth[1:].clip(1e-9) / 2
+    return pull / (sling.area * theta[0] / (2 * (1 + FULL))), table["time"]
+
+
+def pull(bench: Bench, stretches=(1.2, 1.6, 2.2), shares=SHARES) -> list[Finding]:
+    """At rest, drawn so slowly that branches with weight 0 do nothing."""
+    worst = 0.0
+    for share in shares:
+        sling = _string(bench, share, 0.0)
+        for stretch in stretches:
+            path = np.append(np.linspace(1.001, stretch, 40), [stretch] * 20)
+            got, _ = drawn_across(bench, sling, path, 10.0 * np.arange(len(path)))
+            worst = max(worst, off(got[-1], stress(stretch, share)))
+    return [
+        Finding(
+            f"pull of a thin string to stretch {max(stretches):g}, worst of shares"
+            f" {', '.join(f'{one:g}' for one in shares)}",
+            "Mooney and Rivlin in uniaxial stress, P = μ (λ − λ⁻²)(1 − m + m/λ)",
+            worst,
+            "%",
+            PULL_LIMIT,
+            f"{THIN} times thinner than the band, ν {FULL}",
+        )
+    ]
+
+
+def integral(history, time: float, share: float) -> float:
+    """Relaxed stress and what eight branches add of its rates: the hereditary integral."""
+
+    def rate(then: float) -> float:
+        step = 1e-6
+        return (stress(history(then + step), share) - stress(history(then - step), share)) / (
+            2 * step
+        )
+
+    def kernel(then: float) -> float:
+        return rate(then) * np.exp((then - time) / TIMES).sum()
+
+    corners = [one for one in (0.2, 0.5) if one < time]
+    added = quad(kernel, 0, time, points=corners, limit=400, epsabs=1e-7)[0]
+    return stress(history(time), share) + WEIGHT * added
+
+
+def relaxation(bench: Bench, share: float = 0.3, most: float = 1.6) -> list[Finding]:
+    """A step of 0.2 s held for 3 s, and a loop out and back in 1 s."""
+    ramp, turn = 0.2, 0.5
+    histories = {
+        "held after a step": (lambda t: 1 + (most - 1) * np.clip(t / ramp, 0, 1), 3.0, ramp),
+        "out and back": (lambda t: 1 + (most - 1) * (1 - abs(t / turn - 1)), 2 * turn, 0.05),
+    }
+    checks = []
+    for name, (history, end, first) in histories.items():
+        times = np.append(np.linspace(0, 0.25, 251), np.linspace(0.252, end, 400))
+        stretch = np.maximum(history(times), 1.0)
+        got, at = drawn_across(bench, _string(bench, share, WEIGHT, 10.0), stretch, times)
+        chosen = np.flatnonzero((at > first) & (stretch[1:] > 1.05))[::40]
+        told = np.array([integral(history, at[k], share) for k in chosen])
+        worst = 100 * np.abs(got[chosen] - told).max() / told.max()
+        checks.append(
+            Finding(
+                f"stress {name}, to {100 * (most - 1):.0f} % strain, worst moment",
+                "hereditary integral of the nominal stress",
+                float(worst),
+                "% of its peak",
+                INTEGRAL_LIMIT,
+                f"share {share:g}, eight branches of {WEIGHT:g}",
+            )
+        )
+    return checks
+
+
+def oscillator(bench: Bench, share: float = 0.3, stretch: float = 1.5) -> list[Finding]:
+    """A heavy middle, its memory relaxed where it is let go, by the matrix exponential."""
+    mass, theta = 0.5, [1e6, FULL, 1e-6, 0.5, 0.0]
+    sling = rubber_of(bench, share)
+    time, place, _, _ = oscillate(bench, theta, mass=mass, stretch=stretch, sling=sling)
+    thin = replace(sling, radius=sling.radius / STRING, mass=sling.mass / 20)
+    k = 4 * thin.area / thin.rest_length * theta[0] / (2 * (1 + FULL)) * slope(stretch, share)
+    moving = mass + thin.mass / 3
+    rates = np.zeros((10, 10))  # of place, speed, and what the branches carry of k x
+    rates[0, 1], rates[1, 0], rates[1, 2:] = 1, -k / moving, -k * WEIGHT / moving
+    rates[2:, 1], rates[2:, 2:] = 1, -np.diag(1 / TIMES)
+    step, state, told = expm(rates * time[1]), np.append(place[0], np.zeros(9)), []
+    for _ in time:
+        told.append(state[0])
+        state = step @ state
+
+    def modes(place: np.ndarray) -> tuple[float, float]:
+        def miss(share: np.ndarray) -> np.ndarray:
+            return oscillation(time, moving, share[0] * k, share[1] * 0.1, place[0]) - place
+
+        fit = least_squares(miss, [1.0, 1.0], xtol=1e-12, ftol=1e-12)
+        decay = fit.x[1] * 0.1 / (2 * moving)
+        return float(np.sqrt(fit.x[0] * k / moving - decay**2) / (2 * np.pi)), float(decay)
+
+    checks = []
+    against = "m x'' + k (x + w Σ o) = 0, o' = x' − o/t, by the matrix exponential"
+    both = zip(modes(place), modes(np.array(told)), strict=True)
+    for (name, limit, unit), (one, other) in zip(
+        (("frequency", FREQUENCY_LIMIT, "Hz"), ("decay", DECAY_LIMIT, "/s")), both, strict=True
+    ):
+        note = f"{one:.4g} {unit}, closed form {other:.4g} {unit}; both as one damped oscillation"
+        where = f"{name} of a heavy middle, damped by relaxation alone"
+        checks.append(Finding(where, against, off(one, other), "%", limit, note))
+    return checks
+
+
+def growth(bench: Bench, count: int = 16, kinds=tuple(STATES)) -> list[Finding]:
+    """Elastic, kinetic and the branches' energy after random states, relaxed there, are let go."""
+    rng, worst, kept = np.random.default_rng(SEED), 0.0, 0
+    for kind in kinds:
+        thetas = agreement.random_thetas(bench, count, SEED)
+        starts = random_states(band_of(bench), kind, count, rng)
+        for theta, start in zip(thetas, starts, strict=True):
+            sling = rubber_of(bench, rng.uniform(-0.3, 0.9), rng.uniform(0, 0.05))
+            sling = straight(sling, sling.rest_length)
+            table = launched(bench.params.sling.recoil_step, 60, 1)
+            motion = move(bench, sling, theta, table, start, gravity=0.0, double=True)
+            if motion.failed[0]:
+                continue
+            rod, kept = ReferenceRod(sling, tuple(theta), gravity=0.0), kept + 1
+            total = rod.elastic(motion.x[0]) + rod.kinetic(motion.v[0])
+            total = total + energy.remembered(rod, table, motion.start[0], motion.x[0]).free
+            total = np.append(rod.elastic(motion.start[0]), total)
+            worst = max(worst, float(np.diff(total).max() / total[0]))
+    return [
+        Finding(
+            "rise of elastic, kinetic and branches' energy in any one step, backward Euler",
+            "energy never grows without work",
+            worst,
+            "of the start",
+            ROUNDING,
+            f"{kept} of {count * len(kinds)} random states, shares −0.3 to 0.9; others are marked"
+            " failed",
+        )
+    ]
+
+
+def slack(bench: Bench) -> list[Finding]:
+    """A band that relaxed while drawn and is led back to its rest length pushes the hand no more.
+
+    It is longer than it was; it bends out and grows short again.
+    """
+    sling, theta = rubber_of(bench, 0.3, 0.05), np.array([3e5, 0.45, 1e-3, 0.5, 0.5])
+    sling = straight(sling, sling.rest_length)
+    out, back = np.linspace(0.01, 1, 100), 30 + np.linspace(0.005, 0.5, 100)
+    later = np.linspace(1.1, 30, 40), 30.5 + np.linspace(0.05, 60, 200)
+    times = np.concatenate([[0], out, later[0], back, later[1]])
+    depth = 0.3 * np.interp(times, [0, 1, 30, 30.5, 91], [0, 1, 1, 0, 0])
+    table = steps(times, 0.01, grip=Grip.POUCH)
+    table["target"][:, 1] = -depth[1:]
+    motion = move(bench, sling, theta, table, straight_guess(sling), double=True)
+    force = np.linalg.norm(motion.force[0], axis=1)
+    weight = sling.mass * 9.81
+    return [
+        Finding(
+            "force on the hand a minute after a drawn band was led back, over the band's weight",
+            "at most its weight: nothing is stretched",
+            float(force[-1] / weight) if not motion.failed[0] else float("nan"),
+            "weights",
+            1.0,
+            f"{force[: len(table)].max():.1f} N at its most",
+        )
+    ]
+
+
+def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Finding]:
+    """`launch` starts with what a pull and a pause leave in the memory: the march of that pull."""
+    sling, draw = rubber_of(bench), np.array([-0.35, -0.15])
+    done = launching.launch(sling, theta, draw, device=bench.device)
+    none = launching.launch(replace(sling, history=None), theta, draw, device=bench.device)
+    times = 0.02 * np.arange(301)  # 4 s, and 2 s drawn
+    part = np.minimum(times / HISTORY.pull_time, 1)
+    way = (part**2 * (3 - 2 * part))[:, None] * draw
+    taut = np.hypot(sling.half_width, np.linalg.norm(way, axis=1)) > 1.001 * sling.rest_length / 2
+    first = np.flatnonzero(taut)[0]  # until then a band remembers nothing
+    table = steps(times[first:], 0.02, grip=Grip.POUCH)
+    table["target"][:, 1:] = way[first + 1 :]
+    before = settling(Grip.POUCH, (0.0, *way[first]))
+    start = drawn_guess(sling, way[[first]])[0]
+    motion = move(
+        bench, sling, theta, np.concatenate([before, table]), start, payload=sling.projectile_mass
+    )
+    hold = float(np.linalg.norm(motion.force[0, -1]))
+    return [
+        Finding(
+            "hold force of a launch with a history",
+            "a simulated pull of 4 s and a pause of 2 s to that draw",
+            off(done.hold_force[0], hold),
+            "%",
+            0.5,
+            f"{done.hold_force[0]:.3f} N; {none.hold_force[0]:.3f} N without memory",
+        ),
+        Finding(
+            "landing with a history against one that has forgotten all",
+            "—",
+            float(100 * (done.landing_y[0] / none.landing_y[0] - 1)),
+            "%",
+            None,
+            f"{done.landing_y[0]:.3f} m and {none.landing_y[0]:.3f} m",
+        ),
+    ]
+
+
+def random_points(bench: Bench, count: int) -> np.ndarray:
+    """Of the box in params.yaml, θ and what the law adds, shape (count, 7)."""
+    space = Space.of(bench.params.parameters, law=RUBBER)
+    return space.to_physical(np.random.default_rng(SEED).random((count, space.dimension)))
+
+
+def survey(bench: Bench, count: int = 10_000, progress=print) -> tuple[list[Finding], dict]:
+    sling = replace(rubber_of(bench), grip_force=robustness.HELD_FAST)
+    found = robustness.survey(bench, sling, random_points(bench, count), progress)
+    names = (*THETA, *LAWS[RUBBER])
+    failed = robustness.ranges(found["unconverged"], names) if found["unconverged"] else ""
+    return [
+        Finding(
+            f"not finite, though not marked failed, of {count} random points, negative shares among"
+            " them",
+            "0",
+            float(found["not_finite"]),
+            "θ",
+            0.0,
+        ),
+        Finding(
+            f"unconverged, and marked so, of {count} random points, held fast",
+            "0, or marked failed with a reason",
+            float(len(found["unconverged"])),
+            "θ",
+            robustness.ALLOWED * count / robustness.COUNT,
+            failed,
+        ),
+    ], found
+
+
+def section(bench: Bench, count: int = 10_000, progress=print) -> Theme:
+    sling = rubber_of(bench)
+    balance = energy.balance(bench, sling=sling)
+    surveyed, found = survey(bench, count, progress)
+    return Theme(
+        "The law `rubber`",
+        [
+            *pull(bench),
+            *relaxation(bench),
+            *oscillator(bench),
+            *agreement.checks(bench, 2, sling=sling),
+            *energy.checks(balance),
+            *growth(bench),
+            *slack(bench),
+            *histories(bench),
+            *launching.convergence(bench, progress=progress, sling=sling),
+            *surveyed,
+        ],
+        "Mooney's share m and eight relaxing branches of one weight beside the neo-Hookean material"
+        " (`pipeline/sling/rubber.h`). E is the relaxed modulus. Each branch has a free energy,"
+        " whose sum with what the branches lose takes part in the balance.",
+        details={"survey": found},
+    )

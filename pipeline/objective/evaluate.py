@@ -109,7 +109,7 @@ class Evaluator:
         values = dict(zip(self.space.names, theta.T, strict=True))
         extra = {name: values[name] for name in (*LAWS[RUBBER], "air_drag") if name in values}
         rollouts = self._simulate(
-            replace(self._sling, **extra),
+            replace(self._sling, **extra) if extra else self._sling,
             thetas=theta[:, : len(THETA)],
             device=device or self._devices[0],
         )

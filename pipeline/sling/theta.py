@@ -56,7 +56,7 @@ class Confidence(JsonRecord):
     discrepancy: Discrepancy | None = None
 
 
-class History(Section):
+class RecordedPull(Section):
     pull_time: Annotated[float, Range(0.01, 1000)]
     pause: Annotated[float, Range(0, 1e5)]
 
@@ -65,7 +65,7 @@ class ThetaFile(JsonRecord):
     band: str
     law: Literal[NEO_HOOKEAN, RUBBER] = NEO_HOOKEAN
     theta: Theta
-    history: History | None = None
+    history: RecordedPull | None = None
     nuisances: Nuisances = Nuisances()
     confidence: Confidence | None = None
 
@@ -138,6 +138,8 @@ def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Slin
 
 def at_points(sling: Sling, points: np.ndarray) -> tuple[Sling, np.ndarray]:
     """A sling and θ (N, 5) of points (N, P): θ, what the sling's law adds, perhaps the drag."""
+    if points.shape[-1] == len(THETA):
+        return sling, points
     names = (*LAWS[sling.law], "air_drag")
     extra = dict(zip(names, points[:, len(THETA) :].T, strict=False))
     return replace(sling, **extra), points[:, : len(THETA)]

@@ -14,6 +14,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.schema import Section
 from pipeline.objective.nuisance import NUISANCES
 from pipeline.params import Params, check, identification, load, parse
+from pipeline.sling.material import THETA
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "params.yaml").read_text(encoding="utf-8")
@@ -24,7 +25,7 @@ GAIN = BO | {"nuisances": {"force_gain": [0.8, 1.2]}, "fixed": {"youngs_modulus"
 GAIN |= {"priors": {"force_gain": {"mean": 0.1, "weight": 1.0}}}
 NOTHING = dict.fromkeys(("geom", "force", "work", "taut"), 0)
 INSTRUMENTS_ALONE = {
-    "fixed": {name: box["low"] for name, box in CONTENT["parameters"].items()},
+    "fixed": {name: CONTENT["parameters"][name]["low"] for name in THETA},
     "nuisances": {"camera_delay": [-0.003, 0.003]},
 }
 
@@ -183,6 +184,8 @@ REFUSED = [
     ("methods.no_work.covariance", 1, "methods.no_work.covariance: must be a valid boolean"),
     ("policy.robust.methods", ["best"], "policy.robust.methods: best is not one of"),
     ("methods.no_work.k_top", 0, "methods.no_work.k_top: must be between 1 and 50"),
+    ("methods.de.law", "gum", "methods.de.law: must be"),
+    ("methods.de.fixed", {"relaxation": 0.01}, "methods.de.fixed: relaxation is not one of"),
     ("methods.de.fixed", {"poisson": 0.4}, "methods.de.fixed: poisson is not one of youngs_"),
     ("methods.de.fixed", {"poissons_ratio": 0.2}, "must be between 0.3 and 0.49, got 0.2"),
     ("methods.de.fixed", INSTRUMENTS_ALONE["fixed"], "methods.de.fixed: names every parameter"),

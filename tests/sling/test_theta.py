@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.sling.material import THETA
-from pipeline.sling.theta import in_air, law_discrepancy, load_samples, load_theta, vector
+from pipeline.sling.theta import at_points, law_discrepancy, load_samples, load_theta, point, vector
 
 SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 
@@ -52,15 +52,40 @@ def test_nuisances_come_back_and_the_sling_gets_their_drag(tmp_path: Path) -> No
     said = {"air_drag": 2.5, "force_bias_x": -0.1}
     file.write_text(json.dumps({"band": "red", "theta": SOFT, "nuisances": said}))
     assert load_theta(file, "red")["nuisances"] == said
-    sling, theta = in_air(Windless(), np.array([[1.0, 2, 3, 4, 5, 0.7], [1.0, 2, 3, 4, 5, 0.9]]))
+    sling, theta = at_points(Windless(), np.array([[1.0, 2, 3, 4, 5, 0.7], [1.0, 2, 3, 4, 5, 0.9]]))
     assert theta.tolist() == [[1, 2, 3, 4, 5]] * 2
     np.testing.assert_array_equal(sling.air_drag, [0.7, 0.9])
-    assert in_air(Windless(), theta)[0].air_drag == 0.0
+    assert at_points(Windless(), theta)[0].air_drag == 0.0
 
 
 @dataclass(frozen=True)
 class Windless:
     air_drag: float = 0.0
+    law: str = "neo_hookean"
+    mooney_share: float = 0.0
+    relaxation: float = 0.0
+
+
+def test_the_law_rubber_names_its_parameters(tmp_path: Path) -> None:
+    file, rubber = tmp_path / "theta.json", {"mooney_share": 0.3, "relaxation": 0.02}
+    history = {"pull_time": 4.0, "pause": 2.0}
+    whole = {"band": "red", "law": "rubber", "theta": SOFT | rubber, "history": history}
+    file.write_text(json.dumps(whole))
+    content = load_theta(file, "red")
+    assert point(content).tolist() == [*SOFT.values(), 0.3, 0.02]
+    assert vector(content).tolist() == list(SOFT.values())
+    points = np.array([[*range(1, 6), 0.2, 0.01, 0.7]])
+    sling, theta = at_points(Windless(law="rubber"), points)
+    assert theta.tolist() == [[1, 2, 3, 4, 5]]
+    assert (sling.mooney_share, sling.relaxation, sling.air_drag) == (0.2, 0.01, 0.7)
+    for change, message in (
+        ({"theta": SOFT}, "theta: of the law rubber it must have exactly youngs_modulus"),
+        ({"law": "neo_hookean"}, "theta: of the law neo_hookean it must have exactly"),
+        ({"law": "gum"}, "law: must be"),
+        ({"history": None}, "history: {pull_time, pause} is missing"),
+        ({"history": {"pull_time": 0, "pause": 1}}, "history.pull_time: must be"),
+    ):
+        assert message in refusal(file, json.dumps(whole | change))
 
 
 def test_bad_nuisances_are_one_line(tmp_path: Path) -> None:

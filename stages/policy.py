@@ -20,7 +20,7 @@ from pipeline.base.layout import Layout
 from pipeline.base.machine import devices, kind
 from pipeline.base.progress import Progress
 from pipeline.landing.landing_map import LandingMap, surface_of, validation
-from pipeline.landing.simulator import simulator
+from pipeline.landing.simulator import asked_of_the_hand, simulator
 from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.policy import robust
 from pipeline.policy.check import check, check_expected, figures, robust_figures, verdict
@@ -54,7 +54,10 @@ def main() -> None:
 
     stored = Stored(band, method)
     landing_map.save(stored.folder() / "map.parquet", {"band": band, "method": method})
-    about = {"params": params, "band": band, "method": method, "theta": theta, "device": kind()}
+    middle = plain.policy.draws(np.mean(params.policy.targets, keepdims=True))[0]
+    hand = asked_of_the_hand(params, band, theta, middle)
+    about = {"params": params, "band": band, "method": method, "theta": theta, "launch": hand}
+    about["device"] = kind()
     validated = validation([landing_map], params.policy.targets)
     export(plain, stored.folder(), kind=PLAIN, training=training, landing_map=validated, **about)
     print(f"{band} {method}: {verdict(training, checked.failures)}", flush=True)
@@ -66,14 +69,13 @@ def main() -> None:
         if samples is None:
             print(f"{band} {method}: no robust policy, for there are no samples in {source}")
         else:
-            _robust(stored.folder(ROBUST), plain.policy, samples, launcher, about)
+            _robust(stored.folder(ROBUST), plain.policy, middle, samples, launcher, about)
     kept.unlink(missing_ok=True)
 
 
-def _robust(folder: Path, plain: Policy, samples: np.ndarray, launcher, about) -> None:
+def _robust(folder: Path, plain: Policy, middle, samples: np.ndarray, launcher, about) -> None:
     """Train, check and export the policy that knows what the identification leaves open."""
     params, error = about["params"], about["params"].trials.actuation_error
-    middle = plain.draws(np.mean(params.policy.targets, keepdims=True))[0]
     maps = robust.robust_maps(launcher, samples, middle, params)
     title = f"policy-{about['band']}-{about['method']}-robust"
     progress = Progress(title, robust.STEPS, "steps", every=EVERY)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,27 @@ import numpy as np
 from pipeline.base.machine import cores
 from pipeline.sling.launch import launch
 from pipeline.sling.theta import at_points, calibrated, vector
+
+
+def asked_of_the_hand(
+    params, band: str, content: dict, draw: np.ndarray, root: str | Path = "."
+) -> dict[str, float] | None:
+    """How the hand must draw a band whose law remembers it, and what it costs not to.
+
+    Returns:
+        `pull_time_s`, `pause_s`, and by how much a pause of a second more moves the landing of
+        `draw` (2,) [m], None where it does not land; None for a law without memory.
+    """
+    sling, theta = calibrated(params, band, content, root), vector(content)
+    if sling.history is None:
+        return None
+    longer = replace(sling, history=replace(sling.history, pause=sling.history.pause + 1))
+    moved = float(np.diff([launch(one, theta, draw).landing_y[0] for one in (sling, longer)])[0])
+    return {
+        "pull_time_s": sling.history.pull_time,
+        "pause_s": sling.history.pause,
+        "second_more_m": moved if np.isfinite(moved) else None,
+    }
 
 
 def simulator(

@@ -20,6 +20,7 @@ from torch import nn
 
 from pipeline.base.files import replacing, write_json
 from pipeline.policy.train import Policy, Trained
+from pipeline.sling.rubber import NEO_HOOKEAN
 
 OPSET, IR_VERSION = 18, 10  # any onnxruntime from 1.18 (2024) on reads these
 INPUT, OUTPUT = "target", "draw"
@@ -116,6 +117,7 @@ def card(
     kind: str,
     training: dict,
     landing_map: dict,
+    launch: dict | None = None,
     device: str = "cpu",
 ) -> dict:
     """What a user of the files must know; no dates and no wall times: it is reproducible.
@@ -127,6 +129,8 @@ def card(
         training: What check.py says of it; NaN becomes null.
         landing_map: How well the interpolated launches go with simulated ones
             (`LandingMap.validation`).
+        launch: How the hand must draw the band (`landing.simulator.asked_of_the_hand`), where its
+            law remembers that.
         device: Where it was trained, "cpu" or "cuda".
     """
     center, half = policy.draw_center, policy.draw_half
@@ -137,7 +141,9 @@ def card(
         "method": method,
         "kind": kind,
         "theta": theta["theta"],
+        "law": theta.get("law", NEO_HOOKEAN),
         "nuisances": theta.get("nuisances", {}),
+        "launch": launch,
         "input": {
             "name": INPUT,
             "unit": "m",

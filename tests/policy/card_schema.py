@@ -32,6 +32,17 @@ def all_in(names: str, kind: dict) -> dict:
 SETUP = (
     "fork_width_m fork_height_m projectile_mass_kg band_mass_kg band_diameter_m band_rest_length_m"
 )
+FIVE = {
+    "youngs_modulus": POSITIVE,
+    "poissons_ratio": {**POSITIVE, "exclusiveMaximum": 0.5},
+    "elasticity_damping": NOT_NEGATIVE,
+    "dynamic_friction": NOT_NEGATIVE,
+    "damping_scale": {**NOT_NEGATIVE, "maximum": 1},
+}
+RUBBER = {"mooney_share": NUMBER, "relaxation": NOT_NEGATIVE}
+HAND = exactly(
+    pull_time_s=POSITIVE, pause_s=NOT_NEGATIVE, second_more_m={"type": ["number", "null"]}
+)
 READ_BETWEEN = exactly(draws=COUNT, mean_error_m=ERROR, max_error_m=ERROR)
 PLAIN = {
     "converged": {"type": "boolean"},
@@ -56,13 +67,9 @@ SCHEMA = {
         band=TEXT,
         method=TEXT,
         kind={"enum": ["plain", "robust"]},
-        theta=exactly(
-            youngs_modulus=POSITIVE,
-            poissons_ratio={**POSITIVE, "exclusiveMaximum": 0.5},
-            elasticity_damping=NOT_NEGATIVE,
-            dynamic_friction=NOT_NEGATIVE,
-            damping_scale={**NOT_NEGATIVE, "maximum": 1},
-        ),
+        theta={"anyOf": [exactly(**FIVE), exactly(**FIVE, **RUBBER)]},
+        law={"enum": ["neo_hookean", "rubber"]},
+        launch={"anyOf": [{"type": "null"}, HAND]},
         nuisances={"type": "object", "additionalProperties": NUMBER},
         input=port("target", 1, trained_range=PAIR),
         output=port("draw", 2, axes={"const": ["y", "z"]}, frame=TEXT, low=PAIR, high=PAIR),

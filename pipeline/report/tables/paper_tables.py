@@ -126,7 +126,7 @@ def _titled(count: int, name: str, folder: Path) -> str:
 
 def _doubt(results: Results, found: list[parameters.IdentifiedRow], named: Styles) -> list[str]:
     """How to read table 2."""
-    edges = any(value.at_edge for row in found for value in row.values)
+    edges = any(value.at_edge for row in found for value in row.values.values())
     trusted = any(result.confidence for result in results)
     unsettled = [
         f"⚠ The posterior of {one.band}, {named[one.method].name} had **not settled**: its mean"

@@ -9,12 +9,14 @@ import numpy as np
 import pandas as pd
 
 from pipeline.objective.space import Space
+from pipeline.params.identification import LAWS
 from pipeline.report import paper
 from pipeline.report.results import PRINTED, Result, Results
 from pipeline.report.styles import Styles
 from pipeline.report.tables.benchmark import NOT_RUN, PAPER, band_name, method_name, ordered
 from pipeline.report.tables.cells import NONE, Table, number
 from pipeline.sling.material import THETA
+from pipeline.sling.rubber import RUBBER
 
 HEADS = {  # as the paper has them, with units
     "youngs_modulus": "E [Pa]",
@@ -22,6 +24,7 @@ HEADS = {  # as the paper has them, with units
     "elasticity_damping": "d [s]",
     "dynamic_friction": "friction",
     "damping_scale": "s",
+    **{name: name.replace("_", " ") for name in LAWS[RUBBER]},
 }
 UNITS = {"youngs_modulus": "_pa", "elasticity_damping": "_s"}
 RECORDED = {"rig": "virtual", "recording": "measured"}
@@ -47,12 +50,12 @@ class Value:
 
 @dataclass(frozen=True)
 class IdentifiedRow:
-    """Parameters of one method on one band in the order of THETA, and the printed loss there."""
+    """Parameters of one method on one band, by name, and the printed loss there."""
 
     band: str
     method: str
     source: str
-    values: list[Value]
+    values: dict[str, Value]
     loss: float
 
 
@@ -61,15 +64,24 @@ def identified(results: Results, params) -> list[IdentifiedRow]:
     rows = []
     for band, methods in ordered(results).items():
         for method in methods:
-            source, values, loss = NOT_RUN, [Value(math.nan)] * len(THETA), math.nan
+            source, values, loss = NOT_RUN, {}, math.nan
             if result := results.methods.get(band, {}).get(method):
                 source = RECORDED[params.bands[band].source]
-                values = [_value(params, result, name) for name in THETA]
+                names = (name for name in HEADS if name in result.theta["theta"])
+                values = {name: _value(params, result, name) for name in names}
                 loss = printed_loss(result)
             rows.append(IdentifiedRow(band, method, source, values, loss))
             if cells := paper.THETA.get((band, method)):
                 *numbers, loss = cells
-                rows.append(IdentifiedRow(band, method, PAPER, [*map(Value, numbers)], loss))
+                rows.append(
+                    IdentifiedRow(
+                        band,
+                        method,
+                        PAPER,
+                        dict(zip(THETA, map(Value, numbers), strict=True)),
+                        loss,
+                    )
+                )
     return rows
 
 
@@ -106,19 +118,22 @@ def as_table(rows: list[IdentifiedRow], styles: Styles) -> Table:
     for row in rows:
         losses.setdefault((row.band, row.source), []).append(row.loss)
     least = {group: np.nanmin([math.inf, *some]) for group, some in losses.items()}
-    lines = []
+    names, lines = _shown(rows), []
     for row in rows:
-        cells = [_cell(name, one) for name, one in zip(THETA, row.values, strict=True)]
+        cells = [_cell(name, row.values[name]) if name in row.values else NONE for name in names]
         loss = number(row.loss, ".4f")
         loss = f"**{loss}**" if row.loss == least[row.band, row.source] else loss
-        names = band_name(row.band), method_name(row.method, styles), row.source
-        lines.append([*names, *cells, loss])
-    return ["band", "method", "source", *HEADS.values(), "loss"], lines
+        whose = band_name(row.band), method_name(row.method, styles), row.source
+        lines.append([*whose, *cells, loss])
+    return ["band", "method", "source", *(HEADS[name] for name in names), "loss"], lines
+
+
+def _shown(rows: list[IdentifiedRow]) -> list[str]:
+    """The five, and what a law that any method runs with has beside them."""
+    return [name for name in HEADS if name in THETA or any(name in row.values for row in rows)]
 
 
 def _cell(name: str, one: Value) -> str:
-    if not math.isfinite(one.value):
-        return NONE
     shown = _physical(name, one.value) + (" ⚠" if one.at_edge else "")
     if one.state != "identified":
         return f"{shown}, {one.state}" if one.state else shown
@@ -154,7 +169,8 @@ def records(rows: list[IdentifiedRow]) -> pd.DataFrame:
     lines = []
     for row in rows:
         line = {"band": row.band, "method": row.method, "source": row.source}
-        for name, one in zip(THETA, row.values, strict=True):
+        for name in _shown(rows):
+            one = row.values.get(name, Value(math.nan))
             unit = UNITS.get(name, "")
             for part, value in (("", one.value), ("_low", one.low), ("_high", one.high)):
                 line[f"{name}{part}{unit}"] = value

@@ -40,9 +40,8 @@ FIVE = {
     "damping_scale": {**NOT_NEGATIVE, "maximum": 1},
 }
 RUBBER = {"mooney_share": NUMBER, "relaxation": NOT_NEGATIVE}
-HAND = exactly(
-    pull_time_s=POSITIVE, pause_s=NOT_NEGATIVE, second_more_m={"type": ["number", "null"]}
-)
+SECOND = {"type": ["number", "null"]}
+HAND = exactly(pull_time_s=POSITIVE, pause_s=NOT_NEGATIVE, second_more_m=SECOND)
 READ_BETWEEN = exactly(draws=COUNT, mean_error_m=ERROR, max_error_m=ERROR)
 PLAIN = {
     "converged": {"type": "boolean"},

@@ -12,13 +12,20 @@ from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
 from pipeline.params import load
 from pipeline.sling import interact, launch
+from pipeline.sling.model import LaunchHistory
 from tests.sling.bands import random_draws, random_thetas
 
 pytestmark = pytest.mark.skipif(not gpus(), reason="no CUDA device on this machine")
 
 
-def test_interaction_agrees_with_the_cpu(strong_grip, episode):
+RUBBER = {"mooney_share": 0.3, "relaxation": 0.02, "history": LaunchHistory(4.0, 2.0)}
+LAWS = {"neo_hookean": {}, "rubber": RUBBER}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_interaction_agrees_with_the_cpu(strong_grip, episode, law):
     """Held force within 0.1 %; the middle of the taut band within 1 mm in the first recoil."""
+    strong_grip = replace(strong_grip, law=law, **LAWS[law])
     thetas = random_thetas(64, seed=2)
     cpu = interact(strong_grip, episode, thetas, workers=2)
     gpu = interact(strong_grip, episode, thetas, device="cuda:0")
@@ -33,8 +40,10 @@ def test_interaction_agrees_with_the_cpu(strong_grip, episode):
     assert np.median(gap) < 1e-4 and np.percentile(gap, 95) < 1e-3
 
 
-def test_launches_agree_with_the_cpu(sling):
+@pytest.mark.parametrize("law", LAWS)
+def test_launches_agree_with_the_cpu(sling, law):
     """Landing within 0.1 %."""
+    sling = replace(sling, law=law, **LAWS[law])
     draws = random_draws(64, np.random.default_rng(4))
     theta = [2.5e5, 0.45, 2e-3, 0.5, 1.0]
     cpu, gpu = launch(sling, theta, draws), launch(sling, theta, draws, device="cuda:0")

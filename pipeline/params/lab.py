@@ -97,6 +97,7 @@ class SetupParams(Section):
     fork_height: Annotated[float, Range(0.05, 3)]
     clamp_direction: Direction
     projectile_mass: Annotated[float, Range(1e-3, 1)]
+    air_density: Annotated[float, Range(0, 100)]
     grip_force: Annotated[float, Range(0.1, 500)]
     finger_opening_time: Annotated[float, Range(1e-3, 1)]
     max_force: Annotated[float, Range(0.1, 1000)]

@@ -10,6 +10,7 @@ from pipeline.sling import tetrahedra
 from pipeline.sling.rubber import NEO_HOOKEAN
 
 GRAVITY = 9.81
+CYLINDER_DRAG = 1.1  # across the wind, at Reynolds numbers of 1e3 to 1e4 (Wieselsberger 1921)
 ROD, TETRAHEDRA = "rod", "tetrahedra"  # meshes: rod.h, tetrahedra.h
 
 
@@ -44,8 +45,10 @@ class Sling:
         steps: The step sizes and the mesh's grading, as in params.yaml `sling`.
         clamped: Whether the first and the last end are held; experiments on a free band let go.
         clamp_twist: Of the last clamp about the band, against the first [rad].
-        air_drag: Of the moving band: force for its mass and speed [1/s], one or one a theta. It is
-            the drag of a cylinder across the wind, linear about the speeds of a recoil.
+        air_drag: Of the moving band: force for its mass and speed [1/s], one or one a theta;
+            whatever brakes it besides the cylinder's drag.
+        air_density: For the drag of a cylinder across the wind [kg/m^3], which tetrahedra do not
+            feel.
         law: NEO_HOOKEAN, or RUBBER (rubber.h), which the rod alone knows.
         mooney_share: Of `rubber`: Mooney's second constant over the sum of both, one or one a
             theta. The shear modulus is that sum.
@@ -71,6 +74,7 @@ class Sling:
     clamp_twist: float = 0.0
     mesh: str = ROD
     air_drag: float | np.ndarray = 0.0
+    air_density: float = 0.0
     law: str = NEO_HOOKEAN
     mooney_share: float | np.ndarray = 0.0
     relaxation: float | np.ndarray = 0.0
@@ -106,6 +110,7 @@ class Sling:
             projectile_mass=setup.projectile_mass,
             grip_force=setup.grip_force,
             finger_opening_time=setup.finger_opening_time,
+            air_density=setup.air_density,
             steps=resolution,
             mesh=mesh,
         )

@@ -42,7 +42,7 @@ class Outcome(IntEnum):
 
 # what all slings of a batch share; `shortest`: edge, or radius, where that is shorter and meshed
 SETTING = _record(
-    "mean_edge", "area", "radius2", "line_mass", "gravity", "tolerance", "step_limit",
+    "mean_edge", "area", "radius2", "line_mass", "wind", "gravity", "tolerance", "step_limit",
     "max_iterations", ("clamped", 2), "shortest",
 )  # fmt: skip
 # of a sling's law: material.py computes them, state.h takes them to material.h and rod.h

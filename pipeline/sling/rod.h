@@ -47,9 +47,31 @@ auto mass_of = [&](int i, int m) -> real {
   const SC length = m < 3 ? (SC)0.5 * (before + after) : (i < L - 1 ? after : before) * radius2 / 4;
   return zero + line_mass * length + (i == MID && m < 3 ? payload : zero);
 };
-// drag of the air on the moving band, which the projectile does not feel
+// The air on the moving band, which the projectile does not feel: a linear drag by mass, and that of a cylinder across
+// the wind, quadratic: C rho/2 d |v| v for a length, v the part of the speed across the band at the predicted state, d the
+// diameter that keeps the volume of what is stretched. Over the step the matrix is c (1 - t t'), kept as c and sqrt(c) t.
+#define WIND(k, i) STATE[(9 * N + MEMORIES + (k)) * L + (i)]
+auto feel_wind = [&](bool relax) {
+  for (int i = member; i < L; i += T) {
+    const int first = i ? i - 1 : 0, last = i < L - 1 ? i + 1 : i;
+    real way[3], speed[3];
+    UNROLL for (int c = 0; c < 3; ++c) { way[c] = XP(c, last) - XP(c, first); speed[c] = (XP(c, i) - Y(c, i)) * ibh; }
+    const SC rest = (i ? edge[i - 1] : (SC)0) + (i < L - 1 ? edge[i] : (SC)0);
+    const real length = SQRT(maximum(dot(way, way), zero + (SC)1e-12)), along = dot(way, speed) / length;
+    const real whole = dot(speed, speed) - along * along;
+    const real stretched = (SC)0.5 * SQRT(length * rest);  // length times how much thinner the band is
+    const real c = relax ? zero : wind * stretched * SQRT(maximum(whole, zero)) * ibh, shrunk = SQRT(c) / length;
+    WIND(0, i) = c;
+    UNROLL for (int k = 0; k < 3; ++k) WIND(1 + k, i) = shrunk * way[k];
+  }
+};
+auto across = [&](int i, int m, int n) -> real { return (m == n ? WIND(0, i) : zero) - WIND(1 + m, i) * WIND(1 + n, i); };
 auto wind_of = [&](int i, int m) -> real { return m < 3 ? air * (mass_of(i, m) - (i == MID ? payload : zero)) : zero; };
-auto wind_on = [&](int i, int m) -> real { return wind_of(i, m) * (X(m, i) - Y(m, i)); };
+auto wind_on = [&](int i, int m) -> real {
+  real force = wind_of(i, m) * (X(m, i) - Y(m, i));
+  if (m < 3) UNROLL for (int n = 0; n < 3; ++n) force += across(i, m, n) * (X(n, i) - Y(n, i));
+  return force;
+};
 // of the hand on the node that it leads, after Newton's change times `scale`, to first order
 auto hand_force = [&](int c, real scale) -> real {
   real force = mass_of(MID, c) * ibh2 * (X(c, MID) - XH(c, MID)) + wind_on(MID, c);
@@ -74,6 +96,7 @@ auto stage_section = [&](int i) {
     f[m] = mass * ibh2 * (X(m, i) - XH(m, i)) + wind_on(i, m);
     own[LOWER(m, m)] = mass * ibh2 + wind_of(i, m) + shift * (m < 3 ? zero + node_shift : mu * (area * mean_edge));
   }
+  UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n <= m; ++n) own[LOWER(m, n)] += across(i, m, n);
   if (i < L - 1) {
     // ---- edge i: k = 0, 1, 2 are g, a, b; x now, xp predicted, xt rates
     const SC ds = edge[i], per_ds = (SC)1 / ds;

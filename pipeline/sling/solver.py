@@ -11,7 +11,7 @@ from pipeline.base.errors import UserError
 from pipeline.sling import tetrahedra
 from pipeline.sling.initial import fixed_frames
 from pipeline.sling.material import material
-from pipeline.sling.model import GRAVITY, TETRAHEDRA, Sling
+from pipeline.sling.model import CYLINDER_DRAG, GRAVITY, TETRAHEDRA, Sling
 from pipeline.sling.records import LANE, OUTPUT, SETTING, numbers, records, width
 from pipeline.sling.rubber import RUBBER, memories
 from pipeline.sling.schedule import Schedule
@@ -162,7 +162,7 @@ def _widths(sling: Sling, schedule: Schedule, frames: Frames, options: Options) 
     return {
         "state": sling.dofs * sling.sections,
         "lanes": width(LANE),
-        "scratch": (9 * sling.dofs + memories(sling.law)) * sling.sections,
+        "scratch": (9 * sling.dofs + memories(sling.law) + 4) * sling.sections,
         "work": (2 * sling.dofs + 1) * sling.sections * columns,
         "output": 0 if options.launching else width(OUTPUT) * len(schedule.steps),
         "frames": len(frames.steps) * sling.sections * frames.width,
@@ -273,6 +273,7 @@ def _setting(sling: Sling, options: Options) -> np.ndarray:
         "area": sling.area,
         "radius2": sling.radius**2,
         "line_mass": sling.mass / sling.rest_length,
+        "wind": CYLINDER_DRAG * sling.air_density * sling.radius,
         "gravity": options.gravity,
         "tolerance": options.tolerance,
         "step_limit": STEP_LIMIT,

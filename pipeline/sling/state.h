@@ -4,7 +4,7 @@ const int ROW_LENGTH = (N + 3) / 4 * 4;
 const int SAVED = 2 * N + 1;  // numbers kept of a column for the back substitution: multipliers, coupling, solution
 #define SET(name) setting.data[SETTING_##name]
 const SC mean_edge = SET(MEAN_EDGE), area = SET(AREA), radius2 = SET(RADIUS2);
-const SC line_mass = SET(LINE_MASS), gravity = SET(GRAVITY), node_mass = line_mass * mean_edge;
+const SC wind = SET(WIND), line_mass = SET(LINE_MASS), gravity = SET(GRAVITY), node_mass = line_mass * mean_edge;
 const SC per_edge = (SC)1 / mean_edge;
 const SC* edge = mesh.data;  // rest length of each edge; after them, what else the element wants
 const SC tolerance = SET(TOLERANCE), step_limit = SET(STEP_LIMIT), shortest = SET(SHORTEST);
@@ -18,7 +18,7 @@ const real friction = LAW[MATERIAL_FRICTION], bending = LAW[MATERIAL_BENDING], d
 
 // degree of freedom k of cross-section i: now, predicted, the y and xh of step.h, Newton's change, and of the two steps before
 auto INITIAL = ROW(state, N * L);
-auto STATE = ROW(scratch, (9 * N + MEMORIES) * L);
+auto STATE = ROW(scratch, (9 * N + MEMORIES + 4) * L);
 #define FIELD(f, k, i) STATE[((f) * N + (k)) * L + (i)]
 #define X(k, i) FIELD(0, k, i)
 #define XP(k, i) FIELD(1, k, i)

@@ -3,7 +3,7 @@
 //   M (x - xh)/(beta h)^2 + c M x' + dW/dx + dD/dx' = 0,   x' = (x - y)/(beta h),
 //   y = c1 x_n - c2 x_n-1,   xh = y + beta h (c1 v_n - c2 v_n-1) + (beta h)^2 gravity
 //
-// with the air's drag c on the nodes (not on directors or the projectile)
+// with the air's drag c on the nodes (not on directors or the projectile), linear and a cylinder's
 // (backward Euler: beta = c1 = 1, c2 = 0; variable-step BDF2 otherwise) by Newton's method with the exact Hessian;
 // where that is indefinite, its diagonal is shifted.
 
@@ -62,6 +62,8 @@ for (int step = 0; step < steps; ++step) {
 #if RUBBER
   recall(row, relax);
 #endif
+  SYNC;
+  feel_wind(relax);
   SYNC;
 
   // ---- Newton's method; lanes that have settled stay as they are, so that a lane never depends on its neighbours

@@ -38,10 +38,11 @@ class Trajectories:
 
 
 def band_of(bench: Bench) -> Sling:
-    """The first band of params.yaml as a rod of the default resolution, round and solid."""
+    """The first band of params.yaml as a rod of the default resolution, solid, without air."""
     params = bench.params
     band = params.bands[next(iter(params.bands))]
-    return Sling.of(band, params.setup, params.sling, as_rod=True)
+    sling = Sling.of(band, params.setup, params.sling, as_rod=True)
+    return replace(sling, air_density=0.0)
 
 
 def straight(sling: Sling, length: float, **changes) -> Sling:

@@ -94,6 +94,7 @@ DrawZ = Annotated[float, Range(-2, 1)]
 
 class SetupParams(Section):
     fork_width: Annotated[float, Range(0.02, 2)]
+    foot_height: Annotated[float, Range(0, 1)]
     fork_height: Annotated[float, Range(0.05, 3)]
     clamp_direction: Direction
     projectile_mass: Annotated[float, Range(1e-3, 1)]

@@ -36,6 +36,7 @@ class Sling:
         rest_length, radius, mass: Of the band between the clamps [m, m, kg].
         half_width: Half the distance of the fork's tips [m].
         fork_height: Of the tips above the floor [m].
+        foot_height: Of what joins the fork's rods on the floor, which a projectile may hit [m].
         clamp_direction: Unit vector along which the band leaves the tip at -x, shape (3,); it
             leaves the other tip along the mirror image.
         flexural_rigidity: E I of the band where it was measured [N m^2], one or one a theta; None
@@ -64,6 +65,7 @@ class Sling:
     mass: float
     half_width: float
     fork_height: float
+    foot_height: float
     clamp_direction: np.ndarray
     flexural_rigidity: float | None
     projectile_mass: float
@@ -105,6 +107,7 @@ class Sling:
             mass=band.mass,
             half_width=setup.fork_width / 2,
             fork_height=setup.fork_height,
+            foot_height=setup.foot_height,
             clamp_direction=direction / np.linalg.norm(direction),
             flexural_rigidity=mounting.get("flexural_rigidity"),
             projectile_mass=setup.projectile_mass,

@@ -70,3 +70,16 @@ def test_failures_have_names(sling):
 def test_farther_draws_land_farther(sling):
     landings = launch(sling, THETA, [[-0.34, -0.2], [-0.38, -0.2], [-0.42, -0.2]]).landing_y
     assert np.all(np.diff(landings) > 0.2)
+
+
+def test_a_projectile_that_passes_too_low_hits_the_fork(sling):
+    """The same launch, with a foot that reaches above its way and one just below it."""
+    draw = [-0.30, -0.05]
+    free = launch(sling, THETA, draw)
+    assert free.failure == [None]
+    time = -free.separation_y[0] / (free.speed[0] * np.cos(free.angle[0]))
+    rise = free.speed[0] * np.sin(free.angle[0]) * time - GRAVITY * time**2 / 2
+    above = free.separation_z[0] + rise + sling.fork_height
+    for foot, failure in ((0.99 * above, None), (1.01 * above, "hits the fork: too low")):
+        done = launch(replace(sling, foot_height=foot), THETA, draw)
+        assert done.failure == [None] if failure is None else done.failure[0].startswith(failure)

@@ -36,11 +36,20 @@ def files_of(module: str, root: Path = ROOT) -> list[Path]:
     return [file for file in (*packages, leaf) if file.is_file()]
 
 
+class _WithoutTypes(ast.NodeTransformer):
+    """Leaves out what `if TYPE_CHECKING:` imports: no program runs it."""
+
+    def visit_If(self, node: ast.If) -> ast.AST | None:
+        typed = isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+        return None if typed else self.generic_visit(node)
+
+
 def imports(file: Path, root: Path = ROOT) -> set[Path]:
     """Project files that `file` imports itself, with native sources that lie beside a module."""
     package = file.relative_to(root).parent.parts
     found: set[Path] = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), str(file))):
+    tree = ast.parse(file.read_text(encoding="utf-8"), str(file))
+    for node in ast.walk(_WithoutTypes().visit(tree)):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):

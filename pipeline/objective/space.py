@@ -41,20 +41,20 @@ class Space:
         """Make it from params.yaml's `parameters`, in the simulator's order: θ, then its law's.
 
         Of a method's `nuisances`, bounds by name, each adds a linear axis, in NUISANCES' order. Its
-        `bounds` take the place of a parameter's own. `priors` of other nuisances are left out.
+        `bounds` take the place of a parameter's own, and say those of what its law adds. `priors` of other nuisances are left out.
         """
-        inner = (*THETA, *LAWS[law])
-        boxes = [getattr(parameters, name) for name in inner]
-        bounds = bounds or {}
-        known = [
-            bounds.get(name, (box.low, box.high)) for name, box in zip(inner, boxes, strict=True)
-        ]
-        others = {name: nuisances[name] for name in NUISANCES if name in (nuisances or {})}
+        boxes = {name: getattr(parameters, name) for name in THETA}
+        bounds, nuisances = bounds or {}, nuisances or {}
+        known = {name: bounds.get(name, (box.low, box.high)) for name, box in boxes.items()}
+        known |= {name: bounds[name] for name in LAWS[law]}
+        others = {name: nuisances[name] for name in NUISANCES if name in nuisances}
+        low, high = np.array([*known.values(), *others.values()], float).T
+        log = [name in boxes and boxes[name].scale == "log" for name in (*known, *others)]
         return cls(
-            names=(*inner, *others),
-            low=np.array([low for low, _ in (*known, *others.values())], float),
-            high=np.array([high for _, high in (*known, *others.values())], float),
-            log=np.array([*(box.scale == "log" for box in boxes), *(False for _ in others)]),
+            names=(*known, *others),
+            low=low,
+            high=high,
+            log=np.array(log),
             priors={name: known for name, known in (priors or {}).items() if name in others},
         )
 

@@ -12,9 +12,9 @@ from pipeline.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound")
 KTop = Annotated[int, Range(1, 50)]
-LAWS = {  # of the band's material: the parameters that each has beside the five
-    "neo_hookean": (),
-    "rubber": ("mooney_share", "relaxation"),
+LAWS = {  # of the band's material: what each has beside the five, and how far its box may reach
+    "neo_hookean": {},
+    "rubber": {"mooney_share": (-1.0, 1.0), "relaxation": (0.0, 0.2)},
 }
 SEARCHES = ("multistart", "de", "bo", "adam")
 NUISANCES = {  # how far the box of each may reach: 1/s, s, 1, N, m
@@ -69,8 +69,6 @@ class Parameters(Section):
     elasticity_damping: Box[Annotated[float, Range(1e-6, 1)]]
     dynamic_friction: Box[Annotated[float, Range(0, 5)]]
     damping_scale: Box[Annotated[float, Range(0, 1)]]
-    mooney_share: Box[Annotated[float, Range(-1, 1)]]
-    relaxation: Box[Annotated[float, Range(0, 0.2)]]
 
 
 class HeldOut(Section):
@@ -204,6 +202,16 @@ class MethodParams(MethodDefaults):
         return self
 
     @model_validator(mode="after")
+    def _law_has_its_box(self) -> MethodParams:
+        for name, reach in LAWS[self.law].items():
+            if name not in self.bounds:
+                raise refusal(
+                    f"bounds: {name} is missing, [low, high] within {list(reach)}, which the law"
+                    f" {self.law} searches"
+                )
+        return self
+
+    @model_validator(mode="after")
     def _priors_are_of_nuisances(self) -> MethodParams:
         for name in self.priors:
             if name not in self.nuisances:
@@ -223,16 +231,16 @@ def check_method(
     method: MethodParams, path: str, parameters: Parameters, optimizer: OptimizerParams
 ) -> None:
     """Refuse what a method, whose key ends with `path`, asks for outside the box or the budget."""
-    others = {*LAWS["rubber"]} - {*LAWS[method.law]}
-    boxes = {name: (box.low, box.high) for name, box in parameters if name not in others}
+    boxes = {name: (box.low, box.high) for name, box in parameters} | LAWS[method.law]
     for name, (low, high) in method.bounds.items():
         if name not in boxes:
             raise refusal(f"{path}bounds: {name} is not one of {', '.join(boxes)}")
         least, most = boxes[name]
         if not least <= low < high <= most:
+            whose = f"parameters.{name}, " if name not in LAWS[method.law] else ""
             raise refusal(
-                f"{path}bounds.{name}: must be [low, high] within parameters.{name},"
-                f" {least:g} to {most:g}, got {[low, high]}"
+                f"{path}bounds.{name}: must be [low, high] within {whose}{least:g} to {most:g},"
+                f" got {[low, high]}"
             )
     boxes |= method.bounds | method.nuisances
     for name, value in method.fixed.items():

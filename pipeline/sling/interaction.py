@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pipeline.base.errors import UserError
-from pipeline.episode.episode import Episode
 from pipeline.sling.initial import hanging_guess
 from pipeline.sling.model import Sling
 from pipeline.sling.records import Grip, Outcome
 from pipeline.sling.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.sling.solver import Frames, Options, Slings, run
+
+if TYPE_CHECKING:
+    from pipeline.episode.episode import Episode
 
 FAILURES = {
     Outcome.GOING_ON: None,

@@ -39,7 +39,7 @@ Theta = create_model(
     "Theta",
     __base__=Section,
     **{name: (Annotated[float, _limits(name)], ...) for name in THETA},
-    **{name: (Annotated[float, _limits(name)], None) for name in LAWS[RUBBER]},
+    **{name: (Annotated[float, Range(*ends)], None) for name, ends in LAWS[RUBBER].items()},
 )
 Nuisances = create_model(
     "Nuisances",

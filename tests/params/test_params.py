@@ -185,6 +185,7 @@ REFUSED = [
     ("policy.robust.methods", ["best"], "policy.robust.methods: best is not one of"),
     ("methods.no_work.k_top", 0, "methods.no_work.k_top: must be between 1 and 50"),
     ("methods.de.law", "gum", "methods.de.law: must be"),
+    ("methods.de.law", "rubber", "methods.de: bounds: mooney_share is missing, [low, high] within"),
     ("methods.de.fixed", {"relaxation": 0.01}, "methods.de.fixed: relaxation is not one of"),
     ("methods.de.fixed", {"poisson": 0.4}, "methods.de.fixed: poisson is not one of youngs_"),
     ("methods.de.fixed", {"poissons_ratio": 0.2}, "must be between 0.3 and 0.49, got 0.2"),

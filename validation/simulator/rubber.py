@@ -33,6 +33,7 @@ from validation.simulator.finding import Bench, Finding, Theme, off
 from validation.simulator.reference import ReferenceRod
 
 SHARES = (-0.3, 0.3, 0.9)
+BOX = {"mooney_share": (-0.3, 0.9), "relaxation": (0.0, 0.05)}
 WEIGHT = 0.02
 PULL_LIMIT, INTEGRAL_LIMIT, FREQUENCY_LIMIT, DECAY_LIMIT = 0.1, 2.0, 1.0, 2.0  # percent
 THIN = 40  # times thinner than the band: no beam any more
@@ -278,8 +279,8 @@ def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Finding]:
 
 
 def random_points(bench: Bench, count: int) -> np.ndarray:
-    """Of the box in params.yaml, θ and what the law adds, shape (count, 7)."""
-    space = Space.of(bench.params.parameters, law=RUBBER)
+    """Of the box in params.yaml, and BOX of what the law adds, shape (count, 7)."""
+    space = Space.of(bench.params.parameters, bounds=BOX, law=RUBBER)
     return space.to_physical(np.random.default_rng(SEED).random((count, space.dimension)))
 
 

@@ -41,7 +41,8 @@ class Space:
         """Make it from params.yaml's `parameters`, in the simulator's order: θ, then its law's.
 
         Of a method's `nuisances`, bounds by name, each adds a linear axis, in NUISANCES' order. Its
-        `bounds` take the place of a parameter's own, and say those of what its law adds. `priors` of other nuisances are left out.
+        `bounds` take the place of a parameter's own, and say those of what its law adds. `priors`
+        of other nuisances are left out.
         """
         boxes = {name: getattr(parameters, name) for name in THETA}
         bounds, nuisances = bounds or {}, nuisances or {}

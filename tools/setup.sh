@@ -43,10 +43,12 @@ everything=(-q -e '.[dev]' -c constraints.txt)
 # setting NAME: what pip's files and environment say of an option, else nothing.
 setting() { sed -n "s/^[^=]*\.$1='\(.*\)'\$/\1/p" <<<"$settings" | head -n 1; }
 
-# uv does in half a minute what takes pip two; it looks for packages where pip would.
+# uv does in half a minute what takes pip two; it looks for packages where pip would. Which build of
+# torch that is pip alone knows.
 with_uv() {
     local settings index more links certificates
-    .venv/bin/pip install --disable-pip-version-check -q -c constraints.txt uv || return
+    .venv/bin/pip install --disable-pip-version-check -q -c constraints.txt "${compile[@]/#*/--compile}" torch uv ||
+        return
     settings=$(.venv/bin/pip config list)
     index=$(setting index-url) more=$(setting extra-index-url)
     links=$(setting find-links) certificates=$(setting cert)

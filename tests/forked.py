@@ -3,8 +3,6 @@
 Python and what the script imports take seconds to start, the script itself hardly any.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import os
@@ -40,7 +38,7 @@ class Forked:
         print(json.dumps(arguments), file=self._process.stdin, flush=True)
         return SimpleNamespace(**json.loads(self._process.stdout.readline()))
 
-    def __enter__(self) -> Forked:
+    def __enter__(self) -> "Forked":
         return self
 
     def __exit__(self, *_: object) -> None:

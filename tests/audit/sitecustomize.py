@@ -4,8 +4,6 @@ tests/test_pipeline.py compares the notes, `$AUDIT/<stage>.<process>.json`, with
 dvc.yaml. What takes long and no parameter sets is made short: `SHORT`.
 """
 
-from __future__ import annotations
-
 import atexit
 import gc
 import importlib

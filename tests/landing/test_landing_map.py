@@ -1,7 +1,5 @@
 """The landing map against the closed form of the toy slingshot."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The calibrated simulator is that of the θ file, its air as well."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pipeline.landing.simulator import simulator

@@ -1,7 +1,5 @@
 """Stored policies: which there are, what they say, and what a user is told who lacks one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Measured launches read from CSV: whose they are, and what is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Landing intervals of a slingshot in closed form, with a stiffness that is not known exactly."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The stage of the trials on a recorded band: whose launches stand in its table, and how often."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 from pathlib import Path

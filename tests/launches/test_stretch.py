@@ -1,7 +1,5 @@
 """How far a band is stretched."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Trials: what a virtual world leaves in them, their table, and the limit of the arm."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

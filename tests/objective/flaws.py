@@ -1,7 +1,5 @@
 """Episodes of the simulator's own law as instruments with known flaws would record them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

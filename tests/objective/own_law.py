@@ -1,7 +1,5 @@
 """Episodes whose rubber is the simulator's own: truth for the identification, no model error."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

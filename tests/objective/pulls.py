@@ -1,7 +1,5 @@
 """A band of known law, and a hand that lifts, pulls and lets go; no force and no clouds yet."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

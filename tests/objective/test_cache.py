@@ -1,7 +1,5 @@
 """A search that is killed goes on to the same result; what was simulated is recalled."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -1,7 +1,5 @@
 """Distances between clouds and tubes, against a slow reference and shapes with known answers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree

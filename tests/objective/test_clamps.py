@@ -1,7 +1,5 @@
 """The mounting is found again from a slack band that hangs by another angle and bends stiffer."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Batches of parameters: slicing, workers, failures."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from threading import Barrier
 

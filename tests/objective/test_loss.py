@@ -1,7 +1,5 @@
 """Loss terms on episodes whose offsets are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What instruments add is found again in episodes of the simulator's own law, where it is known."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The service of the searching stages: one memory a band, whatever the method, and what it says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The box of the search."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

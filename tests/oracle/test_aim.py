@@ -1,7 +1,5 @@
 """Against a slingshot with a closed form: where its landing depends least on the draw."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq

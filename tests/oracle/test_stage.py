@@ -1,7 +1,5 @@
 """The stage floor where targets are out of reach: it says so, and the others have their floor."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

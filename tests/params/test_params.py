@@ -1,7 +1,5 @@
 """params.yaml is read as it is written, and every mistake in it is one line with the key's path."""
 
-from __future__ import annotations
-
 import copy
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A finished run of a band that was never there: every input of the report, small and synthetic."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Intervals of differences: against SciPy, by enumeration, and how often they hold the truth."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """The paper's numbers, read from its own source where that lies beside the repository."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The replay against the rollout that it filters and samples."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is gathered: all that ran, each method's rows in their order; the printed loss of them."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

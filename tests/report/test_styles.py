@@ -1,7 +1,5 @@
 """Names and colours: one for each method, whatever else runs."""
 
-from __future__ import annotations
-
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -1,7 +1,5 @@
 """The first page and the metrics say what came out, band by band."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """The whole report of a synthetic run: complete, reproducible, and refused where inputs lack."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """A replay without a simulation: nine tenths of the force, clouds a centimetre off."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pipeline.report.replay import Replay, work

@@ -3,8 +3,6 @@
 A campaign writes its file before it asserts, so that a claim that fails leaves its figures too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -10,8 +10,6 @@ checksums were mended after the damage, or never were, nobody can ask for that; 
 traceback, no hang, no memory over 2 GB.
 """
 
-from __future__ import annotations
-
 import faulthandler
 import json
 import os

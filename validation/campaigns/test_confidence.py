@@ -5,8 +5,6 @@ as a recorder's are. Each episode is identified with the budget of params.yaml, 
 asked for the truth.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from dataclasses import replace

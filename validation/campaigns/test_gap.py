@@ -4,8 +4,6 @@ One thing at a time is made perfect, by an oracle that may launch on the rig. No
 finds: the oracle's θ and draws live in this campaign alone.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import matplotlib.pyplot as plt

@@ -1,7 +1,5 @@
 """Flows of the real stages, killed again and again at random: the same bytes as undisturbed."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import shutil

@@ -4,8 +4,6 @@ One recording that this project did not make, and the virtual rig's bands, each 
 budget of params.yaml. Landings are for scoring alone: no interval has seen one.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

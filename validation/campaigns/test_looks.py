@@ -1,7 +1,5 @@
 """Sling clouds against known truth, in many looks of band and background: report of every phase."""
 
-from __future__ import annotations
-
 import pytest
 
 from pipeline.recording.cloud import clouds_of

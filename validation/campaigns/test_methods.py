@@ -4,8 +4,6 @@ Landings score what was identified; no search sees them. Three seeds a method, b
 the default budget stops somewhere along valleys that the data leave open.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

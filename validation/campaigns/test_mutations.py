@@ -1,7 +1,5 @@
 """Thousands of damaged recordings, each an episode or one clear line; nothing passes silently."""
 
-from __future__ import annotations
-
 import os
 from importlib.metadata import version
 

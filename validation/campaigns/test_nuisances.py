@@ -7,8 +7,6 @@ only where it lowers them. Episodes of the simulator's own law, with flaws that 
 the check would see it.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from concurrent.futures import ThreadPoolExecutor

@@ -3,8 +3,6 @@
 The landings enter the copy of the project after θ* is written, so no search can have seen them.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

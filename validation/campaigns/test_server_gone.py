@@ -1,7 +1,5 @@
 """A Prefect server that is killed while a stage runs."""
 
-from __future__ import annotations
-
 import psutil
 import pytest
 

@@ -1,7 +1,5 @@
 """A toy project in several working copies, a DVC remote beside them, Dask processes in them."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys
@@ -58,7 +56,7 @@ CONFIG = """\
 class Copy(project.Copy):
     """A working copy of the toy project."""
 
-    def clone(self, name: str) -> Copy:
+    def clone(self, name: str) -> "Copy":
         self("git", "clone", "-q", ".", str(self.folder.parent / name))
         return Copy(self.folder.parent / name)
 

@@ -1,7 +1,5 @@
 """A small DVC project: stages that sleep, note when, and write what follows from what they read."""
 
-from __future__ import annotations
-
 import copy
 import json
 import shutil
@@ -60,7 +58,7 @@ class Toy(project.Copy):
             (folder / name).write_text(text)
         YAML().dump({"stages": stages}, folder / "dvc.yaml")
 
-    def copy(self, folder: Path) -> Toy:
+    def copy(self, folder: Path) -> "Toy":
         """The project as it is, in another folder."""
         shutil.copytree(self.folder, folder)
         other = copy.copy(self)

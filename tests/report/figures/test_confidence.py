@@ -1,7 +1,5 @@
 """Profile curves and correlations, read back from the objects that were drawn."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

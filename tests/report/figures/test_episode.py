@@ -1,7 +1,5 @@
 """The recording beside the simulation, read back from the objects that were drawn."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

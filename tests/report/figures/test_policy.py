@@ -1,7 +1,5 @@
 """Landings beside predictions, read back from the objects that were drawn."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

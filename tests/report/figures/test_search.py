@@ -1,7 +1,5 @@
 """Pictures of the searches, read back from the objects that were drawn."""
 
-from __future__ import annotations
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest

@@ -3,8 +3,6 @@
 The page's own content security policy stays in force; what it blocks counts as a failure.
 """
 
-from __future__ import annotations
-
 import base64
 import html
 import io

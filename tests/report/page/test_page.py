@@ -1,7 +1,5 @@
 """The page as text: whole, alone, and the same twice; its numbers are those of the replay."""
 
-from __future__ import annotations
-
 import base64
 import json
 import re

@@ -1,7 +1,5 @@
 """Tables 1, 3 and 4 from constructed launches, by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

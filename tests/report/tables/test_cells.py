@@ -1,7 +1,5 @@
 """Tables as markdown and LaTeX: well formed, read back, and compiled where there is a LaTeX."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """What is said of differences, and of robust policies beside plain ones."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Tables of what was identified, against values by hand."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import pytest

@@ -1,7 +1,5 @@
 """Tables from constructed launches whose means are known by hand."""
 
-from __future__ import annotations
-
 import math
 
 import pandas as pd

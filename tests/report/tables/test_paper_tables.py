@@ -1,7 +1,5 @@
 """The chapter of tables: complete, linked to its files, and silent about what did not run."""
 
-from __future__ import annotations
-
 import re
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Table 2: identified parameters with their intervals, and the paper's loss, by hand."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Results of bands and methods that never ran, as far as tables of launches look at them."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -14,7 +14,8 @@ from pipeline.params import Params, expect_known, load
 STEPS = {  # that make a folder of another name
     "raw": "record",
     "episodes": "episode",
-    "clusters": "refined",
+    "clusters": "theta",
+    "refined": "theta",
     "confidence": "theta",
     "policies": "policy",
 }

@@ -1,12 +1,14 @@
-"""Choose θ*, the best of everything that was evaluated, and say how sure it is.
+"""Refine a search's promising regions, choose θ*, the best of all, and say how sure it is.
 
     python -m stages.theta band1 sling2sim2real
 
-Reads data/history/ and data/refined/<band>/<method>.parquet, data/episodes/<band>/ and
-data/mounting/<band>.json; writes data/theta/<band>/<method>.json, and samples of the posterior
-with profile curves to data/confidence/<band>/<method>.json. Where too many simulations around θ*
-fail to tell how sure it is, "confidence" is null and there are no samples. SLING_WORKERS says on
-how many threads.
+Reads data/history/<band>/<method>.parquet, data/episodes/<band>/ and data/mounting/<band>.json.
+Writes the regions with their covariances to data/clusters/<band>/<method>.json and what a CMA-ES in
+each evaluated to data/refined/<band>/<method>.parquet (of a search of one phase, no region and no
+row); θ* to data/theta/<band>/<method>.json, and samples of the posterior with profile curves to
+data/confidence/<band>/<method>.json. Where too many simulations around θ* fail to tell how sure it
+is, "confidence" is null and there are no samples. Killed, it resumes from .checkpoints/.
+SLING_DEVICE and SLING_WORKERS say where it runs.
 """
 
 from __future__ import annotations
@@ -19,9 +21,13 @@ from pipeline.base.machine import workers
 from pipeline.confidence.rounds import NoConfidence
 from pipeline.confidence.summary import confidence
 from pipeline.episode.pull import launch_history
-from pipeline.objective.session import load_episode
+from pipeline.objective.session import load_episode, service
+from pipeline.objective.space import Space
 from pipeline.params.identification import LAWS
 from pipeline.search.history import History, theta_content
+from pipeline.search.loop import Free, search
+from pipeline.search.optimizers.multistart import Multistart
+from pipeline.search.regions import Region, regions_of, save_regions
 from pipeline.sling.load import load_sling
 from pipeline.sling.material import THETA
 from pipeline.sling.rubber import RUBBER
@@ -30,12 +36,13 @@ from stages.start import run, started
 
 def main() -> None:
     params, band, method = started("band", "method")
-    layout = Layout()
-    sources = made(layout.history(band, method)), made(layout.refined(band, method))
-    law, episode = params.methods[method].law, load_episode(band)
-    about = {"law": law, "history": launch_history(episode)} if law == RUBBER else {}
+    refine(params, band, method)
+    layout, law = Layout(), params.methods[method].law
+    sources = layout.history(band, method), layout.refined(band, method)
     history = History.load(method, (*THETA, *LAWS[law]), *sources)
-    content, sling = theta_content(history, band, about), load_sling(params, band, law=law)
+    episode, sling = load_episode(band), load_sling(params, band, law=law)
+    about = {"law": law, "history": launch_history(episode)} if law == RUBBER else {}
+    content = theta_content(history, band, about)
     try:
         known, kept = confidence(params, method, episode, sling, content, workers=workers())
     except NoConfidence as error:  # θ* is what it is, and all that follows does without
@@ -47,6 +54,37 @@ def main() -> None:
     print(f"{band} {method}: loss {content['loss']['total']:.5g}")
     for name, value in content["theta"].items():
         print(f"  {name} {value:.4g}{_trust(known['parameters'][name]) if known else ''}")
+
+
+def refine(params, band: str, method: str) -> None:
+    """Find the promising regions of the history and evaluate a CMA-ES in each."""
+    about, optimizer, layout = params.methods[method], params.optimizer, Layout()
+    space = Space.of_method(params, method)
+    free = Free.of(space, about.fixed)
+    explored = History.load(method, free.names, made(layout.history(band, method)))
+    regions, asked = promising(about, optimizer, explored)
+    save_regions(layout.clusters(band, method), free.names, regions, asked)
+    history = History(method, space.names)
+    if regions:
+        fewer = f" (k_top asks for {asked})" if len(regions) < asked else ""
+        best = f"best loss {regions[0].loss:.5g}"
+        print(f"{band} {method}: {len(regions)} regions{fewer}, {best}", flush=True)
+        search(
+            Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed),
+            service("refined", band, method, params, optimizer.cma_rollouts),
+            history,
+            rollouts=optimizer.cma_rollouts,
+            free=free,
+        )
+    history.save(layout.refined(band, method))
+
+
+def promising(about, optimizer, explored: History) -> tuple[list[Region], int]:
+    """Regions of a history and how many were asked for; none where the search has one phase."""
+    if about.search != "multistart":
+        return [], 0
+    explored.best()  # says why, where all failed
+    return regions_of(about, optimizer, explored)
 
 
 def _trust(about: dict) -> str:

@@ -53,7 +53,7 @@ def test_the_oracle_feeds_no_method() -> None:
         name = relative(file)
         seen = [relative(other) for other in imports(file) if relative(other).startswith(ORACLE)]
         assert not seen or name.startswith(MAY_ASK_THE_ORACLE), f"{name} imports {seen[0]}"
-    for stage in ("history", "refined", "theta", "policy", "trials"):
+    for stage in ("history", "theta", "policy", "trials"):
         reached = closure(ROOT / "stages" / f"{stage}.py")
         assert not any(other.startswith(ORACLE) for other in reached), stage
 

@@ -19,7 +19,7 @@ from stages.start import remedy
 from tests.project import ROOT, python
 
 OF_A_BAND = ("record", "episode", "mounting")
-OF_A_METHOD = ("history", "refined", "theta", "policy", "trials")
+OF_A_METHOD = ("history", "theta", "policy", "trials")
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def test_a_history_that_failed_says_why(stage) -> None:
         Evaluation(unit, theta, nothing, np.full(30, np.inf), reasons), phase="de", generation=0
     )
     history.save(Path("data/history/band1/sling2sim2real.parquet"))
-    status, line = stage("refined", "band1", "sling2sim2real")
+    status, line = stage("theta", "band1", "sling2sim2real")
     assert status == 1
     assert line.startswith(
         "error: sling2sim2real: each of 30 simulations failed (the band slipped)"
@@ -76,13 +76,11 @@ def test_a_hint_names_the_group_by_which_a_method_runs(stage) -> None:
     path = Path("params.yaml")
     run = load(path).run.ablations
     assert "band1" in run.bands and {"de", "adam"} <= set(run.methods)
-    makes = {"refined": "history", "theta": "history"}
-    for name, step in makes.items():
-        for method, group in (("sling2sim2real", step), ("de", f"ablation_{step}")):
-            _, line = stage(name, "band1", method)
-            assert line.endswith(f"missing; `dvc repro {group}@band1-{method}` makes it")
-        _, line = stage(name, "band2", "adam")
-        assert "missing; name adam under run.methods or run.ablations" in line
+    for method, group in (("sling2sim2real", "history"), ("de", "ablation_history")):
+        _, line = stage("theta", "band1", method)
+        assert line.endswith(f"missing; `dvc repro {group}@band1-{method}` makes it")
+    _, line = stage("theta", "band2", "adam")
+    assert "missing; name adam under run.methods or run.ablations" in line
 
 
 def test_missing_inputs(stage) -> None:
@@ -105,9 +103,10 @@ def test_a_file_that_is_missing_or_damaged_says_what_makes_it(stage) -> None:
         "data/policies/band2/sling2sim2real/robust/card.json": "policy@band2-sling2sim2real",
         **{
             f"data/{step}/band1/de.parquet": f"ablation_{step}@band1-de"
-            for step in ("history", "refined", "theta", "trials")
+            for step in ("history", "theta", "trials")
         },
-        "data/clusters/band1/de.json": "ablation_refined@band1-de",
+        "data/clusters/band1/de.json": "ablation_theta@band1-de",
+        "data/refined/band1/de.parquet": "ablation_theta@band1-de",
     }
     for path, makes in cases.items():
         assert remedy(NotMade(Path(path))) == f"`dvc repro {makes}` makes it"

@@ -1,6 +1,6 @@
 """How long a whole search takes, method by method, on the yardstick of `sling bench`.
 
-A search is all that the stages history and refined do, with nothing remembered. Its time
+A search is all that the stages history and theta search, with nothing remembered. Its time
 is what evaluations take (simulation, loss, keeping them) and what is left: the optimiser's own.
 """
 
@@ -109,7 +109,7 @@ def time_search(
 
 
 def complete(params, method: str, optimizer, evaluate) -> History:
-    """Everything that the stages history and refined evaluate for a method."""
+    """Everything that the stages history and theta evaluate in a search for a method."""
     about = params.methods[method]
     space = Space.of_method(params, method)
     free = Free.of(space, about.fixed)

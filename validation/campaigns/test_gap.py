@@ -32,7 +32,7 @@ PAPER, OURS = METHODS = ("sling2sim2real", "sling2sim2real_taut")
 FACTOR = 1.5  # times the floor, asked of ours
 SHOTS, REACH = 40, 0.05  # launches that the oracle's θ is fitted to; m beyond the trained range
 STARTS, STEP, LOST = 48, 2e-3, 0.5  # of the fit: points, of the unit cube, m for a failed launch
-STAGES = ("history", "refined", "theta", "policy")
+STAGES = ("history", "theta", "policy")
 AS_IT_IS, THETA_, AIMED, HIT = "as it is", "oracle θ", "exact policy", "oracle policy"
 
 

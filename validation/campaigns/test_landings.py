@@ -32,7 +32,7 @@ METHODS = ("sling2sim2real", "sling2sim2real_taut")
 DRAWS = np.array(  # of the rig [m], inside the recorded stretch
     [[-0.27, -0.17], [-0.29, -0.15], [-0.31, -0.13], [-0.33, -0.12], [-0.30, -0.18]]
 )
-STAGES = ("history", "refined", "theta")
+STAGES = ("history", "theta")
 
 
 def launched(params, band: str) -> tuple[np.ndarray, np.ndarray]:

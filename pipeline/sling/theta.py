@@ -130,9 +130,10 @@ def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Slin
     law = content.get("law", NEO_HOOKEAN)
     extra = {name: content["theta"][name] for name in LAWS[law]}
     extra["air_drag"] = content.get("nuisances", {}).get("air_drag", 0.0)
+    asked = {"pull_time": params.launch.pull_time, "pause": params.launch.pause}
     if law == RUBBER:
-        asked = params.launch.model_dump(exclude_none=True)
-        extra["history"] = LaunchHistory(**content["history"] | asked)
+        told = {name: value for name, value in asked.items() if value is not None}
+        extra["history"] = LaunchHistory(**content["history"] | told)
     return replace(load_sling(params, band, root, law), **extra)
 
 

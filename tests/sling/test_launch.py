@@ -9,7 +9,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from pipeline.sling import interact, launch, solver
+from pipeline.sling import launch, solver
 from pipeline.sling.launch import ballistic_landing
 from pipeline.sling.model import GRAVITY
 from tests.sling.bands import DRAW, THETA
@@ -83,15 +83,3 @@ def test_a_projectile_that_passes_too_low_hits_the_fork(sling):
     for foot, failure in ((0.99 * above, None), (1.01 * above, "hits the fork: too low")):
         done = launch(replace(sling, foot_height=foot), THETA, draw)
         assert done.failure == [None] if failure is None else done.failure[0].startswith(failure)
-
-
-def test_what_the_stages_do_not_list_changes_nothing(strong_grip, episode):
-    """dvc.yaml: rollouts do not hang on the flight's parameters, launches not on the pads'."""
-    flight = {"fork_height": 0.9, "foot_height": 0.1, "projectile_mass": 0.1}
-    rollouts = (
-        interact(one, episode, THETA) for one in (strong_grip, replace(strong_grip, **flight))
-    )
-    np.testing.assert_array_equal(*(np.ravel(one.center_line) for one in rollouts))
-    pads = {"grip_force": 1.0, "finger_opening_time": 0.02}
-    launches = (launch(one, THETA, DRAW) for one in (strong_grip, replace(strong_grip, **pads)))
-    np.testing.assert_array_equal(*(one.landing_y for one in launches))

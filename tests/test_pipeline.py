@@ -10,6 +10,7 @@ from ruamel.yaml import YAML
 from tests import project
 from tests.project import ROOT, ROUGH, copy_project
 
+pytestmark = pytest.mark.slow
 TINY = {
     "run.bands": ["band1"],
     "run.rig": ["band1"],
@@ -50,6 +51,7 @@ class Copy(project.Copy):
             folder,
             PYTHONPATH=str(ROOT / "tests" / "audit"),
             AUDIT=str(folder.parent / "audit"),
+            SLING_WORKERS="1",
         )
         (folder.parent / "audit").mkdir()
         copy_project(folder)
@@ -82,7 +84,6 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Copy:
     return copy
 
 
-@pytest.mark.slow
 def test_a_run_leaves_only_its_lock_and_report_for_git(project: Copy) -> None:
     """DVC keeps its hands off .gitignore, and nothing else lies about."""
     changed = {line[3:] for line in project("git", "status", "--porcelain", "-uall").splitlines()}
@@ -94,7 +95,6 @@ def covers(listed: str, read: str) -> bool:
     return f"{read}.".startswith(f"{listed}.")
 
 
-@pytest.mark.slow
 def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
     """Neither more, or it would run in vain, nor less, or a change would do nothing."""
     stages = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
@@ -128,12 +128,10 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
     assert not idle, "parameters that do nothing"
 
 
-@pytest.mark.slow
 def test_a_second_run_does_nothing(project: Copy) -> None:
     assert project.dvc("repro") == set()
 
 
-@pytest.mark.slow
 def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
     """Forced once more from one history on, every recorded hash stays, and the whole report."""
     before = (project.folder / "dvc.lock").read_text()
@@ -156,7 +154,6 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
         assert file.read_bytes() == content, file
 
 
-@pytest.mark.slow
 def test_a_variation_of_k_top_keeps_the_history(project: Copy) -> None:
     project.commit()
     theta = METHODS[1]

@@ -33,25 +33,6 @@ def at(y: float, z: float, params, root=".") -> dict:
     return posed(answer, params, "band1", root)
 
 
-def test_a_draw_by_hand() -> None:
-    """45 degrees upwards, the fork's y along the base's x, its x against the base's y.
-
-    In frame O the hand's z is (0, 1, 1) / sqrt 2. In the base its axes are then the columns of
-    [[0, s, s], [-1, 0, 0], [0, -s, s]], s = 1 / sqrt 2, whose trace is s: w = sqrt(1 + s) / 2, and
-    the rest follows from the differences across the diagonal over 4 w.
-    """
-    pose = at(-0.3, -0.3, standing(FORK_IN_BASE))
-    assert pose["tcp_frame"] == "base"
-    assert pose["tcp_position_m"] == pytest.approx([0.7 - 0.3, 0.1, 0.4 - 0.3])
-    assert pose["pitch_rad"] == pytest.approx(np.pi / 4)
-    s = 0.5**0.5
-    w = np.sqrt(1 + s) / 2
-    by_hand = [-s / (4 * w), s / (4 * w), -(1 + s) / (4 * w), w]
-    np.testing.assert_allclose(pose["tcp_quaternion_xyzw"], by_hand, atol=1e-12)
-    assert (pose["warnings"], pose["hold_force_n"]) == (["as before"], 9.0)
-    assert list(pose)[-1] == "warnings"
-
-
 UNIT = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1)
 PLACE = st.lists(st.floats(-2, 2), min_size=3, max_size=3)
 
@@ -78,6 +59,7 @@ def test_band_hand_and_launch_lie_in_one_plane(place, turn, y, z) -> None:
     left, right, origin = seen
     np.testing.assert_allclose(origin, [0, 0, np.hypot(y, z)], atol=2e-6)  # straight ahead
     np.testing.assert_allclose(right - left, [0.275, 0, 0], atol=1e-9)
+    assert (pose["tcp_frame"], pose["hold_force_n"], list(pose)[-1]) == ("base", 9.0, "warnings")
     launch = np.array([0, np.cos(pose["pitch_rad"]), np.sin(pose["pitch_rad"])])
     np.testing.assert_allclose(axes[:, 2], to_base[:3, :3] @ launch, atol=1e-12)
 

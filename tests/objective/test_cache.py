@@ -1,10 +1,7 @@
 """A search that is killed goes on to the same result; what was simulated is recalled."""
 
-import os
 import re
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -21,12 +18,11 @@ from pipeline.objective.loss import TERMS
 from pipeline.objective.session import SOURCES
 from pipeline.params.identification import Prior
 from tests.forked import Forked
+from tests.project import ROOT, python
 from tests.search import toy
 from tests.search.functions import NAMES, Evaluate, quadratic
 from tests.search.killed import ROLLOUTS, VALLEY, searched
 from tools.closure import closure
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -186,9 +182,7 @@ from tests.objective.test_cache import batches, bowl
 resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))
 errors.run(lambda: EvaluationCache(bowl(), Path("memory"), "x")(batches(0.1)[0]) and None)
 """
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    done = python("-c", code, folder=tmp_path)
     said = r"error: memory/x/\w+\.npz: cannot be written \(File too large\)\n"
     assert re.fullmatch(said, done.stderr)
     assert done.returncode == 1

@@ -13,8 +13,8 @@ from pipeline.base.schema import Section
 from pipeline.objective.nuisance import NUISANCES
 from pipeline.params import Params, check, identification, load, parse
 from pipeline.sling.material import THETA
+from tests.project import ROOT
 
-ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "params.yaml").read_text(encoding="utf-8")
 CONTENT = YAML(typ="safe").load(TEXT)
 BO, DE = CONTENT["methods"]["bo"], CONTENT["methods"]["de"]

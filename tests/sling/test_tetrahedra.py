@@ -14,13 +14,7 @@ from pipeline.sling.model import GRAVITY, TETRAHEDRA
 from pipeline.sling.records import Grip
 from pipeline.sling.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.sling.solver import Frames, Options, Slings, run
-from tests.sling.bands import (
-    DRAW,
-    THETA,
-    at_rest,
-    random_thetas,
-    stepped,
-)
+from tests.sling.bands import DRAW, THETA, at_rest, random_thetas, stepped
 from validation.simulator.closed import String
 
 

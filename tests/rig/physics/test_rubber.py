@@ -5,12 +5,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import least_squares
 
-from pipeline.rig.physics.rubber import (
-    UNIT_MODULUS,
-    Rubber,
-    energy_density,
-    nominal_stress,
-)
+from pipeline.rig.physics.rubber import UNIT_MODULUS, Rubber, energy_density, nominal_stress
 
 
 def treloar(shared: Path, test: str) -> tuple[np.ndarray, np.ndarray]:

@@ -25,8 +25,8 @@ def test_taut_both_say_nearly_the_same_and_the_rod_says_it_sooner(columns):
     far = elements.compare(solid, rod)
     assert rod.pull == pytest.approx(np.ones(2), rel=5e-3)
     assert solid.pull == pytest.approx(np.ones(2), rel=0.02)
-    assert 0 < far["launch speed, worst [%]"] < 4  # held sections and locking stiffen it
-    assert 0 < far["peak force of the yardstick's pull [%]"] < 4
+    assert 0 < far["launch speed, worst [%]"] < 2  # held sections and locking stiffen it
+    assert 0 < far["peak force of the yardstick's pull [%]"] < 3
     assert far["centre line in the hand, rms [mm]"] < 10
     assert set(elements.compare(rod, rod).values()) == {0.0}
     assert rod.rollout_seconds < solid.rollout_seconds and rod.memory < solid.memory

@@ -33,7 +33,7 @@ def best_loss(params, sling, episode) -> tuple[float, np.ndarray]:
 @pytest.fixture(scope="module")
 def quick(coarse):
     """Its search, and a simulator of half the edges and steps for both rubbers."""
-    budget = {"generations": 12, "population": 20, "k_top": 2, "cma_rollouts": 480}
+    budget = {"generations": 8, "population": 16, "k_top": 1, "cma_rollouts": 560}
     return with_(with_(coarse, "optimizer", **budget), "sling", **ROUGH)
 
 

@@ -1,7 +1,5 @@
 """What tests of the simulator share: parameters, a straight band, a band at rest."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from pipeline.sling.cylinder import cylinder, volumes
@@ -26,12 +24,6 @@ def random_thetas(count: int, seed: int) -> np.ndarray:
 
 def random_draws(count: int, rng) -> np.ndarray:
     return np.column_stack([rng.uniform(-0.45, -0.33, count), rng.uniform(-0.3, -0.1, count)])
-
-
-def in_line(sling, **changes):
-    """A band whose clamps are as far apart as it is long."""
-    ahead = np.array([1.0, 0.0, 0.0])
-    return replace(sling, half_width=sling.rest_length / 2, clamp_direction=ahead, **changes)
 
 
 def along_x(sling, stretch: float = 1.0) -> np.ndarray:

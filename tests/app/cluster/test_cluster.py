@@ -156,7 +156,7 @@ def test_what_the_head_alone_has_is_pushed_first(copies, place) -> None:
     assert "Running stage" not in head("dvc", "repro", "train")
 
 
-def test_a_copy_with_other_code_is_refused(copies, place) -> None:
+def test_a_copy_with_other_code_or_none_is_refused(copies, place, tmp_path: Path) -> None:
     other = copies[1]
     (other.folder / "step.py").write_text("pass\n")
     with pytest.raises(
@@ -166,9 +166,6 @@ def test_a_copy_with_other_code_is_refused(copies, place) -> None:
     assert "git pull" in str(error.value) and str(other.folder) in str(error.value)
     assert "\n" not in str(error.value)
     assert not other.ran and not (other.folder / "dvc.lock").exists()
-
-
-def test_a_worker_outside_a_copy_is_refused(place, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="is no working copy .*SLING_COPY"):
         run(place(tmp_path), "search@a")
 

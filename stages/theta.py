@@ -36,39 +36,40 @@ from stages.start import run, started
 
 def main() -> None:
     params, band, method = started("band", "method")
-    refine(params, band, method)
-    layout, law = Layout(), params.methods[method].law
-    sources = layout.history(band, method), layout.refined(band, method)
-    history = History.load(method, (*THETA, *LAWS[law]), *sources)
-    episode, sling = load_episode(band), load_sling(params, band, law=law)
-    about = {"law": law, "history": launch_history(episode)} if law == RUBBER else {}
-    content = theta_content(history, band, about)
-    try:
-        known, kept = confidence(params, method, episode, sling, content, workers=workers())
-    except NoConfidence as error:  # θ* is what it is, and all that follows does without
-        print(f"warning: {method}: {error}", file=sys.stderr)
-        known, kept = None, {"samples": []}
-    content["confidence"] = known
-    write_json(layout.confidence(band, method), kept | {"band": band})
-    write_json(layout.theta(band, method), content)
-    print(f"{band} {method}: loss {content['loss']['total']:.5g}")
-    for name, value in content["theta"].items():
-        print(f"  {name} {value:.4g}{_trust(known['parameters'][name]) if known else ''}")
-
-
-def refine(params, band: str, method: str) -> None:
-    """Find the promising regions of the history and evaluate a CMA-ES in each."""
-    about, optimizer, layout = params.methods[method], params.optimizer, Layout()
-    space = Space.of_method(params, method)
-    free = Free.of(space, about.fixed)
+    about, layout = params.methods[method], Layout()
+    free = Free.of(Space.of_method(params, method), about.fixed)
     explored = History.load(method, free.names, made(layout.history(band, method)))
-    regions, asked = promising(about, optimizer, explored)
+    regions, asked = promising(about, params.optimizer, explored)
+    episode, sling = load_episode(band), load_sling(params, band, law=about.law)
+    known = {"law": RUBBER, "history": launch_history(episode)} if about.law == RUBBER else {}
+
     save_regions(layout.clusters(band, method), free.names, regions, asked)
-    history = History(method, space.names)
     if regions:
         fewer = f" (k_top asks for {asked})" if len(regions) < asked else ""
         best = f"best loss {regions[0].loss:.5g}"
         print(f"{band} {method}: {len(regions)} regions{fewer}, {best}", flush=True)
+    refine(params, band, method, free, regions).save(layout.refined(band, method))
+
+    sources = layout.history(band, method), layout.refined(band, method)
+    history = History.load(method, (*THETA, *LAWS[about.law]), *sources)
+    content = theta_content(history, band, known)
+    try:
+        told, kept = confidence(params, method, episode, sling, content, workers=workers())
+    except NoConfidence as error:  # θ* is what it is, and all that follows does without
+        print(f"warning: {method}: {error}", file=sys.stderr)
+        told, kept = None, {"samples": []}
+    content["confidence"] = told
+    write_json(layout.confidence(band, method), kept | {"band": band})
+    write_json(layout.theta(band, method), content)
+    print(f"{band} {method}: loss {content['loss']['total']:.5g}")
+    for name, value in content["theta"].items():
+        print(f"  {name} {value:.4g}{_trust(told['parameters'][name]) if told else ''}")
+
+
+def refine(params, band: str, method: str, free: Free, regions: list[Region]) -> History:
+    """What a CMA-ES in each region evaluates; no row where there is no region."""
+    optimizer, history = params.optimizer, History(method, Space.of_method(params, method).names)
+    if regions:
         search(
             Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed),
             service("refined", band, method, params, optimizer.cma_rollouts),
@@ -76,7 +77,7 @@ def refine(params, band: str, method: str) -> None:
             rollouts=optimizer.cma_rollouts,
             free=free,
         )
-    history.save(layout.refined(band, method))
+    return history
 
 
 def promising(about, optimizer, explored: History) -> tuple[list[Region], int]:

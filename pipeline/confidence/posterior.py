@@ -23,7 +23,16 @@ from pipeline.confidence.ensemble import sample
 from pipeline.confidence.rounds import LANES, Place, Round, Rounds, Tolerances
 from pipeline.episode.episode import Episode
 
-START = np.array([0.04, 0.03, 0.4, 0.4, 0.25, 1.0])  # spread of the first design, even coordinates
+START = {  # spread of the first design, even coordinates
+    "youngs_modulus": 0.04,
+    "poissons_ratio": 0.03,
+    "elasticity_damping": 0.4,
+    "dynamic_friction": 0.4,
+    "damping_scale": 0.25,
+    "mooney_share": 0.1,
+    "relaxation": 0.01,
+    "air_drag": 1.0,
+}
 SPREAD = 1.25  # of a design against the posterior
 SHRINK, GROW = 0.3, 2.0  # of a design's spread against the one before
 HEAT = (100.0, 30.0, 9.0, 2.7)  # of the first rounds
@@ -85,7 +94,7 @@ def fit(
     rng = np.random.default_rng(seed)
     tolerances = tolerances or Tolerances.of(episode)
     even = axes.clipped(axes.even(np.atleast_2d(theta)))[0]
-    factor = np.diag(START[axes.free])
+    factor = np.diag([START[name] for name in axes.names])
     times, steps = np.zeros(2), np.array([tolerances.release, tolerances.camera])
     course = []
     with ThreadPoolExecutor(workers) as pool:

@@ -108,6 +108,10 @@ class Evaluator:
         """
         values = dict(zip(self.space.names, theta.T, strict=True))
         extra = {name: values[name] for name in (*LAWS[RUBBER], "air_drag") if name in values}
+        if missing := [
+            name for name in LAWS[RUBBER] if name in extra and self._sling.law != RUBBER
+        ]:
+            raise ValueError(f"the sling is {self._sling.law}, which has no {', '.join(missing)}")
         rollouts = self._simulate(
             replace(self._sling, **extra) if extra else self._sling,
             thetas=theta[:, : len(THETA)],

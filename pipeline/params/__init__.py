@@ -95,6 +95,19 @@ class Params(Section):
         return self
 
     @model_validator(mode="after")
+    def _the_foot_is_below_the_tips(self) -> Params:
+        if self.setup.foot_height >= self.setup.fork_height:
+            raise refusal("setup.foot_height: must be less than setup.fork_height")
+        return self
+
+    @model_validator(mode="after")
+    def _the_mesh_knows_the_law(self) -> Params:
+        for name, method in self.methods.items():
+            if method.law == "rubber" and self.sling.mesh != "rod":
+                raise refusal(f"methods.{name}.law: rubber is for sling.mesh: rod alone")
+        return self
+
+    @model_validator(mode="after")
     def _bands_reach_across(self) -> Params:
         for name, band in self.bands.items():
             if band.rest_length <= self.setup.fork_width:

@@ -12,8 +12,8 @@ Distance = Annotated[float, Range(0.1, 20)]  # along the floor, m
 class LaunchParams(Section):
     """How a hand draws the band for a launch; None: as for the recording."""
 
-    pull_time: Annotated[float, Range(0.01, 1000)] | None
-    pause: Annotated[float, Range(0, 1e5)] | None
+    pull_time: Annotated[float, Range(0.05, 100)] | None
+    pause: Annotated[float, Range(0, 1000)] | None
 
 
 class Reward(Section):

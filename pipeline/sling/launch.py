@@ -110,7 +110,8 @@ def _outcomes(sling: Sling, lanes: np.ndarray, max_force: float) -> Launches:
 
     failure = np.full(len(lanes), None, object)
     failure[~(landing > 0)] = "the projectile fell short of the fork"
-    foot = ballistic_landing(y, z, vy, vz, sling.foot_height - sling.fork_height)
+    plane = sling.foot_height - sling.fork_height
+    foot = np.where(z <= plane, y, ballistic_landing(y, z, vy, vz, plane))
     failure[(landing > 0) & (foot < 0)] = "hits the fork: too low where it passes"
     failure[outcome != Outcome.SEPARATED] = "the projectile never left the pouch"
     for i in np.flatnonzero(hold_force > max_force):

@@ -44,14 +44,12 @@ def unrelaxed(sling, draws: np.ndarray) -> np.ndarray:
     """
     if sling.law != RUBBER or sling.history is None:
         return np.zeros((len(draws), len(TIMES)))
-    pull_time, pause = sling.history.pull_time, sling.history.pause
-    count = HISTORY_STEPS + int(np.ceil(HISTORY_STEPS * pause / pull_time))
-    part = np.minimum(np.arange(count + 1) / HISTORY_STEPS, 1)
+    part = np.linspace(0, 1, HISTORY_STEPS + 1)
     drawn = np.linalg.norm(draws, axis=1)[:, None] * (part**2 * (3 - 2 * part))
     stretch = np.maximum(2 * np.hypot(sling.half_width, drawn) / sling.rest_length, 1.0)
     stress = uniaxial(stretch, np.reshape(sling.mooney_share, (-1, 1)))
-    carried = overstress(stress, pull_time / HISTORY_STEPS)
-    return carried / np.maximum(stress[:, -1:], 1e-9)
+    carried = overstress(stress, sling.history.pull_time / HISTORY_STEPS)
+    return carried * np.exp(-sling.history.pause / TIMES) / np.maximum(stress[:, -1:], 1e-9)
 
 
 def overstress(stress: np.ndarray, step: float) -> np.ndarray:

@@ -28,6 +28,7 @@ for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
 SYNC;
 #if RUBBER
 start_relaxed();
+SYNC;
 #endif
 for (int step = 0; step < steps; ++step) {
   const SC* row = schedule.data + (size_t)step * STEP_SIZE;

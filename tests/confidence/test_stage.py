@@ -38,7 +38,7 @@ def searched(tmp_path: Path, monkeypatch) -> Space:
     history.add(found, phase="de", generation=0)
     history.save(Path(f"data/history/band1/{METHOD}.parquet"))
     episode(band="band1").save(Path("data/episodes/band1"))
-    monkeypatch.setattr(theta, "refine", lambda *_: None)  # it has been
+    monkeypatch.setattr(theta, "promising", lambda *_: ([], 0))  # refined: nothing more
     return space
 
 

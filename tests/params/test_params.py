@@ -182,6 +182,7 @@ REFUSED = [
     ("methods.no_work.covariance", 1, "methods.no_work.covariance: must be a valid boolean"),
     ("policy.robust.methods", ["best"], "policy.robust.methods: best is not one of"),
     ("methods.no_work.k_top", 0, "methods.no_work.k_top: must be between 1 and 50"),
+    ("setup.foot_height", 0.52, "setup.foot_height: must be less than setup.fork_height"),
     ("methods.de.law", "gum", "methods.de.law: must be"),
     ("methods.de.law", "rubber", "methods.de: bounds: mooney_share is missing, [low, high] within"),
     ("methods.de.fixed", {"relaxation": 0.01}, "methods.de.fixed: relaxation is not one of"),

@@ -103,6 +103,22 @@ def test_history_of_a_recording():
     position[time < 1.5] = [0.0, -0.1, -0.3]
     position[time > 8] = [0.0, -0.5, -0.1]
     episode = SimpleNamespace(time=time, position=position, release_time=8.0)
+    episode.band = "test"
     found = launch_history(episode)
     assert found["pull_time"] == pytest.approx(4.0, abs=0.1)
     assert found["pause"] == pytest.approx(2.0, abs=0.1)
+    assert launch_history(SimpleNamespace(**vars(episode) | {"release_time": 1e6}))["pause"] <= 1e5
+    for release in (-1.0, 8.0):
+        still = vars(episode) | {"release_time": release, "position": 0 * position}
+        with pytest.raises(UserError, match="the hand lets go at the fork"):
+            launch_history(SimpleNamespace(**still))
+
+
+def test_a_pause_fades_the_memory_by_its_own_length(rubber):
+    """Whatever the pull's: exp(-pause / t) of what it left."""
+    for pull_time in (0.05, 4.0, 100.0):
+        none, some = (
+            unrelaxed(replace(rubber, history=LaunchHistory(pull_time, pause)), DRAW[None])[0]
+            for pause in (0.0, 0.7)
+        )
+        np.testing.assert_allclose(some, none * np.exp(-0.7 / TIMES), rtol=1e-12)

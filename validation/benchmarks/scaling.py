@@ -21,7 +21,7 @@ from pipeline.search.history import History
 from pipeline.search.loop import latin_hypercube
 from pipeline.sling.launch import Launches, launch
 from pipeline.sling.load import load_sling
-from pipeline.sling.material import THETA
+from pipeline.sling.theta import at_points
 from validation.benchmarks.methods import BUDGETS, evaluator, time_search
 from validation.benchmarks.timing import REPEATS, seconds, timed
 from validation.synthetic import DRAW, recorded_yardstick
@@ -65,7 +65,8 @@ def scaling(params, devices: Sequence[str], band: str | None, method: str, size:
     expect_known(params, "method", method)
     if band:
         expect_known(params, "band", band)
-        sling, episode = load_sling(params, band), load_episode(band)
+        law = params.methods[method].law
+        sling, episode = load_sling(params, band, law=law), load_episode(band)
     else:
         sling, episode = recorded_yardstick(params)
     optimizer = params.optimizer.model_copy(update=BUDGETS[size])
@@ -81,8 +82,8 @@ def scaling(params, devices: Sequence[str], band: str | None, method: str, size:
 
     def launches(count: int) -> dict:
         unit = latin_hypercube(space.dimension, count, optimizer.seed)
-        thetas = space.to_physical(unit)[:, : len(THETA)]
-        works = [partial(launch, sling, thetas, [-DRAW, -0.15], device=team) for team in teams]
+        own, thetas = at_points(sling, space.to_physical(unit))
+        works = [partial(launch, own, thetas, [-DRAW, -0.15], device=team) for team in teams]
         return {"launches": count} | _compared(works, teams, _launched)
 
     def search() -> dict:

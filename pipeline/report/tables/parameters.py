@@ -95,7 +95,8 @@ def _value(params, result: Result, name: str) -> Value:
     value = result.theta["theta"][name]
     if name in params.methods[result.method].fixed:
         return Value(value, "fixed")
-    edge = at_edge(value, name, Space.of_method(params, result.method))
+    box = Space.of_method(params, result.method)
+    edge = name in box.names and at_edge(value, name, box)
     about = result.confidence.get("parameters", {}).get(name)
     if about is None:
         return Value(value, at_edge=edge)

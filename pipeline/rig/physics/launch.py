@@ -67,7 +67,8 @@ def launch_from(
     taut = string.length / 2
     if np.linalg.norm(aim - string.clamps[0]) <= taut:
         return Trial(float("nan"), "too short: the drawn band is slack", 0.0)
-    _, stress, memory = pulled(string, aim)
+    asked = params.launch
+    _, stress, memory = pulled(string, aim, asked.pull_time, asked.pause)
     y = string.at_rest(bent_at(string, aim), tolerance, held=True, memory=memory[-1] / stress[-1])
     hold_force = float(np.linalg.norm(string.at_middle(y)))
     limit = params.setup.max_force

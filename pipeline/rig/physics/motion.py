@@ -89,7 +89,15 @@ class HandMotion:
         return FINGER_OPEN + (FINGER_CLOSED - FINGER_OPEN) * closed
 
 
-def pull_history(step: float) -> np.ndarray:
-    """Drawn distance, 0 to 1, every `step` seconds from the start of the pull to the release."""
-    part = np.clip(np.arange(0, OPEN - PULL + step / 2, step) / (PULLED - PULL), 0, 1)
+def pull_history(
+    step: float, pull_time: float | None = None, pause: float | None = None
+) -> np.ndarray:
+    """Drawn distance, 0 to 1, every `step` seconds from the start of the pull to the release.
+
+    Args:
+        pull_time, pause: Of the hand [s]; None: as it records a band.
+    """
+    pull_time = PULLED - PULL if pull_time is None else pull_time
+    pause = OPEN - PULLED if pause is None else pause
+    part = np.clip(np.arange(0, pull_time + pause + step / 2, step) / pull_time, 0, 1)
     return part**2 * (3 - 2 * part)

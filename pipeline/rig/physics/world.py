@@ -65,16 +65,19 @@ def _string_of(
     return with_scale(guess.rubber.scale * hidden.peak_force / force)
 
 
-def pulled(string: ElasticString, drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def pulled(
+    string: ElasticString, drawn: np.ndarray, *times: float | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The band while its middle is pulled straight from the origin to `drawn` (3,) and held there.
 
-    Its halves are taken as straight, and as unstretched while they are slack.
+    Its halves are taken as straight, and as unstretched while they are slack. `times` are those of
+    `pull_history`.
 
     Returns:
         Middle (T, 3), elastic stress (T,) and memories (T, K) of Treloar's rubber [MPa], at equal
-        steps of the recording's pull and pause.
+        steps of the pull and the pause.
     """
-    path = np.multiply.outer(pull_history(HISTORY_STEP), drawn)
+    path = np.multiply.outer(pull_history(HISTORY_STEP, *times), drawn)
     half = np.linalg.norm(path - string.clamps[0], axis=1)
     stretch = np.maximum(half / (string.length / 2), 1.0)
     return path, nominal_stress(stretch)[0], string.rubber.memory(stretch, HISTORY_STEP)

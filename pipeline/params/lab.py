@@ -102,6 +102,7 @@ class SetupParams(Section):
     grip_force: Annotated[float, Range(0.1, 500)]
     finger_opening_time: Annotated[float, Range(1e-3, 1)]
     max_force: Annotated[float, Range(0.1, 1000)]
+    arm_stiffness: Annotated[float, Range(300, 1e6)] | None
     draw_y: Annotated[tuple[DrawY, DrawY], LIST, ASCENDING]
     draw_z: Annotated[tuple[DrawZ, DrawZ], LIST, ASCENDING]
     base_to_fork: Pose | None

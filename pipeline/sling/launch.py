@@ -49,9 +49,11 @@ def ballistic_landing(y, z, vy, vz, floor: float):
 
 
 def schedule_of(sling: Sling, refine: int = 1) -> Schedule:
-    """Relax at the draw, then recoil in second-order steps."""
+    """Relax at the draw, where the arm gives way; then recoil in second-order steps."""
     relax = relaxation(Grip.POUCH)
     relax["blend"] = 1.0
+    if sling.arm_stiffness is not None:
+        relax["compliance"][relax["bending"] == 1] = 1 / sling.arm_stiffness
     h = sling.steps.launch_step / refine
     count = int(round(sling.steps.launch_time / h))
     first = steps([0.0, h], h, grip=Grip.FREE)

@@ -43,6 +43,8 @@ class Sling:
             takes a solid round band's, which follows Young's modulus. Tetrahedra are solid and
             round: they bend as their mesh does, whatever was measured.
         projectile_mass, grip_force, finger_opening_time: As in params.yaml `setup` [kg, N, s].
+        arm_stiffness: Of the arm that holds a band to launch it [N/m], which is sent to the draw
+            and rests where its spring holds the band; None: it does not give way.
         steps: The step sizes and the mesh's grading, as in params.yaml `sling`.
         clamped: Whether the first and the last end are held; experiments on a free band let go.
         clamp_twist: Of the last clamp about the band, against the first [rad].
@@ -72,6 +74,7 @@ class Sling:
     grip_force: float
     finger_opening_time: float
     steps: object
+    arm_stiffness: float | None = None
     clamped: tuple[bool, bool] = (True, True)
     clamp_twist: float = 0.0
     mesh: str = ROD
@@ -113,6 +116,7 @@ class Sling:
             projectile_mass=setup.projectile_mass,
             grip_force=setup.grip_force,
             finger_opening_time=setup.finger_opening_time,
+            arm_stiffness=setup.arm_stiffness,
             air_density=setup.air_density,
             steps=resolution,
             mesh=mesh,

@@ -13,6 +13,7 @@ const real balance = tolerance * (SC)(3.0 / PLACES) * ((SC)1.5e4 * node_mass * g
 real offset[PLACES], pull = zero, held[3] = {zero, zero, zero};  // of the hand; the force on it when it last held
 UNROLL for (int m = 0; m < PLACES; ++m) offset[m] = zero;
 real contact_before = zero;  // of the pouch
+real given[3] = {zero, zero, zero}, owed[3] = {zero, zero, zero}, relaxed = one;  // an arm that gives way
 int iterations = 0;
 
 auto middle = [&](const real* dofs, int c) -> real {  // of the held section: the mean of its places
@@ -43,11 +44,21 @@ for (int step = 0; step < steps; ++step) {
   // ---- the hand takes hold of the band where it is, and leads it to its own path
   const bool was_attached = attached;
   gripped = grip == GRIP_HELD; attached = gripped || grip == GRIP_POUCH; opening = grip == GRIP_OPENING;
+  // an arm that gives way rests where its spring holds the force: a fixed point, by Aitken's relaxation
+  if (row[STEP_COMPLIANCE] > 0) {
+    real turn = zero, size = zero;
+    UNROLL for (int c = 0; c < 3; ++c) {
+      const real owes = row[STEP_COMPLIANCE] * held[c] - given[c], change = owes - owed[c];
+      turn -= owed[c] * change; size += change * change; owed[c] = owes;
+    }
+    relaxed = minimum(maximum(relaxed * turn / maximum(size, zero + (SC)1e-16), zero + (SC)0.05), one);
+    UNROLL for (int c = 0; c < 3; ++c) given[c] += relaxed * owed[c];
+  }
   real target[PLACES];
   UNROLL for (int m = 0; m < PLACES; ++m) {
     const SC place = row[STEP_TARGET + m % 3] + in_hand(m);
     if (attached && !was_attached) offset[m] = X1(m, MID) - place;
-    target[m] = zero + place + blend * offset[m];
+    target[m] = given[m % 3] + place + blend * offset[m];
   }
   // what the pads can hold: all of it while they are closed, then less and less of the pull at the release
   capacity = opening ? maximum(pull - grip_force * friction, zero) : grip_force * friction;
@@ -130,7 +141,8 @@ for (int step = 0; step < steps; ++step) {
     }
     separation[0] = separates > zero ? time - ((SC)1 - w) * h : separation[0];
     payload = separates > zero ? zero : payload;
-    outcome = outcome != zero ? outcome : separates * (SC)OUTCOME_SEPARATED;  // done: a finished launch
+    const real restless = dot(owed, owed) > (SC)1e-10 ? zero + (SC)OUTCOME_NOT_CONVERGED : zero;  // the arm, when it let go
+    outcome = outcome != zero ? outcome : restless != zero ? restless : separates * (SC)OUTCOME_SEPARATED;  // done: a finished launch
     contact_before = contact;
   }
 

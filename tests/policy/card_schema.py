@@ -32,6 +32,7 @@ def all_in(names: str, kind: dict) -> dict:
 SETUP = (
     "fork_width_m fork_height_m projectile_mass_kg band_mass_kg band_diameter_m band_rest_length_m"
 )
+ARM = {"type": ["number", "null"], "exclusiveMinimum": 0}  # null: it does not give way
 FIVE = {
     "youngs_modulus": POSITIVE,
     "poissons_ratio": {**POSITIVE, "exclusiveMaximum": 0.5},
@@ -73,7 +74,7 @@ SCHEMA = {
         input=port("target", 1, trained_range=PAIR),
         output=port("draw", 2, axes={"const": ["y", "z"]}, frame=TEXT, low=PAIR, high=PAIR),
         max_force_n=POSITIVE,
-        setup=all_in(SETUP, POSITIVE),
+        setup=exactly(**dict.fromkeys(SETUP.split(), POSITIVE), arm_stiffness_n_m=ARM),
         training={"type": "object"},
         landing_map=exactly(box=READ_BETWEEN, target_range=READ_BETWEEN),
         trained_on=exactly(device={"type": "string", "pattern": "^(cpu|cuda)$"}),

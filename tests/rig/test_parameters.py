@@ -38,6 +38,7 @@ CHANGES = {  # the longest prefix of a number's name counts
     **{f"base.{i}": {TF, POSE} for i in range(3, 7)},  # turns what is reported, moves nothing
     "tool_pitch": FELT,
     "arm": FELT,
+    "arm.stiffness": FELT | LANDING,
     "clock": {GRIPPER, POSE, WRENCH},
     "wrench": {WRENCH},
     "wrench.yaw": {TF, WRENCH},

@@ -14,7 +14,7 @@ from pipeline.sling.model import TETRAHEDRA
 @pytest.fixture(scope="session")
 def sling(params):
     band = SimpleNamespace(mass=0.023, diameter=0.01, rest_length=0.52)
-    return Sling.of(band, params.setup, params.sling)
+    return replace(Sling.of(band, params.setup, params.sling), arm_stiffness=None)
 
 
 @pytest.fixture(scope="session")

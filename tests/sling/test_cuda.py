@@ -42,8 +42,8 @@ def test_interaction_agrees_with_the_cpu(strong_grip, episode, law):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_launches_agree_with_the_cpu(sling, law):
-    """Landing within 0.1 %."""
-    sling = replace(sling, law=law, **LAWS[law])
+    """Landing within 0.1 %, by an arm that gives way."""
+    sling = replace(sling, law=law, arm_stiffness=12000.0, **LAWS[law])
     draws = random_draws(64, np.random.default_rng(4))
     theta = [2.5e5, 0.45, 2e-3, 0.5, 1.0]
     cpu, gpu = launch(sling, theta, draws), launch(sling, theta, draws, device="cuda:0")

@@ -240,7 +240,7 @@ def sling_of(bench: Bench) -> Sling:
     """The first band of params.yaml, mounted as `setup` says."""
     params = bench.params
     sling = Sling.of(params.bands[next(iter(params.bands))], params.setup, params.sling)
-    return replace(sling, air_density=0.0)  # other engines have none
+    return replace(sling, air_density=0.0, arm_stiffness=None)  # other engines have none
 
 
 def _interpolate(at: np.ndarray, places: np.ndarray, rows: np.ndarray) -> np.ndarray:

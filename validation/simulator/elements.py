@@ -73,8 +73,9 @@ def slings(params) -> dict[str, Sling]:
     """The first band of params.yaml in either mesh, and in twice as many sections."""
     band = params.bands[next(iter(params.bands))]
     shapes = (params.sling.model_copy(update={"mesh": mesh}) for mesh in (ROD, TETRAHEDRA))
-    still = (replace(Sling.of(band, params.setup, shape), air_density=0.0) for shape in shapes)
-    rod, solid = still  # tetrahedra feel no cylinder's drag
+    made = (Sling.of(band, params.setup, shape) for shape in shapes)
+    # tetrahedra feel no cylinder's drag
+    rod, solid = (replace(one, air_density=0.0, arm_stiffness=None) for one in made)
     finer = replace(solid, edges=2 * solid.edges)
     return {"rod": rod, "tetrahedra": solid, "tetrahedra, twice as many": finer}
 

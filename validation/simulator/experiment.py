@@ -38,11 +38,11 @@ class Trajectories:
 
 
 def band_of(bench: Bench) -> Sling:
-    """The first band of params.yaml as a rod of the default resolution, solid, without air."""
+    """The first band of params.yaml as a solid rod of the default resolution, no air, stiff arm."""
     params = bench.params
     band = params.bands[next(iter(params.bands))]
     sling = Sling.of(band, params.setup, params.sling, as_rod=True)
-    return replace(sling, air_density=0.0)
+    return replace(sling, air_density=0.0, arm_stiffness=None)
 
 
 def straight(sling: Sling, length: float, **changes) -> Sling:

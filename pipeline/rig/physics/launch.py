@@ -62,14 +62,18 @@ def launch(band_name: str, params: Params, draw: tuple[float, float], number: in
 def launch_from(
     string: ElasticString, params: Params, aim: np.ndarray, kick: np.ndarray | None = None
 ) -> Trial:
-    """Launch from exactly the draw `aim` (3,), let go with the velocity `kick` (3,)."""
+    """Launch by an arm sent to exactly `aim` (3,), let go with the velocity `kick` (3,).
+
+    The arm rests where its stiffness (`rig.arm`) holds the drawn band.
+    """
     tolerance, mass = params.rig.tolerance, params.setup.projectile_mass
     taut = string.length / 2
     if np.linalg.norm(aim - string.clamps[0]) <= taut:
         return Trial(float("nan"), "too short: the drawn band is slack", 0.0)
     asked = params.launch
     _, stress, memory = pulled(string, aim, asked.pull_time, asked.pause)
-    y = string.at_rest(bent_at(string, aim), tolerance, held=True, memory=memory[-1] / stress[-1])
+    give, kept = 1 / params.rig.arm.stiffness, memory[-1] / stress[-1]
+    y = string.at_rest(bent_at(string, aim), tolerance, held=True, give=give, memory=kept)
     hold_force = float(np.linalg.norm(string.at_middle(y)))
     limit = params.setup.max_force
     if hold_force > limit:

@@ -237,12 +237,14 @@ class ElasticString:
         tolerance: float,
         *,
         held: bool = False,
+        give: float = 0.0,
         memory: np.ndarray | None = None,
     ) -> np.ndarray:
         """The state in which the band comes to rest from nodes x (nodes, 3).
 
         Args:
             held: The middle stays where it is.
+            give: By how much what holds the middle gives way to the band's force [m/N].
             memory: w_k / P of every edge (K,); None: all is relaxed.
         """
         rubber = self.rubber
@@ -250,23 +252,27 @@ class ElasticString:
         frozen = replace(rubber, relaxation=np.array([[excess, FOREVER]]))
         sticky = replace(self, rubber=frozen, damping=2 * np.sqrt(-GRAVITY[2] / (self.length / 2)))
         start, hand = sticky.state(x, np.zeros(1)), still if held else None
-        if held and (nodes := sticky.balanced(start, tolerance / 100)) is not None:
+        if held and (nodes := sticky.balanced(start, tolerance / 100, give)) is not None:
             return self.state(nodes, memory)
         end = sticky.integrate(start, np.array([0.0, SETTLING_TIME]), tolerance, hand=hand)[1][-1]
         return self.state(end[:, :3], memory)
 
-    def balanced(self, y: np.ndarray, tolerance: float) -> np.ndarray | None:
+    def balanced(self, y: np.ndarray, tolerance: float, give: float = 0.0) -> np.ndarray | None:
         """Nodes (nodes, 3) near those of y (nodes, 6 + K) that no force moves; see statics.py.
 
-        Clamps, middle and memories stay.
+        Clamps and memories stay, and the middle but for what it gives way [m/N].
         """
 
         def forces(x: np.ndarray) -> np.ndarray:
             state = np.repeat(y[..., None], x.shape[-1], axis=-1)
             state[:, :3] = x
-            return self.forces(state)[0]
+            force = self.forces(state)[0]
+            if give:
+                force[self.middle] -= (x[self.middle] - y[self.middle, :3, None]) / give
+            return force
 
-        return balanced(forces, y[:, :3], [0, self.middle, -1], tolerance)
+        held = [0, -1] if give else [0, self.middle, -1]
+        return balanced(forces, y[:, :3], held, tolerance)
 
     def energy(self, y: np.ndarray) -> float:
         """Motion, height, strain and bending of one state [J]; not what the memories hold."""

@@ -85,6 +85,21 @@ def test_a_kick_moves_the_landing(coarse: Params) -> None:
     assert first == again and first.landing_y != other.landing_y
 
 
+def test_the_arm_gives_way(coarse: Params) -> None:
+    """By force over stiffness; the launch is a firm arm's from there."""
+    string, aim, stiffness = string_of(coarse, "band1"), np.array([0.0, *DRAW]), 3000.0
+    y = string.at_rest(bent_at(string, aim), 1e-6, held=True, give=1 / stiffness)
+    moved = y[string.middle, :3] - aim
+    np.testing.assert_allclose(moved, string.at_middle(y) / stiffness, rtol=1e-6, atol=1e-9)
+    soft, firm = (with_(coarse, "rig.arm", stiffness=k) for k in (stiffness, 1e9))
+    force = launch_from(string, soft, aim).hold_force
+    there = aim - aim / np.linalg.norm(aim) * force / stiffness
+    near, nearer, far = (
+        launch_from(string, *one).landing_y for one in ((soft, aim), (firm, there), (firm, aim))
+    )
+    assert np.isclose(near, nearer, rtol=2e-3) and near < 0.97 * far
+
+
 def test_landing_is_converged(params: Params) -> None:
     """Half the edges at ten times the tolerance move a landing by less than half a per cent."""
     string, aim = string_of(params, "band1"), np.array([0.0, *DRAW])

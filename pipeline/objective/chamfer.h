@@ -1,10 +1,14 @@
 // One camera frame of one rollout: mean distances between its points and the simulated tube, one
 // text for 16 points a CPU vector and for 32 threads of a CUDA warp, a point each.
 //
-// Wants the macros EDGES, SAMPLES (an edge), BOTH (directions), CPU_LANES (as chamfer.py packs).
-// In: line (N, K, EDGES + 1, 3), packed points: blocks of 4 rows x, y, z, weight (0: padding, a
-// copy of a real point), frame_blocks (K + 1). Out: errors (N, K, 2) [m], measured to simulated and
-// back; the first is NaN for an empty frame.
+// Points come in compact blocks, each within a ball. The balls, LANES of them at once, tell which
+// edges and which blocks cannot hold a nearest one; these are skipped, and nothing is changed by it.
+//
+// Wants the macros EDGES, SAMPLES (an edge), BOTH (directions), CULLED (0: nothing is skipped),
+// CPU_LANES (as chamfer.py packs). In: line (N, K, EDGES + 1, 3), packed points: blocks of 4 rows
+// x, y, z, weight (0: padding, a copy of a real point), their balls: groups of LANES as 4 rows x, y,
+// z, radius, frame_blocks, frame_groups (K + 1). Out: errors (N, K, 2) [m], measured to simulated
+// and back; the first is NaN for an empty frame.
 
 #if defined(__CUDA_ARCH__)
 #define THREADS 32
@@ -12,108 +16,209 @@
 #define SHARED __shared__
 #define SYNC() __syncwarp()
 typedef float real;
+typedef unsigned whole;
 const int lane = tid % 32;
-#define ROW(block, row) points.data[((size_t)(block) * 4 + (row)) * LANES + lane]
+#define ROW(array, block, row) array.data[((size_t)(block) * 4 + (row)) * LANES + lane]
 #define ROOT(x) sqrtf(x)
+#define GET(array) (array)[lane]
+#define PUT(array, x) (array)[lane] = x
+#define OF_LANE(x, k) __shfl_sync(0xffffffffu, x, k)
+#define BITS(x) __ballot_sync(0xffffffffu, x)
+#define FIRST_BIT(bits) (__ffsll(bits) - 1)
+#define UNROLL _Pragma("unroll")  // arrays over edges lie in registers
+auto taken = [=](const float* array, int stride, int size) -> float { return array[stride * (lane < size ? lane : size - 1)]; };
 auto sum = [](float x) -> float { for (int o = 16; o > 0; o >>= 1) x += __shfl_xor_sync(0xffffffffu, x, o); return x; };
 auto least = [](float x) -> float { for (int o = 16; o > 0; o >>= 1) x = fminf(x, __shfl_xor_sync(0xffffffffu, x, o)); return x; };
 #else
 #define THREADS 1
 #define LANES CPU_LANES
-#define SHARED
+#define SHARED alignas(4 * LANES)
 #define SYNC()
 typedef float real __attribute__((vector_size(4 * LANES)));
+typedef unsigned whole __attribute__((vector_size(4 * LANES)));
+typedef bool flags __attribute__((ext_vector_type(LANES)));
 const int lane = 0;
-#define ROW(block, row) (*(const real*)(points.data + ((size_t)(block) * 4 + (row)) * LANES))
+#define ROW(array, block, row) (*(const real*)(array.data + ((size_t)(block) * 4 + (row)) * LANES))
 #define ROOT(x) root(x)
+#define GET(array) (*(const real*)(array))
+#define PUT(array, x) (*(real*)(array) = x)
+#define OF_LANE(x, k) x[k]
+#define BITS(x) bits_of(__builtin_convertvector(x, flags))
+#define FIRST_BIT(bits) __builtin_ctzll(bits)
+#define UNROLL
+auto taken = [](const float* array, int stride, int size) -> real { real x; for (int k = 0; k < LANES; ++k) x[k] = array[stride * (k < size ? k : size - 1)]; return x; };
+auto bits_of = [](flags x) -> unsigned { unsigned bits = 0; __builtin_memcpy(&bits, &x, sizeof(x)); return bits; };
 auto root = [](real x) -> real { for (int k = 0; k < LANES; ++k) x[k] = __builtin_sqrtf(x[k]); return x; };
 auto sum = [](real x) -> float { float s = 0.0f; for (int k = 0; k < LANES; ++k) s += x[k]; return s; };
-auto least = [](real x) -> float { float s = x[0]; for (int k = 1; k < LANES; ++k) s = x[k] < s ? x[k] : s; return s; };
+auto least = [](real x) -> float {
+  _Pragma("clang loop unroll(full)")
+  for (int width = LANES / 2; width > 0; width /= 2) {
+    real other;
+    for (int k = 0; k < LANES; ++k) other[k] = x[(k + width) % LANES];
+    x = other < x ? other : x;
+  }
+  return x[0];
+};
 #endif
 const real zero = real() * 0.0f;
+#define FAR 1e30f
+#define INFINITE (FAR * FAR)
+#define LESS 0.99999f  // bounds are this much wider than rounding could ask for
+#define MORE 1.00001f
 
 const int item = tid / THREADS, frame = item % frames;
 const int first = frame_blocks.data[frame], last = frame_blocks.data[frame + 1];
+const int first_group = frame_groups.data[frame], last_group = frame_groups.data[frame + 1];
 const float* nodes = line.data + (size_t)item * (EDGES + 1) * 3;
 
 const float* rest = rest_edges.data;
 float rest_length = 0.0f;
 for (int e = 0; e < EDGES; ++e) rest_length += rest[e];
 
-// of each edge: start (3), vector (3), vector / length^2 (3), radius (stretched at constant volume)
-SHARED float tube[EDGES][10];
+// of each edge: start (3), vector (3), vector / length^2 (3), radius (stretched at constant volume), how
+// far off a bound may be, how far its samples reach from the middle one, samples (3 each)
+enum { RADIUS = 9, OFF, REACH, RIDGE, NEAREST = RIDGE + 3 * SAMPLES, ROWS = NEAREST + SAMPLES, WIDE = (EDGES + LANES - 1) / LANES * LANES };
+SHARED float tube[ROWS][WIDE];
 SYNC();  // a block may have had another frame before
-for (int e = lane; e < EDGES; e += THREADS) {
-  float square = 0.0f;
+for (int e = 0; e < EDGES; e += LANES) {
+  const int size = EDGES - e;
+  real start[3], edge[3], part[3], length2 = zero;
   for (int c = 0; c < 3; ++c) {
-    tube[e][c] = nodes[3 * e + c];
-    tube[e][3 + c] = nodes[3 * e + 3 + c] - nodes[3 * e + c];
-    square += tube[e][3 + c] * tube[e][3 + c];
+    start[c] = taken(nodes + 3 * e + c, 3, size);
+    edge[c] = taken(nodes + 3 * e + 3 + c, 3, size) - start[c];
+    length2 += edge[c] * edge[c];
   }
-  const float least_square = rest[e] * rest[e] * 0.0625f;  // a slack edge grows no thicker than twice
-  square = square > least_square ? square : least_square;
-  for (int c = 0; c < 3; ++c) tube[e][6 + c] = tube[e][3 + c] / square;
-  tube[e][9] = radius * sqrtf(rest[e] / sqrtf(square));
+  const real rest_of = taken(rest + e, 1, size), least2 = rest_of * rest_of * 0.0625f;
+  const real square = length2 > least2 ? length2 : least2;  // a slack edge grows no thicker than twice
+  const real thick = radius * ROOT(rest_of / ROOT(square));
+  for (int c = 0; c < 3; ++c) {
+    part[c] = edge[c] / square;
+    PUT(tube[c] + e, start[c]);
+    PUT(tube[3 + c] + e, edge[c]);
+    PUT(tube[6 + c] + e, part[c]);
+  }
+  PUT(tube[RADIUS] + e, thick);
+  PUT(tube[OFF] + e, 1e-5f * (ROOT(length2) + thick));
+#if BOTH
+  // points on the ridge of the tube that faces the camera
+  real p[SAMPLES][3], reach2 = zero;
+  for (int k = 0; k < SAMPLES; ++k) {
+    const float at = ((float)k + 0.5f) / (float)SAMPLES;
+    real view[3], along = zero, norm = zero;
+    for (int c = 0; c < 3; ++c) {
+      p[k][c] = start[c] + at * edge[c];
+      view[c] = camera[c] - p[k][c];
+      along += view[c] * part[c];
+    }
+    for (int c = 0; c < 3; ++c) { view[c] -= along * edge[c]; norm += view[c] * view[c]; }
+    norm = thick / ROOT(norm + 1e-12f);
+    for (int c = 0; c < 3; ++c) { p[k][c] += norm * view[c]; PUT(tube[RIDGE + 3 * k + c] + e, p[k][c]); }
+  }
+  for (int k = 0; k < SAMPLES; ++k) {
+    real square = zero;
+    for (int c = 0; c < 3; ++c) square += (p[k][c] - p[SAMPLES / 2][c]) * (p[k][c] - p[SAMPLES / 2][c]);
+    reach2 = square > reach2 ? square : reach2;
+  }
+  PUT(tube[REACH] + e, ROOT(reach2) * MORE);
+  for (int k = 0; k < SAMPLES; ++k) PUT(tube[NEAREST + k] + e, zero);
+#endif
 }
 SYNC();
 
+auto to_axis = [&](int e, real x, real y, real z) -> real {
+  const real dx = x - tube[0][e], dy = y - tube[1][e], dz = z - tube[2][e];
+  real part = dx * tube[6][e] + dy * tube[7][e] + dz * tube[8][e];
+  part = part < 0.0f ? zero : part;
+  part = part > 1.0f ? zero + 1.0f : part;
+  const real ex = dx - part * tube[3][e], ey = dy - part * tube[4][e], ez = dz - part * tube[5][e];
+  return ROOT(ex * ex + ey * ey + ez * ez);
+};
+
 // measured to simulated: each point to the surface of the union of all edges' tubes
 real total = zero, count = zero;
-for (int b = first; b < last; ++b) {
-  const real x = ROW(b, 0), y = ROW(b, 1), z = ROW(b, 2), weight = ROW(b, 3);
-  real nearest = zero + 1e30f;
-  for (int e = 0; e < EDGES; ++e) {
-    const float* t = tube[e];
-    const real dx = x - t[0], dy = y - t[1], dz = z - t[2];
-    real part = dx * t[6] + dy * t[7] + dz * t[8];
-    part = part < 0.0f ? zero : part;
-    part = part > 1.0f ? zero + 1.0f : part;
-    const real ex = dx - part * t[3], ey = dy - part * t[4], ez = dz - part * t[5];
-    const real gap = ROOT(ex * ex + ey * ey + ez * ez) - t[9];
-    nearest = gap < nearest ? gap : nearest;
+for (int g = first_group; g < last_group; ++g) {
+  // which edges can be nearest to a point in a ball: the others are farther by more than its width
+  const real x = ROW(balls, g, 0), y = ROW(balls, g, 1), z = ROW(balls, g, 2), ball = ROW(balls, g, 3);
+  real lower[EDGES], limit = zero + FAR;
+  UNROLL for (int e = 0; e < EDGES; ++e) {
+    const real away = to_axis(e, x, y, z);
+    const real upper = away * MORE - (tube[RADIUS][e] - tube[OFF][e]);
+    lower[e] = away * LESS - (tube[RADIUS][e] + tube[OFF][e]);
+    limit = upper < limit ? upper : limit;
   }
-  total += weight * (nearest < 0.0f ? -nearest : nearest);
-  count += weight;
+  limit += CULLED ? 2.0f * ball : zero + INFINITE;
+  whole near[(EDGES + 31) / 32] = {};
+  UNROLL for (int e = 0; e < EDGES; ++e) near[e / 32] |= lower[e] > limit ? whole() : whole() + (1u << e % 32);
+
+  const int begin = first + (g - first_group) * LANES;
+  const int size = last - begin < LANES ? last - begin : LANES;
+  for (int k = 0; k < size; ++k) {
+    const int b = begin + k;
+    const real x = ROW(points, b, 0), y = ROW(points, b, 1), z = ROW(points, b, 2), weight = ROW(points, b, 3);
+    real nearest = zero + FAR;
+    for (int word = 0; word < (EDGES + 31) / 32; ++word)
+      for (unsigned bits = OF_LANE(near[word], k); bits; bits &= bits - 1) {
+        const int e = 32 * word + FIRST_BIT(bits);
+        const real gap = to_axis(e, x, y, z) - tube[RADIUS][e];
+        nearest = gap < nearest ? gap : nearest;
+      }
+    total += weight * (nearest < 0.0f ? -nearest : nearest);
+    count += weight;
+  }
 }
 const float measured = sum(total) / sum(count);
 float simulated = 0.0f;
 
 #if BOTH
-// simulated to measured: points on the ridge of the tube that faces the camera, those of an edge at once
+// simulated to measured: the samples of an edge at once, each to the nearest point
 for (int e = 0; e < EDGES; ++e) {
-  const float* t = tube[e];
   float p[SAMPLES][3];
   real nearest[SAMPLES];
   for (int k = 0; k < SAMPLES; ++k) {
-    const float part = ((float)k + 0.5f) / (float)SAMPLES;
-    float view[3], along = 0.0f, norm = 0.0f;
-    for (int c = 0; c < 3; ++c) {
-      p[k][c] = t[c] + part * t[3 + c];
-      view[c] = camera[c] - p[k][c];
-      along += view[c] * t[6 + c];
-    }
-    for (int c = 0; c < 3; ++c) { view[c] -= along * t[3 + c]; norm += view[c] * view[c]; }
-    norm = t[9] / sqrtf(norm + 1e-12f);
-    for (int c = 0; c < 3; ++c) p[k][c] += norm * view[c];
-    nearest[k] = zero + 1e30f;
+    for (int c = 0; c < 3; ++c) p[k][c] = tube[RIDGE + 3 * k + c][e];
+    nearest[k] = zero + FAR;
   }
-  for (int b = first; b < last; ++b) {
-    const real x = ROW(b, 0), y = ROW(b, 1), z = ROW(b, 2);
-    for (int k = 0; k < SAMPLES; ++k) {
-      const real dx = x - p[k][0], dy = y - p[k][1], dz = z - p[k][2];
-      const real square = dx * dx + dy * dy + dz * dz;
-      nearest[k] = square < nearest[k] ? square : nearest[k];
+  // which blocks can hold it: some ball near the middle sample says how far it is at most
+  auto to_middle2 = [&](int g) -> real {
+    const float* m = p[SAMPLES / 2];
+    const real dx = ROW(balls, g, 0) - m[0], dy = ROW(balls, g, 1) - m[1], dz = ROW(balls, g, 2) - m[2];
+    return dx * dx + dy * dy + dz * dz;
+  };
+  real away2 = zero + FAR, ball = zero;
+  for (int g = first_group; g < last_group; ++g) {
+    const real square = to_middle2(g), its = ROW(balls, g, 3);
+    ball = square < away2 ? its : ball;
+    away2 = square < away2 ? square : away2;
+  }
+  const float limit = least(ROOT(away2) * MORE + ball) + (CULLED ? 2.0f * tube[REACH][e] : INFINITE);
+  for (int g = first_group; g < last_group; g += 64 / LANES) {  // 64 blocks at once
+    const int begin = first + (g - first_group) * LANES;
+    unsigned long long bits = 0;
+    for (int more = 0; more < 64 / LANES && g + more < last_group; ++more) {
+      const real upper = limit + ROW(balls, g + more, 3);
+      bits |= (unsigned long long)BITS(to_middle2(g + more) * LESS <= upper * upper) << (more * LANES);
+    }
+    if (last - begin < 64) bits &= (1ull << (last - begin)) - 1;
+    for (; bits; bits &= bits - 1) {
+      const int b = begin + FIRST_BIT(bits);
+      const real x = ROW(points, b, 0), y = ROW(points, b, 1), z = ROW(points, b, 2);
+      for (int k = 0; k < SAMPLES; ++k) {
+        const real dx = x - p[k][0], dy = y - p[k][1], dz = z - p[k][2];
+        const real square = dx * dx + dy * dy + dz * dz;
+        nearest[k] = square < nearest[k] ? square : nearest[k];
+      }
     }
   }
-  for (int k = 0; k < SAMPLES; ++k) simulated += sqrtf(least(nearest[k])) * rest[e];  // each for its share
+  for (int k = 0; k < SAMPLES; ++k) {
+    const float square = least(nearest[k]);
+    if (lane == 0) tube[NEAREST + k][e] = square;
+  }
 }
-simulated /= rest_length * (float)SAMPLES;
+SYNC();
+real shares = zero;  // each sample's for its edge's
+for (int e = 0; e < EDGES; e += LANES)
+  for (int k = 0; k < SAMPLES; ++k) shares += ROOT(GET(tube[NEAREST + k] + e)) * taken(rest + e, 1, EDGES - e);
+simulated = sum(shares) / (rest_length * (float)SAMPLES);
 #endif
 if (lane == 0) { errors.data[2 * (size_t)item] = measured; errors.data[2 * (size_t)item + 1] = simulated; }
 
-#undef THREADS
-#undef LANES
-#undef SHARED
-#undef SYNC
-#undef ROW
-#undef ROOT

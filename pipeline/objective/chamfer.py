@@ -27,6 +27,7 @@ class Chamfer:
         radius: float,
         rest_length: float | np.ndarray,
         symmetric: bool = True,
+        culled: bool = True,
     ) -> None:
         """Keep the clouds, and from their first use on a device a copy there.
 
@@ -37,10 +38,11 @@ class Chamfer:
                 an incompressible body does. One length is shared evenly by the edges; an array
                 gives each edge its own.
             symmetric: The mean of both directions; else measured to simulated alone.
+            culled: Skip what cannot be nearest; without, the same bits come later.
         """
         self.camera = np.asarray(camera, float)
         self.radius, self.rest_length = float(radius), np.asarray(rest_length, np.float32)
-        self.symmetric, self.clouds = symmetric, clouds
+        self.symmetric, self.culled, self.clouds = symmetric, culled, clouds
         self.frames = len(clouds)
         self._packed, self._lock = {}, threading.Lock()
 
@@ -61,7 +63,7 @@ class Chamfer:
         if frames != self.frames:
             raise ValueError(f"{frames} simulated frames, {self.frames} measured")
         lanes = LANES["cuda" if device.startswith("cuda") else "cpu"]
-        kernel, kind = chamfer_kernel(nodes - 1, SAMPLES, self.symmetric, lanes)
+        kernel, kind = chamfer_kernel(nodes - 1, SAMPLES, self.symmetric, lanes, self.culled)
         with self._lock:
             if device not in self._packed:
                 arrays = _pack(self.clouds, lanes)
@@ -76,7 +78,7 @@ class Chamfer:
             rest = np.full(nodes - 1, rest / (nodes - 1), np.float32)
         arrays = kind()
         arrays.line, arrays.errors, arrays.frames = center_line.flatten(), errors, frames
-        arrays.points, arrays.frame_blocks = packed
+        arrays.points, arrays.balls, arrays.frame_blocks, arrays.frame_groups = packed
         arrays.radius, arrays.camera = self.radius, wp.vec3(*self.camera)
         arrays.rest_edges = wp.array(rest, device=device)
         launch(kernel, count * frames, [arrays], device)
@@ -84,14 +86,48 @@ class Chamfer:
         return both.mean(axis=2) if self.symmetric else both[:, :, 0]
 
 
-def _pack(clouds: list[np.ndarray], lanes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Blocks of `lanes` points as rows x, y, z, weight; and where each frame's blocks begin."""
-    blocks, first = [], [0]
+def _pack(clouds: list[np.ndarray], lanes: int) -> tuple[np.ndarray, ...]:
+    """Points in compact blocks, and balls around these, as chamfer.h wants them.
+
+    Returns:
+        Blocks of `lanes` points as rows x, y, z, weight; groups of `lanes` balls as rows x, y, z,
+        radius; where each frame's blocks and where its groups begin.
+    """
+    blocks, balls, first = [np.zeros(0, np.float32)], [np.zeros(0, np.float32)], [(0, 0)]
     for cloud in clouds:
         size = -(-len(cloud) // lanes)
+        groups = -(-size // lanes)
         rows = np.zeros((size * lanes, 4), np.float32)
-        rows[: len(cloud), :3], rows[: len(cloud), 3] = cloud, 1
-        rows[len(cloud) :, :3] = cloud[:1]  # weighs nothing, and is never nearer than the point
-        blocks.append(rows.reshape(size, lanes, 4).transpose(0, 2, 1).ravel())
-        first.append(first[-1] + size)
-    return np.concatenate([*blocks, np.zeros(0, np.float32)]), np.array(first, np.int32)
+        rows[: len(cloud), :3] = _compact(cloud.astype(np.float32), lanes)
+        rows[: len(cloud), 3] = 1
+        rows[len(cloud) :, :3] = rows[len(cloud) - 1 : len(cloud), :3]  # weighs 0, is no nearer
+        rows = rows.reshape(size, lanes, 4)
+        blocks.append(_by_rows(rows, size, lanes))
+        balls.append(_by_rows(_balls(rows[:, :, :3], groups * lanes), groups, lanes))
+        first.append((size, groups))
+    first = np.cumsum(first, axis=0, dtype=np.int32)
+    return np.concatenate(blocks), np.concatenate(balls), first[:, 0].copy(), first[:, 1].copy()
+
+
+def _by_rows(entries: np.ndarray, count: int, lanes: int) -> np.ndarray:
+    return entries.reshape(count, lanes, 4).transpose(0, 2, 1).ravel()
+
+
+def _compact(cloud: np.ndarray, size: int) -> np.ndarray:
+    """The points in another order, `size` after each other near together: halved where widest."""
+    if len(cloud) <= size:
+        return cloud
+    axis = (cloud.max(axis=0) - cloud.min(axis=0)).argmax()
+    cloud = cloud[cloud[:, axis].argsort(kind="stable")]  # the same order on every CPU
+    half = -(-len(cloud) // size) // 2 * size
+    return np.concatenate([_compact(cloud[:half], size), _compact(cloud[half:], size)])
+
+
+def _balls(blocks: np.ndarray, count: int) -> np.ndarray:
+    """Centres and radii of balls around blocks (B, lanes, 3), shape (count, 4); others far off."""
+    balls = np.zeros((count, 4), np.float32)
+    balls[len(blocks) :, :3] = 1e18
+    centre = ((blocks.max(axis=1) + blocks.min(axis=1)) / 2).astype(np.float32)
+    away = np.linalg.norm(blocks.astype(float) - centre[:, None], axis=2).max(axis=1)
+    balls[: len(blocks), :3], balls[: len(blocks), 3] = centre, 1.00001 * away
+    return balls

@@ -10,7 +10,9 @@ TEXT = Path(__file__).with_name("chamfer.h")
 
 
 @built_once
-def chamfer_kernel(edges: int, samples: int, both: bool, lanes: int) -> tuple[wp.Kernel, type]:
+def chamfer_kernel(
+    edges: int, samples: int, both: bool, lanes: int, culled: bool = True
+) -> tuple[wp.Kernel, type]:
     """Compile chamfer.h for a mesh; Warp keeps the binary in its cache.
 
     Returns:
@@ -22,7 +24,9 @@ def chamfer_kernel(edges: int, samples: int, both: bool, lanes: int) -> tuple[wp
     class CloudArrays:
         line: floats
         points: floats
+        balls: floats
         frame_blocks: wp.array(dtype=wp.int32)
+        frame_groups: wp.array(dtype=wp.int32)
         frames: int
         radius: float
         rest_edges: floats
@@ -30,7 +34,8 @@ def chamfer_kernel(edges: int, samples: int, both: bool, lanes: int) -> tuple[wp
         errors: floats
 
     text = "".join(f"\nconst auto {name} = arrays.{name};" for name in CloudArrays.vars)
-    text += text_of(TEXT, EDGES=edges, SAMPLES=samples, BOTH=int(both), CPU_LANES=lanes)
+    macros = {"BOTH": int(both), "CULLED": int(culled), "CPU_LANES": lanes}
+    text += text_of(TEXT, EDGES=edges, SAMPLES=samples, **macros)
 
     @wp.func_native(text)
     def distances(tid: int, arrays: CloudArrays): ...

@@ -32,6 +32,15 @@ class RigWrench(Section):
     drift: Annotated[float, Range(0, 10)]  # over the recording
 
 
+class RigPads(Section):
+    """Of the fingers, as they truly are; `setup:` has what the lab takes them for."""
+
+    friction: Annotated[float, Range(0.05, 10)]
+    force: Annotated[float, Range(0.1, 1000)]
+    opening_time: Annotated[float, Range(1e-4, 0.1)]
+    shape: Annotated[float, Range(0.2, 5)]
+
+
 class RigArm(Section):
     mass: Annotated[float, Range(0.1, 100)]
     stiffness: Annotated[float, Range(100, 1e6)]
@@ -67,7 +76,7 @@ class RigParams(Section):
     seed: Seed
     edges: Annotated[int, Range(4, 1000)]
     tolerance: Annotated[float, Range(1e-10, 1e-3)]
-    pad_friction: Annotated[float, Range(0.05, 10)]
+    pads: RigPads
     tracking_error: Annotated[float, Range(0, 0.01)]
     pose_latency: Annotated[float, Range(0, 0.1)]
     release_jitter: Annotated[float, Range(0, 1)]

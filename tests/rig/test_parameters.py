@@ -29,7 +29,7 @@ CHANGES = {  # the longest prefix of a number's name counts
     "seed": EVERYTHING | LANDING,
     "edges": FELT | LANDING,
     "tolerance": FELT | LANDING,
-    "pad_friction": FELT,
+    "pads": FELT,
     "tracking_error": FELT,
     "pose_latency": {POSE},
     "release_jitter": LANDING,
@@ -117,7 +117,7 @@ class Laboratory:
 
     def remembered(self, string, hanging, motion, sensor_times, camera_times, params, progress):
         """Integrate anew only where something that goes in is new."""
-        world = {name: getattr(params.rig, name) for name in ("pad_friction", "arm", "tolerance")}
+        world = {name: getattr(params.rig, name) for name in ("pads", "arm", "tolerance")}
         arrays = hanging, motion.amplitude, motion.frequency, motion.phase, camera_times
         key = id(string), repr(world), *(array.tobytes() for array in arrays)
         if key not in self.done:

@@ -33,21 +33,22 @@ class HandMotion:
     Attributes:
         path: Commanded position, a piecewise polynomial.
         amplitude, frequency, phase: Of the wander, shapes (tones, 3), (tones, 1), (tones, 3).
-        opening_time: From the first motion of the opening fingers until they press no more [s].
+        opening: From the first motion of the fingers until they press no more [s], and the power of
+            the part of it that is left by which the pads' force falls.
     """
 
     path: CubicHermiteSpline
     amplitude: np.ndarray
     frequency: np.ndarray
     phase: np.ndarray
-    opening_time: float
+    opening: tuple[float, float]
 
     @classmethod
     def through(
         cls,
         hanging: np.ndarray,
         tracking_error: float,
-        opening_time: float,
+        opening: tuple[float, float],
         rng: np.random.Generator,
     ) -> HandMotion:
         """Grasp the middle where it hangs (3,), lift it to the tips, pull, let go, retreat.
@@ -68,7 +69,7 @@ class HandMotion:
             amplitude=amplitude,
             frequency=rng.uniform(*WANDER_BAND, (WANDER_TONES, 1)),
             phase=rng.uniform(0, 2 * np.pi, (WANDER_TONES, 3)),
-            opening_time=max(opening_time, 1e-3),
+            opening=opening,
         )
 
     def position(self, time: np.ndarray | float, derivative: int = 0) -> np.ndarray:
@@ -80,7 +81,8 @@ class HandMotion:
 
     def grip(self, time: np.ndarray | float) -> np.ndarray:
         """How firmly the closed pads press, from 1 to 0 as the fingers begin to open."""
-        return np.clip(1 - (np.asarray(time) - OPEN) / self.opening_time, 0.0, 1.0)
+        duration, shape = self.opening
+        return np.clip(1 - (np.asarray(time) - OPEN) / duration, 0.0, 1.0) ** shape
 
     def finger(self, time: np.ndarray) -> np.ndarray:
         """Position of each finger joint [m]."""

@@ -67,7 +67,7 @@ def pull_and_release(
         UserError: The pads cannot hold the band.
     """
     rig = params.rig
-    holding = 2 * rig.pad_friction * params.setup.grip_force  # two pads
+    holding = 2 * rig.pads.friction * rig.pads.force  # two pads
     follow = Servo.of(rig.arm, motion)
 
     def margin(time: float, y: np.ndarray) -> float:
@@ -76,7 +76,7 @@ def pull_and_release(
 
     y = string.state(hanging)
     y[string.middle, :6] = np.concatenate([motion.position(GRASP), motion.position(GRASP, 1)])
-    last = OPEN + motion.opening_time
+    last = OPEN + motion.opening[0]
     wanted = np.union1d(sensor_times, camera_times)
     during = wanted[(wanted > GRASP) & (wanted < last)]
     held_times, held = string.integrate(
@@ -86,8 +86,8 @@ def pull_and_release(
     slip = float(held_times[-1])
     if slip < OPEN:
         raise UserError(
-            f"rig.pad_friction: {rig.pad_friction:g} lets the band slip out at {slip:.2f} s,"
-            f" before the fingers open; raise it or setup.grip_force"
+            f"rig.pads.friction: {rig.pads.friction:g} lets the band slip out at {slip:.2f} s,"
+            f" before the fingers open; raise it or rig.pads.force"
         )
     progress(f"held from {GRASP:.2f} s, slipped free at {slip:.4f} s")
 

@@ -60,7 +60,8 @@ def record(
 
     hanging = hang(string, rig.tolerance)
     middle = hanging[string.middle]
-    motion = HandMotion.through(middle, rig.tracking_error, setup.finger_opening_time, motion_rng)
+    opening = rig.pads.opening_time, rig.pads.shape
+    motion = HandMotion.through(middle, rig.tracking_error, opening, motion_rng)
     times = np.arange(round(END * SENSOR_RATE)) / SENSOR_RATE
     frames = eye.FIRST_FRAME + np.arange(int((END - eye.FIRST_FRAME) * eye.RATE)) / eye.RATE
     frames = frames[camera_rng.random(len(frames)) >= rig.camera.drop_rate]

@@ -213,7 +213,7 @@ def test_pictures_show_the_band_where_it_is(messages, recorded) -> None:
 
 
 def test_a_slippery_band_is_refused(coarse: Params, tmp_path: Path) -> None:
-    slippery = with_(coarse, "rig", pad_friction=0.1)
-    with pytest.raises(UserError, match="pad_friction"):
+    slippery = with_(coarse, "rig.pads", friction=0.1)
+    with pytest.raises(UserError, match="pads.friction"):
         record(slippery, "band1", tmp_path / "no.mcap", picture_scale=SCALE)
     assert not list(tmp_path.iterdir())

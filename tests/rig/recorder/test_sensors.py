@@ -70,7 +70,7 @@ def test_calibration(params: Params) -> None:
 def test_the_wander_is_as_large_as_stated(params: Params) -> None:
     error = params.rig.tracking_error
     still, wanders = (
-        HandMotion.through(np.array([0.0, 0.0, -0.2]), size, 0.004, np.random.default_rng(0))
+        HandMotion.through(np.array([0.0, 0.0, -0.2]), size, (0.004, 1.0), np.random.default_rng(0))
         for size in (0.0, error)
     )
     time = np.linspace(0, 1000, 50_000)  # many turns; the path itself stays where it ends
@@ -93,11 +93,11 @@ def test_errors_of_launches(params: Params, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_the_band_slips_when_its_force_is_coulombs(coarse, recorded) -> None:
-    """Two pads whose force dies linearly: 2 mu N (1 - t / t_open) = F."""
-    happened, setup = recorded[1], coarse.setup
+    """Two pads whose force dies by a power: 2 mu N (1 - t / t_open)^shape = F."""
+    happened, pads = recorded[1], coarse.rig.pads
     pull = np.linalg.norm(happened.force[round(1000 * OPEN)])
-    share = pull / (2 * coarse.rig.pad_friction * setup.grip_force)
-    expected = setup.finger_opening_time * (1 - share)
+    share = pull / (2 * pads.friction * pads.force)
+    expected = pads.opening_time * (1 - share ** (1 / pads.shape))
     assert np.isclose(happened.slip_time - OPEN, expected, atol=1e-5)
 
 

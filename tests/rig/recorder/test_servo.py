@@ -13,7 +13,7 @@ MASS, STIFFNESS, DAMPING = 5.0, 12000.0, 200.0
 @pytest.fixture
 def motion() -> HandMotion:
     rng = np.random.default_rng(0)
-    return HandMotion.through(np.array([0.0, 0.0, -0.2]), 0.0, 0.004, rng)
+    return HandMotion.through(np.array([0.0, 0.0, -0.2]), 0.0, (0.004, 1.0), rng)
 
 
 def test_it_swings_back_like_an_oscillator(motion: HandMotion) -> None:

@@ -54,6 +54,12 @@ class Chamfer:
         Args:
             center_line: NumPy's, or Warp's on that device.
         """
+        count, frames = center_line.shape[:2]
+        both = self.errors(center_line, device).numpy().reshape(count, frames, 2).astype(float)
+        return both.mean(axis=2) if self.symmetric else both[:, :, 0]
+
+    def errors(self, center_line: np.ndarray, device: str):
+        """Both directions' distances [m], as Warp's float32 (N * K * 2,) on that device."""
         import warp as wp
 
         from pipeline.base.native import launch
@@ -72,18 +78,17 @@ class Chamfer:
         if isinstance(center_line, np.ndarray):
             center_line = np.ascontiguousarray(center_line, np.float32)
             center_line = wp.array(center_line, device=device)
-        errors = wp.zeros(count * frames * 2, dtype=wp.float32, device=device)
         rest = self.rest_length
         if rest.ndim == 0:
             rest = np.full(nodes - 1, rest / (nodes - 1), np.float32)
         arrays = kind()
-        arrays.line, arrays.errors, arrays.frames = center_line.flatten(), errors, frames
         arrays.points, arrays.balls, arrays.frame_blocks, arrays.frame_groups = packed
-        arrays.radius, arrays.camera = self.radius, wp.vec3(*self.camera)
         arrays.rest_edges = wp.array(rest, device=device)
+        arrays.line, arrays.frames = center_line.flatten(), frames
+        arrays.radius, arrays.camera = self.radius, wp.vec3(*self.camera)
+        arrays.errors = errors = wp.empty(count * frames * 2, dtype=wp.float32, device=device)
         launch(kernel, count * frames, [arrays], device)
-        both = errors.numpy().reshape(count, frames, 2).astype(float)
-        return both.mean(axis=2) if self.symmetric else both[:, :, 0]
+        return errors
 
 
 def _pack(clouds: list[np.ndarray], lanes: int) -> tuple[np.ndarray, ...]:

@@ -1,12 +1,10 @@
-"""chamfer.h as a Warp kernel. (Warp reads annotations: no postponed ones here.)"""
+"""chamfer.h and terms.h as Warp kernels. (Warp reads annotations: no postponed ones here.)"""
 
 from pathlib import Path
 
 import warp as wp
 
 from pipeline.base.native import built_once, text_of
-
-TEXT = Path(__file__).with_name("chamfer.h")
 
 
 @built_once
@@ -18,24 +16,23 @@ def chamfer_kernel(
     Returns:
         The kernel, and the structure of arrays that it takes.
     """
-    floats = wp.array(dtype=wp.float32)
+    floats, integers = wp.array(dtype=wp.float32), wp.array(dtype=wp.int32)
 
     @wp.struct
     class CloudArrays:
         line: floats
         points: floats
         balls: floats
-        frame_blocks: wp.array(dtype=wp.int32)
-        frame_groups: wp.array(dtype=wp.int32)
+        frame_blocks: integers
+        frame_groups: integers
         frames: int
         radius: float
         rest_edges: floats
         camera: wp.vec3
         errors: floats
 
-    text = "".join(f"\nconst auto {name} = arrays.{name};" for name in CloudArrays.vars)
     macros = {"BOTH": int(both), "CULLED": int(culled), "CPU_LANES": lanes}
-    text += text_of(TEXT, EDGES=edges, SAMPLES=samples, **macros)
+    text = _text("chamfer.h", CloudArrays, EDGES=edges, SAMPLES=samples, **macros)
 
     @wp.func_native(text)
     def distances(tid: int, arrays: CloudArrays): ...
@@ -45,3 +42,42 @@ def chamfer_kernel(
         distances(wp.tid(), arrays)
 
     return run, CloudArrays
+
+
+@built_once
+def terms_kernel(window: int) -> tuple[wp.Kernel, type]:
+    """Compile terms.h for a median of so many samples; as `chamfer_kernel`."""
+    doubles, integers = wp.array(dtype=wp.float64), wp.array(dtype=wp.int32)
+
+    @wp.struct
+    class TermArrays:
+        force: wp.array3d(dtype=wp.float32)
+        first: integers
+        columns: integers
+        values: doubles
+        measured: doubles
+        velocity: doubles
+        samples: int
+        sample_weights: doubles
+        errors: wp.array(dtype=wp.float32)
+        both: int
+        cap: wp.float64
+        frames: int
+        frame_weights: doubles
+        filtered: doubles
+        terms: doubles
+
+    @wp.func_native(_text("terms.h", TermArrays, WINDOW=window))
+    def reduced(tid: int, arrays: TermArrays): ...
+
+    @wp.kernel(module="unique")
+    def run(arrays: TermArrays):
+        reduced(wp.tid(), arrays)
+
+    return run, TermArrays
+
+
+def _text(name: str, arrays: type, **macros) -> str:
+    """Native text of a file of this folder in which the fields of `arrays` are names."""
+    text = "".join(f"\nconst auto {field} = arrays.{field};" for field in arrays.vars)
+    return text + text_of(Path(__file__).with_name(name), **macros)

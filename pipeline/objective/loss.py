@@ -27,7 +27,8 @@ from pipeline.episode.episode import Episode
 from pipeline.episode.phases import held_out_blocks, reach, taut_frames, within
 from pipeline.episode.signal import as_recorded, cutoff_hz
 from pipeline.objective.chamfer import Chamfer
-from pipeline.objective.nuisance import Delay, DelayedFrames, along_axes
+from pipeline.objective.device_terms import DeviceTerms
+from pipeline.objective.nuisance import AIR_DRAG, Delay, DelayedFrames, along_axes
 
 TERMS = ("geom", "force", "work", "taut")
 LOCK = threading.Lock()  # while a filter is made, which takes a second
@@ -103,6 +104,15 @@ class EpisodeLoss:
         self.taut = taut_frames(episode) & self.fitted_frames
         pull = np.array([[episode.grasp_time, episode.release_time - guard]])
         self._pull = within(self.time, pull), within(episode.cloud_time, pull)
+        self._on_device = DeviceTerms(
+            self.chamfer,
+            force=self.force,
+            velocity=self.velocity,
+            window=median_window,
+            sample_weights=np.stack([_mean(self.fitted_samples), self._trapezoids()]),
+            frame_weights=100 * np.stack([_mean(self.fitted_frames), _mean(self.taut)]),
+            frame_cap=self.frame_cap,
+        )
         if not self.fitted_frames.any():
             raise UserError(f"episode of {episode.band}: no camera frame shows the band")
         if self.weights["taut"] and not self.taut.any():
@@ -146,11 +156,16 @@ class EpisodeLoss:
         """Each term of N rollouts, shape (N,); NaN or infinite where a rollout is.
 
         `taut` is NaN where the episode has no frame in the recoil. Clouds are compared on the
-        device that holds the rollouts. A rollout's terms are the same to the bit in any batch.
+        device that holds the rollouts; so is all else of rollouts that are Warp arrays, unless
+        there are nuisances of instruments. A rollout's terms are the same to the bit in any batch.
 
         Args:
             nuisances: Values of each that there is, shape (N,).
         """
+        if not isinstance(rollouts.force, np.ndarray) and not set(nuisances or ()) - {AIR_DRAG}:
+            found = self._on_device(rollouts, self._filters(rollouts.times)[0])
+            some = [self.fitted_frames.any(), self.fitted_samples.any(), True, self.taut.any()]
+            return dict(zip(TERMS, np.where(some, found, np.nan).T, strict=True))
         gap = self._gap(rollouts, nuisances)
         frames = self.frames(rollouts, nuisances)
         power = np.einsum("ntc,tc->nt", gap, self.velocity)
@@ -236,6 +251,11 @@ class EpisodeLoss:
         """Measured less simulated force [N], shape (N, T, 3)."""
         return self.force - self.smooth(self.filtered(rollouts, nuisances))
 
+    def _trapezoids(self) -> np.ndarray:
+        """What each sample's power adds to the work [s], shape (T,)."""
+        both = self.fitted_samples[:-1] & self.fitted_samples[1:]
+        return self.period / 2 * (np.append(both, False) + np.append(False, both).astype(float))
+
     def _newtons(self, gap: np.ndarray, samples: np.ndarray) -> np.ndarray:
         size = np.linalg.norm(gap, axis=2).compress(samples, axis=1)
         return size.mean(axis=1) if samples.any() else np.full(len(gap), np.nan)
@@ -255,6 +275,11 @@ class EpisodeLoss:
                 _recording_filter(times.tobytes(), self.cutoff, start, self.period, len(self.time))
                 for start in starts
             ]
+
+
+def _mean(chosen: np.ndarray) -> np.ndarray:
+    """Weights of a mean over what is chosen, shape (T,); all 0 where nothing is."""
+    return chosen / max(chosen.sum(), 1)
 
 
 @lru_cache(maxsize=128)  # shared by all losses of an episode, such as the report's replays

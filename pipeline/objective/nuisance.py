@@ -16,8 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
+AIR_DRAG = "air_drag"  # of the simulator; the others are the instruments'
 NUISANCES = (  # in the order of their axes
-    "air_drag",
+    AIR_DRAG,
     "camera_delay",
     "force_delay",
     "force_gain",

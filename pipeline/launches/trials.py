@@ -14,6 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from pipeline.base.failures import too_strong
 from pipeline.base.files import replacing
 from pipeline.base.pool import Pool
 from pipeline.landing.stored import Stored
@@ -155,7 +156,7 @@ def limited(launches, max_force: float):
     force = launches.hold_force
     over = force > max_force
     failure = [
-        f"holding takes {force[i]:.1f} N, more than {max_force:g} N" if over[i] else reason
+        too_strong(force[i], max_force) if over[i] else reason
         for i, reason in enumerate(launches.failure)
     ]
     unknown = {

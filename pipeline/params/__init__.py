@@ -101,6 +101,12 @@ class Params(Section):
         return self
 
     @model_validator(mode="after")
+    def _draws_are_above_the_floor(self) -> Params:
+        if self.setup.draw_z[0] <= -self.setup.fork_height:
+            raise refusal("setup.draw_z: must be above the floor, setup.fork_height below the tips")
+        return self
+
+    @model_validator(mode="after")
     def _the_mesh_knows_the_law(self) -> Params:
         for name, method in self.methods.items():
             if method.law == "rubber" and self.sling.mesh != "rod":

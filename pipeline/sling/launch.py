@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK, too_strong
 from pipeline.sling.initial import drawn_guess
 from pipeline.sling.model import GRAVITY, Sling
 from pipeline.sling.records import Grip, Outcome
@@ -99,25 +100,29 @@ def launch(
     shares = np.array_split(np.arange(count), len(devices))
     with ThreadPoolExecutor(len(devices)) as pool:
         lanes = np.concatenate(list(pool.map(launched, devices, shares)))
-    return _outcomes(sling, lanes, max_force)
+    return _outcomes(sling, lanes, draws, max_force)
 
 
-def _outcomes(sling: Sling, lanes: np.ndarray, max_force: float) -> Launches:
-    """Of slings that have been launched, by their records (N,) of records.LANE."""
+def _outcomes(sling: Sling, lanes: np.ndarray, draws: np.ndarray, max_force: float) -> Launches:
+    """Of launches from draws (N, 2), by the slings' records (N,) of records.LANE."""
     outcome = np.round(lanes["outcome"])
     hold_force = np.linalg.norm(lanes["hold_force"], axis=1)
     hold_force[outcome > 0] = np.nan
     time, y, z, vy, vz = lanes["separation"].T
-    landing = ballistic_landing(y, z, vy, vz, -sling.fork_height)
+    floor = -sling.fork_height
+    landing = ballistic_landing(y, z, vy, vz, floor)
 
     failure = np.full(len(lanes), None, object)
-    failure[~(landing > 0)] = "the projectile fell short of the fork"
-    plane = sling.foot_height - sling.fork_height
+    failure[~(landing > 0)] = SHORT
+    plane = floor + sling.foot_height
     foot = np.where(z <= plane, y, ballistic_landing(y, z, vy, vz, plane))
-    failure[(landing > 0) & (foot < 0)] = "hits the fork: too low where it passes"
-    failure[outcome != Outcome.SEPARATED] = "the projectile never left the pouch"
+    failure[(landing > 0) & (foot < 0)] = FOOT
+    failure[outcome != Outcome.SEPARATED] = NEVER_LEFT
+    failure[(lanes["lowest"] <= floor) | ((outcome == Outcome.SEPARATED) & (z <= floor))] = DRAGGED
+    half = np.hypot(sling.half_width, np.linalg.norm(draws, axis=1))
+    failure[half <= sling.rest_length / 2] = SLACK
     for i in np.flatnonzero(hold_force > max_force):
-        failure[i] = f"holding takes {hold_force[i]:.1f} N, more than {max_force:g} N"
+        failure[i] = too_strong(hold_force[i], max_force)
     failure[~np.isfinite(hold_force)] = "the simulation did not converge"
     good = np.array([reason is None for reason in failure])
 

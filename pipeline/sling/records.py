@@ -58,11 +58,11 @@ STEP = _record(
     "bending", "compliance", ("forget", BRANCHES), ("follow", BRANCHES),
 )  # fmt: skip
 # of a sling on its way: direction of the launch, mass of the projectile, Outcome; time, y, z, vy,
-# vz at the separation; force on the hand when it last held; Newton iterations, its neighbours' too;
-# what share of a stress at rest the branches carry besides
+# vz at the separation; lowest z until then; force on the hand when it last held; Newton
+# iterations, its neighbours' too; what share of a stress at rest the branches carry besides
 LANE = _record(
-    ("direction", 3), "payload", "outcome", ("separation", 5), ("hold_force", 3), "iterations",
-    ("unrelaxed", BRANCHES),
+    ("direction", 3), "payload", "outcome", ("separation", 5), "lowest", ("hold_force", 3),
+    "iterations", ("unrelaxed", BRANCHES),
 )  # fmt: skip
 # what is put out of a step
 OUTPUT = _record(("force", 3), "iterations")

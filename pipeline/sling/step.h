@@ -12,7 +12,7 @@ const SC close = sqrt(0.25 * tolerance * shortest);  // from here on Newton's ne
 const real balance = tolerance * (SC)(3.0 / PLACES) * ((SC)1.5e4 * node_mass * gravity + (SC)5 * mu * area);
 real offset[PLACES], pull = zero, held[3] = {zero, zero, zero};  // of the hand; the force on it when it last held
 UNROLL for (int m = 0; m < PLACES; ++m) offset[m] = zero;
-real contact_before = zero;  // of the pouch
+real contact_before = zero, lowest = zero + (SC)1e30;  // of the pouch, and its least height
 real given[3] = {zero, zero, zero}, owed[3] = {zero, zero, zero}, relaxed = one;  // an arm that gives way
 int iterations = 0;
 
@@ -125,6 +125,7 @@ for (int step = 0; step < steps; ++step) {
   // ---- the projectile separates at the first pull: contact = m (acceleration + gravity) along the launch direction
   if (grip == GRIP_FREE && launching) {
     real contact = zero, position[3], velocity[3];
+    lowest = outcome == zero ? minimum(lowest, middle(&X1(0, MID), 2)) : lowest;
     UNROLL for (int c = 0; c < 3; ++c) {
       position[c] = middle(&X(0, MID), c);
       velocity[c] = (position[c] - middle(&Y(0, MID), c)) * ibh;
@@ -171,7 +172,7 @@ for (int step = 0; step < steps; ++step) {
 
 for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) INITIAL[k * L + i] = X1(k, i);
 if (member == 0) {
-  LANE[LANE_PAYLOAD] = payload; LANE[LANE_OUTCOME] = outcome;
+  LANE[LANE_PAYLOAD] = payload; LANE[LANE_OUTCOME] = outcome; LANE[LANE_LOWEST] = lowest;
   UNROLL for (int c = 0; c < 5; ++c) LANE[LANE_SEPARATION + c] = separation[c];
   UNROLL for (int c = 0; c < 3; ++c) LANE[LANE_HOLD_FORCE + c] = held[c];
   LANE[LANE_ITERATIONS] = zero + (SC)iterations;

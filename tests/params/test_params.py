@@ -183,6 +183,8 @@ REFUSED = [
     ("policy.robust.methods", ["best"], "policy.robust.methods: best is not one of"),
     ("methods.no_work.k_top", 0, "methods.no_work.k_top: must be between 1 and 50"),
     ("setup.foot_height", 0.52, "setup.foot_height: must be less than setup.fork_height"),
+    ("setup.draw_z", [-0.52, -0.1], "setup.draw_z: must be above the floor"),
+    ("setup.fork_height", 0.3, "setup.draw_z: must be above the floor, setup.fork_height below"),
     ("methods.de.law", "gum", "methods.de.law: must be"),
     ("methods.de.law", "rubber", "methods.de: bounds: mooney_share is missing, [low, high] within"),
     ("methods.de.fixed", {"relaxation": 0.01}, "methods.de.fixed: relaxation is not one of"),

@@ -35,7 +35,7 @@ def test_damping_takes_speed_and_the_projectile_separates_before_the_fork(sling)
 def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch):
     """Small batches stay on the first, and each launch gets its own theta."""
     rng = np.random.default_rng(6)
-    draws = np.column_stack([rng.uniform(-0.45, -0.2, 9), rng.uniform(-0.3, -0.1, 9)])
+    draws = np.column_stack([rng.uniform(-0.45, -0.1, 9), rng.uniform(-0.3, -0.1, 9)])
     thetas = np.column_stack([10 ** rng.uniform(5, 6.2, 9), np.tile(THETA[1:], (9, 1))])
     one, asked = launch(sling, thetas, draws), []
 

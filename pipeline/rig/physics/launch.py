@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK, too_strong
 from pipeline.base.target import TARGET_AREA
 from pipeline.rig.physics.scene import ROD
 from pipeline.rig.physics.string import GRAVITY, ElasticString
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 PATIENCE = 0.5  # s within which the projectile leaves the pouch, if it ever does
 FLIGHT = 20.0  # s, more than any flight takes
-FOOT = ROD  # m: height of the bar that joins the fork's rods on the floor
+SEEN = 501  # moments at which the pouch may touch the floor
 POINTS = 40  # of a flight, evenly in time
 
 
@@ -69,7 +70,7 @@ def launch_from(
     tolerance, mass = params.rig.tolerance, params.setup.projectile_mass
     taut = string.length / 2
     if np.linalg.norm(aim - string.clamps[0]) <= taut:
-        return Trial(float("nan"), "too short: the drawn band is slack", 0.0)
+        return Trial(float("nan"), SLACK, 0.0)
     asked = params.launch
     _, stress, memory = pulled(string, aim, asked.pull_time, asked.pause)
     give, kept = 1 / params.rig.arm.stiffness, memory[-1] / stress[-1]
@@ -77,8 +78,7 @@ def launch_from(
     hold_force = float(np.linalg.norm(string.at_middle(y)))
     limit = params.setup.max_force
     if hold_force > limit:
-        reason = f"holding takes {hold_force:.1f} N, more than {limit:g} N"
-        return Trial(float("nan"), reason, hold_force)
+        return Trial(float("nan"), too_strong(hold_force, limit), hold_force)
 
     loaded = replace(string, payload=mass)
     y[string.middle, 3:6] = 0.0 if kick is None else kick
@@ -89,11 +89,13 @@ def launch_from(
         acceleration = loaded.forces(y)[0][loaded.middle] / loaded.masses[loaded.middle]
         return float(mass * (acceleration - GRAVITY) @ heading)
 
-    times, states = loaded.integrate(y, np.array([0.0, PATIENCE]), tolerance, event=push)
-    if times[-1] >= PATIENCE:
-        return Trial(float("nan"), "the projectile never left the pouch", hold_force)
-    position, velocity = states[-1, loaded.middle, 1:3], states[-1, loaded.middle, 4:6]
+    times, states = loaded.integrate(y, np.linspace(0.0, PATIENCE, SEEN), tolerance, event=push)
     floor = -params.setup.fork_height
+    if states[:, loaded.middle, 2].min() <= floor:
+        return Trial(float("nan"), DRAGGED, hold_force)
+    if times[-1] >= PATIENCE:
+        return Trial(float("nan"), NEVER_LEFT, hold_force)
+    position, velocity = states[-1, loaded.middle, 1:3], states[-1, loaded.middle, 4:6]
     drag = params.rig.projectile_drag / mass
     way = flight(position, velocity, floor, drag)
     landing = float(way[-1, 0])
@@ -101,9 +103,9 @@ def launch_from(
     low, high = TARGET_AREA
     reason = None
     if not landing > 0:
-        landing, reason = float("nan"), "too short: the projectile fell before the fork"
-    elif fly(position, velocity, floor + FOOT, drag) < 0:
-        landing, reason = float("nan"), "hits the fork: too low where it passes"
+        landing, reason = float("nan"), SHORT
+    elif fly(position, velocity, floor + ROD, drag) < 0:
+        landing, reason = float("nan"), FOOT
         way = way[way[:, 0] < 0]
     elif not low <= landing <= high:
         where = "too short" if landing < low else "beyond the area"

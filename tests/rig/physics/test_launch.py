@@ -4,7 +4,8 @@ import numpy as np
 from scipy.integrate import simpson
 
 from pipeline.params import Params
-from pipeline.rig.physics.launch import FOOT, POINTS, flight, fly, launch, launch_from
+from pipeline.rig.physics.launch import POINTS, flight, fly, launch, launch_from
+from pipeline.rig.physics.scene import ROD
 from pipeline.rig.physics.world import bent_at, string_of
 from tests.project import with_
 
@@ -65,7 +66,7 @@ def test_a_low_flight_hits_the_forks_foot(coarse: Params) -> None:
     """It would reach the floor just behind the fork, and meets the bar between the rods."""
     floor = -0.52
     low = np.array([-0.2, floor + 0.03]), np.array([3.0, 0.0])
-    assert fly(*low, floor, 0.0) > 0 > fly(*low, floor + FOOT, 0.0)
+    assert fly(*low, floor, 0.0) > 0 > fly(*low, floor + ROD, 0.0)
     table = with_(coarse, "setup", fork_height=0.1)
     trial = launch("band1", table, (-0.27, 0.0), None)
     assert trial.failure.startswith("hits the fork") and np.isnan(trial.landing_y)

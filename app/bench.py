@@ -12,7 +12,7 @@ TAKES = {
     "scaling": ("methods", "budget", "device"),
     "peers": ("device",),
     "methods": ("budget", "device"),
-    "": ("device",),
+    "": ("law", "device"),
 }
 
 
@@ -32,7 +32,7 @@ def bench(arguments: argparse.Namespace, what: str) -> str:
 
 def asked(arguments: argparse.Namespace) -> str:
     """The benchmark asked for, a key of TAKES. Raises ArgumentTypeError on a flag too many."""
-    flags = ("recording", "scaling", "peers", "methods", "budget", "device")
+    flags = ("recording", "scaling", "peers", "methods", "budget", "law", "device")
     given = [name for name in flags if getattr(arguments, name) is not None]
     what = next((name for name in TAKES if name in given), "")
     for name in given:
@@ -47,7 +47,10 @@ def asked(arguments: argparse.Namespace) -> str:
 def _simulator(arguments, params, device, budget):
     from validation.benchmarks import throughput
 
-    return throughput.bench(params, device), throughput.table, ""
+    if arguments.law is None:
+        return throughput.bench(params, device), throughput.table, ""
+    result = throughput.bench(params, device, arguments.law)
+    return result, throughput.table, f"--law {arguments.law} --device {device}"
 
 
 def _recording(arguments, params, device, budget):

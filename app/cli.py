@@ -280,6 +280,7 @@ def verify(arguments: argparse.Namespace) -> Done:
     flag("--recording", type=Path, metavar="FILE.mcap", help="time how it becomes clouds"),
     flag("--methods", nargs="*", metavar="METHOD", help="time searches, all or of these methods"),
     flag("--budget", choices=("laptop", "large"), help="of --methods, default laptop"),
+    flag("--law", choices=("neo_hookean", "rubber"), help="of the band, default neo_hookean"),
     JSON,
 )
 def bench(arguments: argparse.Namespace) -> Done:

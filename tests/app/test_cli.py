@@ -67,7 +67,7 @@ def test_the_documented_commands_are_understood() -> None:
     assert not aimed.robust and parse("aim --band b --target 2 --robust".split()).robust
     assert parse("aim --band band1 --method m --target 1.925".split()).method == "m"
     assert parse("bench --device cuda:0 --json".split()).device == "cuda:0"
-    assert bench.asked(parse("bench --json".split())) == ""
+    assert bench.asked(parse("bench --law rubber --json".split())) == ""
     assert bench.asked(parse("bench --scaling orange --methods de --budget large".split())) == (
         "scaling"
     )
@@ -107,6 +107,7 @@ def test_a_command_line_that_makes_no_sense(refused) -> None:
         ("bench --budget large", "argument --budget: used by --methods and --scaling alone"),
         ("bench --recording a.mcap --device cpu", "argument --device: not used by --recording"),
         ("bench --recording a.mcap --peers", "argument --peers: not used by --recording"),
+        ("bench --peers --law rubber", "argument --law: not used by --peers"),
         ("bench --scaling --peers", "argument --peers: not used by --scaling"),
         ("bench --peers --methods de", "argument --methods: not used by --peers"),
         ("bench --scaling --methods de bo", "argument --methods: --scaling takes one of them"),

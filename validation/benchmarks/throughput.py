@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -18,24 +19,31 @@ from pipeline.objective.space import Space
 from pipeline.sling.interaction import interact, schedule_of
 from pipeline.sling.launch import launch
 from pipeline.sling.records import Grip
+from pipeline.sling.rubber import NEO_HOOKEAN, RUBBER
 from pipeline.sling.schedule import RELAX_STEPS
 from pipeline.sling.solver import Options, memory
+from pipeline.sling.theta import at_points
 from validation.benchmarks.timing import seconds, shared
 from validation.synthetic import DRAW, recorded_yardstick
 
 BATCHES = {"cpu": (64, 256), "cuda": (64, 1024, 16384)}
+BOXES = {  # of what a law adds to params.yaml's parameters
+    NEO_HOOKEAN: {},
+    RUBBER: {"mooney_share": (-0.3, 0.9), "relaxation": (0.0, 0.05)},
+}
 
 
-def bench(params, device: str = "cpu") -> dict:
+def bench(params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
     """Time the yardstick.
 
     Args:
         device: Or several that share each batch, as SLING_DEVICE names them.
+        law: Of the simulated band.
 
     Returns:
-        `batches`: environments, threads on the CPU, rollouts/s without and with the loss,
-        launches/s; `yardstick`: its steps, the mean of its Newton iterations, bytes a rollout;
-        `first_start_s`: a first rollout with nothing compiled yet, and the next start's.
+        `law`; `batches`: environments, threads on the CPU, seconds and rollouts/s without and with
+        the loss, launches/s; `yardstick`: its steps, the mean of its Newton iterations, bytes a
+        rollout; `first_start_s`: a first rollout with nothing compiled yet, and the next start's.
 
     Raises:
         UserError: There is no such device.
@@ -43,30 +51,44 @@ def bench(params, device: str = "cpu") -> dict:
     devices = named(device, "--device")
     kind = devices[0].partition(":")[0]
     sling, episode = recorded_yardstick(params)
-    space = Space.of(params.parameters)
+    sling = replace(sling, law=law)
+    space = Space.of(params.parameters, bounds=BOXES[law], law=law)
     loss = EpisodeLoss.of(params, next(iter(params.methods)), episode, sling)
-    simulate = partial(shared, devices, partial(interact, sling, episode, fetch=False))
-    shoot = partial(launch, sling, draws=np.array([[-DRAW, -0.15]]), device=devices)
+
+    def on_one(points: np.ndarray, **options):
+        own, thetas = at_points(sling, points)
+        return interact(own, episode, thetas, fetch=False, **options)
+
+    def shoot(points: np.ndarray, **options):
+        own, thetas = at_points(sling, points)
+        return launch(own, thetas, np.array([[-DRAW, -0.15]]), device=devices, **options)
+
+    simulate = partial(shared, devices, on_one)
 
     batches = []
     for count in BATCHES[kind]:
-        unit = qmc.LatinHypercube(5, rng=1).random(count)
-        thetas = space.to_physical(unit)
+        unit = qmc.LatinHypercube(space.dimension, rng=1).random(count)
+        points = space.to_physical(unit)
         for workers in sorted({1, os.cpu_count() or 1} if kind == "cpu" else {1}):
             evaluate = Evaluator(episode, sling, loss, space, devices=devices, workers=workers)
-            evaluate(unit[: len(devices)]), shoot(thetas[:1])  # what compiles
+            evaluate(unit[: len(devices)]), shoot(points[:1])  # what compiles
+            alone = seconds(partial(simulate, points, workers=workers))
+            with_loss = seconds(partial(evaluate, unit))
             batches.append(
                 {
                     "environments": count,
                     "threads": workers,
-                    "rollouts_per_s": count / seconds(partial(simulate, thetas, workers=workers)),
-                    "rollouts_with_loss_per_s": count / seconds(partial(evaluate, unit)),
-                    "launches_per_s": count / seconds(partial(shoot, thetas, workers=workers)),
+                    "rollouts_s": alone,
+                    "rollouts_with_loss_s": with_loss,
+                    "rollouts_per_s": count / alone,
+                    "rollouts_with_loss_per_s": count / with_loss,
+                    "launches_per_s": count / seconds(partial(shoot, points, workers=workers)),
                 }
             )
-    iterations = np.mean([part.iterations.mean() for part in simulate(thetas)])
+    iterations = np.mean([part.iterations.mean() for part in simulate(points)])
     schedule = schedule_of(sling, episode)
     return {
+        "law": law,
         "batches": batches,
         "yardstick": {
             "steps": steps_of(schedule),
@@ -115,7 +137,10 @@ def table(result: dict) -> str:
     """What `bench` found, as lines for people."""
     rows = result["batches"]
     lines = ["  ".join(rows[0])]
-    lines += ["  ".join(f"{value:{len(key)}.0f}" for key, value in row.items()) for row in rows]
+    for row in rows:
+        digits = {name: 2 if name.endswith(("rollouts_s", "loss_s")) else 0 for name in row}
+        cells = [f"{value:{len(name)}.{digits[name]}f}" for name, value in row.items()]
+        lines.append("  ".join(cells))
     steps, yardstick = result["yardstick"]["steps"], result["yardstick"]
     lines += [
         "",

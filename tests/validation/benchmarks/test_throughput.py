@@ -4,6 +4,7 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from pipeline.base.native import start, wp
 from pipeline.params import load
@@ -28,18 +29,23 @@ def test_the_yardstick_is_held_drawn_and_let_go() -> None:
     assert rollouts.force[0, rollouts.times < 7.9, 1].max() > 3.0  # N, towards the fork
 
 
-def test_it_counts_rollouts_and_launches(monkeypatch) -> None:
+@pytest.mark.parametrize("law", bench.BOXES)
+def test_it_counts_rollouts_and_launches(monkeypatch, law: str) -> None:
     """With kernels that are compiled already."""
     start()
     cache = nullcontext(Path(wp.config.kernel_cache_dir).parent)
     monkeypatch.setattr(bench.tempfile, "TemporaryDirectory", lambda: cache)
     monkeypatch.setitem(bench.BATCHES, "cpu", (2, 4))
     monkeypatch.setattr(bench.os, "cpu_count", lambda: 1)
-    result = bench.bench(PARAMS)
+    result = bench.bench(PARAMS, law=law)
+    assert result["law"] == law
     assert [entry["environments"] for entry in result["batches"]] == [2, 4]
     for entry in result["batches"]:
         assert all(np.isfinite(value) and value > 0 for value in entry.values())
         assert entry["rollouts_with_loss_per_s"] < entry["launches_per_s"]
+        for what in ("rollouts", "rollouts_with_loss"):
+            rate = entry["environments"] / entry[f"{what}_s"]
+            assert entry[f"{what}_per_s"] == pytest.approx(rate)
     steps = result["yardstick"]["steps"]
     assert steps["held"] == round((synthetic.RELEASE - synthetic.GRASP) / PARAMS.sling.grip_step)
     assert result["yardstick"]["newton_iterations"] >= sum(steps.values())

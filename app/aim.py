@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TypedDict
+from typing import NotRequired, TypedDict
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from pipeline.landing.simulator import simulator
 from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.launches.spread import landing_intervals
 from pipeline.params import expect_known
-from pipeline.sling.theta import law_discrepancy, load_samples, load_theta
+from pipeline.sling.theta import launch_history, law_discrepancy, load_samples, load_theta
 from stages.start import unmounted
 
 
@@ -30,7 +30,14 @@ class Answer(TypedDict):
     interval_90_m: list[float] | None
     hold_force_n: float | None
     max_force_n: float  # the arm's limit
+    pull_and_pause_s: NotRequired[list[float]]  # where the law remembers them
     warnings: list[str]
+
+
+def pull_and_pause(params, content: dict) -> dict[str, list[float]]:
+    """What a launch takes for granted of the hand, for a θ file whose law remembers it [s]."""
+    history = launch_history(params, content)
+    return {} if history is None else {"pull_and_pause_s": [history.pull_time, history.pause]}
 
 
 def aim(
@@ -96,5 +103,6 @@ def aim(
         "interval_90_m": interval,
         "hold_force_n": force if np.isfinite(force) else None,
         "max_force_n": params.setup.max_force,
+        **pull_and_pause(params, content),
         "warnings": warnings,
     }

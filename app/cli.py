@@ -169,6 +169,7 @@ def plan(arguments: argparse.Namespace) -> Done:
     JSON,
 )
 def launch(arguments: argparse.Namespace) -> Done:
+    from app.aim import pull_and_pause
     from pipeline.params import expect_known, load
     from pipeline.sling.launch import launch
     from pipeline.sling.theta import calibrated, load_theta, vector
@@ -191,6 +192,7 @@ def launch(arguments: argparse.Namespace) -> Done:
         "landing_y_m": finite(result.landing_y[0]),
         "speed_m_s": finite(result.speed[0]),
         "hold_force_n": finite(result.hold_force[0]),
+        **pull_and_pause(params, content),
         "failure": result.failure[0],
     }
     return shown(answer, arguments.json)

@@ -130,11 +130,17 @@ def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Slin
     law = content.get("law", NEO_HOOKEAN)
     extra = {name: content["theta"][name] for name in LAWS[law]}
     extra["air_drag"] = content.get("nuisances", {}).get("air_drag", 0.0)
-    asked = {"pull_time": params.launch.pull_time, "pause": params.launch.pause}
-    if law == RUBBER:
-        told = {name: value for name, value in asked.items() if value is not None}
-        extra["history"] = LaunchHistory(**content["history"] | told)
+    extra["history"] = launch_history(params, content)
     return replace(load_sling(params, band, root, law), **extra)
+
+
+def launch_history(params, content: dict) -> LaunchHistory | None:
+    """How a hand must draw the band of a θ file to launch it; None for a law without memory."""
+    asked = {"pull_time": params.launch.pull_time, "pause": params.launch.pause}
+    if content.get("law", NEO_HOOKEAN) != RUBBER:
+        return None
+    told = {name: value for name, value in asked.items() if value is not None}
+    return LaunchHistory(**content["history"] | told)
 
 
 def at_points(sling: Sling, points: np.ndarray) -> tuple[Sling, np.ndarray]:

@@ -19,6 +19,7 @@ PARAMS = SimpleNamespace(
     policy=SimpleNamespace(targets=(1.425, 2.425)),
     trials=SimpleNamespace(actuation_error=0.001),
     setup=SimpleNamespace(max_force=15.0),
+    launch=SimpleNamespace(pull_time=None, pause=None),
 )
 
 
@@ -116,6 +117,20 @@ def test_what_the_recording_shows_of_the_law_widens_the_interval(root) -> None:
     file.write_text(before)
     expected = np.hypot(narrow, 2 * 1.645 * 0.1 * answer["predicted_landing_m"])
     assert np.ptp(answer["interval_90_m"]) == pytest.approx(expected, rel=0.03)
+
+
+def test_says_the_pull_and_pause_that_rubber_takes_for_granted(root) -> None:
+    """The recording's, but for what params.yaml asks of a launch."""
+    file = root / "data/theta/toy/none.json"
+    before = file.read_text()
+    theta = json.loads(before)["theta"] | {"mooney_share": 0.3, "relaxation": 0.02}
+    history = {"pull_time": 4.0, "pause": 2.0}
+    rubber = {"band": "toy", "law": "rubber", "theta": theta, "history": history}
+    plain = shoot(root, 1.925)
+    file.write_text(json.dumps(rubber))
+    answer = shoot(root, 1.925, launch=SimpleNamespace(pull_time=None, pause=5.0))
+    file.write_text(before)
+    assert answer == plain | {"pull_and_pause_s": [4.0, 5.0]}
 
 
 def test_warns_outside_the_trained_range_and_above_the_force(root) -> None:

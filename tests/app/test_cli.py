@@ -223,3 +223,9 @@ def test_launch_prints_one_json_object(tmp_path: Path) -> None:
     broken = json.loads(python("-m", "app.cli", *arguments, "--draw=-0.45,-0.30").stdout)
     assert broken["landing_y_m"] is None
     assert "N, more than" in broken["failure"]
+    more = {"mooney_share": 0.3, "relaxation": 0.02}
+    history = {"pull_time": 3.5, "pause": 2.0}
+    rubber = {"band": "band1", "law": "rubber", "theta": SOFT | more, "history": history}
+    theta.write_text(json.dumps(rubber))
+    lines = python("-m", "app.cli", *arguments[:-1], "--draw=-0.30,-0.17").stdout.splitlines()
+    assert ["pull_and_pause_s", "3.5", "2"] in [line.split() for line in lines]

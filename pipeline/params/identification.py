@@ -33,6 +33,7 @@ class SlingParams(Section):
     grading: Annotated[float, Range(1, 20)]
     tet_edges: Annotated[int, Range(4, 400)]
     grip_step: Step
+    hold_step: Step
     recoil_step: Step
     recoil_time: Annotated[float, Range(1e-3, 10)]
     swing_step: Step

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import maximum_filter1d
 
 from pipeline.base.errors import UserError
 from pipeline.sling.initial import hanging_guess
@@ -23,6 +24,7 @@ FAILURES = {
     Outcome.NOT_CONVERGED: "the simulation did not converge",
     Outcome.SLIPPED: "the band slipped out of the fingers",
 }
+BOW, GRID, AROUND = 5e-6, 1e-3, 0.03  # m, s, s: of the steps while the hand holds
 GRASP_BLEND = 0.5  # s in which the held node moves from where the band hung to the hand's path
 
 
@@ -63,33 +65,56 @@ def schedule_of(sling: Sling, episode: Episode, refine: int = 1) -> Schedule:
     clear = release + sling.finger_opening_time
     end = max(episode.time[-1], *episode.cloud_time[-1:]) + 1e-3
     recoil_end = max(min(clear + size.recoil_time, end), clear + size.recoil_step)
-    phases = (  # until when, in steps of what size and order
-        (release, size.grip_step, Grip.HELD, 1),
-        (clear, size.recoil_step, Grip.OPENING, 2),
-        (recoil_end, size.recoil_step, Grip.FREE, 2),
-        (end, size.swing_step, Grip.FREE, 2),
+    phases = (  # until when, in steps of what size
+        (clear, size.recoil_step, Grip.OPENING),
+        (recoil_end, size.recoil_step, Grip.FREE),
+        (end, size.swing_step, Grip.FREE),
     )
+    hand = CubicSpline(episode.time, episode.position, axis=0)
+    held = _held_times(hand, episode, size, refine)
     rows = relaxation(Grip.FREE)
-    rows["time"] = begin = episode.grasp_time
-    previous = 1.0
-    for until, step, grip, order in phases:
+    rows["time"] = episode.grasp_time
+    rows = np.concatenate([rows, steps(held, 1.0, grip=Grip.HELD, order=2)])
+    begin = release
+    for until, step, grip in phases:
         if until > begin:
             count = max(int(np.ceil((until - begin) / step * refine - 1e-9)), 1)
             times = np.linspace(begin, until, count + 1)
-            rows = np.concatenate([rows, steps(times, previous, grip=grip, order=order)])
-            begin, previous = until, rows["h"][-1]
-    _lead(rows, sling, episode)
+            rows = np.concatenate([rows, steps(times, rows["h"][-1], grip=grip, order=2)])
+            begin = until
+    _lead(rows, hand, sling, episode)
     return Schedule(rows, first_free=RELAX_STEPS + np.count_nonzero(rows["grip"]))
 
 
-def _lead(rows: np.ndarray, sling: Sling, episode: Episode) -> None:
+def _held_times(hand: CubicSpline, episode: Episode, size, refine: int) -> np.ndarray:
+    """Ends of the steps from grasp to release [s]: as long as the hand goes nearly straight.
+
+    A step of h bows from its chord by h^2 |a| / 8, which is at most BOW, and a band that the hand
+    holds follows it. Between `grip_step` and `hold_step`.
+    """
+    time = np.arange(episode.grasp_time, episode.release_time, GRID)
+    bend = np.linalg.norm(hand(_within(time, episode), 2), axis=1)
+    bend = maximum_filter1d(bend, 2 * round(AROUND / GRID) + 1)
+    longest = np.sqrt(8 * BOW / np.maximum(bend, 1e-9)).clip(size.grip_step, size.hold_step)
+    longest[time < episode.grasp_time + GRASP_BLEND] = size.grip_step
+    done = np.append(0.0, np.cumsum(np.diff(time, append=episode.release_time) / longest))
+    count = max(int(np.ceil(done[-1] * refine - 1e-9)), 1)
+    return np.interp(
+        np.linspace(0, done[-1], count + 1), done, np.append(time, episode.release_time)
+    )
+
+
+def _within(time: np.ndarray, episode: Episode) -> np.ndarray:
+    return np.clip(time, episode.time[0], episode.time[-1])
+
+
+def _lead(rows: np.ndarray, hand: CubicSpline, sling: Sling, episode: Episode) -> None:
     """Say of steps where the hand is, and with what force its pads hold the band."""
     time, opening = rows["time"], rows["grip"] == Grip.OPENING
     rows["grip_force"][rows["grip"] == Grip.HELD] = sling.grip_force
     since = time[opening] - episode.release_time
     rows["grip_force"][opening] = sling.grip_force * since / sling.finger_opening_time
-    hand = CubicSpline(episode.time, episode.position, axis=0)
-    rows["target"] = hand(np.clip(time, episode.time[0], episode.time[-1]))
+    rows["target"] = hand(_within(time, episode))
     part = np.clip((time - episode.grasp_time) / GRASP_BLEND, 0, 1)
     rows["blend"] = 1 - part**3 * (10 - 15 * part + 6 * part**2)
 

@@ -17,6 +17,7 @@ const int member = lane < TEAMS * T ? lane - team * T : 1000;  // spare threads 
 #define ROW(array, size) (array.data + (size_t)sling * (size))
 #define SAVE (work.data + (size_t)(tid / 32) * (L * SAVED) * 32 + lane)
 #define SAVE_STRIDE 32
+#define FIRST_COLUMN (lane - team * T)
 #define OF(array, k, m) __shfl_sync(~0u, array[0][m], team * T + (k))  // row m of column k
 #define AT_MEMBER(array, k) __shfl_sync(~0u, array[0], team * T + (k))
 #define SYNC __syncwarp()
@@ -39,6 +40,7 @@ const int sling = tid, member = 0;
 #define ROW(array, size) ((real*)array.data + (size_t)sling * (size))
 #define SAVE ((real*)work.data + (size_t)sling * (L * SAVED) * COLUMNS)
 #define SAVE_STRIDE COLUMNS
+#define FIRST_COLUMN 0
 #define OF(array, k, m) array[k][m]
 #define AT_MEMBER(array, k) array[k]
 #define SYNC

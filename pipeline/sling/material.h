@@ -40,6 +40,7 @@ auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&
       stress[k][c] = mu * x[k][c] + p * C[k][c]
                    + d * (volumetric * Jt * Cp[k][c] + sv * (mu * xt[k][c] + pv * (u[c] + v[c])));
   }
+  if (!fresh) return;
   UNROLL for (int k = 0; k < 3; ++k) UNROLL for (int l = 0; l <= k; ++l) {
     real (&block)[3][3] = K[k * (k + 1) / 2 + l];
     UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n < 3; ++n)

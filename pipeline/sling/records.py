@@ -49,13 +49,13 @@ SETTING = _record(
 MATERIAL = _record(
     "mu", "lam", "damping", "scale", "friction", "bending", "drag", "mooney", "relaxation"
 )
-# of a step that ends at `time` and is `h` long: c1, c2, beta as in step.h; Mode, Grip; where the
+# of a step that ends at `time` and is `h` long: past and beta as in step.h; Mode, Grip; where the
 # hand is; its normal force (for opening pads, how much of it is gone); how much of the way from
 # where it grasped the band to its own path is left; share of the bending stiffness; metres that the
 # hand gives way per newton; rubber.update
 STEP = _record(
-    "h", "c1", "c2", "beta", "mode", "grip", ("target", 3), "grip_force", "blend", "time",
-    "bending", "compliance", ("forget", BRANCHES), ("follow", BRANCHES),
+    "h", "past", "beta", "mode", "grip", ("target", 3), "grip_force", "blend", "time", "bending",
+    "compliance", ("forget", BRANCHES), ("follow", BRANCHES),
 )  # fmt: skip
 # of a sling on its way: direction of the launch, mass of the projectile, Outcome; time, y, z, vy,
 # vz at the separation; lowest z until then; force on the hand when it last held; Newton

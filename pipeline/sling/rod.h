@@ -94,9 +94,9 @@ auto stage_section = [&](int i) {
   UNROLL for (int m = 0; m < N; ++m) {
     const real mass = mass_of(i, m);
     f[m] = mass * ibh2 * (X(m, i) - XH(m, i)) + wind_on(i, m);
-    own[LOWER(m, m)] = mass * ibh2 + wind_of(i, m) + shift * (m < 3 ? zero + node_shift : mu * (area * mean_edge));
+    if (fresh) own[LOWER(m, m)] = mass * ibh2 + wind_of(i, m) + shift * (m < 3 ? zero + node_shift : mu * (area * mean_edge));
   }
-  UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n <= m; ++n) own[LOWER(m, n)] += across(i, m, n);
+  if (fresh) UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n <= m; ++n) own[LOWER(m, n)] += across(i, m, n);
   if (i < L - 1) {
     // ---- edge i: k = 0, 1, 2 are g, a, b; x now, xp predicted, xt rates
     const SC ds = edge[i], per_ds = (SC)1 / ds;
@@ -119,7 +119,7 @@ auto stage_section = [&](int i) {
       f_next[c] = volume * stress[0][c] * per_ds; f[c] -= f_next[c];
       f[3 + c] += volume * stress[1][c]; f[6 + c] += volume * stress[2][c];
     }
-    UNROLL for (int k = 0; k < 3; ++k) UNROLL for (int l = 0; l <= k; ++l)
+    if (fresh) UNROLL for (int k = 0; k < 3; ++k) UNROLL for (int l = 0; l <= k; ++l)
       UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n < 3; ++n) {
         if (k == l && n > m) continue;
         const real v = volume * K[k * (k + 1) / 2 + l][m][n];
@@ -130,8 +130,8 @@ auto stage_section = [&](int i) {
     if (i == MID - 1 || i == MID) {  // what the hand feels of this edge
       const int side = i - MID + 1;
       UNROLL for (int c = 0; c < 3; ++c) HAND(27 * side + c) = f_next[c];
-      UNROLL for (int c = 0; c < 6; ++c) HAND(27 * side + 3 + c) = PUT(STRETCH + c);
-      UNROLL for (int m = 0; m < 6; ++m) UNROLL for (int n = 0; n < 3; ++n) HAND(27 * side + 9 + 3 * m + n) = own[LOWER(3 + m, n)];
+      if (fresh) UNROLL for (int c = 0; c < 6; ++c) HAND(27 * side + 3 + c) = PUT(STRETCH + c);
+      if (fresh) UNROLL for (int m = 0; m < 6; ++m) UNROLL for (int n = 0; n < 3; ++n) HAND(27 * side + 9 + 3 * m + n) = own[LOWER(3 + m, n)];
     }
     // ---- joints: to the next edge; first, where there is one, from a frame that does not move (a clamp, or
     // the fingers, which hold the middle node's direction while they hold it). `from` and `to` are 6 numbers:
@@ -166,6 +166,7 @@ auto stage_section = [&](int i) {
       if (fixed_from) {
         UNROLL for (int m = 0; m < 6; ++m) {
           f[3 + m] += kb * (to[m] - from[m] + d * s * (to_t[m] - from_t[m])) - kt * twist * tw_next[m];
+          if (!fresh) continue;
           own[LOWER(3 + m, 3 + m)] += hb;
           UNROLL for (int n = 0; n <= m; ++n) own[LOWER(3 + m, 3 + n)] -= ht * tw_next[m] * tw_next[n];
         }
@@ -175,15 +176,16 @@ auto stage_section = [&](int i) {
           const real bend = kb * (from[m] - to[m] + d * s * (from_t[m] - to_t[m]));
           f[3 + m] += bend - kt * twist * tw[m];
           f_next[3 + m] = coupled * (-bend - kt * twist * tw_next[m]);
+          if (!fresh) continue;
           own[LOWER(3 + m, 3 + m)] += hb;
           UNROLL for (int n = 0; n <= m; ++n) own[LOWER(3 + m, 3 + n)] -= ht * tw[m] * tw[n];
           PUT(TWIST + m) = tw[m]; PUT(TWIST_NEXT + m) = tw_next[m];
         }
-        PUT(BEND) = coupled * hb; PUT(TWISTING) = coupled * ht;
+        if (fresh) { PUT(BEND) = coupled * hb; PUT(TWISTING) = coupled * ht; }
       }
     }
   }
-  UNROLL for (int m = 0; m < 45; ++m) PUT(OWN + m) = own[m];
+  if (fresh) UNROLL for (int m = 0; m < 45; ++m) PUT(OWN + m) = own[m];
   UNROLL for (int m = 0; m < N; ++m) { PUT(FORCE + m) = f[m]; PUT(FORCE_NEXT + m) = f_next[m]; }
 };
 

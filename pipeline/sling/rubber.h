@@ -46,7 +46,7 @@ auto add_rubber = [&](int i, const real (&g)[3], real (&stress)[3], real (&K)[3]
   const real along = (extra_slope + following * slope - across) / (l * l);
   UNROLL for (int m = 0; m < 3; ++m) {
     stress[m] += across * g[m];
-    UNROLL for (int n = 0; n < 3; ++n) K[m][n] += along * g[m] * g[n] + (m == n ? across : zero);
+    if (fresh) UNROLL for (int n = 0; n < 3; ++n) K[m][n] += along * g[m] * g[n] + (m == n ? across : zero);
   }
 };
 // of a step; one that relaxes begins with branches that have forgotten part of whatever stress there will be

@@ -36,10 +36,9 @@ def steps(times, previous: float, *, grip: Grip, order: int = 1, mode: Mode = Mo
     result = np.zeros(len(times) - 1, STEP)
     h = np.diff(times)
     ratio = h / np.concatenate([[previous], h[:-1]])
-    result["h"], result["c1"], result["beta"] = h, 1, 1
+    result["h"], result["beta"] = h, 1
     if order == 2:
-        result["c1"] = (1 + ratio) ** 2 / (1 + 2 * ratio)
-        result["c2"] = ratio**2 / (1 + 2 * ratio)
+        result["past"] = ratio**2 / (1 + 2 * ratio)
         result["beta"] = (1 + ratio) / (1 + 2 * ratio)
     result["mode"], result["grip"], result["time"], result["bending"] = mode, grip, times[1:], 1
     result["forget"], result["follow"] = update(h)

@@ -84,6 +84,7 @@ auto complement = [&](int i, real (&D)[COLUMNS][N], real (&U)[COLUMNS][N], real 
       UNROLL for (int m = 1; m < N; ++m) if (m > FIRST_ROW(c)) KEEP(i, m, q) = D[q][m];
       UNROLL for (int m = 0; m < N; ++m) KEEP(i, N + m, q) = SHARED(m, c) * own_inverse[q];
       KEEP(i, 2 * N, q) = SHARED(N, c) * own_inverse[q];
+      KEEP(i, 2 * N + 1, q) = own_inverse[q];
     }
   }
 };
@@ -115,12 +116,34 @@ auto substitute = [&]() {
   }
 };
 
-// Newton's step from the state X into DX
+// the residual alone of section i, through the factors that are kept; `next` as for `take`
+auto eliminate_again = [&](int i, real (&next)[OWN_ROWS]) {
+  real x[OWN_ROWS];
+  UNROLL for (int q = 0; q < OWN_ROWS; ++q) {
+    const int c = q + member;
+    x[q] = c < N && moves(i, c) ? RESIDUAL(c, i % T) + next[q] : zero;
+    if (i == MID && opening && c < PLACES) x[q] += share(c) * capacity * direction[c % 3];
+    next[q] = c < N ? RESIDUAL_NEXT(c, i % T) : zero;
+  }
+  UNROLL for (int k = 0; k < N; ++k) {
+    const real known = AT_MEMBER(x, k);
+    UNROLL for (int q = 0; q < OWN_ROWS; ++q) {
+      const int c = q + member;
+      if (c > k && c < N) x[q] -= OF_COLUMN(i, c, k) * known;
+      if (c < N) next[q] -= OF_COLUMN(i, N + c, k) * known;
+    }
+  }
+  UNROLL for (int q = 0; q < OWN_ROWS; ++q) if (q + member < N) KEEP(i, 2 * N, q) = x[q] * KEEP(i, 2 * N + 1, q);
+};
+
+// Newton's step from the state X into DX; unless `fresh`, with the Hessian of the solve before
 auto solve = [&]() {
-  real D[COLUMNS][N], U[COLUMNS][N], next[COLUMNS][N], inverse[N], own_inverse[COLUMNS], before[N];
-  change = imbalance = indefinite = poison = inexact = zero;
+  real D[COLUMNS][N], U[COLUMNS][N], next[COLUMNS][N], inverse[N], own_inverse[COLUMNS], before[N], again[OWN_ROWS];
+  change = imbalance = poison = zero;
+  if (fresh) indefinite = inexact = zero;
   UNROLL for (int q = 0; q < COLUMNS; ++q) UNROLL for (int m = 0; m < N; ++m) next[q][m] = zero;
   UNROLL for (int m = 0; m < N; ++m) before[m] = zero;
+  UNROLL for (int q = 0; q < OWN_ROWS; ++q) again[q] = zero;
   for (int i = 0; i < L; ++i) {
     if (i % T == 0) {
       SYNC;
@@ -128,9 +151,13 @@ auto solve = [&]() {
       SYNC;
       weigh(i, before);
     }
-    take(i, D, U, next);
-    factorise(D, U, inverse, own_inverse);
-    complement(i, D, U, inverse, own_inverse, next);
+    if (fresh) {
+      take(i, D, U, next);
+      factorise(D, U, inverse, own_inverse);
+      complement(i, D, U, inverse, own_inverse, next);
+    } else {
+      eliminate_again(i, again);
+    }
   }
   substitute();
   change = poison == zero ? change : zero + (SC)1e30;

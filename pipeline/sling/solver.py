@@ -84,7 +84,7 @@ class Options:
     double: bool = False
     gravity: float = GRAVITY
     tolerance: float = 2e-6
-    max_iterations: int = 80
+    max_iterations: int = 100
 
     @property
     def on_gpu(self) -> bool:
@@ -163,7 +163,7 @@ def _widths(sling: Sling, schedule: Schedule, frames: Frames, options: Options) 
         "state": sling.dofs * sling.sections,
         "lanes": width(LANE),
         "scratch": (9 * sling.dofs + memories(sling.law) + 4) * sling.sections,
-        "work": (2 * sling.dofs + 1) * sling.sections * columns,
+        "work": (2 * sling.dofs + 2) * sling.sections * columns,
         "output": 0 if options.launching else width(OUTPUT) * len(schedule.steps),
         "frames": len(frames.steps) * sling.sections * frames.width,
     }

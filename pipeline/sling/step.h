@@ -1,10 +1,10 @@
 // Steps slings through a schedule. A step solves, for all sections at once,
 //
 //   M (x - xh)/(beta h)^2 + c M x' + dW/dx + dD/dx' = 0,   x' = (x - y)/(beta h),
-//   y = c1 x_n - c2 x_n-1,   xh = y + beta h (c1 v_n - c2 v_n-1) + (beta h)^2 gravity
+//   y = x_n + past (x_n - x_n-1),   xh = y + beta h (v_n + past (v_n - v_n-1)) + (beta h)^2 gravity
 //
 // with the air's drag c on the nodes (not on directors or the projectile), linear and a cylinder's
-// (backward Euler: beta = c1 = 1, c2 = 0; variable-step BDF2 otherwise) by Newton's method with the exact Hessian;
+// (backward Euler: beta = 1, past = 0; variable-step BDF2 otherwise) by Newton's method with the exact Hessian;
 // where that is indefinite, its diagonal is shifted.
 
 const SC close = sqrt(0.25 * tolerance * shortest);  // from here on Newton's next change is below the tolerance
@@ -33,7 +33,7 @@ SYNC;
 #endif
 for (int step = 0; step < steps; ++step) {
   const SC* row = schedule.data + (size_t)step * STEP_SIZE;
-  const SC h = row[STEP_H], c1 = row[STEP_C1], c2 = row[STEP_C2], bh = row[STEP_BETA] * h;
+  const SC h = row[STEP_H], past = row[STEP_PAST], bh = row[STEP_BETA] * h;
   const bool relax = row[STEP_MODE] == MODE_RELAX;
   const int grip = (int)row[STEP_GRIP];
   const SC grip_force = row[STEP_GRIP_FORCE], blend = row[STEP_BLEND], time = row[STEP_TIME];
@@ -65,11 +65,11 @@ for (int step = 0; step < steps; ++step) {
 
   // ---- predicted state, and what the step starts from
   for (int i = member; i < L; i += T) UNROLL for (int k = 0; k < N; ++k) {
-    const real x1 = X1(k, i), v1 = V1(k, i), y = c1 * x1 - c2 * X2(k, i);
+    const real x1 = X1(k, i), v1 = V1(k, i), y = x1 + past * (x1 - X2(k, i));
     const bool led = k < PLACES && i == MID && attached;
-    const real x = led ? target[k < PLACES ? k : 0] : x1 + h * v1;
+    const real x = led ? target[k < PLACES ? k : 0] : moves(i, k) ? x1 + h * v1 : x1;
     X(k, i) = x; XP(k, i) = x; Y(k, i) = y;
-    XH(k, i) = y + bh * (c1 * v1 - c2 * V2(k, i)) - (k < PLACES && k % 3 == 2 ? gravity * bh * bh : (SC)0);
+    XH(k, i) = y + bh * (v1 + past * (v1 - V2(k, i))) - (k < PLACES && k % 3 == 2 ? gravity * bh * bh : (SC)0);
   }
 #if RUBBER
   recall(row, relax);
@@ -80,18 +80,31 @@ for (int step = 0; step < steps; ++step) {
 
   // ---- Newton's method; lanes that have settled stay as they are, so that a lane never depends on its neighbours
   real settled = outcome != zero ? one : zero, reaction[3] = {zero, zero, zero};
+  real before = zero, sound = zero;  // the step that Newton's made last; whether it was made whole
   shift = zero;
   int iteration = 0;
   while (iteration < max_iterations) {
+    fresh = iteration % 2 == 0 || iteration > 6;  // every other one, and all of a hard step's
     ++iteration;
     solve();
-    // a step that an indefinite Hessian gives, or that goes far, is not made: the Hessian is shifted
-    const real far = change < zero + (SC)5 * step_limit ? zero : one;
-    const real refused = maximum(far, change < zero + (SC)2 * tolerance ? zero : indefinite);
-    // with the exact Hessian, convergence is quadratic
-    const real enough = shift > zero ? zero + (SC)10 * tolerance : inexact > zero ? zero + tolerance : zero + close;
-    shift = refused > zero ? maximum((SC)4 * shift, zero + (SC)0.25) : (shift < zero + (SC)0.05 ? zero : (SC)0.5 * shift);
-    const real scale = (one - settled) * (one - refused) * minimum(one, step_limit / maximum(change, zero + (SC)1e-12));
+    real refused, scale, enough;
+    if (fresh) {
+      // a step that an indefinite Hessian gives, or that goes far, is not made: the Hessian is shifted
+      const real far = change < zero + (SC)5 * step_limit ? zero : one;
+      refused = maximum(far, change < zero + (SC)2 * tolerance ? zero : indefinite);
+      // with the exact Hessian, convergence is quadratic
+      enough = shift > zero ? zero + (SC)10 * tolerance : inexact > zero ? zero + tolerance : zero + close;
+      shift = refused > zero ? maximum((SC)4 * shift, zero + (SC)0.25) : (shift < zero + (SC)0.05 ? zero : (SC)0.5 * shift);
+      scale = minimum(one, step_limit / maximum(change, zero + (SC)1e-12));
+      sound = (one - refused) * (scale < one ? zero : one);
+    } else {
+      // with a Hessian that is not today's it is linear, at a rate that two steps show
+      refused = sound > zero ? (change < (SC)0.5 * before ? zero : one) : one;
+      enough = SQRT(maximum(tolerance * (before - change), zero));
+      scale = one; sound = sound * (one - refused);
+    }
+    before = change;
+    scale *= (one - settled) * (one - refused);
     if (attached) UNROLL for (int c = 0; c < 3; ++c) {
       const real force = hand_force(c, scale);
       reaction[c] = settled > zero ? reaction[c] : force;
@@ -129,7 +142,7 @@ for (int step = 0; step < steps; ++step) {
     UNROLL for (int c = 0; c < 3; ++c) {
       position[c] = middle(&X(0, MID), c);
       velocity[c] = (position[c] - middle(&Y(0, MID), c)) * ibh;
-      const real v = c1 * middle(&V1(0, MID), c) - c2 * middle(&V2(0, MID), c);
+      const real v1 = middle(&V1(0, MID), c), v = v1 + past * (v1 - middle(&V2(0, MID), c));
       contact += payload * ((velocity[c] - v) * ibh + (c == 2 ? gravity : (SC)0)) * direction[c];
     }
     const real before = step > first_free ? contact_before : contact;

@@ -82,13 +82,14 @@ auto stage_slab = [&](int i) {
       real row[3][3][3];  // derivative of the stress by corner b, times the volume
       UNROLL for (int k = 0; k < 3; ++k) UNROLL for (int m = 0; m < 3; ++m) {
         (above_b ? force_there : force_here)[3 * vb + m] += volume * grad[b][k] * stress[k][m];
+        if (!fresh) continue;
         UNROLL for (int n = 0; n < 3; ++n) {
           row[k][m][n] = zero;
           UNROLL for (int l = 0; l < 3; ++l)
             row[k][m][n] += volume * grad[b][l] * (k >= l ? K[k * (k + 1) / 2 + l][m][n] : K[l * (l + 1) / 2 + k][n][m]);
         }
       }
-      for (int a = 0; a < 4; ++a) {
+      for (int a = 0; fresh && a < 4; ++a) {
         const int va = corners[t][a] % VERTICES, above_a = corners[t][a] / VERTICES;
         if (above_a > above_b || (above_a == above_b && va < vb)) continue;  // its transpose is counted
         auto& block = above_a ? following : above_b ? across : own;
@@ -101,7 +102,7 @@ auto stage_slab = [&](int i) {
     const int side = i - MID + 1;
     felt[side][c] = zero;
     for (int m = c; m < N; m += 3) felt[side][c] += side ? force_here[m] : force_there[m];
-    for (int n = 0; n < N; ++n) {
+    for (int n = 0; fresh && n < N; ++n) {
       felt_of[side][c][n] = zero;
       for (int m = c; m < N; m += 3) felt_of[side][c][n] += side ? across[n][m] : across[m][n];
     }
@@ -110,14 +111,14 @@ auto stage_slab = [&](int i) {
 
 auto stage_section = [&](int i) {
   for (int c = 0; c < N; ++c) {
-    for (int m = 0; m < N; ++m) own[c][m] = following[c][m] = across[c][m] = zero;
+    for (int m = 0; fresh && m < N; ++m) own[c][m] = following[c][m] = across[c][m] = zero;
     force_here[c] = force_there[c] = zero;
   }
   if (i < L - 1) stage_slab(i);
   for (int m = 0; m < N; ++m) {
     const real mass = mass_of(i, m);
     force_here[m] += mass * ibh2 * (X(m, i) - XH(m, i)) + wind_on(i, m);
-    own[m][m] += mass * ibh2 + wind_of(i, m) + shift * (node_shift * share(m));
+    if (fresh) own[m][m] += mass * ibh2 + wind_of(i, m) + shift * (node_shift * share(m));
   }
 };
 

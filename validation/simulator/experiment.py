@@ -113,12 +113,12 @@ def rates(
     x1 = x2 = start
     v1 = np.zeros_like(start)
     for k, step in enumerate(table):
-        h, c1, c2, beta = (step[name] for name in ("h", "c1", "c2", "beta"))
+        h, past, beta = (step[name] for name in ("h", "past", "beta"))
         relax = step["mode"] == Mode.RELAX
         at[:, k] = x1 + h * v1
         if step["grip"] in (Grip.HELD, Grip.POUCH):  # the hand leads it
             at[:, k, middle, :3] = x[:, k, middle, :3]
-        v[:, k] = 0.0 if relax else (x[:, k] - c1 * x1 + c2 * x2) / (beta * h)
+        v[:, k] = 0.0 if relax else (x[:, k] - x1 - past * (x1 - x2)) / (beta * h)
         x1, x2, v1 = x[:, k], (x[:, k] if relax else x1), v[:, k]
     return v, at
 

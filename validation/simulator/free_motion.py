@@ -54,7 +54,7 @@ def free_fall(bench: Bench, count: int = 60) -> list[Finding]:
     checks = []
     for order, name in ((1, "backward Euler"), (2, "second order, uneven steps")):
         table = steps(times, times[1], grip=Grip.FREE, order=order)
-        for field, value in {"c1": 1, "c2": 0, "beta": 1}.items():
+        for field, value in {"past": 0, "beta": 1}.items():
             table[field][0] = value
         motion = move(bench, sling, THETA, table, straight_guess(sling), **TIGHT)
         miss = np.abs(motion.x[0, :, :, 2] - fall_of_a_point(times, order)[1:, None]).max()

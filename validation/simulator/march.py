@@ -49,7 +49,7 @@ def march(
     overstress = np.zeros((rod.sling.edges, len(TIMES)))
     stress = rod.uniaxial(rod.stretch(rod.columns(x1)))  # at the last step's end
     for step in steps:
-        h, c1, c2, grip, target = (step[name] for name in ("h", "c1", "c2", "grip", "target"))
+        h, past, grip, target = (step[name] for name in ("h", "past", "grip", "target"))
         bh = step["beta"] * h
         forget, follow = step["forget"], step["follow"]
         if step["mode"] == Mode.RELAX:  # from rest, whatever was before
@@ -69,8 +69,8 @@ def march(
             free[middle, :3] = False
         else:
             offset = None
-        y = c1 * x1 - c2 * x2
-        inertial = y + bh * (c1 * v1 - c2 * v2)
+        y = x1 + past * (x1 - x2)
+        inertial = y + bh * (v1 + past * (v1 - v2))
         inertial[:, 2] -= bh**2 * rod.gravity
         lost = step["grip_force"] * friction
         capacity = max(pull - lost, 0.0) if grip == Grip.OPENING else 0.0

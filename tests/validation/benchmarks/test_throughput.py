@@ -47,7 +47,8 @@ def test_it_counts_rollouts_and_launches(monkeypatch, law: str) -> None:
             rate = entry["environments"] / entry[f"{what}_s"]
             assert entry[f"{what}_per_s"] == pytest.approx(rate)
     steps = result["yardstick"]["steps"]
-    assert steps["held"] == round((synthetic.RELEASE - synthetic.GRASP) / PARAMS.sling.grip_step)
+    held, sling = synthetic.RELEASE - synthetic.GRASP, PARAMS.sling
+    assert held / sling.hold_step < steps["held"] < held / sling.grip_step / 2
     assert result["yardstick"]["newton_iterations"] >= sum(steps.values())
     assert min(result["first_start_s"].values()) > 0
     assert str(steps["recoil"]) in bench.table(result)

@@ -9,6 +9,7 @@
 #if defined(__CUDA_ARCH__)
 typedef SC real;
 #define TEAMS (32 / T)
+#define AGAIN 0                                          // whether a factor serves twice: a GPU, which waits, gains nothing
 #define COLUMNS 1                                        // columns of a block that a thread has, the residual's too
 #define OWN_ROWS 1                                       // rows of the solution that it has
 const int lane = tid % 32, team = lane / T < TEAMS ? lane / T : TEAMS - 1;
@@ -35,6 +36,7 @@ auto team_maximum = [&](real x) -> real {
 #else
 typedef SC real __attribute__((vector_size(sizeof(SC) * W)));
 #define COLUMNS (N + 1)
+#define AGAIN 1
 #define OWN_ROWS N
 const int sling = tid, member = 0;
 #define ROW(array, size) ((real*)array.data + (size_t)sling * (size))

@@ -63,5 +63,9 @@ bool opening = false;                      // its fingers open
 real capacity = zero;                      // what the pads can hold [N]
 real cb = zero, dh = zero, dsh = zero;     // bending, d / (beta h), that times s
 real air = zero;                           // drag / (beta h)
+#if AGAIN
 bool fresh = true;                         // the Hessian is wanted, not the residual alone
+#else
+const bool fresh = true;
+#endif
 real shift = zero, inexact = zero;         // of the Hessian: what is added to its diagonal, whether it is not exact

@@ -84,7 +84,9 @@ for (int step = 0; step < steps; ++step) {
   shift = zero;
   int iteration = 0;
   while (iteration < max_iterations) {
+#if AGAIN
     fresh = iteration % 2 == 0 || iteration > 6;  // every other one, and all of a hard step's
+#endif
     ++iteration;
     solve();
     real refused, scale, enough;

@@ -22,7 +22,7 @@ from pipeline.sling.load import load_sling
 PIPELINE = Path(__file__).parents[1]
 SOURCES = (  # the code that a term of the loss hangs on
     *(PIPELINE / name for name in ("episode", "objective", "sling")),
-    PIPELINE / "base" / "native.py",
+    *(PIPELINE / "base" / name for name in ("failures.py", "native.py")),
 )
 
 

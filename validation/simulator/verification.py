@@ -41,8 +41,8 @@ gradient F = [g a b] of its stretch and its section, with the stable neo-Hookean
 logarithm (Smith, de Goes and Kim 2018), W = μ/2 (|F|² − 3) − μ (J − 1) + λ/2 (J − 1)², J = det F; \
 λ is the first Lamé parameter plus μ, so that E and ν are the small-strain ones. Joints between \
 edges bend with E I and twist with G J of the round section. Viscous stress is d times the rate of \
-the elastic stress, its shape part times s. Each step, backward Euler in the hand and second order \
-(BDF2) after the release, is solved by Newton's method on the whole band.
+the elastic stress, its shape part times s. Each step, of second order (BDF2), is solved \
+by Newton's method on the whole band.
 
 Device {device}; simulator {simulator}, a digest of pipeline/sling.
 """

@@ -178,26 +178,24 @@ for (int e = 0; e < EDGES; ++e) {
     for (int c = 0; c < 3; ++c) p[k][c] = tube[RIDGE + 3 * k + c][e];
     nearest[k] = zero + FAR;
   }
-  // which blocks can hold it: some ball near the middle sample says how far it is at most
-  auto to_middle2 = [&](int g) -> real {
-    const float* m = p[SAMPLES / 2];
-    const real dx = ROW(balls, g, 0) - m[0], dy = ROW(balls, g, 1) - m[1], dz = ROW(balls, g, 2) - m[2];
-    return dx * dx + dy * dy + dz * dz;
-  };
-  real away2 = zero + FAR, ball = zero;
-  for (int g = first_group; g < last_group; ++g) {
-    const real square = to_middle2(g), its = ROW(balls, g, 3);
-    ball = square < away2 ? its : ball;
-    away2 = square < away2 ? square : away2;
-  }
-  const float limit = least(ROOT(away2) * MORE + ball) + (CULLED ? 2.0f * tube[REACH][e] : INFINITE);
-  for (int g = first_group; g < last_group; g += 64 / LANES) {  // 64 blocks at once
+  // 64 blocks at once: some ball near the middle sample says which of them can hold it
+  real limits = zero + FAR;
+  for (int g = first_group; g < last_group; g += 64 / LANES) {
     const int begin = first + (g - first_group) * LANES;
-    unsigned long long bits = 0;
-    for (int more = 0; more < 64 / LANES && g + more < last_group; ++more) {
-      const real upper = limit + ROW(balls, g + more, 3);
-      bits |= (unsigned long long)BITS(to_middle2(g + more) * LESS <= upper * upper) << (more * LANES);
+    real away[64 / LANES], ball[64 / LANES];
+    UNROLL for (int more = 0; more < 64 / LANES; ++more) {
+      const int group = g + more < last_group ? g + more : last_group - 1;
+      const float* m = p[SAMPLES / 2];
+      const real dx = ROW(balls, group, 0) - m[0], dy = ROW(balls, group, 1) - m[1], dz = ROW(balls, group, 2) - m[2];
+      away[more] = ROOT(dx * dx + dy * dy + dz * dz);
+      ball[more] = ROW(balls, group, 3);
+      const real upper = away[more] * MORE + ball[more];
+      limits = upper < limits ? upper : limits;
     }
+    const float limit = least(limits) + (CULLED ? 2.0f * tube[REACH][e] : INFINITE);
+    unsigned long long bits = 0;
+    UNROLL for (int more = 0; more < 64 / LANES; ++more)
+      bits |= (unsigned long long)BITS(away[more] * LESS - ball[more] <= limit) << (more * LANES);
     if (last - begin < 64) bits &= (1ull << (last - begin)) - 1;
     for (; bits; bits &= bits - 1) {
       const int b = begin + FIRST_BIT(bits);

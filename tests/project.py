@@ -15,7 +15,13 @@ from pipeline.params import Params
 
 ROOT = Path(__file__).parents[1]
 SLING = ("-c", "from app.cli import main; main()")  # after `python`
-ROUGH = {"edges": 16, "grip_step": 0.01, "hold_step": 0.02, "recoil_step": 5e-4, "swing_step": 2e-3}  # a sling's
+ROUGH = {  # a sling's
+    "edges": 16,
+    "grip_step": 0.01,
+    "hold_step": 0.02,
+    "recoil_step": 5e-4,
+    "swing_step": 2e-3,
+}
 
 
 def copy_project(folder: Path) -> None:

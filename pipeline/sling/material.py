@@ -19,6 +19,7 @@ THETA = (
     "dynamic_friction",
     "damping_scale",
 )
+LEAST_SCALE = 0.005  # without any damping of shape its waves ring on for ever, and no step holds them
 
 
 def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
@@ -26,13 +27,15 @@ def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
 
     mu is the shear modulus and lam the volume modulus of the stable neo-Hookean law without its
     logarithm (Smith, de Goes, Kim 2018): first Lame parameter plus mu, so that E and nu are the
-    small-strain ones. `friction` is that of both pads.
+    small-strain ones. `friction` is that of both pads. A damping_scale below LEAST_SCALE is taken
+    as that.
     """
     young, poisson, damping, friction, scale = np.asarray(thetas, float).T
     result = np.empty(len(thetas), MATERIAL)
     result["mu"] = mu = young / (2 * (1 + poisson))
     result["lam"] = young * poisson / ((1 + poisson) * (1 - 2 * poisson)) + mu
-    result["damping"], result["scale"], result["friction"] = damping, scale, 2 * friction
+    result["damping"], result["scale"] = damping, np.maximum(scale, LEAST_SCALE)
+    result["friction"] = 2 * friction
     if sling.flexural_rigidity is None:
         result["bending"] = (1 + poisson) * sling.radius**2 / 2
     else:

@@ -121,10 +121,10 @@ def section(
     boundary = [
         Finding(
             f"unconverged, and marked so, of {one['rollouts']} rollouts {where}, held fast",
-            "—",
+            "0",
             float(len(one["unconverged"])),
             "θ",
-            None,
+            0.0,
             ranges(one["unconverged"]) if one["unconverged"] else "",
         )
         for where, one in (

@@ -102,10 +102,10 @@ def test_the_band_slips_when_its_force_is_coulombs(coarse, recorded) -> None:
 
 
 def test_a_launch_holds_what_the_recording_held(coarse, recorded) -> None:
-    """The same draw after the same pause: relaxed alike; the arm gives by a millimetre."""
+    """The same draw after the same pause, by an arm that gives way alike: by a millimetre."""
     held = np.linalg.norm(recorded[1].force[round(1000 * OPEN)])
     launched = launches.launch("band1", coarse, (-0.40, 0.0), None).hold_force
-    assert np.isclose(launched, held, rtol=5e-3)
+    assert np.isclose(launched, held, rtol=1.5e-3)  # a firm arm: 3.6e-3
     assert launched < 0.985 * coarse.rig.bands["band1"].peak_force
 
 

@@ -76,7 +76,8 @@ float rest_length = 0.0f;
 for (int e = 0; e < EDGES; ++e) rest_length += rest[e];
 
 // of each edge: start (3), vector (3), vector / length^2 (3), radius (stretched at constant volume), how
-// far off a bound may be, how far its samples reach from the middle one, samples (3 each)
+// far off a bound may be, how far its samples reach from the middle one, samples (3 each) and how far the
+// nearest point is from each, squared
 enum { RADIUS = 9, OFF, REACH, RIDGE, NEAREST = RIDGE + 3 * SAMPLES, ROWS = NEAREST + SAMPLES, WIDE = (EDGES + LANES - 1) / LANES * LANES };
 SHARED float tube[ROWS][WIDE];
 SYNC();  // a block may have had another frame before
@@ -120,7 +121,7 @@ for (int e = 0; e < EDGES; e += LANES) {
     reach2 = square > reach2 ? square : reach2;
   }
   PUT(tube[REACH] + e, ROOT(reach2) * MORE);
-  for (int k = 0; k < SAMPLES; ++k) PUT(tube[NEAREST + k] + e, zero);
+  for (int k = 0; k < SAMPLES; ++k) PUT(tube[NEAREST + k] + e, zero + FAR);
 #endif
 }
 SYNC();
@@ -170,23 +171,18 @@ const float measured = sum(total) / sum(count);
 float simulated = 0.0f;
 
 #if BOTH
-// simulated to measured: the samples of an edge at once, each to the nearest point
-for (int e = 0; e < EDGES; ++e) {
-  float p[SAMPLES][3];
-  real nearest[SAMPLES];
-  for (int k = 0; k < SAMPLES; ++k) {
-    for (int c = 0; c < 3; ++c) p[k][c] = tube[RIDGE + 3 * k + c][e];
-    nearest[k] = zero + FAR;
-  }
-  // 64 blocks at once: some ball near the middle sample says which of them can hold it
-  real limits = zero + FAR;
-  for (int g = first_group; g < last_group; g += 64 / LANES) {
-    const int begin = first + (g - first_group) * LANES;
-    real away[64 / LANES], ball[64 / LANES];
+// simulated to measured, 64 blocks at once: which can be nearest to the samples of an edge, by some ball that
+// is near the middle one of them; then each sample to the nearest point
+SHARED unsigned long long within[EDGES];
+for (int g = first_group; g < last_group; g += 64 / LANES) {
+  const int begin = first + (g - first_group) * LANES;
+  const unsigned long long there = last - begin < 64 ? (1ull << (last - begin)) - 1 : ~0ull;
+  for (int e = 0; e < EDGES; ++e) {
+    const float* m = &tube[RIDGE + 3 * (SAMPLES / 2)][e];
+    real away[64 / LANES], ball[64 / LANES], limits = zero + FAR;
     UNROLL for (int more = 0; more < 64 / LANES; ++more) {
       const int group = g + more < last_group ? g + more : last_group - 1;
-      const float* m = p[SAMPLES / 2];
-      const real dx = ROW(balls, group, 0) - m[0], dy = ROW(balls, group, 1) - m[1], dz = ROW(balls, group, 2) - m[2];
+      const real dx = ROW(balls, group, 0) - m[0], dy = ROW(balls, group, 1) - m[WIDE], dz = ROW(balls, group, 2) - m[2 * WIDE];
       away[more] = ROOT(dx * dx + dy * dy + dz * dz);
       ball[more] = ROW(balls, group, 3);
       const real upper = away[more] * MORE + ball[more];
@@ -196,8 +192,17 @@ for (int e = 0; e < EDGES; ++e) {
     unsigned long long bits = 0;
     UNROLL for (int more = 0; more < 64 / LANES; ++more)
       bits |= (unsigned long long)BITS(away[more] * LESS - ball[more] <= limit) << (more * LANES);
-    if (last - begin < 64) bits &= (1ull << (last - begin)) - 1;
-    for (; bits; bits &= bits - 1) {
+    if (lane == 0) within[e] = bits & there;
+  }
+  SYNC();
+  for (int e = 0; e < EDGES; ++e) {
+    float p[SAMPLES][3];
+    real nearest[SAMPLES];
+    for (int k = 0; k < SAMPLES; ++k) {
+      for (int c = 0; c < 3; ++c) p[k][c] = tube[RIDGE + 3 * k + c][e];
+      nearest[k] = zero + tube[NEAREST + k][e];
+    }
+    for (unsigned long long bits = within[e]; bits; bits &= bits - 1) {
       const int b = begin + FIRST_BIT(bits);
       const real x = ROW(points, b, 0), y = ROW(points, b, 1), z = ROW(points, b, 2);
       for (int k = 0; k < SAMPLES; ++k) {
@@ -206,12 +211,15 @@ for (int e = 0; e < EDGES; ++e) {
         nearest[k] = square < nearest[k] ? square : nearest[k];
       }
     }
+    for (int k = 0; k < SAMPLES; ++k) {
+      const float square = least(nearest[k]);
+      if (lane == 0) tube[NEAREST + k][e] = square;
+    }
   }
-  for (int k = 0; k < SAMPLES; ++k) {
-    const float square = least(nearest[k]);
-    if (lane == 0) tube[NEAREST + k][e] = square;
-  }
+  SYNC();
 }
+for (int e = EDGES + lane; e < WIDE; e += THREADS)
+  for (int k = 0; k < SAMPLES; ++k) tube[NEAREST + k][e] = 0.0f;
 SYNC();
 real shares = zero;  // each sample's for its edge's
 for (int e = 0; e < EDGES; e += LANES)

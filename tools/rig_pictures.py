@@ -20,7 +20,7 @@ from pipeline.params import load
 from pipeline.recording.build import process
 from pipeline.recording.input import images
 from pipeline.report.styles import COLORS, INK, THEME
-from pipeline.rig.physics.rubber import nominal_stress
+from pipeline.rig.physics.elasticity import TRELOAR as LAW
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "docs" / "rig"
@@ -54,10 +54,10 @@ def treloar() -> None:
     first = stretch < 1.6
     modulus = np.sum(stress[first] * (stretch - stretch**-2)[first])
     modulus /= np.sum((stretch - stretch**-2)[first] ** 2)
-    error = nominal_stress(stretch)[0] / stress - 1
+    error = LAW.stress(stretch)[0] / stress - 1
     figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.2), width_ratios=(3, 2))
     left.plot(stretch, stress, "o", color=INK, ms=4, label="Treloar 1944, uniaxial")
-    left.plot(fine, nominal_stress(fine)[0], color=COLORS[1], label="Ogden, three terms (the rig)")
+    left.plot(fine, LAW.stress(fine)[0], color=COLORS[1], label="Ogden, three terms (the rig)")
     left.plot(fine, modulus * neo, "--", color=COLORS[0], label="neo-Hookean (the simulator's law)")
     left.set(xlabel="stretch", ylabel="nominal stress [MPa]", ylim=(0, 1.05 * stress.max()))
     left.legend()

@@ -3,17 +3,60 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import model_validator
 
-from pipeline.base.schema import LIST, Metres, Name, Pose, Range, Section, Seed, refusal
+from pipeline.base.schema import (
+    ASCENDING,
+    LIST,
+    Metres,
+    Name,
+    Pose,
+    Range,
+    Section,
+    Seed,
+    refusal,
+)
 
 Share = Annotated[float, Range(0, 1)]
 Point = Annotated[tuple[Metres, Metres, Metres], LIST]
-Relaxation = Annotated[  # weight and time
-    tuple[Annotated[float, Range(0, 10)], Annotated[float, Range(1e-4, 1e4)]], LIST
-]
+Time = Annotated[float, Range(1e-4, 1e4)]
+Relaxation = Annotated[tuple[Annotated[float, Range(0, 10)], Time], LIST]  # weight and time
+
+
+LAWS = {  # ranges of each law's constants; pipeline/rig/physics/elasticity.py says what they are
+    "gent": ((15, 1e4),),
+    "arruda_boyce": ((6, 1e4),),
+    "extended_tube": ((1e-3, 0.25), (0.01, 1), (0, 100)),
+}
+
+
+class RigSpectrum(Section):
+    """Relaxation in so many branches, weights as time^-slope: 0 is flat, more is steep."""
+
+    weight: Annotated[float, Range(0, 10)]
+    times: Annotated[tuple[Time, Time], LIST, ASCENDING]
+    branches: Annotated[int, Range(1, 40)]
+    slope: Annotated[float, Range(-2, 2)]
+
+
+class RigFlow(Section):
+    """A second network that flows."""
+
+    share: Annotated[float, Range(0, 10)]
+    rate: Annotated[float, Range(0, 1e9)]
+    power: Annotated[float, Range(1, 10)]
+    chain: Annotated[float, Range(-1, 0)]
+    offset: Annotated[float, Range(1e-3, 1)]
+
+
+class RigSoftening(Section):
+    """By the largest energy so far; `energy` is over Young's modulus."""
+
+    damage: Annotated[float, Range(1, 100)]
+    energy: Annotated[float, Range(1e-3, 100)]
+    growth: Annotated[float, Range(0, 10)]
 
 
 class RigBand(Section):
@@ -21,6 +64,26 @@ class RigBand(Section):
     relaxation: Annotated[tuple[Relaxation, ...], LIST]
     viscosity: Annotated[float, Range(1e-4, 0.1)]
     color: Annotated[tuple[Share, Share, Share], LIST]
+    law: Literal["ogden", "gent", "arruda_boyce", "extended_tube"]
+    constants: Annotated[tuple[Annotated[float, Range(-100, 1e4)], ...], LIST]
+    spectrum: RigSpectrum | None
+    flow: RigFlow | None
+    softening: RigSoftening | None
+
+    @model_validator(mode="after")
+    def _the_law_has_its_constants(self) -> RigBand:
+        given = self.constants
+        if self.law == "ogden":
+            pairs = [one * other for one, other in zip(given[::2], given[1::2], strict=False)]
+            if len(given) % 2 or not all(product > 0 for product in pairs):
+                raise refusal("constants: ogden has pairs of modulus and exponent of one sign")
+            return self
+        limits = LAWS[self.law]
+        inside = (low <= one <= high for one, (low, high) in zip(given, limits, strict=False))
+        if given and not (len(given) == len(limits) and all(inside)):
+            ranges = ", ".join(f"{low:g} to {high:g}" for low, high in limits)
+            raise refusal(f"constants: {self.law} has [{ranges}], got {list(given)}")
+        return self
 
 
 class RigWrench(Section):

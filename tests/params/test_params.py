@@ -106,6 +106,16 @@ def test_no_model_has_a_default() -> None:
         assert all(field.is_required() for field in model.model_fields.values()), model
 
 
+def test_a_rigs_law_has_constants_of_its_own() -> None:
+    band = {**CONTENT["rig"]["bands"]["band1"], "law": "gent"}
+    path = ("rig", "bands", "band1")
+    assert check(changed(path, {**band, "constants": [80]})).rig.bands["band1"].constants == (80,)
+    for wrong in ([5.0], [80.0, 2.0]):
+        message = refusal(changed(path, {**band, "constants": wrong}))
+        expected = f"rig.bands.band1: constants: gent has [15 to 10000], got {wrong}"
+        assert message == f"params.yaml: {expected}"
+
+
 def test_whole_numbers_refuse_fractions_and_numbers_accept_whole_ones() -> None:
     assert "whole number between 1 and 50, got 2.5" in refusal(changed(("optimizer", "k_top"), 2.5))
     assert check(changed(("setup", "max_force"), 30)).setup.max_force == 30.0
@@ -131,6 +141,10 @@ REFUSED = [
     ("run.ablations.methods", ["sling2sim2real"], "ablations.methods: sling2sim2real is one"),
     ("run.ablations.bands", ["other"], "run.ablations.bands: other is not one of run.bands"),
     ("rig.bands", {}, "rig.bands: lacks band1"),
+    ("rig.bands.band1.law", "mooney", "rig.bands.band1.law: must be 'ogden'"),
+    ("rig.bands.band1.constants", [0.4, 2.0, 0.1], "rig.bands.band1: constants: ogden has pairs"),
+    ("rig.bands.band1.constants", [0.4, -2.0], "rig.bands.band1: constants: ogden has pairs"),
+    ("rig.bands.band1.spectrum", {"weight": 0.1}, "rig.bands.band1.spectrum.times: is missing"),
     ("bands", {"band-1": CONTENT["bands"]["band1"]}, "bands.band-1: a name has"),
     ("bands.band1.source", "bag", "bands.band1.source: must be 'recording' or 'rig'"),
     ("parameters.youngs_modulus.low", 1e8, "parameters.youngs_modulus: low must be less"),

@@ -10,6 +10,7 @@ import pytest
 from mcap.reader import make_reader
 
 from pipeline.params import Params, Section
+from pipeline.params.virtual_rig import RigFlow, RigSoftening, RigSpectrum
 from pipeline.rig.physics import motion
 from pipeline.rig.physics.launch import launch
 from pipeline.rig.recorder import camera, interaction, record
@@ -59,15 +60,24 @@ CHANGES = {  # the longest prefix of a number's name counts
     "bands.band1": FELT | LANDING,
     "bands.band1.color": {COLOR},
 }
+RUBBER = {  # all that a band can have
+    "law": "extended_tube",
+    "constants": (0.0954, 0.331, 1.111),
+    "spectrum": RigSpectrum(weight=0.1, times=(0.01, 1.0), branches=2, slope=0.5),
+    "flow": RigFlow(share=0.3, rate=200.0, power=4.0, chain=-0.6, offset=0.05),
+    "softening": RigSoftening(damage=2.0, energy=0.1, growth=0.1),
+}
 
 
 def numbers(value: Any, name: str = "") -> Iterator[str]:
+    """Names of the numbers in `value`."""
     if isinstance(value, Section):
         value = dict(value)
     if isinstance(value, tuple):
         value = {str(i): one for i, one in enumerate(value)}
     if not isinstance(value, dict):
-        yield name
+        if isinstance(value, int | float):
+            yield name
         return
     for key, one in value.items():
         yield from numbers(one, f"{name}.{key}".lstrip("."))
@@ -143,7 +153,7 @@ def test_each_number_changes_what_it_should(params, tmp_path, monkeypatch) -> No
     rough = {"edges": 8, "tolerance": 1e-2}
     eyes = {"drop_rate": 0.3, "dropout": 0.01}  # few frames, few pixels: let chance have its way
     rough["camera"] = params.rig.camera.model_copy(update=eyes)
-    rough["bands"] = {"band1": params.rig.bands["band1"]}
+    rough["bands"] = {"band1": params.rig.bands["band1"].model_copy(update=RUBBER)}
     rig = params.rig.model_copy(update=rough)
     laboratory = Laboratory(tmp_path / "band1.mcap", monkeypatch)
 

@@ -72,8 +72,8 @@ def launch_from(
     if np.linalg.norm(aim - string.clamps[0]) <= taut:
         return Trial(float("nan"), SLACK, 0.0)
     asked = params.launch
-    _, stress, memory = pulled(string, aim, asked.pull_time, asked.pause)
-    give, kept = 1 / params.rig.arm.stiffness, memory[-1] / stress[-1]
+    *_, relaxed, memory = pulled(string, aim, asked.pull_time, asked.pause, again=True)
+    give, kept = 1 / params.rig.arm.stiffness, memory[-1] / relaxed[-1]
     y = string.at_rest(bent_at(string, aim), tolerance, held=True, give=give, memory=kept)
     hold_force = float(np.linalg.norm(string.at_middle(y)))
     limit = params.setup.max_force

@@ -16,15 +16,14 @@ from functools import cached_property
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pipeline.rig.physics.rubber import UNIT_MODULUS, Rubber, energy_density, nominal_stress
+from pipeline.rig.physics.rubber import Rubber
 from pipeline.rig.physics.statics import balanced
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 AIR_DENSITY = 1.2  # kg/m3
 CYLINDER_DRAG = 1.1  # coefficient of a cylinder across the wind
-NUDGE = 1e-7  # of the difference quotients, in m, m/s and MPa
+NUDGE = 1e-7  # of the difference quotients, in m, m/s, and MPa of the law
 SETTLING_TIME = 4.0
-FOREVER = 1e9  # s
 
 Hand = Callable[[float, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Acceleration (3, ...) of the hand by time, and its place, velocity and the band's force on it."""
@@ -42,8 +41,8 @@ GRADING = 0.75  # edges are 1 - GRADING to 1 + GRADING of their mean
 class ElasticString:
     """A band between two clamps.
 
-    A state Y has a row a node: x (3), v (3) and the memories w (K) of the edge that follows it
-    (those of the last row mean nothing). Arrays of states have trailing axes "...".
+    A state Y has a row a node: x (3), v (3) and the rubber's memories (M) of the edge that follows
+    it (those of the last row mean nothing). Arrays of states have trailing axes "...".
 
     Attributes:
         edges: Even, so that the middle is a node.
@@ -87,13 +86,13 @@ class ElasticString:
 
     @cached_property
     def stiffness(self) -> float:
-        """Tension per nominal stress of Treloar's rubber [N/MPa]."""
+        """Tension per nominal stress of the law [N/MPa]."""
         return self.rubber.scale * np.pi / 4 * self.diameter**2
 
     @cached_property
     def bending(self) -> float:
         """EI of a solid round band [N m2]."""
-        return self.rubber.scale * UNIT_MODULUS * np.pi / 64 * self.diameter**4
+        return self.rubber.scale * self.rubber.law.modulus * np.pi / 64 * self.diameter**4
 
     @cached_property
     def masses(self) -> np.ndarray:
@@ -103,32 +102,34 @@ class ElasticString:
         return masses
 
     def state(self, x: np.ndarray, memory: np.ndarray | None = None) -> np.ndarray:
-        """At rest at the nodes x (nodes, 3); `memory` (K,) is w_k / P, else relaxed (ones)."""
-        branches = len(self.rubber.times)
-        stress = nominal_stress(self.stretch(x))[0]
-        y = np.zeros((self.nodes, 6 + branches))
+        """At rest at the nodes x (nodes, 3, ...).
+
+        Args:
+            memory: Ratios (M,), see `Rubber.remembering`; None: as if held there for ever.
+        """
+        ratios = np.ones(self.rubber.memories) if memory is None else memory
+        y = np.zeros((self.nodes, 6 + len(ratios), *x.shape[2:]))
         y[:, :3] = x
-        y[:-1, 6:] = stress[:, None] * (np.ones(branches) if memory is None else memory)
+        if len(ratios):
+            y[:-1, 6:] = self.rubber.remembering(self.stretch(x), ratios)
         return y
 
     def stretch(self, x: np.ndarray) -> np.ndarray:
         """Of each edge, shape (edges, ...)."""
-        return np.linalg.norm(x[1:] - x[:-1], axis=1) / self.sizes
+        return np.linalg.norm(x[1:] - x[:-1], axis=1) / self.sizes.reshape(-1, *(1,) * (x.ndim - 2))
 
     def forces(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of states (nodes, 6 + K, ...): node forces (nodes, 3, ...) [N], rates of the memories."""
+        """Of states (nodes, 6 + M, ...): node forces (nodes, 3, ...) [N], rates of the memories."""
         rubber, ones = self.rubber, (1,) * (y.ndim - 2)
         sizes, weight = self.sizes.reshape(-1, *ones), self.bending / self.shares
-        x, v, w = y[:, :3], y[:, 3:6], y[:-1, 6:]
+        x, v = y[:, :3], y[:, 3:6]
         slope = (x[1:] - x[:-1]) / sizes[:, None]  # x_s
         turning = (v[1:] - v[:-1]) / sizes[:, None]
         stretch = np.sqrt(np.einsum("ij...,ij...->i...", slope, slope))
         along = slope / stretch[:, None]
-        stress, tangent = nominal_stress(stretch)
+        stress, tangent, forgetting = rubber.response(stretch, y[:-1, 6:])
         rate = np.einsum("ij...,ij...->i...", along, turning)
-        owed = stress[:, None] - w
-        total = stress + np.einsum("k,ik...->i...", rubber.weights, owed)
-        tension = self.stiffness * (total + rubber.viscosity * tangent * rate)
+        tension = self.stiffness * (stress + rubber.viscosity * tangent * rate)
 
         clamp = np.broadcast_to(self.clamp_direction.reshape(1, 3, *ones), (1, *slope.shape[1:]))
         bent = np.concatenate([clamp, slope + rubber.viscosity * turning, -clamp])
@@ -146,10 +147,10 @@ class ElasticString:
         force[0], force[-1] = pull[0] - wind[0], -pull[-1] - wind[-1]
         masses = self.masses.reshape(-1, 1, *ones)
         force += masses * (GRAVITY.reshape(3, *ones) - self.damping * v)
-        return force, owed / rubber.times.reshape(-1, *ones)
+        return force, forgetting
 
     def rates(self, y: np.ndarray, time: float = 0.0, hand: Hand | None = None) -> np.ndarray:
-        """dY/dt of states (nodes, 6 + K, ...); `hand` holds the middle node."""
+        """dY/dt of states (nodes, 6 + M, ...); `hand` holds the middle node."""
         force, forgetting = self.forces(y)
         rates = np.zeros_like(y)
         rates[1:-1, :3] = y[1:-1, 3:6]
@@ -163,7 +164,7 @@ class ElasticString:
     def at_middle(self, y: np.ndarray) -> np.ndarray:
         """Force of the band on what holds its middle, shape (..., 3) [N].
 
-        The middle node's inertia is not in it: it moves with the hand. States (..., nodes, 6 + K).
+        The middle node's inertia is not in it: it moves with the hand. States (..., nodes, 6 + M).
         """
         force = np.moveaxis(self.forces(np.moveaxis(y, (-2, -1), (0, 1)))[0], (0, 1), (-2, -1))
         return force[..., self.middle, :]
@@ -177,16 +178,16 @@ class ElasticString:
         hand: Hand | None = None,
         event: Callable[[float, np.ndarray], float] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Follow the state y (nodes, 6 + K) from times[0], where it holds.
+        """Follow the state y (nodes, 6 + M) from times[0], where it holds.
 
         Args:
             times: To report at, ascending, shape (S,).
-            tolerance: Relative; a hundredth of it in m, m/s and MPa.
+            tolerance: Relative; a hundredth of it in m, m/s, and MPa of the law.
             hand: What holds the middle node, if anything.
             event: Ends the integration where it falls through zero.
 
         Returns:
-            Times (R,) and states (R, nodes, 6 + K): those asked for, up to the event and with it.
+            Times (R,) and states (R, nodes, 6 + M): those asked for, up to the event and with it.
         """
         shape = y.shape
         reach = 2 * shape[1] + 5  # two nodes on, from the first of x to the last of v
@@ -245,42 +246,40 @@ class ElasticString:
         Args:
             held: The middle stays where it is.
             give: By how much what holds the middle gives way to the band's force [m/N].
-            memory: w_k / P of every edge (K,); None: all is relaxed.
+            memory: Ratios (M,) of every edge, see `Rubber.remembering`; None: all is relaxed.
         """
-        rubber = self.rubber
-        excess = 0.0 if memory is None else float(rubber.weights @ (1 - memory))
-        frozen = replace(rubber, relaxation=np.array([[excess, FOREVER]]))
+        frozen, kept = self.rubber.frozen(memory)
         sticky = replace(self, rubber=frozen, damping=2 * np.sqrt(-GRAVITY[2] / (self.length / 2)))
-        start, hand = sticky.state(x, np.zeros(1)), still if held else None
-        if held and (nodes := sticky.balanced(start, tolerance / 100, give)) is not None:
+        if held and (nodes := sticky.balanced(x, kept, tolerance / 100, give)) is not None:
             return self.state(nodes, memory)
+        start, hand = sticky.state(x, kept), still if held else None
         end = sticky.integrate(start, np.array([0.0, SETTLING_TIME]), tolerance, hand=hand)[1][-1]
         return self.state(end[:, :3], memory)
 
-    def balanced(self, y: np.ndarray, tolerance: float, give: float = 0.0) -> np.ndarray | None:
-        """Nodes (nodes, 3) near those of y (nodes, 6 + K) that no force moves; see statics.py.
+    def balanced(
+        self, start: np.ndarray, memory: np.ndarray, tolerance: float, give: float = 0.0
+    ) -> np.ndarray | None:
+        """Nodes near `start` (nodes, 3) that no force moves; see statics.py.
 
-        Clamps and memories stay, and the middle but for what it gives way [m/N].
+        Clamps and the memories' ratios (M,) stay, and the middle but for what it gives way [m/N].
         """
 
         def forces(x: np.ndarray) -> np.ndarray:
-            state = np.repeat(y[..., None], x.shape[-1], axis=-1)
-            state[:, :3] = x
-            force = self.forces(state)[0]
+            force = self.forces(self.state(x, memory))[0]
             if give:
-                force[self.middle] -= (x[self.middle] - y[self.middle, :3, None]) / give
+                force[self.middle] -= (x[self.middle] - start[self.middle, :, None]) / give
             return force
 
         held = [0, -1] if give else [0, self.middle, -1]
-        return balanced(forces, y[:, :3], held, tolerance)
+        return balanced(forces, start, held, tolerance)
 
     def energy(self, y: np.ndarray) -> float:
-        """Motion, height, strain and bending of one state [J]; not what the memories hold."""
+        """Motion, height, strain and bending of one state [J]; not what relaxing branches hold."""
         x, v = y[:, :3], y[:, 3:6]
         slope = (x[1:] - x[:-1]) / self.sizes[:, None]
         turn = np.diff(np.vstack([self.clamp_direction, slope, -self.clamp_direction]), axis=0)
         return float(
             np.sum(self.masses[:, None] * (v**2 / 2 - GRAVITY * x))
-            + self.stiffness * np.sum(self.sizes * energy_density(self.stretch(x)))
+            + self.stiffness * np.sum(self.sizes * self.rubber.stored(self.stretch(x), y[:-1, 6:]))
             + self.bending / 2 * np.sum(turn**2 / self.shares[:, None])
         )

@@ -56,7 +56,7 @@ def record(
     motion_rng, sensor_rng, clock_rng, camera_rng = rng.spawn(4)
     robot = Robot.of(rig)
     string = string_of(params, band_name)
-    progress(f"{band_name}: modulus {string.rubber.scale / 1e6:.3f} of Treloar's rubber")
+    progress(f"{band_name}: modulus {string.rubber.scale / 1e6:.3f} of its law's")
 
     hanging = hang(string, rig.tolerance)
     middle = hanging[string.middle]

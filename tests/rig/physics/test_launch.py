@@ -1,12 +1,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.integrate import simpson
 
 from pipeline.params import Params
+from pipeline.params.virtual_rig import RigFlow, RigSoftening, RigSpectrum
 from pipeline.rig.physics.launch import POINTS, flight, fly, launch, launch_from
 from pipeline.rig.physics.scene import ROD
-from pipeline.rig.physics.world import bent_at, string_of
+from pipeline.rig.physics.world import bent_at, pulled, string_of
 from tests.project import with_
 
 DRAW = (-0.30, -0.15)
@@ -99,6 +101,34 @@ def test_the_arm_gives_way(coarse: Params) -> None:
         launch_from(string, *one).landing_y for one in ((soft, aim), (firm, there), (firm, aim))
     )
     assert np.isclose(near, nearer, rtol=2e-3) and near < 0.97 * far
+
+
+MEMORIES = {
+    "spectrum": RigSpectrum(weight=0.1, times=(0.01, 10.0), branches=3, slope=0.0),
+    "flow": RigFlow(share=0.3, rate=200.0, power=4.0, chain=-1.0, offset=0.05),
+    "softening": RigSoftening(damage=2.0, energy=0.1, growth=0.1),
+}
+
+
+@pytest.mark.parametrize("name", MEMORIES)
+def test_every_memory_reaches_the_launch(coarse: Params, name: str) -> None:
+    """Relaxation and flow forget in a longer pause; the pull for the recording left a band soft."""
+    band = coarse.rig.bands["band1"].model_copy(update={"relaxation": (), name: MEMORIES[name]})
+    world = with_(coarse, "rig", bands={"band1": band})
+    late = with_(world, "launch", pause=20.0)
+    now, then = (launch("band1", one, DRAW, None) for one in (world, late))
+    if name != "softening":
+        assert then.hold_force < 0.999 * now.hold_force and then.speed < now.speed
+        return
+    assert then.hold_force == now.hold_force
+    thin, aim = replace(string_of(world, "band1"), diameter=0.001), np.array([0.0, *DRAW])
+    _, stretch, _, memory = pulled(thin, aim, again=True)
+    elastic = thin.rubber.law.stress(stretch)[0]
+    softer = thin.rubber.response(stretch, memory)[0][-1] / elastic[-1]
+    light = replace(thin, mass=1e-4)  # bends and weighs next to nothing
+    virgin = replace(light, rubber=replace(light.rubber, softening=None))
+    held = [launch_from(one, coarse, aim).hold_force for one in (light, virgin)]
+    assert softer < 0.9 and np.isclose(held[0] / held[1], softer, rtol=5e-3)
 
 
 def test_landing_is_converged(params: Params) -> None:

@@ -2,10 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 from pipeline.rig.physics import string as string_module
-from pipeline.rig.physics.rubber import Rubber, nominal_stress
+from pipeline.rig.physics.elasticity import TRELOAR, ExtendedTube
+from pipeline.rig.physics.rubber import Flow, Rubber, Softening
 from pipeline.rig.physics.string import ElasticString
 from pipeline.rig.physics.world import bent_at
 from pipeline.rig.recorder.interaction import hang
@@ -32,7 +33,7 @@ def test_held_force_is_the_laws(string: ElasticString) -> None:
     thin = replace(string, diameter=0.0005, mass=6e-5)
     y = thin.at_rest(bent_at(thin, DRAWN), 1e-5, held=True)
     half = np.hypot(0.1375, 0.4)
-    stress = 2e5 * nominal_stress(np.array([half / 0.26]))[0][0]
+    stress = 2e5 * TRELOAR.stress(np.array([half / 0.26]))[0][0]
     expected = 2 * np.pi / 4 * thin.diameter**2 * stress * 0.4 / half
     assert np.isclose(thin.at_middle(y)[1], expected, rtol=3e-3)
 
@@ -77,6 +78,53 @@ def test_energy_never_grows_in_the_recoil(string: ElasticString, relaxing: bool)
     assert energies[-1] < 0.6 * energies[0]
 
 
+@pytest.mark.parametrize("kind", ["flow", "softening"])
+def test_energy_is_balanced_by_what_the_rubber_loses(string, monkeypatch, kind) -> None:
+    """The recoil of a band that was drawn on, without air: s sigma e' of each edge, or nothing."""
+    monkeypatch.setattr(string_module, "AIR_DENSITY", 0.0)
+    flow = Flow(share=0.5, rate=300.0, power=3.0, chain=-0.7, offset=0.05)
+    memories = {"flow": flow} if kind == "flow" else {"softening": Softening(2.0, 0.1, 0.1)}
+    rubber = replace(ELASTIC, viscosity=0.0, law=ExtendedTube(), **memories)
+    ratios = np.array([0.6 if kind == "flow" else 1.3])
+    band = replace(string, rubber=rubber)
+    y = band.at_rest(bent_at(band, DRAWN), 1e-6, held=True, memory=ratios)
+    times = np.linspace(0, 0.015, 301)
+    states = band.integrate(y, times, 1e-7)[1]
+    energies = np.array([band.energy(state) for state in states])
+    power = np.zeros(len(times))
+    if kind == "flow":
+        for i, state in enumerate(states):
+            stretch, memory = band.stretch(state[:, :3]), state[:-1, 6:]
+            elastic = stretch / np.exp(memory[:, 0])
+            rate = rubber.response(stretch, memory)[2][:, 0]
+            lost = flow.share * elastic * rubber.law.stress(elastic)[0] * rate
+            power[i] = band.stiffness * np.sum(band.sizes * lost)
+        assert (power >= 0).all()
+    lost = cumulative_trapezoid(power, times, initial=0)
+    assert np.abs(energies + lost - energies[0]).max() < 5e-4 * energies[0]
+    assert (lost[-1] > 0.01 * energies[0]) == (kind == "flow")
+
+
+def test_a_held_band_of_any_memory_is_at_rest(string: ElasticString) -> None:
+    """No node moves though every edge has another stretch, and the memories have their ratios."""
+    rubber = Rubber(
+        2e5,
+        np.array([[0.2, 0.1]]),
+        2e-3,
+        flow=Flow(0.5, 300.0, 3.0, -0.7, 0.05),
+        softening=Softening(2.0, 0.1, 0.1),
+    )
+    ratios = np.array([0.8, 0.7, 1.2])
+    band = replace(string, rubber=rubber)
+    y = band.at_rest(bent_at(band, DRAWN), 1e-6, held=True, memory=ratios)
+    force = band.forces(y)[0]
+    force[[0, band.middle, -1]] = 0.0
+    assert np.abs(force).max() < 1e-6 * np.linalg.norm(band.at_middle(y))
+    stretch = band.stretch(y[:, :3])
+    np.testing.assert_allclose(y[:-1, 7], 0.7 * np.log(stretch), rtol=1e-12)
+    np.testing.assert_allclose(y[:-1, 8], 1.2 * TRELOAR.energy(stretch), rtol=1e-12)
+
+
 def test_relaxation_under_a_constant_hold(string: ElasticString) -> None:
     """A step that is held forgets g of its stress as exp(-t / tau); bending, 1 % here, does not."""
     slow = replace(string, rubber=replace(ELASTIC, relaxation=np.array([[0.3, 0.5]])))
@@ -107,7 +155,7 @@ def test_out_and_back_is_the_laws_loop(string: ElasticString) -> None:
     force = thin.at_middle(thin.integrate(y, times, 1e-5, hand=hand)[1])[:, 1]
 
     def stress(time: np.ndarray) -> np.ndarray:
-        return nominal_stress(np.hypot(0.1375, draw(time)) / 0.26)[0]
+        return TRELOAR.stress(np.hypot(0.1375, draw(time)) / 0.26)[0]
 
     def forget(time: float, w: np.ndarray) -> np.ndarray:
         return (stress(time) - w) / tau

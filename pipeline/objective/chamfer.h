@@ -22,7 +22,6 @@ const int lane = tid % 32;
 #define ROOT(x) sqrtf(x)
 #define GET(array) (array)[lane]
 #define PUT(array, x) (array)[lane] = x
-#define OF_LANE(x, k) __shfl_sync(0xffffffffu, x, k)
 #define BITS(x) __ballot_sync(0xffffffffu, x)
 #define FIRST_BIT(bits) (__ffsll(bits) - 1)
 #define UNROLL _Pragma("unroll")  // arrays over edges lie in registers
@@ -41,12 +40,12 @@ const int lane = 0;
 #define ROW(array, block, row) (*(const real*)(array.data + ((size_t)(block) * 4 + (row)) * LANES))
 #define ROOT(x) root(x)
 #define GET(array) (*(const real*)(array))
-#define PUT(array, x) (*(real*)(array) = x)
-#define OF_LANE(x, k) x[k]
+#define PUT(array, x) put(array, x)
 #define BITS(x) bits_of(__builtin_convertvector(x, flags))
 #define FIRST_BIT(bits) __builtin_ctzll(bits)
 #define UNROLL
 auto taken = [](const float* array, int stride, int size) -> real { real x; for (int k = 0; k < LANES; ++k) x[k] = array[stride * (k < size ? k : size - 1)]; return x; };
+auto put = [](auto* array, auto x) { *(decltype(x)*)array = x; };
 auto bits_of = [](flags x) -> unsigned { unsigned bits = 0; __builtin_memcpy(&bits, &x, sizeof(x)); return bits; };
 auto root = [](real x) -> real { for (int k = 0; k < LANES; ++k) x[k] = __builtin_sqrtf(x[k]); return x; };
 auto sum = [](real x) -> float { float s = 0.0f; for (int k = 0; k < LANES; ++k) s += x[k]; return s; };
@@ -78,7 +77,7 @@ for (int e = 0; e < EDGES; ++e) rest_length += rest[e];
 // of each edge: start (3), vector (3), vector / length^2 (3), radius (stretched at constant volume), how
 // far off a bound may be, how far its samples reach from the middle one, samples (3 each) and how far the
 // nearest point is from each, squared
-enum { RADIUS = 9, OFF, REACH, RIDGE, NEAREST = RIDGE + 3 * SAMPLES, ROWS = NEAREST + SAMPLES, WIDE = (EDGES + LANES - 1) / LANES * LANES };
+enum { RADIUS = 9, OFF, REACH, RIDGE, NEAREST = RIDGE + 3 * SAMPLES, ROWS = NEAREST + SAMPLES, WIDE = (EDGES + LANES - 1) / LANES * LANES, WORDS = (EDGES + 31) / 32 };
 SHARED float tube[ROWS][WIDE];
 SYNC();  // a block may have had another frame before
 for (int e = 0; e < EDGES; e += LANES) {
@@ -137,6 +136,7 @@ auto to_axis = [&](int e, real x, real y, real z) -> real {
 
 // measured to simulated: each point to the surface of the union of all edges' tubes
 real total = zero, count = zero;
+SHARED unsigned near[WORDS][LANES];  // of each ball of a group, a bit for an edge
 for (int g = first_group; g < last_group; ++g) {
   // which edges can be nearest to a point in a ball: the others are farther by more than its width
   const real x = ROW(balls, g, 0), y = ROW(balls, g, 1), z = ROW(balls, g, 2), ball = ROW(balls, g, 3);
@@ -148,8 +148,11 @@ for (int g = first_group; g < last_group; ++g) {
     limit = upper < limit ? upper : limit;
   }
   limit += CULLED ? 2.0f * ball : zero + INFINITE;
-  whole near[(EDGES + 31) / 32] = {};
-  UNROLL for (int e = 0; e < EDGES; ++e) near[e / 32] |= lower[e] > limit ? whole() : whole() + (1u << e % 32);
+  whole bits_of_edges[WORDS] = {};
+  UNROLL for (int e = 0; e < EDGES; ++e) bits_of_edges[e / 32] |= lower[e] > limit ? whole() : whole() + (1u << e % 32);
+  SYNC();  // the group before may be read still
+  for (int word = 0; word < WORDS; ++word) PUT(near[word], bits_of_edges[word]);
+  SYNC();
 
   const int begin = first + (g - first_group) * LANES;
   const int size = last - begin < LANES ? last - begin : LANES;
@@ -157,8 +160,8 @@ for (int g = first_group; g < last_group; ++g) {
     const int b = begin + k;
     const real x = ROW(points, b, 0), y = ROW(points, b, 1), z = ROW(points, b, 2), weight = ROW(points, b, 3);
     real nearest = zero + FAR;
-    for (int word = 0; word < (EDGES + 31) / 32; ++word)
-      for (unsigned bits = OF_LANE(near[word], k); bits; bits &= bits - 1) {
+    for (int word = 0; word < WORDS; ++word)
+      for (unsigned bits = near[word][k]; bits; bits &= bits - 1) {
         const int e = 32 * word + FIRST_BIT(bits);
         const real gap = to_axis(e, x, y, z) - tube[RADIUS][e];
         nearest = gap < nearest ? gap : nearest;

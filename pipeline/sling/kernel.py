@@ -22,7 +22,7 @@ def sling_kernel(
     middle: int,
     double: bool,
     lanes: int,
-    team: int,
+    on_gpu: bool,
 ) -> tuple[wp.Kernel, type]:
     """Compile the native text for a mesh; Warp keeps the binary in its cache.
 
@@ -59,7 +59,6 @@ def sling_kernel(
         *(Path(__file__).with_name(part) for part in parts),
         SC="double" if double else "float",
         W=lanes,
-        T=team,
         N=dofs,
         L=sections,
         MID=middle,
@@ -73,7 +72,7 @@ def sling_kernel(
     def march(tid: int, arrays: Arrays): ...
 
     # approximate reciprocals do for Newton's method; on the CPU it would drop the checks for NaN
-    @wp.kernel(module="unique", module_options={"fast_math": team > 1})
+    @wp.kernel(module="unique", module_options={"fast_math": on_gpu})
     def run(arrays: Arrays):
         march(wp.tid(), arrays)
 

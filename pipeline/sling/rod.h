@@ -20,18 +20,17 @@ auto in_hand = [](int) -> SC { return 0; };           // a place from the hand's
 
 // a staged section: its own block (lower triangle), stretch between nodes, gradient of the twist on both sides of
 // the joint, coefficients of bending and twist, residual of this section and of the next
-enum { OWN = 0, STRETCH = 45, TWIST = 51, TWIST_NEXT = 57, BEND = 63, TWISTING = 64, FORCE = 65, FORCE_NEXT = 74, STAGED = 83 };
+enum { OWN = 0, STRETCH = 45, TWIST = 51, TWIST_NEXT = 57, BEND = 63, TWISTING = 64, FORCE = 65, FORCE_NEXT = 74, NOTHING = 83, STAGED = 84 };
 #if defined(__CUDA_ARCH__)
-__shared__ SC staged[STAGED * 33], felt[54 * TEAMS];
-#define PUT(v) staged[(v) * 33 + lane]
-#define GET(v, j) staged[(v) * 33 + team * T + (j)]
-#define HAND(v) felt[(v) * TEAMS + team]
+__shared__ SC staged[STAGED * (L | 1)], felt[54];
+#define PUT(v) staged[(v) * (L | 1) + i]
+#define GET(v, j) staged[(v) * (L | 1) + (j)]
 #else
 real staged[STAGED], felt[54];
 #define PUT(v) staged[v]
 #define GET(v, j) staged[v]
-#define HAND(v) felt[v]
 #endif
+#define HAND(v) felt[v]
 #define RESIDUAL(m, j) GET(FORCE + (m), j)
 #define RESIDUAL_NEXT(m, j) GET(FORCE_NEXT + (m), j)
 #define LOWER(m, n) ((m) >= (n) ? (m) * ((m) + 1) / 2 + (n) : (n) * ((n) + 1) / 2 + (m))
@@ -185,12 +184,39 @@ auto stage_section = [&](int i) {
       }
     }
   }
+  PUT(NOTHING) = zero;
   if (fresh) UNROLL for (int m = 0; m < 45; ++m) PUT(OWN + m) = own[m];
   UNROLL for (int m = 0; m < N; ++m) { PUT(FORCE + m) = f[m]; PUT(FORCE_NEXT + m) = f_next[m]; }
 };
 
-// column c of a staged section: D of its block, U of the transposed coupling with the next section (what its number c
-// feels of this section), and what is carried into the next section's block; c = N is the residual
+// column c of staged section j: D of its block, U of the transposed coupling with the next section (what its number c
+// feels of this section), and what is carried into the next section's block; c = N is the residual. A chain that comes
+// from the last section wants the coupling with the section before, and what that one carries into this block.
+#if defined(__CUDA_ARCH__)
+// c is mine, so that where its numbers stand is found once
+const bool residual = mine >= N, node = mine < 3, director = !residual && !node;
+int own_at[N], coupled_at[N], carried_at[N];
+UNROLL for (int m = 0; m < N; ++m) {
+  const int block = residual ? NOTHING : OWN + LOWER(m, mine), stretch = node && m < 3 ? STRETCH + LOWER(m, mine) : NOTHING;
+  own_at[m] = block;
+  // of a node with the next section's node, or of directors with a node: an edge's own directors, whichever section is next
+  coupled_at[m] = residual ? FORCE + m : node && m < 3 ? stretch : (down ? director && m < 3 : node && m >= 3) ? block : NOTHING;
+  carried_at[m] = residual ? FORCE_NEXT + m : stretch;
+}
+const int twist_at = director ? (down ? TWIST : TWIST_NEXT) + mine - 3 : NOTHING, carried_twist_at = director ? TWIST_NEXT + mine - 3 : NOTHING;
+const int other_twist = down ? TWIST_NEXT : TWIST;
+auto column = [&](int i, int, real* D, real* U, real* carry) {
+  const int j = down ? i - 1 : i, k = residual ? i : j;
+  const real twisting = -GET(TWISTING, j), coupled = twisting * GET(twist_at, j), carried = twisting * GET(carried_twist_at, j);
+  const real bend = director ? GET(BEND, j) : zero, sign = residual ? one : -one;
+  UNROLL for (int m = 0; m < N; ++m) { D[m] = GET(own_at[m], i); U[m] = sign * GET(coupled_at[m], k); carry[m] = GET(carried_at[m], j); }
+  UNROLL for (int m = 3; m < N; ++m) {
+    const real diagonal = m == mine ? bend : zero;
+    U[m] += coupled * GET(other_twist + m - 3, j) - diagonal;
+    carry[m] += carried * GET(TWIST_NEXT + m - 3, j) + diagonal;
+  }
+};
+#else
 auto column = [&](int j, int c, real* D, real* U, real* carry) {
   const bool residual = c >= N, node = c < 3, director = !residual && !node;
   const real bend = GET(BEND, j), twisting = -GET(TWISTING, j) * GET(TWIST_NEXT + (director ? c - 3 : 0), j);
@@ -208,3 +234,4 @@ auto column = [&](int j, int c, real* D, real* U, real* carry) {
     carry[m] = residual ? there : node ? zero : twisting * there + diagonal;
   }
 };
+#endif

@@ -16,7 +16,8 @@ from pipeline.sling.records import LANE, OUTPUT, SETTING, numbers, records, widt
 from pipeline.sling.rubber import RUBBER, memories
 from pipeline.sling.schedule import Schedule
 
-LANES, TEAM = 16, 10  # slings in a CPU thread's SIMD lanes; GPU threads that share a sling
+LANES = 16  # slings in a CPU thread's SIMD lanes
+WARP = 32  # GPU threads that share a sling
 STEP_LIMIT = 0.004  # m, of Newton's method
 
 
@@ -157,20 +158,21 @@ LONG = ("output", "frames")
 
 def _widths(sling: Sling, schedule: Schedule, frames: Frames, options: Options) -> dict[str, int]:
     """Numbers that each array which a kernel writes holds of one sling."""
-    # of a GPU, a warp's spare threads count
-    columns = -(-32 // (32 // TEAM)) if options.on_gpu else sling.dofs + 1
+    kept = (2 * sling.dofs + 2) * sling.sections * (sling.dofs + 1)
+    if options.on_gpu:  # by two chains, and for spare threads
+        kept = (2 * sling.dofs + 1) * (sling.middle + 1) * WARP
     return {
         "state": sling.dofs * sling.sections,
         "lanes": width(LANE),
         "scratch": (9 * sling.dofs + memories(sling.law) + 4) * sling.sections,
-        "work": (2 * sling.dofs + 2) * sling.sections * columns,
+        "work": kept,
         "output": 0 if options.launching else width(OUTPUT) * len(schedule.steps),
         "frames": len(frames.steps) * sling.sections * frames.width,
     }
 
 
 class _Work:
-    """A batch laid out for a device: slings in rows of SIMD lanes, or one each for a GPU's teams.
+    """A batch laid out for a device: slings in rows of SIMD lanes, or one each for a GPU's warps.
 
     Attributes:
         rows: How many there are.
@@ -183,11 +185,9 @@ class _Work:
 
         on_gpu, self.options = options.on_gpu, options
         self.lanes = 1 if on_gpu else LANES // (2 if options.double else 1)
-        team = TEAM if on_gpu else 1
-        self.together = 32 // team if on_gpu else 1  # rows that one thread (one warp) steps
         self.dtype = np.float64 if options.double else np.float32
         mesh = sling.mesh, sling.law, sling.dofs, sling.sections, sling.middle
-        self.kernel, self.arrays = sling_kernel(*mesh, options.double, self.lanes, team)
+        self.kernel, self.arrays = sling_kernel(*mesh, options.double, self.lanes, on_gpu)
         self.widths = _widths(sling, schedule, frames, options)
         self.common = self._common(sling, schedule, frames)
         state = slings.state.swapaxes(1, 2).reshape(len(slings), -1)
@@ -228,8 +228,8 @@ class _Work:
 
     def _interleave(self, rows: np.ndarray) -> np.ndarray:
         """(N, k) -> (rows, k, lanes); the last sling fills up what one thread steps."""
-        count, lanes, together = len(rows), self.lanes, self.together
-        blocks = -(-count // (lanes * together)) * together
+        count, lanes = len(rows), self.lanes
+        blocks = -(-count // lanes)
         padded = np.concatenate([rows, np.repeat(rows[-1:], blocks * lanes - count, axis=0)])
         by_lane = padded.reshape(blocks, lanes, -1).transpose(0, 2, 1)
         return np.ascontiguousarray(by_lane, self.dtype)
@@ -251,7 +251,7 @@ class _Work:
         given = self.arrays()
         for name, values in arrays.items():
             setattr(given, name, values)
-        launch(self.kernel, size // self.together, [given], device)
+        launch(self.kernel, size, [given], device)
         return {name: self._fetched(name, arrays[name], size) for name in RETURNED}
 
     def _fetched(self, name: str, array, size: int):

@@ -1,7 +1,9 @@
 // What a sling is made of, where its state is kept, and what holds during a step.
 
 const int ROW_LENGTH = (N + 3) / 4 * 4;
-const int SAVED = 2 * N + 2;  // numbers kept of a column: multipliers, coupling, solution, 1 / pivot
+const int LAST = CHAINS == 2 ? MID : L - 1;  // where a chain ends; SECTION(at) is the section that it comes to as number `at`
+#define SECTION(at) (down ? L - 1 - (at) : (at))
+const int SAVED = 2 * N + 1 + AGAIN;  // numbers kept of a column: multipliers, coupling, solution, 1 / pivot
 #define SET(name) setting.data[SETTING_##name]
 const SC mean_edge = SET(MEAN_EDGE), area = SET(AREA), radius2 = SET(RADIUS2);
 const SC wind = SET(WIND), line_mass = SET(LINE_MASS), gravity = SET(GRAVITY), node_mass = line_mass * mean_edge;
@@ -33,15 +35,14 @@ auto OUT = ROW(output, OUTPUT_SIZE * steps);
 auto FRAME = ROW(frames, frame_width * L * n_frames);
 auto SAVE_ROWS = SAVE;
 #define KEEP(i, row, q) SAVE_ROWS[((i) * SAVED + (row)) * SAVE_STRIDE + (q)]
-#define OF_COLUMN(i, row, k) SAVE_ROWS[((i) * SAVED + (row)) * SAVE_STRIDE + (k) - FIRST_COLUMN]  // whoever keeps it
 
 #if defined(__CUDA_ARCH__)
-__shared__ __align__(16) SC rows[2 * TEAMS * (N + 1) * ROW_LENGTH];  // a section's columns, for the whole team; two sections in turn
-#define SHARED(c, k) rows[(((i & 1) * TEAMS + team) * (N + 1) + (c)) * ROW_LENGTH + (k)]
-#define SHARE(U) if (member <= N) { UNROLL for (int k = 0; k < N; ++k) SHARED(member, k) = U[0][k]; } SYNC
+__shared__ __align__(16) SC rows[2 * CHAINS * (N + 1) * ROW_LENGTH];  // a section's columns, for the whole chain; two sections in turn
+#define SHARED(c, k) rows[(((at & 1) * CHAINS + chain) * (N + 1) + (c)) * ROW_LENGTH + (k)]
+#define SHARE(U) if (mine <= N) { UNROLL for (int k = 0; k < N; ++k) SHARED(mine, k) = U[0][k]; } SYNC
 // the back substitution reads a section ahead, so that it need not wait for the memory
-#define BEGIN_KEPT SC now[SAVED], ahead[SAVED]; UNROLL for (int r = 1; r < SAVED - 1; ++r) ahead[r] = KEEP(L - 1, r, 0)
-#define NEXT_KEPT(i) UNROLL for (int r = 1; r < SAVED - 1; ++r) { now[r] = ahead[r]; ahead[r] = KEEP(i ? i - 1 : 0, r, 0); }
+#define BEGIN_KEPT SC now[SAVED], ahead[SAVED]; UNROLL for (int r = 1; r < SAVED; ++r) ahead[r] = KEEP(LAST, r, 0)
+#define NEXT_KEPT(i) UNROLL for (int r = 1; r < SAVED; ++r) { now[r] = ahead[r]; ahead[r] = KEEP(i ? i - 1 : 0, r, 0); }
 #define KEPT(i, row, q) now[row]
 #else
 #define BEGIN_KEPT

@@ -78,7 +78,7 @@ class Softening:
     """Mullins' effect by Ogden and Roxburgh, Proc. R. Soc. Lond. A 455 (1999) 2861.
 
     h = 1 - erf((W_max - W)/(energy E + growth W_max))/damage, with W the law's energy: 1 while W is
-    the largest so far. We could not open the paper: the form is that of Abaqus' manual. W_max
+    the largest so far. We could not open the paper: the formula is written from memory. W_max
     follows W within `lag`, so that its rate is continuous.
 
     Attributes:

@@ -39,7 +39,8 @@ HEAT = (100.0, 30.0, 9.0, 2.7)  # of the first rounds
 ROUNDS = 11  # at most
 STILL = 0.7  # standard deviations that the mean may move before the last round
 SETTLED = 1.0  # and in it, if its intervals are to be relied on
-BATCHES, LAST = 5, 10  # of a round and of the last one
+BATCHES, LAST = 5, 10  # of a round and of the last one, at least
+MORE = 2.5  # rollouts for each term of the surrogate, at least: a few may fail
 SHORT, LONG = 180, 900  # steps of the sampler in a round and in the last one
 DRAWS = 4000  # that intervals are quantiles of
 
@@ -105,7 +106,7 @@ def fit(
             last = number == ROUNDS - 1 or moved < STILL
             heat = HEAT[number] if number < len(HEAT) else 1.0
             place = Place(even, SPREAD * factor, times, steps)
-            z = _design(len(even), (LAST if last else BATCHES) * LANES, seed + number)
+            z = _design(len(even), batches(len(even), last) * LANES, seed + number)
             design = axes.clipped(place.coordinates(z))
             design[0] = even
             found = rounds.run(place, design, heat)
@@ -132,6 +133,12 @@ def fit(
         rounds=rounds,
         course=np.array(course),
     )
+
+
+def batches(dimension: int, last: bool) -> int:
+    """How many batches of LANES rollouts a round simulates: enough for its surrogate."""
+    terms = (dimension + 1) * (dimension + 2) // 2
+    return max(LAST if last else BATCHES, -(-int(MORE * terms) // LANES))
 
 
 def draw(found: Round, rng: np.random.Generator, steps: int) -> np.ndarray:

@@ -8,8 +8,11 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.confidence.axes import Axes
 from pipeline.confidence.intervals import identifiable, interval
+from pipeline.confidence.posterior import batches
 from pipeline.confidence.profile import profiles
 from pipeline.confidence.residuals import Group
+from pipeline.confidence.rounds import LANES
+from pipeline.confidence.surrogate import monomials
 from pipeline.params.identification import Prior
 from tests.confidence.toy import COUNT, GRID, SCALE, SPACE, TRUTH, Toy, ToyResiduals, fitted
 from tests.search.toy import episode
@@ -131,3 +134,12 @@ def test_failures_everywhere_are_one_line(monkeypatch) -> None:
     toy.interact = fails
     with pytest.raises(UserError, match="80 of 80 simulations near the best"):
         fitted(monkeypatch, toy, episode())
+
+
+def test_a_round_has_rollouts_for_all_terms_of_its_surrogate_whatever_its_axes() -> None:
+    for axes in range(1, 10):  # θ, the law rubber and the air's drag are 8
+        for last in (False, True):
+            count = LANES * batches(axes, last)
+            terms = monomials(np.zeros((1, axes))).shape[1]
+            assert count - 2 * terms >= 0.1 * count
+    assert [batches(axes, last) for axes in (1, 5) for last in (False, True)] == [5, 10, 5, 10]

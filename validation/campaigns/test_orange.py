@@ -15,6 +15,7 @@ import pandas as pd
 import pytest
 
 from app.preflight.add_band import add_band
+from pipeline.params import load
 from pipeline.report.tables.landings import prediction_error
 from tests.project import ROOT, copy_project
 
@@ -64,6 +65,10 @@ def test_landings_are_predicted_within_the_recorded_stretch(
     progress(
         "\n  " + add_band(BAND, RECORDING, MASS, params_path=project / "params.yaml", root=project)
     )
+    table = project / "params.yaml"  # the note says where the hand was, not where it was sent
+    text = table.read_text("utf-8").replace("arm_stiffness: 12000.0", "arm_stiffness: null")
+    table.write_text(text, "utf-8")
+    assert load(table).setup.arm_stiffness is None
     wall = {}
     for method in methods:
         start = time.perf_counter()

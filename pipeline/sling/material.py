@@ -19,7 +19,7 @@ THETA = (
     "dynamic_friction",
     "damping_scale",
 )
-LEAST_SCALE = 0.005  # without any damping of shape waves ring on for ever, and no step holds them
+LEAST_SCALE = 0.0075  # without any damping of shape waves ring on for ever, and no step holds them
 
 
 def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:

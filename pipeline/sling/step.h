@@ -102,7 +102,7 @@ for (int step = 0; step < steps; ++step) {
     } else {
       // with a Hessian that is not today's it is linear, at a rate that two steps show
       refused = sound > zero ? (change < (SC)0.5 * before ? zero : one) : one;
-      enough = SQRT(maximum(tolerance * (before - change), zero));
+      enough = minimum(SQRT(maximum(tolerance * (before - change), zero)), zero + (SC)10 * tolerance);
       scale = one; sound = sound * (one - refused);
     }
     before = change;

@@ -1,10 +1,11 @@
 """The band as a string in 3-D: distributed mass, finite strain, relaxation, drag, a little bending.
 
-    m x_tt = d/ds [T x_s / |x_s|] - EI (1 + eta d/dt) x_ssss + m g + drag,   T = A sigma(|x_s|, ...)
+    m x_tt = d/ds [T t - EI (1 + eta d/dt) P t_ss / |x_s|] + m g + drag,   T = A sigma(|x_s|, ...)
 
-with s the reference length, m the mass per s and sigma from rubber.py. Lumped masses on edges that
-are short near the clamps and the middle, where the band turns within millimetres: second order in
-space. Time is left to SciPy's LSODA (adaptive step and order).
+with s the reference length, t = x_s / |x_s| the tangent, P what lies across it, m the mass per s
+and sigma from rubber.py. Bending acts on tangents, so that it does not feel how stretch changes.
+Lumped masses on edges that are short near the clamps and the middle, where the band turns: second
+order in space. Time is left to SciPy's LSODA (adaptive step and order).
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ def still(time: float, x: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.nd
     return np.zeros_like(x)
 
 
+TURN = 1.0  # diameters, in which clamps and hand turn the band
 GRADING = 0.75  # edges are 1 - GRADING to 1 + GRADING of their mean
 
 
@@ -85,6 +87,18 @@ class ElasticString:
         return (np.append(self.sizes, 0) + np.append(0, self.sizes)) / 2
 
     @cached_property
+    def turns(self) -> np.ndarray:
+        """Length over which the band turns at each node [m], shape (nodes,).
+
+        Clamps and hand turn it by shear within a diameter. Euler and Bernoulli's beam, which knows
+        no shear, would keep a taut band from stretching for nearly a diameter on each side.
+        """
+        turns = self.shares.copy()
+        ends = [0, self.middle, -1]
+        turns[ends] = np.maximum(turns[ends], TURN * self.diameter)
+        return turns
+
+    @cached_property
     def stiffness(self) -> float:
         """Tension per nominal stress of the law [N/MPa]."""
         return self.rubber.scale * np.pi / 4 * self.diameter**2
@@ -121,7 +135,7 @@ class ElasticString:
     def forces(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of states (nodes, 6 + M, ...): node forces (nodes, 3, ...) [N], rates of the memories."""
         rubber, ones = self.rubber, (1,) * (y.ndim - 2)
-        sizes, weight = self.sizes.reshape(-1, *ones), self.bending / self.shares
+        sizes, weight = self.sizes.reshape(-1, *ones), self.bending / self.turns
         x, v = y[:, :3], y[:, 3:6]
         slope = (x[1:] - x[:-1]) / sizes[:, None]  # x_s
         turning = (v[1:] - v[:-1]) / sizes[:, None]
@@ -132,9 +146,12 @@ class ElasticString:
         tension = self.stiffness * (stress + rubber.viscosity * tangent * rate)
 
         clamp = np.broadcast_to(self.clamp_direction.reshape(1, 3, *ones), (1, *slope.shape[1:]))
-        bent = np.concatenate([clamp, slope + rubber.viscosity * turning, -clamp])
+        swing = (turning - rate[:, None] * along) / stretch[:, None]  # of the tangents
+        bent = np.concatenate([clamp, along + rubber.viscosity * swing, -clamp])
         moment = weight.reshape(-1, 1, *ones) * (bent[1:] - bent[:-1])
-        pull = tension[:, None] * along - (moment[1:] - moment[:-1]) / sizes[:, None]
+        lever = (moment[1:] - moment[:-1]) / (sizes * stretch)[:, None]
+        across = lever - np.einsum("ij...,ij...->i...", along, lever)[:, None] * along
+        pull = tension[:, None] * along - across
 
         wind = v[1:] + v[:-1]
         wind -= np.einsum("ij...,ij...->i...", along, wind)[:, None] * along  # twice the air across
@@ -277,9 +294,10 @@ class ElasticString:
         """Motion, height, strain and bending of one state [J]; not what relaxing branches hold."""
         x, v = y[:, :3], y[:, 3:6]
         slope = (x[1:] - x[:-1]) / self.sizes[:, None]
-        turn = np.diff(np.vstack([self.clamp_direction, slope, -self.clamp_direction]), axis=0)
+        along = slope / np.linalg.norm(slope, axis=1, keepdims=True)
+        turn = np.diff(np.vstack([self.clamp_direction, along, -self.clamp_direction]), axis=0)
         return float(
             np.sum(self.masses[:, None] * (v**2 / 2 - GRAVITY * x))
             + self.stiffness * np.sum(self.sizes * self.rubber.stored(self.stretch(x), y[:-1, 6:]))
-            + self.bending / 2 * np.sum(turn**2 / self.shares[:, None])
+            + self.bending / 2 * np.sum(turn**2 / self.turns[:, None])
         )

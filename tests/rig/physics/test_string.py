@@ -38,6 +38,21 @@ def test_held_force_is_the_laws(string: ElasticString) -> None:
     assert np.isclose(thin.at_middle(y)[1], expected, rtol=3e-3)
 
 
+def test_a_band_of_a_centimetre_pulls_as_two_straight_halves(string: ElasticString) -> None:
+    """Clamps and hand bend it, and take no more than a hundredth of its length to stretch.
+
+    A solid of tetrahedra says the same, in our solver and in MuJoCo's (reports/simulator.md).
+    """
+    thick = replace(string, edges=120)
+    y = thick.at_rest(bent_at(thick, DRAWN), 1e-5, held=True)
+    half = np.hypot(0.1375, 0.4)
+    stress = 2e5 * TRELOAR.stress(np.array([half / 0.26]))[0][0]
+    expected = 2 * np.pi / 4 * thick.diameter**2 * stress * 0.4 / half
+    assert np.isclose(thick.at_middle(y)[1], expected, rtol=6e-3)
+    stretched = thick.stretch(y[:, :3]) > 0.95 * half / 0.26
+    assert thick.sizes[~stretched].sum() < 0.01 * thick.length
+
+
 def test_forces_are_the_energys_gradient(string: ElasticString) -> None:
     rng = np.random.default_rng(0)
     string = replace(string, rubber=replace(ELASTIC, viscosity=0.0))

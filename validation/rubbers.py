@@ -1,0 +1,91 @@
+"""Rubbers for the virtual rig that no one chose by hand: four to develop on, eight that are sealed.
+
+A seed draws their laws, spectra, sizes and masses. DEVELOP is what a method may be developed on.
+SEALED is run once, with the default method as it then stands, and all of it is reported; a method
+that is changed after it was seen wants another seed.
+"""
+
+from __future__ import annotations
+
+from colorsys import hsv_to_rgb
+
+import numpy as np
+
+from pipeline.params import Params
+
+DEVELOP, SEALED = 20261101, 20261102  # seeds
+COUNT = {DEVELOP: 4, SEALED: 8}
+RECORDINGS = 3  # of each
+KINDS = ("box", "wedge", "flow", "softening")  # two of them outside quasi-linear viscoelasticity
+LAWS = {  # of each constant: a centre, and the share by which it varies
+    "ogden": ((0.69, 1.3, 0.01, 4.0, -0.0122, -2.0), 0.15),
+    "arruda_boyce": ((27.6,), 0.3),
+    "extended_tube": ((0.0954, 0.331, 1.111), 0.15),
+    "gent": ((94.1,), 0.3),
+}
+
+
+def rubbers(seed: int) -> dict[str, tuple[dict, dict]]:
+    """Bands by name: the entries that params.yaml has under `bands` and under `rig.bands`.
+
+    Each kind of relaxation comes equally often, each law too, in an order that the seed draws.
+    """
+    rng, count = np.random.default_rng(seed), COUNT[seed]
+    kinds = rng.permutation(np.resize(KINDS, count))
+    laws = rng.permutation(np.resize(list(LAWS), count))
+    word = {DEVELOP: "develop", SEALED: "sealed"}[seed]
+    return {
+        f"{word}{number + 1}": _rubber(str(kind), str(law), rng)
+        for number, (kind, law) in enumerate(zip(kinds, laws, strict=True))
+    }
+
+
+def _rubber(kind: str, law: str, rng: np.random.Generator) -> tuple[dict, dict]:
+    def near(value: float, share: float) -> float:
+        return float(f"{value * rng.uniform(1 - share, 1 + share):.4g}")
+
+    def between(low: float, high: float, log: bool = False) -> float:
+        ends = np.log([low, high]) if log else (low, high)
+        value = rng.uniform(*ends)
+        return float(f"{np.exp(value) if log else value:.4g}")
+
+    diameter = between(0.008, 0.012)
+    mass = near(np.pi / 4 * diameter**2 * 0.52 * 750, 0.3)
+    constants, share = LAWS[law]
+    about = {
+        "peak_force": between(10.0, 17.0),
+        "relaxation": [],
+        "viscosity": between(0.0005, 0.0025, log=True),
+        "color": [float(f"{one:.2f}") for one in hsv_to_rgb(rng.random(), 0.8, 0.85)],
+        "law": law,
+        "constants": [near(one, share) for one in constants],
+        "spectrum": None,
+        "flow": None,
+        "softening": None,
+    }
+    slope = between(0.25, 0.4) if kind == "wedge" else between(0.0, 0.1)
+    weight = between(0.08, 0.2) if kind in ("box", "wedge") else between(0.03, 0.08)
+    times = [between(0.001, 0.004), between(3.0, 30.0)]
+    about["spectrum"] = {"weight": weight, "times": times, "branches": 7, "slope": slope}
+    if kind == "flow":
+        about["flow"] = {
+            "share": between(0.1, 0.3),
+            "rate": between(100.0, 3000.0, log=True),
+            "power": between(3.0, 5.0),
+            "chain": -0.7,
+            "offset": 0.01,
+        }
+    if kind == "softening":
+        about["softening"] = {"damage": near(2.5, 0.3), "energy": near(0.1, 0.3), "growth": 0.1}
+    band = {"source": "rig", "mass": float(f"{mass:.3g}"), "diameter": diameter}
+    return band | {"rest_length": 0.52}, about
+
+
+def with_rubbers(params: Params, seed: int, recording: int) -> Params:
+    """params.yaml with these bands besides, and the rig's seed of one of their recordings."""
+    drawn = rubbers(seed)
+    content = params.model_dump(mode="json", exclude_unset=True)
+    content["bands"] |= {name: band for name, (band, _) in drawn.items()}
+    content["rig"]["bands"] |= {name: rubber for name, (_, rubber) in drawn.items()}
+    content["rig"]["seed"] = 100 + recording
+    return Params.model_validate(content)

@@ -85,9 +85,9 @@ JSON = flag("--json", action="store_true")
 
 
 @command(
-    "check a recording and add its band to params.yaml",
+    "check recordings and add their band to params.yaml",
     flag("name", help="what to call the band: small letters, digits and _"),
-    flag("--recording", type=Path, required=True, metavar="FILE.mcap"),
+    flag("--recording", type=Path, required=True, nargs="+", metavar="FILE.mcap"),
     flag("--mass", type=positive, required=True, metavar="KG", help="on a scale"),
     flag("--diameter", type=positive, default=0.010, metavar="M", help="default 0.010"),
     flag(
@@ -107,6 +107,17 @@ def add_band(arguments: argparse.Namespace) -> Done:
 
 
 @command(
+    "check further recordings of a band and add them to it",
+    flag("--band", required=True),
+    flag("recordings", type=Path, nargs="+", metavar="FILE.mcap"),
+)
+def add_recording(arguments: argparse.Namespace) -> Done:
+    from app.preflight.recordings import add_recording
+
+    return add_recording(arguments.band, arguments.recordings)
+
+
+@command(
     "say what is in a recording, what is missing, whether it can be used",
     flag("recording", type=Path, metavar="FILE.mcap"),
     flag("--band", metavar="NAME", help="of params.yaml: its diameter and rest length"),
@@ -114,6 +125,7 @@ def add_band(arguments: argparse.Namespace) -> Done:
     flag(
         "--rest-length", type=positive, metavar="M", help="between the clamps; else 0.52 is assumed"
     ),
+    flag("--pull", type=count, metavar="N", help="of several; default the first that can be used"),
     flag("--sheet", type=Path, metavar="OUT.png", help="six moments, force, coverage"),
     flag("--rrd", type=Path, metavar="OUT.rrd", help="one timeline for Rerun's viewer"),
     JSON,
@@ -131,6 +143,7 @@ def check(arguments: argparse.Namespace) -> Done:
         as_json=arguments.json,
         sheet=arguments.sheet,
         rrd=arguments.rrd,
+        pull=arguments.pull,
     )
 
 
@@ -142,6 +155,7 @@ def check(arguments: argparse.Namespace) -> Done:
     flag(
         "--recording", type=Path, metavar="FILE.mcap", help="earlier one: robot's base, and force"
     ),
+    flag("--pulls", type=count, default=1, metavar="N", help="one after the other, default 1"),
     flag("--out", type=Path, metavar="FOLDER", help="default data/plans/<band>"),
     flag("--rate", type=positive, default=100.0, metavar="HZ", help="of the CSV, 100"),
     JSON,
@@ -156,6 +170,7 @@ def plan(arguments: argparse.Namespace) -> Done:
         draw=arguments.draw,
         theta=arguments.theta,
         recording=arguments.recording,
+        pulls=arguments.pulls,
     )
     files = plan.write(arguments.out or Layout().plans(arguments.band), arguments.rate)
     return plan.to_json(files) if arguments.json else plan.to_text(files)

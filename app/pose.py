@@ -51,14 +51,14 @@ def posed(answer: Answer, params, band: str, root: str | Path = ".") -> PosedAns
 
 
 def fork_in_base(params, band: str, root: str | Path = ".") -> tuple[Transform, str]:
-    """Frame O to the robot's base, and the base's name, as the band's recording has them.
+    """Frame O to the robot's base, and the base's name, as the band's first recording has them.
 
     There, setup.base_to_fork comes before /tf_static; without a recording that can be read it
     stands alone, and plan.frame names the base. Raises UserError where neither tells.
     """
     given = params.setup.base_to_fork
     try:
-        fork, frame = _recorded(Layout(Path(root)).recording(band), params.setup)
+        fork, frame = _recorded(Layout(Path(root)), band, params.setup)
     except UserError:
         if given is None:
             raise
@@ -66,14 +66,15 @@ def fork_in_base(params, band: str, root: str | Path = ".") -> tuple[Transform, 
     return fork, frame or params.plan.frame
 
 
-def _recorded(path: Path, setup) -> tuple[Transform, str]:
-    if not path.is_file():
+def _recorded(layout: Layout, band: str, setup) -> tuple[Transform, str]:
+    recordings = layout.recordings(band)
+    if not recordings:
         raise UserError(
-            f"setup.base_to_fork is null and {path} is not there: measure where the fork stands"
-            " (docs/recording.md, Calibration)"
+            f"setup.base_to_fork is null and {layout.raw(band)} holds no recording: measure where"
+            " the fork stands (docs/recording.md, Calibration)"
         )
     from pipeline.recording.geometry import geometry_of
     from pipeline.recording.input.reader import read_recording
 
-    recording = read_recording(path, setup)
+    recording = read_recording(recordings[0], setup)
     return geometry_of(recording, setup).base.inverse(), recording.pose.frame

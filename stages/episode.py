@@ -1,27 +1,49 @@
-"""Turn one band's recording into its episode: signals and clouds on one clock, in frame O.
+"""Turn a band's recordings into its episodes: signals and clouds on one clock, in frame O.
 
     python -m stages.episode band1
 
-Reads data/raw/<band>.mcap; writes data/episodes/<band>/: signals.parquet and clouds.parquet.
+Reads data/raw/<band>/*.mcap; writes data/episodes/<band>/<n>/ for each pull that they hold, n = 1,
+2, ... by the file's name, then by time: signals.parquet and clouds.parquet. A pull that cannot be
+used is left out, with a warning; a file without any that can be used is an error.
 """
 
 from __future__ import annotations
 
-from pipeline.base.layout import Layout
-from pipeline.recording.build import build_episode
+import sys
+
+from pipeline.base.errors import UserError
+from pipeline.base.files import replacing_folder
+from pipeline.base.layout import Layout, NotMade
+from pipeline.recording.build import build_episodes
 from stages.start import run, started
 
 
 def main() -> None:
     params, band = started("band")
-    layout = Layout()
-    episode = build_episode(layout.recording(band), band, params)
-    episode.save(layout.episode(band))
-    force = episode.metadata["preprocessing"]["peak_force"]
-    print(
-        f"{band}: grasp {episode.grasp_time:.3f} s, release {episode.release_time:.4f} s,"
-        f" peak force {force:.2f} N, {len(episode.clouds)} clouds"
-    )
+    layout, number = Layout(), 0
+    recordings = layout.recordings(band)
+    if not recordings and params.bands[band].source == "rig":
+        raise NotMade(layout.recording(band))
+    if not recordings:
+        raise UserError(
+            f"{layout.raw(band)}: no recording is in it; `sling add-recording --band {band}"
+            " FILE.mcap` puts one there"
+        )
+    with replacing_folder(layout.episodes(band)) as folder:
+        for path in recordings:
+            episodes, refused = build_episodes(path, band, params)
+            for reason in refused:
+                print(f"warning: left out: {reason}", file=sys.stderr)
+            for episode in episodes:
+                number += 1
+                episode.save(folder / layout.episode(band, number).name)
+                force = episode.metadata["preprocessing"]["peak_force"]
+                print(
+                    f"{band} {number}: {path.name}, grasp {episode.grasp_time:.3f} s,"
+                    f" release {episode.release_time:.4f} s, peak force {force:.2f} N,"
+                    f" {len(episode.clouds)} clouds",
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Record one of the virtual rig's bands: data/raw/<band>.mcap.
+"""Record one of the virtual rig's bands: data/raw/<band>/<band>.mcap.
 
 python -m stages.record band1
 """

@@ -1,6 +1,6 @@
 """Pictures and figures of docs/rig.md: the law against Treloar's points, the recorded pulls.
 
-    python tools/rig_pictures.py data/raw/band1.mcap ...     # recordings of rig bands, by name
+    python tools/rig_pictures.py data/raw/band1/band1.mcap ...  # recordings of rig bands, by name
 
 Writes docs/rig/treloar.png (where ../shared/data is there), docs/rig/pulls.png and
 docs/rig/recoil.png. What is drawn is what the recordings hold, not the rig's truth.

@@ -43,13 +43,14 @@ def read_earlier(path: Path, params) -> Earlier:
     """Read a recording as far as a plan needs it: no pictures. Raises UserError."""
     from pipeline.recording.geometry import geometry_of
     from pipeline.recording.input.reader import read_recording
+    from pipeline.recording.pulls import pulls_of
     from pipeline.recording.signals import signals_of
 
     recording = read_recording(Path(path), params.setup)
     geometry = geometry_of(recording, params.setup)
     source, frame = geometry.sources["base_to_fork"], recording.pose.frame
     try:
-        signals = signals_of(recording, geometry, params)
+        signals = signals_of(pulls_of(recording, params.setup)[0], geometry, params)
     except UserError as error:
         problem = f"{path}: {error}"
         return Earlier(path, geometry.base, source, frame, None, None, problem)

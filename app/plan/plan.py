@@ -21,6 +21,7 @@ from pipeline.params import expect_known
 from pipeline.recording.input.frames import Transform
 
 RATES = (1.0, 10_000.0)  # Hz of the CSV
+MOST_PULLS = 10  # a file of them is half a gigabyte
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,7 @@ class Plan:
             "duration_s": round(self.trajectory.duration, 6),
             "grasp_s": round(self.trajectory.start_of("grasp"), 6),
             "release_s": round(self.trajectory.start_of("release"), 6),
+            "pulls": sum(phase.name == "pull" for phase in self.trajectory.phases),
             "held_s": round(self.held_time, 6),
             "held_most_s": round(self.most_time, 6),
             "stretch": self.stretch,
@@ -167,6 +169,7 @@ def plan_recording(
     draw: tuple[float, float] | None = None,
     theta: Path | None = None,
     recording: Path | None = None,
+    pulls: int = 1,
 ) -> Plan:
     """Plan the recording of a band of params.yaml and check it against every limit.
 
@@ -175,11 +178,14 @@ def plan_recording(
         theta: θ file that says what holding the draw takes.
         recording: Earlier one of this rig, whose /tf_static says where the fork stands in the
             robot's base where setup.base_to_fork does not; and of this band, for the force.
+        pulls: How many in one recording; between two the hand returns and grasps again.
 
     Raises:
         UserError: in one line, where a limit is broken or something is not known.
     """
     expect_known(params, "band", band)
+    if pulls > MOST_PULLS:
+        raise UserError(f"--pulls: at most {MOST_PULLS} in one recording, got {pulls}")
     setup, about = params.setup, params.bands[band]
     settings = params.plan if draw is None else params.plan.model_copy(update={"draw": draw})
     earlier = None if recording is None else read_earlier(recording, params)
@@ -200,7 +206,7 @@ def plan_recording(
     hand = _orientation(settings.orientation, base, drawn)
     axis = (base.rotation.inv() * hand).apply([0.0, 0.0, 1.0])
     limits.check_hand(settings, about, axis, drawn)
-    trajectory = trajectory_of(settings, setup, params.episode, about, axis)
+    trajectory = trajectory_of(settings, setup, params.episode, about, axis, pulls)
     limits.check_motion(trajectory, settings)
     limits.check_floor(trajectory, setup, settings)
     held_time, most_time = limits.check_window(trajectory, settings, params.episode)

@@ -1,4 +1,7 @@
-"""The phases of a recording: rest, grasp the hanging middle, lift, pull, pause, let go, wait."""
+"""The phases of a recording: rest, grasp the hanging middle, lift, pull, pause, let go, wait.
+
+For several pulls in one recording the hand returns to where it began and does it all again.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from app.plan.trajectory import Phase, Trajectory, leg_time
+from pipeline.recording.pulls import CALM
 
 TICK = 0.001  # s: phases last whole ticks
 SPARE = 0.5  # s beyond what the episode asks for, since nobody starts a recorder on the tick
@@ -35,12 +39,13 @@ def hanging_middle(plan, setup, band) -> np.ndarray:
     return np.array([0.0, 0.0, -below])
 
 
-def trajectory_of(plan, setup, episode, band, axis: np.ndarray) -> Trajectory:
+def trajectory_of(plan, setup, episode, band, axis: np.ndarray, pulls: int = 1) -> Trajectory:
     """The whole recording, frame O.
 
     Args:
         plan, setup, episode, band: Those sections of params.
         axis: Unit vector along which the fingers point, shape (3,); they come and go along it.
+        pulls: How many, one after the other.
     """
     middle = hanging_middle(plan, setup, band)
     level = np.zeros(3)
@@ -53,8 +58,8 @@ def trajectory_of(plan, setup, episode, band, axis: np.ndarray) -> Trajectory:
         return Phase(name, to, _ticks(time), opening)
 
     retreat = leg("retreat", drawn, end, plan.max_speed, wide)
-    phases = [
-        Phase("lead-in", start, _ticks(plan.lead_in), wide),
+    back = leg("return", end, start, plan.max_speed, wide)
+    pull = [
         leg("approach", start, middle, plan.max_speed, wide),
         Phase("grasp", middle, _ticks(plan.finger_time), closed),
         leg("lift", middle, level, plan.max_speed, closed),
@@ -62,13 +67,18 @@ def trajectory_of(plan, setup, episode, band, axis: np.ndarray) -> Trajectory:
         Phase("pause", drawn, _ticks(plan.pause), closed),
         Phase("release", drawn, _ticks(plan.finger_time), wide),
     ]
-    so_far = sum(phase.duration for phase in phases)
+    taken = sum(phase.duration for phase in pull)
     wait = max(
         plan.wait,
         episode.tail + SPARE - plan.finger_time,
-        episode.duration + SPARE - so_far - retreat.duration,
+        episode.duration + SPARE - plan.lead_in - taken - retreat.duration,
     )
-    phases += [Phase("swing", drawn, _ticks(wait), wide), retreat]
+    pull += [Phase("swing", drawn, _ticks(wait), wide), retreat]
+    # The next pull's window begins so long before its tail, and the band is to hang calm by then.
+    between = wait + retreat.duration + back.duration + taken
+    rest = max(plan.lead_in, CALM + SPARE + episode.duration - episode.tail - between)
+    again = [back, Phase("lead-in", start, _ticks(rest), wide), *pull]
+    phases = [Phase("lead-in", start, _ticks(plan.lead_in), wide), *pull, *(pulls - 1) * again]
     return Trajectory.through(start, wide, [phase for phase in phases if phase.duration > 0])
 
 

@@ -1,10 +1,10 @@
-"""Bring a recorded band into the project: check it, keep a copy, and name it in params.yaml."""
+"""Bring a recorded band into the project: check it, keep copies, and name it in params.yaml."""
 
 from __future__ import annotations
 
 import io
 import re
-import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 from ruamel.yaml import YAML
@@ -12,34 +12,32 @@ from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.representer import RoundTripRepresenter
 
-from app.preflight.check import check_recording
-from app.preflight.report import CheckReport
+from app.preflight import recordings as files
 from pipeline.base.errors import UserError
-from pipeline.base.files import replacing, write_text
+from pipeline.base.files import write_text
 from pipeline.base.layout import Layout
-from pipeline.params import Params, load, parse
-from pipeline.recording.input.container import expect_file, sha256
+from pipeline.params import load, parse
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
 def add_band(
     name: str,
-    recording: Path,
+    recordings: Sequence[Path],
     mass: float,
     diameter: float = 0.010,
     rest_length: float = 0.52,
     params_path: Path | str = "params.yaml",
     root: Path | str = ".",
 ) -> str:
-    """Check a recording, copy it to data/raw and add its band to params.yaml and to run.bands.
+    """Check recordings, copy them to data/raw and add their band to params.yaml and to run.bands.
 
     Nothing is written unless everything is right; params.yaml comes last. Adding the same band
-    with the same recording again changes nothing.
+    with the same recordings again changes nothing.
 
     Args:
         name: Of the band: small letters, digits and _.
-        recording: MCAP file.
+        recordings: MCAP files.
         mass: Of the band [kg].
         diameter: Of its section [m].
         rest_length: Between the clamps [m].
@@ -47,15 +45,14 @@ def add_band(
         root: Folder of the project.
 
     Returns:
-        What was done, in words, and below it what of the recording costs accuracy.
+        What was done, in words, and below it what of the recordings costs accuracy.
 
     Raises:
         UserError: in one line, about the first thing that is wrong.
     """
     if not NAME.fullmatch(name):
         raise UserError(f"band name {name!r}: use small letters, digits and _, a letter first")
-    recording, params_path = Path(recording), Path(params_path)
-    raw = Layout(Path(root)).recording(name)
+    params_path, layout = Path(params_path), Layout(Path(root))
     before = load(params_path)
     band = {
         "source": "recording",
@@ -71,31 +68,22 @@ def add_band(
         )
     text = _with_band(params_path, name, band)
     after = parse(text, str(params_path))
-    expect_file(recording)
-    same = raw.exists() and sha256(raw) == sha256(recording)
-    if raw.exists() and not same:
-        raise UserError(f"{raw} is there already with other content: choose another name")
+    new = files.targets(recordings, layout.raw(name))
+    there = layout.recordings(name)
+    same = there and files.digests(there).keys() == files.digests(recordings).keys()
+    if there and not same:
+        raise UserError(
+            f"{layout.raw(name)} holds other recordings already: choose another name, or"
+            f" `sling add-recording --band {name}`"
+        )
     if same and known and name in before.run.bands:
         return f"{name} is there already: nothing to do"
 
-    report = _checked(recording, after, name)
+    reports = files.checked(recordings, after, name)
     if not same:
-        with replacing(raw) as temporary:
-            shutil.copyfile(recording, temporary)
+        files.copy(new)
     write_text(params_path, text)
-    facts = report.signals
-    added = (
-        f"{name} added: peak force {facts['peak_force_n']:.2f} N, release at"
-        f" {facts['release_s']:.3f} s; `dvc repro` identifies it"
-    )
-    return "\n".join([added, *(f"  - but {caution}" for caution in report.cautions)])
-
-
-def _checked(recording: Path, params: Params, name: str) -> CheckReport:
-    report = check_recording(recording, params, params.bands[name])
-    if not report.usable:
-        raise UserError(f"{recording}: {report.problem}")
-    return report
+    return files.told(f"{name} added", reports)
 
 
 def _null(representer: RoundTripRepresenter, _: None) -> ScalarNode:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -23,6 +23,7 @@ from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.container import Container, read_container, sha256
 from pipeline.recording.input.frames import Transform
 from pipeline.recording.input.reader import Recording, recording_of
+from pipeline.recording.pulls import pulls_of
 from pipeline.recording.signals import Signals, signals_of
 from pipeline.recording.view import Scene
 
@@ -56,8 +57,19 @@ def check_recording(path: Path, params: object, band: object | None = None) -> C
     return look_at(path, params, band).report
 
 
-def look_at(path: Path, params: object, band: object | None = None, source: str = "given") -> Look:
-    """As `check_recording`, with what it was told from; `source` says where `band` is from."""
+def look_at(
+    path: Path,
+    params: object,
+    band: object | None = None,
+    source: str = "given",
+    pull: int | None = None,
+) -> Look:
+    """As `check_recording`, with what it was told from.
+
+    Args:
+        source: Where `band` is from.
+        pull: Which of several; None for the first that can be used, if there is one.
+    """
     container = read_container(Path(path))
     about = band or ANY_BAND
     report = CheckReport(
@@ -73,18 +85,22 @@ def look_at(path: Path, params: object, band: object | None = None, source: str 
             "source": source if band else ASSUMED,
         },
     )
-    recording = None
+    recording, pulls = None, []
     try:
         recording = recording_of(container, params.setup)
         report.losses, report.notes = recording.losses, recording.notes
         _add_roles(report.topics, recording)
-        done = process_recording(recording, about, params)
+        pulls = pulls_of(recording, params.setup)
     except UserError as error:
-        report.problem = str(error).removeprefix(f"{path}: ")
-        if recording:
-            _add_signals(report, recording, about, params)
+        report.problem = _without(path, error)
         return Look(report, recording)
-    return _whole_look(report, done, params)
+    if pull is not None and pull > len(pulls):
+        raise UserError(f"--pull {pull}: the last pull in {path} is number {len(pulls)}")
+    looks = [_look_at_pull(replace(report), one, about, params) for one in pulls]
+    usable = [look for look in looks if look.report.usable]
+    chosen = looks[pull - 1] if pull else (usable or looks)[0]
+    chosen.report.pulls = [look.report.row for look in looks]
+    return chosen
 
 
 def band_of(
@@ -117,6 +133,22 @@ def band_of(
         )
     left = [n for n, v in (("--diameter", diameter), ("--rest-length", rest_length)) if v is None]
     return band, f"given, but assumed: {left[0]}" if left else "given"
+
+
+def _look_at_pull(report: CheckReport, pull: Recording, band: object, params: object) -> Look:
+    """Fills the report of what the file is with what the pull is."""
+    report.pull = pull.pull
+    try:
+        done = process_recording(pull, band, params)
+    except UserError as error:
+        report.problem = _without(pull.path, error)
+        _add_signals(report, pull, band, params)
+        return Look(report, pull)
+    return _whole_look(report, done, params)
+
+
+def _without(path: Path, error: UserError) -> str:
+    return str(error).removeprefix(f"{path}: ")
 
 
 def _whole_look(report: CheckReport, done: Processed, params: object) -> Look:
@@ -180,7 +212,7 @@ def _add_signals(report: CheckReport, recording: Recording, band: object, params
 
 def _signal_facts(recording: Recording, signals: Signals, scene: Scene) -> dict[str, object]:
     facts = signals.facts
-    start = (signals.origin - int(recording.wrench.stamp[0])) * 1e-9
+    start = (signals.origin - recording.origin) * 1e-9
     by = recording.gripper or recording.pose
     return {
         "window_start_s": start,

@@ -18,6 +18,7 @@ def check(
     as_json: bool = False,
     sheet: Path | None = None,
     rrd: Path | None = None,
+    pull: int | None = None,
 ) -> tuple[str, int]:
     """Look at a recording; draw it where that is asked for.
 
@@ -28,9 +29,10 @@ def check(
         diameter, rest_length: Of a band that is not there yet [m].
         as_json: The report as JSON, with what was drawn under `written`.
         sheet, rrd: Files to write.
+        pull: Which of several; None for the first that can be used, if there is one.
 
     Returns:
-        The report, and exit status 0 where the recording can be used, else 1.
+        The report, and exit status 0 where the pull can be used, else 1.
 
     Raises:
         UserError: in one line, before anything is read where an output cannot be written.
@@ -39,7 +41,7 @@ def check(
         expect_writable(sheet, ".png")
     if rrd:
         expect_writable(rrd, ".rrd")
-    look = look_at(recording, params, *band_of(params, band, diameter, rest_length))
+    look = look_at(recording, params, *band_of(params, band, diameter, rest_length), pull)
     if sheet:
         from app.preflight.sheet import draw_sheet
 

@@ -45,11 +45,39 @@ class Caution:
         return f"{self.what}: {self.cure}"
 
 
-@dataclass
-class CheckReport:
-    """Everything `sling check` says; `problem` is None where the recording can be used.
+@dataclass(frozen=True)
+class PullLine:
+    """One pull of a file in a line; numbers are None where they could not be told.
 
     Attributes:
+        number: From 1 on, by time.
+        grasp_s, release_s: Since the file's first force.
+        usable, verdict: As of a report.
+        cautions: How many.
+    """
+
+    number: int
+    grasp_s: float | None
+    release_s: float | None
+    peak_force_n: float | None
+    usable: bool
+    verdict: str
+    cautions: int
+
+    def __str__(self) -> str:
+        numbers = (self.grasp_s, self.release_s, self.peak_force_n)
+        cells = "".join(f"{'-' if n is None else format(n, '.3f'):>13}" for n in numbers)
+        verdict = self.verdict.replace("but:", f"but: {self.cautions} remarks")
+        return f"{self.number:>6}{cells}   {verdict}"
+
+
+@dataclass
+class CheckReport:
+    """Everything `sling check` says of a pull; `problem` is None where it can be used.
+
+    Attributes:
+        pull: Which of the file's pulls it is about, from 1 on.
+        pulls: All of them.
         losses: What was lost of the file and its topics or mended in them, in words.
         notes: What else to know of it, which cost nothing.
         band: Diameter and rest length [m] that it was read with, and where they come from.
@@ -80,6 +108,14 @@ class CheckReport:
     extrinsics: dict[str, object] = field(default_factory=dict)
     cautions: list[Caution] = field(default_factory=list)
     written: list[str] = field(default_factory=list)
+    pull: int = 1
+    pulls: list[PullLine] = field(default_factory=list)
+
+    @property
+    def row(self) -> PullLine:
+        """This pull in a line."""
+        facts = (self.signals.get(name) for name in ("grasp_s", "release_s", "peak_force_n"))
+        return PullLine(self.pull, *facts, self.usable, self.verdict, len(self.cautions))
 
     @property
     def usable(self) -> bool:
@@ -103,7 +139,13 @@ class CheckReport:
                 lines += ["", title, *(f"  {k:<22}{_shown(v)}" for k, v in facts.items())]
         lines += _phases(self.phases) + _delays(self.delays) + _extrinsics(self.extrinsics)
         lines += ["", *(f"lost or mended: {loss}" for loss in self.losses)]
-        lines += [*(f"note: {note}" for note in self.notes), self.verdict]
+        lines += [f"note: {note}" for note in self.notes]
+        if len(self.pulls) > 1:
+            heads = "".join(f"{name:>13}" for name in ("grasp [s]", "release [s]", "peak [N]"))
+            lines += ["", f"{'pull':>6}{heads}", *map(str, self.pulls), ""]
+            lines += [f"pull {self.pull} of {len(self.pulls)}: {self.verdict}"]
+        else:
+            lines += [self.verdict]
         lines += [f"  - {caution}" for caution in self.cautions]
         lines += ["", *self.written] if self.written else []
         return "\n".join(lines)

@@ -195,7 +195,7 @@ def _events(axes: object, look: Look, named: bool = False) -> None:
 def _raw(figure: object, recording: Recording) -> None:
     """Six pictures and the raw force of a recording that cannot be used."""
     grid = figure.add_gridspec(2, len(MOMENTS), height_ratios=[1.0, 1.1])
-    origin = int(recording.wrench.stamp[0])
+    origin = recording.origin
     numbers = np.linspace(0, len(recording.color.values) - 1, len(MOMENTS)).round().astype(int)
     for column, number in enumerate(numbers):
         axes = figure.add_subplot(grid[0, column])

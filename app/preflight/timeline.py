@@ -57,7 +57,7 @@ def write_timeline(look: Look, params: object, path: Path) -> str:
         stream.set_log_tick_enabled(False)
         stream.save(temporary)
         recording = look.done.recording if look.done else look.recording
-        log = _Log(stream, int(recording.wrench.stamp[0]))
+        log = _Log(stream, recording.origin)
         log.still("report", rerun.TextDocument(look.report.to_text()))
         _raw_force(log, recording.wrench)
         _pictures(log, recording)

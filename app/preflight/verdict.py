@@ -8,6 +8,8 @@ import numpy as np
 
 from app.preflight.report import Caution, CheckReport, Topic
 from pipeline.recording.build import Processed
+from pipeline.recording.events import SETTLE
+from pipeline.recording.pulls import CALM
 from pipeline.recording.signals import Signals
 
 GAPS = {"wrench": 0.02, "pose": 0.05, "color": 0.2, "depth": 0.2}  # s
@@ -42,6 +44,7 @@ def cautions_of(report: CheckReport, done: Processed, setup: object) -> list[Cau
         *_of_clocks(report),
         *_of_force(report, setup),
         *_of_motion(report, done.signals, setup),
+        *_of_rest(report, done),
         *_of_pictures(report),
         *_of_sensor(done),
         *_of_frames(report),
@@ -152,6 +155,15 @@ def _of_motion(report: CheckReport, signals: Signals, setup: object) -> Iterator
     if facts["turn_deg"] > TURN and setup.tool is None:
         what = f"the hand turns by {facts['turn_deg']:.1f} degrees, and its weight with it"
         yield Caution("turn", what, "keep its orientation, or give setup.tool in params.yaml")
+
+
+def _of_rest(report: CheckReport, done: Processed) -> Iterator[Caution]:
+    """Of the band before a pull that follows on another."""
+    pull, begin = done.recording, done.recording.wrench.seconds(done.recording.origin)[0]
+    since = report.signals["window_start_s"] - begin + SETTLE
+    if pull.pull > 1 and since < CALM:
+        what = f"the pictures begin {since:.1f} s after the pull before, the band may still swing"
+        yield Caution("rest", what, f"wait for {CALM - since:.1f} s longer between two pulls")
 
 
 def pause(signals: Signals) -> tuple[float, float]:

@@ -34,12 +34,32 @@ class Layout:
         """Folder of the launches that a user measured, a CSV a band."""
         return self.data / "trials" / "measured"
 
-    def recording(self, band: str) -> Path:
-        return self.data / "raw" / f"{band}.mcap"
+    def raw(self, band: str) -> Path:
+        """Folder of a band's recordings."""
+        return self.data / "raw" / band
 
-    def episode(self, band: str) -> Path:
-        """Folder of signals.parquet and clouds.parquet."""
+    def recording(self, band: str) -> Path:
+        """The file that the virtual rig records."""
+        return self.raw(band) / f"{band}.mcap"
+
+    def recordings(self, band: str) -> list[Path]:
+        """All recordings of a band, by name. Raises UserError where they lie as they once did."""
+        folder = self.raw(band)
+        found, old = sorted(folder.glob("*.mcap")), folder.parent / f"{band}.mcap"
+        if not found and old.is_file():
+            raise UserError(
+                f"{old}: the recordings of a band lie in a folder now:"
+                f" mkdir -p {folder} && mv {old} {folder}/"
+            )
+        return found
+
+    def episodes(self, band: str) -> Path:
+        """Folder of a band's episodes, a folder for each of its recorded pulls."""
         return self.data / "episodes" / band
+
+    def episode(self, band: str, number: int = 1) -> Path:
+        """Folder of signals.parquet and clouds.parquet of one pull, numbered from 1 on."""
+        return self.episodes(band) / str(number)
 
     def mounting(self, band: str) -> Path:
         return self.data / "mounting" / f"{band}.json"

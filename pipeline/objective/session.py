@@ -82,5 +82,13 @@ def evaluator(params, band: str, method: str) -> Evaluator:
 
 
 def load_episode(band: str) -> Episode:
-    """The recorded episode of a band. Raises NotMade."""
+    """The first recorded episode of a band. Raises NotMade."""
     return Episode.load(Layout().episode(band))
+
+
+def load_episodes(band: str) -> list[Episode]:
+    """All of a band: by the name of the recording, then by time. Raises NotMade."""
+    layout, found = Layout(), [load_episode(band)]
+    while (folder := layout.episode(band, len(found) + 1)).is_dir():
+        found.append(Episode.load(folder))
+    return found

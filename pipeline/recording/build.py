@@ -1,4 +1,4 @@
-"""One recording to one `Episode`: the whole way from MCAP to signals and clouds in frame O."""
+"""A recording to its `Episode`s: the whole way from MCAP to signals and clouds in frame O."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pipeline.recording.cloud import Clouds, clouds_of
 from pipeline.recording.delays import Delays, delays_of
 from pipeline.recording.geometry import Geometry, geometry_of
 from pipeline.recording.input.reader import Recording, explained, read_recording
+from pipeline.recording.pulls import pulls_of
 from pipeline.recording.signals import Signals, signals_of
 from pipeline.recording.view import Scene, View
 
@@ -34,20 +35,43 @@ class Processed:
 
 
 def process(path: Path, band: object, params: object) -> Processed:
-    """Read, resolve frames, set stamps right, find events, mask. Raises UserError.
+    """Of a recording's pulls the first that can be used. Raises UserError."""
+    return process_pulls(path, band, params)[0][0]
+
+
+def process_pulls(
+    path: Path, band: object, params: object
+) -> tuple[list[Processed], list[UserError]]:
+    """Read, then for each pull resolve frames, set stamps right, find events, mask.
 
     Args:
         band: One of params.bands.
+
+    Returns:
+        The pulls that can be used, in time order, and why others cannot, in a line each.
+
+    Raises:
+        UserError: None can be used: about the first.
     """
     recording = read_recording(path, params.setup)
+    found, refused = [], []
     try:
-        return process_recording(recording, band, params)
+        pulls = pulls_of(recording, params.setup)
     except UserError as error:
         raise explained(error, recording.path, recording.losses) from None
+    for pull in pulls:
+        try:
+            found.append(process_recording(pull, band, params))
+        except UserError as error:
+            name = f"pull {pull.pull} of {pull.pulls}" if pull.pulls > 1 else ""
+            refused.append(explained(error, pull.path, pull.losses, name))
+    if not found:
+        raise refused[0]
+    return found, refused
 
 
 def process_recording(recording: Recording, band: object, params: object) -> Processed:
-    """As `process`, from a recording that was read already."""
+    """From a recording of one pull that was read already. Raises UserError."""
     view, delays = view_of(recording, band, params)
     clouds, scene = clouds_of(view, params.cloud), view.scene
     return Processed(view.recording, view.geometry, scene.signals, scene, clouds, delays, view)
@@ -63,10 +87,13 @@ def view_of(recording: Recording, band: object, params: object) -> tuple[View, D
     return View(recording, geometry, scene, params.episode.duration), delays
 
 
-def build_episode(path: Path, band_name: str, params: object) -> Episode:
-    """The episode of a recording. Raises UserError with one line where it cannot be used."""
+def build_episodes(
+    path: Path, band_name: str, params: object
+) -> tuple[list[Episode], list[UserError]]:
+    """The episodes of a recording's pulls, and why others have none; see `process_pulls`."""
     expect_known(params, "band", band_name)
-    return episode_of(process(path, params.bands[band_name], params), band_name, params)
+    found, refused = process_pulls(path, params.bands[band_name], params)
+    return [episode_of(done, band_name, params) for done in found], refused
 
 
 def episode_of(done: Processed, band_name: str, params: object) -> Episode:
@@ -83,6 +110,8 @@ def episode_of(done: Processed, band_name: str, params: object) -> Episode:
             "band": _named(params.bands[band_name], "mass", "diameter", "rest_length"),
         },
         "input": {
+            "file": recording.path.name,
+            "pull": recording.pull,
             "sha256": recording.sha256,
             "start_ns": signals.origin,
             "topics": of_streams("topic"),

@@ -36,7 +36,7 @@ ROUNDS, CLOSE = 4, 3e-4  # s
 
 def camera_delay(recording: Recording, geometry: Geometry) -> tuple[float, float] | None:
     """Delay and its standard error [s]; None where the hand is not seen well enough."""
-    origin = int(recording.wrench.stamp[0])
+    origin = recording.origin
     motion = Motion.of(recording.pose, geometry, origin)
     grasp, release = events_of(recording, motion)
     release = release.time

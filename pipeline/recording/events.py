@@ -53,10 +53,20 @@ class Release:
 
 def events_of(recording: Recording, motion: Motion) -> tuple[float, Release]:
     """Time of the grasp [s] and the release, since the first force. Raises UserError."""
-    origin = int(recording.wrench.stamp[0])
+    origin = recording.origin
     gripper = opening_of(recording, origin)
     release = find_release(recording.wrench.seconds(origin), recording.wrench.values, gripper)
     return find_grasp(gripper, (motion.time, motion.path), release.time), release
+
+
+def releases_of(recording: Recording) -> list[float]:
+    """About when a band is let go [s], each time that one is; none where nothing tells."""
+    t, force = recording.wrench.seconds(recording.origin), recording.wrench.values
+    try:
+        _, ends, _ = _drops(t, force, *_reach(t), opening_of(recording, recording.origin))
+    except UserError:
+        return []
+    return [float(t[i]) for i in ends]
 
 
 def opening_of(recording: Recording, origin: int) -> tuple[np.ndarray, np.ndarray] | None:
@@ -86,9 +96,7 @@ def find_release(
             more than once.
     """
     period = float(np.median(np.diff(t)))
-    near, far = max(1, round(0.005 / period)), max(3, round(0.05 / period))
-    if len(t) < 4 * far:
-        raise UserError("the force is too short to find a release in it")
+    near, far = _reach(t)
     center, others = _steepest(t, force, near, far, gripper)
 
     quiet = slice(max(0, center - 6 * far), center - far)
@@ -115,10 +123,31 @@ def find_release(
     return Release(time, error, resolution, hold, noise, drop, [float(t[i]) for i in others])
 
 
+def _reach(t: np.ndarray) -> tuple[int, int]:
+    """Samples to either side over which short and long means are taken. Raises UserError."""
+    period = float(np.median(np.diff(t)))
+    near, far = max(1, round(0.005 / period)), max(3, round(0.05 / period))
+    if len(t) < 4 * far:
+        raise UserError("the force is too short to find a release in it")
+    return near, far
+
+
 def _steepest(
     t: np.ndarray, force: np.ndarray, near: int, far: int, gripper: tuple | None
 ) -> tuple[int, list[int]]:
     """Sample at which the band is let go, and those of sudden drops before it."""
+    drops, ends, size = _drops(t, force, near, far, gripper)
+    if len(ends) > 1:
+        times = " and ".join(f"{t[i]:.1f}" for i in ends)
+        raise UserError(f"a band is let go at {times} s: nothing tells the pulls apart")
+    release = int(ends[0] if ends else drops[np.argmax(size[drops])])
+    return release, [int(i) for i in drops if i < release]
+
+
+def _drops(
+    t: np.ndarray, force: np.ndarray, near: int, far: int, gripper: tuple | None
+) -> tuple[np.ndarray, list[int], np.ndarray]:
+    """Samples of sudden drops; those of them that leave the hand free; the drop at each sample."""
     sudden = np.linalg.norm(np.subtract(*_means(force, near, far)), axis=1)
     before, after = _means(force, far, 6 * far)
     lasting = np.linalg.norm(before - after, axis=1)
@@ -134,14 +163,11 @@ def _steepest(
         )
     rest = force[t < t[0] + LEAD_IN].mean(axis=0)
     held, left = (np.linalg.norm(x[drops] - rest, axis=1) for x in (before, after))
-    ends = list(drops[(left < FREE * held) & (size[drops] >= SUDDEN * largest)])
+    free = left < FREE * held
+    ends = list(drops[free & (size[drops] >= SUDDEN * largest)])
     if gripper is not None:
-        ends = [i for i in ends if _opens(*gripper, t[i])] or ends
-    if len(ends) > 1:
-        times = " and ".join(f"{t[i]:.1f}" for i in ends)
-        raise UserError(f"a band is let go at {times} s: record one pull at a time")
-    release = int(ends[0] if ends else drops[np.argmax(size[drops])])
-    return release, [int(i) for i in drops if i < release]
+        ends = [i for i in drops[free] if _opens(*gripper, t[i])] or ends
+    return drops, ends, size
 
 
 def _means(x: np.ndarray, near: int, far: int) -> tuple[np.ndarray, np.ndarray]:

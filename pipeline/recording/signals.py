@@ -69,11 +69,11 @@ def signals_of(
     tool, episode = params.setup.tool, params.episode
     inertia = inertia if tool is None else None
     expect_dense(recording.wrench)
-    origin = int(recording.wrench.stamp[0])
+    origin = recording.origin
     t, raw = recording.wrench.seconds(origin), recording.wrench.values
     motion = Motion.of(recording.pose, geometry, origin)
     grasp, release = events_of(recording, motion)
-    until = (motion.time >= 0) & (motion.time <= release.time)
+    until = (motion.time >= t[0]) & (motion.time <= release.time)
     if until.sum() < 10:
         raise UserError(f"{recording.pose.topic} stops before the release at {release.time:.3f} s")
     orientation, turn = turned(motion.turn[until])

@@ -67,7 +67,7 @@ def estimate_tool_inertia(
     Args:
         tool: setup.tool; only its centre of mass is used, the mass is fitted.
     """
-    origin = int(recording.wrench.stamp[0])
+    origin = recording.origin
     t, raw = recording.wrench.seconds(origin), recording.wrench.values
     motion = Motion.of(recording.pose, geometry, origin)
     grasp, release = events_of(recording, motion)

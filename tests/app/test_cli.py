@@ -53,9 +53,13 @@ def test_positive_numbers() -> None:
 def test_the_documented_commands_are_understood() -> None:
     parse = cli.parser().parse_args
     band = parse("add-band orange --recording o.mcap --mass 0.0408".split())
-    assert (band.name, band.recording, band.mass) == ("orange", Path("o.mcap"), 0.0408)
+    assert (band.name, band.recording, band.mass) == ("orange", [Path("o.mcap")], 0.0408)
     assert (band.diameter, band.rest_length) == (0.010, 0.52)
+    more = parse("add-recording --band orange o_2.mcap o_3.mcap".split())
+    assert (more.band, more.recordings) == ("orange", [Path("o_2.mcap"), Path("o_3.mcap")])
     assert parse("check o.mcap --json".split()).json
+    assert parse("check o.mcap --pull 2".split()).pull == 2
+    assert parse("plan --band band1 --pulls 3".split()).pulls == 3
     planned = parse("plan --band band1 --recording o.mcap --draw=-0.30,-0.17 --rate 50".split())
     assert (planned.draw, planned.rate, planned.out) == ((-0.30, -0.17), 50.0, None)
     looked = parse("check o.mcap --band band1 --sheet o.png --rrd o.rrd".split())

@@ -19,6 +19,7 @@ from tests.recording.bag import write_bag
 pytestmark = pytest.mark.usefixtures("nowhere")
 
 PARAMS = load(ROOT / "params.yaml")
+RECORDING = "data/raw/band1/band1.mcap"
 FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target along the base's x
 TIPS = np.array([[-0.1375, 0, 0], [0.1375, 0, 0]])
 
@@ -92,15 +93,15 @@ COLUMNS = "x y z", "qx qy qz qw"
 def recorded(tmp_path_factory):
     """(root, truth) of a project with a recording of band1 whose /tf_static joins base and fork."""
     root = tmp_path_factory.mktemp("project")
-    (root / "data" / "raw").mkdir(parents=True)
-    path = root / "data" / "raw" / "band1.mcap"
+    (root / "data/raw/band1").mkdir(parents=True)
+    path = root / RECORDING
     return root, write_bag(path, cameras=False, rate=200, pose_rate=100)
 
 
 def test_the_recorded_draw_is_the_pose_that_the_robot_reported(recorded) -> None:
     """Before the release, read by another library: same frame, place and turn of the hand."""
     root, truth = recorded
-    path = root / "data/raw/band1.mcap"
+    path = root / RECORDING
     with path.open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         poses = [one[3] for one in reader.iter_decoded_messages(["/arm/current_pose"])]
@@ -122,9 +123,9 @@ def test_the_recorded_draw_is_the_pose_that_the_robot_reported(recorded) -> None
 def test_setup_comes_before_tf_static_and_the_recording_names_the_base(recorded, tmp_path) -> None:
     """As where a recording becomes an episode; without one that can be read, plan.frame does."""
     params = with_(standing(FORK_IN_BASE), "plan", frame="arm")
-    (tmp_path / "data" / "raw").mkdir(parents=True)
+    (tmp_path / RECORDING).parent.mkdir(parents=True)
     poses = [at(-0.3, -0.3, params, root) for root in (recorded[0], tmp_path)]
-    (tmp_path / "data/raw/band1.mcap").write_bytes(b"no recording")
+    (tmp_path / RECORDING).write_bytes(b"no recording")
     poses.append(at(-0.3, -0.3, params, tmp_path))
     assert [pose["tcp_frame"] for pose in poses] == ["base", "arm", "arm"]
     for pose in poses:
@@ -138,8 +139,8 @@ def test_a_base_that_is_not_known_is_one_warning(tmp_path) -> None:
     assert pose["pitch_rad"] == pytest.approx(np.pi / 4)
     before, warning = pose["warnings"]
     assert before == "as before" and "setup.base_to_fork is null" in warning
-    (tmp_path / "data" / "raw").mkdir(parents=True)
-    (tmp_path / "data/raw/band1.mcap").write_bytes(b"no recording")
+    (tmp_path / RECORDING).parent.mkdir(parents=True)
+    (tmp_path / RECORDING).write_bytes(b"no recording")
     damaged = at(-0.3, -0.3, standing(None), tmp_path)
     assert damaged["tcp_position_m"] is None
     assert "band1.mcap" in damaged["warnings"][1] and "\n" not in damaged["warnings"][1]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.base.files import replacing, write_text
+from pipeline.base.files import replacing, replacing_folder, write_text
 
 
 def test_a_failure_leaves_what_was_there(tmp_path: Path) -> None:
@@ -17,6 +17,23 @@ def test_a_failure_leaves_what_was_there(tmp_path: Path) -> None:
         temporary.write_text("half")
         raise RuntimeError
     assert [one.name for one in tmp_path.iterdir()] == ["a.txt"] and file.read_text() == "old"
+
+
+def test_a_folder_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
+    folder = tmp_path / "a"
+    for names in (("1", "2"), ("1",)):
+        with replacing_folder(folder) as temporary:
+            for name in names:
+                (temporary / name).write_text(name)
+        assert sorted(one.name for one in folder.iterdir()) == list(names)
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    (tmp_path / f".a.{dead.pid}.tmp").mkdir()
+    with pytest.raises(RuntimeError), replacing_folder(folder) as temporary:
+        (temporary / "3").write_text("half")
+        raise RuntimeError
+    assert [one.name for one in folder.iterdir()] == ["1"]
+    assert [one.name for one in tmp_path.iterdir()] == ["a"]
 
 
 def test_a_file_is_on_the_disk_before_it_bears_its_name(tmp_path, monkeypatch) -> None:

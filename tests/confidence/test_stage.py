@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.base.layout import Layout
 from pipeline.confidence import rounds
 from pipeline.objective.evaluate import Evaluation
 from pipeline.objective.loss import TERMS
@@ -37,7 +38,7 @@ def searched(tmp_path: Path, monkeypatch) -> Space:
     found = Evaluation(unit, space.to_physical(unit), terms, total, [None] * 3)
     history.add(found, phase="de", generation=0)
     history.save(Path(f"data/history/band1/{METHOD}.parquet"))
-    episode(band="band1").save(Path("data/episodes/band1"))
+    episode(band="band1").save(Layout().episode("band1"))
     monkeypatch.setattr(theta, "promising", lambda *_: ([], 0))  # refined: nothing more
     return space
 

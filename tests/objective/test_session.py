@@ -22,7 +22,7 @@ UNIT = np.random.default_rng(1).random((4, 5))
 def evaluators(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Evaluate]:
     """A folder with an episode; the evaluators that a service makes, of a known function."""
     monkeypatch.chdir(tmp_path)
-    toy.episode().save(Path("data/episodes/band1"))
+    toy.episode().save(Layout().episode("band1"))
     write_json(Layout().mounting("band1"), {})
     made = []
 
@@ -74,11 +74,19 @@ def test_another_number_of_gpus_does_not(evaluators: list[Evaluate], monkeypatch
 
 def test_another_episode_starts_over(evaluators: list[Evaluate]) -> None:
     serve("sling2sim2real")
-    toy.episode(release_time=1.3).save(Path("data/episodes/band1"))
+    toy.episode(release_time=1.3).save(Layout().episode("band1"))
     serve("sling2sim2real")
     write_json(Layout().mounting("band1"), {"clamp_angle_deg": 1.0})
     serve("sling2sim2real")
     assert [one.count for one in evaluators] == [1, 1, 1]
+
+
+def test_all_episodes_of_a_band_come_in_their_order(evaluators: list[Evaluate]) -> None:
+    for number in range(2, 12):  # by number, not by name
+        toy.episode(release_time=1 + number / 100).save(Layout().episode("band1", number))
+    found = [episode.release_time for episode in session.load_episodes("band1")]
+    assert found[0] == session.load_episode("band1").release_time
+    assert found[1:] == [1 + number / 100 for number in range(2, 12)]
 
 
 def test_progress_says_how_far_it_is_and_what_was_recalled(

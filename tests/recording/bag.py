@@ -198,7 +198,7 @@ def write_bag(
                 pose = Message(position=_vector(position), orientation=Message(**turn))
                 write(kind, "/arm/current_pose", t, 0.0003, {"pose": pose}, "base")
             elif kind == "gripper":
-                finger = 0.008 if truth.grasp <= t < truth.release + 0.03 else 0.04
+                finger = 0.008 if truth.holds(t) or truth.holds(t - 0.03) else 0.04
                 joints = {"name": ["finger_joint1", "finger_joint2"], "position": [finger] * 2}
                 joints |= {"velocity": [], "effort": []}
                 write(kind, "/gripper/joint_states", t, 0.0002, joints, "")

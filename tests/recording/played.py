@@ -78,6 +78,7 @@ class Played:
         fingers = np.where((v >= truth.grasp) & (v < truth.release + 0.03), 0.016, 0.08)
         return SimpleNamespace(
             path="played.mcap",
+            origin=START,
             wrench=stream("/ft/wrench", t, wrench),
             pose=stream("/arm/pose", u, np.hstack([place, quats])),
             gripper=stream("/gripper", v, fingers[:, None]),

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
-from pipeline.recording.build import build_episode, episode_of, process, process_recording
+from pipeline.recording.build import build_episodes, episode_of, process, process_recording
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.signals import signals_of
@@ -18,7 +18,7 @@ from tests.recording.bag import EYE, Truth, blind_bag, edit, scores
 
 @pytest.fixture(scope="module")
 def episode(seen, params) -> Episode:
-    return build_episode(seen[0], "band1", params)
+    return build_episodes(seen[0], "band1", params)[0][0]
 
 
 def signals(path, params):
@@ -90,7 +90,7 @@ def test_a_wrong_frame_of_the_wrench_is_noticed(tmp_path, params) -> None:
 
 def test_bytes_are_reproducible_and_come_back(episode, seen, params, tmp_path) -> None:
     episode.save(tmp_path / "a")
-    build_episode(seen[0], "band1", params).save(tmp_path / "b")
+    build_episodes(seen[0], "band1", params)[0][0].save(tmp_path / "b")
     for name in ("signals.parquet", "clouds.parquet"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
     back = Episode.load(tmp_path / "a")
@@ -103,7 +103,7 @@ def test_bytes_are_reproducible_and_come_back(episode, seen, params, tmp_path) -
 def test_an_unknown_mask_is_refused_by_name(seen, params) -> None:
     cloud = params.cloud.model_copy(update={"mask": "sam3"})
     with pytest.raises(UserError, match="sam3"):
-        build_episode(seen[0], "band1", params.model_copy(update={"cloud": cloud}))
+        build_episodes(seen[0], "band1", params.model_copy(update={"cloud": cloud}))[0][0]
 
 
 def test_a_late_camera_is_put_right_and_it_is_said(episode, seen, params) -> None:

@@ -11,7 +11,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from pipeline.episode.episode import Episode
-from pipeline.recording.build import build_episode
+from pipeline.recording.build import build_episodes
 from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording, read_recording
 from tests.recording.foxglove_bag import translate
@@ -19,14 +19,14 @@ from tests.recording.foxglove_bag import translate
 
 @pytest.fixture(scope="module")
 def usual(seen, params) -> Episode:
-    return build_episode(seen[0], "band1", params)
+    return build_episodes(seen[0], "band1", params)[0][0]
 
 
 @pytest.mark.parametrize("encoding", ["protobuf", "json"])
 def test_foxglove_schemas_give_the_same_episode(encoding, usual, seen, params, tmp_path) -> None:
     path = tmp_path / "foxglove.mcap"
     translate(seen[0], path, encoding)
-    assert_same_episode(build_episode(path, "band1", params), usual)
+    assert_same_episode(build_episodes(path, "band1", params)[0][0], usual)
 
 
 def test_raw_pictures_are_what_the_packed_ones_hold(seen, params, tmp_path) -> None:

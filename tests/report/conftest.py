@@ -135,7 +135,7 @@ def template(tmp_path_factory) -> Path:
     data = root / "data"
     for name in ("history", "clusters", "refined", "theta", "confidence", "trials"):
         (data / name / BAND).mkdir(parents=True)
-    episode().save(data / "episodes" / BAND)
+    episode().save(data / "episodes" / BAND / "1")
     for step, rows in (
         ("history", history("de", [3.0, np.inf, 2.0])),
         ("refined", history("cma", [2.5, 1.25], solver=0)),

@@ -132,7 +132,7 @@ def test_metrics_are_those_of_the_results(root, params, results, text_alone) -> 
 
 def test_names_the_input_that_is_missing(root, params) -> None:
     for name in (
-        f"episodes/{BAND}/signals.parquet",
+        f"episodes/{BAND}/1/signals.parquet",
         *(f"{step}/{BAND}/{METHOD}.parquet" for step in ("history", "refined", "trials")),
         *(f"{step}/{BAND}/{METHOD}.json" for step in ("clusters", "theta", "confidence")),
         *(f"policies/{BAND}/{METHOD}/{file}" for file in ("card.json", "map.parquet")),

@@ -9,7 +9,7 @@ from pipeline.episode.signal import cutoff_hz
 from pipeline.objective.evaluate import Evaluator
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
-from pipeline.recording.build import build_episode
+from pipeline.recording.build import build_episodes
 from pipeline.rig.physics.world import string_of
 from pipeline.rig.recorder.record import EPOCH
 from pipeline.sling.material import THETA
@@ -45,7 +45,7 @@ def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorde
     path, happened = recorded
     sling = Sling.of(quick.bands["band1"], quick.setup, quick.sling)
     string, rng = string_of(quick, "band1"), np.random.default_rng(0)
-    episode = build_episode(path, "band1", quick)
+    episode = build_episodes(path, "band1", quick)[0][0]
     start = 1e-9 * (episode.metadata["input"]["start_ns"] - EPOCH)
     nearest = np.abs(happened.seen[:, None] - start - episode.cloud_time).argmin(axis=0)
     about = string.sizes, string.diameter / 2, episode.camera, quick.rig.camera.depth_noise

@@ -7,7 +7,7 @@ from mcap.reader import make_reader
 from ruamel.yaml import YAML
 
 from pipeline.objective.loss import EpisodeLoss
-from pipeline.recording.build import build_episode
+from pipeline.recording.build import build_episodes
 from pipeline.rig.recorder.interaction import Interaction
 from pipeline.sling.model import Sling
 from tests.project import ROOT
@@ -28,7 +28,7 @@ def test_an_episode_and_its_loss_are_made_without_the_world(coarse, recorded) ->
     with pytest.raises(AssertionError, match=r"rig\.seed was read"):
         blind.rig.seed  # noqa: B018
     band = blind.bands["band1"]
-    episode = build_episode(recorded[0], "band1", blind)
+    episode = build_episodes(recorded[0], "band1", blind)[0][0]
     sling = Sling.of(band, blind.setup, blind.sling)
     EpisodeLoss.of(blind, "sling2sim2real", episode, sling)
 

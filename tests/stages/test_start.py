@@ -95,8 +95,8 @@ def test_missing_inputs(stage) -> None:
 def test_a_file_that_is_missing_or_damaged_says_what_makes_it(stage) -> None:
     """By its place alone: in any project's folder, and none for what no stage makes."""
     cases = {
-        "data/raw/band1.mcap": "record@band1",
-        "data/episodes/band1/clouds.parquet": "episode@band1",
+        "data/raw/band1/band1.mcap": "record@band1",
+        "data/episodes/band1/1/clouds.parquet": "episode@band1",
         "data/mounting/band1.json": "mounting@band1",
         "data/floor/band1.json": "floor@band1",
         "/data/x/data/confidence/band1/de.json": "ablation_theta@band1-de",

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from app.preflight.add_band import add_band
+from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.launches.stretch import recorded_stretch, stretch_of
 from pipeline.objective.evaluate import Evaluator
@@ -46,7 +47,7 @@ class Recorded:
 
     def __init__(self, project) -> None:
         self.params = load(project / "params.yaml")
-        self.episode = Episode.load(project / "data/episodes" / BAND)
+        self.episode = Episode.load(Layout(project).episode(BAND))
         self.sling = load_sling(self.params, BAND, project)
         table = pd.read_csv(LANDINGS)
         draws = table[["draw_y_m", "draw_z_m"]].to_numpy()

@@ -18,6 +18,7 @@ import pytest
 from scipy.optimize import minimize
 
 from app.preflight.add_band import add_band
+from pipeline.base.layout import Layout
 from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
 from pipeline.episode.phases import held_out_blocks, reach
@@ -313,7 +314,7 @@ def test_nuisances_are_on_only_where_they_explain_what_was_held_out(
         monkeypatch.chdir(project / str(seed))
         params = load("params.yaml")
         for band in bands if seed == RECORDINGS[0] else RIG:
-            episode = Episode.load(Path("data/episodes", band))
+            episode = Episode.load(Layout().episode(band))
             recorded[band][seed] = episode, load_sling(params, band)
     first = {band: recorded[band][RECORDINGS[0]] for band in bands}
 

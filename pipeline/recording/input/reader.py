@@ -27,7 +27,7 @@ ROLES = ("wrench", "pose", "twist", "gripper", *CAMERAS)
 
 @dataclass(frozen=True)
 class Recording:
-    """What was read of one file.
+    """What was read of one file, or the part of it that one of its pulls takes.
 
     Attributes:
         wrench: Force [N] in `wrench.frame`, values (S, 3).
@@ -41,6 +41,9 @@ class Recording:
         notes: What else to know of it, which cost nothing.
         choices: Why each role has its topic.
         sha256: Hash of the file.
+        pull, pulls: Which of the file's pulls this is, from 1 on, and of how many.
+        start: From which seconds count [ns]: the file's first force, also in a part of it; None
+            for that of `wrench`.
     """
 
     path: Path
@@ -57,6 +60,14 @@ class Recording:
     twist: Stream | None = None
     notes: list[str] = field(default_factory=list)
     choices: dict[str, str] = field(default_factory=dict)
+    pull: int = 1
+    pulls: int = 1
+    start: int | None = None
+
+    @property
+    def origin(self) -> int:
+        """Stamp from which seconds count [ns]."""
+        return int(self.wrench.stamp[0]) if self.start is None else self.start
 
     @property
     def streams(self) -> dict[str, Stream]:
@@ -70,6 +81,12 @@ class Recording:
         except images.Undecodable:
             return None
         return depth if depth.shape == (self.depth_camera.height, self.depth_camera.width) else None
+
+    def part(self, begin: float, end: float, pull: int = 1, pulls: int = 1) -> Recording:
+        """What was recorded from `begin` to `end` [s], as one pull of so many."""
+        first, last = (self.origin + round(time * 1e9) for time in (begin, end))
+        cut = {role: stream.between(first, last) for role, stream in self.streams.items()}
+        return replace(self, **cut, pull=pull, pulls=pulls, start=self.origin)
 
     def shifted(self, pose: float = 0.0, camera: float = 0.0) -> Recording:
         """With stamps that are late by so many seconds put right: pose and twist; pictures."""
@@ -109,8 +126,10 @@ def recording_of(container: Container, setup: object) -> Recording:
     )
 
 
-def explained(error: UserError, path: Path, losses: list[str]) -> UserError:
-    """The error with the file's name and with what was lost, which may be its cause."""
-    text = str(error) if str(path) in str(error) else f"{path}: {error}"
+def explained(error: UserError, path: Path, losses: list[str], pull: str = "") -> UserError:
+    """The error with the file's name, the pull, and with what was lost, which may be its cause."""
+    text = str(error).removeprefix(f"{path}: ")
+    text = f"{pull}: {text}" if pull else text
+    text = text if str(path) in text else f"{path}: {text}"
     shown = losses[:SHOWN] + ["and more"] * (len(losses) > SHOWN)
     return UserError(f"{text} ({'; '.join(shown)})" if losses else text)

@@ -72,6 +72,12 @@ class Stream:
         gaps = np.diff(self.stamp) * 1e-9 / self.period
         return int(np.sum(np.maximum(np.round(gaps) - 1, 0)))
 
+    def between(self, first: int, last: int) -> Stream:
+        """Messages stamped from `first` to `last` [ns]; the nearest two where there are fewer."""
+        begin = min(int(np.searchsorted(self.stamp, first)), len(self.stamp) - 2)
+        end = max(int(np.searchsorted(self.stamp, last, side="right")), begin + 2)
+        return replace(self, stamp=self.stamp[begin:end], values=self.values[begin:end])
+
     def shifted(self, seconds: float) -> Stream:
         """With `seconds` subtracted from every stamp."""
         return replace(self, stamp=self.stamp - round(seconds * 1e9)) if seconds else self

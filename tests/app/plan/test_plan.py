@@ -267,6 +267,27 @@ class Followed(Truth):
         return self.way.position(t)
 
 
+@dataclass(frozen=True)
+class Repeated(Followed):
+    """Pull after pull; `moments` are the grasp and the release of each."""
+
+    moments: tuple[tuple[float, float], ...] = ()
+
+    def at(self, t: float) -> Followed:
+        """The pull that is going on or was the last."""
+        begun = [one for one in self.moments if one[0] <= t] or self.moments[:1]
+        return Followed(*begun[-1][:1], release=begun[-1][1], draw=self.draw, way=self.way)
+
+    def holds(self, t: float) -> bool:
+        return self.at(t).holds(t)
+
+    def force(self, t: float) -> np.ndarray:
+        return self.at(t).force(t)
+
+    def center_line(self, t: float) -> np.ndarray:
+        return self.at(t).center_line(t)
+
+
 FAST = {"max_speed": 0.8, "pull_speed": 0.5, "max_acceleration": 5.0, "hanging": 0.195}
 FAST |= {"lead_in": 0.6, "finger_time": 0.3, "pause": 0.8, "wait": 0.5}
 
@@ -300,6 +321,26 @@ def test_a_robot_that_follows_the_plan_makes_a_recording_that_check_accepts(reco
     assert report.usable, report.problem
     assert report.signals["release_s"] == pytest.approx(truth.release, abs=1e-3)
     assert report.signals["draw_m"] == pytest.approx([0, -0.4, 0], abs=1e-3)
+
+
+def test_a_robot_that_pulls_twice_makes_two_recordings_in_one_file(recorded, tmp_path) -> None:
+    from app.preflight.check import look_at
+
+    plan = plan_recording(recorded[2], "band1", pulls=2)
+    way, path = plan.trajectory, tmp_path / "twice.mcap"
+    begins = list(zip([phase.name for phase in way.phases], way.times, strict=False))
+    grasps = [time for name, time in begins if name == "lift"]
+    releases = [time + 3e-4 for name, time in begins if name == "release"]
+    moments = tuple(zip(grasps, releases, strict=True))
+    write_bag(path, Repeated(end=way.duration, draw=0.4, way=way, moments=moments))
+    report = look_at(path, recorded[2], pull=2).report
+    assert plan.content()["pulls"] == len(report.pulls) == 2
+    assert all(pull.usable for pull in report.pulls), str(report.pulls)
+    assert [pull.release_s for pull in report.pulls] == pytest.approx(releases, abs=1e-3)
+    assert [pull.grasp_s for pull in report.pulls] == pytest.approx(grasps, abs=0.021)
+    assert "rest" not in {caution.about for caution in report.cautions}
+    with pytest.raises(UserError, match="--pulls: at most 10 in one recording, got 11"):
+        plan_recording(recorded[2], "band1", pulls=11)
 
 
 def test_an_earlier_recording_gives_base_frame_and_force(recorded) -> None:

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 from app.plan.pull import SPARE, TICK, catenary_sag, hanging_middle, trajectory_of
 from pipeline.params import PlanParams, load
+from pipeline.recording.pulls import CALM
 from tests.project import ROOT
 
 PARAMS = load(ROOT / "params.yaml")
@@ -77,6 +78,36 @@ PLANS = st.fixed_dictionaries(
         "frame": st.just("base"),
     }
 ).map(lambda one: {**one, "pull_speed": min(one["pull_speed"], one["max_speed"])})
+
+
+@settings(deadline=None, max_examples=100)
+@given(
+    content=PLANS,
+    pulls=st.integers(1, 3),
+    duration=number(1, 120),
+    share=number(0.01, 0.9),
+)
+def test_each_of_several_pulls_is_the_first_again_and_finds_the_band_calm(
+    content, pulls, duration, share
+) -> None:
+    """What the next pull's window shows begins when the last swing is over."""
+    plan = PlanParams.model_validate(content)
+    episode = PARAMS.episode.model_copy(update={"duration": duration, "tail": share * duration})
+    rest = PARAMS.setup, episode, PARAMS.bands["band1"], AHEAD
+    one, way = trajectory_of(plan, *rest), trajectory_of(plan, *rest, pulls)
+    np.testing.assert_array_equal(way.times[: len(one.times)], one.times)
+    starts = dict.fromkeys(("lead-in", "grasp", "pull", "release"), ())
+    for phase, start in zip(way.phases, way.times, strict=False):
+        if phase.name in starts:
+            starts[phase.name] += (start,)
+    assert {len(times) for times in starts.values()} == {pulls}
+    lead, grasp, pull, release = map(np.array, starts.values())
+    for times in (grasp, pull):
+        np.testing.assert_allclose(release - times, release[0] - times[0], atol=1e-6)
+    calm = release[1:] + episode.tail - episode.duration - release[:-1]
+    assert np.all(calm >= CALM - TICK) and np.all(lead[1:] + plan.lead_in <= grasp[1:] + TICK)
+    for begin in lead:
+        np.testing.assert_allclose(way.position(begin), way.position(0.0), atol=1e-9)
 
 
 @settings(deadline=None, max_examples=100)

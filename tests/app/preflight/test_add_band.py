@@ -31,15 +31,16 @@ def content(folder: Path) -> dict[str, bytes]:
 
 def add(project: Path, recording: Path, name: str = "red", **changes) -> str:
     values = {"mass": 0.0408, "params_path": project / "params.yaml", "root": project, **changes}
-    return add_band(name, recording, **values)
+    return add_band(name, [recording], **values)
 
 
 def test_a_band_is_added_and_nothing_else_changes(project, seen, blind) -> None:
     before = (project / "params.yaml").read_text().splitlines()
     bands = load(project / "params.yaml").run.bands
     said = add(project, seen[0]).splitlines()
-    assert said[0].startswith("red added: peak force")
-    assert any("pictures come at 15 Hz" in line for line in said[1:])  # what costs accuracy
+    assert said[0] == "red added, 1 pull; `dvc repro` identifies it"
+    assert said[1].startswith("  seen.mcap: peak force")
+    assert any("pictures come at 15 Hz" in line for line in said[2:])  # what costs accuracy
     after = (project / "params.yaml").read_text().splitlines()
     lines = [x for x in difflib.ndiff(before, after) if x[0] in "+-"]
     assert len([x for x in lines if x[0] == "-"]) == 1  # run.bands
@@ -53,17 +54,17 @@ def test_a_band_is_added_and_nothing_else_changes(project, seen, blind) -> None:
         0.010,
         0.52,
     )
-    assert (project / "data/raw/red.mcap").read_bytes() == seen[0].read_bytes()
+    assert (project / "data/raw/red/seen.mcap").read_bytes() == seen[0].read_bytes()
 
     written = content(project)
     assert "nothing to do" in add(project, seen[0])
     with pytest.raises(UserError, match="other values"):
         add(project, seen[0], mass=0.05)
-    with pytest.raises(UserError, match="other content"):
+    with pytest.raises(UserError, match="holds other recordings already"):
         add(project, blind[0])
     assert content(project) == written
 
-    (project / "data/raw/red.mcap").unlink()  # as in a clone of a project that has the band
+    (project / "data/raw/red/seen.mcap").unlink()  # as in a clone of a project that has the band
     add(project, seen[0])
     assert content(project) == written
 

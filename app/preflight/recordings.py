@@ -1,0 +1,97 @@
+"""Recordings brought into the project: each is checked, then all are copied or none."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from app.preflight.check import check_recording
+from app.preflight.report import CheckReport
+from pipeline.base.errors import UserError
+from pipeline.base.files import replacing
+from pipeline.base.layout import Layout
+from pipeline.params import Params, expect_known, load
+from pipeline.recording.input.container import expect_file, sha256
+
+
+def add_recording(
+    band: str,
+    recordings: Sequence[Path],
+    params_path: Path | str = "params.yaml",
+    root: Path | str = ".",
+) -> str:
+    """Check further recordings of a band that is in params.yaml and copy them to data/raw/<band>.
+
+    Returns:
+        What was done, in words, and below it what of the recordings costs accuracy.
+
+    Raises:
+        UserError: in one line, where the band is not known or a recording cannot be used or is
+            there already, by its name or its content. Nothing is copied then.
+    """
+    params = load(params_path)
+    expect_known(params, "band", band, called="--band")
+    layout = Layout(Path(root))
+    there = digests(layout.recordings(band))
+    files = targets(recordings, layout.raw(band))
+    for file, target in files.items():
+        if target.exists():
+            raise UserError(f"{target} is there already: give {file} another name")
+        same = there.get(sha256(file))
+        if same:
+            raise UserError(f"{file}: is there already, as {same}")
+    reports = checked(recordings, params, band)
+    copy(files)
+    return told(f"{band}: added to the {len(there)} that were there", reports)
+
+
+def targets(recordings: Sequence[Path], folder: Path) -> dict[Path, Path]:
+    """Where each goes: its own name in the band's folder. Raises UserError where two are one."""
+    found: dict[Path, Path] = {}
+    for file in recordings:
+        expect_file(file)
+        target = folder / file.with_suffix(".mcap").name
+        if target in found.values():
+            raise UserError(f"{file}: two of the recordings have this name, rename one")
+        found[file] = target
+    if len(digests(recordings)) < len(recordings):
+        raise UserError(f"two of {', '.join(map(str, recordings))} are the same recording")
+    return found
+
+
+def digests(recordings: Sequence[Path]) -> dict[str, Path]:
+    """The files by the hash of their content."""
+    return {sha256(file): file for file in recordings}
+
+
+def checked(recordings: Sequence[Path], params: Params, band: str) -> list[CheckReport]:
+    """What `sling check` says of each. Raises UserError where one cannot be used."""
+    reports = [check_recording(file, params, params.bands[band]) for file in recordings]
+    for report in reports:
+        if not report.usable:
+            raise UserError(f"{report.path}: {report.problem}")
+    return reports
+
+
+def copy(files: dict[Path, Path]) -> None:
+    """All files to their targets, or none."""
+    with ExitStack() as stack:
+        for file, target in files.items():
+            shutil.copyfile(file, stack.enter_context(replacing(target)))
+
+
+def told(done: str, reports: Sequence[CheckReport]) -> str:
+    """What was done, a line for each pull, and what costs accuracy in the first of each file."""
+    lines = []
+    for report in reports:
+        for pull in report.pulls:
+            name = Path(report.path).name
+            name += f", pull {pull.number}" if len(report.pulls) > 1 else ""
+            said = f"peak force {pull.peak_force_n:.2f} N, release at {pull.release_s:.3f} s"
+            lines.append(f"  {name}: {said if pull.usable else f'left out, {pull.verdict}'}")
+        lines += [f"  - but {caution}" for caution in report.cautions]
+    count = sum(pull.usable for report in reports for pull in report.pulls)
+    pulls = "1 pull" if count == 1 else f"{count} pulls"
+    return "\n".join([f"{done}, {pulls}; `dvc repro` identifies it", *lines])

@@ -1,0 +1,118 @@
+"""Several recordings of a band, and several pulls in one: what is said, what is kept."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from app.preflight.command import check
+from app.preflight.recordings import add_recording
+from app.preflight.verdict import cautions_of
+from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout
+from tests.app.preflight.test_add_band import add, content, project
+from tests.recording.joined import joined
+
+__all__ = ["project"]
+
+
+@pytest.fixture(scope="module")
+def three(seen, blind, tmp_path_factory) -> tuple[Path, list[float]]:
+    """A file of three pulls, the second with black pictures, and when each began."""
+    path = tmp_path_factory.mktemp("three") / "three.mcap"
+    return path, joined(path, [seen[0], blind[0], seen[0]])
+
+
+def more(project: Path, *recordings: Path, band: str = "red") -> str:
+    return add_recording(band, recordings, project / "params.yaml", project)
+
+
+def test_check_lists_the_pulls_and_looks_at_the_first_that_can_be_used(three, seen, params):
+    path, began = three
+    text, status = check(path, params)
+    assert status == 0 and "pull 1 of 3: can be used" in text
+    content = json.loads(check(path, params, as_json=True, pull=3)[0])
+    assert content["pull"] == 3
+    assert [row["usable"] for row in content["pulls"]] == [True, False, True]
+    for row, start in zip(content["pulls"], began, strict=True):
+        assert row["release_s"] == pytest.approx(start + seen[1].release, abs=1e-3)
+        assert row["grasp_s"] == pytest.approx(start + seen[1].grasp, abs=0.021)
+        assert row["peak_force_n"] == pytest.approx(content["pulls"][0]["peak_force_n"], rel=0.01)
+        assert f"{row['release_s']:.3f}" in text and row["verdict"].removesuffix(", but:") in text
+    assert "empty mask" in content["pulls"][1]["verdict"]
+    assert content["signals"]["release_s"] == content["pulls"][2]["release_s"]
+    rest = [one for one in content["cautions"] if one["about"] == "rest"]
+    assert "s after the pull before" in rest[0]["what"]  # its bag hardly waits
+    text, status = check(path, params, pull=2)
+    assert status == 1 and "pull 2 of 3: cannot be used: empty mask" in text
+    with pytest.raises(UserError, match="--pull 4: the last pull in .* is number 3"):
+        check(path, params, pull=4)
+
+
+def test_a_pull_alone_has_nothing_to_rest_from(looked, params) -> None:
+    found = {one.about for one in cautions_of(looked.report, looked.done, params.setup)}
+    assert "rest" not in found and looked.report.pulls == [looked.report.row]
+
+
+def test_recordings_are_added_to_a_band(project, seen, three) -> None:
+    add(project, seen[0])
+    before = (project / "params.yaml").read_bytes()
+    said = more(project, three[0]).splitlines()
+    assert said[0] == "red: added to the 1 that were there, 2 pulls; `dvc repro` identifies it"
+    assert said[1].startswith("  three.mcap, pull 1: peak force")
+    assert said[2].startswith("  three.mcap, pull 2: left out, cannot be used: empty mask")
+    names = [path.name for path in Layout(project).recordings("red")]
+    assert names == ["seen.mcap", "three.mcap"]
+    assert (project / "data/raw/red/three.mcap").read_bytes() == three[0].read_bytes()
+    assert (project / "params.yaml").read_bytes() == before
+
+
+def test_a_band_of_several_recordings(project, seen, three) -> None:
+    from app.preflight.add_band import add_band
+
+    rest = {"mass": 0.0408, "params_path": project / "params.yaml", "root": project}
+    said = add_band("red", [three[0], seen[0]], **rest)
+    assert said.startswith("red added, 3 pulls;")
+    assert "nothing to do" in add_band("red", [seen[0], three[0]], **rest)
+    with pytest.raises(UserError, match="holds other recordings already"):
+        add_band("red", [seen[0]], **rest)
+
+
+def test_what_is_there_or_cannot_be_used_is_refused_and_nothing_is_copied(
+    project, seen, blind, three, tmp_path_factory
+) -> None:
+    folder = tmp_path_factory.mktemp("given")
+    again, other, torn = folder / "again.mcap", folder / "seen.mcap", folder / "torn.mcap"
+    shutil.copy(seen[0], again)
+    shutil.copy(three[0], other)
+    torn.write_bytes(b"no recording")
+    add(project, seen[0])
+    written = content(project)
+    for recordings, words in (
+        ([again], "again.mcap: is there already, as .*seen.mcap"),
+        ([other], "seen.mcap is there already: give .* another name"),
+        ([three[0], torn], "torn.mcap: .*not an MCAP"),
+        ([three[0], blind[0]], "blind.mcap: .*empty mask"),
+        ([three[0], three[0]], "two of the recordings have this name"),
+        ([three[0], other], "are the same recording"),
+        ([folder / "none.mcap"], "no such file"),
+    ):
+        with pytest.raises(UserError, match=words) as caught:
+            more(project, *recordings)
+        assert "\n" not in str(caught.value) and content(project) == written
+    with pytest.raises(UserError, match="--band"):
+        more(project, three[0], band="blue")
+
+
+def test_a_recording_where_it_once_lay_is_told_how_to_move(project, seen, three) -> None:
+    """As it says, and then it is the band's."""
+    add(project, seen[0])
+    folder, old = project / "data/raw/red", project / "data/raw/red.mcap"
+    (folder / "seen.mcap").rename(old)
+    with pytest.raises(UserError, match=r"red.mcap: .* lie in a folder now: mkdir -p .* && mv"):
+        more(project, three[0])
+    old.rename(folder / "red.mcap")
+    more(project, three[0])

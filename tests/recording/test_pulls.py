@@ -1,0 +1,101 @@
+"""Several pulls in one file: each becomes what it would be in a file of its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.base.errors import UserError
+from pipeline.recording.build import build_episodes, process_pulls
+from pipeline.recording.events import releases_of
+from pipeline.recording.input.reader import read_recording
+from pipeline.recording.pulls import pulls_of
+from tests.recording.bag import START, Truth, blind_bag
+from tests.recording.conftest import written
+from tests.recording.joined import joined
+
+DEEP, SHALLOW = Truth(), Truth(draw=0.26, release=3.1507)
+
+
+@pytest.fixture(scope="module")
+def seen_again(tmp_path_factory):
+    """(path, truth) of a shallower pull, with other noise of the clocks."""
+    return written(tmp_path_factory, "shallow.mcap", truth=SHALLOW)
+
+
+@pytest.fixture(scope="module")
+def both(seen, seen_again, tmp_path_factory):
+    """(path, shifts) of both in one file."""
+    path = tmp_path_factory.mktemp("pulls") / "both.mcap"
+    return path, joined(path, [seen[0], seen_again[0]])
+
+
+def test_each_pull_is_as_its_truth_and_as_in_a_file_of_its_own(
+    both, seen, seen_again, params
+) -> None:
+    path, shifts = both
+    together, refused = build_episodes(path, "band1", params)
+    assert [one.metadata["input"]["pull"] for one in together] == [1, 2] and not refused
+    for episode, (alone, truth), shift in zip(together, (seen, seen_again), shifts, strict=True):
+        assert episode.metadata["input"]["file"] == path.name
+        start = (episode.metadata["input"]["start_ns"] - START) * 1e-9 - shift  # of the window
+        assert start + episode.release_time == pytest.approx(truth.release, abs=1e-3)
+        assert start + episode.grasp_time == pytest.approx(truth.grasp, abs=0.021)
+        time = start + episode.time
+        calm = (np.abs(time - truth.release) > 0.06) & (time > 0.1)
+        force = np.array([truth.force(t) for t in time])
+        np.testing.assert_allclose(episode.force[calm], force[calm], atol=0.15)
+        hand = np.array([truth.hand(t) for t in time])
+        np.testing.assert_allclose(episode.position[calm], hand[calm], atol=3e-4)
+
+        own = build_episodes(alone, "band1", params)[0][0]
+        assert (own.metadata["input"]["file"], own.metadata["input"]["pull"]) == (alone.name, 1)
+        before = (own.metadata["input"]["start_ns"] - START) * 1e-9
+        assert start + episode.release_time == pytest.approx(before + own.release_time, abs=2e-5)
+        stamps = start + episode.cloud_time
+        shared = [np.abs(before + own.cloud_time - stamp).min() < 1e-6 for stamp in stamps]
+        assert np.mean(shared) > 0.95  # the same pictures
+
+
+def test_a_shallow_pull_beside_a_deep_one_is_no_slip(both, params) -> None:
+    """The fingers open, and the hand is free. Between the two it serves both."""
+    recording = read_recording(both[0], params.setup)
+    found = releases_of(recording)
+    wanted = [DEEP.release, SHALLOW.release + both[1][1]]
+    np.testing.assert_allclose(found, wanted, atol=0.01)
+    pulls = pulls_of(recording, params.setup)
+    assert [(one.pull, one.pulls) for one in pulls] == [(1, 2), (2, 2)]
+    assert {one.origin for one in pulls} == {recording.origin}
+    first, second = ([one.wrench.seconds(one.origin)[k] for k in (0, -1)] for one in pulls)
+    assert first[0] == 0 and second[1] == recording.wrench.seconds(recording.origin)[-1]
+    assert DEEP.release < second[0] < first[1] < both[1][1] + SHALLOW.grasp  # they share it
+
+
+def test_what_holds_one_pull_or_is_not_understood_stays_whole(blind, params) -> None:
+    recording = read_recording(blind[0], params.setup)
+    assert pulls_of(recording, params.setup) == [recording]
+    assert recording.origin == recording.wrench.stamp[0]
+    still = replace(recording.wrench, values=0 * recording.wrench.values)
+    still = replace(recording, wrench=still)
+    assert releases_of(still) == [] and pulls_of(still, params.setup) == [still]
+
+
+def test_a_pull_that_cannot_be_used_is_named_and_the_others_are_used(
+    both, seen, tmp_path, params
+) -> None:
+    """The second one's pictures are black."""
+    path = tmp_path / "half.mcap"
+    joined(path, [seen[0], blind_bag(tmp_path, SHALLOW)])
+    found, refused = process_pulls(path, params.bands["band1"], params)
+    assert [done.recording.pull for done in found] == [1]
+    (line,) = map(str, refused)
+    assert line.startswith(f"{path}: pull 2 of 2: ") and "empty mask" in line and "\n" not in line
+
+
+def test_where_none_can_be_used_the_first_says_why(blind, tmp_path, params) -> None:
+    path = tmp_path / "black.mcap"
+    joined(path, [blind[0], blind[0]])
+    with pytest.raises(UserError, match=r"black.mcap: pull 1 of 2: .*empty mask"):
+        process_pulls(path, params.bands["band1"], params)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import find_peaks
@@ -60,13 +61,26 @@ def events_of(recording: Recording, motion: Motion) -> tuple[float, Release]:
 
 
 def releases_of(recording: Recording) -> list[float]:
-    """About when a band is let go [s], each time that one is; none where nothing tells."""
+    """About when pulls end [s]; none where nothing tells.
+
+    With a gripper they end where the fingers open, and where a band slips out that was grasped for
+    this pull, if it is grasped anew for the next one.
+    """
     t, force = recording.wrench.seconds(recording.origin), recording.wrench.values
+    gripper, found = opening_of(recording, recording.origin), []
     try:
-        _, ends, _ = _drops(t, force, *_reach(t), opening_of(recording, recording.origin))
+        _, free, ends, _ = _drops(t, force, *_reach(t), gripper)
     except UserError:
         return []
-    return [float(t[i]) for i in ends]
+    for i, later in pairwise([*free, None]):
+        if i not in ends:
+            grasp, again = (_closed(*gripper, t[k]) for k in (i, i if later is None else later))
+            if grasp is None or (found and grasp < found[-1]):
+                continue
+            if later is not None and (again is None or again < t[i]):
+                continue
+        found.append(float(t[i]))
+    return found
 
 
 def opening_of(recording: Recording, origin: int) -> tuple[np.ndarray, np.ndarray] | None:
@@ -136,7 +150,7 @@ def _steepest(
     t: np.ndarray, force: np.ndarray, near: int, far: int, gripper: tuple | None
 ) -> tuple[int, list[int]]:
     """Sample at which the band is let go, and those of sudden drops before it."""
-    drops, ends, size = _drops(t, force, near, far, gripper)
+    drops, _, ends, size = _drops(t, force, near, far, gripper)
     if len(ends) > 1:
         times = " and ".join(f"{t[i]:.1f}" for i in ends)
         raise UserError(f"a band is let go at {times} s: nothing tells the pulls apart")
@@ -146,8 +160,10 @@ def _steepest(
 
 def _drops(
     t: np.ndarray, force: np.ndarray, near: int, far: int, gripper: tuple | None
-) -> tuple[np.ndarray, list[int], np.ndarray]:
-    """Samples of sudden drops; those of them that leave the hand free; the drop at each sample."""
+) -> tuple[np.ndarray, list[int], list[int], np.ndarray]:
+    """Samples of sudden drops; which leave the hand free; which the fingers let go (all of these
+    where none does); the drop at each sample of the force.
+    """
     sudden = np.linalg.norm(np.subtract(*_means(force, near, far)), axis=1)
     before, after = _means(force, far, 6 * far)
     lasting = np.linalg.norm(before - after, axis=1)
@@ -163,11 +179,10 @@ def _drops(
         )
     rest = force[t < t[0] + LEAD_IN].mean(axis=0)
     held, left = (np.linalg.norm(x[drops] - rest, axis=1) for x in (before, after))
-    free = left < FREE * held
-    ends = list(drops[free & (size[drops] >= SUDDEN * largest)])
-    if gripper is not None:
-        ends = [i for i in drops[free] if _opens(*gripper, t[i])] or ends
-    return drops, ends, size
+    opened = [i for i in drops[left < FREE * held] if gripper and _opens(*gripper, t[i])]
+    large = drops[(left < FREE * held) & (size[drops] >= SUDDEN * largest)]
+    free = sorted({*large.tolist(), *map(int, opened)})
+    return drops, free, opened or free, size
 
 
 def _means(x: np.ndarray, near: int, far: int) -> tuple[np.ndarray, np.ndarray]:

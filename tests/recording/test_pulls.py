@@ -12,7 +12,7 @@ from pipeline.recording.build import build_episodes, process_pulls
 from pipeline.recording.events import releases_of
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.pulls import pulls_of
-from tests.recording.bag import START, Truth, blind_bag
+from tests.recording.bag import START, Truth, blind_bag, edit
 from tests.recording.conftest import written
 from tests.recording.joined import joined
 
@@ -92,6 +92,37 @@ def test_a_pull_that_cannot_be_used_is_named_and_the_others_are_used(
     assert [done.recording.pull for done in found] == [1]
     (line,) = map(str, refused)
     assert line.startswith(f"{path}: pull 2 of 2: ") and "empty mask" in line and "\n" not in line
+
+
+def test_a_band_that_slips_out_between_two_pulls_is_a_pull_that_cannot_be_used(
+    seen, tmp_path, params
+) -> None:
+    """Else the force of that pull would be the tare of the next one."""
+
+    def stay(stamp: int, message) -> None:
+        late = (stamp - START) * 1e-9 > 0.5
+        message.position = [0.008 if late else 0.04] * 2
+
+    path = tmp_path / "slipped.mcap"
+    closed = blind_bag(tmp_path, change=edit(gripper=stay))
+    joined(path, [seen[0], closed, seen[0]])
+    found, refused = process_pulls(path, params.bands["band1"], params)
+    assert [done.recording.pull for done in found] == [1, 3]
+    assert "pull 2 of 3: the force drops at" in str(refused[0])
+    assert "gripper stays closed" in str(refused[0])
+    alone = process_pulls(seen[0], params.bands["band1"], params)[0][0].signals
+    for done in found:
+        np.testing.assert_allclose(done.signals.facts["bias"], alone.facts["bias"], atol=0.02)
+
+
+def test_a_force_that_fails_for_a_while_does_not_end_a_pull(seen, params) -> None:
+    """The fingers stay closed, and nothing is grasped anew."""
+    recording = read_recording(seen[0], params.setup)
+    time = recording.wrench.seconds(recording.origin)
+    force = recording.wrench.values.copy()
+    force[(time > 2.4) & (time < 2.75)] = force[0]
+    failed = replace(recording, wrench=replace(recording.wrench, values=force))
+    assert releases_of(failed) == pytest.approx([DEEP.release], abs=0.05)
 
 
 def test_where_none_can_be_used_the_first_says_why(blind, tmp_path, params) -> None:

@@ -1,0 +1,62 @@
+"""The stage that turns a band's folder of recordings into a folder of episodes."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout, NotMade
+from pipeline.objective.session import load_episodes
+from stages import episode
+from tests.recording.conftest import blind, params, seen
+from tests.recording.joined import joined
+
+__all__ = ["blind", "params", "seen"]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, params, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Of band1's recordings, in an empty project."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(episode, "started", lambda *_: (params, "band1"))
+    return Layout().raw("band1")
+
+
+def test_each_pull_of_each_file_becomes_an_episode_in_order(folder, seen, blind, capsys) -> None:
+    folder.mkdir(parents=True)
+    shutil.copy(seen[0], folder / "b.mcap")
+    joined(folder / "a.mcap", [seen[0], blind[0], seen[0]])
+    left = Layout().episode("band1", 4)  # by an earlier run
+    left.mkdir(parents=True)
+    episode.main()
+    found = [one.metadata["input"] for one in load_episodes("band1")]
+    about = [(one["file"], one["pull"]) for one in found]
+    assert about == [("a.mcap", 1), ("a.mcap", 3), ("b.mcap", 1)]
+    assert not left.exists()
+    said = capsys.readouterr()
+    assert said.err.startswith("warning: left out: data/raw/band1/a.mcap: pull 2 of 3: empty mask")
+    assert said.err.count("\n") == 1 and said.out.count("peak force") == 3
+
+
+def test_a_file_without_a_pull_that_can_be_used_leaves_the_episodes_alone(
+    folder, seen, blind
+) -> None:
+    folder.mkdir(parents=True)
+    shutil.copy(seen[0], folder / "a.mcap")
+    episode.main()
+    before = Layout().episode("band1").stat().st_ino
+    shutil.copy(blind[0], folder / "b.mcap")
+    with pytest.raises(UserError, match="b.mcap: empty mask"):
+        episode.main()
+    assert Layout().episode("band1").stat().st_ino == before
+
+
+def test_a_band_without_a_recording_says_who_makes_one(folder, params, monkeypatch) -> None:
+    with pytest.raises(NotMade, match="data/raw/band1/band1.mcap: missing"):
+        episode.main()
+    own = params.bands["band1"].model_copy(update={"source": "recording"})
+    own = params.model_copy(update={"bands": {"band1": own}})
+    monkeypatch.setattr(episode, "started", lambda *_: (own, "band1"))
+    with pytest.raises(UserError, match="sling add-recording --band band1 FILE.mcap` puts one"):
+        episode.main()

@@ -37,11 +37,10 @@ def add_recording(
     there = digests(layout.recordings(band))
     files = targets(recordings, layout.raw(band))
     for file, target in files.items():
+        if same := there.get(sha256(file)):
+            raise UserError(f"{file}: is there already, as {same}")
         if target.exists():
             raise UserError(f"{target} is there already: give {file} another name")
-        same = there.get(sha256(file))
-        if same:
-            raise UserError(f"{file}: is there already, as {same}")
     reports = checked(recordings, params, band)
     copy(files)
     return told(f"{band}: added to the {len(there)} that were there", reports)

@@ -67,8 +67,8 @@ class PullLine:
     def __str__(self) -> str:
         numbers = (self.grasp_s, self.release_s, self.peak_force_n)
         cells = "".join(f"{'-' if n is None else format(n, '.3f'):>13}" for n in numbers)
-        verdict = self.verdict.replace("but:", f"but: {self.cautions} remarks")
-        return f"{self.number:>6}{cells}   {verdict}"
+        remarks = f" {self.cautions} remark{'s' * (self.cautions > 1)}" if self.cautions else ""
+        return f"{self.number:>6}{cells}   {self.verdict}{remarks}"
 
 
 @dataclass

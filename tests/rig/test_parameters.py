@@ -111,7 +111,6 @@ class Laboratory:
         monkeypatch.setattr(record, "SENSOR_RATE", 100)
         monkeypatch.setattr(record, "PIXELS_APART", 0.1)
         monkeypatch.setattr(camera, "RATE", 5.0)
-        monkeypatch.setattr(camera, "FIRST_FRAME", 0.02)  # so that one sees the recoil, at 2.42 s
         for module in (motion, interaction, record):
             for name in HASTE.keys() & vars(module).keys():
                 monkeypatch.setattr(module, name, HASTE[name])

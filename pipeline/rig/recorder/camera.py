@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT = 640, 480
 RATE = 30.0  # Hz
-FIRST_FRAME = 0.004  # s
 LIGHT = np.array([0.45, 0.35, 0.82]) / np.linalg.norm([0.45, 0.35, 0.82])
 AMBIENT = 0.45
 NEAR = 0.05  # m

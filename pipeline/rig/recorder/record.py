@@ -63,7 +63,8 @@ def record(
     opening = rig.pads.opening_time, rig.pads.shape
     motion = HandMotion.through(middle, rig.tracking_error, opening, motion_rng)
     times = np.arange(round(END * SENSOR_RATE)) / SENSOR_RATE
-    frames = eye.FIRST_FRAME + np.arange(int((END - eye.FIRST_FRAME) * eye.RATE)) / eye.RATE
+    phase = camera_rng.random()  # a camera's clock knows nothing of the hand's
+    frames = (phase + np.arange(int(END * eye.RATE - phase))) / eye.RATE
     frames = frames[camera_rng.random(len(frames)) >= rig.camera.drop_rate]
     shutter = rig.camera.exposure * np.linspace(-0.5, 0.5, INSTANTS)
     seen = np.unique(frames[:, None] + shutter)

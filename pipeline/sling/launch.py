@@ -109,6 +109,7 @@ def _outcomes(sling: Sling, lanes: np.ndarray, draws: np.ndarray, max_force: flo
     hold_force = np.linalg.norm(lanes["hold_force"], axis=1)
     hold_force[outcome > 0] = np.nan
     time, y, z, vy, vz = lanes["separation"].T
+    vy, vz = np.sqrt(sling.returned_share) * np.stack([vy, vz])
     floor = -sling.fork_height
     landing = ballistic_landing(y, z, vy, vz, floor)
 

@@ -12,9 +12,16 @@
 //   -mu/m (1 + min(max(J, 0), 1)^2)/2  <=  p  <=  0.7 mu/m
 //
 //   D = d/2 [ K J'^2 + s ( mu |F'|^2 + p d2J(F', F') + mu/3 J'^2 ) ]
+//
+// Nominal stress turns with the material, and its rate is not zero where a stressed band only turns: as written, D would
+// brake every turn of a taut band. So D is taken at F' - w x F, with the spin w at which it is least: of S = mu F + p cof F
+// and tau = F S' (symmetric), (tr tau - tau) w = sum_k S_k x F'_k. A turn costs nothing, a stretch what it did, and every state
+// dissipates still. TURNS mu on the diagonal keeps the matrix regular where nothing is stressed. Of all that is taken off so, `turning`
+// is the share that stays: engines that damp the rate of the nominal stress brake turns in full.
 
 // F now, predicted, and its rate -> stress (columns) and its derivative, K[k (k + 1) / 2 + l] for columns k >= l,
 // exact as long as p / mu is between `least` and `most`; `shaped` scales s further
+#define TURNS 1e-3
 auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&xt)[3][3], SC least, SC most, real shaped, real (&stress)[3][3], real (&K)[6][3][3]) {
   real C[3][3], Cp[3][3], square = zero;  // cofactors; m squared
   UNROLL for (int k = 0; k < 3; ++k) {
@@ -32,19 +39,57 @@ auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&
   const real pv = minimum(maximum(lam * (Jp - (SC)1) - mu, (SC)-0.5 * bound * (one + kept * kept)), (SC)0.7 * bound);
   const real Jt = dot(Cp[0], xt[0]) + dot(Cp[1], xt[1]) + dot(Cp[2], xt[2]);
   const real sv = s * shaped, dshv = dsh * shaped, volumetric = bulk + sv * mu / (SC)3;
+  real S[3][3], A[6], spin[3] = {zero, zero, zero};  // A: 00, 10, 11, 20, 21, 22 of the inverse below
+  UNROLL for (int k = 0; k < 3; ++k) {
+    real turn[3];
+    UNROLL for (int c = 0; c < 3; ++c) S[k][c] = mu * xp[k][c] + pv * Cp[k][c];
+    cross(S[k], xt[k], turn);
+    UNROLL for (int c = 0; c < 3; ++c) spin[c] += turn[c];
+  }
+  {
+    real tau[6];
+    UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n <= m; ++n) {
+      real sum = zero;
+      UNROLL for (int k = 0; k < 3; ++k) sum += xp[k][m] * S[k][n] + xp[k][n] * S[k][m];
+      tau[m * (m + 1) / 2 + n] = (SC)-0.5 * sum;
+    }
+    const real trace = (SC)TURNS * mu - tau[0] - tau[2] - tau[5];
+    tau[0] += trace; tau[2] += trace; tau[5] += trace;
+    A[0] = tau[2] * tau[5] - tau[4] * tau[4]; A[1] = tau[4] * tau[3] - tau[1] * tau[5]; A[2] = tau[0] * tau[5] - tau[3] * tau[3];
+    A[3] = tau[1] * tau[4] - tau[3] * tau[2]; A[4] = tau[3] * tau[1] - tau[0] * tau[4]; A[5] = tau[0] * tau[2] - tau[1] * tau[1];
+    const real over = (one - turning) / (tau[0] * A[0] + tau[1] * A[1] + tau[3] * A[3]);
+    UNROLL for (int m = 0; m < 6; ++m) A[m] *= over;
+    const real b[3] = {spin[0], spin[1], spin[2]};
+    spin[0] = A[0] * b[0] + A[1] * b[1] + A[3] * b[2];
+    spin[1] = A[1] * b[0] + A[2] * b[1] + A[4] * b[2];
+    spin[2] = A[3] * b[0] + A[4] * b[1] + A[5] * b[2];
+  }
   UNROLL for (int k = 0; k < 3; ++k) {
     const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-    real u[3], v[3];  // d2J applied to the rates
-    cross(xt[k1], xp[k2], u); cross(xp[k1], xt[k2], v);
+    real u[3], v[3], turned[3];  // d2J applied to the rates
+    cross(xt[k1], xp[k2], u); cross(xp[k1], xt[k2], v); cross(spin, S[k], turned);
     UNROLL for (int c = 0; c < 3; ++c)
       stress[k][c] = mu * x[k][c] + p * C[k][c]
-                   + d * (volumetric * Jt * Cp[k][c] + sv * (mu * xt[k][c] + pv * (u[c] + v[c])));
+                   + d * (volumetric * Jt * Cp[k][c] + sv * (mu * xt[k][c] + pv * (u[c] + v[c]) - turned[c]));
   }
   if (!fresh) return;
+  UNROLL for (int l = 0; l < 3; ++l) {
+    real turns[3][3];  // turns[n] is the spin that the rate n of column l brings
+    const real* a = S[l];
+    UNROLL for (int m = 0; m < 3; ++m) {
+      const real r0 = A[m ? (m == 1 ? 1 : 3) : 0], r1 = A[m ? (m == 1 ? 2 : 4) : 1], r2 = A[m ? (m == 1 ? 4 : 5) : 3];
+      turns[0][m] = dshv * (r1 * a[2] - r2 * a[1]); turns[1][m] = dshv * (r2 * a[0] - r0 * a[2]); turns[2][m] = dshv * (r0 * a[1] - r1 * a[0]);
+    }
+    UNROLL for (int k = l; k < 3; ++k) UNROLL for (int n = 0; n < 3; ++n) {
+      real turned[3];
+      cross(turns[n], S[k], turned);
+      UNROLL for (int m = 0; m < 3; ++m) K[k * (k + 1) / 2 + l][m][n] = -turned[m];
+    }
+  }
   UNROLL for (int k = 0; k < 3; ++k) UNROLL for (int l = 0; l <= k; ++l) {
     real (&block)[3][3] = K[k * (k + 1) / 2 + l];
     UNROLL for (int m = 0; m < 3; ++m) UNROLL for (int n = 0; n < 3; ++n)
-      block[m][n] = lam * C[k][m] * C[l][n] + dh * volumetric * Cp[k][m] * Cp[l][n];
+      block[m][n] += lam * C[k][m] * C[l][n] + dh * volumetric * Cp[k][m] * Cp[l][n];
     if (k == l) {
       UNROLL for (int m = 0; m < 3; ++m) block[m][m] += mu + dshv * mu;
     } else {

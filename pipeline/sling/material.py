@@ -40,6 +40,6 @@ def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
         result["bending"] = (1 + poisson) * sling.radius**2 / 2
     else:
         result["bending"] = sling.flexural_rigidity / (mu * sling.area)
-    result["drag"] = sling.air_drag
+    result["drag"], result["turning"] = sling.air_drag, sling.turn_damping
     result["mooney"], result["relaxation"] = sling.mooney_share, sling.relaxation
     return result

@@ -50,6 +50,11 @@ class Sling:
         clamp_twist: Of the last clamp about the band, against the first [rad].
         air_drag: Of the moving band: force for its mass and speed [1/s], one or one a theta;
             whatever brakes it besides the cylinder's drag.
+        turn_damping: Share of the damping that brakes a turn of a stressed band besides, one or one
+            a theta: 0 in a material, whose stress turns with it; 1 in engines that damp the rate of
+            the nominal stress.
+        returned_share: Of the energy that the law gives a launch, what it truly gets, one or one a
+            theta.
         air_density: For the drag of a cylinder across the wind [kg/m^3], which tetrahedra do not
             feel.
         law: NEO_HOOKEAN, or RUBBER (rubber.h), which the rod alone knows.
@@ -79,6 +84,8 @@ class Sling:
     clamp_twist: float = 0.0
     mesh: str = ROD
     air_drag: float | np.ndarray = 0.0
+    turn_damping: float | np.ndarray = 0.0
+    returned_share: float | np.ndarray = 1.0
     air_density: float = 0.0
     law: str = NEO_HOOKEAN
     mooney_share: float | np.ndarray = 0.0

@@ -47,7 +47,16 @@ SETTING = _record(
 )  # fmt: skip
 # of a sling's law: material.py computes them, state.h takes them to material.h and rod.h
 MATERIAL = _record(
-    "mu", "lam", "damping", "scale", "friction", "bending", "drag", "mooney", "relaxation"
+    "mu",
+    "lam",
+    "damping",
+    "scale",
+    "friction",
+    "bending",
+    "drag",
+    "mooney",
+    "relaxation",
+    "turning",
 )
 # of a step that ends at `time` and is `h` long: past and beta as in step.h; Mode, Grip; where the
 # hand is; its normal force (for opening pads, how much of it is gone); how much of the way from

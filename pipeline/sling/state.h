@@ -16,7 +16,7 @@ const bool first_clamped = SET(CLAMPED) > 0, last_clamped = setting.data[SETTING
 const SC node_shift = node_mass * (SC)2.5e5;  // the inertia of a 2 ms step
 auto LAW = ROW(coefficients, MATERIAL_SIZE);  // of the material
 const real mu = LAW[MATERIAL_MU], lam = LAW[MATERIAL_LAM], bulk = lam - mu / (SC)3, d = LAW[MATERIAL_DAMPING], s = LAW[MATERIAL_SCALE];
-const real friction = LAW[MATERIAL_FRICTION], bending = LAW[MATERIAL_BENDING], drag = LAW[MATERIAL_DRAG];
+const real friction = LAW[MATERIAL_FRICTION], bending = LAW[MATERIAL_BENDING], drag = LAW[MATERIAL_DRAG], turning = LAW[MATERIAL_TURNING];
 
 // degree of freedom k of cross-section i: now, predicted, the y and xh of step.h, Newton's change, and of the two steps before
 auto INITIAL = ROW(state, N * L);

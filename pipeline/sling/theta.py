@@ -3,8 +3,8 @@
 {"band": "...", "theta": {"youngs_modulus": ..., ... all five}}  is of the neo-Hookean law; with
 "law": "rubber", θ has its parameters too and "history" {"pull_time", "pause"} says in how many
 seconds the recording's hand drew the band and how long it waited. Where a stage wrote it, also
-"method", "nuisances": {"air_drag": ...}, "loss": {"geom", "force", "work", "total"}, "rollouts",
-"confidence"
+"method", "nuisances": {"air_drag": ...}, "turn_damping", "returned_share", "loss":
+{"geom", "force", "work", "total"}, "rollouts", "confidence"
 
 What its confidence rests on, samples of θ, lies beside in data/confidence/.
 """
@@ -27,6 +27,9 @@ from pipeline.sling.load import load_sling
 from pipeline.sling.material import THETA
 from pipeline.sling.model import LaunchHistory, Sling
 from pipeline.sling.rubber import NEO_HOOKEAN, RUBBER
+
+
+EXTRA = "air_drag", "turn_damping", "returned_share"  # of a point, after θ and what its law adds
 
 
 def _limits(name: str) -> Range:
@@ -67,6 +70,8 @@ class ThetaFile(JsonRecord):
     theta: Theta
     history: RecordedPull | None = None
     nuisances: Nuisances = Nuisances()
+    turn_damping: Annotated[float, Range(0, 1)] = 0.0
+    returned_share: Annotated[float, Range(0.1, 10)] = 1.0
     confidence: Confidence | None = None
 
     @model_validator(mode="after")
@@ -89,7 +94,9 @@ class PosteriorFile(JsonRecord):
     @model_validator(mode="after")
     def _a_column_each(self) -> PosteriorFile:
         known = self.names in [
-            [*THETA, *law, *drag] for law in LAWS.values() for drag in ([], ["air_drag"])
+            [*THETA, *law, *EXTRA[:count]]
+            for law in LAWS.values()
+            for count in range(len(EXTRA) + 1)
         ]
         if self.samples and not (known and {*map(len, self.samples)} == {len(self.names)}):
             raise refusal("samples: must have a column for each of `names`, which are those of θ")
@@ -108,7 +115,7 @@ def load_theta(path: Path, band: str) -> dict:
 
 
 def load_samples(path: Path) -> np.ndarray | None:
-    """Samples of θ, what its law adds, and the air's drag if searched, (M, P); None without any.
+    """Samples of θ, what its law adds, and EXTRA, (M, P); None without any.
 
     Raises NotMade where the file is damaged.
     """
@@ -130,6 +137,8 @@ def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Slin
     law = content.get("law", NEO_HOOKEAN)
     extra = {name: content["theta"][name] for name in LAWS[law]}
     extra["air_drag"] = content.get("nuisances", {}).get("air_drag", 0.0)
+    extra["turn_damping"] = content.get("turn_damping", 0.0)
+    extra["returned_share"] = content.get("returned_share", 1.0)
     extra["history"] = launch_history(params, content)
     return replace(load_sling(params, band, root, law), **extra)
 
@@ -144,10 +153,10 @@ def launch_history(params, content: dict) -> LaunchHistory | None:
 
 
 def at_points(sling: Sling, points: np.ndarray) -> tuple[Sling, np.ndarray]:
-    """A sling and θ (N, 5) of points (N, P): θ, what the sling's law adds, perhaps the drag."""
+    """A sling and θ (N, 5) of points (N, P): θ, what the sling's law adds, perhaps EXTRA."""
     if points.shape[-1] == len(THETA):
         return sling, points
-    names = (*LAWS[sling.law], "air_drag")
+    names = (*LAWS[sling.law], *EXTRA)
     extra = dict(zip(names, points[:, len(THETA) :].T, strict=False))
     return replace(sling, **extra), points[:, : len(THETA)]
 

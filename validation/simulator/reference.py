@@ -20,6 +20,7 @@ from pipeline.sling.material import material
 from pipeline.sling.model import GRAVITY, Sling
 from pipeline.sling.rubber import RUBBER, TIMES
 
+TURNS = 1e-3  # of the modulus: keeps the spin of an unstressed edge regular
 STRAIGHT = 0.7  # stretch below which the law `rubber` is a straight line
 
 
@@ -154,8 +155,22 @@ class ReferenceRod:
             stretch = np.maximum(self.stretch(f), STRAIGHT)
             s = s * (self.uniaxial(stretch, 1) / self.uniaxial(stretch, 1, share=0.0))
             s = s[..., None, None]
-        shape = mu * turn + p[..., None, None] * cofactor_rate(f, turn) + mu / 3 * volume_rate * cof
+        p = p[..., None, None]
+        stress = mu * f + p * cof
+        spin = (1 - self.sling.turn_damping) * self._spin(f, stress, turn, mu)[..., None, :]
+        shape = mu * turn + p * cofactor_rate(f, turn) + mu / 3 * volume_rate * cof
+        shape = shape - np.cross(spin, stress)
         return self.sling.area * d * ((lam - mu / 3) * volume_rate * cof + s * shape)
+
+    @staticmethod
+    def _spin(f: np.ndarray, stress: np.ndarray, rate: np.ndarray, mu) -> np.ndarray:
+        """Of the frame in which `rate` dissipates least, (..., E, 3); columns lie in axis -2."""
+        tau = np.einsum("...km,...kn->...mn", f, stress)
+        tau = (tau + np.swapaxes(tau, -1, -2)) / 2
+        trace = np.trace(tau, axis1=-2, axis2=-1) + TURNS * np.squeeze(mu)
+        inertia = trace[..., None, None] * np.eye(3) - tau
+        moment = np.cross(stress, rate).sum(axis=-2)
+        return np.linalg.solve(inertia, moment[..., None])[..., 0]
 
     # ---- joints: between neighbouring frames; one that does not move has no length
 

@@ -16,7 +16,9 @@ LAWS = {  # of the band's material: what each has beside the five, and how far i
     "neo_hookean": {},
     "rubber": {"mooney_share": (-1.0, 1.0), "relaxation": (0.0, 0.2)},
 }
-SEARCHES = ("multistart", "de", "bo", "adam")
+LEAST_SQUARES = "least_squares"
+UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
+SEARCHES = ("multistart", LEAST_SQUARES, "de", "bo", "adam")
 NUISANCES = {  # how far the box of each may reach: 1/s, s, 1, N, m
     "air_drag": (0.0, 50.0),
     "camera_delay": (-0.02, 0.02),
@@ -200,6 +202,17 @@ class MethodParams(MethodDefaults):
             raise refusal("settings are for another search than multistart, which has none")
         if self.search != "multistart" and not (self.k_top is None and self.covariance):
             raise refusal(f"k_top and covariance are for search: multistart, not {self.search}")
+        return self
+
+    @model_validator(mode="after")
+    def _least_squares_fixes_the_unseen(self) -> MethodParams:
+        if self.search == LEAST_SQUARES and (set(self.fixed) != set(UNSEEN) or self.nuisances):
+            raise refusal(
+                f"search: {LEAST_SQUARES} wants `fixed` to name {', '.join(UNSEEN)}, which no pull"
+                " shows, and has nuisances of its own"
+            )
+        if self.search == LEAST_SQUARES and self.settings:
+            raise refusal(f"settings: {LEAST_SQUARES} has none")
         return self
 
     @model_validator(mode="after")

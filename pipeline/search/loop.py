@@ -17,6 +17,7 @@ from scipy.stats import qmc
 from pipeline.base.errors import UserError
 from pipeline.objective.evaluate import Evaluation, Penalty
 from pipeline.objective.space import Space
+from pipeline.params.identification import LEAST_SQUARES
 from pipeline.search.history import History
 
 
@@ -86,7 +87,8 @@ def budget(optimizer, search: str) -> tuple[int, int]:
     """
     explore = optimizer.population * (optimizer.generations + 1)
     refine = optimizer.cma_rollouts
-    return (explore, refine) if search == "multistart" else (explore + refine, 0)
+    two_phases = search in ("multistart", LEAST_SQUARES)
+    return (explore, refine) if two_phases else (explore + refine, 0)
 
 
 def search(

@@ -8,9 +8,11 @@ import sys
 from pathlib import Path
 
 from pipeline.base.errors import UserError, one_line
+from pipeline.params.identification import LEAST_SQUARES
 from pipeline.search.loop import Optimizer
 
 OURS = {
+    "design": f"{__name__}.design:Design",
     "de": f"{__name__}.evolution:Evolution",
     "bo": f"{__name__}.bayes:Bayes",
     "adam": f"{__name__}.adam:Adam",
@@ -21,7 +23,8 @@ def explorer(method, optimizer, dimension: int, rollouts: int) -> Optimizer:
     """The optimiser that searches the whole box for a method.
 
     Args:
-        method: params.yaml's `methods.<name>`; multistart explores by differential evolution.
+        method: params.yaml's `methods.<name>`; multistart explores by differential evolution, least
+            squares by one design.
         optimizer: params.yaml's `optimizer`.
         dimension: Of the cube of the free axes.
         rollouts: How many points it will be asked for, in all.
@@ -29,7 +32,7 @@ def explorer(method, optimizer, dimension: int, rollouts: int) -> Optimizer:
     Raises:
         UserError: As `build`.
     """
-    name = "de" if method.search == "multistart" else method.search
+    name = {"multistart": "de", LEAST_SQUARES: "design"}.get(method.search, method.search)
     settings = dict(method.settings.items())
     if name == "de":
         moves = {"mutation": optimizer.mutation, "recombination": optimizer.recombination}

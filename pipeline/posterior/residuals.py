@@ -1,0 +1,237 @@
+"""Signed residuals of a recording, smooth in the parameters: what least squares needs.
+
+    force   measured less simulated, filtered alike                                       [N]
+    cloud   mean offset of the points in a bin along the band from the simulated tube, in two
+            components across it: `depth` towards the camera, `side` the other one        [m]
+
+Which samples and pictures count is decided by their time alone, before anything is simulated: the
+force from the grasp to just before the release; pictures of the held band in the last half second
+before it, and of the recoil as long as a picture shows the damping more than the mesh. Bins and
+directions are those of one reference rollout; a bin that shows too few points is none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipeline.episode.episode import Episode
+from pipeline.episode.signal import as_recorded
+
+BINS = 16  # along the band, equal at rest
+LEAST_POINTS = 4  # of a bin
+MOST_POINTS = 320  # of a frame that are looked at
+WINDOW = 4  # edges on each side of a bin's own on which its point's foot may lie
+VISIBLE = 2 / np.pi  # mean of cos over the half of a tube that faces the camera
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Which samples and pictures count, in seconds from the release.
+
+    Attributes:
+        force_until: Samples of the force from the grasp until then.
+        held: Pictures of the drawn band.
+        recoil: Pictures of the recoil until then; where none is, the first one after it.
+        bins: Of the recoil, first and end: nearer the clamps the band folds.
+    """
+
+    force_until: float = -0.06
+    held: tuple[float, float] = (-0.5, -0.02)
+    recoil: float = 0.05
+    way: float = 0.15
+    bins: tuple[int, int] = (4, 12)
+
+    def frames(self, episode: Episode) -> np.ndarray:
+        """Numbers of the pictures that count, shape (F,)."""
+        time = episode.cloud_time - episode.release_time
+        held = (time > self.held[0]) & (time < self.held[1])
+        drawn = self._away(
+            episode,
+            episode.position[
+                np.interp(episode.release_time, episode.time, np.arange(len(episode.time))).astype(
+                    int
+                )
+            ][None],
+        )
+        recoil = (time > 0) & (time <= self.recoil)
+        for frame in np.flatnonzero(recoil):
+            recoil[frame] = self._away(episode, episode.clouds[frame]) > self.way * drawn
+        if not recoil.any():
+            later = np.flatnonzero(time > 0)
+            recoil[later[np.argsort(time[later])[:1]]] = True
+        return np.flatnonzero(held | recoil)
+
+    @staticmethod
+    def _away(episode: Episode, points: np.ndarray) -> float:
+        """How far the farthest twentieth of points (P, 3) is behind the fork [m]."""
+        return -float(np.quantile(points[:, 1], 0.05)) if len(points) else 0.0
+
+    def samples(self, episode: Episode) -> np.ndarray:
+        """Numbers of the force's samples that count, shape (S,)."""
+        until = episode.release_time + self.force_until
+        return np.flatnonzero((episode.time > episode.grasp_time) & (episode.time < until))
+
+
+@dataclass
+class Residuals:
+    """Residual vectors of rollouts, in the bins of a reference rollout.
+
+    R residuals: force x, y, z at S samples, then depth and side of M bins.
+
+    Attributes:
+        cutoff: Of the low-pass that the recorded force went through [Hz].
+        reference: Centre lines of one rollout [m], shape (K, L, 3).
+        samples: Numbers of the force's, shape (S,).
+        frame, bin: Of each bin, which picture's and which along the band, shape (M,).
+    """
+
+    episode: Episode
+    sling: object
+    cutoff: float
+    reference: np.ndarray
+    rule: Rule = field(default_factory=Rule)
+
+    def __post_init__(self) -> None:
+        self.samples = self.rule.samples(self.episode)
+        self._edges = self.sling.edge_lengths
+        self._bin(np.asarray(self.reference, float))
+
+    @property
+    def size(self) -> int:
+        return 3 * len(self.samples) + 2 * len(self.frame)
+
+    @property
+    def recoils(self) -> np.ndarray:
+        """Which bins (M,) are of the recoil."""
+        return self.episode.cloud_time[self.frame] > self.episode.release_time
+
+    def _bin(self, reference: np.ndarray) -> None:
+        episode = self.episode
+        place = np.append(0, np.cumsum(self._edges)) / self._edges.sum()
+        found = []
+        for number in self.rule.frames(episode):
+            cloud = episode.clouds[number]
+            if len(cloud) < LEAST_POINTS:
+                continue
+            points = np.asarray(cloud[:: -(-len(cloud) // MOST_POINTS)], float)
+            line = reference[number]
+            foot, edge, part = _nearest(points, line)
+            at = place[edge] + part * (place[edge + 1] - place[edge])
+            bins = np.minimum((at * BINS).astype(int), BINS - 1)
+            count = np.bincount(bins, minlength=BINS)
+            good = np.flatnonzero(count >= LEAST_POINTS)
+            if episode.cloud_time[number] > episode.release_time:
+                good = good[(good >= self.rule.bins[0]) & (good < self.rule.bins[1])]
+            mean = np.stack([np.bincount(bins, axis, BINS) for axis in points.T], 1)[good]
+            mean /= count[good, None]
+            step = np.diff(line, axis=0)
+            length = np.linalg.norm(step, axis=1)
+            tangent = step / length[:, None]
+            radius = self.sling.radius * np.sqrt(self._edges / length)
+            front = _across(episode.camera - foot, tangent[edge])
+            offset = points - foot - VISIBLE * radius[edge, None] * front
+            foot_of_mean, edge_of_mean, _ = _nearest(mean, line)
+            along = tangent[edge_of_mean]
+            depth = _across(episode.camera - mean, along)
+            seen = np.stack([np.bincount(bins, axis, BINS) for axis in offset.T], 1)[good]
+            seen /= count[good, None]
+            # what bending and tube add to a bin's mean point, as they do at the reference
+            bias = (mean - foot_of_mean) - seen
+            frames = np.full(len(good), number)
+            found.append((frames, good, edge_of_mean, mean, depth, np.cross(along, depth), bias))
+        columns = zip(*found, strict=True)
+        self.frame, self.bin, edge, self.point, self.depth, self.side, bias = (
+            np.concatenate(column) for column in columns
+        )
+        self._bias = np.stack([_dot(bias, self.depth), _dot(bias, self.side)])  # (2, M)
+        window = edge[:, None] + np.arange(-WINDOW, WINDOW + 1)
+        self._window = np.clip(window, 0, len(self._edges) - 1)
+
+    def __call__(self, rollouts) -> np.ndarray:
+        """Residual vectors of N rollouts, shape (N, R)."""
+        gap = (self.episode.force - self.force(rollouts))[:, self.samples]
+        line = np.asarray(rollouts.center_line, np.float32)
+        point = self.point.astype(np.float32)[:, None]
+        start = line[:, self.frame[:, None], self._window]  # (N, M, W, 3)
+        step = line[:, self.frame[:, None], self._window + 1] - start
+        start -= point
+        part = -_dot(start, step) / np.maximum(_dot(step, step), 1e-12)
+        start += np.clip(part, 0, 1)[..., None] * step  # from the point to its foot
+        best = _dot(start, start).argmin(axis=2)
+        offset = -np.take_along_axis(start, best[:, :, None, None], 2)[:, :, 0]  # (N, M, 3)
+        cloud = [_dot(offset, self.depth) - self._bias[0], _dot(offset, self.side) - self._bias[1]]
+        return np.concatenate([*gap.transpose(2, 0, 1), *cloud], axis=1).astype(float)
+
+    def force(self, rollouts) -> np.ndarray:
+        """Of N rollouts on the gripper, as the recorded one was filtered [N], shape (N, T, 3)."""
+        episode = self.episode
+        steps = np.moveaxis(np.asarray(rollouts.force, float), 0, 1)  # (S, N, 3)
+        sampling = episode.time[0] - episode.sample_period / 2, episode.sample_period
+        force = as_recorded(rollouts.times, steps, self.cutoff, *sampling, len(episode.time))
+        return np.moveaxis(force, 1, 0)
+
+    def spread(self, force: float, cloud: float, way: float) -> np.ndarray:
+        """Standard deviation of each residual, shape (R,).
+
+        Args:
+            force: Of a sample [N].
+            cloud, way: Of a bin [m], and as a share of the way that the middle has gone.
+        """
+        drawn = self.reference[self.rule.frames(self.episode)[0], self.sling.middle]
+        gone = np.linalg.norm(self.reference[self.frame, self.sling.middle] - drawn, axis=1)
+        bins = np.hypot(cloud, way * np.where(self.recoils, gone, 0.0))
+        return np.concatenate([np.full(3 * len(self.samples), force), bins, bins])
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """How the residuals change with what moves all measured forces or points alike, (R,) each.
+
+        force_bias_* [N], force_drift_* [N over the pull], cloud_shift_* [m], cloud_turn_* about the
+        camera [rad].
+        """
+        count, changes = len(self.samples), {}
+        time = self.episode.time[self.samples]
+        since = (time - time[0]) / (time[-1] - time[0])
+        arm = self.point - self.episode.camera
+        turned = np.cross(arm, self.depth), np.cross(arm, self.side)
+        for axis, letter in enumerate("xyz"):
+            for name, course in (("force_bias", 1.0), ("force_drift", since)):
+                column = np.zeros(self.size)
+                column[axis * count : (axis + 1) * count] = course
+                changes[f"{name}_{letter}"] = column
+            for name, (depth, side) in (
+                ("cloud_shift", (self.depth, self.side)),
+                ("cloud_turn", turned),
+            ):
+                column = np.zeros(self.size)
+                column[3 * count :] = np.concatenate([depth[:, axis], side[:, axis]])
+                changes[f"{name}_{letter}"] = column
+        return changes
+
+    def of_frame(self, number: int) -> np.ndarray:
+        """Which residuals are of one camera frame, shape (R,) bool."""
+        cloud = self.frame == number
+        return np.concatenate([np.zeros(3 * len(self.samples), bool), cloud, cloud])
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("...c,...c->...", a, b)
+
+
+def _across(towards: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+    """Unit part of `towards` across unit `tangent`, both (..., 3)."""
+    towards = towards - _dot(towards, tangent)[..., None] * tangent
+    return towards / np.linalg.norm(towards, axis=-1, keepdims=True)
+
+
+def _nearest(points: np.ndarray, line: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Feet (P, 3) of points on a line (L, 3), the edges (P,) they lie on, and where in them."""
+    step = np.diff(line, axis=0)
+    gap = points[:, None] - line[:-1]
+    part = np.clip(_dot(gap, step) / np.maximum(_dot(step, step), 1e-12), 0, 1)
+    foot = line[:-1] + part[..., None] * step
+    offset = points[:, None] - foot
+    edge = _dot(offset, offset).argmin(axis=1)
+    row = np.arange(len(points))
+    return foot[row, edge], edge, part[row, edge]

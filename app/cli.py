@@ -20,7 +20,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from stages.start import note_unmounted, run
 
-DEFAULT_METHOD = "sling2sim2real_taut"
+DEFAULT_METHOD = "least_squares"
 FURTHEST_DRAW = 2.0  # m
 Done = str | tuple[str, int]  # what to print, and an exit status that is not 0
 COMMANDS: dict[str, tuple[str, tuple, Callable[[argparse.Namespace], Done]]] = {}

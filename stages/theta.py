@@ -1,29 +1,35 @@
-"""Refine a search's promising regions, choose θ*, the best of all, and say how sure it is.
+"""Refine what a search explored, and choose θ*.
 
     python -m stages.theta band1 sling2sim2real
 
-Reads data/history/<band>/<method>.parquet, data/episodes/<band>/ and data/mounting/<band>.json.
-Writes the regions with their covariances to data/clusters/<band>/<method>.json and what a CMA-ES in
-each evaluated to data/refined/<band>/<method>.parquet (of a search of one phase, no region and no
-row); θ* to data/theta/<band>/<method>.json, and samples of the posterior with profile curves to
-data/confidence/<band>/<method>.json. Where too many simulations around θ* fail to tell how sure it
-is, "confidence" is null and there are no samples. Killed, it resumes from .checkpoints/.
-SLING_DEVICE and SLING_WORKERS say where it runs.
+Reads data/history/<band>/<method>.parquet, data/episodes/<band>/, data/mounting/<band>.json and,
+where launches are evidence, data/evidence/<band>.csv. Writes the regions with their covariances to
+data/clusters/<band>/<method>.json and what was evaluated to data/refined/<band>/<method>.parquet,
+θ* to data/theta/<band>/<method>.json, and samples of what is known of it to
+data/confidence/<band>/<method>.json.
+
+By the method's search: `multistart` refines its regions by a CMA-ES in each, and θ* is the best of
+all; `least_squares` fits one density to all recordings and launches, θ* is its mode, and it alone
+says how sure θ* is: else "confidence" is null and there are no samples. A search of one phase has
+no region and no row. Killed, it resumes from .checkpoints/. SLING_DEVICE and SLING_WORKERS say
+where it runs.
 """
 
 from __future__ import annotations
 
-import sys
+import numpy as np
 
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout, made
 from pipeline.base.machine import workers
-from pipeline.confidence.rounds import NoConfidence
-from pipeline.confidence.summary import confidence
 from pipeline.episode.pull import launch_history
-from pipeline.objective.session import load_episode, service
+from pipeline.launches.evidence import read_evidence
+from pipeline.objective.evaluate import Evaluator
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.objective.session import load_episode, load_episodes, service
 from pipeline.objective.space import Space
-from pipeline.params.identification import LAWS
+from pipeline.params.identification import LAWS, LEAST_SQUARES
+from pipeline.posterior import identify
 from pipeline.search.history import History, theta_content
 from pipeline.search.loop import Free, search
 from pipeline.search.optimizers.multistart import Multistart
@@ -31,6 +37,7 @@ from pipeline.search.regions import Region, regions_of, save_regions
 from pipeline.sling.load import load_sling
 from pipeline.sling.material import THETA
 from pipeline.sling.rubber import RUBBER
+from pipeline.sling.theta import calibrated
 from stages.start import run, started
 
 
@@ -40,30 +47,64 @@ def main() -> None:
     free = Free.of(Space.of_method(params, method), about.fixed)
     explored = History.load(method, free.names, made(layout.history(band, method)))
     regions, asked = promising(about, params.optimizer, explored)
-    episode, sling = load_episode(band), load_sling(params, band, law=about.law)
-    known = {"law": RUBBER, "history": launch_history(episode)} if about.law == RUBBER else {}
-
     save_regions(layout.clusters(band, method), free.names, regions, asked)
-    if regions:
-        fewer = f" (k_top asks for {asked})" if len(regions) < asked else ""
-        best = f"best loss {regions[0].loss:.5g}"
-        print(f"{band} {method}: {len(regions)} regions{fewer}, {best}", flush=True)
-    refine(params, band, method, free, regions).save(layout.refined(band, method))
-
-    sources = layout.history(band, method), layout.refined(band, method)
-    history = History.load(method, (*THETA, *LAWS[about.law]), *sources)
-    content = theta_content(history, band, known)
-    try:
-        told, kept = confidence(params, method, episode, sling, content, workers=workers())
-    except NoConfidence as error:  # θ* is what it is, and all that follows does without
-        print(f"warning: {method}: {error}", file=sys.stderr)
-        told, kept = None, {"samples": []}
-    content["confidence"] = told
-    write_json(layout.confidence(band, method), kept | {"band": band})
+    if about.search == LEAST_SQUARES:
+        content, samples = fitted(params, band, method)
+    else:
+        content, samples = searched(params, band, method, free, regions), {"samples": []}
+    write_json(layout.confidence(band, method), samples | {"band": band})
     write_json(layout.theta(band, method), content)
     print(f"{band} {method}: loss {content['loss']['total']:.5g}")
+    told = content["confidence"]
     for name, value in content["theta"].items():
         print(f"  {name} {value:.4g}{_trust(told['parameters'][name]) if told else ''}")
+
+
+def searched(params, band: str, method: str, free: Free, regions: list[Region]) -> dict:
+    """The best of all that a search and a CMA-ES in each region evaluated."""
+    layout, law = Layout(), params.methods[method].law
+    if regions:
+        print(
+            f"{band} {method}: {len(regions)} regions, best loss {regions[0].loss:.5g}", flush=True
+        )
+    refine(params, band, method, free, regions).save(layout.refined(band, method))
+    sources = layout.history(band, method), layout.refined(band, method)
+    history = History.load(method, (*THETA, *LAWS[law]), *sources)
+    known = {"law": RUBBER, "history": launch_history(load_episode(band))} if law == RUBBER else {}
+    return theta_content(history, band, known)
+
+
+def fitted(params, band: str, method: str) -> tuple[dict, dict]:
+    """The mode of the density over all evidence, from the best that was explored."""
+    layout, names = Layout(), (*THETA, *LAWS[params.methods[method].law])
+    explored = History.load(method, names, layout.history(band, method))
+    best = explored.best()
+    sling = load_sling(params, band, law=params.methods[method].law)
+    found = identify.identify(
+        params,
+        method,
+        sling,
+        load_episodes(band),
+        np.array([best[name] for name in names]),
+        observed=read_evidence(layout.evidence, band, params),
+        workers=workers(),
+        progress=lambda fit: print(
+            f"{band} {method}: expansion {fit.steps}, misfit {fit.misfit:.2f}", flush=True
+        ),
+    )
+    content = identify.theta_content(found, band, method)
+    content["confidence"] = identify.confidence(found, params.parameters)
+    content["rollouts"] = len(explored.total) + found.rollouts
+
+    space, episode = Space.of_method(params, method), found.recordings[0].episode
+    sling = calibrated(params, band, content)
+    mode = Evaluator(episode, sling, EpisodeLoss.of(params, method, episode, sling), space)
+    point = space.to_unit(np.array([[content["theta"][name] for name in space.names]]))
+    history = History(method, space.names)
+    history.add(mode(point), phase=LEAST_SQUARES, generation=found.fit.steps)
+    history.save(layout.refined(band, method))
+    samples = {"names": found.names, "samples": found.points.tolist()}
+    return theta_content(history, band, content), samples
 
 
 def refine(params, band: str, method: str, free: Free, regions: list[Region]) -> History:

@@ -34,6 +34,11 @@ class Layout:
         """Folder of the launches that a user measured, a CSV a band."""
         return self.data / "trials" / "measured"
 
+    @property
+    def evidence(self) -> Path:
+        """Folder of the launches that are evidence, a CSV a band."""
+        return self.data / "evidence"
+
     def raw(self, band: str) -> Path:
         """Folder of a band's recordings."""
         return self.data / "raw" / band

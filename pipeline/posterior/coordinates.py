@@ -3,10 +3,10 @@
 A taut band feels the product s d alone. Over L/c, the time that a small wave takes along the band
 (c^2 = E A L/m), it is what a recoil loses; rubbers differ in it less than in s d.
 
-log E, log of the loss factor s d c/L, what the law adds,
-the linear rest of the air's drag, how far damping brakes turns, and the log of the returned share: what a launch gets of the
-energy that the law would give it, which launches alone can show. What no recording of a pull can
-tell is fixed by the method: Poisson's ratio, friction and the damping's scale.
+log E, log of the loss factor s d c/L, what the law adds, the linear rest of the air's drag, how far
+damping brakes turns, and the log of the returned share: what a launch gets of the energy that the
+law would give it, which launches alone can show. What no recording of a pull can tell is fixed by
+the method: Poisson's ratio, friction and the damping's scale.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ PRIORS = {  # mean and standard deviation of Gaussians
         0.35,
     ),  # of the rubbers that validation/rubbers.py DEVELOPs on
     "air_drag": (0.0, 1.0),  # a half-normal: little beside the cylinder's drag
-    "log_returned_share": (0.0, 0.03),  # the law's discrepancy, common to a band's launches
+    "log_returned_share": (0.0, 0.015),  # the law's discrepancy, common to a band's launches
 }
 
 

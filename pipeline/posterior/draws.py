@@ -1,7 +1,6 @@
-"""Samples of a Gaussian within bounds, by Gibbs: each coordinate given the others is a truncated one.
+"""Samples of a Gaussian within bounds, by Gibbs: each coordinate given the others, cut off."""
 
-Robert, Simulation of truncated normal variables (Statistics and Computing 5, 1995).
-"""
+# Robert, Simulation of truncated normal variables (Statistics and Computing 5, 1995).
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The mode of the density by Levenberg-Marquardt within bounds, and the Gaussian around it.
 
-    -2 log p(phi | evidence) = sum of the recordings' misfits + priors
+    -2 log p(phi | evidence) = sum of the recordings' misfits + that of the launches + priors
 
 Each recording's nuisances are its own and eliminated in it, so that what is left is a few
 coordinates, whatever the number of recordings; and leaving one out is a subtraction.
@@ -8,21 +8,22 @@ coordinates, whatever the number of recordings; and leaving one out is a subtrac
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from pipeline.base.errors import UserError
 from pipeline.posterior.coordinates import Coordinates
+from pipeline.posterior.launches import Launches
 from pipeline.posterior.recording import Expansion, Failed, Recording
 
 ITERATIONS = 14  # at most
 BINNED = 4  # of them sort the points into bins anew; then the density keeps its form
 LONGEST = 20.0  # of a step, in those of the finite differences
-STILL = 0.02  # standard deviations that a last step may have, of any coordinate
+STILL = 0.05  # of a last step, in standard deviations given the other coordinates
 DAMP, HARDER, EASIER, HARDEST = 1e-3, 10.0, 0.2, 1e4  # Levenberg's, relative to the diagonal
 
 
@@ -41,6 +42,7 @@ class Fit:
         expansions: Of each recording there.
         misfit: -2 log p there, priors included.
         steps: How many expansions it took.
+        settled: Whether the last step was small.
     """
 
     phi: np.ndarray
@@ -50,18 +52,24 @@ class Fit:
     expansions: list[Expansion]
     misfit: float
     steps: int
+    settled: bool
 
 
 def fit(
     recordings: Sequence[Recording],
     coordinates: Coordinates,
     start: np.ndarray,
+    *,
+    launches: Launches | None = None,
     workers: int | None = None,
+    progress: Callable[[Fit], None] = lambda fit: None,
 ) -> Fit:
     """Fit coordinates from `start` (D,). Raises NoFit.
 
     Args:
+        launches: That are evidence too.
         workers: Threads; they change no result.
+        progress: Is told of each expansion that is nearer.
     """
     phi, nuisances = np.array(start, float), np.zeros((len(recordings), 3))
     best, damp, new = None, DAMP, [None] * len(recordings)
@@ -82,15 +90,17 @@ def fit(
                     ) from None
                 trial = None
             else:
-                trial = _density(coordinates, phi, nuisances, expansions, steps)
+                seen = launches and launches.expand(*around)
+                trial = _density(coordinates, phi, nuisances, expansions, seen, steps)
             if trial and (best is None or trial.misfit < best.misfit or steps <= BINNED):
                 best, damp = trial, damp * EASIER
+                progress(best)
             else:
                 damp *= HARDER
             step = _step(best, coordinates, damp)
             size = np.abs(step) * np.sqrt(np.diag(best.hessian))
             if size.max() < STILL or damp > HARDEST:
-                break
+                return replace(best, settled=True, steps=steps)
             phi = best.phi + step
             nuisances = np.array(
                 [
@@ -98,7 +108,7 @@ def fit(
                     for own, one in zip(best.nuisances, best.expansions, strict=True)
                 ]
             )
-    return best
+    return replace(best, steps=steps)
 
 
 def _steps(coordinates: Coordinates, phi: np.ndarray) -> np.ndarray:
@@ -107,16 +117,18 @@ def _steps(coordinates: Coordinates, phi: np.ndarray) -> np.ndarray:
     return np.where(phi + steps > coordinates.high, -steps, steps)
 
 
-def _density(coordinates, phi, nuisances, expansions, steps) -> Fit:
+def _density(coordinates, phi, nuisances, expansions, launches, steps) -> Fit:
     prior, gap = coordinates.precision, phi - coordinates.expected
+    misfit, hessian, gradient = launches or (0.0, 0.0, 0.0)
     return Fit(
         phi=phi,
-        hessian=sum(one.hessian for one in expansions) + np.diag(prior),
-        gradient=sum(one.gradient for one in expansions) - prior * gap,
+        hessian=sum(one.hessian for one in expansions) + np.diag(prior) + hessian,
+        gradient=sum(one.gradient for one in expansions) - prior * gap + gradient,
         nuisances=nuisances,
         expansions=expansions,
-        misfit=sum(one.misfit for one in expansions) + float(prior @ gap**2),
+        misfit=sum(one.misfit for one in expansions) + float(prior @ gap**2) + misfit,
         steps=steps,
+        settled=False,
     )
 
 

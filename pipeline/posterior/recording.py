@@ -41,7 +41,7 @@ class Tolerances:
 
     force: float = 0.11
     cloud: float = 1.0e-3
-    way: float = 0.01
+    way: float = 0.02
     release: float = 3e-4
     camera: float = 1e-3
     hand: float = 1e-5
@@ -74,6 +74,7 @@ class Expansion:
         misfit: There, with the linear nuisances at their best.
         hessian, gradient: misfit + const - 2 gradient d + d' hessian d for d in phi, (D, D), (D,).
         nuisances: Best change of the simulated ones, and its change with d, (3,), (3, D).
+        spread: Standard deviations of the simulated ones, given phi, (3,).
         residuals, left: What was compared, and what of it is left at d = 0, shape (R,).
     """
 
@@ -81,8 +82,37 @@ class Expansion:
     hessian: np.ndarray
     gradient: np.ndarray
     nuisances: tuple[np.ndarray, np.ndarray]
+    spread: np.ndarray
     residuals: Residuals
     left: np.ndarray
+
+    def rms(self, part: str) -> float:
+        """Root mean square of what is left of force [N], held or recoil [m]; 0 of nothing."""
+        count = len(self.left) - 2 * len(self.residuals.frame)
+        bins, recoils = self.left[count:].reshape(2, -1), self.residuals.recoils
+        parts = {"force": self.left[:count], "held": bins[:, ~recoils], "recoil": bins[:, recoils]}
+        return float(np.sqrt(np.mean(parts[part] ** 2))) if parts[part].size else 0.0
+
+    @property
+    def pictures(self) -> list[float]:
+        """When the recoil is seen, from the release [s]."""
+        seen, episode = self.residuals.frame[self.residuals.recoils], self.residuals.episode
+        return (episode.cloud_time[np.unique(seen)] - episode.release_time).tolist()
+
+
+def opening_time(episode: Episode, sling, friction: float) -> float:
+    """In which the simulated pads must open for the force to fall as fast as recorded [s].
+
+    From the slip on friction falls with the pads' force, which is gone after the opening time: the
+    held force is gone sooner, by its share of the friction of closed pads. An episode that does
+    not say how fast its force fell has the lab's own.
+    """
+    fall = episode.metadata.get("preprocessing", {}).get("release_fall")
+    if not fall:
+        return sling.finger_opening_time
+    late = np.flatnonzero(episode.time < episode.release_time)[-20:]
+    held = np.linalg.norm(episode.force[late], axis=1).max()
+    return float(np.clip(fall * 2 * friction * sling.grip_force / held, 5e-4, 0.05))
 
 
 class Failed(Exception):
@@ -101,10 +131,13 @@ class Recording:
         episode: Episode,
         sling,
         cutoff: float,
+        friction: float,
         tolerances: Tolerances | None = None,
         rule: Rule | None = None,
     ) -> None:
-        self.episode, self.sling, self.cutoff = episode, sling, cutoff
+        """`friction` is what the method fixes, of the pads."""
+        self.episode, self.cutoff = episode, cutoff
+        self.sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
         self.tolerances = tolerances or Tolerances.of(episode)
         self.rule = rule or Rule()
         end = np.searchsorted(episode.time, episode.release_time)
@@ -182,6 +215,7 @@ class Recording:
             hessian=gram[:count, :count] + gram[:count, outer] @ change,
             gradient=slope[:count] - gram[:count, outer] @ best,
             nuisances=(best[:inner], change[:inner]),
+            spread=np.sqrt(np.diag(inverse)[:inner]),
             residuals=residuals,
             left=(left - solved @ design[rest]) / weight,
         )

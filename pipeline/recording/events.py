@@ -36,6 +36,8 @@ class Release:
     Attributes:
         time: The force begins to drop [s].
         error: Standard deviation of `time` [s], by the samples' spacing and noise.
+        fall: In which the force falls to nothing [s]; where that is over between two samples, some
+            of their distance.
         resolution: Time between force samples around it [s].
         hold: Mean force while held, sensor frame, bias included [N], shape (3,).
         noise: Standard deviation of one force sample along the pull [N].
@@ -45,6 +47,7 @@ class Release:
 
     time: float
     error: float
+    fall: float
     resolution: float
     hold: np.ndarray
     noise: float
@@ -133,8 +136,9 @@ def find_release(
             f" {t[first]:.3f} s: its time cannot be told, record again"
         )
     fall = (level - along) / drop
-    time, error = _onset(t, fall, first, max(noise / drop, 0.003), period)
-    return Release(time, error, resolution, hold, noise, drop, [float(t[i]) for i in others])
+    time, error, lasted = _onset(t, fall, first, max(noise / drop, 0.003), period)
+    slips = [float(t[i]) for i in others]
+    return Release(time, error, lasted, resolution, hold, noise, drop, slips)
 
 
 def _reach(t: np.ndarray) -> tuple[int, int]:
@@ -205,8 +209,8 @@ def _median_step(force: np.ndarray, i: int, far: int) -> float:
 
 def _onset(
     t: np.ndarray, fall: np.ndarray, first: int, noise: float, period: float
-) -> tuple[float, float]:
-    """Mean and standard deviation of when the fall (0 held, 1 gone) began.
+) -> tuple[float, float, float]:
+    """Mean and standard deviation of when the fall (0 held, 1 gone) began, and how long it lasted.
 
     Over all straight falls that begin at r and last D, of any D alike on a logarithmic scale, with
     Gaussian noise. What comes after half of the fall is not looked at: a sensor may ring there. A
@@ -223,10 +227,11 @@ def _onset(
         expected = np.minimum((time - begin).clip(0) / lasts, 0.5)
         spread = noise if seen < 0.5 else max(noise, RINGS)
         misfit += ((expected - min(seen, 0.5)) / spread) ** 2
-    weight = np.exp((misfit.min() - misfit) / 2).sum(axis=1)
-    weight /= weight.sum()
+    both = np.exp((misfit.min() - misfit) / 2)
+    both /= both.sum()
+    weight, lasted = both.sum(axis=1), both.sum(axis=0) @ lasts
     mean = weight @ begin[:, 0]
-    return float(mean), float(np.sqrt(weight @ (begin[:, 0] - mean) ** 2))
+    return float(mean), float(np.sqrt(weight @ (begin[:, 0] - mean) ** 2)), float(lasted)
 
 
 def find_grasp(

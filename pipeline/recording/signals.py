@@ -114,6 +114,7 @@ def signals_of(
         "longest_gap": gaps,
         "cutoff_hz": cutoff,
         "release_error": release.error,
+        "release_fall": release.fall,
         "release_resolution": release.resolution,
         "slips": [time - start for time in release.slips],
         "velocity_window": VELOCITY_WINDOW,

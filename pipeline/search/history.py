@@ -103,7 +103,6 @@ def theta_content(history: History, band: str, about: dict | None = None) -> dic
     return {
         "band": band,
         "method": history.method,
-        **(about or {}),
         "theta": {name: best[name] for name in history.names},
         "nuisances": {name: best[name] for name in nuisances},
         "loss": terms,
@@ -111,4 +110,5 @@ def theta_content(history: History, band: str, about: dict | None = None) -> dic
         "failed": int(np.isinf(history.total).sum()),
         "found": {name: best[name] for name in ("phase", "generation", "solver")},
         "confidence": None,
+        **(about or {}),
     }

@@ -28,7 +28,6 @@ from pipeline.sling.material import THETA
 from pipeline.sling.model import LaunchHistory, Sling
 from pipeline.sling.rubber import NEO_HOOKEAN, RUBBER
 
-
 EXTRA = "air_drag", "turn_damping", "returned_share"  # of a point, after θ and what its law adds
 
 

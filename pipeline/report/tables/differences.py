@@ -15,7 +15,7 @@ from pipeline.report.tables.benchmark import LAUNCHED, band_name, spread
 from pipeline.report.tables.cells import NONE, Table, number
 from pipeline.report.tables.landings import landing_errors
 
-REFERENCES = ("sling2sim2real_taut", "sling2sim2real")  # ours and the paper's
+REFERENCES = ("least_squares", "sling2sim2real")  # ours and the paper's
 
 VERDICTS = (
     "more error",

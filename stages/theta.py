@@ -23,13 +23,13 @@ from pipeline.base.files import write_json
 from pipeline.base.layout import Layout, made
 from pipeline.base.machine import workers
 from pipeline.episode.pull import launch_history
-from pipeline.launches.evidence import read_evidence
 from pipeline.objective.evaluate import Evaluator
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.session import load_episode, load_episodes, service
 from pipeline.objective.space import Space
 from pipeline.params.identification import LAWS, LEAST_SQUARES
 from pipeline.posterior import identify
+from pipeline.posterior.evidence import read_evidence
 from pipeline.search.history import History, theta_content
 from pipeline.search.loop import Free, search
 from pipeline.search.optimizers.multistart import Multistart

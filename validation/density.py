@@ -1,71 +1,44 @@
-"""What a method makes of recordings of the virtual rig: landings without noise, and intervals.
+"""A method of params.yaml by library calls: what it finds in episodes, and in its own law's.
 
-Recordings are made once and kept as episodes; a method is run on them by library calls, with the
-budget of params.yaml. It sees the recordings alone: the rig is launched after it has ended.
+It sees episodes alone; nothing here knows the rig.
 """
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from pipeline.base.files import write_json
 from pipeline.episode.episode import Episode
-from pipeline.landing.landing_map import LandingMap
+from pipeline.episode.signal import cutoff_hz
 from pipeline.launches.spread import landing_intervals
-from pipeline.objective.clamps import calibrate_clamps
 from pipeline.objective.evaluate import Evaluator
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
-from pipeline.oracle.aim import hit, least_sensitive_draw
-from pipeline.oracle.world import World
 from pipeline.params.identification import LAWS, LEAST_SQUARES
 from pipeline.posterior import identify
 from pipeline.posterior.launches import Observed
-from pipeline.recording.build import build_episodes
-from pipeline.rig.recorder.record import record
 from pipeline.search.history import History
 from pipeline.search.loop import Free, search
 from pipeline.search.optimizers import explorer
 from pipeline.sling.launch import launch
 from pipeline.sling.material import THETA
 from pipeline.sling.model import Sling
-from pipeline.sling.theta import at_points
+from pipeline.sling.theta import EXTRA, at_points
+from tests.objective.own_law import disturbed, own_law_episode
 from validation.benchmarks.methods import complete
+from validation.synthetic import pull_and_release
 
-TARGETS = np.linspace(1.525, 2.325, 9)  # m
-MAP = 17, 13  # simulated launches that tell where to seek
 WORKERS = os.cpu_count()
-
-
-def recorded(params, band: str, folder: Path) -> Episode:
-    """The episode of a recording that the rig makes, clamps beside it; kept in `folder`."""
-    mounting = folder / "mounting.json"
-    if not mounting.exists():
-        raw = folder / f"{band}.mcap"
-        raw.parent.mkdir(parents=True, exist_ok=True)
-        record(params, band, raw)
-        episode = build_episodes(raw, band, params)[0][0]
-        raw.unlink()
-        episode.save(folder / "episode")
-        sling = Sling.of(params.bands[band], params.setup, params.sling, as_rod=True)
-        clamps = calibrate_clamps(
-            sling, episode, lambda part: EpisodeLoss.plain(params, part, sling), workers=1
-        )
-        write_json(mounting, clamps)
-    return Episode.load(folder / "episode")
-
-
-def sling_of(params, band: str, method: str, folder: Path) -> Sling:
-    """The band as a method takes it, with the clamps of its first recording."""
-    mounting = json.loads((folder / "mounting.json").read_text())
-    sling = Sling.of(params.bands[band], params.setup, params.sling, mounting)
-    return replace(sling, law=params.methods[method].law)
+FLAWS = {
+    "release": 3e-4,
+    "camera": 5e-4,
+    "shift": 1e-3,
+    "turn": 1e-3,
+    "bias": 0.01,
+}  # of a recorder
 
 
 class Outcome:
@@ -114,47 +87,55 @@ def found(
     return Outcome(identify.launched(sling, episodes[0]), point, one.points), told
 
 
-def aimed(outcome: Outcome, params) -> np.ndarray:
-    """Draws (T, 2) that a perfect policy would choose for TARGETS; NaN where it finds none."""
-    setup = params.setup
-    box = {"draw_y": setup.draw_y, "draw_z": setup.draw_z, "max_force": setup.max_force}
-    landing_map = LandingMap.simulate(outcome, **box, size=MAP, checks=0)
+def own_law(params, method: str, number: int) -> dict:
+    """An episode of the simulator's own law, drawn from the priors: what the method makes of it.
 
-    def land(draw: np.ndarray) -> float:
-        done = outcome(draw[None])
-        return float(done.landing_y[0]) if done.failure[0] is None else float("nan")
-
-    starts = [least_sensitive_draw(landing_map, target) for target in TARGETS]
-    draws = [
-        hit(land, target, start) if np.isfinite(start).all() else start
-        for target, start in zip(TARGETS, starts, strict=True)
-    ]
-    return np.array(draws)
-
-
-def scored(outcome: Outcome, params, world: World, seed: int = 0) -> dict:
-    """Launches at TARGETS in the world: errors without noise, and one launch each with noise.
+    Noise, clocks and extrinsics are off as a recorder's are. Even numbers neither relax nor have a
+    Mooney share. The exploration has a fifth of the budget's rollouts.
 
     Returns:
-        "draws" (T, 2); "error" of the landing as a share of the target, without noise; "miss" [m]
-        with it; "low", "high" of the 90 % interval and "inside"; NaN where there is none.
+        "E", "loss_factor": relative errors of θ*; "landing" of a launch, "low" and "high" of its
+        90 % interval [m]; "covers": which parameters' intervals hold the truth; "recoil" [s].
     """
-    draws = aimed(outcome, params)
-    good = np.isfinite(draws).all(axis=1)
-    landing, noisy = np.full(len(draws), np.nan), np.full(len(draws), np.nan)
-    intervals = np.full((len(draws), 2), np.nan)
-    landing[good] = world.exact(draws[good]).landing_y
-    numbers = 1000 * (seed + 1) + np.flatnonzero(good)
-    noisy[good] = world.landings(draws[good], numbers[:, None])[:, 0]
-    if outcome.samples is not None and good.any():
-        error = params.trials.actuation_error
-        intervals[good] = landing_intervals(outcome, draws[good], outcome.samples, error)
-    low, high = intervals.T
+    rng = np.random.default_rng([19, number])
+    band = next(iter(params.bands))
+    about = params.methods[method]
+    sling = replace(Sling.of(params.bands[band], params.setup, params.sling), law=about.law)
+    coordinates = identify.Coordinates.of_method(params, method, sling)
+    true = coordinates.expected.copy()
+    true[0] = rng.uniform(*np.log([1.5e5, 4.5e5]))
+    true[1] += rng.normal(0, coordinates.precision[1] ** -0.5)
+    if number % 2:
+        true[2:4] = rng.uniform([0.0, 0.0], [0.6, 0.03])
+    true[4] = abs(rng.normal(0, coordinates.precision[4] ** -0.5))
+    true[5] = rng.uniform() if number % 4 > 1 else 0.0
+    true[6] = rng.normal(0, coordinates.precision[6] ** -0.5)
+    point = coordinates.points(true[None])
+    cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
+    plan = pull_and_release(band, params.episode, sling)
+    plan = replace(plan, cloud_time=plan.cloud_time + rng.uniform(0, 1 / 30))
+    world, theta = at_points(sling, point)
+    exact = own_law_episode(world, plan, theta[0], cutoff=cutoff, seed=number)
+    episode = disturbed(exact, rng, **FLAWS)
+    small = params.optimizer.model_copy(update={"population": 12, "generations": 2, "k_nn": 6})
+    params = params.model_copy(update={"optimizer": small})
+    outcome, told = found(params, method, sling, [episode])
+    draw = np.array([[rng.uniform(-0.36, -0.30), rng.uniform(-0.18, -0.12)]])
+    off = rng.normal(0, params.trials.actuation_error, 2)
+    landed = launch(*at_points(outcome.sling, point), draw + off)
+    low, high = landing_intervals(outcome, draw, outcome.samples, params.trials.actuation_error)[0]
+    found_at = coordinates.of(outcome.point[: -len(EXTRA)])
     return {
-        "draws": draws,
-        "error": landing / TARGETS - 1,
-        "miss": noisy - TARGETS,
-        "low": low,
-        "high": high,
-        "inside": (noisy >= low) & (noisy <= high),
+        "E": float(np.expm1(found_at[0] - true[0])),
+        "loss_factor": float(np.expm1(found_at[1] - true[1])),
+        "landing": float(landed.landing_y[0]),
+        "low": float(low),
+        "high": float(high),
+        "covers": {
+            name: bool(told["parameters"][name]["low"] <= value <= told["parameters"][name]["high"])
+            for name, value in zip((*THETA, *LAWS[about.law]), point[0], strict=False)
+            if name not in about.fixed
+        },
+        "recoil": told["recordings"][0]["pictures"],
+        "settled": told["settled"],
     }

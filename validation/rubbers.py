@@ -7,7 +7,7 @@ that is changed after it was seen wants another seed.
 The rule by which the default is chosen, written before any sealed rubber was run: least_squares, if
 over the develop rubbers (three recordings each) and the rig's bands (five each) the mean over bands
 of |bias| is less than that of the paper's method on the same recordings; else the paper's. bias is
-the mean error without launch noise of nine targets, as validation/density.py scores it.
+the mean error without launch noise of nine targets, as validation.density.py scores it.
 """
 
 from __future__ import annotations

@@ -6,12 +6,14 @@ Recordings are made once and kept as episodes; the rig is launched after a metho
 from __future__ import annotations
 
 import json
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from ruamel.yaml import YAML
 
-from pipeline.base.files import write_json
+from pipeline.base.files import replacing, write_json
 from pipeline.episode.episode import Episode
 from pipeline.landing.landing_map import LandingMap
 from pipeline.launches.spread import landing_intervals
@@ -19,10 +21,11 @@ from pipeline.objective.clamps import calibrate_clamps
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.oracle.aim import hit, least_sensitive_draw
 from pipeline.oracle.world import World
+from pipeline.posterior.launches import Observed
 from pipeline.recording.build import build_episodes
 from pipeline.rig.recorder.record import record
 from pipeline.sling.model import Sling
-from validation.density import Outcome
+from validation.density import Outcome, found
 
 TARGETS = np.linspace(1.525, 2.325, 9)  # m
 MAP = 17, 13  # simulated launches that tell where to seek
@@ -96,4 +99,81 @@ def scored(outcome: Outcome, params, world: World, seed: int = 0) -> dict:
         "low": low,
         "high": high,
         "inside": (noisy >= low) & (noisy <= high),
+    }
+
+
+def result(params, band: str, numbers: tuple[int, ...], method: str, folder: Path, known=0) -> dict:
+    """Scores of a band by some of its recordings, kept in `folder`, from which it resumes.
+
+    Args:
+        params: Of a recording's number, with the rig's seed: params(0) has the rubbers too.
+        known: Launches at TARGETS' middle, first and last that are evidence: with errors of their
+            own, as a lab would make them.
+    """
+    name = "-".join([band, *map(str, numbers), method, str(known)])
+    path = folder / "scores" / f"{name}.json"
+    if not path.exists():
+        here = params(0)
+        places = [folder / f"{band}_{number}" for number in numbers]
+        episodes = [
+            recorded(params(number), band, place)
+            for number, place in zip(numbers, places, strict=True)
+        ]
+        sling = sling_of(here, band, method, places[0])
+        with World(band, saved(here, folder / f"{band}.yaml")) as world:
+            start = time.perf_counter()
+            outcome, told = found(here, method, sling, episodes)
+            seconds = time.perf_counter() - start
+            if known:
+                draws = aimed(outcome, here)[[4, 0, -1][:known]]
+                trials = 5000 + 10 * numbers[0] + np.arange(known)
+                landings = world.landings(draws, trials[:, None])[:, 0]
+                seen = [
+                    Observed(tuple(draw), here.trials.actuation_error, landing)
+                    for draw, landing in zip(draws.tolist(), landings.tolist(), strict=True)
+                    if np.isfinite(landing)
+                ]
+                outcome, told = found(here, method, sling, episodes, seen)
+            scores = scored(outcome, here, world, seed=numbers[0])
+        about = {"point": outcome.point, "told": told, "identification_s": seconds}
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_json(path, plain(scores | about))
+    return json.loads(path.read_text())
+
+
+def saved(params, path: Path) -> Path:
+    """params.yaml as the rig's processes read it."""
+    content = params.model_dump(mode="json", exclude_unset=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as temporary:
+        YAML().dump(content, temporary)
+    return path
+
+
+def plain(value):
+    """For JSON: NumPy's numbers as Python's, what is not finite as null."""
+    if isinstance(value, dict):
+        return {key: plain(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [plain(one) for one in value]
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def summary(results: list[dict]) -> dict:
+    """Of results with nine targets each: signed mean error, misses, coverage, width, as shares."""
+    error, miss, low, high = (
+        np.array([one[name] for one in results], float) for name in ("error", "miss", "low", "high")
+    )
+    told = np.isfinite(low) & np.isfinite(miss)
+    inside = np.array([one["inside"] for one in results])[told]
+    return {
+        "bias": np.nanmean(error, axis=1),
+        "mean_bias": np.nanmean(error),
+        "mean_miss_m": np.nanmean(np.abs(miss)),
+        "failed": int(np.isnan(error).sum()),
+        "coverage": inside.mean() if told.any() else np.nan,
+        "launches": int(told.sum()),
+        "median_width": np.nanmedian(((high - low) / TARGETS)[told]) if told.any() else np.nan,
     }

@@ -55,9 +55,13 @@ def _loads(library: str) -> bool:
     return True
 
 
-def text_of(*paths: Path, **macros) -> str:
-    """Native text of some files after macros; none of theirs is defined beyond it."""
-    text = "\n" + "".join(f"#define {name} {value}\n" for name, value in macros.items())
+def text_of(*paths: Path, arrays: type, **macros) -> str:
+    """Native text of some files after macros, in which the fields of `arrays` are names.
+
+    No macro is defined beyond it.
+    """
+    text = "".join(f"\nconst auto {field} = arrays.{field};" for field in arrays.vars)
+    text += "\n" + "".join(f"#define {name} {value}\n" for name, value in macros.items())
     text += "".join(path.read_text(encoding="utf-8") for path in paths)
     names = sorted(set(re.findall(r"^#define (\w+)", text, re.MULTILINE)))
     return text + "\n" + "".join(f"#undef {name}\n" for name in names)

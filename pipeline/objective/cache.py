@@ -50,11 +50,8 @@ class EvaluationCache:
 
     def _key(self, theta: np.ndarray) -> str:
         """Of physical points: another box of the search may hold the same ones."""
-        space = self.evaluate.space
-        nuisances = [name in space.nuisances for name in space.names]  # frames hang on their box
-        box = np.stack([space.low[nuisances], space.high[nuisances]])
-        text = " ".join(space.names).encode()
-        return hashlib.sha256(text + box.tobytes() + theta.tobytes()).hexdigest()[:32]
+        text = " ".join(self.evaluate.space.names).encode()
+        return hashlib.sha256(text + theta.tobytes()).hexdigest()[:32]
 
     def _keep(self, path: Path, evaluation: Evaluation) -> None:
         with replacing(path) as temporary, temporary.open("wb") as file:
@@ -79,4 +76,4 @@ class EvaluationCache:
             return None  # not there, or damaged: a zip file can be in many ways
         if NOT_FINITE in failure and kept != self._weighed:
             return None
-        return weighed(self.evaluate.loss, self.evaluate.space, unit, terms, failure)
+        return weighed(self.evaluate.loss, unit, theta, terms, failure)

@@ -11,7 +11,7 @@ from pipeline.objective.chamfer import Chamfer
 
 
 class DeviceTerms:
-    """The loss of one episode, without nuisances, for rollouts that are Warp arrays."""
+    """The loss of one episode for rollouts that are Warp arrays."""
 
     def __init__(
         self,
@@ -22,7 +22,6 @@ class DeviceTerms:
         window: int,
         sample_weights: np.ndarray,
         frame_weights: np.ndarray,
-        frame_cap: float,
     ) -> None:
         """Keep what all rollouts share, and from its first use on a device a copy there.
 
@@ -31,10 +30,9 @@ class DeviceTerms:
             window: Samples of the median filter, odd.
             sample_weights: What a sample adds to `force` for a newton, and to the signed `work` for
                 a watt, shape (2, T).
-            frame_weights: What a frame adds to `geom` and to `taut` for a metre, shape (2, K).
-            frame_cap: No frame counts for more than this [m].
+            frame_weights: What a frame adds to `geom` for a metre, shape (K,).
         """
-        self._chamfer, self._window, self._cap = chamfer, window, frame_cap
+        self._chamfer, self._window = chamfer, window
         self._shared = {
             "measured": force,
             "velocity": velocity,
@@ -44,7 +42,7 @@ class DeviceTerms:
         self._copies, self._lock = {}, threading.Lock()
 
     def __call__(self, rollouts, matrix: csr_array) -> np.ndarray:
-        """Terms (N, 4) in the order of TERMS; 0 where no sample or frame has weight.
+        """Terms (N, 3) in the order of TERMS; 0 where no sample or frame has weight.
 
         Args:
             matrix: The recorded force's way, (T, S) from the rollouts' times.
@@ -62,12 +60,12 @@ class DeviceTerms:
             setattr(arrays, name, values)
         arrays.force, arrays.errors = force, self._chamfer.errors(line, device)
         arrays.samples, arrays.frames = matrix.shape[0], self._chamfer.frames
-        arrays.both, arrays.cap = int(self._chamfer.symmetric), self._cap
+        arrays.both = int(self._chamfer.symmetric)
         filtered = count * 3 * arrays.samples
         arrays.filtered = wp.empty(filtered, dtype=wp.float64, device=device)
-        arrays.terms = terms = wp.empty(count * 4, dtype=wp.float64, device=device)
+        arrays.terms = terms = wp.empty(count * 3, dtype=wp.float64, device=device)
         launch(kernel, count, [arrays], device)
-        return terms.numpy().reshape(count, 4)
+        return terms.numpy().reshape(count, 3)
 
     def _on(self, device: str, matrix: csr_array) -> dict:
         """What all rollouts share, there; another filter replaces the last one."""

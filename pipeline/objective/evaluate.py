@@ -15,7 +15,7 @@ from pipeline.episode.episode import Episode
 from pipeline.objective.loss import TERMS, EpisodeLoss
 from pipeline.objective.space import Space
 from pipeline.params.identification import LAWS
-from pipeline.sling.interaction import Rollouts, interact
+from pipeline.sling.interaction import interact
 from pipeline.sling.material import THETA
 from pipeline.sling.rubber import RUBBER
 
@@ -30,7 +30,7 @@ class Evaluation:
     """N evaluated parameter vectors of dimension D.
 
     Attributes:
-        unit, theta: In the unit cube and physical, shape (N, D); nuisances are the last columns.
+        unit, theta: In the unit cube and physical, shape (N, D).
         terms: Each loss term, shape (N,); NaN where the rollout failed.
         total: Weighted sum of the terms, shape (N,); +inf where the rollout failed.
         failure: None or the reason, length N.
@@ -71,13 +71,10 @@ class Evaluator:
             simulate: Called as `simulate(sling, episode=, thetas=, device=)`.
         """
         self.space, self.loss = space, loss
-        more = len(loss.stamps) / len(episode.cloud_time)  # frames than the camera's
-        if more > 1:
-            episode = replace(episode, cloud_time=loss.stamps)
         self._sling = sling
         self._simulate = partial(simulate, episode=episode)
         on_gpu = devices[0].startswith("cuda")
-        self._slice = int(SLICE["cuda"] / more) if on_gpu else SLICE["cpu"]
+        self._slice = SLICE["cuda" if on_gpu else "cpu"]
         threads = 1 if on_gpu else workers or os.cpu_count()
         self._devices = devices
         self._pools = [ThreadPoolExecutor(threads) for _ in devices]
@@ -96,28 +93,7 @@ class Evaluator:
         terms = {name: np.concatenate([part[0][name] for part in parts]) for name in TERMS}
         failure = [reason for part in parts for reason in part[1]]
         seconds = time.perf_counter() - start
-        return weighed(self.loss, self.space, unit, terms, failure, seconds)
-
-    def rollouts(
-        self, theta: np.ndarray, device: str | None = None
-    ) -> tuple[Rollouts, dict[str, np.ndarray]]:
-        """Simulate physical points (N, D); the rollouts and their nuisances, as the loss asks.
-
-        Args:
-            device: The one that simulates them all; None: the first.
-        """
-        values = dict(zip(self.space.names, theta.T, strict=True))
-        extra = {name: values[name] for name in (*LAWS[RUBBER], "air_drag") if name in values}
-        if missing := [
-            name for name in LAWS[RUBBER] if name in extra and self._sling.law != RUBBER
-        ]:
-            raise ValueError(f"the sling is {self._sling.law}, which has no {', '.join(missing)}")
-        rollouts = self._simulate(
-            replace(self._sling, **extra) if extra else self._sling,
-            thetas=theta[:, : len(THETA)],
-            device=device or self._devices[0],
-        )
-        return rollouts, {name: values[name] for name in self.space.nuisances}
+        return weighed(self.loss, unit, theta, terms, failure, seconds)
 
     def _slices(self, theta: np.ndarray) -> Iterator[np.ndarray]:
         return (theta[i : i + self._slice] for i in range(0, len(theta), self._slice))
@@ -125,21 +101,25 @@ class Evaluator:
     def _evaluate(
         self, device: str, theta: np.ndarray
     ) -> tuple[dict[str, np.ndarray], list[str | None]]:
-        rollouts, nuisances = self.rollouts(theta, device)
+        values = dict(zip(self.space.names, theta.T, strict=True))
+        extra = {name: values[name] for name in LAWS[RUBBER] if name in values}
+        if extra and self._sling.law != RUBBER:
+            raise ValueError(f"the sling is {self._sling.law}, which has no {', '.join(extra)}")
+        sling = replace(self._sling, **extra) if extra else self._sling
+        rollouts = self._simulate(sling, thetas=theta[:, : len(THETA)], device=device)
         with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
-            return self.loss.terms(rollouts, nuisances), rollouts.failure
+            return self.loss.terms(rollouts), rollouts.failure
 
 
 def weighed(
     loss: EpisodeLoss,
-    space: Space,
     unit: np.ndarray,
+    theta: np.ndarray,
     terms: dict[str, np.ndarray],
     failure: list[str | None],
     seconds: float = 0.0,
 ) -> Evaluation:
     """The evaluation of points (N, D) whose terms are known; a loss not finite is a failure."""
-    theta = space.to_physical(unit)
     with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
         total = loss.total(terms)
     failure = [
@@ -148,7 +128,7 @@ def weighed(
     ]
     failed = np.array([reason is not None for reason in failure])
     terms = {name: np.where(failed, np.nan, values) for name, values in terms.items()}
-    total = np.where(failed, np.inf, total + space.cost(theta))
+    total = np.where(failed, np.inf, total)
     return Evaluation(unit, theta, terms, total, failure, seconds)
 
 

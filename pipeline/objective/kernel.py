@@ -32,7 +32,8 @@ def chamfer_kernel(
         errors: floats
 
     macros = {"BOTH": int(both), "CULLED": int(culled), "CPU_LANES": lanes}
-    text = _text("chamfer.h", CloudArrays, EDGES=edges, SAMPLES=samples, **macros)
+    path = Path(__file__).with_name("chamfer.h")
+    text = text_of(path, arrays=CloudArrays, EDGES=edges, SAMPLES=samples, **macros)
 
     @wp.func_native(text)
     def distances(tid: int, arrays: CloudArrays): ...
@@ -61,13 +62,14 @@ def terms_kernel(window: int) -> tuple[wp.Kernel, type]:
         sample_weights: doubles
         errors: wp.array(dtype=wp.float32)
         both: int
-        cap: wp.float64
         frames: int
         frame_weights: doubles
         filtered: doubles
         terms: doubles
 
-    @wp.func_native(_text("terms.h", TermArrays, WINDOW=window))
+    path = Path(__file__).with_name("terms.h")
+
+    @wp.func_native(text_of(path, arrays=TermArrays, WINDOW=window))
     def reduced(tid: int, arrays: TermArrays): ...
 
     @wp.kernel(module="unique")
@@ -75,9 +77,3 @@ def terms_kernel(window: int) -> tuple[wp.Kernel, type]:
         reduced(wp.tid(), arrays)
 
     return run, TermArrays
-
-
-def _text(name: str, arrays: type, **macros) -> str:
-    """Native text of a file of this folder in which the fields of `arrays` are names."""
-    text = "".join(f"\nconst auto {field} = arrays.{field};" for field in arrays.vars)
-    return text + text_of(Path(__file__).with_name(name), **macros)

@@ -3,14 +3,9 @@
     geom   mean over camera frames of the Chamfer distance                              [cm]
     force  mean over samples of |f_real - f_sim|                                        [N]
     work   | sum of trapezoids of (f_real - f_sim) . v over the whole episode |         [J]
-    taut   geom over the frames in which the released band is still taut                [cm]
 
-The first three are the paper's, with its constants read as 1/(T 1 cm), 1/(T 1 N) and 1/(1 J). The
-fourth is ours: after the recoil the band swings slack, and frames of that swing, many and alike,
-drown the few that show the damping. docs/method.md says more.
-
-Blocks of the recording can be held out: they count in `held_out_terms` alone. Nuisances
-(nuisance.py) act on the simulated side before it is compared.
+They are the paper's, with its constants read as 1/(T 1 cm), 1/(T 1 N) and 1/(1 J). docs/method.md
+says more. Blocks of the recording can be held out: they count in no term, but in `residuals`.
 """
 
 from __future__ import annotations
@@ -24,25 +19,21 @@ from scipy.sparse import csr_array
 
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
-from pipeline.episode.phases import held_out_blocks, reach, taut_frames, within
+from pipeline.episode.phases import held_out_blocks, reach, within
 from pipeline.episode.signal import as_recorded, cutoff_hz
 from pipeline.objective.chamfer import Chamfer
 from pipeline.objective.device_terms import DeviceTerms
-from pipeline.objective.nuisance import AIR_DRAG, Delay, DelayedFrames, along_axes
 
-TERMS = ("geom", "force", "work", "taut")
+TERMS = ("geom", "force", "work")
 LOCK = threading.Lock()  # while a filter is made, which takes a second
-
-Nuisances = dict[str, np.ndarray] | None
 
 
 class EpisodeLoss:
     """The loss of one episode, for batches of rollouts.
 
     Attributes:
-        stamps: Those of the frames that a rollout must hold [s], shape (K',): the camera's (K,), or
-            more of them where camera_delay is a nuisance.
-        fitted_samples, held_samples: Which samples `terms` and `held_out_terms` are of, (T,) bool.
+        fitted_samples, held_samples: Which samples count in the terms and which do not, (T,) bool;
+            those of neither are guards.
         fitted_frames, held_frames: The same of the camera frames, shape (K,).
     """
 
@@ -56,8 +47,6 @@ class EpisodeLoss:
         cutoff: float,
         median_window: int = 7,
         symmetric: bool = True,
-        frame_cap: float | None = None,
-        nuisances: dict[str, tuple[float, float]] | None = None,
         held_out: np.ndarray | None = None,
     ) -> None:
         """Prepare the recorded side.
@@ -68,16 +57,13 @@ class EpisodeLoss:
             cutoff: Of the low-pass that the recorded force went through [Hz].
             median_window: Samples of the median filter on forces and velocity, odd.
             symmetric: Chamfer distance both ways, or measured to simulated alone.
-            frame_cap: No frame counts for more than this [m].
-            nuisances: Bounds of those that rollouts will come with.
             held_out: Begin and end [s] of blocks that are not fitted, shape (B, 2). Samples nearer
                 to them than the force's filters reach count nowhere; clouds pass no filter.
 
         Raises:
-            UserError: No cloud has points, or `taut` has weight and no frame is in the recoil.
+            UserError: No cloud has points.
         """
         self.weights = {name: float(weights[name]) for name in TERMS}
-        self.frame_cap = np.inf if frame_cap is None else frame_cap
         self.median_window = median_window
         self.cutoff = cutoff
         self.time, self.period = episode.time, episode.sample_period
@@ -90,10 +76,6 @@ class EpisodeLoss:
             rest_length=rest_length,
             symmetric=symmetric,
         )
-        bounds = nuisances or {}
-        self._force_delay = Delay(bounds.get("force_delay"))
-        self._delayed = DelayedFrames(episode.cloud_time, bounds.get("camera_delay"))
-        self.stamps = self._delayed.stamps if "camera_delay" in bounds else episode.cloud_time
         blocks = np.zeros((0, 2)) if held_out is None else np.asarray(held_out, float)
         guard = reach(self.period, cutoff, median_window)
         seen = np.array([len(cloud) > 0 for cloud in episode.clouds])
@@ -101,7 +83,6 @@ class EpisodeLoss:
         self.held_samples = within(self.time, blocks)
         self.fitted_frames = ~within(episode.cloud_time, blocks) & seen
         self.held_frames = within(episode.cloud_time, blocks) & seen
-        self.taut = taut_frames(episode) & self.fitted_frames
         pull = np.array([[episode.grasp_time, episode.release_time - guard]])
         self._pull = within(self.time, pull), within(episode.cloud_time, pull)
         self._on_device = DeviceTerms(
@@ -110,16 +91,10 @@ class EpisodeLoss:
             velocity=self.velocity,
             window=median_window,
             sample_weights=np.stack([_mean(self.fitted_samples), self._trapezoids()]),
-            frame_weights=100 * np.stack([_mean(self.fitted_frames), _mean(self.taut)]),
-            frame_cap=self.frame_cap,
+            frame_weights=100 * _mean(self.fitted_frames),
         )
         if not self.fitted_frames.any():
             raise UserError(f"episode of {episode.band}: no camera frame shows the band")
-        if self.weights["taut"] and not self.taut.any():
-            raise UserError(
-                f"episode of {episode.band}: no camera frame between the release and the fork"
-                " plane; choose a method whose weights.taut is 0"
-            )
 
     @classmethod
     def of(cls, params, method: str, episode: Episode, sling) -> EpisodeLoss:
@@ -135,7 +110,6 @@ class EpisodeLoss:
             cutoff=cutoff,
             median_window=params.loss.median_window,
             symmetric=params.loss.chamfer == "symmetric",
-            nuisances=params.methods[method].nuisances,
             held_out=held_out_blocks(episode, held.blocks, held.length, guard),
         )
 
@@ -146,28 +120,22 @@ class EpisodeLoss:
             episode,
             radius=sling.radius,
             rest_length=sling.edge_lengths,
-            weights={"geom": 1.0, "force": 1.0, "work": 0.0, "taut": 0.0},
+            weights={"geom": 1.0, "force": 1.0, "work": 0.0},
             cutoff=cutoff_hz(params.force.cutoff, params.force.cutoff_unit),
             median_window=params.loss.median_window,
             symmetric=params.loss.chamfer == "symmetric",
         )
 
-    def terms(self, rollouts, nuisances: Nuisances = None) -> dict[str, np.ndarray]:
+    def terms(self, rollouts) -> dict[str, np.ndarray]:
         """Each term of N rollouts, shape (N,); NaN or infinite where a rollout is.
 
-        `taut` is NaN where the episode has no frame in the recoil. Clouds are compared on the
-        device that holds the rollouts; so is all else of rollouts that are Warp arrays, unless
-        there are nuisances of instruments. A rollout's terms are the same to the bit in any batch.
-
-        Args:
-            nuisances: Values of each that there is, shape (N,).
+        They are computed on the device that holds the rollouts. A rollout's terms are the same to
+        the bit in any batch.
         """
-        if not isinstance(rollouts.force, np.ndarray) and not set(nuisances or ()) - {AIR_DRAG}:
-            found = self._on_device(rollouts, self._filters(rollouts.times)[0])
-            some = [self.fitted_frames.any(), self.fitted_samples.any(), True, self.taut.any()]
-            return dict(zip(TERMS, np.where(some, found, np.nan).T, strict=True))
-        gap = self._gap(rollouts, nuisances)
-        frames = self.frames(rollouts, nuisances)
+        if not isinstance(rollouts.force, np.ndarray):
+            found = self._on_device(rollouts, self._filter(rollouts.times))
+            return dict(zip(TERMS, found.T, strict=True))
+        gap, frames = self._gap(rollouts), self.frames(rollouts)
         power = np.einsum("ntc,tc->nt", gap, self.velocity)
         both = self.fitted_samples[:-1] & self.fitted_samples[1:]  # ends of a trapezoid
         work = (power[:, :-1] + power[:, 1:]).compress(both, axis=1).sum(axis=1)
@@ -175,19 +143,14 @@ class EpisodeLoss:
             "geom": self._centimetres(frames, self.fitted_frames),
             "force": self._newtons(gap, self.fitted_samples),
             "work": np.abs(work) / 2 * self.period,
-            "taut": self._centimetres(frames, self.taut),
         }
 
-    def held_out_terms(self, rollouts, nuisances: Nuisances = None) -> dict[str, np.ndarray]:
-        """`geom` [cm] and `force` [N] of the held-out blocks alone, shape (N,); NaN without any."""
-        return {
-            "geom": self._centimetres(self.frames(rollouts, nuisances), self.held_frames),
-            "force": self._newtons(self._gap(rollouts, nuisances), self.held_samples),
-        }
+    def residuals(self, rollouts) -> dict[str, dict[str, np.ndarray]]:
+        """Fitted against held-out between grasp and release: `force` [N] and `cloud` [cm], (N,).
 
-    def residuals(self, rollouts, nuisances: Nuisances = None) -> dict[str, dict[str, np.ndarray]]:
-        """Fitted against held-out between grasp and release: `force` [N] and `cloud` [cm], (N,)."""
-        gap, frames = self._gap(rollouts, nuisances), self.frames(rollouts, nuisances)
+        NaN where nothing is held out.
+        """
+        gap, frames = self._gap(rollouts), self.frames(rollouts)
         samples, pictures = self._pull
         return {
             "force": {
@@ -204,52 +167,27 @@ class EpisodeLoss:
         """Weighted sum of the terms, shape (N,); one without weight may be NaN."""
         return sum(weight * terms[name] for name, weight in self.weights.items() if weight)
 
-    def filtered(self, rollouts, nuisances: Nuisances = None) -> np.ndarray:
+    def filtered(self, rollouts) -> np.ndarray:
         """The simulated force as the record would have it [N], shape (N, T, 3), before `smooth`."""
-        nuisances = nuisances or {}
         force = rollouts.force
         force = force if isinstance(force, np.ndarray) else force.numpy()
-        force = force.transpose(1, 0, 2)  # (S, N, 3)
-        filters = self._filters(rollouts.times)
-        delay = nuisances.get("force_delay")
-        if delay is None:
-            force = _through(filters[0], force)
-        else:
-            below, part = self._force_delay.between(delay)
-            weight = np.zeros((len(filters), len(delay)))
-            weight[below, np.arange(len(delay))] = 1 - part
-            weight[below + 1, np.arange(len(delay))] = part
-            force = sum(
-                one[:, None, None] * _through(matrix, force)
-                for one, matrix in zip(weight, filters, strict=True)
-            )
-        if "force_gain" in nuisances:
-            force = nuisances["force_gain"][:, None, None] * force
-        bias = along_axes(nuisances, "force_bias")
-        return force if bias is None else force + bias[:, None]
+        count, steps, _ = force.shape
+        flat = force.transpose(1, 0, 2).reshape(steps, -1)
+        return (self._filter(rollouts.times) @ flat).reshape(-1, count, 3).transpose(1, 0, 2)
 
-    def frames(self, rollouts, nuisances: Nuisances = None) -> np.ndarray:
+    def frames(self, rollouts) -> np.ndarray:
         """Chamfer distance of each camera frame [m], shape (N, K); NaN where it shows nothing."""
-        nuisances = nuisances or {}
         line = rollouts.center_line
-        device = "cpu" if isinstance(line, np.ndarray) else str(line.device)
-        delay, shift = nuisances.get("camera_delay"), along_axes(nuisances, "cloud_shift")
-        if delay is not None or shift is not None:
-            line = line if isinstance(line, np.ndarray) else line.numpy()
-        if delay is not None:
-            line = self._delayed(line, delay)
-        if shift is not None:
-            line = line + shift[:, None, None].astype(line.dtype)
-        return np.minimum(self.chamfer(line, device), self.frame_cap)
+        return self.chamfer(line, "cpu" if isinstance(line, np.ndarray) else str(line.device))
 
     def smooth(self, signal: np.ndarray) -> np.ndarray:
         """Median filter along the samples of (..., T, 3)."""
         window = (1,) * (signal.ndim - 2) + (self.median_window, 1)
         return median_filter(signal, size=window, mode="nearest")
 
-    def _gap(self, rollouts, nuisances: Nuisances) -> np.ndarray:
+    def _gap(self, rollouts) -> np.ndarray:
         """Measured less simulated force [N], shape (N, T, 3)."""
-        return self.force - self.smooth(self.filtered(rollouts, nuisances))
+        return self.force - self.smooth(self.filtered(rollouts))
 
     def _trapezoids(self) -> np.ndarray:
         """What each sample's power adds to the work [s], shape (T,)."""
@@ -267,14 +205,13 @@ class EpisodeLoss:
         # not frames[:, chosen]: its order in memory, and so the sum's, would hang on N
         return 100 * frames.compress(chosen, axis=1).mean(axis=1)
 
-    def _filters(self, times: np.ndarray) -> list[csr_array]:
-        """Of forces at simulated times (S,), one for every simulated delay."""
-        starts = tuple((self.time[0] - self.period / 2 - self._force_delay.values).tolist())
+    def _filter(self, times: np.ndarray) -> csr_array:
+        """Of forces at simulated times (S,)."""
+        start = float(self.time[0] - self.period / 2)
         with LOCK:
-            return [
-                _recording_filter(times.tobytes(), self.cutoff, start, self.period, len(self.time))
-                for start in starts
-            ]
+            return _recording_filter(
+                times.tobytes(), self.cutoff, start, self.period, len(self.time)
+            )
 
 
 def _mean(chosen: np.ndarray) -> np.ndarray:
@@ -297,9 +234,3 @@ def _recording_filter(
         parts.append(as_recorded(times, pulses, cutoff, start, period, samples))
     weights = np.hstack(parts)
     return csr_array(np.where(np.abs(weights) > 1e-18, weights, 0))
-
-
-def _through(matrix: csr_array, force: np.ndarray) -> np.ndarray:
-    """Forces (S, N, 3) through a filter (T, S), shape (N, T, 3)."""
-    steps, count, _ = force.shape
-    return (matrix @ force.reshape(steps, -1)).reshape(-1, count, 3).transpose(1, 0, 2)

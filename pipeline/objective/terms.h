@@ -4,7 +4,7 @@
 // Wants the macro WINDOW (samples of the median, odd). In: force (N, S, 3), of any strides [N]; the filter
 // (T, S) by rows: entries of row t are first[t] to first[t + 1] of columns and values; measured and velocity
 // (T, 3); sample_weights (2, T), of a sample's force and of its power; errors (N, K, 2) [m]; frame_weights
-// (2, K), of geom and taut. Scratch: filtered (N, 3, T). Out: terms (N, 4), in the order of TERMS.
+// (K,), of geom. Scratch: filtered (N, 3, T). Out: terms (N, 3), in the order of TERMS.
 
 #if defined(__CUDA_ARCH__)
 #define THREADS 32
@@ -45,7 +45,7 @@ auto median = [](const double* x) -> double {
   }
   return found;
 };
-double newtons = 0.0, joules = 0.0, geom = 0.0, taut = 0.0;
+double newtons = 0.0, joules = 0.0, geom = 0.0;
 for (int t = lane; t < samples; t += THREADS) {
   const double mean = sample_weights.data[t], trapezoid = sample_weights.data[samples + t];
   double square = 0.0, power = 0.0;
@@ -64,13 +64,11 @@ for (int t = lane; t < samples; t += THREADS) {
 }
 for (int k = lane; k < frames; k += THREADS) {
   const float* pair = errors.data + ((size_t)item * frames + k) * 2;
-  double error = both ? ((double)pair[0] + (double)pair[1]) / 2.0 : (double)pair[0];
-  error = error > cap ? cap : error;
+  const double error = both ? ((double)pair[0] + (double)pair[1]) / 2.0 : (double)pair[0];
   if (frame_weights.data[k] != 0.0) geom += frame_weights.data[k] * error;
-  if (frame_weights.data[frames + k] != 0.0) taut += frame_weights.data[frames + k] * error;
 }
-newtons = sum(newtons); joules = sum(joules); geom = sum(geom); taut = sum(taut);
+newtons = sum(newtons); joules = sum(joules); geom = sum(geom);
 if (lane == 0) {
-  double* out = terms.data + (size_t)item * 4;
-  out[0] = geom; out[1] = newtons; out[2] = joules < 0.0 ? -joules : joules; out[3] = taut;
+  double* out = terms.data + (size_t)item * 3;
+  out[0] = geom; out[1] = newtons; out[2] = joules < 0.0 ? -joules : joules;
 }

@@ -19,14 +19,6 @@ LAWS = {  # of the band's material: what each has beside the five, and how far i
 LEAST_SQUARES = "least_squares"
 UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
 SEARCHES = ("multistart", LEAST_SQUARES, "de", "bo", "adam")
-NUISANCES = {  # how far the box of each may reach: 1/s, s, 1, N, m
-    "air_drag": (0.0, 50.0),
-    "camera_delay": (-0.02, 0.02),
-    "force_delay": (-0.02, 0.02),
-    "force_gain": (0.5, 2.0),
-    **dict.fromkeys(("force_bias_x", "force_bias_y", "force_bias_z"), (-5.0, 5.0)),
-    **dict.fromkeys(("cloud_shift_x", "cloud_shift_y", "cloud_shift_z"), (-0.05, 0.05)),
-}
 
 
 class SlingParams(Section):
@@ -126,11 +118,10 @@ class Weights(Section):
     geom: Weight
     force: Weight
     work: Weight
-    taut: Weight
 
     @model_validator(mode="after")
     def _something_counts(self) -> Weights:
-        if not any((self.geom, self.force, self.work, self.taut)):
+        if not any((self.geom, self.force, self.work)):
             raise refusal("at least one weight must be above 0")
         return self
 
@@ -148,30 +139,9 @@ def _is_setting(value: object) -> object:
     return value
 
 
-def _reaches(bounds: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-    for name, (low, high) in bounds.items():
-        if name not in NUISANCES:
-            raise refusal(f"{name} is not one of {', '.join(NUISANCES)}")
-        least, most = NUISANCES[name]
-        neutral = 1.0 if name == "force_gain" else 0.0
-        if not (least <= low <= neutral <= high <= most and low < high):
-            raise refusal(
-                f"{name}: must be [low, high] between {least:g} and {most:g} with {neutral:g}"
-                f" in it, got {[low, high]}"
-            )
-    return bounds
-
-
 Value = Annotated[float, Range(-1e9, 1e9)]
 Setting = Annotated[object, AfterValidator(_is_setting)]
 Bounds = Annotated[tuple[Value, Value], LIST]
-
-
-class Prior(Section):
-    """What is known before of a nuisance: it lies about 0, its size by an exponential law."""
-
-    mean: Annotated[float, Range(1e-6, 1e6)]  # of the size, in the nuisance's unit
-    weight: Weight  # of size / mean in the loss, which is no likelihood; the posterior needs none
 
 
 class MethodDefaults(Section):
@@ -182,8 +152,6 @@ class MethodDefaults(Section):
     settings: dict[str, Setting]
     fixed: dict[str, Value]
     bounds: dict[str, Bounds]
-    nuisances: Annotated[dict[str, Bounds], AfterValidator(_reaches)]
-    priors: dict[str, Prior]
     k_top: KTop | None
     covariance: bool
 
@@ -206,10 +174,10 @@ class MethodParams(MethodDefaults):
 
     @model_validator(mode="after")
     def _least_squares_fixes_the_unseen(self) -> MethodParams:
-        if self.search == LEAST_SQUARES and (set(self.fixed) != set(UNSEEN) or self.nuisances):
+        if self.search == LEAST_SQUARES and set(self.fixed) != set(UNSEEN):
             raise refusal(
                 f"search: {LEAST_SQUARES} wants `fixed` to name {', '.join(UNSEEN)}, which no pull"
-                " shows, and has nuisances of its own"
+                " shows"
             )
         if self.search == LEAST_SQUARES and self.settings:
             raise refusal(f"settings: {LEAST_SQUARES} has none")
@@ -223,21 +191,6 @@ class MethodParams(MethodDefaults):
                     f"bounds: {name} is missing, [low, high] within {list(reach)}, which the law"
                     f" {self.law} searches"
                 )
-        return self
-
-    @model_validator(mode="after")
-    def _priors_are_of_nuisances(self) -> MethodParams:
-        for name in self.priors:
-            if name not in self.nuisances:
-                raise refusal(f"priors: {name} is not one of the method's nuisances")
-            if name == "force_gain":
-                raise refusal("priors: force_gain is about 1 and a prior about 0, so it has none")
-        return self
-
-    @model_validator(mode="after")
-    def _gain_is_no_modulus(self) -> MethodParams:
-        if "force_gain" in self.nuisances and not {"force_gain", "youngs_modulus"} & {*self.fixed}:
-            raise refusal("force_gain and youngs_modulus cannot both be free: fix one in `fixed`")
         return self
 
 
@@ -256,7 +209,7 @@ def check_method(
                 f"{path}bounds.{name}: must be [low, high] within {whose}{least:g} to {most:g},"
                 f" got {[low, high]}"
             )
-    boxes |= method.bounds | method.nuisances
+    boxes |= method.bounds
     for name, value in method.fixed.items():
         if name not in boxes:
             raise refusal(f"{path}fixed: {name} is not one of {', '.join(boxes)}")
@@ -265,12 +218,8 @@ def check_method(
             raise refusal(
                 f"{path}fixed.{name}: must be between {low:g} and {high:g}, got {value:g}"
             )
-    instruments = {*NUISANCES} - {"air_drag"}
-    if not {*boxes} - instruments - {*method.fixed}:
-        raise refusal(
-            f"{path}fixed: names every parameter, so neither one of them nor air_drag is left to"
-            " search"
-        )
+    if not {*boxes} - {*method.fixed}:
+        raise refusal(f"{path}fixed: names every parameter, so none is left to search")
     iteration = (method.k_top or 1) * optimizer.cma_population
     if optimizer.cma_rollouts < iteration:
         raise refusal(

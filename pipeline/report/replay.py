@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.base.layout import Layout, NotMade
 from pipeline.episode.episode import Episode
 from pipeline.objective.loss import EpisodeLoss
-from pipeline.objective.nuisance import along_axes
 from pipeline.sling.theta import calibrated, vector
 
 LOAD = 1.5  # kg: the paper's dumbbell
-SEEN_BY_CAMERA = ("camera_delay", "cloud_shift_x", "cloud_shift_y", "cloud_shift_z")
 
 
 @dataclass(frozen=True)
 class Replay:
-    """One simulated interaction; nuisances of the θ file act on it as in the loss.
+    """One simulated interaction.
 
     Attributes:
         force: On the gripper at the episode's samples, filtered as the measured one, shape (T, 3).
@@ -51,25 +49,19 @@ def replay(params, band: str, method: str, episode: Episode, theta: dict) -> Rep
 
     sling = calibrated(params, band, theta)
     loss = EpisodeLoss.of(params, method, episode, sling)
-    nuisances = {name: np.array([value]) for name, value in theta.get("nuisances", {}).items()}
-    delay, shift = nuisances.get("camera_delay", 0.0), along_axes(nuisances, "cloud_shift")
-    late = replace(episode, cloud_time=episode.cloud_time - delay)
-    rollouts = interact(sling, late, vector(theta)[None])
+    rollouts = interact(sling, episode, vector(theta)[None])
     if rollouts.failure[0]:
         raise NotMade(Layout().theta(band, method), rollouts.failure[0])
-    if shift is not None:
-        rollouts = replace(rollouts, center_line=rollouts.center_line + shift[:, None, None])
-    nuisances = {name: one for name, one in nuisances.items() if name not in SEEN_BY_CAMERA}
-    force = loss.filtered(rollouts, nuisances)
+    force = loss.filtered(rollouts)
     return Replay(
         force=force[0],
         center_line=rollouts.center_line[0],
-        distance=loss.frames(rollouts, nuisances)[0],
+        distance=loss.frames(rollouts)[0],
         measured_work=work(loss.force, loss.velocity, episode.sample_period),
         work=work(loss.smooth(force)[0], loss.velocity, episode.sample_period),
         residuals={
             kind: {part: float(value[0]) for part, value in parts.items()}
-            for kind, parts in loss.residuals(rollouts, nuisances).items()
+            for kind, parts in loss.residuals(rollouts).items()
         },
         loaded=hang(sling, vector(theta), LOAD)[0],
     )

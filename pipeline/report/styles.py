@@ -25,7 +25,6 @@ THEME = {
 # green the geometry-only baselines. Names are the paper's where the methods are.
 KNOWN = {
     "least_squares": ("ours", "#d1495b"),
-    "sling2sim2real_taut": ("taut", "#8d6a9f"),
     "sling2sim2real": ("Sling2Sim2Real", "#00798c"),
     "no_covariance": ("−c", "#3a5ba0"),
     "no_multistart": ("−m", "#6f9bd8"),

@@ -1,8 +1,8 @@
 """Everything that a search evaluated, one row a parameter vector, and the best of it.
 
 Columns: method, phase (de, cma, bo, ...), generation, solver (null unless several run side by
-side), unit_<name> and <name> (physical) of each axis, geom, force, work, taut, total, failure. A
-failed row has total = +inf, NaN terms and the reason.
+side), unit_<name> and <name> (physical) of each axis, geom, force, work, total, failure. A failed
+row has total = +inf, NaN terms and the reason.
 """
 
 from __future__ import annotations
@@ -93,18 +93,14 @@ class History:
 
 
 def theta_content(history: History, band: str, about: dict | None = None) -> dict:
-    """What a theta file holds: the best of everything that was evaluated, and `about`.
-
-    Its nuisances are the searched axes that are none of `history.names`.
-    """
+    """What a theta file holds: the best of everything that was evaluated, and `about`."""
     best = history.best()
-    nuisances = [name for name in best if f"unit_{name}" in best and name not in history.names]
     terms = {name: best[name] for name in (*TERMS, "total") if np.isfinite(best[name])}
     return {
         "band": band,
         "method": history.method,
         "theta": {name: best[name] for name in history.names},
-        "nuisances": {name: best[name] for name in nuisances},
+        "nuisances": {},
         "loss": terms,
         "rollouts": len(history.total),
         "failed": int(np.isinf(history.total).sum()),

@@ -55,8 +55,9 @@ def sling_kernel(
 
     parts = ("lanes.h", "state.h", "material.h", "rubber.h", f"{element}.h", "solve.h", "step.h")
     tetrahedra = {} if element == "rod" else {"TETS": len(CORNERS), "CORNERS": _braced(CORNERS)}
-    text = "".join(f"\nconst auto {name} = arrays.{name};" for name in Arrays.vars) + text_of(
+    text = text_of(
         *(Path(__file__).with_name(part) for part in parts),
+        arrays=Arrays,
         SC="double" if double else "float",
         W=lanes,
         N=dofs,

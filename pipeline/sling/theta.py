@@ -22,7 +22,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.layout import NotMade, owner
 from pipeline.base.schema import JsonRecord, Range, Section, read_json, refusal
 from pipeline.params import Parameters
-from pipeline.params.identification import LAWS, NUISANCES
+from pipeline.params.identification import LAWS
 from pipeline.sling.load import load_sling
 from pipeline.sling.material import THETA
 from pipeline.sling.model import LaunchHistory, Sling
@@ -43,11 +43,10 @@ Theta = create_model(
     **{name: (Annotated[float, _limits(name)], ...) for name in THETA},
     **{name: (Annotated[float, Range(*ends)], None) for name, ends in LAWS[RUBBER].items()},
 )
-Nuisances = create_model(
-    "Nuisances",
-    __base__=Section,
-    **{name: (Annotated[float, Range(*ends)], None) for name, ends in NUISANCES.items()},
-)
+
+
+class Nuisances(Section):
+    air_drag: Annotated[float, Range(0, 50)] | None = None  # force for mass and speed [1/s]
 
 
 class Discrepancy(JsonRecord):

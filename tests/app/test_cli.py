@@ -67,7 +67,7 @@ def test_the_documented_commands_are_understood() -> None:
     launched = parse("launch --theta t.json --band band1 --draw=-0.30,-0.17".split())
     assert (launched.theta, launched.draw) == (Path("t.json"), (-0.30, -0.17))
     aimed = parse("aim --band band1 --target 1.925".split())
-    assert (aimed.method, aimed.target, aimed.json) == ("sling2sim2real_taut", 1.925, False)
+    assert (aimed.method, aimed.target, aimed.json) == ("least_squares", 1.925, False)
     assert not aimed.robust and parse("aim --band b --target 2 --robust".split()).robust
     assert parse("aim --band band1 --method m --target 1.925".split()).method == "m"
     assert parse("bench --device cuda:0 --json".split()).device == "cuda:0"
@@ -160,10 +160,10 @@ def test_a_reader_that_has_seen_enough() -> None:
 def aimable(folder: Path) -> None:
     """A project with a policy of band1."""
     shutil.copy(ROOT / "params.yaml", folder)
-    theta = folder / "data/theta/band1/sling2sim2real_taut.json"
+    theta = folder / "data/theta/band1/least_squares.json"
     theta.parent.mkdir(parents=True)
     theta.write_text(json.dumps({"band": "band1", "theta": SOFT}))
-    policy = folder / "data/policies/band1/sling2sim2real_taut/policy.onnx"
+    policy = folder / "data/policies/band1/least_squares/policy.onnx"
     write_policy(policy, slope=(-0.01, 0.0), offset=(-0.31, -0.15))
 
 
@@ -200,13 +200,13 @@ def test_aim_names_the_stage_that_makes_what_is_missing(tmp_path: Path, refused)
     aim = ("aim", "--band", "band1", "--target", "1.9")
     line = refused(1, *aim, "--robust", folder=tmp_path)
     assert "robust/policy.onnx: missing" in line
-    assert "dvc repro policy@band1-sling2sim2real_taut" in line
+    assert "dvc repro policy@band1-least_squares" in line
     aim = (*aim, "--method", "de")
     assert refused(1, *aim, folder=tmp_path).endswith(
         "de.json: missing; `dvc repro ablation_theta@band1-de` makes it"
     )
     theta = tmp_path / "data/theta/band1"
-    shutil.copy(theta / "sling2sim2real_taut.json", theta / "de.json")
+    shutil.copy(theta / "least_squares.json", theta / "de.json")
     assert refused(1, *aim, folder=tmp_path).endswith(
         "policy.onnx: missing; `dvc repro ablation_policy@band1-de` makes it"
     )

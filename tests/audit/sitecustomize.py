@@ -14,10 +14,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 SHORT = {  # by stage and module
-    "theta": {
-        "pipeline.confidence.posterior": {"HEAT": (100.0,), "ROUNDS": 3, "SHORT": 120, "LONG": 120},
-        "pipeline.confidence.profile": {"POINTS": 3},
-    },
     "policy": {"pipeline.policy.robust": {"STEPS": 30}},
     "report": {"pipeline.report.styles": {"THEME": {}}},  # a layout that is solved draws all twice
 }

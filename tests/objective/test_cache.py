@@ -16,7 +16,6 @@ from pipeline.objective.cache import EvaluationCache
 from pipeline.objective.evaluate import NOT_FINITE, Evaluation, Evaluator
 from pipeline.objective.loss import TERMS
 from pipeline.objective.session import SOURCES
-from pipeline.params.identification import Prior
 from tests.forked import Forked
 from tests.project import ROOT, python
 from tests.search import toy
@@ -103,14 +102,11 @@ def test_what_was_simulated_is_recalled(remembered) -> None:
         assert (one.seconds, other.seconds) == (1.0, 0.0)
 
 
-def test_totals_are_recomputed_by_weights_and_priors(remembered) -> None:
+def test_totals_are_recomputed_by_weights(remembered) -> None:
     _, (plain,) = remembered(batches(0.1))
     count, (heavy,) = remembered(batches(0.1), weights={"geom": 2.0, "force": 3.0})
     assert count == 0 and heavy.failure == [None, "no"]
     np.testing.assert_allclose(heavy.total, 5 * plain.total, rtol=1e-15)
-    count, (dear,) = remembered(batches(0.1), priors={"a": Prior(mean=4.0, weight=2.0)})
-    assert count == 0
-    np.testing.assert_allclose(dear.total, plain.total + 0.5 * plain.theta[:, 0])
 
 
 def test_other_inputs_start_over_and_replace_the_old(remembered, tmp_path: Path) -> None:
@@ -192,12 +188,10 @@ errors.run(lambda: EvaluationCache(bowl(), Path("memory"), "x")(batches(0.1)[0])
 class Loss:
     """Terms of toy rollouts, one of which, work, is infinite for every other rollout."""
 
-    stamps = np.zeros(1)
-
     def __init__(self, **weights: float) -> None:
         self.weights = dict.fromkeys(TERMS, 0.0) | weights
 
-    def terms(self, rollouts, nuisances) -> dict[str, np.ndarray]:
+    def terms(self, rollouts) -> dict[str, np.ndarray]:
         value = rollouts.force[:, 0, 0]
         odd = np.arange(len(value)) % 2 == 1
         return {name: np.where(odd & (name == "work"), np.inf, value) for name in self.weights}

@@ -11,7 +11,6 @@ from pipeline.objective.evaluate import Evaluator
 from pipeline.objective.loss import TERMS, EpisodeLoss
 from pipeline.objective.space import Space
 from pipeline.params import load
-from pipeline.params.identification import Prior
 from tests.search import toy
 from validation.synthetic import recorded_yardstick
 
@@ -34,7 +33,7 @@ def simulate(sling, episode, thetas, device):
 
 
 def evaluator(workers: int = 1, **options) -> Evaluator:
-    weights = {"geom": 1.0, "force": 0.5, "work": 1.0, "taut": 0.0}
+    weights = {"geom": 1.0, "force": 0.5, "work": 1.0}
     sizes = {"radius": toy.RADIUS, "rest_length": toy.LENGTH}
     loss = EpisodeLoss(EPISODE, weights=weights, cutoff=toy.CUTOFF, **sizes)
     options = {"workers": workers, "simulate": simulate, **options}
@@ -51,18 +50,6 @@ def test_losses_of_a_batch() -> None:
     np.testing.assert_allclose(found.terms["force"], [1.0, 0.1])
     np.testing.assert_allclose(found.total, found.terms["geom"] + 0.5 * found.terms["force"])
     assert found.failure == [None, None]
-
-
-def test_priors_of_the_space_are_in_the_total() -> None:
-    unit = np.random.default_rng(1).random((20, 2))
-    plain, dear = evaluator(1), evaluator(1)
-    dear.space = replace(SPACE, priors={"offset": Prior(mean=0.005, weight=0.5)})
-    found, with_prior = plain(unit), dear(unit)
-    good = np.isfinite(found.total)
-    added = with_prior.total[good] - found.total[good]
-    assert good.sum() > 5 and np.array_equal(good, np.isfinite(with_prior.total))
-    np.testing.assert_allclose(added, 100 * found.theta[good, 0])
-    np.testing.assert_array_equal(with_prior.terms["geom"], found.terms["geom"])
 
 
 def test_the_number_of_workers_and_devices_changes_nothing() -> None:
@@ -99,21 +86,18 @@ def test_what_a_device_raises_is_raised() -> None:
         evaluator(devices=["cpu", "cpu"], simulate=broken)(np.full((3, 2), 0.5))
 
 
-def test_nor_does_either_where_nuisances_are_searched() -> None:
-    """Those of the simulator and those of the loss, in the real ones."""
+def test_nor_does_either_where_a_law_adds_its_own_axes() -> None:
+    """Those of the law rubber, each of which changes the loss."""
     sling, recorded = recorded_yardstick(PARAMS)
-    bounds = {"air_drag": (0.0, 8.0), "camera_delay": (-0.003, 0.003)}
-    bounds |= {"force_delay": (0.0, 0.004), "cloud_shift_z": (-0.01, 0.01)}
-    about = PARAMS.methods["sling2sim2real_taut"].model_copy(update={"nuisances": bounds})
-    params = PARAMS.model_copy(update={"methods": {"toy": about}})
-    space = Space.of_method(params, "toy")
+    sling = replace(sling, law="rubber")
+    space = Space.of_method(PARAMS, "least_squares")
     unit = np.random.default_rng(1).random((20, space.dimension))  # more than a slice
     unit[1:3] = unit[0]
-    unit[1, space.names.index("air_drag")] += 0.1
-    unit[2, space.names.index("cloud_shift_z")] += 0.1
+    unit[1, space.names.index("mooney_share")] += 0.1
+    unit[2, space.names.index("relaxation")] += 0.1
     unit[:3] %= 1
     found = []
-    loss = EpisodeLoss.of(params, "toy", recorded, sling)
+    loss = EpisodeLoss.of(PARAMS, "least_squares", recorded, sling)
     for workers, devices in ((1, ["cpu"]), (2, ["cpu"]), (1, ["cpu", "cpu"])):
         evaluate = Evaluator(recorded, sling, loss, space, workers=workers, devices=devices)
         found.append(evaluate(unit))

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.episode.phases import taut_frames
 from pipeline.episode.signal import average, lowpass
 from pipeline.objective.loss import TERMS, EpisodeLoss
 from tests.search import toy
@@ -13,18 +12,8 @@ ONES = dict.fromkeys(TERMS, 1.0)
 
 
 def loss_of(episode, **changes) -> EpisodeLoss:
-    options = {"weights": {**ONES, "taut": 0.0}, "cutoff": toy.CUTOFF, **changes}
+    options = {"weights": ONES, "cutoff": toy.CUTOFF, **changes}
     return EpisodeLoss(episode, radius=toy.RADIUS, rest_length=toy.LENGTH, **options)
-
-
-def recoil(y, release: float = 1.0, step: float = 0.02) -> dict:
-    """Frames whose clouds lie at the given y, the first of them at the release."""
-    clouds = [toy.facing() + [0, value, 0] for value in y]
-    return {
-        "clouds": clouds,
-        "cloud_time": release + step * np.arange(len(y)),
-        "release_time": release,
-    }
 
 
 def test_a_perfect_simulation_costs_nothing_and_one_unit_reads_one() -> None:
@@ -82,35 +71,6 @@ def test_median_filters_both_sides() -> None:
     assert unfiltered["force"][0] == pytest.approx(1.0)
 
 
-def test_taut_counts_only_the_frames_of_the_recoil() -> None:
-    """From the release until the middle crosses the fork plane; the swing back is not taut."""
-    y = [-0.4, -0.3, -0.1, 0.02, 0.1, -0.05, -0.1]
-    episode = toy.episode(**recoil(y))
-    np.testing.assert_array_equal(taut_frames(episode), [0, 1, 1, 0, 0, 0, 0])
-    lines = toy.rollouts(episode)
-    lines.center_line[0, :, :, 1] += np.array(y, np.float32)[:, None]
-    lines.center_line[0, [1, 2], :, 2] -= 0.01  # 1 cm off in the recoil alone
-    loss = loss_of(episode, weights={"geom": 0, "force": 0, "work": 0, "taut": 2.0})
-    terms = loss.terms(lines)
-    assert terms["taut"][0] == pytest.approx(1.0, abs=0.01)
-    assert terms["geom"][0] == pytest.approx(2 / 7, abs=0.01)
-    assert loss.total(terms)[0] == 2 * terms["taut"][0]
-
-
-def test_an_episode_without_taut_frames() -> None:
-    """It serves methods that do not weigh them, and is refused by name for those that do.
-
-    So is one whose recoil is held out.
-    """
-    episode = toy.episode(**recoil([-0.4, 0.1]))
-    assert np.isnan(loss_of(episode).terms(toy.rollouts(episode))["taut"][0])
-    other = toy.episode(**recoil([-0.4, -0.3, -0.1, 0.02, *50 * [0.1]]))
-    loss_of(other, weights=ONES)
-    for one, blocks in ((episode, None), (other, np.array([[0.9, 1.2]]))):
-        with pytest.raises(UserError, match="toy.*taut"):
-            loss_of(one, weights=ONES, held_out=blocks)
-
-
 def test_empty_frames_are_left_out() -> None:
     """The term is the mean over the frames that show the band; an episode of none is refused."""
     episode = toy.episode(frames=4)
@@ -120,14 +80,6 @@ def test_empty_frames_are_left_out() -> None:
     np.testing.assert_allclose(some["geom"], loss_of(episode).terms(shifted)["geom"])
     with pytest.raises(UserError, match="no camera frame"):
         loss_of(toy.episode(frames=4, clouds=[np.zeros((0, 3))] * 4))
-
-
-def test_a_frame_counts_for_no_more_than_its_cap() -> None:
-    episode = toy.episode(frames=4)
-    lines = toy.rollouts(episode)
-    lines.center_line[0, 0, :, 2] -= 1.0
-    assert loss_of(episode).terms(lines)["geom"][0] == pytest.approx(25, rel=0.01)
-    assert loss_of(episode, frame_cap=0.02).terms(lines)["geom"][0] == pytest.approx(0.5, abs=0.01)
 
 
 def test_a_broken_rollout_breaks_no_other() -> None:
@@ -142,8 +94,8 @@ def test_a_broken_rollout_breaks_no_other() -> None:
 BLOCKS = np.array([[0.45, 0.75]])  # of the toy's pull, from 0.3 to 1.2 s
 
 
-def test_a_held_out_block_counts_in_its_own_terms_alone() -> None:
-    """What differs within the block and its guard moves no fitted term, and the other way round."""
+def test_a_held_out_block_counts_in_its_own_residuals_alone() -> None:
+    """What differs within the block and its guard moves no term, and the other way round."""
     episode = toy.episode(samples=200, release_time=5.9)
     loss = loss_of(episode, held_out=np.array([[2.0, 3.0]]), median_window=1)
     off, late = toy.rollouts(episode), toy.rollouts(episode)
@@ -156,14 +108,12 @@ def test_a_held_out_block_counts_in_its_own_terms_alone() -> None:
     for name in ("geom", "force", "work"):
         assert loss.terms(off)[name][0] == pytest.approx(clean[name][0], abs=1e-3)
         assert loss.terms(late)[name][0] > clean[name][0] + 0.1
-    held = loss.held_out_terms(off)
-    assert held["force"][0] == pytest.approx(4 * 0.8, rel=0.05)
-    assert held["geom"][0] == pytest.approx(pictures.sum() / loss.held_frames.sum(), rel=0.01)
-    assert loss.held_out_terms(late)["force"][0] < 1e-6
-    for name, term, least in (("force", "force", 1e-3), ("cloud", "geom", 0.01)):
-        residuals = loss.residuals(off)[name]
-        assert residuals["fitted"][0] < least
-        assert residuals["held_out"][0] == held[term][0]
+    residuals = loss.residuals(off)
+    force, cloud = residuals["force"], residuals["cloud"]
+    assert force["held_out"][0] == pytest.approx(4 * 0.8, rel=0.05)
+    assert cloud["held_out"][0] == pytest.approx(pictures.sum() / loss.held_frames.sum(), rel=0.01)
+    assert loss.residuals(late)["force"]["held_out"][0] < 1e-6
+    assert force["fitted"][0] < 1e-3 and cloud["fitted"][0] < 0.01
 
 
 def test_samples_and_frames_are_fitted_or_held_out_and_samples_may_be_guards() -> None:
@@ -183,8 +133,8 @@ def test_samples_and_frames_are_fitted_or_held_out_and_samples_may_be_guards() -
 def test_terms_of_a_rollout_hang_on_no_other_of_its_batch() -> None:
     """To the bit: batches are cut as devices and threads come."""
     rng = np.random.default_rng(3)
-    episode = toy.episode(**recoil([-0.4, -0.3, -0.1, 0.02, *50 * [0.1]]))
-    loss, lines = loss_of(episode, weights=ONES, frame_cap=0.011), toy.rollouts(episode, count=5)
+    episode = toy.episode(frames=54)
+    loss, lines = loss_of(episode), toy.rollouts(episode, count=5)
     lines.center_line[:] += rng.normal(0, 0.01, lines.center_line.shape)
     lines.force[:] += rng.normal(0, 1, lines.force.shape)
     together = loss.terms(lines)
@@ -201,4 +151,5 @@ def test_without_blocks_nothing_is_held_out() -> None:
     plain, none = loss_of(episode), loss_of(episode, held_out=np.zeros((0, 2)))
     for name, value in plain.terms(lines).items():
         np.testing.assert_array_equal(none.terms(lines)[name], value)
-    assert all(np.isnan(value).all() for value in plain.held_out_terms(lines).values())
+    residuals = plain.residuals(lines).values()
+    assert all(np.isnan(parts["held_out"]).all() for parts in residuals)

@@ -5,11 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy.stats import laplace
 
 from pipeline.objective.space import Space, reflect
 from pipeline.params import load
-from pipeline.params.identification import Prior
 from pipeline.sling.material import THETA
 
 SPACE = Space.of(load().parameters)
@@ -33,18 +31,16 @@ def test_scales() -> None:
     assert middle["poissons_ratio"] == pytest.approx((0.30 + 0.49) / 2)
 
 
-def test_nuisances_are_the_last_axes() -> None:
-    """In one order, whatever that of the params; linear, between their bounds."""
-    bounds = {"force_bias_x": (-1.0, 1.0), "camera_delay": (-0.003, 0.001)}
-    space = Space.of(load().parameters, bounds)
-    assert space.names == (*THETA, "camera_delay", "force_bias_x")
-    assert space.nuisances == ("camera_delay", "force_bias_x")
+def test_what_a_law_adds_are_the_last_axes() -> None:
+    """In one order, whatever that of the bounds; linear, between them."""
+    bounds = {"relaxation": (0.0, 0.05), "mooney_share": (-0.3, 0.9)}
+    space = Space.of(load().parameters, bounds, "rubber")
+    assert space.names == (*THETA, "mooney_share", "relaxation")
     assert space.dimension == 7
     theta = space.to_physical(np.full(7, 0.5))
     np.testing.assert_array_equal(theta[:5], SPACE.to_physical(np.full(5, 0.5)))
-    np.testing.assert_allclose(theta[5:], [-0.001, 0.0], atol=1e-15)
+    np.testing.assert_allclose(theta[5:], [0.3, 0.025], atol=1e-15)
     np.testing.assert_allclose(space.to_unit(theta), np.full(7, 0.5))
-    assert SPACE.nuisances == ()
 
 
 @given(arrays(float, (3, 5), elements=st.floats(-1e6, 1e6)))
@@ -57,24 +53,3 @@ def test_reflection_lands_inside_and_is_idempotent(unit: np.ndarray) -> None:
 def test_reflection_is_a_mirror_at_the_faces() -> None:
     outside = np.array([-0.2, 1.2, 2.1, -1.3, -2.0, 0.3])
     np.testing.assert_allclose(reflect(outside), [0.2, 0.8, 0.1, 0.7, 0.0, 0.3], atol=1e-12)
-
-
-def test_priors_count_in_the_loss_and_in_the_density() -> None:
-    """By the size of their nuisances; the density is SciPy's two-sided exponential."""
-    bounds = {"air_drag": (0.0, 8.0), "camera_delay": (-0.01, 0.01)}
-    means = {"air_drag": 2.0, "camera_delay": 0.005}
-    priors = {
-        "air_drag": Prior(mean=2.0, weight=1.0),
-        "camera_delay": Prior(mean=0.005, weight=0.5),
-        "force_bias_x": Prior(mean=1.0, weight=1.0),  # of no axis of this box
-    }
-    parameters = load().parameters
-    space = Space.of(parameters, bounds, priors=priors)
-    theta = np.tile(space.low, (3, 1))
-    columns = [space.names.index(name) for name in bounds]
-    theta[:, columns] = [[0.0, 0.0], [2.0, -0.01], [4.0, 0.01]]
-    np.testing.assert_allclose(space.cost(theta), [0.0, 2.0, 3.0])
-    density = laplace(scale=[*means.values()]).logpdf(theta[:, columns]).sum(axis=1)
-    np.testing.assert_allclose(space.log_prior(theta), density - density[0], atol=1e-14)
-    for nothing in (Space.of(parameters, bounds).cost, Space.of(parameters, bounds).log_prior):
-        assert not nothing(theta).any()

@@ -10,22 +10,15 @@ from ruamel.yaml import YAML
 
 from pipeline.base.errors import UserError
 from pipeline.base.schema import Section
-from pipeline.objective.nuisance import NUISANCES
-from pipeline.params import Params, check, identification, load, parse
+from pipeline.params import Params, check, load, parse
 from pipeline.sling.material import THETA
 from tests.project import ROOT
 
 TEXT = (ROOT / "params.yaml").read_text(encoding="utf-8")
 CONTENT = YAML(typ="safe").load(TEXT)
-BO, DE = CONTENT["methods"]["bo"], CONTENT["methods"]["de"]
-WINDY = BO | {"nuisances": {"air_drag": [0, 8]}}
-GAIN = BO | {"nuisances": {"force_gain": [0.8, 1.2]}, "fixed": {"youngs_modulus": 3e5}}
-GAIN |= {"priors": {"force_gain": {"mean": 0.1, "weight": 1.0}}}
-NOTHING = dict.fromkeys(("geom", "force", "work", "taut"), 0)
-INSTRUMENTS_ALONE = {
-    "fixed": {name: CONTENT["parameters"][name]["low"] for name in THETA},
-    "nuisances": {"camera_delay": [-0.003, 0.003]},
-}
+NOTHING = dict.fromkeys(("geom", "force", "work"), 0)
+ALL_FIXED = {name: CONTENT["parameters"][name]["low"] for name in THETA}
+NARROW = {"bounds": {"poissons_ratio": [0.45, 0.49]}, "fixed": {"poissons_ratio": 0.4}}
 
 
 def leaves(node: object, path: tuple = ()) -> list[tuple[tuple, object]]:
@@ -173,20 +166,16 @@ REFUSED = [
     ("cloud.sam3.device", "gpu", "cloud.sam3.device: must be cpu, cuda, or one GPU such as cuda:0"),
     ("weather", 3, "weather: unknown key"),
     ("methods.de.weights", NOTHING, "methods.de.weights: at least one weight"),
-    ("methods.de.search", "cmaes", "methods.de.search: must be multistart, de, bo, adam or"),
+    ("methods.de.search", "cmaes", "methods.de.search: must be multistart, least_squares, de"),
     ("methods.de.search", "my.module:", "or package.module:Class, got 'my.module:'"),
     ("methods.de.search", "my module:Class", "methods.de.search: must be multistart"),
     ("methods.no_work.settings", {"rate": 1}, "methods.no_work: settings are for another"),
     ("methods.de.settings", {"seed": 3}, "methods.de: settings: seed stands under `optimizer`"),
     ("optimizer.mutation", [0.5, 2.0], "optimizer.mutation.1: must be between 0 and 1.99"),
-    ("methods.sling2sim2real_taut.fixed", {"poissons_ratio": 0.4}, "must be between 0.45 and 0.49"),
-    ("methods.bo", WINDY | {"fixed": {"air_drag": 9}}, "fixed.air_drag: must be between 0 and 8"),
-    ("methods.de.priors", {"air_drag": {"mean": 1.0, "weight": 0.02}}, "of the method's nuisances"),
-    ("methods.bo", GAIN, "methods.bo: priors: force_gain is about 1 and a prior about 0, so"),
-    ("methods.bo", WINDY | {"priors": {"air_drag": {"mean": 0, "weight": 1}}}, "drag.mean: must"),
-    ("methods.bo", WINDY | {"priors": {"air_drag": {"mean": 1, "weight": -1}}}, "g.weight: must"),
-    ("methods.bo", WINDY | {"priors": {"air_drag": {"mean": 1.0}}}, "drag.weight: is missing"),
-    ("methods.bo", WINDY | {"priors": {"air_drag": 0.02}}, "priors.air_drag: must be a mapping"),
+    ("methods.de", CONTENT["methods"]["de"] | NARROW, "must be between 0.45 and 0.49, got 0.4"),
+    ("methods.least_squares.fixed", {}, "wants `fixed` to name poissons_ratio, dynamic_friction"),
+    ("methods.de.nuisances", {"air_drag": [0, 8]}, "methods.de.nuisances: unknown key"),
+    ("methods.de.weights.taut", 1.0, "methods.de.weights.taut: unknown key"),
     ("methods.de.fixed", {"air_drag": 1.0}, "air_drag is not one of youngs_modulus"),
     ("methods.de.bounds", {"air_drag": [0.0, 1.0]}, "air_drag is not one of youngs_modulus"),
     ("methods.de.bounds", {"poissons_ratio": [0.2, 0.4]}, "[low, high] within parameters.poissons"),
@@ -204,13 +193,8 @@ REFUSED = [
     ("methods.de.fixed", {"relaxation": 0.01}, "methods.de.fixed: relaxation is not one of"),
     ("methods.de.fixed", {"poisson": 0.4}, "methods.de.fixed: poisson is not one of youngs_"),
     ("methods.de.fixed", {"poissons_ratio": 0.2}, "must be between 0.3 and 0.49, got 0.2"),
-    ("methods.de.fixed", INSTRUMENTS_ALONE["fixed"], "methods.de.fixed: names every parameter"),
-    ("methods.de", DE | INSTRUMENTS_ALONE, "every parameter, so neither one of them nor air_drag"),
-    ("methods.de.nuisances", {"delay": [0, 1]}, "delay is not one of air_drag, camera_delay"),
-    ("methods.de.nuisances", {"camera_delay": [-0.1, 0.1]}, "high] between -0.02 and 0.02 with 0"),
-    ("methods.de.nuisances", {"force_bias_x": [0.1, 0.2]}, "with 0 in it, got [0.1, 0.2]"),
-    ("methods.de.nuisances", {"camera_delay": 0.1}, "camera_delay: must be a list"),
-    ("methods.de.nuisances", {"force_gain": [0.8, 1.2]}, "and youngs_modulus cannot both be free"),
+    ("methods.de.fixed", ALL_FIXED, "methods.de.fixed: names every parameter, so none is left"),
+    ("methods.de.bounds", {"poissons_ratio": 0.4}, "bounds.poissons_ratio: must be a list"),
     ("loss.held_out.length", 0.1, "loss.held_out.length: must be between 0.5 and 5"),
 ]
 
@@ -226,20 +210,16 @@ def test_what_a_method_leaves_out_is_as_the_defaults_say() -> None:
     weights = CONTENT["methods"]["de"]["weights"]
     about = check(changed(("methods", "de"), {"weights": weights})).methods["de"]
     assert (about.search, about.k_top, about.covariance) == ("multistart", None, True)
-    assert (about.settings, about.fixed, about.nuisances, about.priors) == ({}, {}, {}, {})
+    assert (about.settings, about.fixed, about.bounds) == ({}, {}, {})
     other = check(changed(("method_defaults", "bounds"), {"poissons_ratio": [0.4, 0.49]})).methods
     assert other["no_work"].bounds == {"poissons_ratio": (0.4, 0.49)}
-    assert other["sling2sim2real_taut"].bounds == {"poissons_ratio": (0.45, 0.49)}
+    assert set(other["least_squares"].bounds) == {"mooney_share", "relaxation"}
     without = {key: value for key, value in CONTENT.items() if key != "method_defaults"}
     assert refusal(without) == "params.yaml: method_defaults: is missing"
     assert refusal(changed(("method_defaults", "k_top"), 0)).startswith(
         "params.yaml: method_defaults.k_top: must be between 1 and 50"
     )
     assert "methods.de: must be a mapping" in refusal(changed(("methods", "de"), 3))
-
-
-def test_nuisances_are_those_that_the_objective_knows() -> None:
-    assert tuple(identification.NUISANCES) == NUISANCES
 
 
 def test_a_methods_regions_need_rollouts() -> None:
@@ -252,14 +232,9 @@ def test_what_a_method_may_ask_for() -> None:
     base = CONTENT["methods"]["de"]
     own = {"search": "lab.search:Own", "settings": {"rate": 0.1, "steps": 3, "name": "x"}}
     assert check(changed(("methods", "de"), base | own)).methods["de"].settings["rate"] == 0.1
-    gain = {"nuisances": {"force_gain": [0.8, 1.2]}, "fixed": {"youngs_modulus": 3e5}}
-    assert check(changed(("methods", "de"), base | gain)).methods["de"].nuisances == {
-        "force_gain": (0.8, 1.2)
-    }
-    held = {"nuisances": {"camera_delay": [0, 0.01]}, "fixed": {"camera_delay": 0.005}}
-    assert check(changed(("methods", "de"), base | held)).methods["de"].fixed["camera_delay"]
-    drag = INSTRUMENTS_ALONE | {"nuisances": {"air_drag": [0, 8]}}
-    assert len(check(changed(("methods", "de"), base | drag)).methods["de"].fixed) == 5
+    rubber = {"law": "rubber", "bounds": CONTENT["methods"]["least_squares"]["bounds"]}
+    rubber |= {"fixed": ALL_FIXED}  # what the law adds is left
+    assert len(check(changed(("methods", "de"), base | rubber)).methods["de"].fixed) == 5
 
 
 def test_targets_beyond_the_paper_area_are_refused_though_trained() -> None:

@@ -18,7 +18,7 @@ from tests.policy import toy
 from tests.project import ROOT
 
 POINT = (2e5, 0.47, 2e-3, 0.5, 0.6)
-STORED = Stored("band1", "sling2sim2real_taut")
+STORED = Stored("band1", "least_squares")
 FOLDER = STORED.folder()
 FILES = {"card.json", "policy.onnx", "policy.pt", "training.parquet"}
 
@@ -41,18 +41,18 @@ def project(tmp_path, monkeypatch):
     content["policy"]["robust"].update({"samples": 3, "map_size": [7, 5]})
     yaml.dump(content, tmp_path / "params.yaml")
     theta = {"band": "band1", "theta": dict(zip(THETA, POINT, strict=True))}
-    for method in ("sling2sim2real_taut", "package_si"):
+    for method in ("least_squares", "package_si"):
         write_json(Path(f"data/theta/band1/{method}.json"), theta)
     samples = np.tile(POINT, (20, 1))
     samples[:, 0] *= np.linspace(0.95, 1.05, 20)
     write_json(
-        Path("data/confidence/band1/sling2sim2real_taut.json"),
+        Path("data/confidence/band1/least_squares.json"),
         {"names": list(THETA), "samples": samples.tolist()},
     )
 
     monkeypatch.setattr(robust, "STEPS", 30)
 
-    def run(method: str = "sling2sim2real_taut", launch=launcher) -> None:
+    def run(method: str = "least_squares", launch=launcher) -> None:
         monkeypatch.setattr(policy, "simulator", lambda *args, **kwargs: launch)
         monkeypatch.setattr(sys, "argv", ["policy.py", "band1", method])
         policy.main()
@@ -84,7 +84,7 @@ def test_both_policies_are_written_with_their_cards(project, capsys) -> None:
 
 def test_without_confidence_there_is_no_robust_policy(project, capsys) -> None:
     """A θ file by hand has none beside it: to load_samples the same as one without samples."""
-    Path("data/confidence/band1/sling2sim2real_taut.json").unlink()
+    Path("data/confidence/band1/least_squares.json").unlink()
     project()
     assert {file.name for file in FOLDER.iterdir()} == FILES | {"map.parquet"}
     assert "no robust policy, for there are no samples in data/conf" in capsys.readouterr().out

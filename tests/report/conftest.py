@@ -56,7 +56,7 @@ def history(phase: str, totals: list[float], solver: int | None = None) -> pd.Da
         value = low + place * (high - low)
         rows[f"unit_{name}"], rows[name] = place, np.exp(value) if box.scale == "log" else value
     finite = np.where(np.isfinite(totals), totals, np.nan)
-    for name, share in (("geom", 0.5), ("force", 0.25), ("work", 0.25), ("taut", 0.1)):
+    for name, share in (("geom", 0.5), ("force", 0.25), ("work", 0.25)):
         rows[name] = share * finite
     rows["failure"] = np.where(np.isfinite(totals), None, "slipped")
     return rows
@@ -143,7 +143,7 @@ def template(tmp_path_factory) -> Path:
         rows.to_parquet(data / step / BAND / f"{METHOD}.parquet")
     region = Region(np.full(5, 0.4), 0.01 * np.eye(5), 2.0, [2, 0])
     save_regions(data / "clusters" / BAND / f"{METHOD}.json", NAMES, [region], 5)
-    loss = {"geom": 0.5, "force": 0.25, "work": 0.5, "taut": 0.1, "total": 1.25}
+    loss = {"geom": 0.5, "force": 0.25, "work": 0.5, "total": 1.25}
     theta = {"band": BAND, "method": METHOD, "theta": THETA, "loss": loss, "rollouts": 5}
     theta["confidence"] = confidence()
     (data / "theta" / BAND / f"{METHOD}.json").write_text(json.dumps(theta))

@@ -98,7 +98,7 @@ def test_the_methods_own_best_never_rises(total: list[float]) -> None:
 
 
 def test_which_weights_are_the_printed_ones() -> None:
-    ones = {"geom": 1, "force": 1, "work": 1, "taut": 0}
+    ones = {"geom": 1, "force": 1, "work": 1}
     assert not has_another_loss(ones)
-    for another in ({"taut": 0.5}, {"work": 0}, {"geom": 2}):
+    for another in ({"work": 0}, {"geom": 2}):
         assert has_another_loss(ones | another)

@@ -8,7 +8,6 @@ import numpy as np
 from pipeline.objective.evaluate import Evaluation
 from pipeline.objective.loss import TERMS
 from pipeline.objective.space import Space
-from pipeline.params.identification import Prior
 from pipeline.search.history import History
 from pipeline.search.loop import budget, search
 from pipeline.search.optimizers import build
@@ -40,12 +39,11 @@ class Evaluate:
         names: tuple[str, ...] = NAMES,
         fails: Callable[[np.ndarray], np.ndarray] = lambda unit: unit[:, 0] < 0,
         weights: dict[str, float] | None = None,
-        priors: dict[str, Prior] | None = None,
     ) -> None:
         self.function, self.fails, self.count = function, fails, 0
         size = len(names)
         low, high, linear = np.zeros(size), np.full(size, 10.0), np.zeros(size, bool)
-        self.space = Space(names, low, high, linear, priors or {})
+        self.space = Space(names, low, high, linear)
         weights = dict.fromkeys(TERMS, 0.0) | (weights or {"geom": 1.0})
         weighed = [name for name in TERMS if weights[name]]
         total = lambda terms: sum(weights[name] * terms[name] for name in weighed)  # noqa: E731

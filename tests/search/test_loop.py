@@ -167,7 +167,6 @@ def test_a_history_without_rows_can_be_kept(tmp_path: Path) -> None:
 
 
 def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
-    """Nuisances, which are axes of no other name, stand beside it."""
     paths = tmp_path / "a.parquet", tmp_path / "b.parquet"
     for path, history in zip(paths, chain(quadratic(CENTRE, VALLEY))[:2], strict=True):
         history.save(path)
@@ -180,7 +179,6 @@ def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
         content, best = theta_content(history, "band1"), history.best()
         assert best["total"] == content["loss"]["total"] == history.total.min()
         assert content["theta"] == {name: best[name] for name in names}
-        assert content["nuisances"] == {name: best[name] for name in NAMES[len(names) :]}
         np.testing.assert_array_equal(
             list(content["theta"].values()), 10 * history.unit[np.argmin(history.total)]
         )

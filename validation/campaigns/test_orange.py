@@ -24,7 +24,7 @@ pytestmark = pytest.mark.validation
 RECORDING = ROOT.parent / "shared/recordings/orange.mcap"
 LANDINGS = RECORDING.with_name("orange_landings.csv")
 BAND, MASS = "orange", 0.0408  # kg, as its note says
-OURS, LIMIT = "sling2sim2real_taut", 0.05
+OURS, LIMIT = "least_squares", 0.05
 
 
 def copy_of_the_project(folder: Path) -> Path:

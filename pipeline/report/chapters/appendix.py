@@ -22,11 +22,10 @@ out the covariance, −m the several starts, −L_work the term of work.
 {_trust(results, styles)}
 ### Loss
 
-Terms of the loss at θ: mean distance of the point clouds (geom), mean force error (force), error of
-the mechanical work (work), and the distance of the clouds in the few taut frames of the recoil
-(taut). Per cent: what a term weighs in the total of its method, to which a nuisance may add its
-cost. Totals of methods with different weights are not comparable; the *printed loss*, geom + force
-+ work as in the paper, is one measure for all, though not all minimise it.
+Terms of the loss at θ: mean distance of the point clouds (geom), mean force error (force), and
+error of the mechanical work (work). Per cent: what a term weighs in the total of its method. Totals
+of methods with different weights are not comparable; the *printed loss*, geom + force + work as in
+the paper, is one measure for all, though not all minimise it.
 
 {markdown(identified.losses(results, params, styles))}"""
 

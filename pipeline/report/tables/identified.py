@@ -25,7 +25,7 @@ SEARCHES = {
     "bo": "Bayesian optimisation",
     "adam": "Adam on finite differences",
 }
-TERMS = {"geom": "geom [cm]", "force": "force [N]", "work": "work [J]", "taut": "taut [cm]"}
+TERMS = {"geom": "geom [cm]", "force": "force [N]", "work": "work [J]"}
 
 
 def methods(results: Results, params, styles: Styles) -> Table:
@@ -45,12 +45,9 @@ def methods(results: Results, params, styles: Styles) -> Table:
             search = f"DE, then CMA-ES in {regions} region{'s' if max(found) > 1 else ''}"
             search += "" if about.covariance else ", isotropic starts"
         fixed = [_held(name, value) for name, value in about.fixed.items()]
-        known = {name: f" (prior: mean {one.mean:g})" for name, one in about.priors.items()}
-        more = [name + known.get(name, "") for name in about.nuisances]
-        shown = [style.name, f"`{method}`", search, " + ".join(terms), ", ".join(fixed) or NONE]
-        rows.append([*shown, ", ".join(more) or NONE])
-    heads = ["method", "in params.yaml", "search", "minimises", "held fixed", "nuisances besides"]
-    return heads, rows
+        held = ", ".join(fixed) or NONE
+        rows.append([style.name, f"`{method}`", search, " + ".join(terms), held])
+    return ["method", "in params.yaml", "search", "minimises", "held fixed"], rows
 
 
 def _held(name: str, value: float) -> str:

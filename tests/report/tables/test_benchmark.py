@@ -11,7 +11,7 @@ from pipeline.report.styles import styles
 from pipeline.report.tables.benchmark import ablation, as_table, benchmark, records, spread
 from tests.report.tables.toy_results import TARGETS, floor, launches, ran
 
-NAMED = styles(["sling2sim2real", "sling2sim2real_taut", "package_si", "mine", "de"])
+NAMED = styles(["sling2sim2real", "least_squares", "package_si", "mine", "de"])
 CLOSE = launches([[0.01, 0.03], [-0.02, 0.02], [0.04, -0.04]])
 FAR = launches([[0.1, 0.1], [0.2, 0.2], [0.3, 0.3]])
 

@@ -8,11 +8,11 @@ from pipeline.report.tables.differences import as_table, claims, compared, recor
 from tests.report.tables.toy_results import launches, ran, result, results
 
 NOISE = np.random.default_rng(0).normal(0, 0.01, (3, 5))
-NAMED = styles(["sling2sim2real", "sling2sim2real_taut", "package_si", "real2sim2real"])
+NAMED = styles(["sling2sim2real", "least_squares", "package_si", "real2sim2real"])
 RAN = ran(
     {
         "band1 sling2sim2real": launches(0.05 - NOISE),
-        "band1 sling2sim2real_taut": launches(0.05 + NOISE),
+        "band1 least_squares": launches(0.05 + NOISE),
         "band1 package_si": launches(0.2 + NOISE),
         "band1 real2sim2real": launches(NOISE, failed=15),
         "orange package_si": launches(NOISE, "measured"),
@@ -22,19 +22,19 @@ RAN = ran(
 
 def test_methods_are_held_against_ours_and_the_papers() -> None:
     heads, rows = as_table(compared(RAN, 1), NAMED)
-    assert heads[3:] == ["beside ours (taut)", "beside Sling2Sim2Real"]
+    assert heads[3:] == ["beside ours", "beside Sling2Sim2Real"]
     found = {row[1]: row[2:] for row in rows}
-    assert found["Sling2Sim2Real"][2] == found["ours (taut)"][1] == "–"
+    assert found["Sling2Sim2Real"][2] == found["ours"][1] == "–"
     assert found["Package SI"][1] == "**+15.00 (+15.00 to +15.00)**"
     assert found["Real2Sim2Real"] == ["virtual", "N/A", "N/A"]
-    assert found["ours (taut)"][2].count("+") + found["ours (taut)"][2].count("−") == 3
+    assert found["ours"][2].count("+") + found["ours"][2].count("−") == 3
     assert not any(row[0] == "orange" for row in rows)  # none of the two ran there
 
 
 def test_no_more_is_said_than_the_intervals_allow() -> None:
     beside_ours, beside_papers = claims(compared(RAN, 1), NAMED)
     assert beside_ours == (
-        "- Band 1 (soft), virtual, beside **ours (taut)**: more error: Package SI; cannot be told"
+        "- Band 1 (soft), virtual, beside **ours**: more error: Package SI; cannot be told"
         " apart: Sling2Sim2Real; cannot be compared: Real2Sim2Real."
     )
     assert "beside **Sling2Sim2Real**" in beside_papers
@@ -60,11 +60,11 @@ def test_what_is_said_where_launches_fail() -> None:
 
 def test_machines_read_the_same(tmp_path) -> None:
     read = records(compared(RAN, 1)).set_index(["method", "beside"])
-    one = read.loc["package_si", "sling2sim2real_taut"]
+    one = read.loc["package_si", "least_squares"]
     assert one.difference_cm == pytest.approx(15) and one.launches == 15 and one.left_out == 0
     assert (one.launches_beside, one.failed_share, one.failed_share_beside) == (15, 0, 0)
     assert one.low_95_cm <= 15.001 and one.high_95_cm >= 14.999
-    assert ("real2sim2real", "sling2sim2real_taut") not in read.index
+    assert ("real2sim2real", "least_squares") not in read.index
     some = launches(NOISE, "measured", failed=3), launches(NOISE, "measured", failed=6)
     both = ran({"band1 sling2sim2real": some[0], "band1 bo": some[1]})
     (few,) = records(compared(both, 1)).itertuples()
@@ -76,7 +76,7 @@ def test_robust_policies_stand_beside_the_plain_ones() -> None:
     """Landings 5 cm beyond and scattered: half the scatter, and the same mean miss."""
     assert robust(RAN, NAMED, 1) is None
     plain, second = launches(0.05 + NOISE), launches(0.05 + 0.5 * NOISE)
-    both = results(result("band1", "sling2sim2real_taut", plain, robust_trials=second))
+    both = results(result("band1", "least_squares", plain, robust_trials=second))
     (row,) = robust(both, NAMED, 1)[1]
     scatter = 100 * np.sqrt(np.mean(np.var(NOISE, axis=1, ddof=1)))
     assert row[5:7] == [f"{scatter:.2f}", f"{scatter / 2:.2f}"]

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipeline.params.identification import Prior
 from pipeline.report.styles import styles
 from pipeline.report.tables.identified import derived, held_out, losses, methods, phases
 from pipeline.report.tables.policies import policies
@@ -46,19 +45,6 @@ def test_what_a_method_holds_fixed(results, params, named) -> None:
     ]
 
 
-def test_what_a_method_searches_besides(params) -> None:
-    windy = params.methods["sling2sim2real_taut"].model_copy(
-        update={
-            "nuisances": {"air_drag": (0.0, 8.0)},
-            "priors": {"air_drag": Prior(mean=1.0, weight=0.02)},
-        }
-    )
-    params = params.model_copy(update={"methods": params.methods | {"sling2sim2real_taut": windy}})
-    table = methods(ran({m: [1] for m in params.methods}), params, styles(params.methods))
-    besides = dict(zip(column(table, "method"), column(table, "nuisances besides"), strict=True))
-    assert besides["ours (taut)"] == "air_drag (prior: mean 1)" and besides["DE_L"] == "–"
-
-
 def test_what_a_method_minimises_and_by_what_search(params) -> None:
     counts = {m: [1] for m in params.methods} | {"sling2sim2real": [4, 3, 4], "no_work": [2]}
     table = methods(ran(counts), params, styles(params.methods))
@@ -89,7 +75,6 @@ def test_residuals_by_phase_in_newtons_and_centimetres(results, named) -> None:
 def test_losses_say_what_each_term_weighs(results, params, named) -> None:
     table = losses(results, params, named)
     assert column(table, "geom [cm]") == column(table, "work [J]") == ["0.5 (40 %)"]
-    assert column(table, "taut [cm]") == ["0.1 (unused)"]
     assert column(table, "printed loss") == ["1.25"] and column(table, "rollouts") == ["5"]
 
 

@@ -15,7 +15,7 @@ from tests.report.tables.toy_results import floor, launches, result, results
 
 PARAMS = load()
 NOISE = np.random.default_rng(0).normal(0, 0.01, (3, 5))
-NAMED = styles(["sling2sim2real_taut", "package_si", "de"])
+NAMED = styles(["least_squares", "package_si", "de"])
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def written(tmp_path):
 def test_every_table_is_there_in_each_form(written, tmp_path) -> None:
     ours = launches(0.05 + NOISE)
     ran = (
-        result("band1", "sling2sim2real_taut", ours, robust_trials=launches(0.05 + 0.5 * NOISE)),
+        result("band1", "least_squares", ours, robust_trials=launches(0.05 + 0.5 * NOISE)),
         result("band1", "package_si", launches(0.2 + NOISE)),
         result("band1", "de", launches(0.1 + NOISE)),
     )

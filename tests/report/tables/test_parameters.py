@@ -74,7 +74,7 @@ def test_a_theta_outside_its_interval_and_at_an_edge() -> None:
 
 
 def test_the_loss_is_the_papers_whatever_a_method_minimised() -> None:
-    loss = {"geom": 0.5, "force": 0.25, "work": 0.125, "taut": 9.0, "total": 9.5}
+    loss = {"geom": 0.5, "force": 0.25, "work": 0.125, "glow": 9.0, "total": 9.5}
     ours, _ = table_of(theta={"theta": THETA, "loss": loss})
     assert ours[8] == "**0.8750**"
 

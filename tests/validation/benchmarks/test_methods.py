@@ -48,9 +48,9 @@ def test_every_search_spends_its_budget_and_says_what_it_took(monkeypatch) -> No
 
 
 def test_a_search_is_timed_in_the_box_of_its_method() -> None:
-    """Bounds and nuisances of the method included."""
+    """Bounds of the method included."""
     sling, episode = recorded_yardstick(PARAMS)
-    for method in ("sling2sim2real", "sling2sim2real_taut"):
+    for method in ("sling2sim2real", "least_squares"):
         evaluate = bench.evaluator(PARAMS, method, sling, episode, ["cpu"])
         expected = Space.of_method(PARAMS, method)
         assert evaluate.space.names == expected.names

@@ -1,1 +1,0 @@
-"""How sure the identified parameters are: posterior, intervals, profile curves."""

@@ -12,15 +12,15 @@ from pipeline.landing.simulator import simulator
 from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.launches.spread import landing_intervals
 from pipeline.params import expect_known
-from pipeline.sling.theta import launch_history, law_discrepancy, load_samples, load_theta
+from pipeline.sling.theta import launch_history, load_samples, load_theta
 from stages.start import unmounted
 
 
 class Answer(TypedDict):
     """Where to draw; the keys are those of `sling aim --json`.
 
-    The interval holds 90 % of the landings that samples of θ (data/confidence), the law's own error
-    as the recording shows it, and an error of `trials.actuation_error` in the drawn position give.
+    The interval holds 90 % of the landings that samples of θ (data/confidence) and an error of
+    `trials.actuation_error` in the drawn position give.
     Landing and interval are None where the launch fails.
     """
 
@@ -84,8 +84,7 @@ def aim(
         samples = load_samples(layout.confidence(band, method))
         if samples is None:
             warnings.append("the interval leaves out how well the parameters are known")
-        error, discrepancy = params.trials.actuation_error, law_discrepancy(content)
-        found = landing_intervals(launcher, draw, samples, error, discrepancy)[0]
+        found = landing_intervals(launcher, draw, samples, params.trials.actuation_error)[0]
         if np.isfinite(found).all():
             interval = found.tolist()
         else:

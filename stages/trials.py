@@ -22,7 +22,7 @@ from pipeline.launches import trials
 from pipeline.launches.stretch import recorded_stretch, stretch_of
 from pipeline.params import load
 from pipeline.rig.physics.launch import Trial, launch
-from pipeline.sling.theta import law_discrepancy, load_samples, load_theta
+from pipeline.sling.theta import load_samples, load_theta
 from stages.start import run, started
 
 
@@ -42,8 +42,7 @@ def main() -> None:
     batches = batches or trials.aimed(stored, list(targets))
 
     launcher = simulator(params, band, theta)
-    share = law_discrepancy(theta)
-    launches, intervals = trials.predict(batches, launcher, samples, params, share)
+    launches, intervals = trials.predict(batches, launcher, samples, params)
     draws = np.concatenate([batch.draws for batch in batches])
     table = trials.table(
         band,

@@ -19,13 +19,11 @@ def landing_intervals(
     draws: np.ndarray,
     samples: np.ndarray | None,
     error: float,
-    discrepancy: float = 0.0,
 ) -> np.ndarray:
     """Central 90 % of the landings of each draw [m], shape (N, 2); NaN where launches fail.
 
-    Landings of samples of θ, spread by the error of the draw through the launch's own gradient, and
-    by what the recording shows of the law's error (pipeline/confidence/discrepancy.py). Both are
-    normal and independent, so they add in quadrature. More than a tenth of failures among the
+    Landings of samples of θ, what the law gets wrong among them (`returned_share`), spread by the
+    error of the draw through the launch's own gradient. More than a tenth of failures among the
     samples is a failure.
 
     Args:
@@ -33,14 +31,13 @@ def landing_intervals(
         draws: (y, z) [m], shape (N, 2).
         samples: Of θ, shape (M, P); None leaves out that θ is not known exactly.
         error: Standard deviation of the drawn position along each axis [m].
-        discrepancy: Of the landing, as a share of it.
     """
     draws = np.atleast_2d(np.asarray(draws, float))
     count = len(draws)
     around = launcher((draws[:, None] + CROSS).reshape(-1, 2))
     landing = _landing(around).reshape(count, len(CROSS))
     gradient = (landing[:, 1::2] - landing[:, 2::2]) / (2 * STEP)  # (N, 2)
-    spread = np.hypot(error * np.linalg.norm(gradient, axis=1), discrepancy * landing[:, 0])
+    spread = error * np.linalg.norm(gradient, axis=1)
     centres = landing[:, :1]
     if samples is not None:
         some = samples[np.linspace(0, len(samples) - 1, min(MOST, len(samples))).astype(int)]

@@ -129,13 +129,11 @@ def _virtual(batch: Batch, tried: list) -> Batch:
     return replace(batch, kind="virtual", landing=landing, **told)
 
 
-def predict(
-    batches: list[Batch], launcher: Callable, samples: np.ndarray | None, params, discrepancy: float
-):
+def predict(batches: list[Batch], launcher: Callable, samples: np.ndarray | None, params):
     """What the calibrated simulator makes of the draws of all batches, N in all.
 
     Args:
-        launcher, samples, discrepancy: As `landing_intervals` has them.
+        launcher, samples: As `landing_intervals` has them.
         params: The whole of params.yaml.
 
     Returns:
@@ -146,7 +144,7 @@ def predict(
     launches = limited(launcher(draws), params.setup.max_force)
     once, again = np.unique(draws, axis=0, return_inverse=True)
     error = params.trials.actuation_error
-    intervals = landing_intervals(launcher, once, samples, error, discrepancy)[again]
+    intervals = landing_intervals(launcher, once, samples, error)[again]
     intervals[np.isnan(launches.landing_y)] = np.nan
     return launches, intervals
 

@@ -43,7 +43,7 @@ class Result:
         history: Every evaluated θ, the exploration's rows before the refinement's.
         regions: Where the refinement began; none for a search of one phase.
         axes: Names of the regions' axes in the unit cube.
-        posterior: "names", "samples", "profiles", "mean"; None where θ has no confidence.
+        posterior: "names" and "samples"; None where θ has no confidence.
         card: The policy's card; `robust_card` that of the second policy, None without one.
         training: One row an iteration of the policy's training.
         landing_map: Simulated launches over the box of draws.

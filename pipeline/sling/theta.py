@@ -49,14 +49,6 @@ class Nuisances(Section):
     air_drag: Annotated[float, Range(0, 50)] | None = None  # force for mass and speed [1/s]
 
 
-class Discrepancy(JsonRecord):
-    landing: float  # share of a landing by which the law errs
-
-
-class Confidence(JsonRecord):
-    discrepancy: Discrepancy | None = None
-
-
 class RecordedPull(Section):
     pull_time: Annotated[float, Range(0.01, 1000)]
     pause: Annotated[float, Range(0, 1e5)]
@@ -70,7 +62,6 @@ class ThetaFile(JsonRecord):
     nuisances: Nuisances = Nuisances()
     turn_damping: Annotated[float, Range(0, 1)] = 0.0
     returned_share: Annotated[float, Range(0.1, 10)] = 1.0
-    confidence: Confidence | None = None
 
     @model_validator(mode="after")
     def _keys_of_its_law(self) -> ThetaFile:
@@ -119,12 +110,6 @@ def load_samples(path: Path) -> np.ndarray | None:
     """
     samples = read_json(path, PosteriorFile).samples if path.is_file() else []
     return np.array(samples, float) if samples else None
-
-
-def law_discrepancy(content: dict) -> float:
-    """Share of a landing by which the law errs, as a θ file says it; 0 where it says nothing."""
-    known = (content.get("confidence") or {}).get("discrepancy") or {}
-    return float(known.get("landing", 0.0))
 
 
 def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Sling:

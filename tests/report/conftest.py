@@ -94,31 +94,29 @@ def confidence(fixed: str | None = None) -> dict:
         "parameters": parameters,
         "derived": {
             "damping_product": {"value": 2.1e-3, "low": 1.9e-3, "high": 2.3e-3, "unit": "s"},
-            "hold_force": {"value": 12.0, "low": 11.96, "high": 12.04, "unit": "N"},
+            "turn_damping": {"value": 0.0, "low": 0.0, "high": 0.2, "unit": ""},
+            "returned_share": {"value": 1.0, "low": 0.97, "high": 1.03, "unit": ""},
+            "air_drag": {"value": 0.5, "low": 0.1, "high": 1.5, "unit": "1/s"},
         },
         "correlation": {"names": list(NAMES), "matrix": matrix.tolist()},
-        "phases": {
-            phase: {"force_rms": 0.1 * number, "cloud_rms": 0.002 * number}
-            for number, phase in enumerate(("slack", "taut", "recoil", "swing"), start=1)
-        },
+        "recordings": [
+            {"force_rms": 0.041, "held_rms": 5e-4, "recoil_rms": 2.1e-3, "pictures": [0.0123]}
+            | {"source": {"file": "one.mcap"}}
+        ],
+        "disagreement": 1.0,
+        "launches": [],
+        "steps": 5,
+        "settled": True,
     }
 
 
 def posterior() -> dict:
-    """Samples within ± 10 % of θ, and parabolas as profiles."""
+    """Samples within ± 10 % of θ."""
     spread = np.linspace(0.9, 1.1, 41)
     theta = np.array(list(THETA.values()))
     return {
         "names": list(NAMES),
         "samples": (theta * spread[:, None]).tolist(),
-        "profiles": {
-            name: {
-                "value": (value * spread).tolist(),
-                "misfit": (2.71 * ((spread - 1) / 0.1) ** 2).tolist(),
-            }
-            for name, value in THETA.items()
-        },
-        "mean": theta.tolist(),
     }
 
 

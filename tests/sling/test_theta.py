@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.sling.material import THETA
-from pipeline.sling.theta import at_points, law_discrepancy, load_samples, load_theta, point, vector
+from pipeline.sling.theta import at_points, load_samples, load_theta, point, vector
 
 SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 
@@ -101,12 +101,6 @@ def test_bad_nuisances_are_one_line(tmp_path: Path) -> None:
     ):
         text = json.dumps({"band": "red", "theta": SOFT, "nuisances": said})
         assert message in refusal(tmp_path / "theta.json", text)
-
-
-def test_a_theta_file_that_says_nothing_of_the_law_adds_nothing() -> None:
-    for content in ({}, {"confidence": None}, {"confidence": {"level": 0.9}}):
-        assert law_discrepancy(content) == 0.0
-    assert law_discrepancy({"confidence": {"discrepancy": {"landing": 0.07}}}) == 0.07
 
 
 def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:

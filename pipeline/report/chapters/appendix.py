@@ -35,12 +35,18 @@ def _trust(results: Results, styles: Styles) -> str:
     derived = identified.derived(results, styles)
     if derived is None:
         return ""
-    words = "### What the data can see\n\nThe posterior's median and 90 % interval:\n"
+    words = "### What the data can see\n\nThe density's mode and 90 % interval:\n"
     text = [words, markdown(derived)]
-    by_phase = identified.phases(results, styles)
-    if by_phase:
-        words = "Root mean square of what the posterior's best leaves, by part of the recording:\n"
-        text += [words, markdown(by_phase)]
+    left = identified.recordings(results, styles)
+    words = (
+        "Root mean square of what each recording shows and the simulation does not; and, of"
+        " several, how much worse the mode of the others alone meets it, and which coordinate it"
+        " moves by how many standard deviations:\n"
+    )
+    text += [words, markdown(left)]
+    known = identified.observed(results, styles)
+    words = "Launches that were evidence (`sling observe`); none of them is scored anywhere:\n"
+    text += [words, markdown(known)] if known else []
     return "\n".join(text)
 
 

@@ -157,15 +157,14 @@ def _confidence(band: Band) -> list[str]:
     trusted = {method: result for method, result in band.near.items() if result.confidence}
     if not trusted:
         return []
-    boxes, styles = band.report.params.parameters, band.styles
-    drawing = confidence.profiles, trusted, styles, boxes
-    profiles = band.picture("profiles", "profile curves", *drawing)
+    styles = band.styles
+    marginals = band.picture("marginals", "marginals", confidence.marginals, trusted, styles)
     drawing = confidence.correlation, trusted, styles
     correlation = band.picture("correlation", "correlation of the parameters", *drawing)
     return [
         "### Confidence\n\n"
-        "Least misfit (−2 log likelihood of whitened residuals) with one parameter held, all"
-        f" others free; the posterior's marginals; its 90 % intervals.\n\n{profiles}",
+        "What is known of the band, by all its recordings and observed launches: samples, 90 %"
+        f" intervals, and θ*, the mode.\n\n{marginals}",
         correlation,
     ]
 

@@ -9,18 +9,20 @@ import numpy as np
 from pipeline.report.replay import Replay
 from pipeline.report.results import Results
 from pipeline.report.styles import Styles
-from pipeline.report.tables.cells import NONE, Table, centimetres, number, percent
+from pipeline.report.tables.cells import NONE, Table, number, percent
 from pipeline.report.tables.parameters import HEADS, exactly, printed_loss
 
 DERIVED = {  # heading and factor from SI; others keep their name and unit
     "damping_product": ("s·d [ms]", 1e3),
-    "hold_force": ("held force [N]", 1.0),
+    "air_drag": ("drag beside the air's [1/s]", 1.0),
+    "turn_damping": ("turn damping", 1.0),
+    "returned_share": ("returned share", 1.0),
     "release_time": ("release [s]", 1.0),
     "camera_delay": ("camera delay [ms]", 1e3),
 }
 PARTS = ("fitted", "held out", "ratio")
-PHASES = ("slack", "taut", "recoil", "swing")
 SEARCHES = {
+    "least_squares": "a design, then Levenberg-Marquardt",
     "de": "differential evolution",
     "bo": "Bayesian optimisation",
     "adam": "Adam on finite differences",
@@ -46,6 +48,8 @@ def methods(results: Results, params, styles: Styles) -> Table:
             search += "" if about.covariance else ", isotropic starts"
         fixed = [_held(name, value) for name, value in about.fixed.items()]
         held = ", ".join(fixed) or NONE
+        if about.search == "least_squares":
+            terms = ["−2 log p of all recordings and launches"]
         rows.append([style.name, f"`{method}`", search, " + ".join(terms), held])
     return ["method", "in params.yaml", "search", "minimises", "held fixed"], rows
 
@@ -85,20 +89,57 @@ def _range(about: dict | None, factor: float) -> str:
     return f"{value:.{digits}f} ({low:.{digits}f} – {high:.{digits}f})"
 
 
-def phases(results: Results, styles: Styles) -> Table | None:
-    """Root mean square residuals by part of the episode; None without a confidence."""
-    shown = [result for result in results if result.confidence.get("phases")]
-    if not shown:
-        return None
-    parts = [part for part in PHASES if part in shown[0].confidence["phases"]]
+def recordings(results: Results, styles: Styles) -> Table | None:
+    """What of each recording the simulation leaves, and how the others alone would have it.
+
+    None without a density. The last two columns are for bands with several recordings.
+    """
     rows = []
-    for result in shown:
-        about = result.confidence["phases"]
-        force = [number(about[part].get("force_rms"), ".3f") for part in parts]
-        cloud = [centimetres(about[part].get("cloud_rms")) for part in parts]
-        rows.append([result.band, styles[result.method].name, *force, *cloud])
-    heads = [f"force, {part} [N]" for part in parts] + [f"cloud, {part} [cm]" for part in parts]
-    return ["band", "method", *heads], rows
+    for result in results:
+        for count, about in enumerate(result.confidence.get("recordings", []), 1):
+            source, without = about["source"], about.get("without_it")
+            moved = without and max(without["moved"].items(), key=lambda one: abs(one[1]))
+            rows.append(
+                [
+                    result.band,
+                    styles[result.method].name,
+                    str(source.get("file", count)),
+                    _scaled(about["force_rms"], 1e3, ".0f"),
+                    _scaled(about["held_rms"], 1e3, ".1f"),
+                    _scaled(about["recoil_rms"], 1e3, ".1f"),
+                    ", ".join(f"{1e3 * time:.0f}" for time in about["pictures"]) or NONE,
+                    f"{without['misfit']:.1f}" if without else NONE,
+                    f"{_word(moved[0])} {moved[1]:+.1f} sd" if moved else NONE,
+                ]
+            )
+    heads = ["band", "method", "recording", "force [mN]", "held band [mm]", "recoil [mm]"]
+    heads += ["recoil seen after [ms]", "misfit without it", "which moves"]
+    return (heads, rows) if rows else None
+
+
+def _scaled(value: float, factor: float, form: str) -> str:
+    return f"{factor * value:{form}}"
+
+
+def _word(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def observed(results: Results, styles: Styles) -> Table | None:
+    """Launches that were evidence: none of them is a score; None where there are none."""
+    rows = [
+        [
+            result.band,
+            styles[result.method].name,
+            f"{one['draw'][0]:.3f}, {one['draw'][1]:.3f}",
+            number(one["landing"], ".3f"),
+            NONE if one["left"] is None else f"{100 * one['left']:+.1f} %",
+        ]
+        for result in results
+        for one in result.confidence.get("launches", [])
+    ]
+    heads = ["band", "method", "draw (y, z) [m]", "landing [m]", "farther than simulated"]
+    return (heads, rows) if rows else None
 
 
 def losses(results: Results, params, styles: Styles) -> Table:

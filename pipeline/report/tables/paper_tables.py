@@ -63,10 +63,9 @@ FLOOR = """\
 least sensitive to them, launched with errors as in the trials. No method has seen them.
 """
 DOUBT = """\
-In brackets: 90 % intervals of the posterior; *not identifiable* where it says hardly more than the
-box; *fixed* where the method does not search; † where θ*, the least loss, lies outside: the loss is
-no likelihood, so the two may disagree. [docs/identification.md](../docs/identification.md) says
-what such an interval is and is not.
+In brackets: 90 % intervals, of the methods that are one density; *not identifiable* where it says
+hardly more than the box; *fixed* where the method does not search.
+[docs/identification.md](../docs/identification.md) says what such an interval is and is not.
 """
 EDGE = "⚠ the search ended at a side of its box: the optimum may lie outside.\n"
 NO_CONFIDENCE = "No θ of this run comes with a confidence.\n"
@@ -129,17 +128,16 @@ def _doubt(results: Results, found: list[parameters.IdentifiedRow], named: Style
     edges = any(value.at_edge for row in found for value in row.values.values())
     trusted = any(result.confidence for result in results)
     unsettled = [
-        f"⚠ The posterior of {one.band}, {named[one.method].name} had **not settled**: its mean"
-        f" moved by {one.confidence['moved']:.1f} of its own deviations in the last round. Its"
-        " intervals are not to be relied on.\n"
+        f"⚠ The fit of {one.band}, {named[one.method].name} had **not settled** after"
+        f" {one.confidence['steps']} steps. Its intervals are not to be relied on.\n"
         for one in results
         if not one.confidence.get("settled", True)
     ]
     unseen = [
-        f"⚠ No picture shows the recoil of {one.band}, so {named[one.method].name} has its damping"
-        " from the slack swing alone: intervals of d, s, s·d and of landings are **too narrow**.\n"
+        f"⚠ No picture shows the recoil of {one.band}: {named[one.method].name} has its damping"
+        " from what other rubbers have, and a launch would say most.\n"
         for one in results
-        if "discrepancy" in one.confidence and one.confidence["discrepancy"]["recoil"] is None
+        if one.confidence and not any(r["pictures"] for r in one.confidence["recordings"])
     ]
     notes = [*([EDGE] if edges else []), *unsettled, *unseen]
     return [DOUBT if trusted else NO_CONFIDENCE, *notes]

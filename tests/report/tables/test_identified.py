@@ -5,7 +5,14 @@ from types import SimpleNamespace
 import pytest
 
 from pipeline.report.styles import styles
-from pipeline.report.tables.identified import derived, held_out, losses, methods, phases
+from pipeline.report.tables.identified import (
+    derived,
+    held_out,
+    losses,
+    methods,
+    observed,
+    recordings,
+)
 from pipeline.report.tables.policies import policies
 from tests.report.conftest import BAND, METHOD, episode
 from tests.report.tables.toy_results import launches
@@ -61,15 +68,31 @@ def test_what_a_method_minimises_and_by_what_search(params) -> None:
 def test_derived_quantities_keep_the_digits_that_their_width_deserves(results, named) -> None:
     table = derived(results, named)
     assert column(table, "s·d [ms]") == ["2.10 (1.90 – 2.30)"]
-    assert column(table, "held force [N]") == ["12.000 (11.960 – 12.040)"]
+    assert column(table, "returned share") == ["1.00 (0.97 – 1.03)"]
     results.methods[BAND][METHOD].theta["confidence"] = None
-    assert derived(results, named) is None and phases(results, named) is None
+    assert derived(results, named) is None and recordings(results, named) is None
 
 
-def test_residuals_by_phase_in_newtons_and_centimetres(results, named) -> None:
-    table = phases(results, named)
-    assert column(table, "force, taut [N]") == ["0.200"]
-    assert column(table, "cloud, swing [cm]") == ["0.80"]
+def test_what_a_recording_leaves_and_how_the_others_would_have_it(results, named) -> None:
+    table = recordings(results, named)
+    assert column(table, "force [mN]") == ["41"] and column(table, "recoil [mm]") == ["2.1"]
+    assert column(table, "recoil seen after [ms]") == ["12"]
+    assert column(table, "misfit without it") == ["–"]
+    about = results.methods[BAND][METHOD].theta["confidence"]
+    without = {"misfit": 3.21, "moved": {"mooney_share": 0.4, "log_loss_factor": -1.26}}
+    about["recordings"][0]["without_it"] = without
+    table = recordings(results, named)
+    assert column(table, "misfit without it") == ["3.2"]
+    assert column(table, "which moves") == ["log loss factor -1.3 sd"]
+
+
+def test_launches_that_were_evidence_are_named(results, named) -> None:
+    assert observed(results, named) is None
+    about = results.methods[BAND][METHOD].theta["confidence"]
+    about["launches"] = [{"draw": [-0.3, -0.15], "landing": 1.9, "left": 0.021}]
+    table = observed(results, named)
+    assert column(table, "draw (y, z) [m]") == ["-0.300, -0.150"]
+    assert column(table, "farther than simulated") == ["+2.1 %"]
 
 
 def test_losses_say_what_each_term_weighs(results, params, named) -> None:

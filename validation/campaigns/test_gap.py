@@ -21,7 +21,6 @@ from pipeline.oracle.floor import errors_of, trial_numbers
 from pipeline.oracle.world import World
 from pipeline.params import load
 from pipeline.report.styles import COLORS, INK, THEME
-from pipeline.sling.material import THETA
 from pipeline.sling.theta import load_theta
 from tests.project import ROOT
 from validation.campaigns.test_orange import copy_of_the_project, run
@@ -82,12 +81,6 @@ def oracle_theta(launcher, space: Space, draws: np.ndarray, landing: np.ndarray,
     return dict(zip(space.names, space.to_physical(unit).tolist(), strict=True)), fit.fun
 
 
-def theta_file(band: str, method: str, values: dict) -> dict:
-    nuisances = {name: value for name, value in values.items() if name not in THETA}
-    theta = {name: values[name] for name in THETA}
-    return {"band": band, "method": method, "theta": theta, "nuisances": nuisances}
-
-
 def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
     """What the error of one method on one band is made of.
 
@@ -100,7 +93,7 @@ def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
     path = root / "data/theta" / band / f"{method}.json"
     stored = Stored(band, method, root)
     content = load_theta(path, band)
-    values = content["theta"] | content.get("nuisances", {})
+    values = content["theta"]
     launcher = simulator(params, band, content, root=root)
     draws = {AS_IT_IS: stored.draws(targets)}
     own = draws[AS_IT_IS]
@@ -109,7 +102,7 @@ def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
     draws[HIT] = world.hits(targets, own)
 
     best, missed = oracle_theta(launcher, Space.of_method(params, method), *known, values)
-    fitted = theta_file(band, method, best)
+    fitted = content | {"theta": best, "confidence": None}
     predicted, aimed = launcher(own).landing_y, simulator(params, band, fitted, root=root)
     write_json(path, fitted)
     (root / "data/confidence" / band / f"{method}.json").unlink(missing_ok=True)  # nor robust ones

@@ -14,16 +14,9 @@ from app.preflight.add_band import add_band
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.launches.stretch import recorded_stretch, stretch_of
-from pipeline.objective.evaluate import Evaluator
-from pipeline.objective.loss import EpisodeLoss
-from pipeline.objective.space import Space
 from pipeline.params import load
-from pipeline.search.history import theta_content
-from pipeline.sling.launch import launch
 from pipeline.sling.load import load_sling
-from pipeline.sling.material import THETA
-from pipeline.sling.theta import vector
-from validation.benchmarks.methods import LARGE, complete
+from validation.benchmarks.methods import LARGE
 from validation.campaigns.test_orange import (
     BAND,
     LANDINGS,
@@ -33,6 +26,7 @@ from validation.campaigns.test_orange import (
     copy_of_the_project,
     run,
 )
+from validation.density import found
 
 pytestmark = pytest.mark.validation
 
@@ -46,9 +40,8 @@ class Recorded:
     """The episode, and launches inside the stretch that it shows."""
 
     def __init__(self, project) -> None:
-        self.params = load(project / "params.yaml")
+        self.params, self._project = load(project / "params.yaml"), project
         self.episode = Episode.load(Layout(project).episode(BAND))
-        self.sling = load_sling(self.params, BAND, project)
         table = pd.read_csv(LANDINGS)
         draws = table[["draw_y_m", "draw_z_m"]].to_numpy()
         setup, length = self.params.setup, self.params.bands[BAND].rest_length
@@ -57,41 +50,20 @@ class Recorded:
         self.draws, self.landing = draws[inside], table.landing_y_m.to_numpy()[inside]
 
     def errors(self, method: str, seed: int = 1, *, episode=None, params=None) -> tuple:
-        """Signed landing errors (L,) of what a search found, its loss, and θ with its nuisances."""
-        params, episode = params or self.params, episode or self.episode
-        loss = EpisodeLoss.of(params, method, episode, self.sling)
-        evaluate = Evaluator(episode, self.sling, loss, Space.of_method(params, method))
+        """Signed landing errors (L,) of what a method found, and its point (P,)."""
+        params = params or self.params
         optimizer = params.optimizer.model_copy(update={"seed": seed})
-        history = complete(params, method, optimizer, evaluate)
-        found = theta_content(replace(history, names=THETA), BAND)
-        sling = replace(self.sling, air_drag=found["nuisances"].get("air_drag", 0.0))
-        landed = launch(sling, vector(found), self.draws)
-        return landed.landing_y / self.landing - 1, found
-
-    def changed(self, **keys) -> object:
-        """The parameters, with other keys of our method."""
-        ours = self.params.methods[OURS].model_copy(update=keys)
-        return self.params.model_copy(update={"methods": {**self.params.methods, OURS: ours}})
+        params = params.model_copy(update={"optimizer": optimizer})
+        sling = load_sling(params, BAND, self._project, params.methods[method].law)
+        outcome, _ = found(params, method, sling, [episode or self.episode])
+        return outcome(self.draws).landing_y / self.landing - 1, outcome.point
 
     def variations(self) -> dict[str, dict]:
-        """Arguments of `errors` under which something of our method is another."""
+        """Arguments of `errors` under which something of the data or the budget is another."""
         episode = self.episode
+        large = self.params.optimizer.model_copy(update=LARGE)
         result = {
-            "with the air's drag, 0 to 8 1/s": {
-                "params": self.changed(nuisances={"air_drag": (0.0, 8.0)})
-            },
-            "with five starts": {"params": self.changed(k_top=None)},
-            "with the large budget": {
-                "params": self.params.model_copy(
-                    update={"optimizer": self.params.optimizer.model_copy(update=LARGE)}
-                )
-            },
-            "without bounds of nu": {"params": self.changed(bounds={})},
-            "without the taut term": {
-                "params": self.changed(
-                    weights=self.params.methods[OURS].weights.model_copy(update={"taut": 0.0})
-                )
-            },
+            "with the large budget": {"params": self.params.model_copy(update={"optimizer": large})}
         }
         for shift in (-3e-4, 3e-4):
             later = replace(episode, release_time=episode.release_time + shift)
@@ -102,15 +74,14 @@ class Recorded:
         return result
 
 
-def summary(errors: list[np.ndarray], found: list[dict]) -> dict:
+def summary(errors: list[np.ndarray], points: list[np.ndarray]) -> dict:
     sizes = np.abs(np.array(errors))
     return {
         "mean_by_seed": sizes.mean(axis=1),
         "bias_by_seed": np.mean(errors, axis=1),
         "mean": sizes.mean(),
         "worst": sizes.max(),
-        "loss_by_seed": [one["loss"]["total"] for one in found],
-        "theta_by_seed": [one["theta"] | one["nuisances"] for one in found],
+        "point_by_seed": points,
     }
 
 
@@ -129,7 +100,7 @@ def difference(ours: np.ndarray, other: np.ndarray) -> list[float]:
 )
 def test_ours_lands_nearest_and_says_why_not_nearer(tmp_path, progress, record) -> None:
     project = copy_of_the_project(tmp_path / "project")
-    add_band(BAND, RECORDING, MASS, params_path=project / "params.yaml", root=project)
+    add_band(BAND, [RECORDING], MASS, params_path=project / "params.yaml", root=project)
     run(project, "dvc", "repro", f"mounting@{BAND}")
     recorded = Recorded(project)
 
@@ -142,8 +113,8 @@ def test_ours_lands_nearest_and_says_why_not_nearer(tmp_path, progress, record) 
     gaps = {name: difference(errors[OURS], one) for name, one in errors.items() if name != OURS}
     moved = {}
     for name, change in recorded.variations().items():
-        error, found = recorded.errors(OURS, **change)
-        moved[name] = {"bias": error.mean(), "loss": found["loss"]["total"]}
+        error, _ = recorded.errors(OURS, **change)
+        moved[name] = {"bias": error.mean()}
         progress(f"  ours, {name}: {100 * error.mean():+.2f} %")
 
     ours = figures[OURS]

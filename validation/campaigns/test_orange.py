@@ -62,10 +62,9 @@ def test_landings_are_predicted_within_the_recorded_stretch(
     tmp_path, params, progress, record
 ) -> None:
     project, methods = copy_of_the_project(tmp_path / "project"), params.run.methods
-    progress(
-        "\n  " + add_band(BAND, RECORDING, MASS, params_path=project / "params.yaml", root=project)
-    )
-    table = project / "params.yaml"  # the note says where the hand was, not where it was sent
+    table = project / "params.yaml"
+    progress("\n  " + add_band(BAND, [RECORDING], MASS, params_path=table, root=project))
+    # the note says where the hand was, not where it was sent
     text = table.read_text("utf-8").replace("arm_stiffness: 12000.0", "arm_stiffness: null")
     table.write_text(text, "utf-8")
     assert load(table).setup.arm_stiffness is None

@@ -16,12 +16,16 @@
 // Nominal stress turns with the material, and its rate is not zero where a stressed band only turns: as written, D would
 // brake every turn of a taut band. So D is taken at F' - w x F, with the spin w at which it is least: of S = mu F + p cof F
 // and tau = F S' (symmetric), (tr tau - tau) w = sum_k S_k x F'_k. A turn costs nothing, a stretch what it did, and every state
-// dissipates still. TURNS mu on the diagonal keeps the matrix regular where nothing is stressed. Of all that is taken off so, `turning`
-// is the share that stays: engines that damp the rate of the nominal stress brake turns in full.
+// dissipates still. TURNS mu on the diagonal keeps the matrix regular where nothing is stressed. Of all that is taken off so,
+// the share `turning` stays: engines that damp the rate of the nominal stress brake turns in full. So does what holds the
+// steps where W is not convex, or they would gain energy and not converge: a slack column that turns keeps the brake of a
+// material whose s d is HOLDS [s], less and less up to a stretch of TAUT; one turned inside out keeps all.
 
 // F now, predicted, and its rate -> stress (columns) and its derivative, K[k (k + 1) / 2 + l] for columns k >= l,
 // exact as long as p / mu is between `least` and `most`; `shaped` scales s further
 #define TURNS 1e-3
+#define HOLDS 1e-4
+#define TAUT 1.2
 auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&xt)[3][3], SC least, SC most, real shaped, real (&stress)[3][3], real (&K)[6][3][3]) {
   real C[3][3], Cp[3][3], square = zero;  // cofactors; m squared
   UNROLL for (int k = 0; k < 3; ++k) {
@@ -57,7 +61,9 @@ auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&
     tau[0] += trace; tau[2] += trace; tau[5] += trace;
     A[0] = tau[2] * tau[5] - tau[4] * tau[4]; A[1] = tau[4] * tau[3] - tau[1] * tau[5]; A[2] = tau[0] * tau[5] - tau[3] * tau[3];
     A[3] = tau[1] * tau[4] - tau[3] * tau[2]; A[4] = tau[3] * tau[1] - tau[0] * tau[4]; A[5] = tau[0] * tau[2] - tau[1] * tau[1];
-    const real over = (one - turning) / (tau[0] * A[0] + tau[1] * A[1] + tau[3] * A[3]);
+    const real slack = minimum(maximum((zero + (SC)TAUT - SQRT(dot(xp[0], xp[0]))) / (SC)(TAUT - 1), zero), one);
+    const real holds = Jp > zero ? slack * minimum(one, (SC)HOLDS / (d * s)) : one;
+    const real over = (one - maximum(turning, holds)) / (tau[0] * A[0] + tau[1] * A[1] + tau[3] * A[3]);
     UNROLL for (int m = 0; m < 6; ++m) A[m] *= over;
     const real b[3] = {spin[0], spin[1], spin[2]};
     spin[0] = A[0] * b[0] + A[1] * b[1] + A[3] * b[2];

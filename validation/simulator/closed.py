@@ -75,9 +75,9 @@ class String:
         return per_length * w @ whole @ w, per_length * w @ viscous @ w
 
     def transverse(self, stretch: float) -> tuple[float, float]:
-        """The same across the band, k = 4 T / (l L): only the shape turns, so c = s d k."""
+        """The same across the band, k = 4 T / (l L): c is what brakes a turn of s d k."""
         k = 4 * float(self.force(stretch)) / (stretch * self.sling.rest_length)
-        return k, self.scale * self.damping * k
+        return k, self.sling.turn_damping * self.scale * self.damping * k
 
 
 def cantilever(load: float, length: float, rigidity: float) -> float:

@@ -21,6 +21,10 @@ from pipeline.sling.model import GRAVITY, Sling
 from pipeline.sling.rubber import RUBBER, TIMES
 
 TURNS = 1e-3  # of the modulus: keeps the spin of an unstressed edge regular
+HOLDS, TAUT = (
+    1e-4,
+    1.2,
+)  # s d that brakes turns of a slack edge [s]; the stretch from which it is taut
 STRAIGHT = 0.7  # stretch below which the law `rubber` is a straight line
 
 
@@ -140,7 +144,10 @@ class ReferenceRod:
         return tuple((one.sum(-1) * volume).sum(-1) for one in (free, lost))
 
     def viscous_stress(self, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """d times the rate of the nominal stress at state `at`, shape part scaled by s, times A."""
+        """d times the rate of the nominal stress at state `at`, shape part scaled by s, times A.
+
+        In the frame in which it dissipates least, but for the share of turns that is braked.
+        """
         mu, lam, d, s = self.parameters
         f, turn = self.columns(at), self.columns(rate)
         cof = cofactor(f)
@@ -151,13 +158,16 @@ class ReferenceRod:
         j = (f[..., 0, :] * cof[..., 0, :]).sum(-1)
         least = -bound * (1 + np.clip(j, 0, 1) ** 2) / 2
         p = np.clip(lam * (j - 1) - mu, least, 0.7 * bound)
+        holds = min(HOLDS / max(d * s, 1e-30), 1)
+        holds = holds * np.clip((TAUT - self.stretch(f)) / (TAUT - 1), 0, 1)
+        braked = np.maximum(self.sling.turn_damping, np.where(j > 0, holds, 1))
         if self.sling.law == RUBBER:  # as the relaxed stress grows against the neo-Hookean
             stretch = np.maximum(self.stretch(f), STRAIGHT)
             s = s * (self.uniaxial(stretch, 1) / self.uniaxial(stretch, 1, share=0.0))
             s = s[..., None, None]
         p = p[..., None, None]
         stress = mu * f + p * cof
-        spin = (1 - self.sling.turn_damping) * self._spin(f, stress, turn, mu)[..., None, :]
+        spin = ((1 - braked)[..., None] * self._spin(f, stress, turn, mu))[..., None, :]
         shape = mu * turn + p * cofactor_rate(f, turn) + mu / 3 * volume_rate * cof
         shape = shape - np.cross(spin, stress)
         return self.sling.area * d * ((lam - mu / 3) * volume_rate * cof + s * shape)

@@ -1,5 +1,7 @@
 """The checks of `sling verify` keep their limits, at smaller sizes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,6 +25,9 @@ CHECKS = {
     "beams": at_rest.beams,
     "torsion": lambda bench: at_rest.torsion(bench, (0.45,)),
     "the kernel's steps": lambda bench: agreement.checks(bench, count=2),
+    "half-braked turns": lambda bench: agreement.checks(
+        bench, 1, sling=replace(rubber.rubber_of(bench, 0.5, 0.02), turn_damping=0.5)
+    ),
     "growth of energy": lambda bench: damping.growth(bench, count=16),
     "a heavy middle": lambda bench: damping.oscillator(bench, OSCILLATORS),
     "free fall": free_motion.free_fall,

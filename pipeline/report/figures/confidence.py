@@ -31,12 +31,14 @@ def marginals(results: dict[str, Result], styles: Styles) -> plt.Figure:
     figure, axes = plt.subplots(2, 4, figsize=(10.8, 4.6))
     for ax, (name, (label, factor)) in zip(axes.flat, SHOWN.items(), strict=False):
         for number, (method, result) in enumerate(results.items()):
+            if name not in known(result):
+                continue
             samples, best = factor * _column(result, name), factor * _best(result, name)
             color = styles[method].color
             edges = np.histogram_bin_edges(samples, BINS)
             counts, edges = np.histogram(samples, edges)
             ax.stairs(counts / counts.max(), edges, fill=True, color=color, alpha=0.25)
-            about = result.confidence["parameters"].get(name) or result.confidence["derived"][name]
+            about = known(result)[name]
             height = 1.12 + 0.12 * number
             ends = factor * about["low"], factor * about["high"]
             ax.plot(ends, [height, height], color=color, lw=3, solid_capstyle="butt")
@@ -53,12 +55,19 @@ def marginals(results: dict[str, Result], styles: Styles) -> plt.Figure:
     return figure
 
 
+def known(result: Result) -> dict:
+    """Intervals by name."""
+    return result.confidence["parameters"] | result.confidence["derived"]
+
+
 def _column(result: Result, name: str) -> np.ndarray:
     """Samples of a parameter, SI units, shape (S,)."""
     samples, names = np.array(result.posterior["samples"], float), result.posterior["names"]
     if name == "damping_product":
         return _column(result, "damping_scale") * _column(result, "elasticity_damping")
-    return samples[:, names.index(name)] if name in names else np.zeros(len(samples))
+    if name not in names:
+        return np.full(len(samples), known(result)[name]["value"])
+    return samples[:, names.index(name)]
 
 
 def _best(result: Result, name: str) -> float:

@@ -68,7 +68,7 @@ def test_what_a_method_minimises_and_by_what_search(params) -> None:
 def test_derived_quantities_keep_the_digits_that_their_width_deserves(results, named) -> None:
     table = derived(results, named)
     assert column(table, "s·d [ms]") == ["2.10 (1.90 – 2.30)"]
-    assert column(table, "returned share") == ["1.00 (0.97 – 1.03)"]
+    assert column(table, "returned share") == ["1.000 (0.970 – 1.030)"]
     results.methods[BAND][METHOD].theta["confidence"] = None
     assert derived(results, named) is None and recordings(results, named) is None
 

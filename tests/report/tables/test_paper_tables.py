@@ -70,7 +70,7 @@ def test_warnings_stand_below_table_2(written) -> None:
     text = written(result("band1", "de", trials, confidence=about, theta=theta))
     section = text.split("### Table 2")[1].split("### Table 3")[0]
     assert "fit of band1, DE_L had **not settled** after 14 steps" in section
-    assert "No picture shows the recoil of band1, so DE_L has its damping" in section
+    assert "No picture shows the recoil of band1: DE_L has its damping" in section
     assert "⚠ the search ended at a side of its box" in section
     other = written(result("band1", "de", trials))
     assert "not settled" not in other and "⚠" not in other

@@ -5,12 +5,12 @@ It sees episodes alone; nothing here knows the rig.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import cutoff_hz
 from pipeline.launches.spread import landing_intervals
@@ -31,7 +31,7 @@ from tests.objective.own_law import disturbed, own_law_episode
 from validation.benchmarks.methods import complete
 from validation.synthetic import pull_and_release
 
-WORKERS = os.cpu_count()
+WORKERS = cores()
 FLAWS = {
     "release": 3e-4,
     "camera": 5e-4,

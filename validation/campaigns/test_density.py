@@ -75,6 +75,10 @@ def test_the_default_is_chosen_by_the_rule(params, progress, record) -> None:
             "bands": both,
             "coverage_by_bands": bootstrap(ours),
             "three_recordings": three,
+            "launches_as_evidence": {
+                known: results(params, DEVELOP, BANDS, one_by_one(RECORDINGS), known=known)
+                for known in (1, 3)
+            },
         },
     )
     assert sizes[OURS] < sizes[PAPER]

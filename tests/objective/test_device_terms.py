@@ -11,6 +11,7 @@ import pytest
 from pipeline.base.machine import gpus
 from pipeline.base.native import start, wp
 from pipeline.objective.evaluate import Evaluator
+from pipeline.objective.kernel import terms_kernel
 from pipeline.objective.loss import TERMS, EpisodeLoss
 from pipeline.objective.space import Space
 from pipeline.params import load
@@ -99,6 +100,15 @@ def test_another_schedule_brings_its_own_filter() -> None:
     for one in (rollouts, later, rollouts):
         for name, values in loss.terms(there(one)).items():
             np.testing.assert_allclose(values, loss.terms(one)[name], rtol=1e-9)
+
+
+def test_the_text_compiles_for_a_gpu(tmp_path) -> None:
+    """For Hopper, by the compiler that comes with Warp: no GPU is asked for."""
+    kernel, _ = terms_kernel(7)
+    wp.compile_aot_module(kernel.module, arch=90, module_dir=tmp_path, use_ptx=True)
+    (file,) = tmp_path.glob("*.ptx")
+    text = file.read_text()
+    assert ".target sm_90" in text and "shfl.sync" in text  # threads share a rollout
 
 
 @pytest.mark.skipif(not gpus(), reason="no CUDA device on this machine")

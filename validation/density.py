@@ -20,9 +20,6 @@ from pipeline.objective.space import Space
 from pipeline.params.identification import LAWS, LEAST_SQUARES
 from pipeline.posterior import identify
 from pipeline.posterior.launches import Observed
-from pipeline.search.history import History
-from pipeline.search.loop import Free, search
-from pipeline.search.optimizers import explorer
 from pipeline.sling.launch import launch
 from pipeline.sling.material import THETA
 from pipeline.sling.model import Sling
@@ -68,17 +65,10 @@ def found(
     about, space = params.methods[method], Space.of_method(params, method)
     loss = EpisodeLoss.of(params, method, episodes[0], sling)
     evaluate = Evaluator(episodes[0], sling, loss, space, workers=WORKERS)
-    names = (*THETA, *LAWS[about.law])
+    best = complete(params, method, params.optimizer, evaluate).best()
+    start = np.array([best[name] for name in space.names])
     if about.search != LEAST_SQUARES:
-        best = complete(params, method, params.optimizer, evaluate).best()
-        point = np.array([best[name] for name in names])
-        return Outcome(identify.launched(sling, episodes[0]), point, None), {}
-    free = Free.of(space, about.fixed)
-    count = params.optimizer.population * (params.optimizer.generations + 1)
-    history = History(method, space.names)
-    design = explorer(about, params.optimizer, len(free.axes), count)
-    search(design, evaluate, history, rollouts=count, free=free)
-    start = np.array([history.best()[name] for name in names])
+        return Outcome(identify.launched(sling, episodes[0]), start, None), {}
     one = identify.identify(
         params, method, sling, episodes, start, observed=observed, workers=WORKERS
     )

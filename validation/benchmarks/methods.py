@@ -1,7 +1,8 @@
 """How long a whole search takes, method by method, on the yardstick of `sling bench`.
 
 A search is all that the stages history and theta search, with nothing remembered. Its time
-is what evaluations take (simulation, loss, keeping them) and what is left: the optimiser's own.
+is what evaluations take (simulation, loss, keeping them) and what is left: the optimiser's own, and
+of least squares the fit with its rollouts.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -21,6 +23,8 @@ from pipeline.objective.evaluate import Evaluator, simulated
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
 from pipeline.params import expect_known
+from pipeline.params.identification import LEAST_SQUARES
+from pipeline.posterior.identify import identify
 from pipeline.search.history import History
 from pipeline.search.loop import Free, budget, latin_hypercube, search
 from pipeline.search.optimizers import explorer
@@ -61,7 +65,7 @@ def bench_methods(
         `budget`: its name and settings; `batch`: seconds of one generation, simulated alone and
         with the loss; `methods`, by name: regions (0: it has none), rollouts, failures, seconds of
         the whole, CPU seconds of all threads, seconds of evaluations and of the optimiser,
-        rollouts/s, best loss.
+        rollouts/s, best loss that was explored or refined.
 
     Raises:
         UserError: There is no such device or method.
@@ -87,13 +91,24 @@ def time_search(
     params, method: str, optimizer, sling: Sling, episode: Episode, devices: Sequence[str]
 ) -> tuple[dict, History]:
     """One search from nothing, all its rollouts counted; and what it evaluated."""
+    about = params.methods[method]
+    sling = replace(sling, law=about.law)
+
+    def whole(evaluate) -> tuple[History, int]:
+        history = complete(params, method, optimizer, evaluate)
+        if about.search != LEAST_SQUARES:
+            return history, len(history.total)
+        best = history.best()
+        start = np.array([best[name] for name in history.names])
+        fit = identify(params, method, sling, [episode], start, workers=os.cpu_count())
+        return history, len(history.total) + fit.rollouts
+
     with tempfile.TemporaryDirectory() as folder:
         cache = EvaluationCache(
             evaluator(params, method, sling, episode, devices), Path(folder), "bench"
         )
         evaluate = Clocked(cache)
-        history, cpu, wall = timed(partial(complete, params, method, optimizer, evaluate))
-    count, about = len(history.total), params.methods[method]
+        (history, count), cpu, wall = timed(partial(whole, evaluate))
     row = {
         "regions": regions_asked(about, optimizer) if about.search == "multistart" else 0,
         "rollouts": count,
@@ -109,7 +124,10 @@ def time_search(
 
 
 def complete(params, method: str, optimizer, evaluate) -> History:
-    """Everything that the stages history and theta evaluate in a search for a method."""
+    """Everything that the stages history and theta evaluate in a search for a method.
+
+    Of least squares that is the exploration; the fit has no history.
+    """
     about = params.methods[method]
     space = Space.of_method(params, method)
     free = Free.of(space, about.fixed)
@@ -117,7 +135,7 @@ def complete(params, method: str, optimizer, evaluate) -> History:
     history = History(method, space.names)
     first = explorer(about, optimizer, len(free.axes), explore)
     search(first, evaluate, history, rollouts=explore, free=free)
-    if refine:
+    if about.search == "multistart":
         explored = History(method, free.names, [history.table])
         regions, _ = regions_of(about, optimizer, explored)
         solvers = Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed)

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from app import __version__
-from app.arguments import address, count, draw, finite, positive, shown, target
+from app.arguments import address, count, draw, finite, number, positive, shown, target
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from stages.start import note_unmounted, run
@@ -233,6 +233,32 @@ def aim(arguments: argparse.Namespace) -> Done:
         return shown(answer, True)
     warnings = answer.pop("warnings")
     return "\n".join([shown(answer, False), *(f"warning: {line}" for line in warnings)])
+
+
+@command(
+    "tell a launch that you measured, and identify and train anew with it",
+    flag("--band", required=True),
+    flag("--draw", type=draw, required=True, metavar="Y,Z", help="frame O [m]: --draw=-0.30,-0.17"),
+    flag("--landing", type=positive, required=True, metavar="M", help="along the floor"),
+    flag("--draw-error", type=number, metavar="M", help="standard deviation; else a command's"),
+    flag("--method", default=DEFAULT_METHOD, help=f"default {DEFAULT_METHOD}"),
+    flag("--no-run", action="store_true", help="only write it down"),
+    JSON,
+)
+def observe(arguments: argparse.Namespace) -> Done:
+    from app import observe
+    from pipeline.params import load
+
+    answer = observe.observe(
+        load(),
+        arguments.band,
+        arguments.method,
+        arguments.draw,
+        arguments.landing,
+        error=arguments.draw_error,
+        run=not arguments.no_run,
+    )
+    return shown(answer, True) if arguments.json else observe.shown(answer, arguments.landing)
 
 
 @command(

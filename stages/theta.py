@@ -20,6 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.base.files import write_json
+from pipeline.base.launch_table import expect_apart
 from pipeline.base.layout import Layout, made
 from pipeline.base.machine import workers
 from pipeline.episode.pull import launch_history
@@ -79,6 +80,7 @@ def fitted(params, band: str, method: str) -> tuple[dict, dict]:
     layout, names = Layout(), (*THETA, *LAWS[params.methods[method].law])
     explored = History.load(method, names, layout.history(band, method))
     best = explored.best()
+    expect_apart(layout, band)
     sling = load_sling(params, band, law=params.methods[method].law)
     found = identify.identify(
         params,

@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 
+from pipeline.base.launch_table import expect_apart
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.landing.simulator import simulator
@@ -34,6 +35,7 @@ def main() -> None:
     samples = load_samples(layout.confidence(band, method))
     episode = Episode.load(layout.episode(band))
 
+    expect_apart(layout, band)
     stored, targets = Stored(band, method), params.trials.targets
     batches = trials.measured(params, band, method, layout.measured)
     if about.source == "rig":

@@ -81,7 +81,7 @@ def run_stage(
     )
     if status == 0:
         return any(line == f"Running stage '{name}':" for line in said)
-    raise StageFailed(f"{name}: {_reason(name, said, status)}")
+    raise StageFailed(f"{name}: {reason(name, said, status)}")
 
 
 def dvc(
@@ -170,7 +170,7 @@ def _is_own(line: str) -> bool:
     return bool(line) and not line.startswith(DVCS)
 
 
-def _reason(name: str, said: list[str], status: int) -> str:
+def reason(name: str, said: list[str], status: int) -> str:
     """Why a stage failed: its own line of error, else what DVC says, else its last line."""
     if signal := _signal(status):  # whatever the stage said of that; DVC's comes by the guard
         return f"{'its guard' if status < 0 else 'DVC'} was killed by signal {signal}"

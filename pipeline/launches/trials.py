@@ -16,9 +16,10 @@ import pyarrow.parquet as pq
 
 from pipeline.base.failures import too_strong
 from pipeline.base.files import replacing
+from pipeline.base.launch_table import file_of
 from pipeline.base.pool import Pool
 from pipeline.landing.stored import Stored
-from pipeline.launches.measured import file_of, read_measured
+from pipeline.launches.measured import read_measured
 from pipeline.launches.spread import landing_intervals
 
 SCHEMA = pa.schema(

@@ -8,9 +8,39 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pipeline.base import launch_table as table
+from pipeline.base.errors import UserError
 from pipeline.posterior.launches import Observed
+
+COLUMNS = (*table.DRAW, "draw_error_m", table.LANDING)  # as they are written
+MOST_ERROR = 0.1  # of a draw [m]
 
 
 def read_evidence(folder: Path, band: str, params) -> list[Observed]:
-    """Of a band, oldest first; none where it has no file. Raises UserError."""
-    return []
+    """Of a band, oldest first; none where it has no file.
+
+    A draw without an error of its own has that of a commanded one, `trials.actuation_error`.
+
+    Raises:
+        UserError: A file is no band's, cannot be read, or says what no launch can have done.
+    """
+    path = table.file_of(folder, band, params.bands)
+    error, launches = params.trials.actuation_error, []
+    for line, row in table.rows(path, *table.EVIDENCE) if path else []:
+        where = f"{path}, line {line}"
+        landing = table.metres(where, table.LANDING, row[table.LANDING])
+        if landing is None:
+            raise UserError(f"{where}: a launch that did not land is no evidence, leave it out")
+        own = row["draw_error_m"]
+        own = expect_error(where, table.number(where, "draw_error_m", own)) if own else error
+        launches.append(Observed(table.drawn(where, row), own, landing))
+    return launches
+
+
+def expect_error(where: str, error: float) -> float:
+    """A draw's standard deviation [m], if it can be one. Raises UserError."""
+    if not 0 <= error < MOST_ERROR:
+        raise UserError(
+            f"{where}: draw_error_m must be at least 0 and below {MOST_ERROR:g} m, got {error:g}"
+        )
+    return error

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from pipeline.base.launch_table import file_of
 from pipeline.base.layout import Layout, made
 from pipeline.base.schema import JsonRecord, read_json
 from pipeline.episode.episode import Episode
 from pipeline.landing.landing_map import LandingMap
 from pipeline.landing.stored import ROBUST, Stored
-from pipeline.launches.measured import file_of, named
+from pipeline.launches.measured import named
 from pipeline.search.regions import Region, load_regions
 from pipeline.sling.theta import PosteriorFile, load_theta
 

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.launches.measured import OPTIONAL, REQUIRED, Measured, file_of, named, read_measured
+from pipeline.base.launch_table import file_of
+from pipeline.launches.measured import OPTIONAL, REQUIRED, Measured, named, read_measured
 
 KNOWN = ("ours", "theirs")
 HEAD = "draw_y_m,draw_z_m,landing_y_m"

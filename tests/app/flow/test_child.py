@@ -77,7 +77,7 @@ def test_why_a_stage_failed_by_lines_of_dvc() -> None:
         (["Running stage 'x':", "> x.py", "1"], 128 + 9, "DVC was killed by signal 9"),
         (failed("1", why=f"{RUN} -2"), -9, "its guard was killed by signal 9"),
     ):
-        assert child._reason("x", said, status) == reason
+        assert child.reason("x", said, status) == reason
 
 
 def test_lines_come_as_they_are_printed_and_a_cancelled_stage_leaves_nothing(toy: Toy) -> None:

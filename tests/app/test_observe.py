@@ -1,0 +1,115 @@
+"""`sling observe`: what it writes, what it runs, what it refuses."""
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+from app import cli, observe
+from app.flow import child
+from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout
+
+DRAW, LANDING = (-0.3, -0.17), 2.2
+
+
+@pytest.fixture
+def put(tmp_path, params, monkeypatch):
+    """`observe` of band1 in an empty project, with the stages that DVC was asked for."""
+    asked = []
+
+    def dvc(root, arguments, **about):
+        asked.append(arguments)
+        return status.pop() if status else 0, ["error: it broke"]
+
+    monkeypatch.setattr(child, "dvc", dvc)
+    status = []
+
+    def run(draw=DRAW, landing=LANDING, band="band1", method="least_squares", **options) -> dict:
+        return observe.observe(params, band, method, draw, landing, root=tmp_path, **options)
+
+    return SimpleNamespace(run=run, asked=asked, status=status, layout=Layout(tmp_path))
+
+
+def test_a_launch_is_written_below_the_others_and_the_policy_runs(put) -> None:
+    first = put.run()
+    assert put.run((-0.32, -0.2), 3.0, error=0.0)["launches"] == 2
+    file = put.layout.evidence / "band1.csv"
+    assert file.read_text() == (
+        "draw_y_m,draw_z_m,draw_error_m,landing_y_m\n-0.3,-0.17,,2.2\n-0.32,-0.2,0.0,3.0\n"
+    )
+    assert put.asked == [("repro", "policy@band1-least_squares")] * 2
+    assert first == {"file": str(file), "launches": 1, "before": None, "after": None}
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_no_run_runs_nothing(put) -> None:
+    assert put.run(run=False)["after"] is None
+    assert put.asked == []
+
+
+def test_a_stage_that_fails_says_why_and_the_launch_stays(put) -> None:
+    put.status.append(1)
+    with pytest.raises(child.StageFailed, match="policy@band1-least_squares: it broke"):
+        put.run()
+    assert (put.layout.evidence / "band1.csv").is_file()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"band": "none"}, "--band none: not in params.yaml"),
+        ({"method": "none"}, "--method none: not in params.yaml"),
+        ({"method": "sling2sim2real"}, "takes no launches as evidence"),
+        ({"draw": (-0.3, -0.6)}, "lies below the floor"),
+        ({"draw": (-30.0, -0.17)}, "is it in centimetres"),
+        ({"landing": 220.0}, "is it in centimetres"),
+        ({"error": 1.0}, "--draw-error: draw_error_m must be at least 0 and below 0.1 m"),
+        ({"error": -0.001}, "--draw-error"),
+    ],
+)
+def test_refuses_what_is_no_launch(put, wrong: dict, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        put.run(**wrong)
+    assert put.asked == [] and not put.layout.evidence.exists()
+
+
+def test_refuses_a_launch_that_is_there_or_a_score(put) -> None:
+    put.run(run=False)
+    with pytest.raises(UserError, match="this launch is there already"):
+        put.run()
+    put.layout.measured.mkdir(parents=True)
+    score = put.layout.measured / "band1.csv"
+    score.write_text("draw_y_m,draw_z_m,landing_y_m\n-0.4,-0.2,3.0\n")
+    with pytest.raises(UserError, match="evidence or a score, never both"):
+        put.run((-0.4, -0.2), 3.0)
+    assert len((put.layout.evidence / "band1.csv").read_text().splitlines()) == 2
+
+
+def test_what_is_said_before_and_after() -> None:
+    told = {
+        "landing_m": 2.0,
+        "interval_90_m": [1.9, 2.1],
+        "failure": None,
+        "returned_share": 1.0,
+        "share_90": [0.9, 1.1],
+    }
+    failed = {**told, "landing_m": None, "interval_90_m": None, "failure": "the band is slack"}
+    text = observe.shown({"file": "x.csv", "launches": 2, "before": told, "after": failed}, 2.2)
+    assert text.splitlines() == [
+        "x.csv: 2 launches as evidence",
+        "before  landing 2.000 m (90 %: 1.900 to 2.100 m), returned share 1.000"
+        " (90 %: 0.900 to 1.100)",
+        "after   landing fails in simulation: the band is slack, returned share 1.000"
+        " (90 %: 0.900 to 1.100)",
+        "warning: a launch that fails in simulation counts for nothing",
+        "measured  2.200 m",
+    ]
+
+
+def test_the_command(put, monkeypatch, capsys) -> None:
+    given = "observe --band band1 --draw=-0.3,-0.17 --landing 2.2 --no-run --json".split()
+    arguments = cli.parser().parse_args(given)
+    monkeypatch.setattr(observe, "Layout", lambda root: put.layout)
+    assert cli.execute(arguments) == 0
+    assert json.loads(capsys.readouterr().out)["launches"] == 1

@@ -66,7 +66,7 @@ class Coordinates:
     def of_method(cls, params, method: str, sling) -> Coordinates:
         """Of a method of params.yaml that searches by least squares, and its band's sling."""
         about = params.methods[method]
-        box = {name: (one.low, one.high) for name, one in params.parameters} | about.bounds
+        box = {name: (one.low, one.high) for name, one in params.parameters} | dict(about.bounds)
         young, damping = (box[THETA[i]] for i in (YOUNG, DAMPING))
         product = np.array(damping) * about.fixed["damping_scale"]
         wave = np.sqrt(sling.rest_length * sling.mass / sling.area)

@@ -72,13 +72,13 @@ def observe(
 
 def expect_launch(params, draw: tuple[float, float], landing: float, error: float | None) -> None:
     """Raises UserError where no launch can be so."""
-    floor = -params.setup.fork_height
-    if draw[1] < floor:
-        raise UserError(f"--draw: z = {draw[1]:g} m lies below the floor, z = {floor:g} m")
     if math.hypot(*draw) > FURTHEST_DRAW:
         raise UserError(
             f"--draw: must be at most {FURTHEST_DRAW:g} m from the fork; is it in centimetres?"
         )
+    floor = -params.setup.fork_height
+    if draw[1] < floor:
+        raise UserError(f"--draw: z = {draw[1]:g} m lies below the floor, z = {floor:g} m")
     furthest = table.LIMITS[table.LANDING][1]
     if not landing < furthest:
         raise UserError(

@@ -62,7 +62,7 @@ def test_a_stage_that_fails_says_why_and_the_launch_stays(put) -> None:
         ({"method": "none"}, "--method none: not in params.yaml"),
         ({"method": "sling2sim2real"}, "takes no launches as evidence"),
         ({"draw": (-0.3, -0.6)}, "lies below the floor"),
-        ({"draw": (-30.0, -0.17)}, "is it in centimetres"),
+        ({"draw": (-30.0, -17.0)}, "is it in centimetres"),
         ({"landing": 220.0}, "is it in centimetres"),
         ({"error": 1.0}, "--draw-error: draw_error_m must be at least 0 and below 0.1 m"),
         ({"error": -0.001}, "--draw-error"),

@@ -23,7 +23,7 @@
 
 // F now, predicted, and its rate -> stress (columns) and its derivative, K[k (k + 1) / 2 + l] for columns k >= l,
 // exact as long as p / mu is between `least` and `most`; `shaped` scales s further
-#define TURNS 1e-3
+#define TURNS 1e-2
 #define HOLDS 1e-4
 #define TAUT 1.2
 auto material = [&](const real (&x)[3][3], const real (&xp)[3][3], const real (&xt)[3][3], SC least, SC most, real shaped, real (&stress)[3][3], real (&K)[6][3][3]) {

@@ -240,7 +240,8 @@ def sling_of(bench: Bench) -> Sling:
     """The first band of params.yaml, mounted as `setup` says."""
     params = bench.params
     sling = Sling.of(params.bands[next(iter(params.bands))], params.setup, params.sling)
-    return replace(sling, air_density=0.0, arm_stiffness=None)  # other engines have none
+    # MuJoCo has neither air nor an arm, and damps the rate of the nominal stress
+    return replace(sling, air_density=0.0, arm_stiffness=None, turn_damping=1.0)
 
 
 def _interpolate(at: np.ndarray, places: np.ndarray, rows: np.ndarray) -> np.ndarray:

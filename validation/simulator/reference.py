@@ -20,7 +20,7 @@ from pipeline.sling.material import material
 from pipeline.sling.model import GRAVITY, Sling
 from pipeline.sling.rubber import RUBBER, TIMES
 
-TURNS = 1e-3  # of the modulus: keeps the spin of an unstressed edge regular
+TURNS = 1e-2  # of the modulus: keeps the spin of an unstressed edge regular
 HOLDS, TAUT = (
     1e-4,
     1.2,

@@ -18,12 +18,13 @@ from scipy.optimize import lsq_linear
 from pipeline.base.errors import UserError
 from pipeline.posterior.coordinates import Coordinates
 from pipeline.posterior.launches import Launches
-from pipeline.posterior.recording import Expansion, Failed, Recording
+from pipeline.posterior.likelihood import Expansion, Failed, Likelihood
 
 ITERATIONS = 14  # at most
 BINNED = 4  # of them sort the points into bins anew; then the density keeps its form
 LONGEST = 20.0  # of a step, in those of the finite differences
 STILL = 0.05  # of a last step, in standard deviations given the other coordinates
+LEAST = 1e-12  # of a precision
 DAMP, HARDER, EASIER, HARDEST = 1e-3, 10.0, 0.2, 1e4  # Levenberg's, relative to the diagonal
 
 
@@ -56,7 +57,7 @@ class Fit:
 
 
 def fit(
-    recordings: Sequence[Recording],
+    recordings: Sequence[Likelihood],
     coordinates: Coordinates,
     start: np.ndarray,
     *,
@@ -137,7 +138,7 @@ def _step(fit: Fit, coordinates: Coordinates, damp: float) -> np.ndarray:
     longest = LONGEST * coordinates.steps
     low = np.maximum(coordinates.low - fit.phi, -longest)
     high = np.minimum(coordinates.high - fit.phi, longest)
-    scale = np.sqrt(np.diag(fit.hessian))
+    scale = np.sqrt(np.maximum(np.diag(fit.hessian), LEAST))  # of what nothing tells, too
     hessian = fit.hessian / np.outer(scale, scale) + damp * np.eye(len(scale))
     root = np.linalg.cholesky(hessian).T
     aim = np.linalg.solve(root.T, fit.gradient / scale)

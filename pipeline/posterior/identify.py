@@ -20,7 +20,7 @@ from pipeline.posterior.coordinates import Coordinates
 from pipeline.posterior.draws import truncated_gaussian
 from pipeline.posterior.fit import Fit, fit
 from pipeline.posterior.launches import Launches, Observed
-from pipeline.posterior.recording import SIMULATED, Recording
+from pipeline.posterior.likelihood import SIMULATED, Likelihood
 from pipeline.sling.material import THETA
 from pipeline.sling.model import LaunchHistory, Sling
 from pipeline.sling.rubber import RUBBER
@@ -54,7 +54,7 @@ class Identified:
     fit: Fit
     birge: float
     samples: np.ndarray
-    recordings: list[Recording]
+    recordings: list[Likelihood]
     launches: Launches | None
 
     @property
@@ -99,7 +99,7 @@ def identify(
     """
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
     friction = params.methods[method].fixed["dynamic_friction"]
-    recordings = [Recording(one, sling, cutoff, friction) for one in episodes]
+    recordings = [Likelihood(one, sling, cutoff, friction) for one in episodes]
     coordinates = Coordinates.of_method(params, method, sling)
     launches = Launches(observed, launched(sling, episodes[0])) if observed else None
     known = {"launches": launches, "workers": workers, "progress": progress}

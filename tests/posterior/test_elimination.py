@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.posterior.recording import Recording, Tolerances, opening_time
+from pipeline.posterior.likelihood import Likelihood, Tolerances, opening_time
 
 PHI, INNER, FORCES, BINS = 4, 3, 15, 12
 FRAME = np.repeat([7, 8, 9], 4)
@@ -39,7 +39,7 @@ class Case:
         return np.concatenate([np.full(3 * FORCES, force), np.full(2 * BINS, np.hypot(cloud, way))])
 
     def expanded(self):
-        recording = object.__new__(Recording)
+        recording = object.__new__(Likelihood)
         recording.tolerances = self.tolerances
         return recording._eliminated(
             self.residuals, self.gap, self.slopes, self.own, self.nuisances

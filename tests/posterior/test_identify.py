@@ -9,7 +9,7 @@ import pytest
 from pipeline.episode.signal import cutoff_hz
 from pipeline.posterior import coordinates, identify
 from pipeline.posterior.coordinates import Coordinates
-from pipeline.posterior.recording import Recording
+from pipeline.posterior.likelihood import Likelihood
 from pipeline.posterior.residuals import Residuals, Rule
 from pipeline.sling.interaction import interact
 from pipeline.sling.theta import at_points, load_theta
@@ -112,7 +112,7 @@ def test_workers_change_no_byte(exact, first):
 def test_residuals_at_the_truth_are_of_the_size_of_the_noise():
     """Of the force what its low-pass leaves of white noise, and of a bin far below a point's."""
     episode = recorded(0.012, 5, NOISE)
-    recording = Recording(episode, SLING, CUTOFF, 0.7)
+    recording = Likelihood(episode, SLING, CUTOFF, 0.7)
     rollouts = recording.simulate(POINT[None], np.zeros(3))
     residuals = Residuals(episode, SLING, CUTOFF, rollouts.center_line[0])
     gap, count = residuals(rollouts)[0], 3 * len(residuals.samples)

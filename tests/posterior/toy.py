@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from pipeline.posterior.coordinates import STEPS, Coordinates
-from pipeline.posterior.recording import Failed
+from pipeline.posterior.likelihood import Failed
 
 NAMES = "mooney_share", "relaxation", "air_drag"
 SIZE = np.array([STEPS[name] for name in NAMES])

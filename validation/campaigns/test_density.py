@@ -16,7 +16,7 @@ import pytest
 from pipeline.params import load
 from tests.project import ROOT
 from validation import density
-from validation.rig_scores import result, summary
+from validation.campaigns.rig_scores import result, summary
 from validation.rubbers import COUNT, DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
 pytestmark = pytest.mark.validation

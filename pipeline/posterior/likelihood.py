@@ -119,8 +119,8 @@ class Failed(Exception):
     """A simulation did not reach its end."""
 
 
-class Recording:
-    """One recording of a band.
+class Likelihood:
+    """Of the parameters of a band, by one recording.
 
     Attributes:
         episode, sling, cutoff, tolerances: As given; the sling is that of this episode.

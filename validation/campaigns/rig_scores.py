@@ -127,7 +127,7 @@ def result(params, band: str, numbers: tuple[int, ...], method: str, folder: Pat
             if known:
                 draws = aimed(outcome, here)[[4, 0, -1][:known]]
                 trials = 5000 + 10 * numbers[0] + np.arange(known)
-                landings = world.landings(draws, trials[:, None])[:, 0]
+                landings = np.array([one.landing_y for one in world.trials(draws, trials.tolist())])
                 seen = [
                     Observed(tuple(draw), here.trials.actuation_error, landing)
                     for draw, landing in zip(draws.tolist(), landings.tolist(), strict=True)

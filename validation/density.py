@@ -38,7 +38,7 @@ FLAWS = {
 }  # of a recorder
 
 
-class Outcome:
+class Calibrated:
     """A method's θ of a band, and its simulator.
 
     Attributes:
@@ -60,7 +60,7 @@ def found(
     sling: Sling,
     episodes: Sequence[Episode],
     observed: Sequence[Observed] = (),
-) -> tuple[Outcome, dict]:
+) -> tuple[Calibrated, dict]:
     """What a method finds, and says of it: least squares takes all, others the first."""
     about, space = params.methods[method], Space.of_method(params, method)
     loss = EpisodeLoss.of(params, method, episodes[0], sling)
@@ -68,13 +68,13 @@ def found(
     best = complete(params, method, params.optimizer, evaluate).best()
     start = np.array([best[name] for name in space.names])
     if about.search != LEAST_SQUARES:
-        return Outcome(identify.launched(sling, episodes[0]), start, None), {}
+        return Calibrated(identify.launched(sling, episodes[0]), start, None), {}
     one = identify.identify(
         params, method, sling, episodes, start, observed=observed, workers=WORKERS
     )
     point = one.coordinates.points(one.fit.phi[None])[0]
     told = identify.confidence(one, params.parameters)
-    return Outcome(identify.launched(sling, episodes[0]), point, one.points), told
+    return Calibrated(identify.launched(sling, episodes[0]), point, one.points), told
 
 
 def own_law(params, method: str, number: int) -> dict:

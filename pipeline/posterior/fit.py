@@ -17,7 +17,7 @@ from scipy.optimize import lsq_linear
 
 from pipeline.base.errors import UserError
 from pipeline.posterior.coordinates import Coordinates
-from pipeline.posterior.launches import Launches
+from pipeline.posterior.launches import LaunchLikelihood
 from pipeline.posterior.likelihood import Expansion, Failed, Likelihood
 
 ITERATIONS = 14  # at most
@@ -61,7 +61,7 @@ def fit(
     coordinates: Coordinates,
     start: np.ndarray,
     *,
-    launches: Launches | None = None,
+    launches: LaunchLikelihood | None = None,
     workers: int | None = None,
     progress: Callable[[Fit], None] = lambda fit: None,
 ) -> Fit:

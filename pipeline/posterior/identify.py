@@ -19,7 +19,7 @@ from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.posterior.coordinates import Coordinates
 from pipeline.posterior.draws import truncated_gaussian
 from pipeline.posterior.fit import Fit, fit
-from pipeline.posterior.launches import Launches, Observed
+from pipeline.posterior.launches import LaunchLikelihood, Observed
 from pipeline.posterior.likelihood import SIMULATED, Likelihood
 from pipeline.sling.material import THETA
 from pipeline.sling.model import LaunchHistory, Sling
@@ -55,7 +55,7 @@ class Identified:
     birge: float
     samples: np.ndarray
     recordings: list[Likelihood]
-    launches: Launches | None
+    launches: LaunchLikelihood | None
 
     @property
     def points(self) -> np.ndarray:
@@ -101,7 +101,7 @@ def identify(
     friction = params.methods[method].fixed["dynamic_friction"]
     recordings = [Likelihood(one, sling, cutoff, friction) for one in episodes]
     coordinates = Coordinates.of_method(params, method, sling)
-    launches = Launches(observed, launched(sling, episodes[0])) if observed else None
+    launches = LaunchLikelihood(observed, launched(sling, episodes[0])) if observed else None
     known = {"launches": launches, "workers": workers, "progress": progress}
     found = fit(recordings, coordinates, coordinates.of(start), **known)
     birge = disagreement(found)
@@ -256,7 +256,7 @@ def without(found: Identified, number: int) -> dict:
     }
 
 
-def _launched(launches: Launches | None) -> list[dict]:
+def _launched(launches: LaunchLikelihood | None) -> list[dict]:
     if launches is None:
         return []
     return [

@@ -31,7 +31,7 @@ class Observed:
     landing: float
 
 
-class Launches:
+class LaunchLikelihood:
     """Launches of one band.
 
     Attributes:

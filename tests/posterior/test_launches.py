@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.posterior import launches
-from pipeline.posterior.launches import TAPE, Launches, Observed
+from pipeline.posterior.launches import TAPE, LaunchLikelihood, Observed
 
 STEPS = np.array([1e-3, 1e-3])
 
@@ -26,7 +26,7 @@ def closed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def expanded(*observed: Observed, phi=(0.0, 0.0)):
-    evidence = Launches(observed, None)
+    evidence = LaunchLikelihood(observed, None)
     return evidence, *evidence.expand(lambda phi: phi, np.array(phi), STEPS)
 
 

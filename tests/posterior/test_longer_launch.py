@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.posterior.coordinates import Coordinates
-from pipeline.posterior.launches import Launches, Observed
+from pipeline.posterior.launches import LaunchLikelihood, Observed
 from pipeline.sling.launch import launch
 from pipeline.sling.load import load_sling
 from pipeline.sling.model import LaunchHistory
@@ -32,7 +32,7 @@ def told(params):
 
     def by(count: int):
         observed = [Observed(DRAW, 0.001, FURTHER * float(once.landing_y[0]))] * count
-        _, hessian, gradient = Launches(observed, sling).expand(
+        _, hessian, gradient = LaunchLikelihood(observed, sling).expand(
             coordinates.points, phi, coordinates.steps
         )
         return known + hessian, gradient

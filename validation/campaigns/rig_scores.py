@@ -25,7 +25,7 @@ from pipeline.posterior.launches import Observed
 from pipeline.recording.build import build_episodes
 from pipeline.rig.recorder.record import record
 from pipeline.sling.model import Sling
-from validation.density import Outcome, found
+from validation.density import Calibrated, found
 
 TARGETS = np.linspace(1.525, 2.325, 9)  # m
 MAP = 17, 13  # simulated launches that tell where to seek
@@ -56,7 +56,7 @@ def sling_of(params, band: str, method: str, folder: Path) -> Sling:
     return replace(sling, law=params.methods[method].law)
 
 
-def aimed(outcome: Outcome, params) -> np.ndarray:
+def aimed(outcome: Calibrated, params) -> np.ndarray:
     """Draws (T, 2) that a perfect policy would choose for TARGETS; NaN where it finds none."""
     setup = params.setup
     box = {"draw_y": setup.draw_y, "draw_z": setup.draw_z, "max_force": setup.max_force}
@@ -74,7 +74,7 @@ def aimed(outcome: Outcome, params) -> np.ndarray:
     return np.array(draws)
 
 
-def scored(outcome: Outcome, params, world: World, seed: int = 0) -> dict:
+def scored(outcome: Calibrated, params, world: World, seed: int = 0) -> dict:
     """Launches at TARGETS in the world: errors without noise, and one launch each with noise.
 
     Returns:

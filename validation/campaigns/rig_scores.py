@@ -40,13 +40,18 @@ def recorded(params, band: str, folder: Path) -> Episode:
         record(params, band, raw)
         episode = build_episodes(raw, band, params)[0][0]
         raw.unlink()
-        episode.save(folder / "episode")
-        sling = Sling.of(params.bands[band], params.setup, params.sling, as_rod=True)
-        clamps = calibrate_clamps(
-            sling, episode, lambda part: EpisodeLoss.plain(params, part, sling), workers=1
-        )
-        write_json(mounting, clamps)
+        calibrated_clamps(params, band, episode, folder)
     return Episode.load(folder / "episode")
+
+
+def calibrated_clamps(params, band: str, episode: Episode, folder: Path) -> None:
+    """Keep an episode in `folder`, with its clamps beside it."""
+    episode.save(folder / "episode")
+    sling = Sling.of(params.bands[band], params.setup, params.sling, as_rod=True)
+    clamps = calibrate_clamps(
+        sling, episode, lambda part: EpisodeLoss.plain(params, part, sling), workers=1
+    )
+    write_json(folder / "mounting.json", clamps)
 
 
 def sling_of(params, band: str, method: str, folder: Path) -> Sling:

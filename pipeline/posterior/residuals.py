@@ -34,6 +34,7 @@ class Rule:
         force_until: Samples of the force from the grasp until then.
         held: Pictures of the drawn band.
         recoil: Pictures of the recoil until then; where none is, the first one after it.
+        way: Share of the draw by which the band must still be behind the fork in those.
         bins: Of the recoil, first and end: nearer the clamps the band folds.
     """
 
@@ -47,24 +48,18 @@ class Rule:
         """Numbers of the pictures that count, shape (F,)."""
         time = episode.cloud_time - episode.release_time
         held = (time > self.held[0]) & (time < self.held[1])
-        drawn = self._away(
-            episode,
-            episode.position[
-                np.interp(episode.release_time, episode.time, np.arange(len(episode.time))).astype(
-                    int
-                )
-            ][None],
-        )
+        hand = episode.position[episode.time <= episode.release_time][-1:]
+        drawn = self._behind(hand)
         recoil = (time > 0) & (time <= self.recoil)
         for frame in np.flatnonzero(recoil):
-            recoil[frame] = self._away(episode, episode.clouds[frame]) > self.way * drawn
+            recoil[frame] = self._behind(episode.clouds[frame]) > self.way * drawn
         if not recoil.any():
             later = np.flatnonzero(time > 0)
             recoil[later[np.argsort(time[later])[:1]]] = True
         return np.flatnonzero(held | recoil)
 
     @staticmethod
-    def _away(episode: Episode, points: np.ndarray) -> float:
+    def _behind(points: np.ndarray) -> float:
         """How far the farthest twentieth of points (P, 3) is behind the fork [m]."""
         return -float(np.quantile(points[:, 1], 0.05)) if len(points) else 0.0
 

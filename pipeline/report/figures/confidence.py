@@ -9,7 +9,7 @@ from pipeline.report.figures.canvas import PARAMETERS, few_ticks, key, mark, pat
 from pipeline.report.results import Result
 from pipeline.report.styles import INK, Styles
 
-BINS, LEVEL = 14, 0.9
+BINS = 14
 SHOWN = {  # label, and factor from SI
     "youngs_modulus": ("E [kPa]", 1e-3),
     "mooney_share": ("Mooney's share", 1.0),
@@ -47,8 +47,9 @@ def marginals(results: dict[str, Result], styles: Styles) -> plt.Figure:
         few_ticks(ax.xaxis)
     axes.flat[-1].axis("off")
     entries = [(styles[method].name, mark(color=styles[method].color)) for method in results]
+    level = next(iter(results.values())).confidence["level"]
     entries += [
-        (f"{100 * LEVEL:g} % interval and θ*", mark(color="0.4", lw=3)),
+        (f"{100 * level:g} % interval and θ*", mark(color="0.4", lw=3)),
         ("samples", patch("0.8")),
     ]
     key(figure, entries)

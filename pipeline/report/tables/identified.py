@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pipeline.params.identification import LEAST_SQUARES
 from pipeline.report.replay import Replay
 from pipeline.report.results import Results
 from pipeline.report.styles import Styles
@@ -22,7 +23,7 @@ DERIVED = {  # heading and factor from SI; others keep their name and unit
 }
 PARTS = ("fitted", "held out", "ratio")
 SEARCHES = {
-    "least_squares": "a design, then Levenberg-Marquardt",
+    LEAST_SQUARES: "a design, then Levenberg-Marquardt",
     "de": "differential evolution",
     "bo": "Bayesian optimisation",
     "adam": "Adam on finite differences",
@@ -48,7 +49,7 @@ def methods(results: Results, params, styles: Styles) -> Table:
             search += "" if about.covariance else ", isotropic starts"
         fixed = [_held(name, value) for name, value in about.fixed.items()]
         held = ", ".join(fixed) or NONE
-        if about.search == "least_squares":
+        if about.search == LEAST_SQUARES:
             terms = ["−2 log p of all recordings and launches"]
         rows.append([style.name, f"`{method}`", search, " + ".join(terms), held])
     return ["method", "in params.yaml", "search", "minimises", "held fixed"], rows

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from PIL import Image
-from playwright.sync_api import Page, Request, sync_playwright
+from playwright.sync_api import ConsoleMessage, Page, Request, sync_playwright
 
 from pipeline.base.errors import UserError
 
@@ -19,20 +19,29 @@ OPTIONS = [
     "--disable-gpu", "--hide-scrollbars", "--no-proxy-server",
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
 ]  # fmt: skip
-LOCAL = re.compile(r"(https?|wss?)://(127\.0\.0\.1|localhost)[:/]|data:|blob:|about:")
+LOCAL = re.compile(r"(https?|wss?)://(127\.0\.0\.1|localhost)[:/]|data:|blob:|about:|file:")
 SHOWN = "texts => texts.every(text => document.body?.innerText.includes(text))"
 
 
 class Browser:
-    """One page; `elsewhere` has the addresses that it asked for and that are not on this machine.
+    """One page, and what it did that it should not.
 
-    Not those that the server's content policy forbids.
+    Attributes:
+        elsewhere: Addresses that it asked for and that are not on this machine; not those that the
+            content policy of the page or its server forbids.
+        errors: What it wrote to the console as an error, with what the content policy forbade.
     """
 
     def __init__(self, page: Page) -> None:
-        self.page, self.elsewhere = page, set()
+        self.page, self.elsewhere, self.errors = page, set(), []
         page.on("request", self._asks)
         page.on("requestfailed", self._fails)
+        page.on("console", self._says)
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+
+    def _says(self, message: ConsoleMessage) -> None:
+        if message.type == "error":
+            self.errors.append(message.text)
 
     def _asks(self, request: Request) -> None:
         if not LOCAL.match(request.url):

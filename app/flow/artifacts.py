@@ -50,10 +50,10 @@ def _episode(root: Path, band: str, method: str) -> Iterator[str]:
 def _theta(root: Path, band: str, method: str) -> Iterator[str]:
     import pandas as pd
 
+    from pipeline.drawing.styles import styles
     from pipeline.params import load
     from pipeline.report.figures import search
     from pipeline.report.results import has_another_loss
-    from pipeline.report.styles import styles
     from pipeline.report.tables import parameters
     from pipeline.report.tables.benchmark import PAPER
     from pipeline.report.tables.cells import markdown
@@ -81,9 +81,9 @@ def _theta(root: Path, band: str, method: str) -> Iterator[str]:
 def _policy(root: Path, band: str, method: str) -> Iterator[str]:
     import pandas as pd
 
+    from pipeline.drawing.styles import styles
     from pipeline.landing.stored import ROBUST, Stored
     from pipeline.report.figures import policy
-    from pipeline.report.styles import styles
     from pipeline.report.tables.cells import markdown
     from pipeline.report.tables.policies import policies
 
@@ -103,8 +103,8 @@ def _policy(root: Path, band: str, method: str) -> Iterator[str]:
 def _trials(root: Path, band: str, method: str) -> Iterator[str]:
     import pandas as pd
 
+    from pipeline.drawing.styles import styles
     from pipeline.report.figures import policy
-    from pipeline.report.styles import styles
     from pipeline.report.tables.cells import markdown
     from pipeline.report.tables.landings import predictions
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.drawing.replay import Replay, replay
+from pipeline.drawing.styles import SIDE_BY_SIDE, Styles, drawn, styles
 from pipeline.landing.stored import PLAIN, ROBUST, Stored
 from pipeline.params import Params
-from pipeline.report.replay import Replay, replay
 from pipeline.report.results import Result, Results, gather
-from pipeline.report.styles import SIDE_BY_SIDE, Styles, drawn, styles
 
 
 @dataclass(frozen=True)

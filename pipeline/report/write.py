@@ -31,7 +31,7 @@ def write(params, root: str | Path = ".") -> None:
         write_json(report.folder / "metrics" / f"{name}.json", content)
     write_text(report.folder / "README.md", markdown)
     write_run(report.folder)
-    write_page(report, markdown)
+    write_page(report.folder, markdown)
 
 
 def metrics(results: Results) -> dict[str, dict]:

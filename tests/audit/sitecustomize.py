@@ -15,7 +15,7 @@ from pathlib import Path
 
 SHORT = {  # by stage and module
     "policy": {"pipeline.policy.robust": {"STEPS": 30}},
-    "report": {"pipeline.report.styles": {"THEME": {}}},  # a layout that is solved draws all twice
+    "report": {"pipeline.drawing.styles": {"THEME": {}}},  # a layout that is solved draws all twice
 }
 read: set[str] = set()
 gc.set_threshold(100_000, 50, 50)  # it is looked for garbage while torch is imported

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from pipeline.drawing.styles import styles
 from pipeline.report.chapters.summary import summary
-from pipeline.report.styles import styles
 from pipeline.report.write import metrics
 from tests.report.tables.toy_results import floor, launches, result, results
 

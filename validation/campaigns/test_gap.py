@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from pipeline.base.files import write_json
+from pipeline.drawing.styles import COLORS, INK, THEME
 from pipeline.landing.simulator import simulator
 from pipeline.landing.stored import Stored
 from pipeline.objective.space import Space
@@ -20,7 +21,6 @@ from pipeline.oracle.aim import hit, least_sensitive_draw
 from pipeline.oracle.floor import errors_of, trial_numbers
 from pipeline.oracle.world import World
 from pipeline.params import load
-from pipeline.report.styles import COLORS, INK, THEME
 from pipeline.sling.theta import load_theta
 from tests.project import ROOT
 from validation.campaigns.test_orange import copy_of_the_project, run

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from pipeline.drawing.styles import Styles
 from pipeline.report.report import Report
 from pipeline.report.results import Results
-from pipeline.report.styles import Styles
 from pipeline.report.tables import identified
 from pipeline.report.tables import policies as tables
 from pipeline.report.tables.cells import markdown

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.drawing.styles import Styles, drawn
 from pipeline.landing.stored import PLAIN, ROBUST
 from pipeline.report.figures import confidence, episode, policy, search
 from pipeline.report.report import Report
 from pipeline.report.results import Result, has_another_loss
-from pipeline.report.styles import Styles, drawn
 from pipeline.report.tables import identified, landings, policies
 from pipeline.report.tables.cells import markdown
 

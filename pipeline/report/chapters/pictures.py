@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.drawing.replay import LOAD
 from pipeline.launches.stretch import stretch_of
 from pipeline.report.figures import episode, launches
-from pipeline.report.replay import LOAD
 from pipeline.report.report import Report, side_by_side
 
 

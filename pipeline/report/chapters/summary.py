@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pandas as pd
 
+from pipeline.drawing.styles import Styles
 from pipeline.report.report import Report
 from pipeline.report.results import Result, Results
-from pipeline.report.styles import Styles
 from pipeline.report.tables.benchmark import APART
 from pipeline.report.tables.landings import AIM, intervals, landing_errors, prediction_error
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pipeline.report.figures.canvas import PARAMETERS, few_ticks, key, mark, patch, picture
+from pipeline.drawing.canvas import PARAMETERS, few_ticks, key, mark, patch, picture
+from pipeline.drawing.styles import INK, Styles
 from pipeline.report.results import Result
-from pipeline.report.styles import INK, Styles
 
 BINS = 14
 SHOWN = {  # label, and factor from SI

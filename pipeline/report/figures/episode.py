@@ -7,11 +7,11 @@ from collections.abc import Iterable
 import matplotlib.pyplot as plt
 import numpy as np
 
+from pipeline.drawing.canvas import key, mark, picture
+from pipeline.drawing.replay import LOAD, Replay
+from pipeline.drawing.styles import INK, Style, Styles
 from pipeline.episode.episode import Episode
 from pipeline.episode.phases import phases, taut_frames
-from pipeline.report.figures.canvas import key, mark, picture
-from pipeline.report.replay import LOAD, Replay
-from pipeline.report.styles import INK, Style, Styles
 
 DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)))  # so that curves that lie on each other are seen
 AROUND = (-0.25, 0.5)  # of the release, magnified [s]

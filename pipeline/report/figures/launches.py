@@ -11,10 +11,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Rectangle
 
 from pipeline.base.target import TARGET_AREA
-from pipeline.report.figures.canvas import key, mark, patch, picture
+from pipeline.drawing.canvas import key, mark, patch, picture
+from pipeline.drawing.styles import INK, SIDE_BY_SIDE, Styles
 from pipeline.report.noise import landed
 from pipeline.report.results import Results
-from pipeline.report.styles import INK, SIDE_BY_SIDE, Styles
 from pipeline.sling.model import GRAVITY
 
 BEHIND, BEYOND = -0.45, 0.35  # how far a picture reaches behind the fork, and past the target [m]

@@ -6,11 +6,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
+from pipeline.drawing.canvas import key, log_y, mark, patch, picture
+from pipeline.drawing.styles import COLORS, SIDE_BY_SIDE, Styles, drawn
 from pipeline.landing.landing_map import LandingMap
 from pipeline.launches.stretch import stretch_of
-from pipeline.report.figures.canvas import key, log_y, mark, patch, picture
 from pipeline.report.results import Result
-from pipeline.report.styles import COLORS, SIDE_BY_SIDE, Styles, drawn
 
 FAIR = 0.05  # of the distance, shaded
 ERRORS = (-80, -50, -20, -10, -5, 0, 5, 10, 20, 50, 100, 200)  # % at the axis

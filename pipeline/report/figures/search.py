@@ -8,9 +8,9 @@ import pandas as pd
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Ellipse
 
-from pipeline.report.figures.canvas import PARAMETERS, few_ticks, key, log_y, mark, picture
+from pipeline.drawing.canvas import PARAMETERS, few_ticks, key, log_y, mark, picture
+from pipeline.drawing.styles import INK, SIDE_BY_SIDE, Styles, drawn
 from pipeline.report.results import Result, best_so_far, printed
-from pipeline.report.styles import INK, SIDE_BY_SIDE, Styles, drawn
 from pipeline.sling.material import THETA
 
 PATH, STAR = "#e4003a", "#ffd23f"

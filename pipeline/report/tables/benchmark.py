@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from pipeline.drawing.styles import KNOWN, Styles, styles
 from pipeline.report import paper
 from pipeline.report.results import Results
-from pipeline.report.styles import KNOWN, Styles, styles
 from pipeline.report.tables.cells import NONE, Table, number
 from pipeline.report.tables.landings import landing_errors, pooled_std
 

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from pipeline.drawing.styles import Styles
 from pipeline.report.noise import Difference, difference, landed
 from pipeline.report.results import Results
-from pipeline.report.styles import Styles
 from pipeline.report.tables.benchmark import LAUNCHED, band_name, spread
 from pipeline.report.tables.cells import NONE, Table, number
 from pipeline.report.tables.landings import landing_errors

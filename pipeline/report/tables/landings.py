@@ -8,9 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
+from pipeline.drawing.styles import Styles
 from pipeline.report.noise import landed
 from pipeline.report.results import Results
-from pipeline.report.styles import Styles
 from pipeline.report.tables.cells import NONE, Table, number, percent
 
 AIM = 0.05  # mean error of predicted landings inside the recorded stretch, share of the distance

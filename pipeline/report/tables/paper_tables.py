@@ -8,11 +8,11 @@ import pandas as pd
 
 from pipeline.base.files import replacing, write_text
 from pipeline.base.target import TARGET_AREA
+from pipeline.drawing.styles import Styles
 from pipeline.report import paper
 from pipeline.report.noise import LEVEL, RESAMPLES
 from pipeline.report.report import Report
 from pipeline.report.results import Results
-from pipeline.report.styles import Styles
 from pipeline.report.tables import benchmark, differences, parameters
 from pipeline.report.tables.cells import latex, markdown, percent
 

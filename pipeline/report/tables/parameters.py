@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from pipeline.drawing.styles import Styles
 from pipeline.objective.space import Space
 from pipeline.params.identification import LAWS
 from pipeline.report import paper
 from pipeline.report.results import PRINTED, Result, Results
-from pipeline.report.styles import Styles
 from pipeline.report.tables.benchmark import NOT_RUN, PAPER, band_name, method_name, ordered
 from pipeline.report.tables.cells import NONE, Table, number
 from pipeline.sling.material import THETA

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.drawing.styles import Styles
 from pipeline.landing.landing_map import LandingMap
 from pipeline.landing.stored import PLAIN, ROBUST
 from pipeline.report.results import Result, Results
-from pipeline.report.styles import Styles
 from pipeline.report.tables.cells import NONE, Table, centimetres, number
 
 

@@ -1,7 +1,7 @@
 import matplotlib.pyplot as plt
 import pytest
 
-from pipeline.report.figures import canvas
+from pipeline.drawing import canvas
 
 
 @pytest.fixture

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pipeline.drawing.styles import styles
 from pipeline.report.figures import confidence
-from pipeline.report.styles import styles
 from tests.report.conftest import METHOD, THETA
 
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.drawing.styles import styles
 from pipeline.report.figures import episode as drawing
-from pipeline.report.styles import styles
+from tests.drawing.toy_replay import toy_replay
 from tests.report.conftest import BAND, METHOD, episode
-from tests.report.toy_replay import toy_replay
 
 STYLES = styles([METHOD])
 

@@ -8,8 +8,8 @@ import pytest
 from matplotlib.patches import Circle
 from scipy.integrate import solve_ivp
 
+from pipeline.drawing.styles import styles
 from pipeline.report.figures import launches as drawing
-from pipeline.report.styles import styles
 from pipeline.sling.model import GRAVITY
 from tests.report.conftest import BAND, METHOD, launches
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
+from pipeline.drawing.styles import styles
 from pipeline.report.figures import policy
-from pipeline.report.styles import styles
 from tests.report.conftest import METHOD, launches
 
 

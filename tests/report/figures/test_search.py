@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from matplotlib.patches import Ellipse
 
+from pipeline.drawing.styles import styles
 from pipeline.report.figures import search
-from pipeline.report.styles import styles
 from tests.report.conftest import METHOD
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pipeline.drawing.styles import styles
 from pipeline.report import paper
-from pipeline.report.styles import styles
 from pipeline.report.tables.benchmark import ablation, as_table, benchmark, records, spread
 from tests.report.tables.toy_results import TARGETS, floor, launches, ran
 

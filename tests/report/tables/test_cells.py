@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from pipeline.report.styles import KNOWN, styles
+from pipeline.drawing.styles import KNOWN, styles
 from pipeline.report.tables.benchmark import as_table, benchmark
 from pipeline.report.tables.cells import NAMES, latex, markdown, text
 from tests.report.tables.toy_results import TARGETS, floor, launches, result, results

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.report.styles import styles
+from pipeline.drawing.styles import styles
 from pipeline.report.tables.differences import as_table, claims, compared, records, robust
 from tests.report.tables.toy_results import launches, ran, result, results
 

@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pipeline.drawing.styles import styles
 from pipeline.params import load
-from pipeline.report.styles import styles
 from pipeline.report.tables.paper_tables import paper_tables
 from tests.report.conftest import confidence
 from tests.report.tables.toy_results import floor, launches, result, results

@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pipeline.drawing.styles import styles
 from pipeline.objective.space import Space
 from pipeline.params import load
-from pipeline.report.styles import styles
 from pipeline.report.tables.parameters import as_table, at_edge, identified, records
 from tests.report.conftest import THETA, confidence
 from tests.report.tables.toy_results import launches, result, results

@@ -1,6 +1,6 @@
 """What all pictures share. Equal data give equal bytes.
 
-Black is what was measured; a method has one colour everywhere (pipeline/report/styles.py).
+Black is what was measured; a method has one colour everywhere (pipeline/drawing/styles.py).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from matplotlib.ticker import LogFormatter
 from PIL import Image
 
 from pipeline.base.files import replacing
-from pipeline.report.styles import THEME
+from pipeline.drawing.styles import THEME
 
 PARAMETERS = {  # name and unit on an axis, and the factor from SI to that unit
     "youngs_modulus": ("E [MPa]", 1e-6),

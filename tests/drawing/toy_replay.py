@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.report.replay import Replay, work
+from pipeline.drawing.replay import Replay, work
 
 LOADED = -0.4 * (1 - np.abs(np.linspace(-1, 1, 25)))  # z [m]: 40 cm deep in the middle
 NOTHING = {kind: {"fitted": 0.2, "held_out": np.nan} for kind in ("force", "cloud")}

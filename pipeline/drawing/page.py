@@ -1,51 +1,53 @@
-"""reports/index.html: the report as one file without a network, with a replay to turn and play.
+"""A text as one page without a network: its pictures are inside, and each chapter has a link.
 
-Its content security policy forbids every request but for run.js beside it, which says where and
-when it was written and may be missing. Equal inputs give equal bytes.
+The content security policy forbids every request but for scripts beside the page. Equal inputs give
+equal bytes.
 """
 
 from __future__ import annotations
 
 import base64
-import json
 import re
 from pathlib import Path
 from string import Template
 
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_text
-from pipeline.report.page.replays import content
-from pipeline.report.report import Report
 
 HERE = Path(__file__).parent
 
 
-def write_page(report: Report, markdown: str) -> None:
-    """Write reports/index.html.
+def page(
+    markdown: str,
+    folder: Path,
+    title: str,
+    *,
+    section: str = "",
+    links: tuple[tuple[str, str], ...] = (),
+    foot: str = "",
+) -> str:
+    """The page as HTML.
 
     Args:
-        markdown: The report as text; its pictures lie in reports/.
+        folder: Where the text's pictures lie.
+        section: HTML that stands before the second chapter.
+        links: Ids and titles of chapters in `section`; their links come first.
+        foot: HTML at the end.
 
     Raises:
-        UserError: A picture of the report is missing.
+        UserError: A picture is missing.
     """
-    from plotly.offline import get_plotlyjs
-
-    body, chapters = _rendered(markdown, report.folder)
-    links = [("replay", "The replay"), *chapters]
+    body, chapters = _rendered(markdown, folder)
     begins = [match.start() for match in re.finditer("<h2 ", body)]
-    second = begins[1] if len(begins) > 1 else len(body)  # the replay comes before it
-    data = json.dumps(content(report), separators=(",", ":"))
-    page = Template((HERE / "page.html").read_text("utf-8")).substitute(
+    second = begins[1] if len(begins) > 1 else len(body)
+    return Template((HERE / "page.html").read_text("utf-8")).substitute(
+        title=title,
         style=(HERE / "page.css").read_text("utf-8"),
-        navigation="\n".join(f'<a href="#{name}">{title}</a>' for name, title in links),
+        navigation="\n".join(f'<a href="#{id_}">{name}</a>' for id_, name in (*links, *chapters)),
         first=body[:second],
+        section=section,
         rest=body[second:],
-        data=data.replace("</", "<\\/"),
-        plotly=get_plotlyjs(),
-        script=(HERE / "replay.js").read_text("utf-8"),
+        foot=foot,
     )
-    write_text(report.folder / "index.html", page)
 
 
 def _rendered(markdown: str, folder: Path) -> tuple[str, list[tuple[str, str]]]:
@@ -75,4 +77,5 @@ def _inside(picture: Path) -> str:
         raise UserError(
             f"{picture}: cannot be read ({error.strerror}); `dvc repro --force report` draws it"
         ) from error
-    return f"data:image/png;base64,{base64.b64encode(content).decode()}"
+    kind = picture.suffix[1:]
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"

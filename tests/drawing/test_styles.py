@@ -3,9 +3,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.drawing.styles import FEW, KNOWN, SIDE_BY_SIDE, drawn, styles
 from pipeline.params import load
 from pipeline.report import paper
-from pipeline.report.styles import FEW, KNOWN, SIDE_BY_SIDE, drawn, styles
 
 METHODS = st.lists(st.sampled_from([*KNOWN, "mine", "yours", "theirs"]), unique=True, min_size=1)
 

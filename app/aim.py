@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.base.layout import Layout
 from pipeline.landing.simulator import simulator
-from pipeline.landing.stored import PLAIN, ROBUST, Stored
+from pipeline.landing.stored import Stored
 from pipeline.launches.spread import landing_intervals
 from pipeline.params import expect_known
 from pipeline.sling.theta import launch_history, load_samples, load_theta
@@ -47,13 +47,11 @@ def aim(
     target: float,
     root: str | Path = ".",
     launcher=None,
-    robust: bool = False,
 ) -> Answer:
     """Where to draw `band` so that the projectile lands at `target` [m].
 
     Args:
         params: The whole of params.yaml.
-        robust: By the policy that was trained over what the identification leaves open.
         launcher: Simulates draws, shape (N, 2) [m], and with a second argument those of other θ,
             as `simulator` does; the calibrated simulator by default.
 
@@ -65,7 +63,7 @@ def aim(
     layout = Layout(Path(root))
     content = load_theta(layout.theta(band, method), band)
     stored = Stored(band, method, layout.root)
-    draw = stored.draws(np.array([target]), ROBUST if robust else PLAIN)[0]
+    draw = stored.draws(np.array([target]))[0]
     warnings = []
     if launcher is None:
         warnings += unmounted(band, root)

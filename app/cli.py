@@ -218,7 +218,6 @@ def launch(arguments: argparse.Namespace) -> Done:
     flag("--band", required=True),
     flag("--method", default=DEFAULT_METHOD, help=f"default {DEFAULT_METHOD}"),
     flag("--target", type=target, required=True, metavar="M", help="along the floor"),
-    flag("--robust", action="store_true", help="by the method's second policy"),
     JSON,
 )
 def aim(arguments: argparse.Namespace) -> Done:
@@ -227,7 +226,7 @@ def aim(arguments: argparse.Namespace) -> Done:
     from pipeline.params import load
 
     params, band = load(), arguments.band
-    answer = aim(params, band, arguments.method, arguments.target, robust=arguments.robust)
+    answer = aim(params, band, arguments.method, arguments.target)
     answer = posed(answer, params, band)
     if arguments.json:
         return shown(answer, True)

@@ -70,7 +70,7 @@ def remedy(error: NotMade) -> str:
         stage = f"{'' if method in asked.methods else 'ablation_'}{stage}-{method}"
     if error.problem != "missing":
         return f"`dvc repro --force {stage}` makes it anew"
-    return " ".join(filter(None, (f"`dvc repro {stage}` makes it", error.condition)))
+    return f"`dvc repro {stage}` makes it"
 
 
 def unmounted(band: str, root: str | Path = ".") -> list[str]:

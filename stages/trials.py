@@ -40,8 +40,8 @@ def main() -> None:
     batches = trials.measured(params, band, method, layout.measured)
     if about.source == "rig":
         own = trials.aimed(stored, np.repeat(targets, params.trials.repeats).tolist())
-        batches = trials.launched(own, partial(_launch, band)) + batches
-    batches = batches or trials.aimed(stored, list(targets))
+        batches = [trials.launched(own, partial(_launch, band)), *batches]
+    batches = batches or [trials.aimed(stored, list(targets))]
 
     launcher = simulator(params, band, theta)
     launches, intervals = trials.predict(batches, launcher, samples, params)
@@ -56,7 +56,7 @@ def main() -> None:
         recorded=recorded_stretch(episode, fork_width, about.rest_length),
     )
     trials.save(table, layout.trials(band, method))
-    counts = [" ".join(filter(None, (b.kind, b.policy, str(len(b.draws))))) for b in batches]
+    counts = [f"{batch.kind} {len(batch.draws)}" for batch in batches]
     print(f"{band} {method}: launches: {', '.join(counts)}")
 
 

@@ -53,7 +53,7 @@ def python(*arguments: str | Path, folder: Path = ROOT, **more: str) -> subproce
 
 
 def with_(params: Params, section: str, **values: object) -> Params:
-    """`params` with other values in a section, such as policy.robust."""
+    """`params` with other values in a section, such as rig.camera."""
     first, _, rest = section.partition(".")
     inner = getattr(params, first)
     inner = with_(inner, rest, **values) if rest else inner.model_copy(update=values)

@@ -27,7 +27,6 @@ TINY = {
     "policy.map_size": [7, 7],
     "policy.envs": 32,
     "policy.iterations": 3,
-    "policy.robust": {"methods": ["least_squares"], "samples": 2, "map_size": [4, 4]},
     "trials.targets": [1.925],
     "trials.repeats": 1,
     "floor.map_size": [4, 4],

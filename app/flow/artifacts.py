@@ -82,7 +82,7 @@ def _policy(root: Path, band: str, method: str) -> Iterator[str]:
     import pandas as pd
 
     from pipeline.drawing.styles import styles
-    from pipeline.landing.stored import ROBUST, Stored
+    from pipeline.landing.stored import Stored
     from pipeline.report.figures import policy
     from pipeline.report.tables.cells import markdown
     from pipeline.report.tables.policies import policies
@@ -92,9 +92,8 @@ def _policy(root: Path, band: str, method: str) -> Iterator[str]:
     result = SimpleNamespace(
         band=band,
         method=method,
-        training=pd.read_parquet(stored.folder() / "training.parquet"),
+        training=pd.read_parquet(stored.folder / "training.parquet"),
         card=stored.card(),
-        robust_card=stored.card(ROBUST) if ROBUST in stored.kinds() else None,
     )
     yield _drawn("training", lambda path: policy.training(path, {method: result}, named))
     yield markdown(policies([result], named))
@@ -117,18 +116,17 @@ def _trials(root: Path, band: str, method: str) -> Iterator[str]:
 
 
 def _errors(trials) -> tuple[list[str], list[list[str]]]:
-    """Landing errors of launches by policy and target, as in the report."""
-    from pipeline.report.tables.cells import NONE, centimetres
+    """Landing errors of launches by target, as in the report."""
+    from pipeline.report.tables.cells import centimetres
     from pipeline.report.tables.landings import landing_errors
 
-    heads = ["policy", "target [m]", "launches", "failed", "mean miss [cm]", "±", "bias [cm]"]
+    heads = ["target [m]", "launches", "failed", "mean miss [cm]", "±", "bias [cm]"]
     rows = []
-    for policy, launched in trials.groupby(trials.policy.fillna(NONE), sort=True):
-        for target, one in landing_errors(launched).items():
-            where = "all" if target == "all" else f"{target:.3f}"
-            counts = str(one["launches"]), str(one["failed"])
-            figures = (centimetres(one[name]) for name in ("mean", "std", "bias"))
-            rows.append([policy, where, *counts, *figures])
+    for target, one in landing_errors(trials).items():
+        where = "all" if target == "all" else f"{target:.3f}"
+        counts = str(one["launches"]), str(one["failed"])
+        figures = (centimetres(one[name]) for name in ("mean", "std", "bias"))
+        rows.append([where, *counts, *figures])
     return heads, rows
 
 

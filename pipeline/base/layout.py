@@ -123,12 +123,11 @@ class NotMade(UserError):
     Attributes:
         path: Of the file.
         problem: What is wrong with it.
-        condition: What the run hangs on that makes it: "where ...".
     """
 
-    def __init__(self, path: Path, problem: str = "missing", condition: str = "") -> None:
-        super().__init__(path, problem, condition)
-        self.path, self.problem, self.condition = Path(path), problem, condition
+    def __init__(self, path: Path, problem: str = "missing") -> None:
+        super().__init__(path, problem)
+        self.path, self.problem = Path(path), problem
 
     def __str__(self) -> str:
         return f"{self.path}: {self.problem}"

@@ -8,8 +8,8 @@ million launches in seconds, and the error of reading between is itself measured
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -20,8 +20,8 @@ import pyarrow.parquet as pq
 from pipeline.base.files import replacing
 from pipeline.landing.response_surface import NO_FAILURE, Landings, ResponseSurface
 
-# draws (N, 2) [m], and θ (N, P) or none -> object with landing_y (N,) [m], hold_force (N,) [N],
-# failure list[str | None]; without a force limit of its own
+# draws (N, 2) [m] -> object with landing_y (N,) [m], hold_force (N,) [N], failure
+# list[str | None]; without a force limit of its own
 Launcher = Callable[..., object]
 
 
@@ -49,62 +49,53 @@ class LandingMap:
     checks: np.ndarray
 
     @classmethod
-    def simulate(cls, launcher: Launcher, *, checks: int = 128, **box) -> LandingMap:
-        """The map of a launcher that knows its θ; the rest as `simulate_each` has it."""
-        return cls.simulate_each(lambda at, _: launcher(at), [None], checks=checks, **box)[0]
-
-    @classmethod
-    def simulate_each(
+    def simulate(
         cls,
         launcher: Launcher,
-        thetas: np.ndarray,
         *,
         draw_y: tuple[float, float],
         draw_z: tuple[float, float],
         size: tuple[int, int],
         max_force: float,
-        checks: int = 16,
+        checks: int = 128,
         seed: int = 0,
-    ) -> list[LandingMap]:
-        """A map for each of several θ, shape (S, P): a grid and random draws, all in one batch.
+    ) -> LandingMap:
+        """A grid and random draws, all in one batch.
 
         Args:
             launcher: Simulates draws, shape (N, 2) [m], without a force limit of its own.
             draw_y, draw_z: Bounds of the box [m].
             size: Number of nodes along y and z.
             max_force: Limit of the holding force [N].
-            checks: Number of random draws that validate the interpolation of each map.
+            checks: Number of random draws that validate the interpolation.
             seed: Seed of those draws.
         """
         grid = [np.linspace(*draw_y, size[0]), np.linspace(*draw_z, size[1])]
         low, high = np.array([draw_y, draw_z]).T
         random = np.random.default_rng(seed).uniform(low, high, (checks, 2))
         nodes = np.stack(np.meshgrid(*grid, indexing="ij"), -1).reshape(-1, 2)  # y slowest
-        draws = np.concatenate([nodes, random])
-        launched = launcher(np.tile(draws, (len(thetas), 1)), np.repeat(thetas, len(draws), axis=0))
+        launched = launcher(np.concatenate([nodes, random]))
         failure = np.array([reason or NO_FAILURE for reason in launched.failure], object)
         landing = np.where(failure == NO_FAILURE, launched.landing_y, np.nan)
         columns = landing, np.asarray(launched.hold_force, float), failure
-        maps = []
-        for one in zip(*(np.split(column, len(thetas)) for column in columns), strict=True):
-            at_nodes = (column[: len(nodes)].reshape(size) for column in one)
-            beside = (column[len(nodes) :] for column in one[:2])
-            maps.append(cls(*grid, *at_nodes, float(max_force), np.column_stack([random, *beside])))
-        return maps
+        at_nodes = (column[: len(nodes)].reshape(size) for column in columns)
+        beside = (column[len(nodes) :] for column in columns[:2])
+        return cls(*grid, *at_nodes, float(max_force), np.column_stack([random, *beside]))
 
     @property
     def reasons(self) -> list[str]:
         """Names of the failure codes; code 0 is success."""
-        return self._surface.reasons
+        return self.surface.reasons
 
     def __call__(self, draws: np.ndarray) -> Landings:
-        """Landings of draws, shape (N, 2) [m], read off the splines: fields of shape (N,)."""
-        several = self._surface(draws)
-        return Landings(*(getattr(several, one.name)[:, 0] for one in fields(Landings)))
+        """Landings of draws, shape (N, 2) [m], read off the splines."""
+        return self.surface(draws)
 
     @cached_property
-    def _surface(self) -> ResponseSurface:
-        return surface_of([self])
+    def surface(self) -> ResponseSurface:
+        """What is read between the launches."""
+        values = self.landing_y, self.hold_force, self.failure
+        return ResponseSurface((self.draw_y, self.draw_z), *values, self.max_force)
 
     def save(self, path: Path, header: dict | None = None) -> None:
         """Write one row a launch: grid nodes first (y slowest), then the validation draws."""
@@ -150,22 +141,10 @@ class LandingMap:
         )
 
 
-def surface_of(maps: Sequence[LandingMap], error: float = 0.0) -> ResponseSurface:
-    """What is read between the launches of maps that share grid and force limit, a θ each.
-
-    Args:
-        error: Standard deviation of the drawn position along each axis [m].
-    """
-    names = ("landing_y", "hold_force", "failure")
-    values = (np.stack([getattr(one, name) for one in maps], -1) for name in names)
-    return ResponseSurface((maps[0].draw_y, maps[0].draw_z), *values, maps[0].max_force, error)
-
-
-def validation(maps: list[LandingMap], targets: tuple[float, float]) -> dict:
-    """Interpolation error [m] on the random draws of maps: over the box, and where targets lie."""
-    predicted = np.concatenate([one(one.checks[:, :2]).landing_y for one in maps])
-    simulated = np.concatenate([one.checks[:, 2] for one in maps])
-    error = np.abs(predicted - simulated)
+def validation(landing_map: LandingMap, targets: tuple[float, float]) -> dict:
+    """Interpolation error [m] on a map's random draws: over the box, and where targets lie."""
+    simulated = landing_map.checks[:, 2]
+    error = np.abs(landing_map(landing_map.checks[:, :2]).landing_y - simulated)
     known = np.isfinite(error)
     near = known & (simulated >= targets[0]) & (simulated <= targets[1])
 

@@ -1,9 +1,4 @@
-"""Where a draw lands under one θ or several, read between launches of a grid by cubic splines.
-
-Under each θ the landing is a smooth function of the draw. A normal error of the drawn position,
-small against the grid, spreads it in proportion to its gradient: so expectations over that error
-have a closed form (expected.py), and none is drawn at random.
-"""
+"""Where a draw lands, read between launches of a grid by cubic splines."""
 
 from __future__ import annotations
 
@@ -20,23 +15,21 @@ NO_FAILURE = ""
 
 @dataclass(frozen=True)
 class Landings:
-    """What draws lead to under each θ, shapes (N, S).
+    """What draws lead to, shapes (N,).
 
     Attributes:
         landing_y: Landing on the floor [m], NaN where failed.
-        spread: Standard deviation of it by the error of the draw [m].
         hold_force: Force that the hand holds before the release [N].
         failure: Index into `ResponseSurface.reasons`, 0 where the launch succeeds.
     """
 
     landing_y: np.ndarray
-    spread: np.ndarray
     hold_force: np.ndarray
     failure: np.ndarray
 
 
 class ResponseSurface:
-    """Landings of draws under S θ.
+    """Landings of draws.
 
     A draw is a failure, and not interpolated, where the interpolated holding force exceeds the
     arm's limit or where a corner of its grid cell failed in simulation.
@@ -53,19 +46,17 @@ class ResponseSurface:
         hold_force: np.ndarray,
         failure: np.ndarray,
         max_force: float,
-        error: float = 0.0,
     ):
         """Read between launches of a grid.
 
         Args:
             grid: Draws along y (Y,) and along z (Z,) [m], ascending.
-            landing_y: Landings [m], NaN where failed, shape (Y, Z, S).
-            hold_force: Of the drawn band [N], NaN where the simulation failed, shape (Y, Z, S).
-            failure: Reasons, NO_FAILURE where none, shape (Y, Z, S).
+            landing_y: Landings [m], NaN where failed, shape (Y, Z).
+            hold_force: Of the drawn band [N], NaN where the simulation failed, shape (Y, Z).
+            failure: Reasons, NO_FAILURE where none, shape (Y, Z).
             max_force: The arm may hold no more [N].
-            error: Standard deviation of the drawn position along each axis [m].
         """
-        self.grid, self.max_force, self.error = grid, max_force, error
+        self.grid, self.max_force = grid, max_force
         self.low, self.high = (np.array([axis[end] for axis in grid]) for end in (0, -1))
         known = sorted(set(failure.flat) - {NO_FAILURE})
         self.reasons = [NO_FAILURE, TOO_MUCH_FORCE, OUTSIDE, *known]
@@ -75,7 +66,7 @@ class ResponseSurface:
 
     def fingerprint(self) -> str:
         """Of all that landings hang on."""
-        digest = hashlib.sha256(repr((self.reasons, self.max_force, self.error)).encode())
+        digest = hashlib.sha256(repr((self.reasons, self.max_force)).encode())
         for one in (*self.grid, self._cell, self._landing.c, self._force.c):
             digest.update(np.ascontiguousarray(one).tobytes())
         return digest.hexdigest()
@@ -92,17 +83,12 @@ class ResponseSurface:
         landing, force = self._landing(inside), self._force(inside)
         failure = self._cell[*cell]
         failure = np.where((failure == 0) & (force > self.max_force), 1, failure)
-        failure = np.where(outside[:, None], 2, failure)
-        spread = np.zeros(landing.shape)
-        if self.error:
-            slopes = [self._landing(inside, nu=order) for order in ((1, 0), (0, 1))]
-            spread = self.error * np.hypot(*slopes)
-        return Landings(np.where(failure > 0, np.nan, landing), spread, force, failure)
+        failure = np.where(outside, 2, failure)
+        return Landings(np.where(failure > 0, np.nan, landing), force, failure)
 
     def _spline(self, values: np.ndarray) -> NdBSpline:
-        """Interpolating bicubic splines through values (Y, Z, S)."""
-        whole = np.stack([_continued(one) for one in np.moveaxis(values, -1, 0)], -1)
-        along_y = make_interp_spline(self.grid[0], whole)
+        """Interpolating bicubic splines through values (Y, Z)."""
+        along_y = make_interp_spline(self.grid[0], _continued(values))
         along_z = make_interp_spline(self.grid[1], np.moveaxis(along_y.c, 1, 0))
         coefficients = np.ascontiguousarray(np.moveaxis(along_z.c, 0, 1))
         return NdBSpline((along_y.t, along_z.t), coefficients, 3)

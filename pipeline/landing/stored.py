@@ -1,4 +1,4 @@
-"""Where the policies of a band and a method lie, and what they say."""
+"""Where the policy of a band and a method lies, and what it says."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.base.layout import Layout, NotMade
+from pipeline.base.layout import Layout, NotMade, made
 from pipeline.base.schema import JsonRecord, read_json
-
-PLAIN, ROBUST = "plain", "robust"  # ROBUST is also the folder of a method's second policy
 
 
 class Training(JsonRecord):
@@ -43,7 +41,7 @@ class Card(JsonRecord):
 
 @dataclass(frozen=True)
 class Stored:
-    """The policies of `method` for `band`: a plain one, and beside it a robust one or none.
+    """The policy of `method` for `band`.
 
     Attributes:
         root: Of the project.
@@ -53,20 +51,16 @@ class Stored:
     method: str
     root: Path = Path()
 
-    def folder(self, kind: str = PLAIN) -> Path:
-        """Where a policy's files lie, or would."""
-        plain = Layout(self.root).policy(self.band, self.method)
-        return plain / ROBUST if kind == ROBUST else plain
+    @property
+    def folder(self) -> Path:
+        """Where its files lie, or would."""
+        return Layout(self.root).policy(self.band, self.method)
 
-    def kinds(self) -> list[str]:
-        """PLAIN, and ROBUST where there is such a policy; its card is what is written last."""
-        return [PLAIN, ROBUST] if (self.folder(ROBUST) / "card.json").is_file() else [PLAIN]
+    def card(self) -> dict:
+        """What its card says (export.card). Raises NotMade: missing, or damaged."""
+        return read_json(made(self.folder / "card.json"), Card).model_dump()
 
-    def card(self, kind: str = PLAIN) -> dict:
-        """What a policy's card says (export.card). Raises NotMade: missing, or damaged."""
-        return read_json(self._file(kind, "card.json"), Card).model_dump()
-
-    def draws(self, targets: np.ndarray, kind: str = PLAIN) -> np.ndarray:
+    def draws(self, targets: np.ndarray) -> np.ndarray:
         """Draws (y, z) [m], shape (N, 2), for targets [m], (N,).
 
         Raises:
@@ -74,7 +68,7 @@ class Stored:
         """
         import onnxruntime
 
-        path = self._file(kind, "policy.onnx")
+        path = made(self.folder / "policy.onnx")
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         options.log_severity_level = 4  # what is wrong is said below
@@ -86,13 +80,3 @@ class Stored:
             return session.run(["draw"], {"target": targets})[0].astype(float)
         except Exception as error:  # onnxruntime has an error of its own for each kind of damage
             raise NotMade(path, "damaged") from error
-
-    def _file(self, kind: str, name: str) -> Path:
-        path = self.folder(kind) / name
-        if path.is_file():
-            return path
-        trains = (
-            f"where policy.robust.methods in params.yaml names {self.method} and its θ file tells"
-            " its confidence"
-        )
-        raise NotMade(path, condition=trains if kind == ROBUST else "")

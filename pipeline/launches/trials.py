@@ -27,10 +27,9 @@ SCHEMA = pa.schema(
         ("band", pa.string()),
         ("method", pa.string()),
         ("kind", pa.string()),  # virtual, measured or predicted
-        ("policy", pa.string()),  # plain or robust; null where the launch was measured
         ("target", pa.float64()),  # m; null where the launch had none
         ("trial", pa.int64()),  # counts launches at a target; virtual ones of equal number are
-        # off by the same errors, whatever the method and the policy
+        # off by the same errors, whatever the method
         ("draw_y", pa.float64()),  # m, as commanded
         ("draw_z", pa.float64()),
         ("predicted_y", pa.float64()),  # m, by the calibrated simulator; null where it fails
@@ -67,7 +66,6 @@ class Batch:
     """
 
     kind: str
-    policy: str | None
     draws: np.ndarray
     targets: list[float | None]
     landing: list[float | None] | None = None
@@ -98,32 +96,23 @@ def measured(params, band: str, method: str, folder: Path) -> list[Batch]:
     landing = [one.landing for one in launches]
     failure = [None if y is not None else "did not land" for y in landing]
     draws, targets = np.array([o.draw for o in launches]), [o.target for o in launches]
-    return [Batch("measured", None, draws, targets, landing, failure)]
+    return [Batch("measured", draws, targets, landing, failure)]
 
 
-def aimed(stored: Stored, targets: list[float]) -> list[Batch]:
-    """What each of the method's policies would launch at the targets [m]. Raises UserError."""
-    return [
-        Batch("predicted", kind, stored.draws(np.array(targets), kind), list(targets))
-        for kind in stored.kinds()
-    ]
+def aimed(stored: Stored, targets: list[float]) -> Batch:
+    """What the policy would launch at the targets [m]. Raises UserError."""
+    return Batch("predicted", stored.draws(np.array(targets)), list(targets))
 
 
-def launched(batches: list[Batch], launch: Callable) -> list[Batch]:
-    """The same launched in a virtual world; launches of equal number have equal errors.
+def launched(batch: Batch, launch: Callable) -> Batch:
+    """The same in a virtual world; launches of equal number have equal errors.
 
     Args:
         launch: `launch(draw, number)` gives landing_y [m], NaN where there is none, failure,
             hold_force [N] and flight. It goes to processes of its own: it keeps one core busy.
     """
     with Pool() as pool:
-        return [
-            _virtual(batch, list(pool.map(launch, batch.draws, range(len(batch.draws)))))
-            for batch in batches
-        ]
-
-
-def _virtual(batch: Batch, tried: list) -> Batch:
+        tried = list(pool.map(launch, batch.draws, range(len(batch.draws))))
     landing = [one.landing_y if np.isfinite(one.landing_y) else None for one in tried]
     names = ("failure", "hold_force", "flight")
     told = {name: [getattr(one, name) for one in tried] for name in names}
@@ -199,7 +188,6 @@ def table(
         "band": [band] * len(stretch),
         "method": [method] * len(stretch),
         "kind": each("kind"),
-        "policy": each("policy"),
         "target": every("targets"),
         "trial": [number for batch in batches for number in _counted(batch.targets)],
         "draw_y": [y for y, _ in every("draws")],

@@ -76,7 +76,6 @@ class Params(Section):
         for band in self.run.ablations.bands:
             if band not in self.run.bands:
                 raise refusal(f"run.ablations.bands: {band} is not one of run.bands")
-        _expect_all(self.policy.robust.methods, self.methods, "policy.robust.methods")
         rig = [name for name in self.run.bands if self.bands[name].source == "rig"]
         if list(self.run.rig) != rig:
             raise refusal(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pipeline.base.schema import ASCENDING, FILLED, LIST, UNIQUE, Name, Range, Section, Seed
+from pipeline.base.schema import ASCENDING, FILLED, LIST, UNIQUE, Range, Section, Seed
 
 Distance = Annotated[float, Range(0.1, 20)]  # along the floor, m
 
@@ -26,14 +26,6 @@ Nodes = Annotated[int, Range(4, 1000)]  # a cubic spline needs four
 Width = Annotated[int, Range(1, 4096)]
 
 
-class Robust(Section):
-    """A second policy, trained over what the identification leaves open."""
-
-    methods: Annotated[tuple[Name, ...], LIST, UNIQUE]  # that get one
-    samples: Annotated[int, Range(2, 1000)]  # of the posterior, each with a landing map of its own
-    map_size: Annotated[tuple[Nodes, Nodes], LIST]
-
-
 class PolicyParams(Section):
     seed: Seed
     targets: Annotated[tuple[Distance, Distance], LIST, ASCENDING]
@@ -46,7 +38,6 @@ class PolicyParams(Section):
     init_std: Annotated[float, Range(1e-3, 10)]
     final_std: Annotated[float, Range(1e-4, 10)]
     reward: Reward
-    robust: Robust
 
 
 class FloorParams(Section):

@@ -12,16 +12,10 @@ from pipeline.landing.response_surface import TOO_MUCH_FORCE
 from pipeline.policy.train import CHECKED_TARGETS, Policy, Trained
 
 CONVERGED = 0.01  # mean |y_p - g| [m] over the checked targets that counts as converged
-SLACK = 0.001  # m, by which a robust policy's expected error may exceed the plain one's
 CRITERION = (
     f"mean |y_p - g| <= {CONVERGED:g} m over {CHECKED_TARGETS} targets launched in the calibrated"
     " simulator, no failure"
 )
-ROBUST_CRITERION = (
-    "expected |y_p - g| over samples of theta and errors of the draw <= the plain policy's"
-    f" + {SLACK:g} m, no failure in the calibrated simulator"
-)
-TRIED = 8  # launches of each target with a θ and an error of the draw of their own
 
 
 @dataclass(frozen=True)
@@ -45,25 +39,8 @@ def check(policy: Policy, launcher: Launcher, params) -> Check:
         params: The whole of params.yaml.
     """
     targets = np.linspace(*params.policy.targets, CHECKED_TARGETS)
-    return _checked(launcher(policy.draws(targets)), targets, params.setup.max_force)
-
-
-def check_expected(policy: Policy, launcher: Launcher, thetas: np.ndarray, params) -> Check:
-    """The same with θ drawn from `thetas`, shape (M, P), and an error in each drawn position.
-
-    Which θ and which error a launch gets hangs on params.policy.seed alone: policies that are
-    compared get the same.
-    """
-    targets = np.repeat(np.linspace(*params.policy.targets, CHECKED_TARGETS), TRIED)
-    random = np.random.default_rng(params.policy.seed)
-    errors = random.normal(0, params.trials.actuation_error, (len(targets), 2))
-    chosen = thetas[random.integers(len(thetas), size=len(targets))]
-    launched = launcher(policy.draws(targets) + errors, chosen)
-    return _checked(launched, targets, params.setup.max_force)
-
-
-def _checked(launched, targets: np.ndarray, max_force: float) -> Check:
-    heavy = np.asarray(launched.hold_force) > max_force
+    launched = launcher(policy.draws(targets))
+    heavy = np.asarray(launched.hold_force) > params.setup.max_force
     pairs = zip(launched.failure, heavy, strict=True)
     reasons = [reason or (TOO_MUCH_FORCE if much else None) for reason, much in pairs]
     landed = np.array([reason is None for reason in reasons])
@@ -89,28 +66,6 @@ def figures(trained: Trained, checked: Check) -> dict:
         "failed_targets": sum(checked.failures.values()),
         "map_mean_error_m": trained.mean_error,  # the same by the interpolated landing map
         "failed_launches": trained.failures,  # exploring ones, by reason
-    }
-
-
-def robust_figures(
-    trained: Trained, checked: Check, expected: Check, plain: Check, samples: int, error: float
-) -> dict:
-    """The same of a robust policy.
-
-    Args:
-        expected, plain: Of the robust and the plain policy's `check_expected`.
-        samples: Of θ, how many it was trained over.
-        error: Standard deviation of the drawn position along each axis [m].
-    """
-    better = expected.mean_error <= plain.mean_error + SLACK
-    return {
-        **figures(trained, checked),
-        "converged": not checked.failures and better,
-        "criterion": ROBUST_CRITERION,
-        "expected_error_m": expected.mean_error,
-        "plain_expected_error_m": plain.mean_error,
-        "samples": samples,
-        "actuation_error_m": error,
     }
 
 

@@ -5,9 +5,7 @@
     reward             height * exp(-|y_p - g| / scale), or -penalty for a failed launch
 
 Every step ends the episode, so discounting plays no part. Observations are normalised to [-1, 1]
-over the range of targets. Where the response surface has several θ, or draws have an error, the
-reward is the expected one over both: its gradient is that of rewards of single launches, without
-their noise.
+over the range of targets.
 """
 
 from __future__ import annotations
@@ -20,15 +18,13 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from pipeline.landing.response_surface import Landings, ResponseSurface
-from pipeline.policy.expected import closeness
 
 
 class SlingshotEnv(VecEnv):
     """One launch an episode, `num_envs` at a time.
 
     Attributes:
-        failures: How often each reason of failure has occurred since the last `take_failures`;
-            a draw counts once for each θ.
+        failures: How often each reason of failure has occurred since the last `take_failures`.
     """
 
     num_actions = 2
@@ -105,11 +101,10 @@ class SlingshotEnv(VecEnv):
 def rewarded(
     surface: ResponseSurface, draws: np.ndarray, targets: np.ndarray, reward
 ) -> tuple[np.ndarray, Landings]:
-    """Expected rewards, shape (N,), and landings of draws (N, 2) [m] for targets (N,) [m]."""
+    """Rewards, shape (N,), and landings of draws (N, 2) [m] for targets (N,) [m]."""
     launched = surface(draws)
-    gap = launched.landing_y - targets[:, None]
-    hit = reward.height * closeness(gap, launched.spread, reward.scale)
-    return np.where(launched.failure > 0, -reward.penalty, hit).mean(1), launched
+    hit = reward.height * np.exp(-np.abs(launched.landing_y - targets) / reward.scale)
+    return np.where(launched.failure > 0, -reward.penalty, hit), launched
 
 
 def draw_box(surface: ResponseSurface) -> tuple[torch.Tensor, torch.Tensor]:

@@ -114,7 +114,6 @@ def card(
     method: str,
     theta: dict,
     *,
-    kind: str,
     training: dict,
     landing_map: dict,
     launch: dict | None = None,
@@ -125,10 +124,9 @@ def card(
     Args:
         params: The whole of params.yaml.
         theta: Content of the theta file whose simulator the policy was trained in.
-        kind: PLAIN, or ROBUST: trained over what the identification leaves open.
         training: What check.py says of it; NaN becomes null.
         landing_map: How well the interpolated launches go with simulated ones
-            (`LandingMap.validation`).
+            (`landing_map.validation`).
         launch: How the hand must draw the band (`landing.simulator.asked_of_the_hand`), where its
             law remembers that.
         device: Where it was trained, "cpu" or "cuda".
@@ -139,7 +137,6 @@ def card(
     return {
         "band": band,
         "method": method,
-        "kind": kind,
         "theta": theta["theta"],
         "law": theta.get("law", NEO_HOOKEAN),
         "nuisances": theta.get("nuisances", {}),

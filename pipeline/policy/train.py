@@ -25,12 +25,11 @@ from pipeline.landing import response_surface
 from pipeline.landing.response_surface import ResponseSurface
 from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.environment import SlingshotEnv, draw_box, rewarded
-from pipeline.policy.expected import distance
 
 CHECKED_TARGETS = 256
 KEPT_EVERY = 5  # iterations; a checkpoint takes some 10 ms
 SOURCES = [
-    *(Path(__file__).with_name(f"{name}.py") for name in ("environment", "expected", "train")),
+    *(Path(__file__).with_name(f"{name}.py") for name in ("environment", "train")),
     Path(response_surface.__file__),
 ]
 PACKAGES = ("torch", "rsl-rl-lib", "tensordict", "numpy", "scipy")
@@ -69,7 +68,7 @@ class Trained:
         curve: One row an iteration: iteration, mean_reward (of exploring launches), mean_error [m]
             (deterministic, over the checked targets; NaN if all fail), failed_targets
             (deterministic), failures (exploring launches that failed), learning_rate, std (of the
-            exploration). Under several θ errors and failed targets are their mean.
+            exploration).
         iteration: The iteration that `policy` comes from.
         mean_error: Its error [m], as in the curve.
         failures: Exploring launches that failed, by reason, over the whole training.
@@ -129,13 +128,13 @@ def one_thread() -> Iterator[None]:
 
 def earned(
     surface: ResponseSurface, draws: np.ndarray, targets: np.ndarray, reward
-) -> tuple[float, float, float]:
+) -> tuple[float, float, int]:
     """Mean reward and |y_p - g| [m] (NaN if all fail) of draws for targets, and failed targets."""
     rewards, launched = rewarded(surface, draws, targets, reward)
-    error = distance(launched.landing_y - targets[:, None], launched.spread)
+    error = np.abs(launched.landing_y - targets)
     failed = launched.failure > 0
     mean = float(error[~failed].mean()) if not failed.all() else float("nan")
-    return float(rewards.mean()), mean, float(failed.mean(1).sum())
+    return float(rewards.mean()), mean, int(failed.sum())
 
 
 def told(error: float) -> str:
@@ -215,7 +214,7 @@ class _Training:
         if self.progress:
             self.progress.advance(1, told(error))
 
-    def _check(self) -> tuple[float, float, float]:
+    def _check(self) -> tuple[float, float, int]:
         draws = self.policy.draws(self.checked)
         return earned(self.env.surface, draws, self.checked, self.env.reward)
 

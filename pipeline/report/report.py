@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.drawing.replay import Replay, replay
 from pipeline.drawing.styles import SIDE_BY_SIDE, Styles, drawn, styles
-from pipeline.landing.stored import PLAIN, ROBUST, Stored
+from pipeline.landing.stored import Stored
 from pipeline.params import Params
 from pipeline.report.results import Result, Results, gather
 
@@ -48,11 +48,9 @@ class Report:
         draw(self.folder / "figures" / f"{name}.png", *arguments)
         return f"![{alt}](figures/{name}.png)\n"
 
-    def draws(self, result: Result, targets: np.ndarray) -> dict[str, np.ndarray]:
-        """Draws (N, 2) [m] for targets (N,) [m] of a plain policy, and of a robust one if any."""
-        stored = Stored(result.band, result.method, self.root)
-        kinds = [PLAIN, ROBUST] if result.robust_card else [PLAIN]
-        return {kind: stored.draws(targets, kind) for kind in kinds}
+    def draws(self, result: Result, targets: np.ndarray) -> np.ndarray:
+        """Draws (N, 2) [m] of a policy for targets (N,) [m]."""
+        return Stored(result.band, result.method, self.root).draws(targets)
 
 
 def side_by_side(params: Params) -> list[str]:

@@ -14,7 +14,7 @@ from pipeline.base.layout import Layout, made
 from pipeline.base.schema import JsonRecord, read_json
 from pipeline.episode.episode import Episode
 from pipeline.landing.landing_map import LandingMap
-from pipeline.landing.stored import ROBUST, Stored
+from pipeline.landing.stored import Stored
 from pipeline.launches.measured import named
 from pipeline.search.regions import Region, load_regions
 from pipeline.sling.theta import PosteriorFile, load_theta
@@ -45,11 +45,10 @@ class Result:
         regions: Where the refinement began; none for a search of one phase.
         axes: Names of the regions' axes in the unit cube.
         posterior: "names" and "samples"; None where θ has no confidence.
-        card: The policy's card; `robust_card` that of the second policy, None without one.
+        card: The policy's card.
         training: One row an iteration of the policy's training.
         landing_map: Simulated launches over the box of draws.
-        trials: One row a launch (pipeline/launches/trials.py), those of the robust policy apart.
-        robust_trials: Its launches; no rows where the method has none.
+        trials: One row a launch (pipeline/launches/trials.py).
     """
 
     band: str
@@ -60,11 +59,9 @@ class Result:
     axes: list[str]
     posterior: dict | None
     card: dict
-    robust_card: dict | None
     training: pd.DataFrame
     landing_map: LandingMap
     trials: pd.DataFrame
-    robust_trials: pd.DataFrame
 
     @property
     def confidence(self) -> dict:
@@ -125,8 +122,6 @@ def _result(layout: Layout, band: str, method: str) -> Result:
     if theta.get("confidence"):
         path = layout.confidence(band, method)
         posterior = read_json(path, PosteriorFile).model_dump(exclude_unset=True)
-    trials = pd.read_parquet(made(layout.trials(band, method)))
-    robust = trials.policy == ROBUST
     stored, policy = Stored(band, method, layout.root), layout.policy(band, method)
     return Result(
         band=band,
@@ -137,11 +132,9 @@ def _result(layout: Layout, band: str, method: str) -> Result:
         axes=axes,
         posterior=posterior,
         card=stored.card(),
-        robust_card=stored.card(ROBUST) if ROBUST in stored.kinds() else None,
         training=pd.read_parquet(made(policy / "training.parquet")),
         landing_map=LandingMap.load(made(policy / "map.parquet")),
-        trials=trials[~robust].reset_index(drop=True),
-        robust_trials=trials[robust].reset_index(drop=True),
+        trials=pd.read_parquet(made(layout.trials(band, method))),
     )
 
 

@@ -52,7 +52,7 @@ def _of(result: Result, floor: dict) -> dict:
     if floor:
         entry["floor_cm"] = _rounded(floor["mean_error_m"], 100)
     groups = {kind: result.trials[result.trials.kind == kind] for kind in LAUNCHED}
-    for name, trials in {**groups, "robust": result.robust_trials}.items():
+    for name, trials in groups.items():
         if trials.target.notna().any() and set(trials.kind) != {"predicted"}:
             total = landing_errors(trials)["all"]
             entry[f"{name}_cm"] = _rounded(total["mean"], 100)

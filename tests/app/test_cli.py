@@ -68,7 +68,6 @@ def test_the_documented_commands_are_understood() -> None:
     assert (launched.theta, launched.draw) == (Path("t.json"), (-0.30, -0.17))
     aimed = parse("aim --band band1 --target 1.925".split())
     assert (aimed.method, aimed.target, aimed.json) == ("least_squares", 1.925, False)
-    assert not aimed.robust and parse("aim --band b --target 2 --robust".split()).robust
     assert parse("aim --band band1 --method m --target 1.925".split()).method == "m"
     assert parse("bench --device cuda:0 --json".split()).device == "cuda:0"
     assert bench.asked(parse("bench --law rubber --json".split())) == ""
@@ -197,9 +196,10 @@ def test_aim_prints_one_json_object(tmp_path: Path) -> None:
 
 def test_aim_names_the_stage_that_makes_what_is_missing(tmp_path: Path, refused) -> None:
     aimable(tmp_path)
+    (tmp_path / "data/policies/band1/least_squares/policy.onnx").unlink()
     aim = ("aim", "--band", "band1", "--target", "1.9")
-    line = refused(1, *aim, "--robust", folder=tmp_path)
-    assert "robust/policy.onnx: missing" in line
+    line = refused(1, *aim, folder=tmp_path)
+    assert "policy.onnx: missing" in line
     assert "dvc repro policy@band1-least_squares" in line
     aim = (*aim, "--method", "de")
     assert refused(1, *aim, folder=tmp_path).endswith(

@@ -14,7 +14,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 SHORT = {  # by stage and module
-    "policy": {"pipeline.policy.robust": {"STEPS": 30}},
     "report": {"pipeline.drawing.styles": {"THEME": {}}},  # a layout that is solved draws all twice
 }
 read: set[str] = set()

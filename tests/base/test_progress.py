@@ -79,7 +79,7 @@ def test_what_is_told_is_read_back_and_other_lines_are_no_steps() -> None:
     facts = ("generation 0", "best 0.5", "recalled")
     for step in (
         Step("history-band1-de", 4, 12, "rollouts", facts),
-        Step("policy-b-x-robust", 0, 1, "steps"),
+        Step("policy-b-x-second", 0, 1, "steps"),
     ):
         assert parse(f"{step}\n") == step
     for line in ("", "band1 de: loss 0.3", "picture 3 of 9", "x 3/2 rollouts", "x 0/0 rollouts"):

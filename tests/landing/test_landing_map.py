@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from pipeline.landing.landing_map import LandingMap, surface_of, validation
+from pipeline.landing.landing_map import LandingMap, validation
 from pipeline.landing.response_surface import OUTSIDE, TOO_MUCH_FORCE
 from tests.policy import toy
 
@@ -77,9 +77,9 @@ def test_refuses_draws_outside_the_box() -> None:
 
 def test_validation_sees_an_error_of_the_map() -> None:
     chart = simulate()
-    good = validation([chart], (1.425, 2.425))
+    good = validation(chart, (1.425, 2.425))
     shifted = validation(
-        [dataclasses.replace(chart, landing_y=chart.landing_y + 0.05)], (1.425, 2.425)
+        dataclasses.replace(chart, landing_y=chart.landing_y + 0.05), (1.425, 2.425)
     )
     assert good["box"]["draws"] == 128 and 5 < good["target_range"]["draws"] < 128
     assert good["box"]["max_error_m"] < 1e-4
@@ -93,45 +93,7 @@ def test_survives_the_file(tmp_path) -> None:
     draws = random_draws()
     np.testing.assert_array_equal(loaded(draws).landing_y, chart(draws).landing_y)
     np.testing.assert_array_equal(loaded(draws).failure, chart(draws).failure)
-    assert validation([loaded], (1.4, 2.4)) == validation([chart], (1.4, 2.4))
-
-
-def test_maps_of_several_theta_are_those_of_each() -> None:
-    """One batch, read together: what each θ alone gives, its failures with it."""
-
-    def launcher(draws: np.ndarray, thetas: np.ndarray):
-        launched = toy.launch(draws)
-        launched.landing_y = launched.landing_y * thetas[:, 0]
-        bad = draws.sum(1) > thetas[:, 1]
-        launched.failure = ["it broke" if one else None for one in bad]
-        return launched
-
-    thetas = np.array([[0.9, -0.45], [1.1, -0.5]])
-    box = {"draw_y": toy.DRAW_Y, "draw_z": toy.DRAW_Z, "size": (17, 13), "max_force": 1e3}
-    maps = LandingMap.simulate_each(launcher, thetas, **box, checks=40)
-    draws = random_draws()
-    together = surface_of(maps)(draws)
-    assert together.landing_y.shape == (500, 2)
-    for column, theta in enumerate(thetas):
-
-        def alone(draws: np.ndarray, theta: np.ndarray = theta):
-            return launcher(draws, np.tile(theta, (len(draws), 1)))
-
-        single = LandingMap.simulate(alone, **box, checks=0)(draws)
-        np.testing.assert_array_equal(together.landing_y[:, column], single.landing_y)
-        np.testing.assert_array_equal(together.failure[:, column], single.failure)
-    both = validation(maps, (1.4, 2.4))["box"]
-    assert both["draws"] == sum(validation([one], (1.4, 2.4))["box"]["draws"] for one in maps)
-    assert both["draws"] > 20 and both["mean_error_m"] < 5e-3
-
-
-def test_the_spread_is_the_landings_own_by_the_error_of_the_draw() -> None:
-    draws, error = np.array([[-0.35, -0.2], [-0.3, -0.15]]), 0.001
-    landed = surface_of([simulate()], error)(draws)
-    errors = np.random.default_rng(0).normal(0, error, (20_000, 2))
-    truth = [toy.launch(draw + errors).landing_y.std() for draw in draws]
-    np.testing.assert_allclose(landed.spread[:, 0], truth, rtol=0.02)
-    assert not surface_of([simulate()])(draws).spread.any()
+    assert validation(loaded, (1.4, 2.4)) == validation(chart, (1.4, 2.4))
 
 
 def test_a_box_in_which_every_launch_fails() -> None:
@@ -139,4 +101,4 @@ def test_a_box_in_which_every_launch_fails() -> None:
     landed = chart(random_draws(20))
     assert {chart.reasons[code] for code in landed.failure} == {"it broke"}
     nothing = {"draws": 0, "mean_error_m": None, "max_error_m": None}
-    assert validation([chart], (1.4, 2.4))["box"] == nothing
+    assert validation(chart, (1.4, 2.4))["box"] == nothing

@@ -1,6 +1,5 @@
 """The stage of the trials on a recorded band: whose launches stand in its table, and how often."""
 
-import shutil
 import sys
 from pathlib import Path
 
@@ -22,16 +21,11 @@ def tried(root: Path, monkeypatch):
     monkeypatch.chdir(root)
     monkeypatch.setattr(sys, "argv", ["", BAND, METHOD])
 
-    def run(csv: str | None = None, robust: bool = False) -> pd.DataFrame:
+    def run(csv: str | None = None) -> pd.DataFrame:
         if csv is not None:
             file = Path("data/trials/measured", f"{BAND}.csv")
             file.parent.mkdir(exist_ok=True)
             file.write_text(csv)
-        if robust:
-            folder = Path("data/policies", BAND, METHOD)
-            (folder / "robust").mkdir()
-            for name in ("policy.onnx", "card.json"):
-                shutil.copy(folder / name, folder / "robust")
         from stages import trials
 
         trials.main()
@@ -40,15 +34,12 @@ def tried(root: Path, monkeypatch):
     return run
 
 
-def test_without_landings_the_policies_draws_are_predicted(tried) -> None:
-    rows = tried(robust=True)
-    assert rows.kind.tolist() == ["predicted"] * 6
-    assert rows.policy.tolist() == ["plain"] * 3 + ["robust"] * 3
-    assert rows.target.tolist() == [1.725, 1.925, 2.125] * 2
+def test_without_landings_the_policys_draws_are_predicted(tried) -> None:
+    rows = tried()
+    assert rows.kind.tolist() == ["predicted"] * 3
+    assert rows.target.tolist() == [1.725, 1.925, 2.125]
     assert rows.landing_y.isna().all() and rows.predicted_y.notna().all()
     assert rows.predicted_speed.gt(0).all() and rows.flight_y.isna().all()
-    plain, robust = rows[:3].reset_index(), rows[3:].reset_index()
-    pd.testing.assert_series_equal(plain.predicted_low, robust.predicted_low)  # equal draws
 
 
 def test_measured_launches_take_their_place(tried) -> None:
@@ -56,8 +47,8 @@ def test_measured_launches_take_their_place(tried) -> None:
         f"{HEAD}\n-0.30,-0.17,2.2,1.925,{METHOD}\n-0.30,-0.17,,1.925,{METHOD}\n"
         "-0.31,-0.17,2.3,1.925,\n-0.29,-0.15,1.9,1.725,package_si\n"
     )
-    rows = tried(text, robust=True)
-    assert rows.kind.tolist() == ["measured"] * 3 and rows.policy.isna().all()
+    rows = tried(text)
+    assert rows.kind.tolist() == ["measured"] * 3
     assert rows.target.fillna(0).tolist() == [1.925, 1.925, 0] and rows.trial.tolist() == [1, 2, 1]
     assert rows.failure.fillna("").tolist() == ["", "did not land", ""]
     assert rows.predicted_y[0] == rows.predicted_y[1] != rows.predicted_y[2]
@@ -76,8 +67,7 @@ def test_an_unknown_method_stops_the_stage_and_leaves_what_was_there(tried) -> N
     assert Path("data/trials", BAND, f"{METHOD}.parquet").read_bytes() == before
 
 
-def test_a_rig_band_is_launched_with_equal_errors_for_both_policies(tried) -> None:
-    """Plain and robust draws are equal here, so their launches are; measured ones stand apart."""
+def test_a_rig_band_is_launched_and_measured_launches_stand_apart(tried) -> None:
     yaml = YAML()
     content = yaml.load(Path("params.yaml"))
     content["run"]["rig"] = [BAND]
@@ -86,17 +76,14 @@ def test_a_rig_band_is_launched_with_equal_errors_for_both_policies(tried) -> No
     content["rig"].update(edges=20, tolerance=1e-4)
     content["trials"].update(targets=[1.725, 1.925], repeats=2)
     yaml.dump(content, Path("params.yaml"))
-    rows = tried(f"{HEAD}\n-0.30,-0.17,2.2,1.925,{METHOD}\n", robust=True)
-    assert rows.kind.tolist() == ["virtual"] * 8 + ["measured"]
-    assert rows.policy.fillna("").tolist() == ["plain"] * 4 + ["robust"] * 4 + [""]
-    assert rows.trial.tolist() == [1, 2, 1, 2] * 2 + [1]
-    plain, robust = rows[:4], rows[4:8]
-    assert plain.hold_force.tolist() == robust.hold_force.tolist()
-    assert plain.hold_force.nunique() == 4  # each trial has errors of its own
-    for one, other in zip(plain.itertuples(), robust.itertuples(), strict=True):
-        assert one.flight_y.tolist() == other.flight_y.tolist()
+    rows = tried(f"{HEAD}\n-0.30,-0.17,2.2,1.925,{METHOD}\n")
+    assert rows.kind.tolist() == ["virtual"] * 4 + ["measured"]
+    assert rows.trial.tolist() == [1, 2, 1, 2, 1]
+    virtual = rows[:4]
+    assert virtual.hold_force.nunique() == 4  # each trial has errors of its own
+    for one in virtual.itertuples():
         assert one.flight_z[-1] == pytest.approx(-0.52)
         assert (one.failure is None) == (1.425 <= one.flight_y[-1] <= 2.425)
         assert one.landing_y == one.flight_y[-1]  # where it counts as failed, too
-    assert plain.failure.str.startswith("beyond the area: lands at").all()
-    assert rows.flight_y[8] is None and rows.landing_y[8] == 2.2
+    assert virtual.failure.str.startswith("beyond the area: lands at").all()
+    assert rows.flight_y[4] is None and rows.landing_y[4] == 2.2

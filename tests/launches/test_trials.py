@@ -42,7 +42,6 @@ def test_a_table_holds_what_is_known_and_nothing_else() -> None:
     flight = np.array([[-0.05, -0.03], [1.0, 0.2], [1.95, -0.52]])
     tried = Batch(
         kind="virtual",
-        policy="plain",
         draws=np.array(DRAWS),
         targets=[1.9, 1.9, 2.1],
         landing=[1.95, None, None],
@@ -51,7 +50,7 @@ def test_a_table_holds_what_is_known_and_nothing_else() -> None:
         flight=[flight, flight[:2], None],
     )
     rows = made([tried])
-    assert rows["trial"] == [1, 2, 1] and rows["policy"] == ["plain"] * 3
+    assert rows["trial"] == [1, 2, 1]
     assert rows["draw_y"] == [-0.3, -0.31, -0.32] and rows["draw_z"] == [-0.17, -0.17, -0.18]
     assert rows["predicted_y"] == [1.9, None, 2.0]
     assert rows["predicted_low"] == [1.8, None, 1.9]
@@ -67,16 +66,15 @@ def test_a_table_holds_what_is_known_and_nothing_else() -> None:
 
 
 def test_batches_follow_each_other_and_count_anew() -> None:
-    """Plain, robust and measured launches in one table, each with trials of its own."""
+    """Launches of a policy and measured ones in one table, each with trials of its own."""
     rows = made(
         [
-            Batch("predicted", "plain", DRAWS[:1], [1.9]),
-            Batch("predicted", "robust", DRAWS[1:2], [1.9]),
-            Batch("measured", None, DRAWS[2:], [None], [2.2]),
+            Batch("predicted", DRAWS[:1], [1.9]),
+            Batch("predicted", DRAWS[1:2], [1.9]),
+            Batch("measured", DRAWS[2:], [None], [2.2]),
         ]
     )
     assert rows["kind"] == ["predicted", "predicted", "measured"]
-    assert rows["policy"] == ["plain", "robust", None]
     assert rows["trial"] == [1, 1, 1] and rows["target"] == [1.9, 1.9, None]
     assert rows["hold_force"] == [9.0, None, 31.0]  # as predicted
     assert rows["landing_y"] == [None, None, 2.2] and rows["flight_y"] == [None] * 3
@@ -112,13 +110,10 @@ def landed(draw: np.ndarray, number: int) -> SimpleNamespace:
 
 
 def test_landings_outside_the_area_stand_beside_their_failure() -> None:
-    """Launches of two batches are numbered alike; what else is known of a launch stays."""
-    drawn = {"plain": np.tile([-0.3, -0.1], (3, 1)), "robust": np.tile([-0.4, -0.2], (3, 1))}
-    aimed = [Batch("predicted", policy, draws, [1.9, 1.9, 2.1]) for policy, draws in drawn.items()]
-    plain, robust = launched(aimed, landed)
-    for one, policy in ((plain, "plain"), (robust, "robust")):
-        assert (one.kind, one.policy, one.targets) == ("virtual", policy, [1.9, 1.9, 2.1])
-        assert one.draws.tolist() == drawn[policy].tolist()
-        assert one.landing == [1.9, 3.0, None]
-        assert one.failure == [None, "failed", "failed"]
-    assert plain.hold_force == [300, 301, 302] and robust.hold_force == [400, 401, 402]
+    draws = np.tile([-0.3, -0.1], (3, 1))
+    one = launched(Batch("predicted", draws, [1.9, 1.9, 2.1]), landed)
+    assert (one.kind, one.targets) == ("virtual", [1.9, 1.9, 2.1])
+    assert one.draws.tolist() == draws.tolist()
+    assert one.landing == [1.9, 3.0, None]
+    assert one.failure == [None, "failed", "failed"]
+    assert one.hold_force == [300, 301, 302]

@@ -183,7 +183,6 @@ REFUSED = [
     ("methods.de.k_top", 3, "methods.de: k_top and covariance are for search: multistart"),
     ("methods.de.covariance", False, "methods.de: k_top and covariance are for search"),
     ("methods.no_work.covariance", 1, "methods.no_work.covariance: must be a valid boolean"),
-    ("policy.robust.methods", ["best"], "policy.robust.methods: best is not one of"),
     ("methods.no_work.k_top", 0, "methods.no_work.k_top: must be between 1 and 50"),
     ("setup.foot_height", 0.52, "setup.foot_height: must be less than setup.fork_height"),
     ("setup.draw_z", [-0.52, -0.1], "setup.draw_z: must be above the floor"),

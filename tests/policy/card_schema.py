@@ -44,7 +44,7 @@ RUBBER = {"mooney_share": NUMBER, "relaxation": NOT_NEGATIVE}
 SECOND = {"type": ["number", "null"]}
 HAND = exactly(pull_time_s=POSITIVE, pause_s=NOT_NEGATIVE, second_more_m=SECOND)
 READ_BETWEEN = exactly(draws=COUNT, mean_error_m=ERROR, max_error_m=ERROR)
-PLAIN = {
+TRAINING = {
     "converged": {"type": "boolean"},
     "criterion": TEXT,
     "iteration": {"type": "integer", "minimum": 1},
@@ -55,18 +55,11 @@ PLAIN = {
     "map_mean_error_m": ERROR,
     "failed_launches": {"type": "object", "additionalProperties": COUNT},
 }
-ROBUST = {
-    "expected_error_m": ERROR,
-    "plain_expected_error_m": ERROR,
-    "samples": {"type": "integer", "minimum": 2},
-    "actuation_error_m": NOT_NEGATIVE,
-}
 SCHEMA = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     **exactly(
         band=TEXT,
         method=TEXT,
-        kind={"enum": ["plain", "robust"]},
         theta={"anyOf": [exactly(**FIVE), exactly(**FIVE, **RUBBER)]},
         law={"enum": ["neo_hookean", "rubber"]},
         launch={"anyOf": [{"type": "null"}, HAND]},
@@ -75,12 +68,9 @@ SCHEMA = {
         output=port("draw", 2, axes={"const": ["y", "z"]}, frame=TEXT, low=PAIR, high=PAIR),
         max_force_n=POSITIVE,
         setup=exactly(**dict.fromkeys(SETUP.split(), POSITIVE), arm_stiffness_n_m=ARM),
-        training={"type": "object"},
+        training=exactly(**TRAINING),
         landing_map=exactly(box=READ_BETWEEN, target_range=READ_BETWEEN),
         trained_on=exactly(device={"type": "string", "pattern": "^(cpu|cuda)$"}),
         versions=all_in("sling2sim2real torch rsl-rl-lib onnx numpy", TEXT),
     ),
-    "if": {"properties": {"kind": {"const": "robust"}}},
-    "then": {"properties": {"training": exactly(**PLAIN, **ROBUST)}},
-    "else": {"properties": {"training": exactly(**PLAIN)}},
 }

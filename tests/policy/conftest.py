@@ -3,7 +3,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipeline.landing.landing_map import LandingMap, surface_of
+from pipeline.landing.landing_map import LandingMap
 from tests import once
 from tests.policy import toy
 
@@ -39,6 +39,6 @@ def trained(toy_map, tmp_path_factory: pytest.TempPathFactory):
     from pipeline.policy.train import train
 
     def make(_: Path):
-        return train(surface_of([toy_map]), SETTINGS)
+        return train(toy_map.surface, SETTINGS)
 
     return once.value(tmp_path_factory, "trained", make)

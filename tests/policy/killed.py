@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
-from pipeline.landing.landing_map import LandingMap, surface_of
+from pipeline.landing.landing_map import LandingMap
 from pipeline.policy import train as module
 from tests.policy import toy
 from tests.policy.conftest import SETTINGS
@@ -19,7 +19,6 @@ from tests.policy.conftest import SETTINGS
 def training(
     kept: Path,
     on_iteration: Callable[[int], None] = lambda iteration: None,
-    error: float = 0.0,
     **changes,
 ) -> module.Trained:
     """Twelve iterations; `on_iteration` is told each one's number at its end, from 0."""
@@ -35,7 +34,7 @@ def training(
 
     module._Training.log = log
     try:
-        return module.train(surface_of([chart], error), SimpleNamespace(**settings), kept)
+        return module.train(chart.surface, SimpleNamespace(**settings), kept)
     finally:
         module._Training.log = inner
 

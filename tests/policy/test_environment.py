@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.landing.landing_map import LandingMap, surface_of
 from pipeline.landing.response_surface import TOO_MUCH_FORCE, ResponseSurface
-from pipeline.policy.environment import SlingshotEnv, rewarded
+from pipeline.policy.environment import SlingshotEnv
 from tests.policy import toy
 
 TARGETS = (1.425, 2.425)
@@ -17,7 +16,7 @@ REWARD = SimpleNamespace(height=5.0, scale=0.5, penalty=1.0)
 
 @pytest.fixture
 def env(toy_map) -> SlingshotEnv:
-    return make(surface_of([toy_map]))
+    return make(toy_map.surface)
 
 
 def make(surface: ResponseSurface, **changes) -> SlingshotEnv:
@@ -59,7 +58,7 @@ def test_targets_cover_the_range_and_change_every_step(env) -> None:
 
 
 def test_equal_seeds_give_equal_targets(toy_map, env) -> None:
-    twin, other = (make(surface_of([toy_map]), seed=seed) for seed in (7, 8))
+    twin, other = (make(toy_map.surface, seed=seed) for seed in (7, 8))
     assert (twin.get_observations()["target"] == env.get_observations()["target"]).all()
     assert (other.get_observations()["target"] != env.get_observations()["target"]).any()
 
@@ -69,7 +68,7 @@ def test_each_part_of_the_reward_counts(toy_map) -> None:
 
     def reward(**changes) -> np.ndarray:
         other = SimpleNamespace(**{**vars(REWARD), **changes})
-        return make(surface_of([toy_map]), reward=other).step(actions)[1].numpy()
+        return make(toy_map.surface, reward=other).step(actions)[1].numpy()
 
     usual = reward()
     failed = usual == -1
@@ -78,37 +77,10 @@ def test_each_part_of_the_reward_counts(toy_map) -> None:
     np.testing.assert_array_equal(reward(penalty=3.0)[failed], -3.0)
 
 
-def test_the_reward_is_the_mean_over_thetas_and_errors_of_the_draw() -> None:
-    """Of single launches: the toy's landing times a factor, from draws with a random error."""
-    factors, error = (0.97, 1.05), 0.004
-
-    def launcher(draws, thetas):
-        launched = toy.launch(draws)
-        launched.landing_y = launched.landing_y * thetas[:, 0]
-        return launched
-
-    maps = LandingMap.simulate_each(
-        launcher,
-        np.array(factors)[:, None],
-        draw_y=toy.DRAW_Y,
-        draw_z=toy.DRAW_Z,
-        size=(33, 25),
-        max_force=1e3,
-    )
-    draws = np.array([[-0.35, -0.2], [-0.3, -0.15], [-0.38, -0.25]])
-    targets = toy.launch(draws).landing_y + np.array([0.0, 0.01, -0.05])
-    expected, _ = rewarded(surface_of(maps, error), draws, targets, REWARD)
-    errors = np.random.default_rng(0).normal(0, error, (40_000, 2))
-    for draw, target, one in zip(draws, targets, expected, strict=True):
-        landing = toy.launch(draw + errors).landing_y
-        single = [5 * np.exp(-np.abs(landing * factor - target) / 0.5) for factor in factors]
-        assert one == pytest.approx(np.mean(single), abs=0.01)
-
-
 def test_it_goes_on_from_a_state(env, toy_map) -> None:
     env.step(torch.zeros(400, 2))
     state = env.state()
-    twin = make(surface_of([toy_map]), seed=99)
+    twin = make(toy_map.surface, seed=99)
     twin.restore({name: value.clone() for name, value in state.items()})
     for _ in range(2):
         once, again = (one.step(torch.zeros(400, 2)) for one in (env, twin))

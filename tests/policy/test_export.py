@@ -11,9 +11,9 @@ import onnxruntime
 import pytest
 import torch
 
-from pipeline.landing.stored import PLAIN, ROBUST, Stored
+from pipeline.landing.stored import Stored
 from pipeline.params import load
-from pipeline.policy.check import Check, figures, robust_figures
+from pipeline.policy.check import Check, figures
 from pipeline.policy.export import card, write_onnx, write_torchscript
 from pipeline.sling.material import THETA
 from tests.policy import toy
@@ -26,14 +26,14 @@ TARGETS = np.random.default_rng(0).uniform(1.425, 2.425, (1000, 1)).astype(np.fl
 @pytest.fixture(scope="module")
 def stored(trained, tmp_path_factory):
     stored = Stored("toy", "none", tmp_path_factory.mktemp("root"))
-    write_onnx(trained.policy, stored.folder() / "policy.onnx")
-    write_torchscript(trained.policy, stored.folder() / "policy.pt")
+    write_onnx(trained.policy, stored.folder / "policy.onnx")
+    write_torchscript(trained.policy, stored.folder / "policy.pt")
     return stored
 
 
 @pytest.fixture(scope="module")
 def folder(stored):
-    return stored.folder()
+    return stored.folder
 
 
 def apart(code: str, folder: Path, **environment: str) -> str:
@@ -117,17 +117,11 @@ FIGURES = {
     "map_mean_error_m": 0.004,
     "failed_launches": {"holding force above the limit": 12},
 }
-BY_SAMPLES = {
-    "expected_error_m": 0.031,
-    "plain_expected_error_m": 0.035,
-    "samples": 24,
-    "actuation_error_m": 0.001,
-}
 NEAR = {"draws": 60, "mean_error_m": 0.001, "max_error_m": 0.004}
 MAP = {"box": {"draws": 0, "mean_error_m": None, "max_error_m": None}, "target_range": NEAR}
 
 
-def written(trained, kind: str, training: dict, **theta) -> dict:
+def written(trained, training: dict, **theta) -> dict:
     """A card of band1 as a reader of the file finds it."""
     params = load(ROOT / "params.yaml")
     content = {"theta": dict.fromkeys(THETA, 0.4), **theta}
@@ -137,24 +131,20 @@ def written(trained, kind: str, training: dict, **theta) -> dict:
         "band1",
         "ours",
         content,
-        kind=kind,
         training=training,
         landing_map=MAP,
     )
     return json.loads(json.dumps(made, allow_nan=False))
 
 
-@pytest.mark.parametrize(
-    ("kind", "training"), [(PLAIN, FIGURES), (ROBUST, {**FIGURES, **BY_SAMPLES})]
-)
-def test_the_card_keeps_to_its_schema(trained, kind, training) -> None:
-    content = written(trained, kind, training, nuisances={"air_drag": 2.5})
+def test_the_card_keeps_to_its_schema(trained) -> None:
+    content = written(trained, FIGURES, nuisances={"air_drag": 2.5})
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     jsonschema.validate(content, SCHEMA, jsonschema.Draft202012Validator)
     for broken in (
         {**content, "theta": {}},
         {**content, "nuisances": {"air_drag": None}},
-        {**content, "kind": ROBUST if kind == PLAIN else PLAIN},
+        {**content, "training": {**FIGURES, "more": 1.0}},
         {key: value for key, value in content.items() if key != "versions"},
     ):
         with pytest.raises(jsonschema.ValidationError):
@@ -162,7 +152,7 @@ def test_the_card_keeps_to_its_schema(trained, kind, training) -> None:
 
 
 def test_the_card_tells_units_ranges_and_the_air(trained) -> None:
-    content = written(trained, PLAIN, FIGURES, nuisances={"air_drag": 2.5})
+    content = written(trained, FIGURES, nuisances={"air_drag": 2.5})
     assert content["input"]["unit"] == content["output"]["unit"] == "m"
     assert content["input"]["trained_range"] == [1.425, 2.425]
     assert content["output"]["low"] == [-0.45, -0.3] and content["output"]["high"] == [-0.25, -0.1]
@@ -170,12 +160,12 @@ def test_the_card_tells_units_ranges_and_the_air(trained) -> None:
     assert content["setup"]["projectile_mass_kg"] == 0.039
     assert content["setup"]["band_mass_kg"] == 0.023
     assert content["versions"]["torch"] == torch.__version__.partition("+")[0]
-    assert written(trained, PLAIN, FIGURES)["nuisances"] == {}
+    assert written(trained, FIGURES)["nuisances"] == {}
 
 
 def test_a_policy_that_never_hits_has_no_errors_in_its_card(trained) -> None:
     never = {"converged": False, "mean_error_m": np.nan, "max_error_m": float("nan")}
-    content = written(trained, PLAIN, {**FIGURES, **never, "failed_targets": 256})
+    content = written(trained, {**FIGURES, **never, "failed_targets": 256})
     assert content["training"]["mean_error_m"] is content["training"]["max_error_m"] is None
     jsonschema.validate(content, SCHEMA, jsonschema.Draft202012Validator)
 
@@ -183,5 +173,3 @@ def test_a_policy_that_never_hits_has_no_errors_in_its_card(trained) -> None:
 def test_what_is_checked_is_what_the_schema_wants(trained) -> None:
     checked = Check(0.004, 0.011, {})
     assert figures(trained, checked).keys() == FIGURES.keys()
-    more = robust_figures(trained, checked, checked, checked, 24, 0.001)
-    assert more.keys() == FIGURES.keys() | BY_SAMPLES.keys()

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from pipeline.base.progress import Progress, parse
-from pipeline.landing.landing_map import LandingMap, surface_of
+from pipeline.landing.landing_map import LandingMap
 from pipeline.policy import train as module
 from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.train import Trained, train
@@ -58,7 +58,7 @@ def same(one: Trained, other: Trained) -> bool:
 
 
 def test_the_same_settings_give_the_same_training_and_each_counts(toy_map, settings) -> None:
-    surface = surface_of([toy_map])
+    surface = toy_map.surface
     once, again = (train(surface, short(settings)) for _ in range(2))
     assert same(once, again)
     rewards = [dict(zip(("height", "scale", "penalty"), values, strict=True)) for values in REWARDS]
@@ -70,7 +70,7 @@ def test_the_same_settings_give_the_same_training_and_each_counts(toy_map, setti
 
 def test_without_a_launch_that_lands_it_says_so(settings) -> None:
     box = {"draw_y": toy.DRAW_Y, "draw_z": toy.DRAW_Z, "size": (5, 5), "max_force": 15.0}
-    trained = train(surface_of([LandingMap.simulate(toy.broken, **box)]), short(settings))
+    trained = train(LandingMap.simulate(toy.broken, **box).surface, short(settings))
     assert np.isnan(trained.mean_error)
     assert trained.failures == {"the simulation did not converge": 2 * 4 * 64}
     assert trained.curve["failed_targets"] == [256.0, 256.0]
@@ -82,7 +82,7 @@ def test_each_iteration_is_told_and_those_of_an_earlier_run_are_counted(
 ) -> None:
     def train_and_tell(told: Progress) -> Trained:
         some = short(settings, iterations=7)
-        return train(surface_of([toy_map]), some, tmp_path / "kept.pt", told)
+        return train(toy_map.surface, some, tmp_path / "kept.pt", told)
 
     class Ended(Progress):
         def advance(self, count: int, *facts: str, seconds: float | None = None) -> None:

@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from torch import nn
 
 from pipeline.episode.episode import Episode
-from pipeline.landing.landing_map import LandingMap, surface_of, validation
+from pipeline.landing.landing_map import LandingMap, validation
 from pipeline.params import load
 from pipeline.policy.export import write_onnx
 from pipeline.policy.train import Policy
@@ -157,12 +157,12 @@ def template(tmp_path_factory) -> Path:
     )
     card = {
         "training": {"converged": True, "mean_error_m": 0.004, "max_error_m": 0.01},
-        "landing_map": validation([chart], (1.425, 2.425)),
+        "landing_map": validation(chart, (1.425, 2.425)),
     }
     (folder / "card.json").write_text(json.dumps(card))
     torch.manual_seed(0)
     network = nn.Sequential(nn.Linear(1, 8), nn.ELU(), nn.Linear(8, 2))
-    write_onnx(Policy(network, (1.425, 2.425), surface_of([chart])), folder / "policy.onnx")
+    write_onnx(Policy(network, (1.425, 2.425), chart.surface), folder / "policy.onnx")
     launches().to_parquet(data / "trials" / BAND / f"{METHOD}.parquet")
     return root
 

@@ -37,22 +37,6 @@ def test_further_methods_run_on_some_bands_only(root, params) -> None:
     assert list(gather(plain, root).methods[BAND]) == [METHOD]
 
 
-def test_robust_launches_stand_apart(root, params) -> None:
-    file = root / "data" / "trials" / BAND / f"{METHOD}.parquet"
-    plain = pd.read_parquet(file)
-    second = plain.assign(policy="robust", landing_y=2.0)
-    pd.concat([plain.assign(policy="plain"), second]).to_parquet(file)
-    result = gather(params, root).methods[BAND][METHOD]
-    assert len(result.trials) == len(result.robust_trials) == len(plain)
-    assert (result.robust_trials.landing_y == 2.0).all() and result.robust_card is None
-    assert result.trials.index.tolist() == result.robust_trials.index.tolist()
-    card = root / "data" / "policies" / BAND / METHOD / "robust" / "card.json"
-    card.parent.mkdir()
-    plain = json.loads((card.parents[1] / "card.json").read_text())
-    card.write_text(json.dumps(plain | {"kind": "robust"}))
-    assert gather(params, root).methods[BAND][METHOD].robust_card["kind"] == "robust"
-
-
 def test_a_band_of_the_rig_has_a_floor(root, params) -> None:
     run = params.run.model_copy(update={"rig": (BAND,)})
     virtual = params.model_copy(update={"run": run})

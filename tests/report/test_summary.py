@@ -64,16 +64,15 @@ def test_measured_launches_are_judged_by_method() -> None:
 
 
 def test_a_rig_band_shows_its_errors_beside_the_floor() -> None:
-    plain, robust = launches([[0.03, -0.01]] * 3), launches([[0.02, 0.02]] * 3)
+    plain = launches([[0.03, -0.01]] * 3)
     ran = results(
-        result("band1", "ours", plain, robust_trials=robust),
+        result("band1", "ours", plain),
         result("band1", "theirs", launches([[0.1] * 5] * 3, failed=15)),
         floors={"band1": floor((0.01, 0.02, 0.03), (0.01,) * 3)},
     )
     common = {"loss": 1.5, "policy_cm": 0.4, "floor_cm": 2.0}
-    robust = {"robust_cm": 2.0, "robust_failed": 0}
     assert metrics(ran) == {
-        "band1-ours": common | {"virtual_cm": 2.0, "virtual_failed": 0} | robust,
+        "band1-ours": common | {"virtual_cm": 2.0, "virtual_failed": 0},
         "band1-theirs": common | {"virtual_cm": None, "virtual_failed": 15},
     }
 
@@ -90,5 +89,5 @@ def test_measured_launches_show_what_was_predicted() -> None:
 
 def test_predictions_alone_show_no_error() -> None:
     only = launches([[math.nan]] * 3, "predicted")
-    entry = metrics(results(result("mine", "ours", only, robust_trials=only)))["mine-ours"]
+    entry = metrics(results(result("mine", "ours", only)))["mine-ours"]
     assert entry == {"loss": 1.5, "policy_cm": 0.4}

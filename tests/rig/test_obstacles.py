@@ -8,7 +8,7 @@ import torch
 
 from app.aim import aim
 from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK
-from pipeline.landing.landing_map import LandingMap, surface_of
+from pipeline.landing.landing_map import LandingMap
 from pipeline.policy.environment import SlingshotEnv
 from pipeline.rig.physics.launch import launch as on_the_rig
 from pipeline.sling import Sling, launch
@@ -60,7 +60,7 @@ def low(params):
 def test_training_has_no_reward_for_them(low) -> None:
     world, launcher = low
     box = {"draw_y": (-0.40, -0.15), "draw_z": (-0.13, -0.02), "max_force": 30.0}
-    surface = surface_of([LandingMap.simulate(launcher, size=(17, 12), checks=0, **box)])
+    surface = LandingMap.simulate(launcher, size=(17, 12), checks=0, **box).surface
     assert {DRAGGED, SHORT, SLACK} <= {*surface.reasons}
     env = SlingshotEnv(surface, targets=(0.2, 1.5), num_envs=3, seed=1, reward=world.policy.reward)
     draws = torch.tensor([[-0.35, -0.125], [-0.18, -0.03], [-0.38, -0.05]])

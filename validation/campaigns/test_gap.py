@@ -105,7 +105,6 @@ def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
     fitted = content | {"theta": best, "confidence": None}
     predicted, aimed = launcher(own).landing_y, simulator(params, band, fitted, root=root)
     write_json(path, fitted)
-    (root / "data/confidence" / band / f"{method}.json").unlink(missing_ok=True)  # nor robust ones
     run(root, "python", "-m", "stages.policy", band, method)
     draws[THETA_] = stored.draws(targets)
 

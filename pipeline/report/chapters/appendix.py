@@ -56,11 +56,9 @@ def policies(report: Report) -> str:
 ## Policies
 
 PPO on the launches of each calibrated simulator, targets {low:g} – {high:g} m. Converged: the mean
-error of the deterministic policy over 256 targets, launched in its own simulator, is at most 1 cm;
-of a robust policy, that it is not expected to miss by more than the plain one (`card.json` has the
-criterion in full). Training reads landings off maps of simulated launches; their own error, within
-the range of targets, comes next. *Expected*: the mean error over samples of the posterior and
-errors of the draw, of a robust policy and of the plain one beside it.
+error of the deterministic policy over 256 targets, launched in its own simulator, is at most 1 cm.
+Training reads landings off maps of simulated launches; their own error, within the range of
+targets, comes next.
 
 {markdown(tables.policies(report.results, report.styles))}"""
 

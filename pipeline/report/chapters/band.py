@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.drawing.styles import Styles, drawn
-from pipeline.landing.stored import PLAIN, ROBUST
 from pipeline.report.figures import confidence, episode, policy, search
 from pipeline.report.report import Report
 from pipeline.report.results import Result, has_another_loss
@@ -28,7 +27,6 @@ Error in per cent of the landing distance, of every launch that came down, outsi
 too; bias is its signed mean, predicted less landed; *not predicted* are launches whose simulation
 fails, which the means leave out; *beyond* marks draws that stretch the band further than the
 recording did."""
-WHOSE = {PLAIN: "the policy's", ROBUST: "the robust policy's"}
 
 
 @dataclass(frozen=True)
@@ -176,11 +174,10 @@ def _policy(band: Band) -> list[str]:
     path = np.linspace(*params.policy.targets, 101)  # from near to far
     for method, result in band.near.items():
         name = styles[method].name
-        for kind, draws in report.draws(result, targets).items():
-            aims[name + (", robust" if kind == ROBUST else "")] = result.landing_map, draws
-        paths = {WHOSE[kind]: draws for kind, draws in report.draws(result, path).items()}
+        aims[name] = result.landing_map, report.draws(result, targets)
+        way = report.draws(result, path)
         sizes = params.setup.fork_width, params.bands[band.name].rest_length
-        drawing = result, paths, targets, float(result.trials.recorded_stretch.max()), *sizes
+        drawing = result, way, targets, float(result.trials.recorded_stretch.max()), *sizes
         alt = f"landing map of {name}"
         maps.append(band.picture(f"{method}-map", alt, policy.landing_map, *drawing))
     training = band.picture("training", "training", policy.training, band.methods, styles)

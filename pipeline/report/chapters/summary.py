@@ -74,8 +74,6 @@ def _doubts(result: Result, name: str) -> list[str]:
         said.append(f"{name}: no launch to compare its predictions with.")
     if not result.card["training"]["converged"]:
         said.append(f"The policy of {name} did **not** converge in its own simulator.")
-    if result.robust_card and not result.robust_card["training"]["converged"]:
-        said.append(f"The robust policy of {name} did **not** converge.")
     return said
 
 

@@ -180,14 +180,15 @@ def scatter(results: Results, methods: list[str], styles: Styles) -> plt.Figure:
 
 
 def _strips(results: Results, band: str, methods: list[str], styles: Styles) -> list:
-    """Name, colour and launches of each strip; a robust policy has one of its own."""
-    strips = []
-    for method in methods:
-        result, style = results.methods[band][method], styles[method]
-        strips.append((style.name, style.color, _with_target(result.trials)))
-        if len(robust := _with_target(result.robust_trials)):
-            strips.append((f"{style.name}, robust", style.color, robust))
-    return strips
+    """Name, colour and launches of each strip."""
+    return [
+        (
+            styles[method].name,
+            styles[method].color,
+            _with_target(results.methods[band][method].trials),
+        )
+        for method in methods
+    ]
 
 
 def _landings(ax: plt.Axes, trials: pd.DataFrame, middle: float, width: float, color: str) -> None:

@@ -98,16 +98,16 @@ def training(results: dict[str, Result], styles: Styles) -> plt.Figure:
 @picture()
 def landing_map(
     result: Result,
-    draws: dict[str, np.ndarray],
+    draws: np.ndarray,
     targets: np.ndarray,
     recorded: float,
     fork_width: float,
     rest_length: float,
 ) -> plt.Figure:
-    """Landing against draw, with the policies' paths over their targets.
+    """Landing against draw, with the policy's path over its targets.
 
     Args:
-        draws: By whose they are, draws [m] from the near to the far target, shape (N, 2).
+        draws: The policy's [m] from the near to the far target, shape (N, 2).
         targets: Whose landings are drawn as lines [m].
         recorded: Largest stretch of the recording; what lies beyond is extrapolated.
     """
@@ -129,9 +129,8 @@ def landing_map(
     if stretch.min() < recorded < stretch.max():
         ax.contour(y, z, stretch, levels=[recorded], colors="k", linestyles=":")
         ax.plot([], [], "k:", label=f"recorded stretch {recorded:.2f}: beyond is extrapolated")
-    for (whose, way), color in zip(draws.items(), (COLORS[0], COLORS[6]), strict=False):
-        ax.plot(*way.T, color=color, lw=2.5, label=f"{whose} draws, near (dot) to far target")
-        ax.plot(*way[0], "o", color=color)
+    ax.plot(*draws.T, color=COLORS[0], lw=2.5, label="the policy's draws, near (dot) to far target")
+    ax.plot(*draws[0], "o", color=COLORS[0])
     ax.set(xlabel="draw y [m]", ylabel="draw z [m]")
     ax.set(xlim=(fine_y[0], fine_y[-1]), ylim=(fine_z[0], fine_z[-1]))
     figure.legend(loc="outside lower center", ncols=2, fontsize=8)

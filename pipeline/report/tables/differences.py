@@ -1,19 +1,17 @@
-"""Which landing errors differ by more than noise, and what the robust policies change."""
+"""Which landing errors differ by more than noise."""
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from pipeline.drawing.styles import Styles
-from pipeline.report.noise import Difference, difference, landed
+from pipeline.report.noise import Difference, difference
 from pipeline.report.results import Results
-from pipeline.report.tables.benchmark import LAUNCHED, band_name, spread
-from pipeline.report.tables.cells import NONE, Table, number
-from pipeline.report.tables.landings import landing_errors
+from pipeline.report.tables.benchmark import LAUNCHED, band_name
+from pipeline.report.tables.cells import NONE, Table
 
 REFERENCES = ("least_squares", "sling2sim2real")  # ours and the paper's
 
@@ -127,24 +125,3 @@ def records(rows: list[Compared]) -> pd.DataFrame:
         for reference, one in found.items()
         if one is not None
     )
-
-
-def robust(results: Results, styles: Styles, seed: int) -> Table | None:
-    """Robust policies beside the plain ones of the same method; None where there is none."""
-    rows = []
-    for result in results:
-        pair = [_aimed(trials, "virtual") for trials in (result.trials, result.robust_trials)]
-        if pair[1].empty:
-            continue
-        names = band_name(result.band), styles[result.method].name, "virtual"
-        errors = (spread(landing_errors(trials)["all"]) for trials in pair)
-        scatter = (number(100 * _scatter(trials), ".2f") for trials in pair)
-        rows.append([*names, *errors, *scatter, shown(difference(*pair, seed))])
-    heads = ["band", "method", "launches", "plain", "robust", "scatter, plain", "scatter, robust"]
-    return ([*heads, "robust less plain"], rows) if rows else None
-
-
-def _scatter(trials: pd.DataFrame) -> float:
-    """Deviation of landings around the mean of their target [m], within targets."""
-    variances = trials[landed(trials)].groupby("target").landing_y.var(ddof=1)
-    return math.sqrt(variances.mean())

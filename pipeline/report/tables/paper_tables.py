@@ -84,14 +84,6 @@ The intervals hold for **launches of these policies**, not for the methods at la
 identified each band once, from one recording and with one seed, and what another recording or seed
 would give is not in them.
 """
-ROBUST = """\
-### Robust policies
-
-The plain policy is trained at θ*, the robust one over samples of the posterior and errors of the
-draw. Both are launched with the same errors. Mean ± deviation of |landing − target| in cm; scatter:
-deviation of the landings around their own mean, within targets; last, the difference with its
-interval as above, which again holds for launches and not for another identification.
-"""
 
 
 def paper_tables(report: Report) -> str:
@@ -150,8 +142,7 @@ def _noise(params, results: Results, named: Styles, folder: Path) -> list[str]:
         _write_csv(folder / "differences.csv", differences.records(rows))
         table = markdown(differences.as_table(rows, named), repeats=False)
         text += [NOISE, table, "\n".join(differences.claims(rows, named)) + "\n"]
-    second = differences.robust(results, named, seed)
-    return text + ([ROBUST, markdown(second)] if second else [])
+    return text
 
 
 def _write_csv(path: Path, records: pd.DataFrame) -> None:

@@ -6,8 +6,7 @@ import numpy as np
 
 from pipeline.drawing.styles import Styles
 from pipeline.landing.landing_map import LandingMap
-from pipeline.landing.stored import PLAIN, ROBUST
-from pipeline.report.results import Result, Results
+from pipeline.report.results import Results
 from pipeline.report.tables.cells import NONE, Table, centimetres, number
 
 
@@ -30,34 +29,23 @@ def aims(named: dict[str, tuple[LandingMap, np.ndarray]], targets: np.ndarray) -
 
 def policies(results: Results, styles: Styles) -> Table:
     """How each policy converged in its own simulator, and how well its map interpolates."""
-    heads = ["band", "method", "policy", "converged", "mean error [cm]", "largest"]
-    heads += ["failed targets", "map error", "largest", "expected [cm]"]
+    heads = ["band", "method", "converged", "mean error [cm]", "largest"]
+    heads += ["failed targets", "map error", "largest"]
     rows = []
     for one in results:
-        for name, card in ((PLAIN, one.card), (ROBUST, one.robust_card)):
-            if card is not None:
-                training, near = card["training"], card["landing_map"]["target_range"]
-                rows.append(
-                    [
-                        one.band,
-                        styles[one.method].name,
-                        name,
-                        "yes" if training["converged"] else "**no**",
-                        *_errors(training),
-                        str(training.get("failed_targets", NONE)),
-                        *_errors(near),
-                        _expected(one, name),
-                    ]
-                )
+        training, near = one.card["training"], one.card["landing_map"]["target_range"]
+        rows.append(
+            [
+                one.band,
+                styles[one.method].name,
+                "yes" if training["converged"] else "**no**",
+                *_errors(training),
+                str(training.get("failed_targets", NONE)),
+                *_errors(near),
+            ]
+        )
     return heads, rows
 
 
 def _errors(about: dict) -> list[str]:
     return [centimetres(about[name]) for name in ("mean_error_m", "max_error_m")]
-
-
-def _expected(result: Result, policy: str) -> str:
-    """Of either policy, where there is a robust one that both were compared with."""
-    known = (result.robust_card or {}).get("training", {})
-    prefix = "" if policy == ROBUST else "plain_"
-    return centimetres(known.get(f"{prefix}expected_error_m"))

@@ -51,7 +51,7 @@ def test_a_bar_moves_at_most_once_a_second_and_to_its_end(shown, monkeypatch, tm
 
 def test_a_stages_lines_are_logged_and_two_bars_are_told_apart(shown, tmp_path, caplog) -> None:
     seen = reporter.Reporter(STAGE, tmp_path)
-    lines = ["x 1/2 rollouts", "x-robust 1/2 steps", "words", "error: params.yaml: no such file"]
+    lines = ["x 1/2 rollouts", "x-second 1/2 steps", "words", "error: params.yaml: no such file"]
     with caplog.at_level(logging.INFO):
         for line in lines:
             seen(line)
@@ -60,7 +60,7 @@ def test_a_stages_lines_are_logged_and_two_bars_are_told_apart(shown, tmp_path, 
     assert said == [*(("INFO", line) for line in lines[:3]), ("ERROR", lines[3])]
     assert [call[:3] for call in shown] == [
         ("create_progress_artifact", 50.0, "x"),
-        ("create_progress_artifact", 50.0, "x-robust"),
+        ("create_progress_artifact", 50.0, "x-second"),
     ]
 
 

@@ -1,11 +1,11 @@
-"""What is said of differences, and of robust policies beside plain ones."""
+"""What is said of differences."""
 
 import numpy as np
 import pytest
 
 from pipeline.drawing.styles import styles
-from pipeline.report.tables.differences import as_table, claims, compared, records, robust
-from tests.report.tables.toy_results import launches, ran, result, results
+from pipeline.report.tables.differences import as_table, claims, compared, records
+from tests.report.tables.toy_results import launches, ran
 
 NOISE = np.random.default_rng(0).normal(0, 0.01, (3, 5))
 NAMED = styles(["sling2sim2real", "least_squares", "package_si", "real2sim2real"])
@@ -70,25 +70,3 @@ def test_machines_read_the_same(tmp_path) -> None:
     (few,) = records(compared(both, 1)).itertuples()
     assert (few.launches, few.launches_beside) == (9, 10)  # of the two targets that both reach
     assert few.failed_share == pytest.approx(0.4) and few.failed_share_beside == pytest.approx(0.2)
-
-
-def test_robust_policies_stand_beside_the_plain_ones() -> None:
-    """Landings 5 cm beyond and scattered: half the scatter, and the same mean miss."""
-    assert robust(RAN, NAMED, 1) is None
-    plain, second = launches(0.05 + NOISE), launches(0.05 + 0.5 * NOISE)
-    both = results(result("band1", "least_squares", plain, robust_trials=second))
-    (row,) = robust(both, NAMED, 1)[1]
-    scatter = 100 * np.sqrt(np.mean(np.var(NOISE, axis=1, ddof=1)))
-    assert row[5:7] == [f"{scatter:.2f}", f"{scatter / 2:.2f}"]
-    far = second.assign(
-        landing_y=np.where(second.trial == 1, 2.6, second.landing_y),
-        failure=np.where(second.trial == 1, "beyond the area: lands at 2.600 m", None),
-    )  # counts for no scatter, as if it had come down nowhere
-    nowhere = far.assign(landing_y=far.landing_y.where(far.failure.isna()))
-    one, other = (
-        robust(results(result("band1", "bo", plain, robust_trials=t)), styles(["bo"]), 1)[1]
-        for t in (far, nowhere)
-    )
-    assert one == other
-    change = -50 * NOISE.mean()
-    assert row[7].lstrip("*").startswith(f"{change:+.2f}".replace("-", "−"))

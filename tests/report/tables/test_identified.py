@@ -126,13 +126,11 @@ def card(**training) -> dict:
     return {"training": usual | training, "landing_map": MAP}
 
 
-def test_a_robust_policy_is_a_row_with_what_both_are_expected_to_miss() -> None:
+def test_policies_stand_with_their_errors() -> None:
     trials, named = launches([[0.0]] * 3), styles(["package_si", "sling2sim2real"])
-    robust = card(converged=False, expected_error_m=0.03, plain_expected_error_m=0.04)
-    ours = one("band1", "sling2sim2real", trials, card=card(), robust_card=robust)
+    ours = one("band1", "sling2sim2real", trials, card=card(converged=False))
     theirs = one("band1", "package_si", trials, card=card(mean_error_m=None))
-    _, (plain, second, other) = policies(all_of(ours, theirs), named)
-    assert plain[1:4] == ["Sling2Sim2Real", "plain", "yes"]
-    assert plain[4:] == ["0.40", "1.00", "2", "0.03", "–", "4.00"]
-    assert second[2:4] == ["robust", "**no**"] and second[-1] == "3.00"
-    assert other[3:5] == ["yes", "–"] and other[-1] == "–"
+    _, (first, other) = policies(all_of(ours, theirs), named)
+    assert first[1:3] == ["Sling2Sim2Real", "**no**"]
+    assert first[3:] == ["0.40", "1.00", "2", "0.03", "–"]
+    assert other[2:4] == ["yes", "–"]

@@ -32,7 +32,7 @@ def written(tmp_path):
 def test_every_table_is_there_in_each_form(written, tmp_path) -> None:
     ours = launches(0.05 + NOISE)
     ran = (
-        result("band1", "least_squares", ours, robust_trials=launches(0.05 + 0.5 * NOISE)),
+        result("band1", "least_squares", ours),
         result("band1", "package_si", launches(0.2 + NOISE)),
         result("band1", "de", launches(0.1 + NOISE)),
     )
@@ -41,7 +41,6 @@ def test_every_table_is_there_in_each_form(written, tmp_path) -> None:
     assert re.findall("^### (.*)$", text, re.MULTILINE) == [
         *(f"Table {number}" for number in (1, 2, 3, 4)),
         "Which differences are more than noise",
-        "Robust policies",
     ]
     links = re.findall(r"\]\((tables/.*?)\)", text)
     files = {file.relative_to(tmp_path).as_posix() for file in (tmp_path / "tables").iterdir()}
@@ -57,7 +56,7 @@ def test_nothing_is_said_of_what_did_not_run(written, tmp_path) -> None:
     nothing = launches(np.full((3, 1), np.nan), "predicted")
     text = written(result("band3", "package_si", nothing, confidence={}))
     assert "Actuation floor" not in text and "more than noise" not in text
-    assert "Robust" not in text and not (tmp_path / "tables" / "differences.csv").exists()
+    assert not (tmp_path / "tables" / "differences.csv").exists()
     assert "No θ of this run comes with a confidence" in text
     assert "|  | Package SI | no launch yet | – |" in text
 

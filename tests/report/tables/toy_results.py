@@ -31,9 +31,7 @@ def result(band: str, method: str, trials: pd.DataFrame, **more) -> SimpleNamesp
     usual = {
         "theta": {"theta": THETA, "loss": {"geom": 1.0, "force": 0.5, "work": 0.25, "total": 1.5}},
         "confidence": confidence(),
-        "robust_trials": trials.iloc[:0],
         "card": {"training": {"converged": True, "mean_error_m": 0.004}},
-        "robust_card": None,
     }
     return SimpleNamespace(band=band, method=method, trials=trials, **(usual | more))
 

@@ -85,6 +85,25 @@ JSON = flag("--json", action="store_true")
 
 
 @command(
+    "identify a band from its recordings, train its policy, write its card",
+    flag("recordings", type=Path, nargs="*", metavar="FILE.mcap", help="of one band"),
+    flag("--mass", type=positive, metavar="KG", help="of the band, on a scale"),
+    flag("--name", metavar="NAME", help="of the band; default from the first file's name"),
+    flag("--diameter", type=positive, metavar="M", help="of its section, default 0.010"),
+    flag("--rest-length", type=positive, metavar="M", help="between the clamps, default 0.52"),
+    flag("--launches", type=Path, metavar="CSV", help="measured launches, as evidence"),
+    JSON,
+)
+def fit(arguments: argparse.Namespace) -> Done:
+    from app.fit.fit import Band, fit
+    from app.fit.screen import shown as screen
+
+    band = Band(arguments.mass, arguments.diameter, arguments.rest_length)
+    card = fit(arguments.recordings, arguments.name, band, arguments.launches)
+    return shown(card, True) if arguments.json else screen(card)
+
+
+@command(
     "check recordings and add their band to params.yaml",
     flag("name", help="what to call the band: small letters, digits and _"),
     flag("--recording", type=Path, required=True, nargs="+", metavar="FILE.mcap"),

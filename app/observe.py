@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import sys
 from pathlib import Path
 
 import numpy as np
 
+from app import evidence
 from app.flow import child
 from pipeline.base import launch_table as table
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_text
 from pipeline.base.layout import Layout
-from pipeline.base.machine import cores
 from pipeline.landing.simulator import simulator
 from pipeline.launches.spread import LEVEL, landing_intervals
 from pipeline.params import expect_known
 from pipeline.params.identification import LEAST_SQUARES
-from pipeline.posterior.evidence import COLUMNS, expect_error, read_evidence
+from pipeline.posterior.evidence import expect_error
 from pipeline.sling.theta import load_samples, load_theta
 
 FURTHEST_DRAW = 2.0  # m
@@ -61,11 +58,11 @@ def observe(
     layout = Layout(Path(root))
     expect_launch(params, draw, landing, error)
     stage = policy_stage(params, band, method) if run else None
-    number = append(layout, band, params, draw, landing, error)
+    number = evidence.add(layout, band, params, [(*draw, error, landing)])
     answer = {"file": str(layout.evidence / f"{band}.csv"), "launches": number}
     answer["before"] = known(params, band, method, draw, layout.root)
     if stage:
-        repro(layout.root, stage)
+        child.repro(layout.root, stage, lambda line: print(line, file=sys.stderr, flush=True))
     answer["after"] = known(params, band, method, draw, layout.root) if run else None
     return answer
 
@@ -86,32 +83,6 @@ def expect_launch(params, draw: tuple[float, float], landing: float, error: floa
         )
     if error is not None:
         expect_error("--draw-error", error)
-
-
-def append(
-    layout: Layout,
-    band: str,
-    params,
-    draw: tuple[float, float],
-    landing: float,
-    error: float | None,
-) -> int:
-    """Write a launch below the band's others; how many there are then. Raises UserError."""
-    path, launch = layout.evidence / f"{band}.csv", (*draw, landing)
-    there = read_evidence(layout.evidence, band, params)
-    if table.among(launch, table.scores(layout, band)):
-        raise UserError(table.told_twice(launch, path, layout.measured / path.name))
-    if table.among(launch, [(*one.draw, one.landing) for one in there]):
-        raise UserError(f"{path}: this launch is there already; `dvc repro` runs what is stale")
-    rows = [row for _, row in table.rows(path, *table.EVIDENCE)] if there else []
-    values = (*draw, "" if error is None else error, landing)
-    rows.append(dict(zip(COLUMNS, values, strict=True)))
-    text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    write_text(path, text.getvalue())
-    return len(rows)
 
 
 def known(params, band: str, method: str, draw: tuple[float, float], root: Path) -> dict | None:
@@ -147,21 +118,6 @@ def policy_stage(params, band: str, method: str) -> str:
     if band in asked.ablations.bands and method in asked.ablations.methods:
         return f"ablation_policy@{band}-{method}"
     raise UserError(f"{method} does not run on {band}: see `run:` in params.yaml, or --no-run")
-
-
-def repro(root: Path, stage: str) -> None:
-    """Let DVC run a stage and what it needs, as far as it is stale; its lines go to stderr.
-
-    Raises StageFailed.
-    """
-    status, said = child.dvc(
-        root,
-        ("repro", stage),
-        environment=child.stage_environment(cores()),
-        on_line=lambda line: print(line, file=sys.stderr, flush=True),
-    )
-    if status:
-        raise child.StageFailed(f"{stage}: {child.reason(stage, said, status)}")
 
 
 def shown(answer: dict, landing: float) -> str:

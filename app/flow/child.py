@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,6 +13,7 @@ from threading import Event, Thread
 
 from app.flow import guard
 from pipeline.base.errors import UserError
+from pipeline.base.machine import cores
 
 # It reads and writes all of dvc.lock; to look for garbage meanwhile takes a seventh of its time.
 DVC = "import gc, sys; gc.disable(); from dvc.cli import main; sys.exit(main())"
@@ -21,6 +23,7 @@ DVCS = (
     "To track the changes with git", "\tgit add", "To enable auto staging", "\tdvc config",
     "Data and pipelines are up to date", "Stage '", "WARNING: '", "ERROR: failed to reproduce",
 )  # fmt: skip
+BEGINS = re.compile("Running stage '(.+)':")
 
 
 class StageFailed(UserError):
@@ -84,15 +87,47 @@ def run_stage(
     raise StageFailed(f"{name}: {reason(name, said, status)}")
 
 
+def repro(
+    root: Path,
+    stage: str,
+    on_line: Callable[[str], None],
+    on_stage: Callable[[str], None] = lambda name: None,
+) -> None:
+    """Let DVC run a stage and what it needs, as far as it is stale, on all cores.
+
+    Args:
+        on_line, on_stage: As `dvc` has them.
+
+    Raises:
+        StageFailed: With the name of the stage that failed and its clear line.
+    """
+    running = [stage]
+
+    def begins(name: str) -> None:
+        running.append(name)
+        on_stage(name)
+
+    environment = stage_environment(cores())
+    status, said = dvc(
+        root, ("repro", stage), environment=environment, on_line=on_line, on_stage=begins
+    )
+    if status:
+        raise StageFailed(f"{running[-1]}: {reason(running[-1], said, status)}")
+
+
 def dvc(
     root: Path,
     arguments: Sequence[str],
     *,
     environment: Mapping[str, str],
     on_line: Callable[[str], None] = lambda line: None,
+    on_stage: Callable[[str], None] = lambda name: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> tuple[int, list[str]]:
     """A DVC command in `root`, which waits for DVC's lock; see `run_stage`.
+
+    Args:
+        on_stage: Called with the name of each stage as it begins to run.
 
     Returns:
         Its exit status, and all lines that it said.
@@ -109,7 +144,9 @@ def dvc(
             line = line.rstrip("\n")
             said.append(line)
             ending = cancelled() or (process.poll() or 0) < 0  # what an interrupt makes it say
-            if not ending and _is_own(line):
+            if begun := BEGINS.fullmatch(line):
+                on_stage(begun[1])
+            elif not ending and _is_own(line):
                 on_line(line)
     if process.returncode and cancelled():
         raise Cancelled

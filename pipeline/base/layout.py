@@ -96,6 +96,10 @@ class Layout:
         """Folder of a policy's files."""
         return self.data / "policies" / band / method
 
+    def card(self, band: str) -> Path:
+        """Folder of a band's card."""
+        return self.root / "reports" / "bands" / band
+
     def trials(self, band: str, method: str) -> Path:
         return self.data / "trials" / band / f"{method}.parquet"
 

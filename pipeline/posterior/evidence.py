@@ -25,8 +25,20 @@ def read_evidence(folder: Path, band: str, params) -> list[Observed]:
         UserError: A file is no band's, cannot be read, or says what no launch can have done.
     """
     path = table.file_of(folder, band, params.bands)
-    error, launches = params.trials.actuation_error, []
-    for line, row in table.rows(path, *table.EVIDENCE) if path else []:
+    return read_launches(path, params.trials.actuation_error) if path else []
+
+
+def read_launches(path: Path, error: float | None) -> list[Observed]:
+    """Of a CSV with `COLUMNS`, of which the error may be missing.
+
+    Args:
+        error: Of a draw without one of its own [m].
+
+    Raises:
+        UserError: It cannot be read, or says what no launch can have done.
+    """
+    launches = []
+    for line, row in table.rows(path, *table.EVIDENCE):
         where = f"{path}, line {line}"
         landing = table.metres(where, table.LANDING, row[table.LANDING])
         if landing is None:

@@ -1,0 +1,63 @@
+"""Launches that become evidence: into data/evidence/<band>.csv, each once, and never a score."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+from pipeline.base import launch_table as table
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_text
+from pipeline.base.layout import Layout
+from pipeline.posterior.evidence import COLUMNS, read_launches
+
+Launch = tuple[float, float, float | None, float]  # draw (y, z), its error or None, landing [m]
+
+
+def read(path: Path) -> list[Launch]:
+    """Launches of a CSV with the columns of data/evidence. Raises UserError."""
+    if not path.is_file():
+        raise UserError(f"{path}: no such file")
+    found = read_launches(path, error=None)
+    if not found:
+        raise UserError(f"{path}: holds no launch; columns are {','.join(COLUMNS)}")
+    return [(*one.draw, one.error, one.landing) for one in found]
+
+
+def add(
+    layout: Layout, band: str, params, launches: Sequence[Launch], *, again: bool = False
+) -> int:
+    """Write launches below the band's others; how many there are then.
+
+    Args:
+        params: The whole of params.yaml.
+        again: Whether a launch that is there already is passed over, instead of refused.
+
+    Raises:
+        UserError: One of them is there already, or is a score; nothing is written.
+    """
+    path = layout.evidence / f"{band}.csv"
+    scores = table.scores(layout, band)
+    there = table.rows(path, *table.EVIDENCE) if path.is_file() else []
+    known = table.landed(path, *table.EVIDENCE) if there else []
+    rows, before = [row for _, row in there], len(there)
+    for *draw, error, landing in launches:
+        launch = (*draw, landing)
+        if table.among(launch, scores):
+            raise UserError(table.told_twice(launch, path, layout.measured / path.name))
+        if table.among(launch, known):
+            if again:
+                continue
+            raise UserError(f"{path}: this launch is there already; `dvc repro` runs what is stale")
+        known.append(launch)
+        values = (*draw, "" if error is None else error, landing)
+        rows.append(dict(zip(COLUMNS, values, strict=True)))
+    if len(rows) > before:
+        text = io.StringIO()
+        writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        write_text(path, text.getvalue())
+    return len(rows)

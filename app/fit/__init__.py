@@ -1,0 +1,1 @@
+"""`sling fit`: a band from its recordings to its card, by the stages of dvc.yaml."""

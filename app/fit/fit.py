@@ -1,0 +1,134 @@
+"""Bring a band's recordings and launches into the project, and run the stages of its card."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from app import evidence
+from app.fit.countdown import Countdown
+from app.flow import child
+from app.preflight.add_band import NAME, add_band
+from app.preflight.recordings import add_recording, digests
+from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout
+from pipeline.params import Params, load
+
+
+@dataclass(frozen=True)
+class Band:
+    """What a scale, a ruler and a calliper say of a band that is new; None: not given."""
+
+    mass: float | None = None
+    diameter: float | None = None
+    rest_length: float | None = None
+
+    @property
+    def known(self) -> dict[str, float]:
+        return {name: value for name, value in vars(self).items() if value is not None}
+
+
+def fit(
+    recordings: Sequence[Path],
+    name: str | None,
+    band: Band,
+    launches: Path | None = None,
+    root: Path | str = ".",
+) -> dict:
+    """Identify a band, train its policy and write its card, as far as that is not done yet.
+
+    Args:
+        recordings: MCAP files of one band; none for a band that is in params.yaml.
+        name: Of the band; None: from the first file's name.
+        band: Of a new one, with `mass` [kg].
+        launches: CSV of launches that are to be evidence.
+        root: Of the project.
+
+    Returns:
+        What the card says (reports/bands/<band>/card.json), and where it lies, under `card`.
+
+    Raises:
+        UserError: Something given is wrong, and nothing is changed; or a stage fails, and what was
+            done stays done.
+    """
+    root = Path(root)
+    layout, params = Layout(root), load(root / "params.yaml")
+    name = name or name_of(recordings)
+    told = [] if launches is None else evidence.read(launches)
+    if recordings:
+        say(brought_in(params, layout, recordings, name, band))
+        params = load(root / "params.yaml")
+    expect_running(params, name)
+    if told:
+        count = evidence.add(layout, name, params, told, again=True)
+        say(f"{layout.evidence / name}.csv: {count} launches as evidence")
+    countdown = Countdown(params.bands[name].source)
+    child.repro(root, f"card@{name}", countdown.line, countdown.begins)
+    countdown.ends()
+    card = layout.card(name)
+    return json.loads((card / "card.json").read_text("utf-8")) | {"card": str(card / "README.md")}
+
+
+def say(text: str) -> None:
+    """On stderr: stdout is for the answer."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def name_of(recordings: Sequence[Path]) -> str:
+    """A band's name from its first file's. Raises UserError where that makes none."""
+    if not recordings:
+        raise UserError("give a recording (FILE.mcap), or with --name a band of params.yaml")
+    name = re.sub(r"[^a-z0-9]+", "_", recordings[0].stem.lower()).strip("_")
+    if not NAME.fullmatch(name):
+        raise UserError(
+            f"{recordings[0]}: this file name makes no band name; give one: --name NAME"
+        )
+    return name
+
+
+def brought_in(
+    params: Params, layout: Layout, recordings: Sequence[Path], name: str, band: Band
+) -> str:
+    """Have the recordings in data/raw/<name> and the band in params.yaml; what was done.
+
+    A band that is there already takes further recordings, given beside those that it has.
+
+    Raises:
+        UserError: Nothing is changed.
+    """
+    at = layout.root / "params.yaml"
+    known = params.bands.get(name)
+    if known is None:
+        if band.mass is None:
+            raise UserError(f"{name}: is new; weigh the band and give --mass KG, such as 0.0408")
+        return add_band(name, recordings, **band.known, params_path=at, root=layout.root)
+    if known.source != "recording":
+        raise UserError(f"{name}: is a band of the virtual rig; choose another name: --name NAME")
+    for what, value in band.known.items():
+        if value != getattr(known, what):
+            raise UserError(
+                f"--{what.replace('_', '-')} {value:g}: bands.{name}.{what} in {at} is"
+                f" {getattr(known, what):g}; choose another name, or edit it there"
+            )
+    there = digests(layout.recordings(name))
+    given = digests(recordings)
+    new = [file for digest, file in given.items() if digest not in there]
+    if there and new and there.keys() <= given.keys():
+        return add_recording(name, new, params_path=at, root=layout.root)
+    values = {what: getattr(known, what) for what in ("mass", "diameter", "rest_length")}
+    return add_band(name, recordings, **values, params_path=at, root=layout.root)
+
+
+def expect_running(params: Params, name: str) -> None:
+    """Raises UserError where dvc.yaml has no card of this band."""
+    if name not in params.bands:
+        raise UserError(
+            f"{name}: is no band of params.yaml, which has {', '.join(params.bands)};"
+            " give its recording: sling fit FILE.mcap --mass KG"
+        )
+    if name not in params.run.bands:
+        raise UserError(f"{name}: add it to run.bands in params.yaml, which names what runs")

@@ -1,0 +1,183 @@
+"""`sling fit`: what it brings in, what it asks DVC for, what it refuses, and its screen."""
+
+import json
+import shutil
+from types import SimpleNamespace
+
+import pytest
+
+from app import cli
+from app.fit import fit as module
+from app.fit.countdown import STEPS, Countdown
+from app.fit.screen import shown
+from app.flow import child
+from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout
+from pipeline.params import load
+from tests.project import ROOT
+
+CARD = {
+    "band": "mine",
+    "verdict": "with care",
+    "reasons": ["It is not settled."],
+    "values": [
+        {"label": "stiffness E", "unit": "kPa", "value": 412.3, "low": 401, "high": 423.4}
+        | {"fixed": False},
+        {"label": "Poisson's ratio", "unit": "", "value": 0.47, "low": None, "high": None}
+        | {"fixed": True},
+    ],
+    "draws": [
+        {"target_m": 1.725, "draw_y_m": -0.3, "draw_z_m": -0.15, "predicted_landing_m": 1.726}
+        | {"interval_90_m": [1.6, 1.9], "hold_force_n": 9.06},
+        {"target_m": 2.1, "draw_y_m": -0.4, "draw_z_m": -0.2, "predicted_landing_m": None}
+        | {"interval_90_m": None, "hold_force_n": None},
+    ],
+    "next": ["Measure a launch."],
+}
+LAUNCHES = "draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.17,2.2\n-0.32,-0.2,3.0\n"
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """A project without bands of its own, whose recordings are all fine and whose DVC succeeds."""
+    shutil.copy(ROOT / "params.yaml", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("app.preflight.recordings.checked", lambda *given: [])
+    asked, layout = [], Layout(tmp_path)
+
+    def dvc(root, arguments, **about):
+        asked.append(arguments)
+        band = arguments[1].partition("@")[2]
+        layout.card(band).mkdir(parents=True, exist_ok=True)
+        (layout.card(band) / "card.json").write_text(json.dumps(CARD | {"band": band}))
+        about["on_stage"](f"theta@{band}-least_squares")
+        about["on_line"](f"{band}: settled")
+        return 0, []
+
+    monkeypatch.setattr(child, "dvc", dvc)
+
+    def recording(name: str, content: str):
+        (tmp_path / name).write_text(content)
+        return tmp_path / name
+
+    def run(*files, name=None, launches=None, **band) -> dict:
+        return module.fit(files, name, module.Band(**band), launches, tmp_path)
+
+    return SimpleNamespace(run=run, recording=recording, asked=asked, layout=layout)
+
+
+def test_a_new_band_is_added_and_its_card_made(project) -> None:
+    file = project.recording("My band 2.mcap", "a")
+    card = project.run(file, mass=0.04, rest_length=0.5)
+    assert card["band"] == "my_band_2" and card["card"].endswith("bands/my_band_2/README.md")
+    about = load().bands["my_band_2"]
+    assert (about.mass, about.rest_length, about.diameter) == (0.04, 0.5, 0.01)
+    assert project.asked == [("repro", "card@my_band_2")]
+    again = project.run(file, mass=0.04, rest_length=0.5)
+    assert again == card and load().run.bands[-1] == "my_band_2"
+    assert project.run(name="my_band_2") == card
+
+
+def test_further_recordings_join_those_that_are_there(project) -> None:
+    first, second = project.recording("a.mcap", "a"), project.recording("b.mcap", "b")
+    project.run(first, mass=0.04)
+    project.run(first, second, name="a")
+    assert [file.name for file in project.layout.recordings("a")] == ["a.mcap", "b.mcap"]
+    with pytest.raises(UserError, match="other recordings already"):
+        project.run(project.recording("c.mcap", "c"), name="a")
+
+
+def test_launches_become_evidence_once(project) -> None:
+    file = project.recording("a.mcap", "a")
+    launches = project.recording("landings.csv", LAUNCHES)
+    for _ in range(2):
+        project.run(file, mass=0.04, launches=launches)
+        assert (project.layout.evidence / "a.csv").read_text() == (
+            "draw_y_m,draw_z_m,draw_error_m,landing_y_m\n-0.3,-0.17,,2.2\n-0.32,-0.2,,3.0\n"
+        )
+    project.layout.measured.mkdir(parents=True)
+    (project.layout.measured / "a.csv").write_text(LAUNCHES.replace("3.0", "3.1"))
+    more = project.recording("more.csv", LAUNCHES.replace("3.0", "3.1"))
+    with pytest.raises(UserError, match="evidence or a score, never both"):
+        project.run(file, launches=more)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "a: is new; weigh the band and give --mass KG"),
+        ({"mass": 0.04, "name": "Big"}, "use small letters"),
+        ({"mass": 0.04, "name": "band1"}, "band1: is a band of the virtual rig"),
+        ({"mass": 0.04, "launches": "none.csv"}, "none.csv: no such file"),
+        ({"mass": 0.04, "launches": "bad.csv"}, "bad.csv, line 2: a launch that did not land"),
+        ({"mass": 0.04, "launches": "empty.csv"}, "empty.csv: holds no launch"),
+    ],
+)
+def test_what_is_wrong_is_said_before_anything_changes(project, given, message) -> None:
+    file = project.recording("a.mcap", "a")
+    project.recording("bad.csv", "draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.17,\n")
+    project.recording("empty.csv", "draw_y_m,draw_z_m,landing_y_m\n")
+    if "launches" in given:
+        given = given | {"launches": file.with_name(given["launches"])}
+    with pytest.raises(UserError, match=message):
+        project.run(file, **given)
+    assert (file.parent / "params.yaml").read_text() == (ROOT / "params.yaml").read_text()
+    assert project.asked == [] and not project.layout.data.exists()
+
+
+def test_a_band_must_be_known_or_recorded(project) -> None:
+    for given, message in (
+        ({}, "give a recording"),
+        ({"name": "none"}, "none: is no band of params.yaml, which has band1, band2, band3"),
+    ):
+        with pytest.raises(UserError, match=message):
+            project.run(**given)
+    with pytest.raises(UserError, match="makes no band name; give one: --name NAME"):
+        project.run(project.recording("2026.mcap", "a"), mass=0.04)
+    file = project.recording("a.mcap", "a")
+    project.run(file, mass=0.04)
+    with pytest.raises(UserError, match=r"--mass 0.05: bands.a.mass in .* is 0.04"):
+        project.run(file, mass=0.05)
+
+
+def test_the_screen() -> None:
+    text = shown(CARD | {"card": "reports/bands/mine/README.md"})
+    lines = text.splitlines()
+    assert lines[:2] == ["mine: with care", "  - It is not settled."]
+    assert "  stiffness E      412.3 kPa  (401 to 423.4)" in lines
+    assert "  Poisson's ratio  0.47, fixed" in lines
+    assert any("1.725 m" in one and "1.600 to 1.900 m" in one and "9.1 N" in one for one in lines)
+    assert any("fails in simulation" in one for one in lines)
+    assert lines[-1] == "Card: reports/bands/mine/README.md" and len(lines) < 25
+
+
+def test_the_countdown_tells_each_stage_and_falls(capsys, monkeypatch) -> None:
+    clock = [0.0]
+    monkeypatch.setattr("app.fit.countdown.time.monotonic", lambda: clock[0])
+    countdown = Countdown("recording")
+    chain = [step for step in STEPS if step != "record"]
+    for step in chain:
+        countdown.begins(f"{step}@mine")
+        clock[0] += 2 * STEPS[step][0]  # a machine half as fast
+    countdown.line("history-mine-x 48/600 rollouts")
+    countdown.line("mine: 300 samples")
+    countdown.ends()
+    lines = capsys.readouterr().err.splitlines()
+    left = [line.rpartition("about ")[2].split()[0] for line in lines[: len(chain)]]
+    seconds = [60 * int(one.split(":")[0]) + int(one.split(":")[1]) for one in left]
+    assert lines[0].startswith(f"[1/{len(chain)}]") and seconds[1] == 2 * (
+        sum(STEPS[step][0] for step in chain[1:])
+    )
+    assert seconds[1:] == sorted(seconds[1:], reverse=True)
+    assert lines[-2:] == [
+        "      mine: 300 samples",
+        f"done in {clock[0]:.0f} s; `dvc repro` takes it from its cache from now on",
+    ]
+
+
+def test_the_command(project, monkeypatch, capsys) -> None:
+    file = project.recording("a.mcap", "a")
+    arguments = cli.parser().parse_args(["fit", str(file), "--mass", "0.04", "--json"])
+    assert cli.execute(arguments) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert {"band", "verdict", "draws", "card"} <= answer.keys()

@@ -95,10 +95,10 @@ JSON = flag("--json", action="store_true")
     JSON,
 )
 def fit(arguments: argparse.Namespace) -> Done:
-    from app.fit.fit import Band, fit
+    from app.fit.fit import NewBand, fit
     from app.fit.screen import shown as screen
 
-    band = Band(arguments.mass, arguments.diameter, arguments.rest_length)
+    band = NewBand(arguments.mass, arguments.diameter, arguments.rest_length)
     card = fit(arguments.recordings, arguments.name, band, arguments.launches)
     return shown(card, True) if arguments.json else screen(card)
 

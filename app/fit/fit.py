@@ -20,7 +20,7 @@ from pipeline.params import Params, load
 
 
 @dataclass(frozen=True)
-class Band:
+class NewBand:
     """What a scale, a ruler and a calliper say of a band that is new; None: not given."""
 
     mass: float | None = None
@@ -35,7 +35,7 @@ class Band:
 def fit(
     recordings: Sequence[Path],
     name: str | None,
-    band: Band,
+    band: NewBand,
     launches: Path | None = None,
     root: Path | str = ".",
 ) -> dict:
@@ -91,7 +91,7 @@ def name_of(recordings: Sequence[Path]) -> str:
 
 
 def brought_in(
-    params: Params, layout: Layout, recordings: Sequence[Path], name: str, band: Band
+    params: Params, layout: Layout, recordings: Sequence[Path], name: str, band: NewBand
 ) -> str:
     """Have the recordings in data/raw/<name> and the band in params.yaml; what was done.
 

@@ -61,7 +61,7 @@ def project(tmp_path, monkeypatch):
         return tmp_path / name
 
     def run(*files, name=None, launches=None, **band) -> dict:
-        return module.fit(files, name, module.Band(**band), launches, tmp_path)
+        return module.fit(files, name, module.NewBand(**band), launches, tmp_path)
 
     return SimpleNamespace(run=run, recording=recording, asked=asked, layout=layout)
 

@@ -7,13 +7,14 @@ from typing import NotRequired, TypedDict
 
 import numpy as np
 
+from app import safety
+from app.safety import Hazard
 from pipeline.base.layout import Layout
 from pipeline.landing.simulator import simulator
 from pipeline.landing.stored import Stored
 from pipeline.launches.spread import landing_intervals
 from pipeline.params import expect_known
 from pipeline.sling.theta import launch_history, load_samples, load_theta
-from stages.start import unmounted
 
 
 class Answer(TypedDict):
@@ -31,7 +32,7 @@ class Answer(TypedDict):
     hold_force_n: float | None
     max_force_n: float  # the arm's limit
     pull_and_pause_s: NotRequired[list[float]]  # where the law remembers them
-    warnings: list[str]
+    warnings: list[Hazard]
 
 
 def pull_and_pause(params, content: dict) -> dict[str, list[float]]:
@@ -61,38 +62,37 @@ def aim(
     expect_known(params, "band", band)
     expect_known(params, "method", method)
     layout = Layout(Path(root))
-    content = load_theta(layout.theta(band, method), band)
+    file = layout.theta(band, method)
+    content = load_theta(file, band)
     stored = Stored(band, method, layout.root)
     draw = stored.draws(np.array([target]))[0]
-    warnings = []
     if launcher is None:
-        warnings += unmounted(band, root)
         launcher = simulator(params, band, content, root=root)
     launched = launcher(draw[None])
+    force, failure = float(launched.hold_force[0]), launched.failure[0]
     low, high = params.policy.targets
+    warnings = []
     if not low <= target <= high:
-        warnings.append(f"the policy was trained for targets from {low:g} to {high:g} m")
+        what = f"the policy was trained for targets from {low:g} to {high:g} m, not {target:g} m"
+        warnings.append(Hazard("target", what))
+    warnings += safety.of_launch(params, force, failure)
     landing, interval = None, None
-    if launched.failure[0]:
-        warnings.append(f"the launch fails in simulation: {launched.failure[0]}")
-    else:
+    if not failure:
         landing = float(launched.landing_y[0])
-        if abs(landing - target) > 0.05:
-            warnings.append(f"the simulated landing is {landing - target:+.2f} m off the target")
+        if abs(landing - target) > safety.MISS:
+            what = f"the simulated landing is {landing - target:+.2f} m off the target"
+            warnings.append(Hazard("miss", what))
         samples = load_samples(layout.confidence(band, method))
-        if samples is None:
-            warnings.append("the interval leaves out how well the parameters are known")
         found = landing_intervals(launcher, draw, samples, params.trials.actuation_error)[0]
         if np.isfinite(found).all():
             interval = found.tolist()
         else:
-            warnings.append("no interval: too many launches beside the predicted one fail")
-    force = float(launched.hold_force[0])
-    if force > params.setup.max_force:
-        warnings.append(
-            f"holding this draw takes {force:.1f} N, more than setup.max_force"
-            f" {params.setup.max_force:g} N"
-        )
+            what = "no interval: too many launches beside the predicted one fail"
+            warnings.append(Hazard("interval", what))
+    warnings += safety.of_draw(params, band, draw, layout.root)
+    warnings += safety.of_confidence(content, file)
+    warnings += safety.of_policy(params, band, method, content, layout.root)
+    warnings += safety.of_mounting(band, layout.root)
     return {
         "draw_y_m": float(draw[0]),
         "draw_z_m": float(draw[1]),
@@ -103,3 +103,9 @@ def aim(
         **pull_and_pause(params, content),
         "warnings": warnings,
     }
+
+
+def why_refused(answer: Answer) -> str | None:
+    """Why no robot should carry an answer out: it misses by safety.MISS or more, or fails."""
+    wrong = [one.what for one in answer["warnings"] if one.about in ("miss", "failure")]
+    return wrong[0] if wrong else None

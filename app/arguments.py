@@ -1,4 +1,8 @@
-"""What the `sling` command reads and prints: types of arguments, results as lines or JSON."""
+"""What the `sling` command reads and prints: types of arguments, results as lines or JSON.
+
+A type refuses what cannot be while the command line is read, before any work, and names the unit
+that the number looks like.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +10,60 @@ import argparse
 import json
 import math
 import re
+from collections.abc import Callable
 
-FURTHEST_TARGET = 100.0  # m
+from pipeline.base import launch_table as table
+from pipeline.base.schema import Range
+from pipeline.params.lab import BandParams
+
+METRES = {"centimetres": 1e-2, "millimetres": 1e-3}
+KILOGRAMS = {"grams": 1e-3}
 
 
-def positive(text: str) -> float:
-    """A finite number above 0."""
-    value = number(text)
-    if value <= 0:
-        raise argparse.ArgumentTypeError(f"must be above 0, got {text}")
-    return value
+def quantity(unit: str, low: float, high: float, units: dict[str, float], usual: float) -> Callable:
+    """A type: a number of `unit` from `low` to `high`.
+
+    Args:
+        units: Smaller ones that it may be given in by mistake, and what they are worth.
+        usual: A common value, which decides between them.
+    """
+
+    def read(text: str) -> float:
+        value = number(text)
+        if not low <= value <= high:
+            found = {name: value * worth for name, worth in units.items()}
+            found = {name: other for name, other in found.items() if low <= other <= high}
+            raise argparse.ArgumentTypeError(
+                f"must be in {unit}, from {low:g} to {high:g}, got {text}{likely(found, usual)}"
+            )
+        return value
+
+    return read
+
+
+def likely(found: dict[str, float], usual: float) -> str:
+    """A hint at the one of some units in which a number, given in `found`, is most usual."""
+    if not found:
+        return ""
+    name = min(found, key=lambda name: abs(math.log(found[name] / usual)))
+    return f", which looks like {name} ({found[name]:.4g})"
+
+
+def of_a_band(name: str, unit: str, units: dict[str, float], usual: float) -> Callable:
+    """A type: a number of params.yaml's `bands`, within the range that it has there."""
+    kept = BandParams.model_fields[name].metadata
+    limits = next(one for one in kept if isinstance(one, Range))
+    return quantity(unit, limits.low, limits.high, units, usual)
+
+
+mass = of_a_band("mass", "kilograms", KILOGRAMS, 0.03)
+diameter = of_a_band("diameter", "metres", METRES, 0.010)
+rest_length = of_a_band("rest_length", "metres", METRES, 0.52)
+target = quantity("metres", 0.1, table.LIMITS[table.LANDING][1], METRES, 2.0)
+landing = quantity("metres", 0.01, table.LIMITS[table.LANDING][1], METRES, 2.0)
+distance = quantity("metres", 0.05, 2.0, METRES, 0.35)  # of a draw from the fork
+draw_error = quantity("metres", 0.0, 0.05, METRES, 0.002)
+rate = quantity("hertz", 1.0, 10_000.0, {}, 100.0)
 
 
 def count(text: str) -> int:
@@ -35,14 +83,6 @@ def number(text: str) -> float:
     return value
 
 
-def target(text: str) -> float:
-    """A distance along the floor that a slingshot may be asked for [m]."""
-    value = positive(text)
-    if value > FURTHEST_TARGET:
-        raise argparse.ArgumentTypeError(f"must be at most {FURTHEST_TARGET:g} m, got {text}")
-    return value
-
-
 def draw(text: str) -> tuple[float, float]:
     """A drawn position (y, z), frame O [m]."""
     parts = text.split(",")
@@ -51,6 +91,10 @@ def draw(text: str) -> tuple[float, float]:
     y, z = map(number, parts)
     if y >= 0:
         raise argparse.ArgumentTypeError(f"y must be below 0 (behind the fork), got {y:g}")
+    try:
+        distance(f"{math.hypot(y, z):.3g}")
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"its distance from the fork {error}") from None
     return y, z
 
 

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-import math
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from scipy.special import ndtri
 
-from app import evidence
+from app import evidence, safety
 from app.flow import child
-from pipeline.base import launch_table as table
+from app.launch import expect_above_floor
+from app.safety import Hazard
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.landing.simulator import simulator
 from pipeline.launches.spread import LEVEL, landing_intervals
 from pipeline.params import expect_known
 from pipeline.params.identification import LEAST_SQUARES
-from pipeline.posterior.evidence import expect_error
 from pipeline.sling.theta import load_samples, load_theta
+from stages.start import stage_of
 
-FURTHEST_DRAW = 2.0  # m
+FAR = 3.0  # standard deviations of a predicted landing, from which a measured one is doubted
 
 
 def observe(
@@ -45,7 +47,8 @@ def observe(
         root: Of the project.
 
     Returns:
-        `file`, `launches` in it, and what `known` says `before` and `after`.
+        `file`, `launches` in it, what `known` says `before` and `after`, and `warnings`, which are
+        told on stderr before stages run.
 
     Raises:
         UserError: It can be no launch, or is known already, and nothing is written; or a stage
@@ -56,36 +59,48 @@ def observe(
     if params.methods[method].search != LEAST_SQUARES:
         raise UserError(f"--method {method}: takes no launches as evidence, least_squares does")
     layout = Layout(Path(root))
-    expect_launch(params, draw, landing, error)
+    expect_above_floor(params, draw)
     stage = policy_stage(params, band, method) if run else None
     number = evidence.add(layout, band, params, [(*draw, error, landing)])
     answer = {"file": str(layout.evidence / f"{band}.csv"), "launches": number}
-    answer["before"] = known(params, band, method, draw, layout.root)
+    answer["before"] = known(params, band, method, draw, layout.root, error)
+    doubts = list(doubted(answer["before"], landing, answer["file"]))
+    safety.tell(doubts)
     if stage:
         child.repro(layout.root, stage, lambda line: print(line, file=sys.stderr, flush=True))
-    answer["after"] = known(params, band, method, draw, layout.root) if run else None
+    answer["after"] = known(params, band, method, draw, layout.root, error) if run else None
+    if failure := (answer["after"] or {}).get("failure"):
+        what = f"the launch fails in simulation, so it counts for nothing: {failure}"
+        doubts.append(Hazard("failure", what))
+        safety.tell(doubts[-1:])
+    answer["warnings"] = safety.as_json(doubts)
     return answer
 
 
-def expect_launch(params, draw: tuple[float, float], landing: float, error: float | None) -> None:
-    """Raises UserError where no launch can be so."""
-    if math.hypot(*draw) > FURTHEST_DRAW:
-        raise UserError(
-            f"--draw: must be at most {FURTHEST_DRAW:g} m from the fork; is it in centimetres?"
+def doubted(before: dict | None, landing: float, file: str) -> Iterator[Hazard]:
+    """A measured landing [m] that is far from what `known` said before, by its own interval."""
+    if before is None or before["interval_90_m"] is None:
+        return
+    low, high = before["interval_90_m"]
+    spread = max((high - low) / (2 * ndtri((1 + LEVEL) / 2)), 1e-6)
+    away = abs(landing - before["landing_m"]) / spread
+    if away > FAR:
+        yield Hazard(
+            "miss",
+            f"{landing:g} m is {away:.0f} standard deviations from the predicted"
+            f" {before['landing_m']:.3f} m: if draw or landing was mistaken, take its row out of"
+            f" {file}",
         )
-    floor = -params.setup.fork_height
-    if draw[1] < floor:
-        raise UserError(f"--draw: z = {draw[1]:g} m lies below the floor, z = {floor:g} m")
-    furthest = table.LIMITS[table.LANDING][1]
-    if not landing < furthest:
-        raise UserError(
-            f"--landing: must be below {furthest:g} m, got {landing:g}; is it in centimetres?"
-        )
-    if error is not None:
-        expect_error("--draw-error", error)
 
 
-def known(params, band: str, method: str, draw: tuple[float, float], root: Path) -> dict | None:
+def known(
+    params,
+    band: str,
+    method: str,
+    draw: tuple[float, float],
+    root: Path,
+    error: float | None = None,
+) -> dict | None:
     """What θ and its samples say; None where nothing has been identified.
 
     `landing_m` of `draw` and its `interval_90_m` (None where the launch fails), `failure`,
@@ -101,8 +116,8 @@ def known(params, band: str, method: str, draw: tuple[float, float], root: Path)
     told = {"landing_m": None, "interval_90_m": None, "failure": once.failure[0]}
     if once.failure[0] is None:
         told["landing_m"] = float(once.landing_y[0])
-        error = params.trials.actuation_error
-        found = landing_intervals(launcher, np.array(draw), samples, error)[0]
+        spread = params.trials.actuation_error if error is None else error
+        found = landing_intervals(launcher, np.array(draw), samples, spread)[0]
         told["interval_90_m"] = found.tolist() if np.isfinite(found).all() else None
     told["returned_share"] = content.get("returned_share", 1.0)
     ends = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
@@ -112,11 +127,8 @@ def known(params, band: str, method: str, draw: tuple[float, float], root: Path)
 
 def policy_stage(params, band: str, method: str) -> str:
     """Of dvc.yaml. Raises UserError where params.yaml runs the method on no such band."""
-    asked = params.run
-    if band in asked.bands and method in asked.methods:
-        return f"policy@{band}-{method}"
-    if band in asked.ablations.bands and method in asked.ablations.methods:
-        return f"ablation_policy@{band}-{method}"
+    if stage := stage_of(params, "policy", band, method):
+        return stage
     raise UserError(f"{method} does not run on {band}: see `run:` in params.yaml, or --no-run")
 
 
@@ -130,8 +142,6 @@ def shown(answer: dict, landing: float) -> str:
             landed = told["failure"] and f"fails in simulation: {told['failure']}"
             landed = landed or _with_ends(told["landing_m"], told["interval_90_m"], " m")
             lines.append(f"{when:6}  landing {landed}, returned share {share}")
-            if when == "after" and told["failure"]:
-                lines.append("warning: a launch that fails in simulation counts for nothing")
     lines.append(f"measured  {landing:.3f} m" + ("" if answer["after"] else "; nothing has run"))
     return "\n".join(lines)
 

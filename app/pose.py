@@ -15,6 +15,7 @@ import numpy as np
 
 from app.aim import Answer
 from app.plan.hand import along_pull, quaternion
+from app.safety import Hazard
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.recording.input.frames import Transform
@@ -36,7 +37,7 @@ def posed(answer: Answer, params, band: str, root: str | Path = ".") -> PosedAns
     try:
         fork, frame = fork_in_base(params, band, root)
     except UserError as error:
-        warnings.append(f"no pose of the hand in the robot's base: {error}")
+        warnings.append(Hazard("pose", f"no pose of the hand in the robot's base: {error}"))
     else:
         position = [round(float(value), 6) + 0.0 for value in fork.apply(drawn)]
         turn = quaternion(fork.rotation * along_pull(drawn)).tolist()

@@ -58,19 +58,26 @@ def remedy(error: NotMade) -> str:
     if known is None:
         return ""
     folder, band, method = known
-    step, asked = STEPS.get(folder, folder), load().run
-    stage = f"{step}@{band}"
-    if method is not None:
-        ablated = asked.ablations.methods if band in asked.ablations.bands else ()
-        if band not in asked.bands or method not in (*asked.methods, *ablated):
-            return (
-                f"name {method} under run.methods or run.ablations in params.yaml,"
-                " then `dvc repro` makes it"
-            )
-        stage = f"{'' if method in asked.methods else 'ablation_'}{stage}-{method}"
+    step, params = STEPS.get(folder, folder), load()
+    stage = f"{step}@{band}" if method is None else stage_of(params, step, band, method)
+    if stage is None:
+        return (
+            f"name {method} under run.methods or run.ablations in params.yaml,"
+            " then `dvc repro` makes it"
+        )
     if error.problem != "missing":
         return f"`dvc repro --force {stage}` makes it anew"
     return f"`dvc repro {stage}` makes it"
+
+
+def stage_of(params: Params, step: str, band: str, method: str) -> str | None:
+    """The stage of a step for a band and a method; None where `run` lets them not meet."""
+    asked = params.run
+    if band in asked.bands and method in asked.methods:
+        return f"{step}@{band}-{method}"
+    if band in asked.ablations.bands and method in asked.ablations.methods:
+        return f"ablation_{step}@{band}-{method}"
+    return None
 
 
 def unmounted(band: str, root: str | Path = ".") -> list[str]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
+from app.safety import of_mounting, tell
 from pipeline.base.errors import UserError
 from pipeline.recording.input.frames import Transform
 
@@ -40,7 +41,10 @@ class Earlier:
 
 
 def read_earlier(path: Path, params) -> Earlier:
-    """Read a recording as far as a plan needs it: no pictures. Raises UserError."""
+    """Read a recording as far as a plan needs it: no pictures. Raises UserError.
+
+    Of several pulls, the first that can be used.
+    """
     from pipeline.recording.geometry import geometry_of
     from pipeline.recording.input.reader import read_recording
     from pipeline.recording.pulls import pulls_of
@@ -49,14 +53,20 @@ def read_earlier(path: Path, params) -> Earlier:
     recording = read_recording(Path(path), params.setup)
     geometry = geometry_of(recording, params.setup)
     source, frame = geometry.sources["base_to_fork"], recording.pose.frame
+    problem = None
     try:
-        signals = signals_of(pulls_of(recording, params.setup)[0], geometry, params)
+        for pull in pulls_of(recording, params.setup):
+            try:
+                signals = signals_of(pull, geometry, params)
+            except UserError as error:
+                problem = problem or f"{path}: {str(error).removeprefix(f'{path}: ')}"
+                continue
+            force = float(np.linalg.norm(signals.facts["hold_force"]))
+            drawn = signals.hand(signals.release_time)
+            return Earlier(path, geometry.base, source, frame, force, drawn, None)
     except UserError as error:
         problem = f"{path}: {error}"
-        return Earlier(path, geometry.base, source, frame, None, None, problem)
-    force = float(np.linalg.norm(signals.facts["hold_force"]))
-    drawn = signals.hand(signals.release_time)
-    return Earlier(path, geometry.base, source, frame, force, drawn, None)
+    return Earlier(path, geometry.base, source, frame, None, None, problem)
 
 
 @dataclass(frozen=True)
@@ -143,10 +153,9 @@ def predict(
 def _simulated(params, band: str, drawn: np.ndarray, path: Path) -> float:
     from pipeline.sling.launch import launch
     from pipeline.sling.theta import calibrated, load_theta, vector
-    from stages.start import note_unmounted
 
     content = load_theta(path, band)
-    note_unmounted(band)
+    tell(of_mounting(band, Path()))
     force = float(
         launch(calibrated(params, band, content), vector(content), drawn[1:]).hold_force[0]
     )

@@ -15,6 +15,7 @@ from app.plan.force import Held, Prediction, predict, read_earlier
 from app.plan.hand import along_pull, quaternion
 from app.plan.pull import hanging_middle, trajectory_of
 from app.plan.trajectory import Trajectory
+from app.sizes import band_to_come
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_json, write_text
 from pipeline.params import expect_known
@@ -160,6 +161,29 @@ class Plan:
         except OSError as error:
             raise UserError(f"{folder}: cannot be written ({error.strerror})") from error
         return files
+
+
+def with_band(
+    params,
+    name: str | None,
+    mass: float | None = None,
+    diameter: float | None = None,
+    rest_length: float | None = None,
+):
+    """Params and a band's name: of a band that is there, or with sizes of one that is not yet.
+
+    Raises:
+        UserError: Neither a name nor sizes, or both for one band.
+    """
+    if mass is diameter is rest_length is None:
+        if name is None:
+            raise UserError("give --band, or --diameter and --rest-length of a band to come")
+        return params, name
+    if name in params.bands:
+        raise UserError(f"--band {name} brings its sizes from params.yaml: leave the others out")
+    band = band_to_come(params, mass, diameter, rest_length)
+    name = name or "new"
+    return params.model_copy(update={"bands": {**params.bands, name: band}}), name
 
 
 def plan_recording(

@@ -7,16 +7,14 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-from pydantic import ValidationError
 
 from app.preflight.coverage import by_phase, coverage, over_time
 from app.preflight.report import CheckReport, Topic
 from app.preflight.tips import Tips, along, measure_tips
 from app.preflight.verdict import cautions_of
+from app.sizes import DIAMETER, REST_LENGTH, band_to_come
 from pipeline.base.errors import UserError
-from pipeline.base.schema import explained
 from pipeline.params import expect_known
-from pipeline.params.lab import BandParams
 from pipeline.recording.build import Processed, process_recording
 from pipeline.recording.delays import Delays, delays_of
 from pipeline.recording.geometry import geometry_of
@@ -29,7 +27,6 @@ from pipeline.recording.view import Scene
 
 __all__ = ["Look", "check_recording", "coverage", "look_at"]
 
-ANY_BAND = SimpleNamespace(diameter=0.010, rest_length=0.52)  # where none is named
 ASSUMED = "assumed: give --band, or --diameter and --rest-length"
 
 
@@ -71,7 +68,7 @@ def look_at(
         pull: Which of several; None for the first that can be used, if there is one.
     """
     container = read_container(Path(path))
-    about = band or ANY_BAND
+    about = band or SimpleNamespace(diameter=DIAMETER, rest_length=REST_LENGTH)
     report = CheckReport(
         path=str(path),
         sha256=sha256(path),
@@ -109,7 +106,7 @@ def band_of(
     """The band that a command line names, None where it names none, and where it is from.
 
     Raises:
-        UserError: about a name that is not known, or sizes that no band of this fork can have.
+        UserError: about a name that is not known, or a band that does not reach across the fork.
     """
     if name is not None and (diameter or rest_length):
         raise UserError("--band brings its diameter and rest length: leave the other two out")
@@ -118,19 +115,7 @@ def band_of(
         return params.bands[name], f"bands.{name} of params.yaml"
     if diameter is None and rest_length is None:
         return None, ASSUMED
-    sizes = {
-        "diameter": diameter or ANY_BAND.diameter,
-        "rest_length": rest_length or ANY_BAND.rest_length,
-    }
-    try:
-        band = BandParams(source="recording", mass=0.01, **sizes)  # the mass is not asked for
-    except ValidationError as error:
-        raise UserError(f"--{explained(error, BandParams).replace('_', '-', 1)}") from None
-    if band.rest_length <= params.setup.fork_width:
-        raise UserError(
-            f"--rest-length {band.rest_length:g}: must be longer than setup.fork_width"
-            f" {params.setup.fork_width:g}"
-        )
+    band = band_to_come(params, None, diameter, rest_length)
     left = [n for n, v in (("--diameter", diameter), ("--rest-length", rest_length)) if v is None]
     return band, f"given, but assumed: {left[0]}" if left else "given"
 

@@ -16,6 +16,7 @@ def check(
     diameter: float | None = None,
     rest_length: float | None = None,
     as_json: bool = False,
+    frames: bool = False,
     sheet: Path | None = None,
     rrd: Path | None = None,
     pull: int | None = None,
@@ -28,6 +29,7 @@ def check(
         band: One of params.bands.
         diameter, rest_length: Of a band that is not there yet [m].
         as_json: The report as JSON, with what was drawn under `written`.
+        frames: There, a row a picture under `coverage`.
         sheet, rrd: Files to write.
         pull: Which of several; None for the first that can be used, if there is one.
 
@@ -53,4 +55,4 @@ def check(
         with written(rrd):
             look.report.written.append(write_timeline(look, params, rrd))
     report = look.report
-    return report.to_json() if as_json else report.to_text(), int(not report.usable)
+    return report.to_json(frames) if as_json else report.to_text(), int(not report.usable)

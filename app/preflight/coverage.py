@@ -11,6 +11,10 @@ from pipeline.recording.view import Scene
 COVERED = 1.5  # diameters from a point of the cloud to the part of the band that it stands for
 FINGERS = 0.05  # m of a slack band that the open or closed hand may hide
 RECOIL = 0.15  # s after the release
+# From the plane in which a slack band hangs [m]: six sound recordings have no point beyond 16 mm,
+# and a hand's or an arm's points lie 3 cm off and more.
+OFF_PLANE = 0.02
+LIFTED = 0.5  # of the way to the tips' height, from which the slack band may swing
 PHASES = ("hanging", "held", "drawn", "recoil", "swing")
 
 
@@ -59,6 +63,23 @@ def share_covered(scene: Scene, time: float, points: np.ndarray) -> float:
     return float(np.mean(gaps < COVERED * scene.diameter))
 
 
+def share_off_plane(scene: Scene, time: float, points: np.ndarray) -> float | None:
+    """Share of points that lie off the plane through the tips and the hand that holds the band.
+
+    Before the grasp it is the upright plane through the tips. None where the band need not lie in
+    such a plane: drawn, swinging, or lifted.
+    """
+    if not len(points) or time >= scene.signals.release_time:
+        return None
+    down = np.array([0.0, -1.0])  # y, z
+    if scene.holds(time):
+        down = scene.signals.hand(time)[1:]
+        if down[1] > LIFTED * scene.signals.hand(scene.signals.grasp_time)[2]:
+            return None
+    across = np.array([down[1], -down[0]]) / np.linalg.norm(down)
+    return float(np.mean(np.abs(points[:, 1:] @ across) > OFF_PLANE))
+
+
 def phase(scene: Scene, time: float) -> str:
     """One of PHASES."""
     signals = scene.signals
@@ -77,6 +98,7 @@ def over_time(done: Processed, start: float) -> list[dict]:
             "phase": phase(done.scene, time),
             "points": len(points),
             "coverage": round(share_covered(done.scene, time, points), 4),
+            "off_plane": share_off_plane(done.scene, time, points),
         }
         for time, points in zip(done.clouds.time, done.clouds.points, strict=True)
     ]

@@ -127,28 +127,32 @@ class CheckReport:
             return f"cannot be used: {self.problem}"
         return "can be used, but:" if self.cautions else "can be used"
 
-    def to_json(self) -> str:
+    def to_json(self, frames: bool = False) -> str:
+        """As one object; `frames` adds `coverage`, a row for each picture."""
         content = {**asdict(self), "usable": self.usable, "verdict": self.verdict}
+        if not frames:
+            del content["coverage"]
         return json.dumps(content, indent=2, allow_nan=False)
 
     def to_text(self) -> str:
-        lines = [f"{self.path}  sha256 {self.sha256[:16]}", "", *_topics(self.topics)]
-        for title in ("band", "frames", "signals", "cloud"):
+        """The verdict, what it rests on, and then everything else."""
+        lines = [f"{self.path}  sha256 {self.sha256[:16]}", "", *self._verdict(), *self.written]
+        lines += [f"lost or mended: {loss}" for loss in self.losses]
+        lines += [f"note: {note}" for note in self.notes]
+        lines += _phases(self.phases) + _extrinsics(self.extrinsics) + _delays(self.delays)
+        for title in ("band", "signals", "cloud", "frames"):
             facts = getattr(self, title)
             if facts:
                 lines += ["", title, *(f"  {k:<22}{_shown(v)}" for k, v in facts.items())]
-        lines += _phases(self.phases) + _delays(self.delays) + _extrinsics(self.extrinsics)
-        lines += ["", *(f"lost or mended: {loss}" for loss in self.losses)]
-        lines += [f"note: {note}" for note in self.notes]
-        if len(self.pulls) > 1:
-            heads = "".join(f"{name:>13}" for name in ("grasp [s]", "release [s]", "peak [N]"))
-            lines += ["", f"{'pull':>6}{heads}", *map(str, self.pulls), ""]
-            lines += [f"pull {self.pull} of {len(self.pulls)}: {self.verdict}"]
-        else:
-            lines += [self.verdict]
-        lines += [f"  - {caution}" for caution in self.cautions]
-        lines += ["", *self.written] if self.written else []
-        return "\n".join(lines)
+        return "\n".join([*lines, "", *_topics(self.topics)])
+
+    def _verdict(self) -> list[str]:
+        cautions = [f"  - {caution}" for caution in self.cautions]
+        if len(self.pulls) <= 1:
+            return [self.verdict, *cautions]
+        heads = "".join(f"{name:>13}" for name in ("grasp [s]", "release [s]", "peak [N]"))
+        about = f"pull {self.pull} of {len(self.pulls)}: {self.verdict}"
+        return [about, *cautions, "", f"{'pull':>6}{heads}", *map(str, self.pulls)]
 
 
 def _topics(topics: list[Topic]) -> list[str]:

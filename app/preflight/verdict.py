@@ -17,6 +17,7 @@ MISSING = 0.05  # share of the messages
 FORCE_RATE, PICTURE_RATE = 900.0, 20.0  # Hz
 COVERAGE = {"hanging": 0.7, "drawn": 0.9, "recoil": 0.6, "swing": 0.7}
 EMPTY = 0.05  # share of the pictures
+FOREIGN = 0.02  # share of a picture's points
 TIPS_OFF, HAND_OFF = 0.004, 0.006  # m
 SURE = 3.0  # standard errors from which something is more than noise
 NOISE = DRIFT = SETTLED = 0.02  # of the held force; drift from grasp to release
@@ -196,6 +197,16 @@ def _of_pictures(report: CheckReport) -> Iterator[Caution]:
     for phase in (phase for phase in SEEN_AS if phase not in shown):
         what = f"no picture shows how the band {SEEN_AS[phase]}"
         yield Caution("unseen", what, "record the camera from before the grasp until it has swung")
+    told = [row for row in report.coverage if row["off_plane"] is not None]
+    foreign = [row for row in told if row["off_plane"] > FOREIGN]
+    if foreign:
+        times = f"{foreign[0]['time']:.2f} - {foreign[-1]['time']:.2f} s"
+        yield Caution(
+            "off_plane",
+            f"{len(foreign)} of {len(told)} pictures of the hanging band hold points off the plane"
+            f" that it hangs in ({times}): the hand, the arm or the background",
+            look,
+        )
     facts = report.cloud
     if facts["empty"] > EMPTY * facts["frames"]:
         what = f"{facts['empty']} of {facts['frames']} pictures show no band"

@@ -43,7 +43,7 @@ class Fit:
         expansions: Of each recording there.
         misfit: -2 log p there, priors included.
         steps: How many expansions it took.
-        settled: Whether the last step was small.
+        settled: Whether the next step would be small, hardly damped.
     """
 
     phi: np.ndarray
@@ -99,9 +99,10 @@ def fit(
             else:
                 damp *= HARDER
             step = _step(best, coordinates, damp)
-            size = np.abs(step) * np.sqrt(np.diag(best.hessian))
-            if size.max() < STILL or damp > HARDEST:
-                return replace(best, settled=True, steps=steps)
+            if _size(best, step) < STILL or damp > HARDEST:
+                # Damping makes any step short, also where the fit is stuck.
+                free = _step(best, coordinates, min(damp, DAMP))
+                return replace(best, settled=_size(best, free) < STILL, steps=steps)
             phi = best.phi + step
             nuisances = np.array(
                 [
@@ -110,6 +111,11 @@ def fit(
                 ]
             )
     return replace(best, steps=steps)
+
+
+def _size(fit: Fit, step: np.ndarray) -> float:
+    """Of a step (D,), in standard deviations of a coordinate given the others."""
+    return float((np.abs(step) * np.sqrt(np.diag(fit.hessian))).max())
 
 
 def _steps(coordinates: Coordinates, phi: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 """The command line: what it accepts, and that every mistake is one line without a traceback."""
 
-import argparse
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from app import __version__, bench, cli
-from app.arguments import address, draw, positive, shown
+from app.command_line import COMMANDS, EXITS
 from pipeline.sling.material import THETA
 from tests.policy.linear import write_policy
 from tests.project import ROOT, python
@@ -36,18 +36,25 @@ def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
     return run
 
 
-def test_draw_is_two_numbers_behind_the_fork() -> None:
-    assert draw("-0.30,-0.17") == (-0.30, -0.17)
-    for wrong in ("", "-0.3", "-0.3,", "-0.3,a", "-0.3,-0.1,0", "0.3,-0.1", "nan,0", "-inf,0"):
-        with pytest.raises(argparse.ArgumentTypeError):
-            draw(wrong)
+def examples() -> list[tuple[str, str]]:
+    return [(name, one.example) for name, one in COMMANDS.items()]
 
 
-def test_positive_numbers() -> None:
-    assert positive("0.0408") == 0.0408
-    for wrong in ("0", "-1", "nan", "inf", "a", ""):
-        with pytest.raises(argparse.ArgumentTypeError):
-            positive(wrong)
+@pytest.mark.parametrize(("name", "example"), examples())
+def test_each_example_is_understood_and_stands_in_the_help(name: str, example: str, capsys) -> None:
+    parsed = cli.parser().parse_args([name, *example.split()])
+    assert parsed.command is COMMANDS[name].run
+    with pytest.raises(SystemExit) as ended:
+        cli.parser().parse_args([name, "--help"])
+    assert ended.value.code == 0
+    assert f"example:  sling {name} {example}\n" in capsys.readouterr().out
+
+
+def test_the_help_documents_each_exit_status(capsys) -> None:
+    with pytest.raises(SystemExit):
+        cli.parser().parse_args(["--help"])
+    said = capsys.readouterr().out.partition("exit status:")[2]
+    assert [int(line.split()[0]) for line in said.splitlines() if line.strip()] == [*EXITS]
 
 
 def test_the_documented_commands_are_understood() -> None:
@@ -68,6 +75,7 @@ def test_the_documented_commands_are_understood() -> None:
     assert (launched.theta, launched.draw) == (Path("t.json"), (-0.30, -0.17))
     aimed = parse("aim --band band1 --target 1.925".split())
     assert (aimed.method, aimed.target, aimed.json) == ("least_squares", 1.925, False)
+    assert not aimed.force and parse("aim --band b --target 2 --force".split()).force
     assert parse("aim --band band1 --method m --target 1.925".split()).method == "m"
     assert parse("bench --device cuda:0 --json".split()).device == "cuda:0"
     assert bench.asked(parse("bench --law rubber --json".split())) == ""
@@ -76,20 +84,6 @@ def test_the_documented_commands_are_understood() -> None:
     )
     assert bench.asked(parse("bench --methods --device cuda --json".split())) == "methods"
     assert bench.asked(parse("bench --peers".split())) == "peers"
-    for right in ("tcp://10.0.0.5:8786", "head:8786", "tls://[::1]:8786"):
-        assert address(right) == right
-
-
-def test_results_are_json_or_lines() -> None:
-    content = {"landing_y_m": None, "interval_90_m": [1.0, 1.25], "failure": "broke"}
-    assert json.loads(shown(content, True)) == content
-    assert shown(content, False).splitlines() == [
-        "landing_y_m    -",
-        "interval_90_m  1 1.25",
-        "failure        broke",
-    ]
-    with pytest.raises(ValueError, match="JSON"):
-        shown({"x": float("nan")}, True)
 
 
 def test_a_command_line_that_makes_no_sense(refused) -> None:
@@ -101,11 +95,16 @@ def test_a_command_line_that_makes_no_sense(refused) -> None:
         ("launch --theta t.json --band band1 --draw=0.30,-0.17", "y must be below 0"),
         ("launch --theta t.json --band band1 --draw=-0.30", "must be Y,Z such as"),
         ("aim --band band1 --target inf", "must be a number, got 'inf'"),
-        ("aim --band band1 --target 1e30", "must be at most 100 m"),
+        ("aim --band band1 --target 1e30", "must be in metres, from 0.1 to 20, got 1e30"),
         ("aim --band band1 --target far", "must be a number, got 'far'"),
-        ("aim --band band1 --target -1.9", "must be above 0"),
+        ("aim --band band1 --target -1.9", "from 0.1 to 20, got -1.9"),
         ("aim --band band1", "required: --target"),
-        ("add-band new --recording new.mcap --mass 0", "must be above 0"),
+        ("add-band new --recording new.mcap --mass 40.8", "looks like grams (0.0408)"),
+        ("check a.mcap --rest-length 52", "argument --rest-length: must be in metres, from 0.05"),
+        ("check a.mcap --diameter 10", "argument --diameter: must be in metres, from 0.0005"),
+        ("launch --theta t.json --band band1 --draw=-2.30,0", "from 0.05 to 2, got 2.3"),
+        ("observe --band band1 --draw=-0.3,-0.2 --landing 221", "looks like centimetres (2.21)"),
+        ("plan --band band1 --rate 1e9", "argument --rate: must be in hertz, from 1 to 10000"),
         ("flow --cluster foo", "must be such as tcp://10.0.0.5:8786, got 'foo'"),
         ("bench --budget large", "argument --budget: used by --methods and --scaling alone"),
         ("bench --recording a.mcap --device cpu", "argument --device: not used by --recording"),
@@ -125,13 +124,15 @@ def test_a_users_mistake(tmp_path: Path, refused) -> None:
         ("launch --theta none.json --band band1 --draw=-0.30,-0.17", "none.json: no such file"),
         ("launch --theta none.json --band band9 --draw=-0.30,-0.17", "band band9: not in params"),
         ("launch --theta none.json --band band1 --draw=-0.30,-0.60", "lies below the floor"),
-        ("launch --theta none.json --band band1 --draw=-2.30,0", "at most 2 m from the fork"),
         ("aim --band band9 --target 1.925", "band band9: not in params.yaml"),
         ("aim --band band1 --method best --target 1.925", "method best: not in params.yaml"),
         ("check none.mcap", "none.mcap"),
         ("check none.mcap --band band9", "band9"),
         ("check none.mcap --sheet none/out.png", "none"),
         ("plan --band band1", "setup.base_to_fork is null"),
+        ("plan", "give --band, or --diameter and --rest-length"),
+        ("plan --band band1 --rest-length 0.5", "--band band1 brings its sizes from params.yaml"),
+        ("plan --rest-length 0.2", "--rest-length 0.2: must be longer than setup.fork_width"),
         ("plan --band band9", "band band9: not in params.yaml"),
         ("plan --band band1 --recording none.mcap", "none.mcap: no such file"),
         ("bench --recording none.mcap", "none.mcap: no such file"),
@@ -141,9 +142,10 @@ def test_a_users_mistake(tmp_path: Path, refused) -> None:
 
 
 def test_the_version_and_a_mistake_as_a_process() -> None:
-    done = python("-m", "app.cli", "--version")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == f"sling2sim2real {__version__}\n"
+    for module in ("app", "app.cli"):
+        done = python("-m", module, "--version")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout == f"sling2sim2real {__version__}\n"
     done = python("-m", "app.cli", "aim", "--band", "band9", "--target", "1.925")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
 
@@ -171,27 +173,31 @@ def test_aim_prints_one_json_object(tmp_path: Path) -> None:
     aimable(tmp_path)
     arguments = ("aim", "--band", "band1", "--target", "1.9")
     done = python("-m", "app.cli", *arguments, "--json", folder=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")  # what it warns of is in the answer
+    assert (done.returncode, done.stdout, done.stderr.count("\nerror: ")) == (3, "", 1)
+    assert re.search("off the target; --force answers all the same\n$", done.stderr)
+
+    done = python("-m", "app.cli", *arguments, "--json", "--force", folder=tmp_path)
+    assert done.returncode == 0
     answer = json.loads(done.stdout)
     stable = ["draw_y_m", "draw_z_m", "predicted_landing_m", "interval_90_m", "hold_force_n"]
     pose = ["pitch_rad", "tcp_frame", "tcp_position_m", "tcp_quaternion_xyzw"]
     assert list(answer) == [*stable, "max_force_n", *pose, "warnings"]
     assert answer["draw_y_m"] == pytest.approx(-0.329, abs=1e-6)
     assert answer["tcp_position_m"] is None
-    assert "setup.base_to_fork is null" in answer["warnings"][-1]
+    assert "setup.base_to_fork is null" in answer["warnings"][-1]["what"]
     assert answer["interval_90_m"][0] < answer["predicted_landing_m"] < answer["interval_90_m"][1]
+    said = [f"warning: {warning['what']}" for warning in answer["warnings"]]
+    assert done.stderr.splitlines() == said
 
     params = tmp_path / "params.yaml"
     known = "base_to_fork: [0.5, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0]"
     params.write_text(params.read_text().replace("base_to_fork: null", known))
-    done = python("-m", "app.cli", *arguments, folder=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    lines = done.stdout.splitlines()
-    shown = dict(line.split(maxsplit=1) for line in lines if not line.startswith("warning: "))
+    done = python("-m", "app.cli", *arguments, "--force", folder=tmp_path)
+    shown = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
     assert shown["tcp_position_m"] == "0.5 -0.329 0.25"
-    assert shown["max_force_n"] == "30"
-    for warning in ("the interval leaves out", "data/mounting/band1.json is missing"):
-        assert any(line.startswith(f"warning: {warning}") for line in lines)
+    assert shown["max_force_n"] == "30" and "warnings" not in shown
+    for warning in ("does not tell how well", "data/mounting/band1.json is missing"):
+        assert warning in done.stderr
 
 
 def test_aim_names_the_stage_that_makes_what_is_missing(tmp_path: Path, refused) -> None:
@@ -220,7 +226,7 @@ def test_launch_prints_one_json_object(tmp_path: Path) -> None:
     done = python("-m", "app.cli", *arguments, "--draw=-0.30,-0.17")
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
-    assert set(result) == {"landing_y_m", "speed_m_s", "hold_force_n", "failure"}
+    assert [*result] == ["landing_y_m", "speed_m_s", "hold_force_n", "failure", "warnings"]
     assert result["failure"] is None
     assert 0.5 < result["landing_y_m"] < 6.0
     assert 1.0 < result["hold_force_n"] < 30.0

@@ -39,7 +39,8 @@ def test_a_launch_is_written_below_the_others_and_the_policy_runs(put) -> None:
         "draw_y_m,draw_z_m,draw_error_m,landing_y_m\n-0.3,-0.17,,2.2\n-0.32,-0.2,0.0,3.0\n"
     )
     assert put.asked == [("repro", "policy@band1-least_squares")] * 2
-    assert first == {"file": str(file), "launches": 1, "before": None, "after": None}
+    answer = {"file": str(file), "launches": 1, "before": None, "after": None, "warnings": []}
+    assert first == answer
     assert list(file.parent.iterdir()) == [file]
 
 
@@ -62,10 +63,6 @@ def test_a_stage_that_fails_says_why_and_the_launch_stays(put) -> None:
         ({"method": "none"}, "--method none: not in params.yaml"),
         ({"method": "sling2sim2real"}, "takes no launches as evidence"),
         ({"draw": (-0.3, -0.6)}, "lies below the floor"),
-        ({"draw": (-30.0, -17.0)}, "is it in centimetres"),
-        ({"landing": 220.0}, "is it in centimetres"),
-        ({"error": 1.0}, "--draw-error: draw_error_m must be at least 0 and below 0.1 m"),
-        ({"error": -0.001}, "--draw-error"),
     ],
 )
 def test_refuses_what_is_no_launch(put, wrong: dict, message: str) -> None:
@@ -86,6 +83,28 @@ def test_refuses_a_launch_that_is_there_or_a_score(put) -> None:
     assert len((put.layout.evidence / "band1.csv").read_text().splitlines()) == 2
 
 
+def test_a_launch_far_from_its_prediction_is_doubted_before_stages_run(
+    put, monkeypatch, capsys
+) -> None:
+    """An interval of 90 % from 1.9 to 2.1 m: a standard deviation of 0.1 / 1.645 m."""
+    told = {"landing_m": 2.0, "interval_90_m": [1.9, 2.1], "failure": None}
+    monkeypatch.setattr(observe, "known", lambda *_: told)
+    for landing, doubts in ((2.17, 0), (1.83, 0), (2.19, 1), (1.81, 1)):
+        answer = put.run((-0.3, -landing / 10), landing)
+        assert [one["about"] for one in answer["warnings"]] == ["miss"] * doubts
+        assert capsys.readouterr().err.count("3 standard deviations from") == doubts
+    monkeypatch.setattr(observe, "known", lambda *_: told | {"interval_90_m": None})
+    assert put.run((-0.4, -0.2), 9.0)["warnings"] == []
+
+
+def test_a_launch_that_fails_in_simulation_is_told(put, monkeypatch, capsys) -> None:
+    told = {"landing_m": None, "interval_90_m": None, "failure": "the band is slack"}
+    monkeypatch.setattr(observe, "known", lambda *_: told)
+    (warning,) = put.run()["warnings"]
+    assert warning["about"] == "failure" and "counts for nothing" in warning["what"]
+    assert capsys.readouterr().err == f"warning: {warning['what']}\n"
+
+
 def test_what_is_said_before_and_after() -> None:
     told = {
         "landing_m": 2.0,
@@ -102,7 +121,6 @@ def test_what_is_said_before_and_after() -> None:
         " (90 %: 0.900 to 1.100)",
         "after   landing fails in simulation: the band is slack, returned share 1.000"
         " (90 %: 0.900 to 1.100)",
-        "warning: a launch that fails in simulation counts for nothing",
         "measured  2.200 m",
     ]
 

@@ -137,10 +137,11 @@ def test_a_base_that_is_not_known_is_one_warning(tmp_path) -> None:
     pose = at(-0.3, -0.3, standing(None), tmp_path)
     assert [pose[name] for name in pose if name.startswith("tcp")] == [None, None, None]
     assert pose["pitch_rad"] == pytest.approx(np.pi / 4)
-    before, warning = pose["warnings"]
+    before, warning = pose["warnings"][0], pose["warnings"][1].what
     assert before == "as before" and "setup.base_to_fork is null" in warning
     (tmp_path / RECORDING).parent.mkdir(parents=True)
     (tmp_path / RECORDING).write_bytes(b"no recording")
     damaged = at(-0.3, -0.3, standing(None), tmp_path)
     assert damaged["tcp_position_m"] is None
-    assert "band1.mcap" in damaged["warnings"][1] and "\n" not in damaged["warnings"][1]
+    said = damaged["warnings"][1].what
+    assert "band1.mcap" in said and "\n" not in said

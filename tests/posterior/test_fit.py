@@ -91,6 +91,13 @@ def test_it_settles_only_where_the_steps_end(monkeypatch):
     assert not cut.settled and cut.steps == 2
 
 
+def test_it_is_not_settled_where_it_is_stuck():
+    """Everything but its start fails: its damped steps get short, and the minimum stays away."""
+    stuck = fit(curves(1, fails=lambda phi: not np.allclose(phi, START)), space(), START)
+    assert not stuck.settled and stuck.steps < module.ITERATIONS
+    np.testing.assert_array_equal(stuck.phi, START)
+
+
 def test_bins_are_kept_after_the_first_iterations(monkeypatch):
     """Or the density would change its form with each step."""
     monkeypatch.setattr(module, "STILL", 0.0)

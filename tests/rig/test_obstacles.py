@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.aim import aim
+from app.aim import aim, why_refused
 from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK
 from pipeline.landing.landing_map import LandingMap
 from pipeline.policy.environment import SlingshotEnv
@@ -81,4 +81,4 @@ def test_aiming_says_so(low, tmp_path) -> None:
     file.write_text(json.dumps({"band": "band1", "theta": theta}))
     answer = aim(world, "band1", name, 1.925, tmp_path, launcher=launcher)
     assert answer["predicted_landing_m"] is None and answer["interval_90_m"] is None
-    assert f"the launch fails in simulation: {DRAGGED}" in answer["warnings"]
+    assert f"the launch fails in simulation: {DRAGGED}" == why_refused(answer)

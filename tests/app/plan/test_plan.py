@@ -12,12 +12,13 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 from app.plan import limits
-from app.plan.force import Earlier, Held, predict
+from app.plan.force import Earlier, Held, predict, read_earlier
 from app.plan.messages import COLUMNS
-from app.plan.plan import plan_recording
+from app.plan.plan import plan_recording, with_band
 from app.plan.trajectory import Phase, Trajectory
 from pipeline.base.errors import UserError
 from pipeline.params import Params, load
+from pipeline.recording.input.reader import read_recording
 from tests.project import ROOT, with_
 from tests.recording.bag import BASE, HAND, REST, Truth, write_bag
 
@@ -365,6 +366,43 @@ def test_an_earlier_recording_gives_base_frame_and_force(recorded) -> None:
     weak = with_(unknown, "setup", max_force=force - 2)
     with pytest.raises(UserError, match=r"N more than setup.max_force .*--draw=-0\.\d\d,0\.00"):
         plan_recording(weak, "band1", recording=path)
+
+
+def test_a_band_to_come_is_planned_by_its_sizes(params) -> None:
+    known, name = with_band(params, "band1")
+    assert (known, name) == (params, "band1")
+    longer, name = with_band(params, None, 0.04, 0.02, 0.6)
+    assert name == "new" and longer.bands["new"].rest_length == 0.6 and "new" not in params.bands
+    assert plan_recording(longer, name).stretch < plan_recording(params, "band1").stretch
+    assert with_band(params, "red", None, None, 0.6)[1] == "red"
+    for arguments, words in (
+        ((None,), "give --band, or --diameter and --rest-length of a band to come"),
+        (("band1", 0.04), "--band band1 brings its sizes from params.yaml"),
+        ((None, None, None, 0.2), "--rest-length 0.2: must be longer than setup.fork_width 0.275"),
+    ):
+        with pytest.raises(UserError, match=words):
+            with_band(params, *arguments)
+
+
+def test_of_several_pulls_the_first_that_can_be_used_tells(recorded, monkeypatch) -> None:
+    """A first pull that says nothing is passed over, as `check` does."""
+    from pipeline.recording import pulls, signals
+
+    path, _, params, truth = recorded
+    (whole,) = pulls.pulls_of(read_recording(path, params.setup), params.setup)
+    tell = signals.signals_of
+
+    def signals_of(pull, *others):
+        if pull == "bad":
+            raise UserError("nothing is drawn")
+        return tell(pull, *others)
+
+    monkeypatch.setattr(signals, "signals_of", signals_of)
+    monkeypatch.setattr(pulls, "pulls_of", lambda *_: ["bad", whole])
+    force = float(np.linalg.norm(truth.force(truth.release - 0.1)))
+    assert read_earlier(path, params).force == pytest.approx(force, rel=0.01)
+    monkeypatch.setattr(pulls, "pulls_of", lambda *_: ["bad", "bad"])
+    assert read_earlier(path, params).problem == f"{path}: nothing is drawn"
 
 
 def test_a_recording_without_a_pull_gives_the_frame_alone(recorded, tmp_path) -> None:

@@ -1,0 +1,118 @@
+"""How the `sling` command is put together: a table of commands, each a small function.
+
+A user's mistake is one line on stderr.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NoReturn
+
+from app import __version__
+from pipeline.base.errors import UserError
+
+Done = str | tuple[str, int]  # what to print, and an exit status that is not 0
+EXITS = {
+    0: "done",
+    1: "a mistake in what was given, or a recording that cannot be used: one line says which",
+    2: "a command line that cannot be understood",
+    3: "refused: a draw that misses its target, or fails, in simulation (`sling aim`)",
+    130: "interrupted",
+}
+REFUSED = 3
+
+
+class Refusal(UserError):
+    """A command could answer, but should not: a robot may listen."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A row of the table.
+
+    Attributes:
+        help: What it does, in a line.
+        example: Arguments with which it works.
+        flags: As argparse's `add_argument` takes them: names and options.
+        run: Given the arguments.
+    """
+
+    help: str
+    example: str
+    flags: tuple[tuple[tuple, dict], ...]
+    run: Callable[[argparse.Namespace], Done]
+
+
+COMMANDS: dict[str, Command] = {}
+
+
+def command(help: str, example: str, *flags: tuple) -> Callable:
+    """Put a function into the table, under its own name."""
+
+    def put(function: Callable[[argparse.Namespace], Done]) -> Callable:
+        COMMANDS[function.__name__.replace("_", "-")] = Command(help, example, flags, function)
+        return function
+
+    return put
+
+
+def flag(*names: str, **options) -> tuple[tuple, dict]:
+    """An argument of a command, as argparse's `add_argument` takes it."""
+    return names, options
+
+
+JSON = flag("--json", action="store_true", help="print one JSON object instead of text")
+
+
+class Parser(argparse.ArgumentParser):
+    """A command line that cannot be understood is one line too."""
+
+    def error(self, message: str) -> NoReturn:
+        if "--draw: expected one argument" in message:
+            message += ", joined by = because it begins with -: --draw=-0.30,-0.17"
+        self.exit(2, f"error: {message} (see `{self.prog} --help`)\n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The whole command line."""
+    lines = [f"  {status:<5}{meaning}" for status, meaning in EXITS.items()]
+    top = Parser(
+        prog="sling",
+        description="From a recording of an elastic band to a slingshot policy.",
+        epilog="\n".join(["exit status:", *lines]),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    top.add_argument("--version", action="version", version=f"sling2sim2real {__version__}")
+    commands = top.add_subparsers(required=True, metavar="COMMAND")
+    for name, one in COMMANDS.items():
+        sub = commands.add_parser(
+            name,
+            help=one.help,
+            description=f"{one.help[0].upper()}{one.help[1:]}.",
+            epilog=f"example:  sling {name} {one.example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        for names, options in one.flags:
+            sub.add_argument(*names, **options)
+        sub.set_defaults(command=one.run, refuse=sub.error)
+    return top
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Run a command and print its text; whatever a library prints goes to stderr.
+
+    Returns its exit status.
+    """
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            done = arguments.command(arguments)
+    except Refusal as refusal:
+        print(f"error: {refusal}", file=sys.stderr)
+        return REFUSED
+    text, status = done if isinstance(done, tuple) else (done, 0)
+    print(text)
+    return status

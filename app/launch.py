@@ -1,0 +1,53 @@
+"""Launch: one draw in the simulator, with identified or hand-written parameters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from app import safety
+from app.aim import pull_and_pause
+from app.arguments import finite
+from pipeline.base.errors import UserError
+from pipeline.params import expect_known
+from pipeline.sling.launch import launch
+from pipeline.sling.theta import calibrated, load_theta, vector
+
+
+def expect_above_floor(params, draw: tuple[float, float]) -> None:
+    """Raises UserError where a draw (y, z) [m] lies below the floor."""
+    floor = -params.setup.fork_height
+    if draw[1] < floor:
+        raise UserError(
+            f"--draw: z = {draw[1]:g} m lies below the floor, z = {floor:g} m"
+            " (setup.fork_height in params.yaml)"
+        )
+
+
+def launched(
+    params, band: str, theta: Path, draw: tuple[float, float], root: str | Path = "."
+) -> dict:
+    """What `sling launch --json` says of a draw (y, z) [m]; `warnings` are of app.safety.
+
+    Raises:
+        UserError: Unknown band, a draw that cannot be, or a θ file that is missing or wrong.
+    """
+    expect_known(params, "band", band)
+    expect_above_floor(params, draw)
+    content, root = load_theta(theta, band), Path(root)
+    sling = calibrated(params, band, content, root)
+    result = launch(sling, vector(content), draw, max_force=params.setup.max_force)
+    force, failure = result.hold_force[0], result.failure[0]
+    return {
+        "landing_y_m": finite(result.landing_y[0]),
+        "speed_m_s": finite(result.speed[0]),
+        "hold_force_n": finite(force),
+        **pull_and_pause(params, content),
+        "failure": failure,
+        "warnings": [
+            *safety.of_launch(params, force, failure),
+            *safety.of_draw(params, band, draw, root),
+            *safety.of_confidence(content, theta),
+            *safety.of_identification(params, content, theta, root),
+            *safety.of_mounting(band, root),
+        ],
+    }

@@ -1,0 +1,150 @@
+"""What a robot must hear before it carries out a draw: what the numbers do not rest on."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from app import arguments
+from app.trained_with import Change, since_card, since_run
+from pipeline.base.layout import Layout, NotMade, owner
+from pipeline.episode.episode import Episode
+from pipeline.landing.stored import Stored
+from pipeline.launches.stretch import recorded_stretch, stretch_of
+from stages.start import stage_of, unmounted
+
+MISS = 0.05  # m from the target, in simulation, from which no pose is given
+ROUNDING = 1e-3  # of a stretch
+TOLD = 3  # changed keys at most
+
+About = Literal[
+    "box", "stretch", "force", "confidence", "params", "mounting", "target", "miss", "failure",
+    "interval", "pose",
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Hazard:
+    """A reason not to trust an answer: `about` is for programs, `what` for people."""
+
+    about: About
+    what: str
+
+
+def tell(hazards: Iterable[Hazard]) -> None:
+    """On stderr, a line each."""
+    for hazard in hazards:
+        print(f"warning: {hazard.what}", file=sys.stderr)
+
+
+def as_json(hazards: Iterable[Hazard]) -> list[dict[str, str]]:
+    return [asdict(hazard) for hazard in hazards]
+
+
+def shown(answer: dict, to_json: bool) -> str:
+    """An answer with its `warnings`, which are told first: as one JSON object, or as lines."""
+    hazards = answer["warnings"]
+    tell(hazards)
+    if to_json:
+        return arguments.shown({**answer, "warnings": as_json(hazards)}, True)
+    return arguments.shown({k: v for k, v in answer.items() if k != "warnings"}, False)
+
+
+def of_draw(params, band: str, draw: tuple[float, float], root: Path) -> Iterator[Hazard]:
+    """A draw (y, z) [m] outside the box, or further than the band was drawn in its recordings."""
+    for axis, value in zip("yz", draw, strict=True):
+        low, high = getattr(params.setup, f"draw_{axis}")
+        if not low - 1e-6 <= value <= high + 1e-6:
+            yield Hazard(
+                "box",
+                f"the draw's {axis} = {value:g} m lies outside setup.draw_{axis}"
+                f" [{low:g}, {high:g}], where the arm reaches",
+            )
+    folder = Layout(root).episodes(band)
+    episodes = [Episode.load(one.parent) for one in sorted(folder.glob("*/signals.parquet"))]
+    if not episodes:
+        yield Hazard("stretch", f"{folder} is missing, so nothing tells how far the band was drawn")
+        return
+    sizes = params.setup.fork_width, params.bands[band].rest_length
+    asked = float(stretch_of(np.array([[0.0, *draw]]), *sizes)[0])
+    recorded = max(recorded_stretch(episode, *sizes) for episode in episodes)
+    if asked > recorded + ROUNDING:
+        yield Hazard(
+            "stretch",
+            f"the draw stretches the band by {100 * (asked - 1):.1f} %, its recordings by"
+            f" {100 * (recorded - 1):.1f} % at most: force and landing are extrapolated",
+        )
+
+
+def of_launch(params, force: float, failure: str | None) -> Iterator[Hazard]:
+    """A simulated launch that fails, or whose draw takes more force [N] than the arm may hold."""
+    if failure:
+        yield Hazard("failure", f"the launch fails in simulation: {failure}")
+    elif force > params.setup.max_force:
+        yield Hazard(
+            "force",
+            f"holding this draw takes {force:.1f} N, more than setup.max_force"
+            f" {params.setup.max_force:g} N",
+        )
+
+
+def of_confidence(content: dict, path: Path) -> Iterator[Hazard]:
+    """A θ file (its content) that is not sure of itself."""
+    confidence = content.get("confidence")
+    if not confidence:
+        what = f"{path} does not tell how well its parameters are known, and no interval does"
+        yield Hazard("confidence", what)
+    elif not confidence.get("settled", True):
+        yield Hazard(
+            "confidence",
+            f"the fit of {path} had not settled after {confidence.get('steps', 'all its')} steps:"
+            " its values and intervals may be wrong",
+        )
+
+
+def of_identification(params, content: dict, path: Path, root: Path) -> Iterator[Hazard]:
+    """A θ file of a run whose parameters have changed since; a hand-written one has no run."""
+    known = owner(path)
+    if known and known[2]:
+        stage = stage_of(params, "theta", content["band"], known[2])
+        yield from _of_changes(since_run(root, stage) or [], "θ was identified", _mended(stage))
+
+
+def of_policy(params, band: str, method: str, content: dict, root: Path) -> Iterator[Hazard]:
+    """A policy whose parameters, or θ, are no longer those that it was trained with."""
+    stage = stage_of(params, "policy", band, method)
+    changes = since_run(root, stage)
+    try:
+        card = Stored(band, method, root).card()
+    except NotMade as error:
+        yield Hazard("params", f"{error}, so nothing tells what the policy was trained with")
+        card = {"theta": content["theta"]}
+    if changes is None:
+        changes = since_card(root, band, card)
+    yield from _of_changes(changes, "the policy was trained", _mended(stage))
+    if card.get("theta") != content["theta"]:
+        what = f"the policy was trained with another θ than there is now: {_mended(stage)}"
+        yield Hazard("params", what)
+
+
+def of_mounting(band: str, root: Path) -> list[Hazard]:
+    return [Hazard("mounting", what) for what in unmounted(band, root)]
+
+
+def _of_changes(changes: list[Change], done: str, mended: str) -> Iterator[Hazard]:
+    for change in changes[:TOLD]:
+        yield Hazard("params", f"params.yaml: {change}, since {done}: {mended}")
+    if len(changes) > TOLD:
+        names = ", ".join(change.key for change in changes[TOLD:])
+        yield Hazard("params", f"params.yaml has changed since {done} also in {names}")
+
+
+def _mended(stage: str | None) -> str:
+    if stage is None:
+        return "`run:` in params.yaml has to name band and method, then `dvc repro` mends it"
+    return f"`dvc repro {stage}` mends it"

@@ -1,0 +1,192 @@
+"""What a robot hears first: each warning, by what it is about."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from app import safety
+from pipeline.base.layout import Layout
+from pipeline.episode.episode import Episode
+from pipeline.sling.material import THETA
+from tests.project import ROOT
+
+VALUES = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
+CONTENT = {"band": "band1", "theta": VALUES, "confidence": {"settled": True, "steps": 7}}
+STAGE = "policy@band1-least_squares"
+
+
+def abouts(hazards) -> list[str]:
+    return [hazard.about for hazard in hazards]
+
+
+@pytest.fixture
+def project(tmp_path):
+    """params.yaml, and a recording that draws band1 to y = -0.3."""
+    (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
+    time = np.arange(4.0)
+    way = np.array([[0, 0, 0], [0, -0.1, 0], [0, -0.3, 0], [0, -0.9, 0]])
+    nothing = np.zeros((4, 3))
+    clouds = [np.zeros((1, 3))] * 4
+    episode = Episode(
+        "band1", time, way, nothing, nothing, time, time, clouds, 0.0, 2.0, np.zeros(3)
+    )
+    episode.save(Layout(tmp_path).episode("band1"))
+    return tmp_path
+
+
+def edit(root, old: str, new: str) -> None:
+    path = root / "params.yaml"
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+
+
+def lock(root, **stages: dict) -> None:
+    """A dvc.lock of stages with `params`, `deps` and `outs`."""
+    whole = {}
+    for name, one in stages.items():
+        paths = {key: [{"path": path} for path in one.get(key, ())] for key in ("deps", "outs")}
+        whole[name] = {**paths, "params": {"params.yaml": one["params"]}}
+    (root / "dvc.lock").write_text(json.dumps({"stages": whole}))
+
+
+def card(root, **content) -> None:
+    errors = {"draws": 1, "mean_error_m": 0.0, "max_error_m": 0.0}
+    whole = {
+        "theta": VALUES,
+        "training": {"converged": True, "mean_error_m": 0.0, "max_error_m": 0.0},
+        "landing_map": {"box": errors, "target_range": errors},
+        **content,
+    }
+    path = Layout(root).policy("band1", "least_squares") / "card.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(whole))
+
+
+def of_policy(params, root, content=CONTENT) -> list[safety.Hazard]:
+    return list(safety.of_policy(params, "band1", "least_squares", content, root))
+
+
+def test_a_draw_outside_the_box(params, project) -> None:
+    for draw, expected in (
+        ((-0.26, -0.12), []),
+        ((-0.25, -0.10), []),
+        ((-0.20, -0.12), ["box"]),
+        ((-0.20, -0.35), ["box", "box", "stretch"]),
+    ):
+        assert abouts(safety.of_draw(params, "band1", draw, project)) == expected
+
+
+def test_a_draw_beyond_the_recorded_stretch_says_both_in_per_cent(params, project) -> None:
+    """Two sides of a triangle: 0.1375 and 0.3 against 0.1375 and 0.4, rest length 0.52."""
+    edit(project, "draw_z: [-0.30, -0.10]", "draw_z: [-0.30, 0.0]")
+    (found,) = safety.of_draw(params, "band1", (-0.4, -0.1), project)
+    asked = 2 * np.hypot(0.1375, np.hypot(0.4, 0.1)) / 0.52 - 1
+    recorded = 2 * np.hypot(0.1375, 0.3) / 0.52 - 1
+    assert f"by {100 * asked:.1f} %, its recordings by {100 * recorded:.1f} % at most" in found.what
+
+
+def test_without_an_episode_the_recorded_stretch_is_unknown(params, tmp_path) -> None:
+    (found,) = safety.of_draw(params, "band1", (-0.3, -0.2), tmp_path)
+    assert found.about == "stretch" and "data/episodes/band1 is missing" in found.what
+
+
+def test_more_force_than_the_arm_may_hold(params) -> None:
+    limit = params.setup.max_force
+    assert not list(safety.of_launch(params, limit, None))
+    (found,) = safety.of_launch(params, limit + 1, None)
+    assert found.about == "force" and "31.0 N, more than setup.max_force 30 N" in found.what
+    assert abouts(safety.of_launch(params, np.nan, "it broke")) == ["failure"]
+
+
+def test_a_posterior_that_has_not_settled_or_is_not_there(tmp_path) -> None:
+    assert not list(safety.of_confidence(CONTENT, tmp_path))
+    content = CONTENT | {"confidence": {"settled": False, "steps": 14}}
+    (found,) = safety.of_confidence(content, tmp_path / "t.json")
+    assert "t.json had not settled after 14 steps" in found.what
+    for content in (CONTENT | {"confidence": None}, {"theta": VALUES}):
+        (found,) = safety.of_confidence(content, tmp_path)
+        assert found.about == "confidence" and "does not tell how well" in found.what
+
+
+def test_params_that_changed_since_training_by_key_values_and_cure(params, project) -> None:
+    """Of the policy's stage, and of the one that made the θ which it reads."""
+    card(project)
+    lock(
+        project,
+        **{
+            "theta@band1-least_squares": {
+                "params": {"loss": {"chamfer": "symmetric", "median_window": 9}},
+                "outs": ["data/theta/band1/least_squares.json"],
+            },
+            "theta@band2-least_squares": {"params": {"launch": {"pause": 3.0}}, "outs": ["x"]},
+            STAGE: {
+                "params": {"setup.max_force": 30.0, "setup.draw_y": [-0.45, -0.25]},
+                "deps": ["data/theta/band1/least_squares.json"],
+            },
+        },
+    )
+    told = [hazard.what for hazard in of_policy(params, project)]
+    cure = f"since the policy was trained: `dvc repro {STAGE}` mends it"
+    assert told[0] == f"params.yaml: loss.median_window was 9, is 7, {cure}"
+    held_out = "{'blocks': 0, 'length': 0.6}"
+    assert told[1] == f"params.yaml: loss.held_out was not there, is {held_out}, {cure}"
+    assert len(told) == 2
+    edit(project, "max_force: 30.0", "max_force: 25.0")
+    last = of_policy(params, project)[-1]
+    assert last.what == f"params.yaml: setup.max_force was 30.0, is 25.0, {cure}"
+
+
+def test_many_changes_are_three_and_the_names_of_the_others(params, project) -> None:
+    card(project)
+    values = {f"setup.{name}": 1e-3 for name in ("max_force", "fork_width", "fork_height")}
+    lock(project, **{STAGE: {"params": values | {"policy.seed": 7, "trials.seed": 8}}})
+    told = of_policy(params, project)
+    assert abouts(told) == ["params"] * 4 and "policy.seed was 7, is 1" in told[0].what
+    assert told[3].what.endswith("also in setup.max_force, trials.seed")
+
+
+def test_without_dvc_lock_the_card_tells(params, project) -> None:
+    card(
+        project,
+        input={"trained_range": [1.425, 2.425]},
+        max_force_n=28.0,
+        setup={"band_mass_kg": 0.023, "fork_width_m": 0.275, "arm_stiffness_n_m": 12000.0},
+    )
+    (found,) = of_policy(params, project)
+    assert "setup.max_force was 28.0, is 30.0, since the policy was trained" in found.what
+
+
+def test_a_policy_of_another_theta(params, project) -> None:
+    card(project)
+    lock(project, **{STAGE: {"params": {"setup.max_force": 30.0}}})
+    assert not of_policy(params, project)
+    other = CONTENT | {"theta": VALUES | {"youngs_modulus": 5e5}}
+    (found,) = of_policy(params, project, other)
+    assert "another θ" in found.what and f"`dvc repro {STAGE}`" in found.what
+
+
+def test_a_policy_without_a_card(params, project) -> None:
+    (found,) = of_policy(params, project)
+    assert found.about == "params" and "card.json: missing" in found.what
+
+
+def test_theta_of_a_run_and_by_hand(params, project) -> None:
+    band = params.bands["band1"].model_dump() | {"mass": 0.05}
+    lock(project, **{"theta@band1-least_squares": {"params": {"bands.band1": band}}})
+    path = Layout(project).theta("band1", "least_squares")
+    told = [hazard.what for hazard in safety.of_identification(params, CONTENT, path, project)]
+    assert told == [
+        "params.yaml: bands.band1.mass was 0.05, is 0.023, since θ was identified:"
+        " `dvc repro theta@band1-least_squares` mends it"
+    ]
+    by_hand = safety.of_identification(params, CONTENT, project / "mine.json", project)
+    assert not list(by_hand)
+
+
+def test_a_method_that_runs_no_more_is_mended_by_naming_it(params, project) -> None:
+    card(project, max_force_n=28.0)
+    run = SimpleNamespace(bands=[], methods=[], ablations=SimpleNamespace(bands=[], methods=[]))
+    (found,) = of_policy(SimpleNamespace(run=run), project)
+    assert "`run:` in params.yaml has to name" in found.what

@@ -1,8 +1,14 @@
 # Each target works first on a fresh clone: it sets up .venv where that is missing or out of date.
-.PHONY: setup run large paper ui test lint validate clean
+.PHONY: help setup demo run large paper ui test lint validate clean
 .DEFAULT_GOAL := run
 
-setup: .venv/ready
+help:                 # this list
+	@sed -n 's/^\([a-z][a-z ]*\):[^#]*# /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
+
+setup: .venv/ready    # .venv with everything that is needed
+
+demo: setup           # one virtual band from recording to card, as `sling fit` does it
+	@PATH="$(CURDIR)/.venv/bin:$$PATH" sling fit --name band1
 
 .venv/ready: pyproject.toml constraints.txt tools/setup.sh
 	@bash tools/setup.sh
@@ -16,10 +22,10 @@ large paper: setup    # the same with ten times the rollouts a method; an hour a
 ui: setup             # what `sling flow` does, in a browser on this machine: http://127.0.0.1:4200
 	@.venv/bin/sling ui
 
-test: setup
+test: setup           # the tests
 	.venv/bin/python -m pytest
 
-lint: setup
+lint: setup           # ruff: rules and format
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 

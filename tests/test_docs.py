@@ -1,23 +1,237 @@
-"""What README and docs point at is there."""
+"""What README and docs say is so: links, commands, stages, keys, Python, and the results on top."""
 
+import ast
+import csv
+import importlib.util
 import re
+import shlex
 import subprocess
+from pathlib import Path
 
+import pytest
+from ruamel.yaml import YAML
+
+from app.cli import parser
 from tests.project import ROOT
 
-LINK = re.compile(r"\]\((?!https?:)([^)#]+)(?:#[^)]*)?\)")
+LINK = re.compile(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)")
 CODE = re.compile(r"`((?:app|docs|pipeline|reports|stages|tests|tools|validation)/[\w./-]+)`")
-IGNORED = {"reports/index.html", "reports/run.js"}  # by Git; a run writes them
+SPAN = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+SETTING = re.compile(r"\w+=\S*")  # of the environment, before a command
+IGNORED = {"reports/index.html", "reports/run.js", "reports/bands"}  # a run writes them
+HISTORY = (
+    "formerly",
+    "previously",
+    "used to be",
+    "no longer",
+    "any more",
+    "anymore",
+    "since then",
+    "earlier version",
+    "earlier simulator",
+    "earlier report",
+    "old version",
+    "as it was",
+    "was replaced",
+    "has been replaced",
+    "at first we",
+)
+PARAMS = YAML(typ="safe").load(ROOT / "params.yaml")
+STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
+TARGETS = set(re.findall(r"^([a-z][a-z ]*):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+ELSEWHERE = {"git", "pre-commit"}
 
 
-def test_links_and_paths_of_every_page_are_there() -> None:
+def pages() -> list[Path]:
     listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "*.md"]
-    pages = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    named = []
-    for page in map(ROOT.joinpath, pages.split()):
-        if page.is_file():
-            text = page.read_text(encoding="utf-8")
-            named += [(page, page.parent / one) for one in LINK.findall(text)]
-            named += [(page, ROOT / one) for one in CODE.findall(text) if one not in IGNORED]
-    assert len(named) > 50
-    assert [(str(page), str(one)) for page, one in named if not one.exists()] == []
+    names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return [ROOT / name for name in names.split() if (ROOT / name).is_file()]
+
+
+def written() -> list[Path]:
+    """Pages that people write for users; no stage does."""
+    return [page for page in pages() if "reports" not in page.parts and page.name != "CHANGELOG.md"]
+
+
+def blocks(language: str, *files: Path) -> list[tuple[Path, str]]:
+    """Code blocks of a language."""
+    return [
+        (page, code)
+        for page in files or written()
+        for kind, code in BLOCK.findall(page.read_text(encoding="utf-8"))
+        if kind == language
+    ]
+
+
+def commands(code: str) -> list[list[str]]:
+    """The words of each command of a block, without settings of its environment."""
+    lines = code.replace("\\\n", " ").splitlines()
+    found = [shlex.split(line, comments=True) for line in lines]
+    for words in found:
+        while words and SETTING.fullmatch(words[0]):
+            words.pop(0)
+    return [words for words in found if words]
+
+
+def anchors(page: Path) -> set[str]:
+    """Of its headings, as GitHub names them."""
+    text = BLOCK.sub("", page.read_text(encoding="utf-8"))
+    heads = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
+
+
+def made_by_a_run(path: Path) -> bool:
+    return any(path.is_relative_to(ROOT / one) for one in IGNORED)
+
+
+def test_links_paths_and_anchors_of_every_page_are_there() -> None:
+    named, wrong = 0, []
+    for page in pages():
+        text = page.read_text(encoding="utf-8")
+        links = [(page.parent / one if one else page, head) for one, head in LINK.findall(text)]
+        links += [(ROOT / one, "") for one in CODE.findall(text)]
+        for path, head in links:
+            path, named = path.resolve(), named + 1
+            if made_by_a_run(path):
+                continue
+            if not path.exists() or (head and head not in anchors(path)):
+                wrong.append((str(page.relative_to(ROOT)), str(path), head))
+    assert named > 100
+    assert wrong == []
+
+
+def test_every_page_is_in_the_index() -> None:
+    index = (ROOT / "docs/README.md").read_text(encoding="utf-8")
+    linked = {(ROOT / "docs" / one).resolve() for one, _ in LINK.findall(index)}
+    assert {page for page in written() if page.name != "README.md"} - linked == set()
+    notes = {page for page in written() if page.name == "README.md"} - linked
+    assert notes == {ROOT / "docs/README.md"}
+
+
+def test_pages_tell_of_today() -> None:
+    found = [
+        (page.name, word)
+        for page in written()
+        for word in HISTORY
+        if re.search(rf"\b{word}\b", " ".join(page.read_text(encoding="utf-8").lower().split()))
+    ]
+    assert found == []
+
+
+def test_every_command_is_one() -> None:
+    """Those of `bash` blocks, word for word as they stand there."""
+    seen = set()
+    for page, code in blocks("bash"):
+        for words in commands(code):
+            tool = words[0].removeprefix(".venv/bin/")
+            seen.add(tool)
+            check = {"sling": sling, "make": make, "dvc": dvc, "python": python}.get(tool)
+            try:
+                if check:
+                    check(words[1:])
+                else:
+                    assert tool in ELSEWHERE
+            except (AssertionError, SystemExit) as error:
+                pytest.fail(f"{page.name}: {shlex.join(words)}: {error}")
+    assert seen >= {"sling", "make", "dvc", "python"}
+
+
+def sling(words: list[str]) -> None:
+    parser().parse_args(words)
+
+
+def make(words: list[str]) -> None:
+    assert set(words) <= {target for names in TARGETS for target in names.split()}
+
+
+def python(words: list[str]) -> None:
+    if words[:1] == ["-m"]:
+        assert importlib.util.find_spec(words[1])
+    paths = [word for word in words if "/" in word and "=" not in word]
+    assert all((ROOT / path).exists() for path in paths)
+
+
+def dvc(words: list[str]) -> None:
+    """The stages and parameters that a command names are there."""
+    for value in (words[i + 1] for i, word in enumerate(words) if word == "-S"):
+        expect_key(value.partition("=")[0])
+    if words[0] == "repro":
+        for name in (word for word in words[1:] if not word.startswith("-")):
+            stage, _, item = name.partition("@")
+            band, _, method = item.partition("-")
+            assert stage in STAGES, f"no stage {stage}"
+            assert not band or band in PARAMS["bands"], f"no band {band}"
+            assert not method or method in PARAMS["methods"], f"no method {method}"
+
+
+def expect_key(name: str) -> None:
+    node = PARAMS
+    for key in name.split("."):
+        assert key in node, f"params.yaml has no {name}"
+        node = node[key]
+
+
+def test_every_key_is_one() -> None:
+    """Of params.yaml, where a page names it with its section: `trials.repeats`."""
+    named = {span for page in written() for span in SPAN.findall(page.read_text(encoding="utf-8"))}
+    keys = {one for one in named if re.fullmatch(r"[a-z_]+(\.[a-z_0-9]+)+", one)}
+    keys = {one for one in keys if one.partition(".")[0] in PARAMS and not is_file(one)}
+    assert len(keys) > 40
+    for key in sorted(keys):
+        expect_key(key)
+
+
+def is_file(name: str) -> bool:
+    """Such as policy.onnx."""
+    return name.rpartition(".")[2] in {"csv", "json", "md", "onnx", "png", "pt", "py", "yaml"}
+
+
+def test_every_option_is_one() -> None:
+    """Commands inside sentences: `sling check --sheet`; placeholders may follow."""
+    subs = next(one for one in parser()._actions if one.choices and "check" in one.choices).choices
+    found = 0
+    for page in written():
+        for span in SPAN.findall(page.read_text(encoding="utf-8")):
+            words = span.split()
+            if words[0] != "sling" or len(words) < 2 or words[1].startswith("--"):
+                continue
+            assert words[1] in subs, f"{page.name}: {span}"
+            flags = {word.partition("=")[0].strip("[]") for word in words if word.startswith("--")}
+            assert flags <= set(subs[words[1]]._option_string_actions), f"{page.name}: {span}"
+            found += 1
+    assert found > 20
+
+
+def test_python_imports_what_there_is() -> None:
+    """README's runs on a tiny project in tests/test_pipeline.py."""
+    for page, code in blocks("python"):
+        for node in ast.walk(ast.parse(code)):
+            for module, name in imported(node):
+                found = importlib.import_module(module)
+                assert not name or hasattr(found, name), f"{page.name}: {module}.{name}"
+
+
+def imported(node: ast.AST) -> list[tuple[str, str]]:
+    if isinstance(node, ast.Import):
+        return [(one.name, "") for one in node.names]
+    return (
+        [(node.module, one.name) for one in node.names] if isinstance(node, ast.ImportFrom) else []
+    )
+
+
+def test_readme_is_short_and_its_results_are_those_of_the_report() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(readme.splitlines()) <= 160
+    with (ROOT / "reports/tables/table1.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["target_m"] == "all"]
+    errors = {
+        (row["band"], row["method"]): row["mean_error_cm"]
+        for row in rows
+        if row["source"].startswith("virtual")
+    }
+    for band in ("band1", "band2", "band3"):
+        names = "least_squares", "sling2sim2real", "actuation floor"
+        cells = [f"{float(errors[band, name]):.1f} cm" for name in names]
+        row = next(line for line in readme.splitlines() if line.startswith(f"| {band}, "))
+        assert row.removesuffix(" |").split(" | ")[1:] == cells

@@ -138,6 +138,13 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
     assert not idle, "parameters that do nothing"
 
 
+def test_the_python_of_the_readme_runs(project: Copy) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    said = project("python", "-c", text.split("```python\n")[1].split("```")[0]).splitlines()
+    assert "clouds, peak force" in said[0]
+    assert len(said[1].strip("[]").split()) == 2
+
+
 def test_a_second_run_does_nothing(project: Copy) -> None:
     assert project.dvc("repro") == set()
 

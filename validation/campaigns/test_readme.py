@@ -1,0 +1,61 @@
+"""README, typed: *Your band* word for word, and its Python, on a recording of the virtual rig."""
+
+import shutil
+
+import pytest
+
+from pipeline.params import load
+from tests.project import ROOT, Copy, copy_project
+from tests.test_docs import BLOCK
+
+pytestmark = pytest.mark.validation
+
+RECORDING, MASS, BAND = "my.mcap", "0.0408", "my"  # of README's
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Copy:
+    """A copy of the project with a recording in it that nothing knows; the rig's band is gone."""
+    folder = tmp_path_factory.mktemp("readme") / "copy"
+    folder.mkdir()
+    copy_project(folder)
+    copy = Copy(folder)
+    copy("git", "init", "-q")
+    copy("dvc", "repro", "record@band1")
+    (folder / "data/raw/band1/band1.mcap").rename(folder / RECORDING)
+    shutil.rmtree(folder / "data/raw")
+    return copy
+
+
+def section(title: str, language: str) -> str:
+    """The code of a section of README."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    part = text.split(f"\n## {title}\n")[1].split("\n## ")[0]
+    return next(code for kind, code in BLOCK.findall(part) if kind == language)
+
+
+def test_your_band_runs_as_it_is_written(project: Copy, progress) -> None:
+    """Only the mass is that of the recording at hand."""
+    mass = load(ROOT / "params.yaml").bands["band1"].mass
+    lines = section("Your band", "bash").splitlines()
+    assert len(lines) >= 5 and any(MASS in line for line in lines)
+    for line in lines:
+        progress(line)
+        said = project("bash", "-ec", line.replace(MASS, str(mass)))
+        assert said.strip()
+    for made in (
+        "my.png",
+        f"reports/bands/{BAND}/README.md",
+        f"reports/bands/{BAND}/index.html",
+        f"data/evidence/{BAND}.csv",
+    ):
+        assert (project.folder / made).is_file(), made
+
+
+def test_the_python_runs(project: Copy) -> None:
+    """After the commands above, of their band."""
+    code = section("From Python", "python").replace("band1", BAND)
+    (project.folder / "readme.py").write_text(code)
+    said = project("python", "readme.py").splitlines()
+    assert "clouds, peak force" in said[0]
+    assert all(1.0 < float(one) < 3.0 for one in said[1].strip("[]").split())

@@ -19,7 +19,12 @@ CODE = re.compile(r"`((?:app|docs|pipeline|reports|stages|tests|tools|validation
 SPAN = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SETTING = re.compile(r"\w+=\S*")  # of the environment, before a command
-IGNORED = {"reports/index.html", "reports/run.js", "reports/bands"}  # a run writes them
+IGNORED = {
+    "reports/index.html",
+    "reports/run.js",
+    "reports/bands",
+    "reports/summary.json",
+}  # a run writes them
 HISTORY = (
     "formerly",
     "previously",
@@ -37,6 +42,7 @@ HISTORY = (
     "has been replaced",
     "at first we",
 )
+HEADS = "cannot be used", "can be used, but", "warning"  # tables of docs/faq.md
 PARAMS = YAML(typ="safe").load(ROOT / "params.yaml")
 STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
 TARGETS = set(re.findall(r"^([a-z][a-z ]*):", (ROOT / "Makefile").read_text(), re.MULTILINE))
@@ -235,3 +241,19 @@ def test_readme_is_short_and_its_results_are_those_of_the_report() -> None:
         cells = [f"{float(errors[band, name]):.1f} cm" for name in names]
         row = next(line for line in readme.splitlines() if line.startswith(f"| {band}, "))
         assert row.removesuffix(" |").split(" | ")[1:] == cells
+
+
+def test_what_commands_say_is_quoted_as_they_say_it() -> None:
+    """Each piece of a line that docs/faq.md quotes stands in the code."""
+    folders = (ROOT / "pipeline/recording", ROOT / "app", ROOT / "stages")
+    files = sorted(file for folder in folders for file in folder.rglob("*.py"))
+    code = "\n".join(file.read_text(encoding="utf-8") for file in files)
+    said = re.sub(r'"\s*\n\s*f?"', "", code)  # strings that go on in the next line
+    page = (ROOT / "docs/faq.md").read_text(encoding="utf-8")
+    tables = [page.split(f"| {head} | do |\n|---|---|\n")[1].split("\n\n")[0] for head in HEADS]
+    rows = "\n".join(tables).splitlines()
+    quotes = [quote for row in rows for quote in row.split("|")[1].split("`")[1::2]]
+    assert len(quotes) > 20
+    for quote in quotes:
+        for piece in filter(None, (part.strip() for part in quote.split("..."))):
+            assert piece in said, f"no message says {piece!r}"

@@ -1,7 +1,5 @@
 """The calibration of docs/recording.md, run as it stands there."""
 
-import re
-
 import numpy as np
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
@@ -9,8 +7,6 @@ from scipy.spatial.transform import Rotation
 from app.plan.plan import plan_recording
 from pipeline.params import load
 from tests.project import ROOT, python, with_
-
-HEADS = "cannot be used", "can be used, but"
 
 
 def test_two_touched_tips_give_the_fork_in_the_base() -> None:
@@ -45,19 +41,3 @@ def test_the_table_of_phases_has_the_defaults() -> None:
     assert f"| pause | {plan.pause:g} s |" in page
     assert f"| release, swing | {plan.finger_time + plan.wait:g} s |" in page
     assert f"| retreat | {plan.retreat:.2f} m |" in page
-
-
-def test_what_check_says_is_quoted_as_it_says_it() -> None:
-    """Each piece of a quoted line stands in the code that reads and checks recordings."""
-    folders = (ROOT / "pipeline/recording", ROOT / "app/preflight")
-    files = sorted(file for folder in folders for file in folder.rglob("*.py"))
-    code = "\n".join(file.read_text(encoding="utf-8") for file in files)
-    said = re.sub(r'"\s*\n\s*f?"', "", code)  # strings that go on in the next line
-    page = (ROOT / "docs/recording.md").read_text(encoding="utf-8")
-    tables = [page.split(f"| {head} | do |\n|---|---|\n")[1].split("\n\n")[0] for head in HEADS]
-    rows = "\n".join(tables).splitlines()
-    quotes = [quote for row in rows for quote in row.split("|")[1].split("`")[1::2]]
-    assert len(quotes) > 20
-    for quote in quotes:
-        for piece in filter(None, (part.strip() for part in quote.split("..."))):
-            assert piece in said, f"no message says {piece!r}"

@@ -13,8 +13,9 @@ from types import SimpleNamespace
 from app.flow.graph import Stage
 from pipeline.base.layout import Layout
 
+PICTURE = re.compile(r"!\[[^\]]*\]\([^)]*\)\n")
 LINK = re.compile(r"\[([^\]]*)\]\((?!https?:)[^)]*\)")  # to a file beside the report
-CHAPTERS = ("In short", "The paper's tables")
+CHAPTERS = ("What came out", "The paper's tables")
 DRAWING = threading.Lock()  # pyplot knows one thread
 
 
@@ -38,13 +39,10 @@ def _drawn(name: str, draw: Callable[[Path], None]) -> str:
 
 def _episode(root: Path, band: str, method: str) -> Iterator[str]:
     from pipeline.episode.episode import Episode
-    from pipeline.params import load
-    from pipeline.report.figures import episode
+    from pipeline.report.figures.pull import pull
 
     recorded = Episode.load(Layout(root).episode(band))
-    frames = episode.moments(recorded)
-    diameter = load(root / "params.yaml").bands[band].diameter
-    yield _drawn("clouds", lambda path: episode.clouds(path, recorded, {}, {}, frames, diameter))
+    yield _drawn("pull", lambda path: pull(path, {band: recorded}, {}, {}))
 
 
 def _theta(root: Path, band: str, method: str) -> Iterator[str]:
@@ -53,7 +51,6 @@ def _theta(root: Path, band: str, method: str) -> Iterator[str]:
     from pipeline.drawing.styles import styles
     from pipeline.params import load
     from pipeline.report.figures import search
-    from pipeline.report.results import has_another_loss
     from pipeline.report.tables import parameters
     from pipeline.report.tables.benchmark import PAPER
     from pipeline.report.tables.cells import markdown
@@ -69,11 +66,10 @@ def _theta(root: Path, band: str, method: str) -> Iterator[str]:
         confidence=theta.get("confidence") or {},
         history=pd.concat([one for one in steps if len(one)], ignore_index=True),
     )
-    own = {method} if has_another_loss(dict(params.methods[method].weights)) else set()
-    yield _drawn("convergence", lambda path: search.convergence(path, {method: result}, named, own))
-    table2 = parameters.identified(SimpleNamespace(methods={band: {method: result}}), params)
-    mine = [row for row in table2 if (row.band, row.method) == (band, method)]
-    heads, rows = parameters.as_table([row for row in mine if row.source != PAPER], named)
+    searches = {band: {method: result}}
+    yield _drawn("convergence", lambda path: search.convergence(path, searches, named))
+    table2 = parameters.identified(SimpleNamespace(methods=searches), params)
+    heads, rows = parameters.as_table([row for row in table2 if row.source != PAPER], named)
     turned = [list(pair) for pair in zip(heads, *rows, strict=True)]
     yield markdown((["identified", "value (90 % interval)"], turned))
 
@@ -89,13 +85,9 @@ def _policy(root: Path, band: str, method: str) -> Iterator[str]:
 
     stored = Stored(band, method, root)
     named = styles([method])
-    result = SimpleNamespace(
-        band=band,
-        method=method,
-        training=pd.read_parquet(stored.folder / "training.parquet"),
-        card=stored.card(),
-    )
-    yield _drawn("training", lambda path: policy.training(path, {method: result}, named))
+    result = SimpleNamespace(band=band, method=method, card=stored.card())
+    curves = {band: {method: pd.read_parquet(stored.folder / "training.parquet")}}
+    yield _drawn("training", lambda path: policy.training(path, curves, named))
     yield markdown(policies([result], named))
 
 
@@ -103,13 +95,17 @@ def _trials(root: Path, band: str, method: str) -> Iterator[str]:
     import pandas as pd
 
     from pipeline.drawing.styles import styles
-    from pipeline.report.figures import policy
+    from pipeline.report.figures import landings
     from pipeline.report.tables.cells import markdown
     from pipeline.report.tables.landings import predictions
+    from pipeline.sling.theta import load_theta
 
-    trials, named = pd.read_parquet(Layout(root).trials(band, method)), styles([method])
+    layout, named = Layout(root), styles([method])
+    trials = pd.read_parquet(layout.trials(band, method))
+    theta = load_theta(layout.theta(band, method), band)
+    trusted = {(band, method)} if theta.get("confidence") else set()
     if trials.landing_y.notna().any():
-        yield _drawn("landings", lambda path: policy.landings(path, trials, named, [method]))
+        yield _drawn("landings", lambda path: landings.predictions(path, trials, trusted, named))
     for kind, launched in trials.groupby("kind", sort=True):
         table = predictions(launched) if kind == "predicted" else _errors(launched)
         yield f"{kind.capitalize()} launches\n\n{markdown(table)}"
@@ -135,7 +131,7 @@ def _report(root: Path, band: str, method: str) -> Iterator[str]:
     for chapter in text.split("\n## ")[1:]:
         title, _, content = chapter.partition("\n")
         if title in CHAPTERS:
-            without_links = LINK.sub(r"\1", content)
+            without_links = LINK.sub(r"\1", PICTURE.sub("", content))
             yield f"## {title}\n{without_links}"
 
 

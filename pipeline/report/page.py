@@ -5,11 +5,13 @@ Only run.js lies beside it, which says where and when it was written and may be 
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from pipeline.base.files import write_text
 from pipeline.drawing.page import page
 
+CARD = re.compile(r"\]\((bands/[^)/]+)/README\.md\)")
 RUN = """\
 <p id="run"></p>
 <script src="run.js"></script>
@@ -22,5 +24,9 @@ if (window.run) {
 
 
 def write_page(folder: Path, markdown: str) -> None:
-    """Write index.html into `folder`, where the text's pictures lie. Raises UserError."""
-    write_text(folder / "index.html", page(markdown, folder, "Sling2Sim2Real: report", foot=RUN))
+    """Write index.html into `folder`, where the text's pictures lie. Raises UserError.
+
+    Bands link to the pages of their cards.
+    """
+    pages = CARD.sub(r"](\1/index.html)", markdown)
+    write_text(folder / "index.html", page(pages, folder, "Sling2Sim2Real: report", foot=RUN))

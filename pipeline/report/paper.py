@@ -5,6 +5,8 @@ They stand beside ours as what they are: another rubber, another rig and real la
 
 from __future__ import annotations
 
+METHOD = "sling2sim2real"  # its own
+
 # Landing error [cm] by our names of band and method: mean and deviation for each of TARGETS [m] and
 # over all of them; None where the paper prints N/A.
 LANDING = {

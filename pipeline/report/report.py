@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.drawing.replay import Replay, replay
-from pipeline.drawing.styles import SIDE_BY_SIDE, Styles, drawn, styles
+from pipeline.drawing.styles import Styles, drawn, styles
 from pipeline.landing.stored import Stored
 from pipeline.params import Params
+from pipeline.report.paper import METHOD
 from pipeline.report.results import Result, Results, gather
 
 
@@ -43,25 +44,40 @@ class Report:
     def folder(self) -> Path:
         return self.root / "reports"
 
+    @property
+    def main(self) -> str:
+        """The method that the report is about first: that of the cards."""
+        return self.params.run.methods[0]
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """The main method, and the paper's where that ran beside it."""
+        return references(self.params)
+
+    def shown(self, methods) -> Styles:
+        """The styles of methods, in the order of the run."""
+        return {method: style for method, style in self.styles.items() if method in methods}
+
     def picture(self, name: str, alt: str, draw: Callable[..., None], *arguments) -> str:
         """Have `draw` write reports/figures/<name>.png; return the line that shows it."""
         draw(self.folder / "figures" / f"{name}.png", *arguments)
         return f"![{alt}](figures/{name}.png)\n"
 
     def draws(self, result: Result, targets: np.ndarray) -> np.ndarray:
-        """Draws (N, 2) [m] of a policy for targets (N,) [m]."""
+        """The policy's draws (N, 2) [m] for targets (N,) [m]."""
         return Stored(result.band, result.method, self.root).draws(targets)
 
 
-def side_by_side(params: Params) -> list[str]:
-    """Methods in pictures of all bands: those that ran on every one, as far as there is room."""
-    return drawn(params.run.methods, SIDE_BY_SIDE)
+def references(params: Params) -> tuple[str, ...]:
+    """What others are compared with: the first method of the run, and the paper's if it runs."""
+    methods = params.run.methods
+    return tuple(dict.fromkeys([methods[0], *(m for m in methods if m == METHOD)]))
 
 
 def _replays(params: Params, results: Results, band: str) -> dict[str, Replay]:
     """Of the methods that are drawn; of all where held-out data are to be compared."""
     recorded, methods = results.episodes[band], results.methods[band]
-    some = {*drawn(methods, SIDE_BY_SIDE), *side_by_side(params)}
+    some = drawn(params.run.methods)
     return {
         method: replay(params, band, method, recorded, methods[method].theta)
         for method in methods

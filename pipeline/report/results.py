@@ -17,7 +17,7 @@ from pipeline.landing.landing_map import LandingMap
 from pipeline.landing.stored import Stored
 from pipeline.launches.measured import named
 from pipeline.search.regions import Region, load_regions
-from pipeline.sling.theta import PosteriorFile, load_theta
+from pipeline.sling.theta import load_theta
 
 PRINTED = ("geom", "force", "work")  # the paper's loss is their sum (docs/method.md)
 
@@ -44,7 +44,6 @@ class Result:
         history: Every evaluated θ, the exploration's rows before the refinement's.
         regions: Where the refinement began; none for a search of one phase.
         axes: Names of the regions' axes in the unit cube.
-        posterior: "names" and "samples"; None where θ has no confidence.
         card: The policy's card.
         training: One row an iteration of the policy's training.
         landing_map: Simulated launches over the box of draws.
@@ -57,7 +56,6 @@ class Result:
     history: pd.DataFrame
     regions: list[Region]
     axes: list[str]
-    posterior: dict | None
     card: dict
     training: pd.DataFrame
     landing_map: LandingMap
@@ -118,10 +116,6 @@ def _result(layout: Layout, band: str, method: str) -> Result:
     history = [pd.read_parquet(made(path)) for path in steps]
     regions, axes = load_regions(layout.clusters(band, method))
     theta = load_theta(layout.theta(band, method), band)
-    posterior = None
-    if theta.get("confidence"):
-        path = layout.confidence(band, method)
-        posterior = read_json(path, PosteriorFile).model_dump(exclude_unset=True)
     stored, policy = Stored(band, method, layout.root), layout.policy(band, method)
     return Result(
         band=band,
@@ -130,7 +124,6 @@ def _result(layout: Layout, band: str, method: str) -> Result:
         history=pd.concat([part for part in history if len(part)], ignore_index=True),
         regions=regions,
         axes=axes,
-        posterior=posterior,
         card=stored.card(),
         training=pd.read_parquet(made(policy / "training.parquet")),
         landing_map=LandingMap.load(made(policy / "map.parquet")),

@@ -1,143 +1,105 @@
-"""The policies: training, where each draw lands, and landings beside their predictions."""
+"""The policies: how they were trained, and where each draw lands."""
 
 from __future__ import annotations
+
+from itertools import cycle
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.colors import BoundaryNorm
 
-from pipeline.drawing.canvas import key, log_y, mark, patch, picture
-from pipeline.drawing.styles import COLORS, SIDE_BY_SIDE, Styles, drawn
+from pipeline.drawing.canvas import log_y, mark, picture
+from pipeline.drawing.styles import COLORS, INK, Styles
 from pipeline.landing.landing_map import LandingMap
 from pipeline.launches.stretch import stretch_of
-from pipeline.report.results import Result
+from pipeline.report.figures.panels import explain, panels
 
-FAIR = 0.05  # of the distance, shaded
-ERRORS = (-80, -50, -20, -10, -5, 0, 5, 10, 20, 50, 100, 200)  # % at the axis
-REACH = 2.0  # of the farthest target, up to which a landing map tells landings apart
-LEVEL = 90  # % that the predicted intervals are of
+AROUND = 0.03  # of the policies' draws, the part of the box that is shown [m]
+DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
 
 
 @picture()
-def landings(trials: pd.DataFrame, styles: Styles, near: list[str]) -> plt.Figure:
-    """Landings against predictions of two methods, and the error of every method.
+def training(curves: dict[str, dict[str, pd.DataFrame]], styles: Styles) -> plt.Figure:
+    """Error of the deterministic policy by iteration of PPO, in its own simulator.
 
     Args:
-        styles: Of every method, in the order of the rows.
-        near: Methods of the left panel.
+        curves: training.parquet of each band and method.
     """
-    trials = trials[trials.landing_y.notna() & trials.predicted_y.notna()]
-    inside = trials.stretch <= trials.recorded_stretch
-    tall = max(4.0, 1.6 + 0.3 * len(styles))
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, tall), width_ratios=(1, 1.15))
-    shown = trials[trials.method.isin(near)]
-    both = shown[["landing_y", "predicted_y"]].to_numpy()
-    low, high = (0, 1) if both.size == 0 else (0.95 * both.min(), 1.05 * both.max())
-    line = np.array([low, high])
-    left.fill_between(line, (1 - FAIR) * line, (1 + FAIR) * line, color="0.9", lw=0)
-    left.plot(line, line, color="0.6", lw=1)
-    kinds = " and ".join(sorted(set(trials.kind))) or "no"
-    left.set(xlabel=f"{kinds} landing [m]", ylabel="predicted landing [m]")
-    left.set(xlim=(low, high), ylim=(low, high), aspect="equal")
-    right.axvspan(-100 * FAIR, 100 * FAIR, color="0.9", lw=0)
-    right.axvline(0, color="0.6", lw=1)
-    for row, (method, style) in enumerate(styles.items()):
-        for chosen, face in ((inside, style.color), (~inside, "none")):
-            mine = trials[(trials.method == method) & chosen]
-            if method in near:
-                _with_intervals(left, mine, style.color, face)
-            error = 100 * (mine.predicted_y / mine.landing_y - 1)
-            right.scatter(
-                error, [row] * len(mine), s=20, facecolors=face, edgecolors=style.color, alpha=0.7
-            )
-    right.set_yticks(range(len(styles)), [style.name for style in styles.values()])
-    right.set_ylim(len(styles) - 0.5, -0.5)
-    right.set_xscale("symlog", linthresh=10)
-    right.xaxis.set_major_locator(plt.FixedLocator(ERRORS))
-    right.xaxis.set_major_formatter("{x:g}")
-    right.set_xlabel("predicted / landed − 1 [%], logarithmic beyond ± 10")
-    dot = {"ls": "", "marker": "o"}
-    entries = [(styles[m].name, mark(**dot, color=styles[m].color)) for m in near]
-    entries += [
-        ("inside the recorded stretch", mark(**dot, ms=5, color="0.4")),
-        ("beyond it", mark(**dot, ms=5, color="0.4", mfc="none")),
-        (f"± {100 * FAIR:g} %", patch("0.9")),
-    ]
-    if trials.predicted_low.notna().any():
-        entries.append((f"{LEVEL} % interval", mark(color="0.4", lw=1)))
-    key(figure, entries, 4)
+    title = "A policy has converged where its curve stays below the line at 1 cm"
+    figure, found = panels(curves, title, 3.8, 2.6, sharex=True, sharey=True)
+    for band, ax in found.items():
+        for (method, curve), dash in zip(curves[band].items(), cycle(DASHES)):
+            error = 100 * curve.mean_error
+            ax.plot(curve.iteration, error, color=styles[method].color, lw=1.2, ls=dash)
+        ax.axhline(1, color=INK, lw=0.8)
+        ax.set_xlabel("PPO iteration (line: 1 cm)")
+        log_y(ax)
+    next(iter(found.values())).set_ylabel("mean |landing − target| [cm]")
+    methods = dict.fromkeys(method for of_band in curves.values() for method in of_band)
+    dashes = dict(zip(methods, cycle(DASHES)))
+    explain(figure, [(styles[m].name, mark(color=styles[m].color, ls=dashes[m])) for m in methods])
     return figure
 
 
-def _with_intervals(ax: plt.Axes, trials: pd.DataFrame, color: str, face: str) -> None:
-    for one in trials[trials.predicted_low.notna()].itertuples():
-        ends = [one.predicted_low, one.predicted_high]
-        ax.plot([one.landing_y] * 2, ends, color=color, lw=1, alpha=0.5)
-    ax.scatter(
-        trials.landing_y, trials.predicted_y, s=20, facecolors=face, edgecolors=color, alpha=0.8
-    )
-
-
-@picture()
-def training(results: dict[str, Result], styles: Styles) -> plt.Figure:
-    """Landing error of the deterministic policy by iteration of PPO, in its own simulator."""
-    first = drawn(results, SIDE_BY_SIDE)  # on top where curves lie on each other
-    figure, ax = plt.subplots(figsize=(7.2, 3.4))
-    for method, result in results.items():
-        curve, own = result.training, styles[method]
-        style = {"lw": 1.6, "zorder": 3} if method in first else {"lw": 0.9, "zorder": 2}
-        error = 100 * curve.mean_error
-        ax.plot(curve.iteration, error, color=own.color, label=own.name, **style)
-    ax.axhline(1, color="0.6", lw=1)
-    ax.set(xlabel="PPO iteration (line: the aim of 1 cm)", ylabel="mean |landing − target| [cm]")
-    log_y(ax)
-    figure.legend(loc="outside right upper")
-    return figure
-
-
-@picture()
-def landing_map(
-    result: Result,
-    draws: np.ndarray,
+@picture({"axes.grid": False})
+def landing_maps(
+    maps: dict[str, LandingMap],
+    draws: dict[str, np.ndarray],
     targets: np.ndarray,
-    recorded: float,
+    recorded: dict[str, float],
     fork_width: float,
-    rest_length: float,
+    rest_lengths: dict[str, float],
 ) -> plt.Figure:
-    """Landing against draw, with the policy's path over its targets.
+    """Where draws about its policy's path land by one method's simulator.
 
     Args:
-        draws: The policy's [m] from the near to the far target, shape (N, 2).
+        maps: By band.
+        draws: By band, of the policy from the near to the far target [m], shape (N, 2).
         targets: Whose landings are drawn as lines [m].
-        recorded: Largest stretch of the recording; what lies beyond is extrapolated.
+        recorded: By band, the largest stretch of the recording; beyond, θ is extrapolated.
+        rest_lengths: By band [m].
     """
-    chart: LandingMap = result.landing_map
-    fine_y, fine_z = (np.linspace(a[0], a[-1], 161) for a in (chart.draw_y, chart.draw_z))
-    y, z = np.meshgrid(fine_y, fine_z, indexing="ij")
-    points = np.stack([y.ravel(), z.ravel()], 1)
-    landing = chart(points).landing_y.reshape(y.shape)
-    stretch = stretch_of(np.insert(points, 0, 0, axis=1), fork_width, rest_length).reshape(y.shape)
-    figure, ax = plt.subplots(figsize=(6, 4.6))
-    ax.set_facecolor("0.8")
-    ax.grid(False)
-    if np.isfinite(landing).any():
-        levels = _round(landing, REACH * targets.max())
-        filled = ax.contourf(y, z, landing, levels=levels, cmap="viridis", extend="max")
-        figure.colorbar(filled, label="simulated landing [m] (grey: the launch fails)")
-        lines = ax.contour(y, z, landing, levels=np.unique(targets), colors="w", linewidths=0.8)
-        ax.clabel(lines, fmt="%g m", fontsize=7)
-    if stretch.min() < recorded < stretch.max():
-        ax.contour(y, z, stretch, levels=[recorded], colors="k", linestyles=":")
-        ax.plot([], [], "k:", label=f"recorded stretch {recorded:.2f}: beyond is extrapolated")
-    ax.plot(*draws.T, color=COLORS[0], lw=2.5, label="the policy's draws, near (dot) to far target")
-    ax.plot(*draws[0], "o", color=COLORS[0])
-    ax.set(xlabel="draw y [m]", ylabel="draw z [m]")
-    ax.set(xlim=(fine_y[0], fine_y[-1]), ylim=(fine_z[0], fine_z[-1]))
-    figure.legend(loc="outside lower center", ncols=2, fontsize=8)
+    title = "Where each draw lands, and which draws the policy takes for near and far targets"
+    figure, found = panels(maps, title, 4.0, 3.3, sharex=True, sharey=True)
+    low = np.min([path.min(0) for path in draws.values()], axis=0) - AROUND
+    high = np.max([path.max(0) for path in draws.values()], axis=0) + AROUND
+    charts = {band: _fine(one, low, high) for band, one in maps.items()}
+    known = np.concatenate([landing[np.isfinite(landing)] for *_, landing in charts.values()])
+    levels = plt.MaxNLocator(16).tick_values(known.min(), known.max()) if len(known) else [0, 1]
+    shades = plt.cm.ScalarMappable(BoundaryNorm(levels, 256), "cividis")
+    for band, ax in found.items():
+        y, z, landing = charts[band]
+        points = np.stack([0 * y.ravel(), y.ravel(), z.ravel()], 1)
+        stretch = stretch_of(points, fork_width, rest_lengths[band]).reshape(y.shape)
+        ax.set_facecolor("0.8")
+        if np.isfinite(landing).any():
+            ax.contourf(y, z, landing, levels=levels, cmap=shades.cmap, norm=shades.norm)
+            line = {"levels": np.unique(targets), "colors": "w", "linewidths": 0.9}
+            ax.clabel(ax.contour(y, z, landing, **line), fmt="%g m", fontsize=7)
+        if stretch.min() < recorded[band] < stretch.max():
+            ax.contour(y, z, stretch, levels=[recorded[band]], colors="k", linestyles=":")
+        ax.plot(*draws[band].T, color=COLORS[0], lw=2.5)
+        ax.plot(*draws[band][0], "o", color=COLORS[0])
+        ax.set(xlabel="draw y [m]", xlim=y[[0, -1], 0], ylim=z[0, [0, -1]])
+    next(iter(found.values())).set_ylabel("draw z [m]")
+    figure.colorbar(shades, ax=list(found.values()), label="simulated landing [m]")
+    entries = [
+        ("policy's draws, from near (dot) to far", mark(color=COLORS[0], lw=2.5)),
+        ("recorded stretch; left: extrapolated", mark(color="k", ls=":")),
+        ("grey: the launch fails", mark(ls="", marker="s", color="0.8")),
+    ]
+    explain(figure, entries)
     return figure
 
 
-def _round(values: np.ndarray, most: float) -> np.ndarray:
-    """Some twenty round levels over finite values, but for those beyond `most`."""
-    low, high = np.nanmin(values), np.nanmax(values)
-    return plt.MaxNLocator(20).tick_values(low, min(high, most) if low < most else high)
+def _fine(
+    chart: LandingMap, low: np.ndarray, high: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Draws y and z within limits and the map's box, and where they land, finely [m]."""
+    sides = [
+        np.linspace(max(side[0], least), min(side[-1], most), 121)
+        for side, least, most in zip((chart.draw_y, chart.draw_z), low, high, strict=True)
+    ]
+    y, z = np.meshgrid(*sides, indexing="ij")
+    return y, z, chart(np.stack([y.ravel(), z.ravel()], 1)).landing_y.reshape(y.shape)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -9,12 +11,14 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Ellipse
 
 from pipeline.drawing.canvas import PARAMETERS, few_ticks, key, log_y, mark, picture
-from pipeline.drawing.styles import INK, SIDE_BY_SIDE, Styles, drawn
+from pipeline.drawing.styles import INK, Styles
+from pipeline.report.figures.panels import entitle, explain, panels
+from pipeline.report.figures.policy import DASHES
 from pipeline.report.results import Result, best_so_far, printed
 from pipeline.sling.material import THETA
 
 PATH, STAR = "#e4003a", "#ffd23f"
-NEAR = 0.3  # of the least loss, the part that is magnified
+NEAR = 0.5  # above the least loss, up to which a picture reaches at least
 EDGE = 0.02
 BOXED = dict.fromkeys(["axes.spines.top", "axes.spines.right"], True)
 BOXED |= dict.fromkeys(["axes.grid", "figure.constrained_layout.use"], False)
@@ -22,37 +26,44 @@ SHOWN = 0.9  # share of the evaluated points that the colour scale tells apart
 
 
 @picture()
-def convergence(results: dict[str, Result], styles: Styles, own) -> plt.Figure:
+def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> plt.Figure:
     """The printed loss of every method's best so far, against rollouts.
 
     Args:
-        own: Methods that minimise another loss than the printed one: their curves may rise.
+        searches: By band and method. A method that minimises another loss may rise.
     """
-    least = min(printed(result.history).min() for result in results.values())
-    first = drawn(results, SIDE_BY_SIDE)  # on top where curves lie on each other
-    figure, axes = plt.subplots(1, 2, figsize=(10.5, 4.2))
-    for method, result in results.items():
-        common = printed(result.history)
-        best = common[best_so_far(result.history)]
-        best = np.where(np.isfinite(best), best, np.nan)
-        rollouts = np.arange(1, len(best) + 1)
-        style = {"color": styles[method].color, "ls": "--" if method in own else "-"}
-        style |= {"lw": 1.6, "zorder": 3} if method in first else {"lw": 1.0, "zorder": 2}
-        label = f"{styles[method].name}: {best[-1]:.3f}"
-        later = np.flatnonzero(result.history.phase.to_numpy() == "cma")[:1]
-        for ax in axes:
-            ax.plot(rollouts, best, drawstyle="steps-post", label=label, **style)
-            ax.plot(rollouts[later], best[later], "o", ms=5, color=style["color"])
-            ax.set_xlabel("rollouts (dot: CMA-ES takes over)")
-    axes[0].set_ylabel("printed loss of the best so far")
-    log_y(axes[0])
-    axes[1].set_ylim(least * (1 - NEAR / 15), least * (1 + NEAR))
-    axes[1].set_title("the same near the least", fontsize=9)
-    curves, names = axes[0].get_legend_handles_labels()
-    order = np.argsort([line.get_ydata()[-1] for line in curves], kind="stable")
-    entries = [(names[i], curves[i]) for i in order]
-    key(figure, entries + [("dashed: has another loss", mark(color="0.5", ls="--"))] * bool(own), 4)
+    title = "Lower is a better fit, further left a cheaper one: the paper's loss so far"
+    figure, found = panels(searches, title, 3.8, 3.0, sharex=True)
+    methods = dict.fromkeys(method for of_band in searches.values() for method in of_band)
+    dashes = dict(zip(methods, cycle(DASHES)))
+    for band, ax in found.items():
+        ends = []
+        for method, result in searches[band].items():
+            common = printed(result.history)
+            best = common[best_so_far(result.history)]
+            best = np.where(np.isfinite(best), best, np.nan)
+            style = {"color": styles[method].color, "ls": dashes[method], "lw": 1.3}
+            ax.plot(rollouts(result), best, drawstyle="steps-post", **style)
+            ax.plot(rollouts(result)[-1], best[-1], "o", ms=4, color=style["color"])
+            ends.append(best[-1])
+        least = np.nanmin(ends)
+        ax.set_ylim(0.97 * least, max((1 + NEAR) * least, 1.03 * np.nanmax(ends)))
+        ax.set_xlabel("rollouts")
+        log_y(ax)
+    next(iter(found.values())).set_ylabel("geom + force + work")
+    entries = [(styles[m].name, mark(color=styles[m].color, ls=dashes[m])) for m in methods]
+    explain(figure, entries)
     return figure
+
+
+def rollouts(result: Result) -> np.ndarray:
+    """How many rollouts the search had spent at each row of its history, shape (N,).
+
+    A fit keeps one row of all that it spends.
+    """
+    spent = np.arange(1, len(result.history) + 1)
+    spent[-1] = max(spent[-1], result.theta.get("rollouts", 0))
+    return spent
 
 
 @picture(BOXED, dpi=100)
@@ -78,7 +89,8 @@ def corner(result: Result, boxes, title: str) -> plt.Figure:
     star = {"color": STAR, "mec": INK}
     inches = 1.4 + 1.55 * max(size, 3)
     figure, axes = plt.subplots(size, size, figsize=(inches, inches), squeeze=False)
-    figure.subplots_adjust(0.08, 0.07, 0.93, 0.98, wspace=0.08, hspace=0.08)
+    entitle(figure, "Every point that the search tried: dark is good, the star is the best")
+    figure.subplots_adjust(0.08, 0.07, 0.93, 0.95, wspace=0.08, hspace=0.08)
     for (row, column), ax in np.ndenumerate(axes):
         if column > row:
             ax.remove()
@@ -110,7 +122,7 @@ def corner(result: Result, boxes, title: str) -> plt.Figure:
             ax.set_ylabel(_label(free[row]))
         elif row != column:
             ax.tick_params(labelleft=False)
-    side = figure.add_axes((0.62, 0.93, 0.31, 0.016))
+    side = figure.add_axes((0.62, 0.9, 0.31, 0.016))
     bar = figure.colorbar(points, cax=side, orientation="horizontal", extend="max")
     bar.set_label(f"loss of {title}")
     few_ticks(bar.ax.xaxis)
@@ -153,7 +165,7 @@ def _key(figure: plt.Figure, result: Result, failures: bool) -> None:
             ("mean of its CMA-ES by iteration", mark(color=PATH, lw=0.9)),
         ]
     entries.append(("θ*, the best of all", mark(ls="", marker="*", ms=11, color=STAR, mec=INK)))
-    key(figure, entries, 1, loc="upper right", bbox_to_anchor=(0.95, 0.87), fontsize=8)
+    key(figure, entries, 1, loc="upper right", bbox_to_anchor=(0.95, 0.84), fontsize=8)
 
 
 def _label(name: str) -> str:

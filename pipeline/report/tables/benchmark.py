@@ -9,18 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from pipeline.drawing.styles import KNOWN, Styles, styles
+from pipeline.drawing.styles import Styles
 from pipeline.report import paper
 from pipeline.report.results import Results
 from pipeline.report.tables.cells import NONE, Table, number
-from pipeline.report.tables.landings import landing_errors, pooled_std
+from pipeline.report.tables.landings import LAUNCHED, landing_errors, pooled_std
 
 PAPER = "paper, real robot"
 FLOOR, ORACLE = "actuation floor", "virtual, oracle"
-NOT_RUN, NOT_LAUNCHED = "not run", "no launch yet"
-LAUNCHED = ("virtual", "measured")
-NOTHING = {"launches": 0, "failed": None, "mean": math.nan, "std": math.nan}
-STYLES = styles(KNOWN)
 APART = {*paper.OPTIMISERS, *paper.ABLATIONS} - set(paper.BENCHMARK)  # tables 3 and 4 hold these
 
 
@@ -31,8 +27,8 @@ class Row:
     Attributes:
         band: As in params.yaml.
         method: As in params.yaml, or FLOOR.
-        source: "virtual", "measured", PAPER, ORACLE, or why there are none.
-        errors: As `landing_errors` gives them; empty where there are none.
+        source: "virtual", "measured", PAPER or ORACLE.
+        errors: As `landing_errors` gives them.
     """
 
     band: str
@@ -41,41 +37,36 @@ class Row:
     errors: dict
 
 
-def ordered(results: Results) -> dict[str, list[str]]:
-    """Methods of tables 1 and 2 by band: the paper's, and all that ran, those of APART last."""
-    order = {}
-    for band in dict.fromkeys([*paper.BANDS, *results.methods]):
-        ran = results.methods.get(band, {})
-        theirs = [m for m in paper.BENCHMARK if band in paper.BANDS or m in ran]
-        order[band] = list(dict.fromkeys([*theirs, *sorted(ran, key=APART.__contains__)]))
-    return order
+def ordered(methods: Iterable[str]) -> list[str]:
+    """Methods of tables 1 and 2 that ran: the paper's, then others, those of APART last."""
+    theirs = [method for method in paper.BENCHMARK if method in methods]
+    return list(dict.fromkeys([*theirs, *sorted(methods, key=APART.__contains__)]))
 
 
 def benchmark(results: Results) -> list[Row]:
-    """Table 1: the paper's methods and all that stand in no other table, on every band."""
+    """Table 1: every method that stands in no other table, on every band that it launched on."""
     rows = []
-    for band, methods in ordered(results).items():
-        rows += _rows(results, band, (method for method in methods if method not in APART))
+    for band, ran in results.methods.items():
+        rows += _rows(results, band, (method for method in ordered(ran) if method not in APART))
         if band in results.floors:
             rows.append(Row(band, FLOOR, ORACLE, _floor(results.floors[band])))
     return rows
 
 
 def ablation(results: Results, methods: tuple[str, ...]) -> list[Row]:
-    """Tables 3 and 4: the paper's rows, on its Band 1 and wherever one of them ran."""
+    """Tables 3 and 4: the paper's rows that ran, on bands where one of the ablations did."""
     bands = [band for band, ran in results.methods.items() if APART & {*methods} & {*ran}]
-    return [r for band in dict.fromkeys(["band1", *bands]) for r in _rows(results, band, methods)]
+    return [row for band in bands for row in _rows(results, band, methods)]
 
 
 def _rows(results: Results, band: str, methods: Iterable[str]) -> list[Row]:
+    """Rows of the methods that launched on a band, each with the paper's own below it."""
     rows = []
     for method in methods:
-        result = results.methods.get(band, {}).get(method)
+        result = results.methods[band].get(method)
         found = [] if result is None else _launched(result.trials)
-        nothing = NOT_RUN if result is None else NOT_LAUNCHED
-        rows += [Row(band, method, kind, errors) for kind, errors in found or [(nothing, {})]]
-        cells = paper.LANDING.get((band, method))
-        if cells:
+        rows += [Row(band, method, kind, errors) for kind, errors in found]
+        if found and (cells := paper.LANDING.get((band, method))):
             rows.append(Row(band, method, PAPER, _papers(cells)))
     return rows
 
@@ -112,7 +103,8 @@ def _floor(floor: dict) -> dict:
 def as_table(rows: list[Row], targets: Iterable[float], styles: Styles) -> Table:
     """Mean ± deviation in cm; bold: the lowest of a band where no launch failed."""
     tried = {key for row in rows for key in row.errors if key != "all"}
-    keys = [*sorted({*targets, *paper.TARGETS, *tried}), "all"]
+    papers = paper.TARGETS if any(row.source == PAPER for row in rows) else ()
+    keys = [*sorted({*targets, *papers, *tried}), "all"]
     lowest = {key: _lowest(rows, key) for key in keys}
     lines = []
     for row in rows:
@@ -122,7 +114,7 @@ def as_table(rows: list[Row], targets: Iterable[float], styles: Styles) -> Table
             least = lowest[key].get((row.band, row.source))
             bold = "**" if one and not one["failed"] and one["mean"] == least else ""
             cells.append(bold + spread(one) + bold)
-        total = row.errors.get("all", NOTHING)
+        total = row.errors["all"]
         failed = NONE if total["failed"] is None else f"{total['failed']} of {total['launches']}"
         names = band_name(row.band), method_name(row.method, styles), row.source
         lines.append([*names, *cells, number(100 * total["std"], ".2f"), failed])
@@ -157,8 +149,8 @@ def band_name(band: str) -> str:
 
 
 def method_name(method: str, styles: Styles) -> str:
-    """For readers, also of a method that did not run."""
-    return method if method == FLOOR else (styles | STYLES)[method].name
+    """For readers."""
+    return method if method == FLOOR else styles[method].name
 
 
 def records(rows: list[Row]) -> pd.DataFrame:

@@ -52,7 +52,7 @@ def without_repeats(rows: list[list[str]], columns: int = 2) -> list[list[str]]:
 def number(value: float | None, form: str, otherwise: str | None = NONE) -> str:
     """`value` in a format such as ".3f", or `otherwise` where there is none."""
     if value is not None and np.isfinite(value):
-        return format(value, form)
+        return format(value, form).replace("-", "−")
     return otherwise if isinstance(otherwise, str) else NONE
 
 

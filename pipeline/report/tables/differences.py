@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,19 +11,9 @@ import pandas as pd
 from pipeline.drawing.styles import Styles
 from pipeline.report.noise import Difference, difference
 from pipeline.report.results import Results
-from pipeline.report.tables.benchmark import LAUNCHED, band_name
+from pipeline.report.tables.benchmark import band_name
 from pipeline.report.tables.cells import NONE, Table
-
-REFERENCES = ("least_squares", "sling2sim2real")  # ours and the paper's
-
-VERDICTS = (
-    "more error",
-    "more error where both land, but fewer launches fail",
-    "less error",
-    "less error where it lands, but more launches fail",
-    "cannot be told apart",
-    "cannot be compared",
-)
+from pipeline.report.tables.landings import LAUNCHED
 
 
 class Compared(NamedTuple):
@@ -34,14 +25,14 @@ class Compared(NamedTuple):
     found: dict[str, Difference | None]
 
 
-def compared(results: Results, seed: int) -> list[Compared]:
+def compared(results: Results, references: Iterable[str], seed: int) -> list[Compared]:
     """Every method beside those of the references that ran on the same band."""
     rows = []
     for band, of_band in results.methods.items():
         for kind in LAUNCHED:
             aimed = {method: _aimed(one.trials, kind) for method, one in of_band.items()}
             for method, trials in aimed.items():
-                others = [m for m in REFERENCES if m in aimed and m != method and len(aimed[m])]
+                others = [m for m in references if m != method and len(aimed.get(m, ()))]
                 found = {other: difference(aimed[other], trials, seed) for other in others}
                 if found and len(trials):
                     rows.append(Compared(band, method, kind, found))
@@ -54,7 +45,8 @@ def _aimed(trials: pd.DataFrame, kind: str) -> pd.DataFrame:
 
 def as_table(rows: list[Compared], styles: Styles) -> Table:
     """Differences in cm with their intervals; bold where the interval leaves out zero."""
-    beside, lines = [one for one in REFERENCES if one in styles], []
+    beside = [m for m in styles if any(m in row.found for row in rows)]
+    lines = []
     for band, method, kind, found in rows:
         cells = (shown(found[one]) if one in found else NONE for one in beside)
         lines.append([band_name(band), styles[method].name, kind, *cells])
@@ -74,34 +66,6 @@ def shown(one: Difference | None) -> str:
 
 def _signed(metres: float) -> str:
     return f"{100 * metres:+.2f}".replace("-", "−")
-
-
-def claims(rows: list[Compared], styles: Styles) -> list[str]:
-    """What the intervals allow to be said, a line a band and reference."""
-    said: dict[tuple[str, str, str], dict[str, list[str]]] = {}
-    for band, method, kind, found in rows:
-        for reference, one in found.items():
-            parts = said.setdefault((band, kind, reference), {})
-            few = f" ({one.launches[1]} launches count)" if one and one.left_out else ""
-            parts.setdefault(_verdict(one), []).append(styles[method].name + few)
-    lines = []
-    for (band, kind, reference), parts in said.items():
-        words = [f"{one}: {' · '.join(parts[one])}" for one in VERDICTS if one in parts]
-        beside = f"{band_name(band)}, {kind}, beside **{styles[reference].name}**"
-        lines.append(f"- {beside}: {'; '.join(words)}.")
-    return lines
-
-
-def _verdict(one: Difference | None) -> str:
-    more, more_of_more, less, less_of_fewer, open_, none = VERDICTS
-    if one is None or not np.isfinite(one.low):
-        return none
-    if not one.real:
-        return open_
-    beside, own = one.failed
-    if one.mean > 0:
-        return more_of_more if own < beside else more
-    return less_of_fewer if own > beside else less
 
 
 def records(rows: list[Compared]) -> pd.DataFrame:

@@ -73,15 +73,17 @@ def derived(results: Results, styles: Styles) -> Table | None:
     rows = []
     for result in shown:
         own = result.confidence["derived"]
-        cells = [_range(own.get(name), factor) for name, (_, factor) in titles.items()]
+        cells = [ranged(own.get(name), factor) for name, (_, factor) in titles.items()]
         rows.append([result.band, styles[result.method].name, *cells])
     return ["band", "method", *(title for title, _ in titles.values())], rows
 
 
-def _range(about: dict | None, factor: float) -> str:
+def ranged(about: dict | None, factor: float) -> str:
     """A value and its interval, with as many digits as the interval's width deserves."""
     if about is None:
         return NONE
+    if "low" not in about:
+        return f"{factor * about['value']:.3g}"
     value, low, high = (factor * about[key] for key in ("value", "low", "high"))
     width = high - low
     if width <= 0:
@@ -151,26 +153,30 @@ def losses(results: Results, params, styles: Styles) -> Table:
     rows = []
     for result in results:
         loss, weights = result.theta.get("loss", {}), dict(params.methods[result.method].weights)
-        total = loss.get("total", math.nan)
+        another = params.methods[result.method].search == LEAST_SQUARES  # minimises no such sum
+        total = math.nan if another else loss.get("total", math.nan)
         cells = []
         for term in terms:
             weight, value = weights.get(term, 0.0), loss.get(term, math.nan)
             share = f" ({percent(weight * value / total)})" if weight else " (unused)"
-            cells.append(number(value, ".3g") + (share if np.isfinite(value) else ""))
+            share = share if np.isfinite(value) and not another else ""
+            cells.append(number(value, ".3g") + share)
         common = printed_loss(result)
-        cells += [number(total, ".4g"), number(common, ".4g"), str(len(result.history))]
+        spent = result.theta.get("rollouts", len(result.history))
+        cells += [number(total, ".4g"), number(common, ".4g"), str(spent)]
         rows.append([result.band, styles[result.method].name, *cells])
     return heads, rows
 
 
-def held_out(replays: dict[str, Replay], styles: Styles) -> Table:
-    """Residuals of fitted and of held-out data of a band's pull."""
+def held_out(replays: dict[str, dict[str, Replay]], styles: Styles) -> Table:
+    """Residuals of fitted and of held-out data of each band's pull, by band and method."""
     rows = []
-    for method, replay in replays.items():
-        cells = []
-        for kind, form in (("force", ".3f"), ("cloud", ".2f")):
-            fitted, held = (replay.residuals[kind][part] for part in ("fitted", "held_out"))
-            cells += [number(fitted, form), number(held, form), number(held / fitted, ".2f")]
-        rows.append([styles[method].name, *cells])
+    for band, of_band in replays.items():
+        for method, replay in of_band.items():
+            cells = []
+            for kind, form in (("force", ".3f"), ("cloud", ".2f")):
+                fitted, held = (replay.residuals[kind][part] for part in ("fitted", "held_out"))
+                cells += [number(fitted, form), number(held, form), number(held / fitted, ".2f")]
+            rows.append([band, styles[method].name, *cells])
     heads = [f"{what}, {part}" for what in ("force [N]", "cloud [cm]") for part in PARTS]
-    return ["method", *heads], rows
+    return ["band", "method", *heads], rows

@@ -13,7 +13,7 @@ from pipeline.report.noise import landed
 from pipeline.report.results import Results
 from pipeline.report.tables.cells import NONE, Table, number, percent
 
-AIM = 0.05  # mean error of predicted landings inside the recorded stretch, share of the distance
+LAUNCHED = ("virtual", "measured")  # kinds of launches that landed, or failed to
 
 
 def landing_errors(trials: pd.DataFrame) -> dict:
@@ -126,32 +126,42 @@ def intervals(trials: pd.DataFrame) -> dict[str, dict] | None:
     }
 
 
-def prediction_summary(results: Results, band: str, kind: str, styles: Styles) -> Table | None:
-    """Prediction error of each method on launches of a kind, and what its intervals cover."""
-    rows = []
-    for method, result in results.methods[band].items():
-        trials = result.trials[result.trials.kind == kind]
-        if trials.empty:
-            continue
-        parts, ranges = prediction_error(trials), intervals(trials) or {}
-        bias = number(100 * parts["all"]["bias"], "+.1f")
-        unpredicted = f"{parts['all']['unpredicted']} of {parts['all']['tried']}"
-        covered = (_coverage(ranges.get(name)) for name in ("inside", "beyond"))
-        shares = map(_share, parts.values())
-        rows.append([styles[method].name, *shares, bias, unpredicted, *covered])
-    heads = ["method", "inside the recorded stretch", "beyond it", "all launches", "bias [%]"]
-    heads += ["not predicted", "in the 90 % interval, inside", "beyond"]
+def prediction_summary(results: Results, styles: Styles) -> Table | None:
+    """Prediction error of each method on launches of each kind, and what its intervals cover."""
+    rows, beyond = [], False
+    for result in results:
+        for kind in LAUNCHED:
+            trials = result.trials[result.trials.kind == kind]
+            if trials.empty:
+                continue
+            parts, ranges = prediction_error(trials), intervals(trials) or {}
+            beyond |= parts["beyond"]["tried"] > 0
+            bias = number(100 * parts["all"]["bias"], "+.1f")
+            unpredicted = f"{parts['all']['unpredicted']} of {parts['all']['tried']}"
+            mark = "" if result.confidence else " †"
+            covered = [coverage(ranges.get(name)) for name in ("inside", "beyond")]
+            covered = [text + mark * (text != NONE) for text in covered]
+            shares = (_share(parts[name]) for name in ("inside", "beyond"))
+            names = result.band, styles[result.method].name, kind
+            rows.append([*names, *shares, bias, unpredicted, *covered])
+    heads = ["band", "method", "launches", "error inside the recorded stretch", "beyond it"]
+    heads += ["bias [%]", "not predicted", "in the 90 % interval, inside", "beyond"]
+    if not beyond:
+        kept = [n for n, head in enumerate(heads) if not head.startswith("beyond")]
+        heads, *rows = ([row[n] for n in kept] for row in (heads, *rows))
     return (heads, rows) if rows else None
 
 
 def _share(part: dict) -> str:
     if not part["launches"]:
-        return "no launches"
+        return NONE
     mean, most = percent(part["mean"], ".1f"), percent(part["max"], ".1f")
     return f"{mean} (max {most}, {part['launches']} launches)"
 
 
-def _coverage(part: dict | None) -> str:
+def coverage(part: dict | None) -> str:
+    """How many landings lie in their intervals, and how wide these are."""
     if not part or not part["launches"]:
         return NONE
-    return f"{part['covered']} of {part['launches']} (median width {percent(part['width'])})"
+    width = percent(part["width"], ".2g")
+    return f"{part['covered']} of {part['launches']}, median width {width}"

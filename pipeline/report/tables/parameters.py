@@ -13,7 +13,7 @@ from pipeline.objective.space import Space
 from pipeline.params.identification import LAWS
 from pipeline.report import paper
 from pipeline.report.results import PRINTED, Result, Results
-from pipeline.report.tables.benchmark import NOT_RUN, PAPER, band_name, method_name, ordered
+from pipeline.report.tables.benchmark import PAPER, band_name, method_name, ordered
 from pipeline.report.tables.cells import NONE, Table, number
 from pipeline.sling.material import THETA
 from pipeline.sling.rubber import RUBBER
@@ -24,7 +24,7 @@ HEADS = {  # as the paper has them, with units
     "elasticity_damping": "d [s]",
     "dynamic_friction": "friction",
     "damping_scale": "s",
-    **{name: name.replace("_", " ") for name in LAWS[RUBBER]},
+    **{name: name.replace("_", " ").replace("mooney", "Mooney") for name in LAWS[RUBBER]},
 }
 UNITS = {"youngs_modulus": "_pa", "elasticity_damping": "_s"}
 RECORDED = {"rig": "virtual", "recording": "measured"}
@@ -60,28 +60,18 @@ class IdentifiedRow:
 
 
 def identified(results: Results, params) -> list[IdentifiedRow]:
-    """Table 2: the paper's methods and every other that ran, those of tables 3 and 4 last."""
+    """Table 2: every method that ran, the paper's own numbers below those of its methods."""
     rows = []
-    for band, methods in ordered(results).items():
-        for method in methods:
-            source, values, loss = NOT_RUN, {}, math.nan
-            if result := results.methods.get(band, {}).get(method):
-                source = RECORDED[params.bands[band].source]
-                names = (name for name in HEADS if name in result.theta["theta"])
-                values = {name: _value(params, result, name) for name in names}
-                loss = printed_loss(result)
-            rows.append(IdentifiedRow(band, method, source, values, loss))
+    for band, ran in results.methods.items():
+        for method in ordered(ran):
+            result, source = ran[method], RECORDED[params.bands[band].source]
+            names = (name for name in HEADS if name in result.theta["theta"])
+            values = {name: _value(params, result, name) for name in names}
+            rows.append(IdentifiedRow(band, method, source, values, printed_loss(result)))
             if cells := paper.THETA.get((band, method)):
                 *numbers, loss = cells
-                rows.append(
-                    IdentifiedRow(
-                        band,
-                        method,
-                        PAPER,
-                        dict(zip(THETA, map(Value, numbers), strict=True)),
-                        loss,
-                    )
-                )
+                values = dict(zip(THETA, map(Value, numbers), strict=True))
+                rows.append(IdentifiedRow(band, method, PAPER, values, loss))
     return rows
 
 

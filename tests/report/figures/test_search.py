@@ -1,5 +1,7 @@
 """Pictures of the searches, read back from the objects that were drawn."""
 
+from dataclasses import replace
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from matplotlib.patches import Ellipse
 
 from pipeline.drawing.styles import styles
 from pipeline.report.figures import search
-from tests.report.conftest import METHOD
+from tests.report.conftest import BAND, METHOD
 
 
 def pairs(figure: plt.Figure) -> list[plt.Axes]:
@@ -15,14 +17,17 @@ def pairs(figure: plt.Figure) -> list[plt.Axes]:
 
 
 def test_convergence_draws_the_printed_loss_of_the_best_so_far(kept, result) -> None:
-    search.convergence("", {METHOD: result, "de": result}, styles([METHOD, "de"]), {"de"})
-    for ax in kept[0].axes:
-        steps, other = (line for line in ax.lines if len(line.get_xdata()) == 5)
-        assert steps.get_xdata().tolist() == [1, 2, 3, 4, 5]
-        np.testing.assert_allclose(steps.get_ydata(), [3, 3, 2, 2, 1.25])
-        assert (steps.get_linestyle(), other.get_linestyle()) == ("-", "--")
-        dots = [line for line in ax.lines if line.get_marker() == "o"]
-        assert [dot.get_xdata().tolist() for dot in dots] == [[4], [4]]  # the first of CMA-ES
+    """Of a fit that keeps one row, that row stands where its rollouts end."""
+    fitted = replace(result, theta=result.theta | {"rollouts": 60})
+    search.convergence("", {BAND: {METHOD: result, "de": fitted}}, styles([METHOD, "de"]))
+    (ax,) = kept[0].axes
+    steps, end, other, _ = ax.lines
+    assert steps.get_xdata().tolist() == [1, 2, 3, 4, 5]
+    assert other.get_xdata().tolist() == [1, 2, 3, 4, 60]
+    for line in (steps, other):
+        np.testing.assert_allclose(line.get_ydata(), [3, 3, 2, 2, 1.25])
+    assert end.get_xydata().tolist() == [[5, 1.25]]
+    assert steps.get_linestyle() != other.get_linestyle()
 
 
 def test_the_corner_shows_every_pair_of_parameters(kept, result, params) -> None:

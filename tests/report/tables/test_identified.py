@@ -99,6 +99,15 @@ def test_losses_say_what_each_term_weighs(results, params, named) -> None:
     table = losses(results, params, named)
     assert column(table, "geom [cm]") == column(table, "work [J]") == ["0.5 (40 %)"]
     assert column(table, "printed loss") == ["1.25"] and column(table, "rollouts") == ["5"]
+    results.methods[BAND][METHOD].theta["rollouts"] = 246  # a fit keeps one row of many
+    assert column(losses(results, params, named), "rollouts") == ["246"]
+
+
+def test_a_fit_that_minimises_no_sum_of_terms_has_no_shares(results, params, named) -> None:
+    method = params.methods[METHOD].model_copy(update={"search": "least_squares"})
+    params = params.model_copy(update={"methods": {METHOD: method}})
+    table = losses(results, params, named)
+    assert column(table, "geom [cm]") == ["0.5"] and column(table, "total of its own loss") == ["–"]
 
 
 def test_a_term_of_another_name_has_a_column_too(results, params, named) -> None:
@@ -106,19 +115,18 @@ def test_a_term_of_another_name_has_a_column_too(results, params, named) -> None
     assert column(losses(results, params, named), "glow") == ["0.7 (unused)"]
 
 
-def test_held_out_residuals_stand_beside_the_fitted(params, named) -> None:
-    inputs = params, BAND, METHOD, episode(), {}
+def test_held_out_residuals_stand_beside_the_fitted(params) -> None:
+    inputs, named = (params, BAND, METHOD, episode(), {}), styles(["de", METHOD])
     residuals = {
         "force": {"fitted": 0.2, "held_out": 0.3},
         "cloud": {"fitted": 0.5, "held_out": 0.25},
-    }
-    heads, rows = held_out({METHOD: toy_replay(*inputs, residuals=residuals)}, named)
-    assert rows == [["Sling2Sim2Real", "0.200", "0.300", "1.50", "0.50", "0.25", "0.50"]]
-    named = styles(["de", METHOD])  # one that knows nothing takes nothing from the other
+    }  # one that knows nothing takes nothing from the other
     replays = {"de": toy_replay(*inputs), METHOD: toy_replay(*inputs, residuals=residuals)}
-    unknown = ["DE_L", "0.200", "–", "–", "0.20", "–", "–"]
-    assert held_out(replays, named)[1] == [unknown, *rows]
-    assert heads[1:4] == ["force [N], fitted", "force [N], held out", "force [N], ratio"]
+    heads, rows = held_out({BAND: replays}, named)
+    unknown, known = rows
+    assert unknown == [BAND, "DE_L", "0.200", "–", "–", "0.20", "–", "–"]
+    assert known == [BAND, "Sling2Sim2Real", "0.200", "0.300", "1.50", "0.50", "0.25", "0.50"]
+    assert heads[2:5] == ["force [N], fitted", "force [N], held out", "force [N], ratio"]
 
 
 def card(**training) -> dict:

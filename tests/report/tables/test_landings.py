@@ -68,7 +68,7 @@ def test_prediction_error_inside_and_beyond() -> None:
     assert (error["beyond"]["unpredicted"], error["beyond"]["tried"]) == (1, 2)
     assert error["inside"]["unpredicted"] == 0
     text = markdown(predictions(launched))
-    assert "+5.0%" in text and "-10.0%" in text and text.count("(beyond)") == 2
+    assert "+5.0%" in text and "−10.0%" in text and text.count("(beyond)") == 2
 
 
 def test_predictions_are_held_against_landings_outside_the_area_too() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from pipeline.drawing.replay import replay, work
+from pipeline.drawing.replay import replay
 from pipeline.episode.episode import Episode
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.params import load
@@ -80,18 +80,7 @@ def test_the_bands_ends_stay_at_the_tips(played) -> None:
     np.testing.assert_allclose(np.abs(ends), np.broadcast_to([0.1375, 0, 0], ends.shape), atol=2e-3)
 
 
-def test_it_ends_where_the_loss_says(params, sling, played) -> None:
+def test_it_is_as_far_off_as_the_loss_says(params, sling, played) -> None:
     episode, rollouts, played = played
     terms = EpisodeLoss.of(params, METHOD, episode, sling).terms(rollouts)
-    apart = abs(played.measured_work[-1] - played.work[-1])
-    assert apart == pytest.approx(terms["work"][0], rel=1e-9) and apart > 0.1
     assert 100 * played.distance.mean() == pytest.approx(terms["geom"][0], rel=1e-6)
-
-
-def test_work_of_a_constant_force_and_of_a_spring() -> None:
-    time = np.linspace(0, 2, 2001)
-    velocity = np.stack([0 * time, np.cos(time), 0 * time], 1)
-    constant = work(np.tile([5.0, 2.0, 0.0], (2001, 1)), velocity, 1e-3)
-    np.testing.assert_allclose(constant, 2 * np.sin(time), atol=1e-6)
-    spring = np.stack([0 * time, -3 * np.sin(time), 0 * time], 1)
-    np.testing.assert_allclose(work(spring, velocity, 1e-3), -1.5 * np.sin(time) ** 2, atol=1e-6)

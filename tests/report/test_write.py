@@ -127,7 +127,7 @@ def test_a_run_of_three_bands_is_told_in_few_words_and_pictures(root, params, te
     assert "not run" not in text and text.count(".png") <= 15
     sentences = [line for line in told.splitlines() if line.startswith("- ") and "⚠" not in line]
     assert len([line for line in sentences if "](bands/" not in line]) <= 8
-    assert "[band2](bands/band2/README.md)" in told and "| band3 | virtual | 3.0 |" in told
+    assert "[band2](bands/band2/README.md)" in told and "| band3 | 4 virtual | 3.0 |" in told
 
 
 def test_a_band_that_nobody_launched_is_told_without_emptiness(root, params, text_alone) -> None:

@@ -109,7 +109,6 @@ def _methods(report: Report) -> list[str]:
     params, results, styles = report.params, report.results, report.styles
     text = [
         "### Searches and losses\n",
-        "−c leaves out the covariance, −m the several starts, −L_work the term of work.\n",
         markdown(identified.methods(results, params, styles)),
         LOSS,
         markdown(identified.losses(results, params, styles), repeats=False),

@@ -12,20 +12,20 @@ from pipeline.report.tables.landings import LAUNCHED
 INTRODUCTION = """\
 # Report
 
-From one recording of a robot that pulls and releases an elastic band, each method fits a simulator
-of the band (parameters θ) and trains a slingshot policy in it. Then the policy's launches are
-compared with launches that the simulator has never seen. The last stage of `dvc repro` writes this
-file.
+From a recording of a robot that pulls and releases an elastic band, each method fits a simulator of
+the band (parameters θ) and trains a slingshot policy in it. Then its launches are compared with
+launches that the simulator has never seen. The last stage of `dvc repro` writes this file.
 
 ## What came out
 """
+COLUMNS = """\
+Centimetres are the mean distance from the target. Per cent are of the landing's distance: how far
+the prediction is off on average, its signed mean (*bias*), and how wide its 90 % interval is."""
+FLOOR = """\
+The *actuation floor* is what errors of draw and release alone cost: no method can do better."""
 VIRTUAL = """\
 *Virtual* launches are those of a rig in software, whose rubber follows another law than the
 simulator."""
-COLUMNS = """\
-Columns: mean distance from the target; the *actuation floor*, which errors of draw and release
-alone cost; launches that failed; mean of predicted less actual landing, in per cent of the
-distance; how many landings lie in their predicted 90 % interval, and how wide that is."""
 NOTHING = """\
 Nothing was launched in this run, so no landing error is known. The cards say where to draw. Put
 measured landings into `data/trials/measured/<band>.csv` and run `dvc repro` to compare them with
@@ -39,11 +39,9 @@ def outcome(report: Report) -> str:
     table = tables.outcome(results, report.references, report.styles)
     text = [INTRODUCTION]
     if table:
-        kinds = set(results.trials.kind)
-        text += [
-            markdown(table),
-            f"{COLUMNS} {VIRTUAL}\n" if "virtual" in kinds else f"{COLUMNS}\n",
-        ]
+        virtual = (results.trials.kind == "virtual").any()
+        words = [COLUMNS, *([FLOOR] if results.floors else []), *([VIRTUAL] if virtual else [])]
+        text += [markdown(table), "\n".join(words) + "\n"]
         text += _picture(report)
     else:
         text.append(NOTHING)
@@ -51,8 +49,8 @@ def outcome(report: Report) -> str:
     if recorded:
         words = "What the recordings say of the bands, with 90 % intervals:\n"
         text += [words, markdown(tables.values(results, recorded, report.main))]
-    lines = [*findings(report), *doubts(report)]
-    return "\n".join([*text, *(f"- {line}" for line in lines), "", _cards(report)])
+    lines = [f"- {line}" for line in (*findings(report), *doubts(report))]
+    return "\n".join([*text, *lines, *([""] if lines else []), _cards(report)])
 
 
 def _picture(report: Report) -> list[str]:

@@ -31,8 +31,8 @@ Only what ran has rows. Bold: the lowest of a band, which may be noise (see the 
 SOURCES = {
     "virtual": "*virtual*: recorded or launched by the virtual rig.",
     "measured": "*measured*: recorded or launched by a robot.",
-    benchmark.PAPER: f"*{benchmark.PAPER}*: what the authors of Sling2Sim2Real measured, with other"
-    " rubber on another rig; it is no result of this run.",
+    benchmark.PAPER: f"*{benchmark.PAPER}*: what the authors of Sling2Sim2Real found, with other"
+    " rubber, another rig and another simulator; it is no result of this run.",
 }
 BEFORE = {
     1: f"""\
@@ -45,8 +45,7 @@ that does not land, takes more force than the arm may hold, or lands outside y =
 θ: Young's modulus E, Poisson's ratio ν, elasticity damping d (viscous stress = d × rate of the
 elastic stress), friction of the finger pads, damping scale s (share of d that acts on shape). A
 pull hardly tells E from ν, or s from d: single values are less certain than what they do together.
-The loss is the paper's (geometry + force + work), whatever the method minimised. The paper's values
-are those of another simulator and other rubber.
+The loss is the paper's (geometry + force + work), whatever the method minimised.
 """,
     3: "Other searches of the paper's loss, with the same number of rollouts.\n",
     4: """\

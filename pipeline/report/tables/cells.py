@@ -11,6 +11,7 @@ import numpy as np
 
 Table = tuple[list[str], list[list[str]]]
 NONE = "–"
+MINUS = re.compile(r"(?<![\w.])-(?=\d)")  # before a number, not in 1E-3
 NAMES = {  # of methods, as the paper prints them
     "DE_L": r"$DE_{\mathcal{L}}$",
     "BO_L": r"$BO_{\mathcal{L}}$",
@@ -34,8 +35,16 @@ def markdown(table: Table, repeats: bool = True) -> str:
     """As markdown; without `repeats`, first cells that repeat those above are blank."""
     heads, rows = table
     rows = rows if repeats else without_repeats(rows)
+    rows = [[MINUS.sub("−", cell) for cell in row] for row in rows]
     lines = [heads, ["---"] * len(heads), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+
+
+def without_empty(table: Table) -> Table:
+    """Without the columns that have no number in any row."""
+    heads, rows = table
+    kept = [n for n in range(len(heads)) if any(row[n] != NONE for row in rows)]
+    return [heads[n] for n in kept], [[row[n] for n in kept] for row in rows]
 
 
 def without_repeats(rows: list[list[str]], columns: int = 2) -> list[list[str]]:
@@ -52,7 +61,7 @@ def without_repeats(rows: list[list[str]], columns: int = 2) -> list[list[str]]:
 def number(value: float | None, form: str, otherwise: str | None = NONE) -> str:
     """`value` in a format such as ".3f", or `otherwise` where there is none."""
     if value is not None and np.isfinite(value):
-        return format(value, form).replace("-", "−")
+        return format(value, form)
     return otherwise if isinstance(otherwise, str) else NONE
 
 

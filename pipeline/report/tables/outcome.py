@@ -6,7 +6,7 @@ import pandas as pd
 
 from pipeline.drawing.styles import Styles
 from pipeline.report.results import Result, Results
-from pipeline.report.tables.cells import NONE, Table, number
+from pipeline.report.tables.cells import NONE, Table, number, without_empty
 from pipeline.report.tables.identified import ranged
 from pipeline.report.tables.landings import (
     LAUNCHED,
@@ -41,20 +41,20 @@ def outcome(results: Results, references: tuple[str, ...], styles: Styles) -> Ta
             if trials[0].empty:
                 continue
             found = [_errors(some) for some in trials]
-            parts, ranges = prediction_error(trials[0]), intervals(trials[0]) or {}
+            parts, ranges = prediction_error(trials[0])["all"], intervals(trials[0]) or {}
             cells = [number(100 * one["mean"], ".1f", "N/A") if one else NONE for one in found]
             own = found[0]["mean"] if found[0] else None
             cells += [number(floor and 100 * floor, ".1f")]
             cells += [number(own and floor and own / floor, ".1f")]
-            failed = " · ".join(str(one["failed"]) if one else NONE for one in found)
-            counts = f"{failed} of {len(trials[0])}"
-            bias = number(100 * parts["all"]["bias"], "+.1f")
-            rows.append([band, kind, *cells, counts, bias, coverage(ranges.get("all"))])
+            failed = [str(one["failed"]) for one in found if one]
+            cells += [" · ".join(failed) or NONE]
+            cells += [number(100 * parts["mean"], ".1f"), number(100 * parts["bias"], "+.1f")]
+            rows.append([band, f"{len(trials[0])} {kind}", *cells, coverage(ranges.get("all"))])
     names = [styles[method].name for method in references]
     heads = ["band", "launches", *(f"{name} [cm]" for name in names)]
     heads += ["actuation floor [cm]", f"{names[0]}, in floors", f"failed: {' · '.join(names)}"]
-    heads += ["prediction bias [%]", "in the 90 % interval"]
-    return (heads, rows) if rows else None
+    heads += ["prediction off by [%]", "bias [%]", "in the 90 % interval"]
+    return without_empty((heads, rows)) if rows else None
 
 
 def _of(result: Result, kind: str) -> pd.DataFrame:
@@ -76,7 +76,4 @@ def values(results: Results, bands: list[str], method: str) -> Table:
             for name, about in result.confidence.get(group, {}).items():
                 known[name] = known.get(name, {}) | about
         rows.append([band, *(ranged(known.get(n), factor) for n, (_, factor) in VALUES.items())])
-    heads = [title for title, _ in VALUES.values()]
-    shown = [n for n in range(len(heads)) if any(row[n + 1] != NONE for row in rows)]
-    rows = [[row[0], *(row[n + 1] for n in shown)] for row in rows]
-    return ["band", *(heads[n] for n in shown)], rows
+    return without_empty((["band", *(title for title, _ in VALUES.values())], rows))

@@ -108,12 +108,12 @@ def as_table(rows: list[IdentifiedRow], styles: Styles) -> Table:
     losses: dict[tuple[str, str], list[float]] = {}
     for row in rows:
         losses.setdefault((row.band, row.source), []).append(row.loss)
-    least = {group: np.nanmin([math.inf, *some]) for group, some in losses.items()}
+    least = {group: np.nanmin([math.inf, *some]) for group, some in losses.items() if len(some) > 1}
     names, lines = _shown(rows), []
     for row in rows:
         cells = [_cell(name, row.values[name]) if name in row.values else NONE for name in names]
         loss = number(row.loss, ".4f")
-        loss = f"**{loss}**" if row.loss == least[row.band, row.source] else loss
+        loss = f"**{loss}**" if row.loss == least.get((row.band, row.source)) else loss
         whose = band_name(row.band), method_name(row.method, styles), row.source
         lines.append([*whose, *cells, loss])
     return ["band", "method", "source", *(HEADS[name] for name in names), "loss"], lines

@@ -28,21 +28,23 @@ def test_a_row_a_band_with_errors_predictions_and_failures() -> None:
     heads, (row,) = outcome(ran, (MAIN, THEIRS), NAMED)
     assert dict(zip(heads, row, strict=True)) == {
         "band": "band1",
-        "launches": "virtual",
+        "launches": "6 virtual",
         "ours [cm]": "2.0",
         "Sling2Sim2Real [cm]": "N/A",
         "actuation floor [cm]": "1.0",
         "ours, in floors": "2.0",
-        "failed: ours · Sling2Sim2Real": "0 · 15 of 6",
-        "prediction bias [%]": "−2.0",
+        "failed: ours · Sling2Sim2Real": "0 · 15",
+        "prediction off by [%]": "2.0",
+        "bias [%]": "-2.0",
         "in the 90 % interval": "6 of 6, median width 10 %",
     }
 
 
-def test_measured_launches_without_a_target_have_a_bias_alone() -> None:
-    plain = launches([[0.0]], "measured", targets=[2.0]).assign(target=math.nan, predicted_y=2.1)
-    _, (row,) = outcome(results(result("mine", MAIN, plain)), (MAIN,), NAMED)
-    assert row == ["mine", "measured", "–", "–", "–", "– of 1", "+5.0", "–"]
+def test_measured_launches_without_a_target_have_predictions_alone() -> None:
+    plain = launches([[0.0]], "measured", targets=[2.0]).assign(target=math.nan, predicted_y=1.9)
+    heads, (row,) = outcome(results(result("mine", MAIN, plain)), (MAIN,), NAMED)
+    assert heads == ["band", "launches", "prediction off by [%]", "bias [%]"]
+    assert row == ["mine", "1 measured", "5.0", "-5.0"]
 
 
 def test_no_launch_is_no_table() -> None:

@@ -97,7 +97,7 @@ def of_confidence(content: dict, path: Path) -> Iterator[Hazard]:
     """A θ file (its content) that is not sure of itself."""
     confidence = content.get("confidence")
     if not confidence:
-        what = f"{path} does not tell how well its parameters are known, and no interval does"
+        what = f"{path} does not tell how well its parameters are known: intervals leave that out"
         yield Hazard("confidence", what)
     elif not confidence.get("settled", True):
         yield Hazard(

@@ -136,7 +136,8 @@ class CheckReport:
 
     def to_text(self) -> str:
         """The verdict, what it rests on, and then everything else."""
-        lines = [f"{self.path}  sha256 {self.sha256[:16]}", "", *self._verdict(), *self.written]
+        lines = [f"{self.path}  sha256 {self.sha256[:16]}", "", *self._verdict(), *self._basis()]
+        lines += ["", *self.written] if self.written else []
         lines += [f"lost or mended: {loss}" for loss in self.losses]
         lines += [f"note: {note}" for note in self.notes]
         lines += _phases(self.phases) + _extrinsics(self.extrinsics) + _delays(self.delays)
@@ -145,6 +146,26 @@ class CheckReport:
             if facts:
                 lines += ["", title, *(f"  {k:<22}{_shown(v)}" for k, v in facts.items())]
         return "\n".join([*lines, "", *_topics(self.topics)])
+
+    def _basis(self) -> list[str]:
+        """The numbers that tell most, in words."""
+        lines, told, seen = [], self.signals, self.cloud
+        if told:
+            lines += [
+                f"  force: at most {told['peak_force_n']:.1f} N, at {told['stretch']:.2f} times the"
+                f" rest length; release known to ± {1e3 * told['release_error_s']:.1f} ms"
+            ]
+        if seen:
+            shown = seen["frames"] - seen["empty"]
+            covered = seen["taut_coverage"]
+            part = "" if covered is None else f", {100 * covered:.0f} % of it while it is drawn"
+            lines += [f"  pictures: the band is in {shown} of {seen['frames']}{part}"]
+        if "assumed" in str(self.band.get("source")):
+            lines += [
+                f"  the band: {self.band['diameter_m']:g} m thick and"
+                f" {self.band['rest_length_m']:g} m long, {self.band['source']}"
+            ]
+        return ["", "it rests on", *lines] if lines else []
 
     def _verdict(self) -> list[str]:
         cautions = [f"  - {caution}" for caution in self.cautions]

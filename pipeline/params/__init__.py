@@ -157,6 +157,8 @@ def load(path: str | Path = "params.yaml") -> Params:
     """Read and check params.yaml. Raises UserError."""
     try:
         text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise UserError(f"{path}: no such file; run this in the project's folder") from error
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not UTF-8 text"
         raise UserError(f"{path}: cannot be read ({reason})") from error

@@ -119,7 +119,7 @@ def test_a_command_line_that_makes_no_sense(refused) -> None:
 
 def test_a_users_mistake(tmp_path: Path, refused) -> None:
     aim = "aim --band band1 --target 1.9".split()
-    assert "params.yaml: cannot be read" in refused(1, *aim, folder=tmp_path)
+    assert "params.yaml: no such file; run this in" in refused(1, *aim, folder=tmp_path)
     for arguments, expected in (
         ("launch --theta none.json --band band1 --draw=-0.30,-0.17", "none.json: no such file"),
         ("launch --theta none.json --band band9 --draw=-0.30,-0.17", "band band9: not in params"),
@@ -139,6 +139,16 @@ def test_a_users_mistake(tmp_path: Path, refused) -> None:
         ("add-band new --recording none.mcap --mass 0.04", "none.mcap"),
     ):
         assert expected in refused(1, *arguments.split())
+
+
+def test_a_mistake_in_params_is_told_before_any_stage_runs(tmp_path: Path, refused) -> None:
+    text = (ROOT / "params.yaml").read_text()
+    (tmp_path / "params.yaml").write_text(
+        text.replace("bands: [band1, band2, band3] ", "bands: [band9] ")
+    )
+    for command in ("flow", "fit --name band1", "aim --band band1 --target 1.9"):
+        line = refused(1, *command.split(), folder=tmp_path)
+        assert line == "error: params.yaml: run.bands: band9 is not one of band1, band2, band3"
 
 
 def test_the_version_and_a_mistake_as_a_process() -> None:

@@ -52,7 +52,11 @@ def test_the_verdict_and_its_cautions_come_first(looked) -> None:
         report = replace(looked.report, cautions=cautions, problem=problem)
         lines = report.to_text().splitlines()
         assert lines[2:4] == [verdict, "  - the force has a gap: record it again"]
-        assert lines[-1].startswith("  pose") or "chosen" in lines  # topics come last
+        basis = lines.index("it rests on")
+        assert lines[basis + 1].startswith("  force: at most ")
+        assert lines[basis + 2].startswith("  pictures: the band is in ")
+        assert lines[basis + 3].endswith(f"0.52 m long, {ASSUMED}")
+        assert basis < lines.index("signals") < lines.index("chosen")
     pulls = [replace(looked.report.row, number=number) for number in (1, 2)]
     lines = replace(looked.report, pulls=pulls, cautions=cautions).to_text().splitlines()
     assert lines[2] == "pull 1 of 2: can be used, but:" and lines[5].split()[:2] == [

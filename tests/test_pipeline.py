@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 TINY = {
     "run.bands": ["band1"],
     "run.rig": ["band1"],
-    "run.methods": ["sling2sim2real", "least_squares"],
+    "run.methods": ["least_squares", "sling2sim2real"],
     "run.ablations": {"bands": ["band1"], "methods": ["de"]},
     "cloud.points": 100,
     **{f"sling.{name}": value for name, value in ROUGH.items()},
@@ -40,7 +40,7 @@ METHODS = [f"{step}@band1-sling2sim2real" for step in SEARCHED]
 FITTED = [f"{step}@band1-least_squares" for step in SEARCHED]
 ABLATIONS = [f"ablation_{step}@band1-de" for step in SEARCHED]
 OF_THE_BAND = {f"{step}@band1" for step in ("record", "episode", "mounting", "floor")}
-EVERYTHING = {*OF_THE_BAND, *METHODS, *FITTED, *ABLATIONS, "report"}
+EVERYTHING = {*OF_THE_BAND, *METHODS, *FITTED, *ABLATIONS, "card@band1", "report"}
 
 
 class Copy(project.Copy):
@@ -106,7 +106,9 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
         step, *item = name.split("@")
         band, _, method = item[0].partition("-") if item else ("", "", "")
         listed = [
-            key.replace("${item.band}", band).replace("${item.method}", method)
+            key.replace("${item.band}", band)
+            .replace("${item.method}", method)
+            .replace("${run.methods[0]}", TINY["run.methods"][0])
             for key in stages[step].get("params", [])
         ]
         notes = list((project.folder.parent / "audit").glob(f"{script}.*.json"))

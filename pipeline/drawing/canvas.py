@@ -18,6 +18,7 @@ from PIL import Image
 from pipeline.base.files import replacing
 from pipeline.drawing.styles import THEME
 
+WEBP_QUALITY = 88
 PARAMETERS = {  # name and unit on an axis, and the factor from SI to that unit
     "youngs_modulus": ("E [MPa]", 1e-6),
     "poissons_ratio": ("ν", 1.0),
@@ -81,11 +82,14 @@ def picture(theme: dict | None = None, dpi: int = 130) -> Callable:
 
 
 def save(figure: plt.Figure, path: Path, dpi: int) -> None:
-    """Write the picture as PNG of 256 colours, a third of the size, and forget it."""
+    """Write the picture and forget it: as PNG of 256 colours, a third of the size, or as WebP."""
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=dpi)
     plt.close(figure)
-    few = Image.open(drawn).convert("RGB")
-    few = few.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    image, how = Image.open(drawn).convert("RGB"), {"format": path.suffix[1:]}
+    if path.suffix == ".png":
+        image = image.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    else:  # a camera's picture has more colours
+        how |= {"quality": WEBP_QUALITY}
     with replacing(path) as temporary:
-        few.save(temporary, format="png")
+        image.save(temporary, **how)

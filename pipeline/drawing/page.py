@@ -29,7 +29,7 @@ def page(
 
     Args:
         folder: Where the text's pictures lie.
-        section: HTML that stands before the second chapter.
+        section: HTML that stands before the first chapter.
         links: Ids and titles of chapters in `section`; their links come first.
         foot: HTML at the end.
 
@@ -37,15 +37,14 @@ def page(
         UserError: A picture is missing.
     """
     body, chapters = _rendered(markdown, folder)
-    begins = [match.start() for match in re.finditer("<h2 ", body)]
-    second = begins[1] if len(begins) > 1 else len(body)
+    begin = next((match.start() for match in re.finditer("<h2 ", body)), len(body))
     return Template((HERE / "page.html").read_text("utf-8")).substitute(
         title=title,
         style=(HERE / "page.css").read_text("utf-8"),
         navigation="\n".join(f'<a href="#{id_}">{name}</a>' for id_, name in (*links, *chapters)),
-        first=body[:second],
+        first=body[:begin],
         section=section,
-        rest=body[second:],
+        rest=body[begin:],
         foot=foot,
     )
 

@@ -46,7 +46,7 @@ def test_the_text_is_in_the_page_with_its_pictures(html: str) -> None:
         ("chapter-2-band-more", "Band &amp; more"),
     ):
         assert f'<a href="#{name}">{title}</a>' in html and f'<h2 id="{name}">{title}</h2>' in html
-    order = ("Before.", 'id="chapter-1', 'id="between"', 'id="chapter-2', "<p>last</p>")
+    order = ("Before.", 'id="between"', 'id="chapter-1', 'id="chapter-2', "<p>last</p>")
     places = [html.index(text) for text in order]
     assert places == sorted(places)
 

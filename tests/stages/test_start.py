@@ -19,7 +19,7 @@ from stages.start import remedy
 from tests.project import ROOT, python
 
 OF_A_BAND = ("record", "episode", "mounting")
-OF_A_METHOD = ("history", "theta", "policy", "trials")
+OF_A_METHOD = ("history", "theta", "policy", "trials", "card")
 
 
 @pytest.fixture
@@ -131,13 +131,14 @@ def test_a_stage_has_one_thread_of_blas_whatever_the_machine() -> None:
 def test_a_stage_imports_no_library_that_it_does_not_use() -> None:
     """Each costs seconds of a run's start: networks and meshes, plots, tables."""
     names = [file.stem for file in (ROOT / "stages").glob("*.py")]
-    light = [name for name in names if name not in ("__init__", "policy", "report")]
+    light = [name for name in names if name not in ("__init__", "policy", "report", "card")]
     assert len(light) >= 8
     for stages, heavy in (
         (light, "torch open3d matplotlib pandas sklearn cma onnx onnxruntime transformers rsl_rl"),
         ([name for name in light if name != "episode"], "cv2"),
         (["record", "episode", "floor"], "warp"),
         (["report"], "torch open3d cv2 cma"),
+        (["card"], "torch cma"),
     ):
         code = f"import sys, {', '.join(f'stages.{name}' for name in stages)}\n"
         code += f"print(*set({heavy.split()}) & sys.modules.keys())"

@@ -1,0 +1,71 @@
+"""The colour pictures of a recorded pull, and where points of frame O are seen in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.base.layout import NotMade
+from pipeline.episode.episode import Episode
+from pipeline.recording.geometry import geometry_of
+from pipeline.recording.input import images
+from pipeline.recording.input.camera import Camera
+from pipeline.recording.input.frames import Transform
+from pipeline.recording.input.reader import read_recording
+
+CLOSEST = 0.05  # m before the camera
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """N colour pictures on an episode's clock.
+
+    Attributes:
+        time: Of each [s], as the episode has the camera's stamps, shape (N,).
+        camera, pose: The colour camera, and frame O to its frame.
+    """
+
+    time: np.ndarray
+    camera: Camera
+    pose: Transform
+    _packed: list
+
+    @classmethod
+    def of(cls, path: Path, episode: Episode, setup) -> Pictures:
+        """Of the recording that an episode was made from.
+
+        Raises:
+            NotMade: It is not there.
+            UserError: It cannot be read.
+        """
+        if not path.is_file():
+            raise NotMade(path)
+        recording = read_recording(path, setup)
+        geometry = geometry_of(recording, setup)
+        delay = (episode.metadata["preprocessing"].get("delays") or {}).get("camera") or {}
+        late = delay["value"] if delay.get("applied") else 0.0
+        color = recording.color.shifted(late)
+        pose = geometry.color @ geometry.camera.inverse()
+        time = color.seconds(episode.metadata["input"]["start_ns"])
+        return cls(time, recording.color_camera, pose, color.values)
+
+    def __getitem__(self, number: int) -> np.ndarray | None:
+        """A picture, BGR, shape (H, W, 3); None where it is damaged."""
+        try:
+            return images.color(self._packed[number])
+        except images.Undecodable:
+            return None
+
+    def latest(self, time: float) -> int:
+        """Number of the last picture at or before a moment, or else of the first."""
+        return max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Pixels (u, v) of points (N, 3), shape (N, 2); NaN of those behind the camera."""
+        seen = self.pose.apply(points)
+        pixels = np.full((len(points), 2), np.nan)
+        ahead = seen[:, 2] > CLOSEST
+        pixels[ahead] = self.camera.project(seen[ahead])
+        return pixels

@@ -1,0 +1,23 @@
+"""Write one band's card: can it be trusted, its values, three draws, pictures, what would help.
+
+    python -m stages.card band1 least_squares
+
+Reads the band's recordings, episodes, mounting, θ, confidence, policy and trials; writes
+reports/bands/<band>/.
+"""
+
+from __future__ import annotations
+
+from pipeline.base.layout import Layout
+from pipeline.card.write import write
+from stages.start import run, started
+
+
+def main() -> None:
+    params, band, method = started("band", "method")
+    card = write(params, band, method)
+    print(f"{band} {method}: {card['verdict']}; wrote {Layout().card(band)}/README.md")
+
+
+if __name__ == "__main__":
+    run(main)

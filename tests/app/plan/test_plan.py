@@ -1,8 +1,7 @@
-"""`sling plan`: frames, files, limits, and that a robot which follows it makes a good recording."""
+"""`sling plan`: frames, files, limits, bands to come."""
 
 import csv
 import json
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +11,13 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 from app.plan import limits
-from app.plan.force import Earlier, Held, predict, read_earlier
+from app.plan.force import Earlier, Held, predict
 from app.plan.messages import COLUMNS
 from app.plan.plan import plan_recording, with_band
 from app.plan.trajectory import Phase, Trajectory
 from pipeline.base.errors import UserError
 from pipeline.params import Params, load
-from pipeline.recording.input.reader import read_recording
 from tests.project import ROOT, with_
-from tests.recording.bag import BASE, HAND, REST, Truth, write_bag
 
 FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target along the base's x
 
@@ -255,119 +252,6 @@ def test_a_band_that_the_arm_cannot_hold(params) -> None:
         limits.check_force(params.setup, held, drawn, predict(params, "band1", drawn, None, strong))
 
 
-# A robot that follows the plan
-
-
-@dataclass(frozen=True)
-class Followed(Truth):
-    """The small recording's world, with the hand where the plan has it."""
-
-    way: Trajectory | None = None
-
-    def hand(self, t: float) -> np.ndarray:
-        return self.way.position(t)
-
-
-@dataclass(frozen=True)
-class Repeated(Followed):
-    """Pull after pull; `moments` are the grasp and the release of each."""
-
-    moments: tuple[tuple[float, float], ...] = ()
-
-    def at(self, t: float) -> Followed:
-        """The pull that is going on or was the last."""
-        begun = [one for one in self.moments if one[0] <= t] or self.moments[:1]
-        return Followed(*begun[-1][:1], release=begun[-1][1], draw=self.draw, way=self.way)
-
-    def holds(self, t: float) -> bool:
-        return self.at(t).holds(t)
-
-    def force(self, t: float) -> np.ndarray:
-        return self.at(t).force(t)
-
-    def center_line(self, t: float) -> np.ndarray:
-        return self.at(t).center_line(t)
-
-
-FAST = {"max_speed": 0.8, "pull_speed": 0.5, "max_acceleration": 5.0, "hanging": 0.195}
-FAST |= {"lead_in": 0.6, "finger_time": 0.3, "pause": 0.8, "wait": 0.5}
-
-
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    """(path, plan, params) of a recording by a robot that follows a plan, with pictures."""
-    inverse = BASE[0].inv()
-    fork_in_base = (*inverse.apply(-BASE[1]), *inverse.as_quat())
-    whole = load(ROOT / "params.yaml")
-    placed = with_(whole, "setup", base_to_fork=tuple(map(float, fork_in_base)))
-    params = with_(with_(placed, "plan", **FAST), "episode", duration=4.2, samples=140, tail=0.5)
-    plan = plan_recording(params, "band1")
-    way, release = plan.trajectory, plan.trajectory.start_of("release") + 3e-4
-    truth = Followed(
-        grasp=way.start_of("lift"), release=release, end=way.duration, draw=0.4, way=way
-    )
-    path = tmp_path_factory.mktemp("plan") / "followed.mcap"
-    write_bag(path, truth)
-    return path, plan, params, truth
-
-
-def test_a_robot_that_follows_the_plan_makes_a_recording_that_check_accepts(recorded) -> None:
-    from app.preflight.check import check_recording
-
-    path, plan, params, truth = recorded
-    np.testing.assert_allclose(
-        Rotation.from_quat(plan.hand).as_matrix(), (BASE[0].inv() * HAND).as_matrix(), atol=1e-9
-    )
-    report = check_recording(path, params)
-    assert report.usable, report.problem
-    assert report.signals["release_s"] == pytest.approx(truth.release, abs=1e-3)
-    assert report.signals["draw_m"] == pytest.approx([0, -0.4, 0], abs=1e-3)
-
-
-def test_a_robot_that_pulls_twice_makes_two_recordings_in_one_file(recorded, tmp_path) -> None:
-    from app.preflight.check import look_at
-
-    plan = plan_recording(recorded[2], "band1", pulls=2)
-    way, path = plan.trajectory, tmp_path / "twice.mcap"
-    begins = list(zip([phase.name for phase in way.phases], way.times, strict=False))
-    grasps = [time for name, time in begins if name == "lift"]
-    releases = [time + 3e-4 for name, time in begins if name == "release"]
-    moments = tuple(zip(grasps, releases, strict=True))
-    write_bag(path, Repeated(end=way.duration, draw=0.4, way=way, moments=moments))
-    report = look_at(path, recorded[2], pull=2).report
-    assert plan.content()["pulls"] == len(report.pulls) == 2
-    assert all(pull.usable for pull in report.pulls), str(report.pulls)
-    assert [pull.release_s for pull in report.pulls] == pytest.approx(releases, abs=1e-3)
-    assert [pull.grasp_s for pull in report.pulls] == pytest.approx(grasps, abs=0.021)
-    assert "rest" not in {caution.about for caution in report.cautions}
-    with pytest.raises(UserError, match="--pulls: at most 10 in one recording, got 11"):
-        plan_recording(recorded[2], "band1", pulls=11)
-
-
-def test_an_earlier_recording_gives_base_frame_and_force(recorded) -> None:
-    """Frame and force are the recording's; the law there is its formula, known at its own draw."""
-    path, plan, params, truth = recorded
-    unknown = with_(params, "setup", base_to_fork=None)
-    again = plan_recording(unknown, "band1", recording=path)
-    np.testing.assert_allclose(again.base.translation, plan.base.translation, atol=1e-6)
-    np.testing.assert_allclose(again.hand, plan.hand, atol=1e-6)
-    assert again.base_source == "/tf_static fork <- base"
-    force = float(np.linalg.norm(truth.force(truth.release - 0.1)))
-    assert again.force.force == pytest.approx(force, rel=0.01)
-    deeper = plan_recording(unknown, "band1", recording=path, draw=(-0.44, 0.0)).force
-    stretch = 2 * np.hypot(0.1375, np.array([0.4, 0.44])) / REST
-    tension = stretch - stretch**-2
-    cosine = np.array([0.4, 0.44]) / np.hypot(0.1375, [0.4, 0.44])
-    ratio = np.divide(*(tension * cosine)[::-1])
-    assert deeper.force / again.force.force == pytest.approx(ratio, rel=2e-3)
-    assert deeper.source.endswith("beyond that stretch a band may stiffen")
-    assert "scaled" not in again.force.source
-
-    weak = with_(unknown, "setup", max_force=force - 2)
-    with pytest.raises(UserError, match=r"N more than setup.max_force .*--draw=-0\.\d\d,0\.00"):
-        plan_recording(weak, "band1", recording=path)
-
-
 def test_a_band_to_come_is_planned_by_its_sizes(params) -> None:
     known, name = with_band(params, "band1")
     assert (known, name) == (params, "band1")
@@ -382,33 +266,3 @@ def test_a_band_to_come_is_planned_by_its_sizes(params) -> None:
     ):
         with pytest.raises(UserError, match=words):
             with_band(params, *arguments)
-
-
-def test_of_several_pulls_the_first_that_can_be_used_tells(recorded, monkeypatch) -> None:
-    """A first pull that says nothing is passed over, as `check` does."""
-    from pipeline.recording import pulls, signals
-
-    path, _, params, truth = recorded
-    (whole,) = pulls.pulls_of(read_recording(path, params.setup), params.setup)
-    tell = signals.signals_of
-
-    def signals_of(pull, *others):
-        if pull == "bad":
-            raise UserError("nothing is drawn")
-        return tell(pull, *others)
-
-    monkeypatch.setattr(signals, "signals_of", signals_of)
-    monkeypatch.setattr(pulls, "pulls_of", lambda *_: ["bad", whole])
-    force = float(np.linalg.norm(truth.force(truth.release - 0.1)))
-    assert read_earlier(path, params).force == pytest.approx(force, rel=0.01)
-    monkeypatch.setattr(pulls, "pulls_of", lambda *_: ["bad", "bad"])
-    assert read_earlier(path, params).problem == f"{path}: nothing is drawn"
-
-
-def test_a_recording_without_a_pull_gives_the_frame_alone(recorded, tmp_path) -> None:
-    path = tmp_path / "still.mcap"
-    write_bag(path, Truth(stiffness=0.0), cameras=False, rate=200)
-    unknown = with_(recorded[2], "setup", base_to_fork=None)
-    plan = plan_recording(unknown, "band1", recording=path)
-    assert plan.force.force is None
-    assert "no release of a drawn band is in it" in plan.force.source

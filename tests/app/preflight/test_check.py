@@ -2,14 +2,12 @@
 
 import json
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from app.preflight.check import ASSUMED, band_of, check_recording
 from app.preflight.command import check
-from app.preflight.coverage import over_time, share_off_plane
 from app.preflight.report import Caution
 from app.preflight.verdict import cautions_of, pause
 from pipeline.base.errors import UserError
@@ -69,62 +67,6 @@ def test_json_has_a_row_for_each_picture_only_where_asked(looked) -> None:
     assert "coverage" not in json.loads(looked.report.to_json())
     rows = json.loads(looked.report.to_json(frames=True))["coverage"]
     assert rows == looked.report.coverage and len(rows) == looked.report.cloud["frames"]
-
-
-def test_points_of_the_arm_in_the_hanging_band_are_said(looked, params) -> None:
-    """Points 5 cm towards the hand, off the upright plane through the tips, in one picture."""
-    assert "off_plane" not in abouts(looked.report)
-    clouds = looked.done.clouds
-    arm = np.array([[0.0, -0.05, -0.2]], np.float32).repeat(len(clouds.points[1]) // 20, 0)
-    points = [*clouds.points]
-    points[1] = np.vstack([points[1], arm])
-    done = replace(looked.done, clouds=replace(clouds, points=points))
-    rows = over_time(done, 0.0)
-    assert rows[1]["phase"] == "hanging" and rows[1]["off_plane"] == pytest.approx(0.05, abs=0.01)
-    assert all(row["off_plane"] in (None, 0.0) for row in (rows[0], *rows[2:]))
-    found = cautions_of(replace(looked.report, coverage=rows), done, params.setup)
-    (said,) = [caution.what for caution in found if caution.about == "off_plane"]
-    told = sum(row["off_plane"] is not None for row in rows)
-    assert said.startswith(f"1 of {told} pictures of the hanging band hold points off the plane")
-
-
-def test_the_plane_is_that_of_the_tips_and_the_hand(looked) -> None:
-    """Held 45 degrees below and behind the tips, points there lie in the plane, others do not."""
-    hand = np.array([0.0, -0.1, -0.1])
-    signals = SimpleNamespace(grasp_time=1.0, release_time=2.0, hand=lambda time: hand)
-    scene = SimpleNamespace(signals=signals, holds=lambda time: 1 <= time < 2)
-    points = np.array([[0.1, -0.05, -0.05], [0.0, 0.0, -0.1]])
-    assert share_off_plane(scene, 1.5, points) == 0.5
-    assert share_off_plane(scene, 0.5, points) == 0.5 and points[0, 1] < -0.02
-    assert share_off_plane(scene, 2.5, points) is None
-    assert share_off_plane(scene, 1.5, points[:0]) is None
-
-
-def test_coverage_over_time_follows_the_phases(looked, seen) -> None:
-    rows, truth = looked.report.coverage, seen[1]
-    assert len(rows) == looked.report.cloud["frames"]
-    for row in rows:
-        if truth.drawn < row["time"] < truth.release:
-            assert row["phase"] == "drawn" and row["coverage"] > 0.9
-        assert (row["phase"] == "hanging") == (row["time"] < looked.report.signals["grasp_s"])
-        assert (row["phase"] in ("recoil", "swing")) == (row["time"] >= truth.release)
-    phases = looked.report.phases
-    assert [row["phase"] for row in phases] == ["hanging", "held", "drawn", "recoil", "swing"]
-    assert sum(row["pictures"] for row in phases) == len(rows)
-
-
-def test_a_cloud_without_one_side_covers_half(looked) -> None:
-    from app.preflight.coverage import share_covered
-
-    scene, clouds = looked.done.scene, looked.done.clouds
-    time = max(t for t in clouds.time if scene.taut(t))
-    points = clouds.points[int(np.flatnonzero(clouds.time == time)[0])]
-    assert share_covered(scene, time, points[points[:, 0] < 0]) == pytest.approx(0.5, abs=0.06)
-    assert share_covered(scene, 0.0, points[:0]) == 0
-    s = np.linspace(0, np.pi, 300)
-    hanging = np.stack([0.1375 * np.cos(s), 0 * s, -0.2 * np.sin(s)], axis=1)
-    assert share_covered(scene, 0.0, hanging) == 1
-    assert share_covered(scene, 0.0, hanging[hanging[:, 0] < 0]) == pytest.approx(0.5, abs=0.1)
 
 
 def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:

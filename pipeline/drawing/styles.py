@@ -37,9 +37,9 @@ KNOWN = {
     "package_si": ("Package SI", "#33673b"),
 }
 SPARE = ("#2e4057", "#8c8c8c", "#c2187b", "#00b5a0", "#5e35b1", "#9e9d24")  # of a user's methods
-# Rather than others where curves would crowd: two in a band's own pictures, four side by side.
+# Rather than others where curves would crowd.
 DRAWN = ("least_squares", "sling2sim2real", "package_si", "real2sim2real")
-FEW, SIDE_BY_SIDE = 2, 4
+FEW = 2
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import json
 import math
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -45,7 +46,12 @@ def test_a_band_that_was_never_launched_shows_its_modulus() -> None:
 def dvc(root: Path, *words: str) -> str:
     wide = os.environ | {"COLUMNS": str(COLUMNS)}
     done = subprocess.run(
-        ["dvc", *words], cwd=root, env=wide, check=True, capture_output=True, text=True
+        [sys.executable, "-m", "dvc", *words],
+        cwd=root,
+        env=wide,
+        check=True,
+        capture_output=True,
+        text=True,
     )
     return done.stdout
 

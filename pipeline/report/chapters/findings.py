@@ -28,7 +28,10 @@ CAVEAT = (
     "The comparisons hold for launches of these policies (95 % intervals), of one identification"
     " each: another recording or another seed may turn them round"
 )
-OWN = "; and choices of ours were made with landings of the rig in sight (docs/decisions.md)"
+OWN = (
+    "; and choices of ours were made with landings of the rig in sight"
+    " ([decisions](../docs/decisions.md))"
+)
 
 
 def findings(report: Report) -> list[str]:
@@ -99,7 +102,8 @@ def _predictions(report: Report, kind: str) -> list[str]:
     )
     if not count:
         return [said]
-    text = f"{held} of {count} lie in their 90 % interval, which is {_between(widths)} % wide"
+    text = f"{held} of these {count} landings lie in their 90 % interval,"
+    text += f" which is {_between(widths)} % wide"
     if held < ENOUGH * count:
         text += ": too few, so the intervals are too narrow"
     elif np.mean(widths) / 2 > WIDE * 100 * np.mean(off):

@@ -22,7 +22,7 @@ COLUMNS = """\
 Centimetres are the mean distance from the target. Per cent are of the landing's distance: how far
 the prediction is off on average, its signed mean (*bias*), and how wide its 90 % interval is."""
 FLOOR = """\
-The *actuation floor* is what errors of draw and release alone cost: no method can do better."""
+The *actuation floor* is what even an oracle's draws miss by, for errors of draw and release."""
 VIRTUAL = """\
 *Virtual* launches are those of a rig in software, whose rubber follows another law than the
 simulator."""

@@ -16,7 +16,6 @@ from pipeline.report.noise import landed
 FAIR = 5  # % of the distance, shaded
 LINEAR = 10  # cm or %, beyond which an axis is logarithmic
 TICKS = (-100, -30, -10, -5, 0, 5, 10, 30, 100)
-BEYOND = f"logarithmic beyond ± {LINEAR}"
 MARKS = ("v", "o", "^", "s", "D", "P")  # of targets, near to far
 ROOM = 0.32  # of a row, that launches take to either side
 SHADE = "0.88"
@@ -35,7 +34,7 @@ def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> pl
     trials = trials.assign(off=off.where(landed(trials)))
     targets = dict(zip(sorted(set(trials.target)), MARKS, strict=False))
     title = "Nearer to the line is better: every launch, beside its target"
-    figure, found = _rows(trials, styles, title, trials.off)
+    figure, found, beyond = _rows(trials, styles, title, trials.off)
     for band, ax in found.items():
         floor = 100 * floors.get(band, 0)
         ax.axvspan(-floor, floor, color=SHADE, lw=0)
@@ -55,7 +54,7 @@ def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> pl
                 where = {"transform": ax.get_yaxis_transform(), "fontsize": 7}
                 text = f"{failed} of {len(mine)} failed"
                 ax.text(0.01 if left else 0.99, row, text, **words, **where)
-        ax.set_xlabel(f"landing − target [cm], {BEYOND}")
+        ax.set_xlabel(f"landing − target [cm]{beyond}")
     dot = {"ls": "", "color": "0.4"}
     entries = [(f"aimed at {t:g} m", mark(**dot, marker=m)) for t, m in targets.items()]
     if floors:
@@ -83,7 +82,7 @@ def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> pl
     trials = trials.assign(off=off, low=low, high=high).reset_index(drop=True)
     inside = trials.stretch <= trials.recorded_stretch
     title = "A good prediction lies at zero, in a short interval that holds zero"
-    figure, found = _rows(trials, styles, title, off)
+    figure, found, beyond = _rows(trials, styles, title, off)
     trials = trials.sort_values(["target", "landing_y"])
     for band, ax in found.items():
         ax.axvspan(-FAIR, FAIR, color=SHADE, lw=0)
@@ -94,7 +93,7 @@ def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> pl
             ax.hlines(height, mine.low, mine.high, color=color, lw=0.9, ls=line, zorder=2)
             face = np.where(inside[mine.index], color, "none")
             ax.scatter(mine.off, height, s=9, facecolors=face, edgecolors=color, lw=0.7, zorder=3)
-        ax.set_xlabel(f"predicted / landed − 1 [%], {BEYOND}")
+        ax.set_xlabel(f"predicted / landed − 1 [%]{beyond}")
     dot = {"ls": "", "marker": "o", "ms": 4, "color": "0.4"}
     entries = [("a launch", mark(**dot))]
     if not inside.all():
@@ -110,11 +109,11 @@ def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> pl
 
 
 def _rows(trials: pd.DataFrame, styles: Styles, title: str, off: pd.Series):
-    """A panel a band with a row a method, and an axis that reaches as far as `off`."""
+    """A panel a band with a row a method, an axis that reaches as far as `off`, and its label."""
     bands = dict.fromkeys(trials.band)
     tall = 0.45 * len(styles) + 0.9
     figure, found = panels(bands or [""], title, 3.8, tall, sharex=True, sharey=True)
-    most = max(LINEAR, 1.1 * np.nanmax(off.abs(), initial=0))
+    most = max(LINEAR, 1.1 * float(np.nanmax(off.abs(), initial=0)))
     for ax in found.values():
         ax.axvline(0, color=INK, lw=0.8, zorder=1)
         ax.set_yticks(range(len(styles)), [style.name for style in styles.values()])
@@ -126,7 +125,7 @@ def _rows(trials: pd.DataFrame, styles: Styles, title: str, off: pd.Series):
         ax.xaxis.set_major_formatter("{x:g}")
         for label, style in zip(ax.get_yticklabels(), styles.values(), strict=False):
             label.set_color(style.color)  # those of the first panel: others share them
-    return figure, found
+    return figure, found, f", logarithmic beyond ± {LINEAR}" * (most > LINEAR)
 
 
 def _spread(count: int) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from textwrap import fill
 
 import matplotlib.pyplot as plt
 from matplotlib.artist import Artist
@@ -10,7 +11,8 @@ from matplotlib.artist import Artist
 from pipeline.drawing.canvas import key
 
 COLUMNS = 3
-ENTRY = 2.9  # inches of the longest
+ENTRY = 2.6  # inches of an entry of a key
+LETTERS = 11.5  # of a title, an inch
 
 
 def panels(
@@ -47,4 +49,5 @@ def explain(figure: plt.Figure, entries: Iterable[tuple[str, Artist]]) -> None:
 
 def entitle(figure: plt.Figure, title: str) -> None:
     """What to see, above the picture."""
-    figure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight="bold")
+    lines = fill(title, int(LETTERS * figure.get_figwidth()))
+    figure.suptitle(lines, x=0.01, ha="left", fontsize=10, fontweight="bold")

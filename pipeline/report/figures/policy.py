@@ -68,6 +68,7 @@ def landing_maps(
     known = np.concatenate([landing[np.isfinite(landing)] for *_, landing in charts.values()])
     levels = plt.MaxNLocator(16).tick_values(known.min(), known.max()) if len(known) else [0, 1]
     shades = plt.cm.ScalarMappable(BoundaryNorm(levels, 256), "cividis")
+    beyond = False
     for band, ax in found.items():
         y, z, landing = charts[band]
         points = np.stack([0 * y.ravel(), y.ravel(), z.ravel()], 1)
@@ -78,17 +79,18 @@ def landing_maps(
             line = {"levels": np.unique(targets), "colors": "w", "linewidths": 0.9}
             ax.clabel(ax.contour(y, z, landing, **line), fmt="%g m", fontsize=7)
         if stretch.min() < recorded[band] < stretch.max():
+            beyond = True
             ax.contour(y, z, stretch, levels=[recorded[band]], colors="k", linestyles=":")
         ax.plot(*draws[band].T, color=COLORS[0], lw=2.5)
         ax.plot(*draws[band][0], "o", color=COLORS[0])
         ax.set(xlabel="draw y [m]", xlim=y[[0, -1], 0], ylim=z[0, [0, -1]])
     next(iter(found.values())).set_ylabel("draw z [m]")
     figure.colorbar(shades, ax=list(found.values()), label="simulated landing [m]")
-    entries = [
-        ("policy's draws, from near (dot) to far", mark(color=COLORS[0], lw=2.5)),
-        ("recorded stretch; left: extrapolated", mark(color="k", ls=":")),
-        ("grey: the launch fails", mark(ls="", marker="s", color="0.8")),
-    ]
+    entries = [("policy's draws, from near (dot) to far", mark(color=COLORS[0], lw=2.5))]
+    if beyond:
+        entries.append(("recorded stretch; left: extrapolated", mark(color="k", ls=":")))
+    if any(np.isnan(landing).any() for *_, landing in charts.values()):
+        entries.append(("the launch fails", mark(ls="", marker="s", color="0.8")))
     explain(figure, entries)
     return figure
 

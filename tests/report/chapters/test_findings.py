@@ -56,11 +56,11 @@ def test_predictions_and_how_sure_they_were() -> None:
             "Ours predicts where its virtual launches land within 2.0 % of the distance on average"
             " (bias +2.0 %)."
         )
-        lies = f"15 of 15 lie in their 90 % interval, which is {200 * half:.1f} % wide{words}."
-        assert held == lies
+        lies = "15 of these 15 landings lie in their 90 % interval, which is"
+        assert held == f"{lies} {200 * half:.1f} % wide{words}."
     narrow = trials.assign(predicted_low=1.01 * trials.landing_y, predicted_high=9.0)
     narrow = narrow.assign(predicted_high=1.03 * trials.landing_y)
-    assert "0 of 15" in findings(run(result("band1", MAIN, narrow)))[2]
+    assert "0 of these 15" in findings(run(result("band1", MAIN, narrow)))[2]
     assert "too narrow" in findings(run(result("band1", MAIN, narrow)))[2]
     bare = run(result("band1", MAIN, narrow, confidence={}))
     assert not any("90 %" in line for line in findings(bare))  # of the draw's error alone

@@ -56,6 +56,13 @@ def test_a_landing_outside_the_area_is_a_failure_and_no_dot(kept) -> None:
     assert not any("floor" in word for word in words(kept[0]))
 
 
+def test_what_is_far_off_lies_on_a_logarithmic_axis_that_says_so(kept) -> None:
+    for off, words in ((0.05, ""), (0.2, ", logarithmic beyond ± 10")):
+        trials = launches()
+        landings.misses("", trials.assign(landing_y=trials.target + off), {}, styles([METHOD]))
+        assert kept[-1].axes[0].get_xlabel() == f"landing − target [cm]{words}"
+
+
 def test_predictions_lie_in_intervals_that_are_called_what_they_are(kept) -> None:
     landings.predictions("", trials(), {(BAND, METHOD)}, styles(METHODS))
     (ax,) = kept[0].axes  # nothing landed on the other band

@@ -71,13 +71,14 @@ def fit(arguments: argparse.Namespace) -> Done:
 def add_band(arguments: argparse.Namespace) -> Done:
     from app.preflight.add_band import add_band
 
-    return add_band(
+    done = add_band(
         arguments.name,
         arguments.recording,
         mass=arguments.mass,
         diameter=arguments.diameter,
         rest_length=arguments.rest_length,
     )
+    return f"{done}\n`sling fit --name {arguments.name}` identifies it"
 
 
 @command(
@@ -89,7 +90,8 @@ def add_band(arguments: argparse.Namespace) -> Done:
 def add_recording(arguments: argparse.Namespace) -> Done:
     from app.preflight.recordings import add_recording
 
-    return add_recording(arguments.band, arguments.recordings)
+    done = add_recording(arguments.band, arguments.recordings)
+    return f"{done}\n`sling fit --name {arguments.band}` identifies it anew"
 
 
 @command(

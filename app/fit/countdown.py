@@ -39,20 +39,17 @@ class Countdown:
 
     def line(self, line: str) -> None:
         """A line of the stage."""
-        if step := parse(line):
-            if self.bar:
-                self._show(step.counted)
-        else:
+        step = parse(line)
+        if self.bar:
+            self._show(step.counted if step else "")
+        elif not step:
             self._print(f"      {line}")
-            if self.bar:
-                self._show()
 
     def ends(self) -> None:
         """The last stage has ended."""
         self._done()
         took = time.monotonic() - self.start
-        ran = f"done in {took:.0f} s" if self.worth else "nothing was stale"
-        self._print(f"{ran}; `dvc repro` takes it from its cache from now on")
+        self._print(f"done in {took:.0f} s" if self.worth else "nothing is stale")
 
     def _done(self) -> None:
         if self.now in STEPS:

@@ -93,4 +93,4 @@ def told(done: str, reports: Sequence[CheckReport]) -> str:
         lines += [f"  - but {caution}" for caution in report.cautions]
     count = sum(pull.usable for report in reports for pull in report.pulls)
     pulls = "1 pull" if count == 1 else f"{count} pulls"
-    return "\n".join([f"{done}, {pulls}; `dvc repro` identifies it", *lines])
+    return "\n".join([f"{done}, {pulls}", *lines])

@@ -38,7 +38,7 @@ def test_a_band_is_added_and_nothing_else_changes(project, seen, blind) -> None:
     before = (project / "params.yaml").read_text().splitlines()
     bands = load(project / "params.yaml").run.bands
     said = add(project, seen[0]).splitlines()
-    assert said[0] == "red added, 1 pull; `dvc repro` identifies it"
+    assert said[0] == "red added, 1 pull"
     assert said[1].startswith("  seen.mcap: peak force")
     assert any("pictures come at 15 Hz" in line for line in said[2:])  # what costs accuracy
     after = (project / "params.yaml").read_text().splitlines()

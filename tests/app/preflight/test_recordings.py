@@ -61,7 +61,7 @@ def test_recordings_are_added_to_a_band(project, seen, three) -> None:
     add(project, seen[0])
     before = (project / "params.yaml").read_bytes()
     said = more(project, three[0]).splitlines()
-    assert said[0] == "red: added to the 1 that were there, 2 pulls; `dvc repro` identifies it"
+    assert said[0] == "red: added to the 1 that were there, 2 pulls"
     assert said[1].startswith("  three.mcap, pull 1: peak force")
     assert said[2].startswith("  three.mcap, pull 2: left out, cannot be used: empty mask")
     names = [path.name for path in Layout(project).recordings("red")]

@@ -75,7 +75,7 @@ def test_a_band_of_several_recordings(project, seen, three) -> None:
 
     rest = {"mass": 0.0408, "params_path": project / "params.yaml", "root": project}
     said = add_band("red", [three[0], seen[0]], **rest)
-    assert said.startswith("red added, 3 pulls;")
+    assert said.startswith("red added, 3 pulls\n")
     assert "nothing to do" in add_band("red", [seen[0], three[0]], **rest)
     with pytest.raises(UserError, match="holds other recordings already"):
         add_band("red", [seen[0]], **rest)

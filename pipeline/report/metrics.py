@@ -33,8 +33,8 @@ def summary(results: Results, main: str, theirs: str | None) -> dict[str, float]
             found[f"{band}_kPa"] = 1e-3 * modulus
             continue
         found[f"{band}_cm"] = 100 * error
-        if band in results.floors:
-            ratios.append(error / results.floors[band]["mean_error_m"])
+        if band in results.least:
+            ratios.append(error / results.least[band])
         if theirs is not None:
             beside.append(_error(methods[theirs]))
     some = [methods[main].trials for methods in results.methods.values()]

@@ -81,6 +81,12 @@ class Results:
     unused: dict[str, int] = field(default_factory=dict)
 
     @property
+    def least(self) -> dict[str, float]:
+        """Mean error of the actuation floor by band [m], where the oracle's launches land."""
+        means = {band: one["mean_error_m"] for band, one in self.floors.items()}
+        return {band: mean for band, mean in means.items() if mean}
+
+    @property
     def trials(self) -> pd.DataFrame:
         return pd.concat([one.trials for one in self], ignore_index=True)
 

@@ -38,6 +38,12 @@ def test_numbers_by_hand() -> None:
     }  # fmt: skip
 
 
+def test_an_oracle_that_never_lands_is_no_floor() -> None:
+    lost = {"band1": floor((0.01,) * 3, (0.01,) * 3) | {"mean_error_m": None}}
+    ran = results(result("band1", MAIN, launches([[0.03]] * 3)), floors=lost)
+    assert "floors" not in summary(ran, MAIN, None)
+
+
 def test_a_band_that_was_never_launched_shows_its_modulus() -> None:
     nothing = launches([[math.nan]] * 3, "predicted")
     assert summary(results(result("mine", MAIN, nothing)), MAIN, None) == {"mine_kPa": 300.0}

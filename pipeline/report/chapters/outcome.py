@@ -58,10 +58,9 @@ def _picture(report: Report) -> list[str]:
     trials = trials[trials.kind.isin(LAUNCHED) & trials.target.notna()]
     if trials.empty:
         return []
-    floors = {band: one["mean_error_m"] for band, one in report.results.floors.items()}
     shown = report.shown([m for m in report.params.run.methods if m in set(trials.method)])
     alt = "how far from its target each launch landed"
-    return [report.picture("landings", alt, misses, trials, floors, shown)]
+    return [report.picture("landings", alt, misses, trials, report.results.least, shown)]
 
 
 def _cards(report: Report) -> str:
@@ -71,6 +70,8 @@ def _cards(report: Report) -> str:
         sizes = f"{about.mass * 1e3:g} g, {about.rest_length * 100:g} cm between the clamps"
         sizes += f", {about.diameter * 1e3:g} mm thick"
         whose = "the virtual rig" if about.source == "rig" else "a robot"
+        launched = report.results.methods[band][report.main].trials.kind.isin(LAUNCHED).any()
+        whose += "" if launched else "; no launch yet"
         lines.append(f"- [{band}](bands/{band}/README.md): {sizes}; recorded by {whose}")
     return "\n".join(
         [

@@ -35,8 +35,8 @@ def outcome(results: Results, references: tuple[str, ...], styles: Styles) -> Ta
     """
     rows = []
     for band, methods in results.methods.items():
-        floor = results.floors.get(band, {}).get("mean_error_m")
         for kind in LAUNCHED:
+            floor = results.least.get(band) if kind == "virtual" else None
             trials = [_of(methods[method], kind) for method in references]
             if trials[0].empty:
                 continue

@@ -43,7 +43,7 @@ def since_run(root: Path, stage: str | None) -> list[Change] | None:
 
     None where there is no such stage, or dvc.lock does not know it.
     """
-    stages = (_read(root / "dvc.lock") or {}).get("stages", {})
+    stages = _read(root / "dvc.lock").get("stages", {})
     if stage not in stages:
         return None
     makers = {out["path"]: name for name, one in stages.items() for out in one.get("outs", ())}
@@ -73,7 +73,7 @@ def _maker(makers: dict[str, str], path: str) -> str | None:
     return makers.get(path) or next(inside, None)
 
 
-def _changes(then: dict[str, Any], now: Any) -> list[Change]:
+def _changes(then: dict[str, Any], now: dict) -> list[Change]:
     found = []
     for key, old in sorted(then.items()):
         new = now
@@ -96,11 +96,12 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _read(path: Path) -> Any:
-    """Raises UserError."""
+def _read(path: Path) -> dict:
+    """{} where there is no such file. Raises UserError."""
     try:
-        return YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+        content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        return None
+        return {}
     except (OSError, ValueError, YAMLError) as error:
-        raise UserError(f"{path}: cannot be read as YAML") from error
+        raise UserError(f"{path}: damaged; `git checkout {path.name}` brings it back") from error
+    return content if isinstance(content, dict) else {}

@@ -49,7 +49,8 @@ def read_json(path: Path, model: type[Read]) -> Read:
     except FileNotFoundError as error:
         raise NotMade(path) from error
     except (OSError, ValueError, RecursionError) as error:
-        raise NotMade(path, f"cannot be read as JSON ({one_line(error)})") from error
+        why = getattr(error, "strerror", None) or one_line(error)
+        raise NotMade(path, f"cannot be read as JSON ({why})") from error
     try:
         return model.model_validate(content)
     except ValidationError as error:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from app import safety
+from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.sling.material import THETA
@@ -156,6 +157,15 @@ def test_without_dvc_lock_the_card_tells(params, project) -> None:
     )
     (found,) = of_policy(params, project)
     assert "setup.max_force was 28.0, is 30.0, since the policy was trained" in found.what
+
+
+def test_a_damaged_lock_is_one_line(params, project) -> None:
+    (project / "dvc.lock").write_text("stages: {")
+    with pytest.raises(UserError, match="dvc.lock: damaged; `git checkout dvc.lock`"):
+        of_policy(params, project)
+    (project / "dvc.lock").write_text("- no mapping")
+    card(project)
+    assert not of_policy(params, project)
 
 
 def test_a_policy_of_another_theta(params, project) -> None:

@@ -20,7 +20,7 @@ from pipeline.episode.episode import Episode
 
 SLOWER = 50
 STEP = 1.25e-3  # s between frames, of the recording
-BEGIN, END = -0.03, 0.115  # of the release [s]
+BEGIN, END = -0.03, 0.105  # of the release [s]
 LOOK = 700  # ms for which a new picture is looked at
 LAST = 1500  # ms for the last frame
 WIDE, TALL, HEAD = 480, 440, 52  # pixels of each half, and of the line above

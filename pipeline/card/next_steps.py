@@ -18,8 +18,8 @@ from pipeline.posterior.launches import TAPE
 LEAST = 0.05  # share of an interval: less is no help
 MOST = 5  # sentences
 LAUNCHES = 5
-RELAXING = 0.5  # s before the release in which the force must be still,
-STILL = 0.01  # to this share of it
+EARLY, LATE = (0.75, 0.5), (0.4, 0.15)  # s before the release, between which the force must be
+STILL = 0.01  # still to this share of it
 RECOIL = "elasticity_damping", "air_drag", "turn_damping"  # what only pictures of the recoil show
 PULL = "youngs_modulus", "mooney_share", "relaxation"  # what the force shows
 
@@ -32,55 +32,57 @@ class Gain(NamedTuple):
 
 
 def next_steps(
-    band: str, reasons: Sequence[Reason], model: LandingModel | None, targets, episode: Episode
+    band: str,
+    reasons: Sequence[Reason],
+    model: LandingModel | None,
+    targets,
+    episode: Episode,
+    launches: int = 0,
 ) -> list[str]:
     """Sentences, the most helpful first; one that says so where nothing helps.
 
     Args:
         targets: Of the landings [m], shape (T,).
+        launches: That are evidence already.
     """
     found = list(dict.fromkeys(reason.cure for reason in reasons if reason.cure))
     if model is not None:
         aim = len(targets) // 2
         before = model.half_width[aim]
-        steps = [
-            one for one in _steps(band, model, aim, episode) if one.width < (1 - LEAST) * before
-        ]
-        for step in sorted(steps, key=lambda one: one.width):
-            found.append(step.text.format(f"{targets[aim]:g} m", _cm(before), _cm(step.width)))
+        words = {"band": band, "a": "another" if launches else "a"}
+        words |= {"at": f"at {targets[aim]:g} m", "before": f"±{_cm(before)} cm"}
+        for gain in sorted(_gains(model, aim, episode), key=lambda gain: gain.width):
+            if gain.width < (1 - LEAST) * before:
+                found.append(gain.text.format(**words, after=f"±{_cm(gain.width)} cm"))
     if not found:
         found.append("Nothing more would narrow the landings by much: launch.")
     return found[:MOST]
 
 
-def _steps(band: str, model: LandingModel, aim: int, episode: Episode) -> Iterator[Gain]:
+def _gains(model: LandingModel, aim: int, episode: Episode) -> Iterator[Gain]:
     one, more = (model.after(model.launched(aim, TAPE, count))[aim] for count in (1, LAUNCHES))
-    several = f"; {LAUNCHES} launches to ±{_cm(more)} cm" if _cm(more) != _cm(one) else ""
     yield Gain(
-        f"Measure a launch and tell it with `sling observe --band {band}`: the interval at {{0}}"
-        f" narrows from ±{{1}} to ±{{2}} cm{several}.",
+        "Measure {a} launch and tell it with `sling observe --band {band}`: {at} {before} become"
+        f" {{after}}, with {LAUNCHES} launches ±{_cm(more)} cm.",
         one,
     )
     yield Gain(
-        "Record another pull like those that you have: the interval at {0} narrows from ±{1} to"
-        " about ±{2} cm.",
+        "Record another pull like those that you have: {at} {before} become about {after}.",
         model.after(model.pulled())[aim],
     )
     yield Gain(
-        "Record with a faster camera, or pulls whose pictures fall at other moments of the recoil:"
-        " with damping and drag known exactly, the interval at {0} would be ±{2} cm instead of"
-        " ±{1} cm.",
+        "Take more pictures of the recoil, by a faster camera or by pulls that are seen at other"
+        " moments: with damping and drag known exactly, {at} {before} become {after}.",
         model.after(model.exact(RECOIL))[aim],
     )
     if relaxing(episode):
         yield Gain(
             "Pause longer before the release, for the force was still falling: with stiffness and"
-            " relaxation known exactly, the interval at {0} would be ±{2} cm instead of ±{1} cm.",
+            " relaxation known exactly, {at} {before} become {after}.",
             model.after(model.exact(PULL))[aim],
         )
     yield Gain(
-        "Let a more exact arm draw: without an error of the draw, the interval at {0} would be"
-        " ±{2} cm instead of ±{1} cm.",
+        "Draw more exactly: by an arm without error, {at} {before} become {after}.",
         model.after(draw=0.0)[aim],
     )
 
@@ -89,10 +91,7 @@ def relaxing(episode: Episode) -> bool:
     """Whether the force of the drawn band still fell shortly before the release."""
     before = episode.release_time - episode.time
     size = np.linalg.norm(episode.force, axis=1)
-    early, late = (
-        size[(before > begin) & (before < begin + RELAXING / 2)].mean()
-        for begin in (RELAXING, RELAXING / 4)
-    )
+    early, late = (size[(before < begin) & (before > end)].mean() for begin, end in (EARLY, LATE))
     return bool(early - late > STILL * late)
 
 

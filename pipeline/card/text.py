@@ -45,7 +45,10 @@ def residuals(known: Known, found: Findings) -> str:
     pictures = known.confidence["recordings"][0]["pictures"]
     seen = " and ".join(f"{1000 * time:.0f} ms" for time in pictures)
     return f"""\
-- The **force** of the pull is met within {found.force:.2f} N of {peak:.1f} N (root mean square).
+What is left, as a root mean square; the sensor's bias and what the camera's calibration leaves
+open are taken out:
+
+- The **force** of the pull is met within {found.force:.2f} N of {peak:.1f} N.
 - The **band in the hand** lies within {1000 * found.held:.1f} mm of the camera's points.
 - The **recoil** is met within {1000 * found.recoil:.1f} mm. It is seen {seen} after the release;
   later pictures show the slack band, which no launch depends on.
@@ -64,11 +67,7 @@ def card_text(
 ) -> str:
     """README.md of a card; without the animation where a replay takes its place."""
     rig = known.params.bands[known.band].source == "rig"
-    note = (
-        "A band of the **virtual rig**: its recording and its landings are virtual.\n"
-        if rig
-        else ""
-    )
+    note = "A band of the **virtual rig**: its recording and its landings are virtual.\n\n"
     animation = (
         "![The release, recorded and simulated, 50 times slower](animation.webp)\n\n"
         "*The release, 50 times slower. Left: the camera's picture and the simulated band in it."
@@ -78,8 +77,7 @@ def card_text(
 # {known.band}: {SAID[verdict]}
 
 {_listed(reasons, "-")}
-{note}
-{animation if animated else ""}
+{note if rig else ""}{animation if animated else ""}
 ## Values
 
 {_values(shown)}

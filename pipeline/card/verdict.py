@@ -106,7 +106,7 @@ def _identified(found: Findings):
         yield Reason(
             False,
             "The fit had not settled when it ended, so values and intervals may still move.",
-            "Record another pull: more evidence makes the fit settle.",
+            "Record a further pull: more evidence makes a fit settle.",
         )
     misfits = (
         ("force of the pull", found.force, FORCE, "N", 1, "Check the force sensor, its frame"

@@ -36,7 +36,8 @@ def write(params, band: str, method: str, root: str | Path = ".") -> dict:
     verdict, against = judge(found)
     reasons, shown = reasons_of(found, against), values(told.theta, about.fixed)
     model = LandingModel.of(told.names, told.samples, told.aims)
-    steps = next_steps(band, against, model, told.aims.target, episode)
+    launches = len(told.confidence.get("launches", []))
+    steps = next_steps(band, against, model, told.aims.target, episode, launches)
     card = content(told, verdict, reasons, shown, steps)
     text = told, found, verdict, reasons, shown, steps
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.drawing.replay import Replay, replay
 from pipeline.drawing.styles import Styles, drawn, styles
 from pipeline.landing.stored import Stored
 from pipeline.params import Params
 from pipeline.report.paper import METHOD
+from pipeline.report.replay import Replay, replay
 from pipeline.report.results import Result, Results, gather
 
 

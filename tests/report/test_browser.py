@@ -4,7 +4,7 @@ import pytest
 
 from pipeline.report import report as reporting
 from pipeline.report import write as writing
-from tests.drawing.toy_replay import toy_replay
+from tests.report.toy_replay import toy_replay
 from tests.visit import DESKTOP, PHONE, overflow, visited
 
 FOREIGN = "new Image().src = 'http://example.invalid/picture.png'"

@@ -13,8 +13,8 @@ import pytest
 from pipeline.base.layout import NotMade
 from pipeline.report import report as reporting
 from pipeline.report import write as writing
-from tests.drawing.toy_replay import toy_replay
 from tests.report.conftest import BAND, METHOD
+from tests.report.toy_replay import toy_replay
 
 THETA_FILE = f"data/theta/{BAND}/{METHOD}.json"
 
@@ -40,7 +40,7 @@ ELSEWHERE = """\
 from pathlib import Path
 from pipeline.params import load
 from pipeline.report import report, write
-from tests.drawing.toy_replay import toy_replay
+from tests.report.toy_replay import toy_replay
 report.replay = toy_replay
 root = Path({root!r})
 write.write(load(root / "params.yaml"), root)

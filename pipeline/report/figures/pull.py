@@ -6,11 +6,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from pipeline.drawing.canvas import mark, picture
-from pipeline.drawing.replay import Replay
 from pipeline.drawing.styles import INK, Styles
 from pipeline.episode.episode import Episode
 from pipeline.report.figures.panels import entitle, explain
 from pipeline.report.figures.policy import DASHES
+from pipeline.report.replay import Replay
 
 SLACK, MARGIN = 0.05, 0.04  # of the peak force, below which the band is slack; of its draw [m]
 

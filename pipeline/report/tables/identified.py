@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from pipeline.drawing.replay import Replay
 from pipeline.drawing.styles import Styles
 from pipeline.params.identification import LEAST_SQUARES
+from pipeline.report.replay import Replay
 from pipeline.report.results import Results
 from pipeline.report.tables.cells import NONE, Table, number, percent
 from pipeline.report.tables.parameters import HEADS, exactly, printed_loss

@@ -6,8 +6,8 @@ import numpy as np
 
 from pipeline.drawing.styles import styles
 from pipeline.report.figures.pull import pull
-from tests.drawing.toy_replay import toy_replay
 from tests.report.conftest import BAND, METHOD, episode
+from tests.report.toy_replay import toy_replay
 
 STILL = episode()
 DEPTH = np.clip(STILL.time / 20, 0, 0.4)

@@ -14,11 +14,11 @@ from pipeline.report.tables.identified import (
     recordings,
 )
 from pipeline.report.tables.policies import policies
-from tests.drawing.toy_replay import toy_replay
 from tests.report.conftest import BAND, METHOD, episode
 from tests.report.tables.toy_results import launches
 from tests.report.tables.toy_results import result as one
 from tests.report.tables.toy_results import results as all_of
+from tests.report.toy_replay import toy_replay
 
 MAP = {"target_range": {"draws": 9, "mean_error_m": 3e-4, "max_error_m": None}}
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from pipeline.drawing.replay import replay
 from pipeline.episode.episode import Episode
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.params import load
+from pipeline.report.replay import replay
 from pipeline.sling.interaction import interact
 from pipeline.sling.material import THETA as NAMES
 from pipeline.sling.model import Sling

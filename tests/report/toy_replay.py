@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.drawing.replay import Replay
+from pipeline.report.replay import Replay
 
 NOTHING = {kind: {"fitted": 0.2, "held_out": np.nan} for kind in ("force", "cloud")}
 

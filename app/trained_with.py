@@ -47,12 +47,13 @@ def since_run(root: Path, stage: str | None) -> list[Change] | None:
     if stage not in stages:
         return None
     makers = {out["path"]: name for name, one in stages.items() for out in one.get("outs", ())}
-    then, todo = {}, [stage]
+    now, found, todo = _read(root / "params.yaml"), {}, [stage]
     for name in todo:  # which grows
-        then |= stages[name].get("params", {}).get("params.yaml", {})
-        deps = (dep["path"] for dep in stages[name].get("deps", ()))
-        todo += {maker for path in deps if (maker := _maker(makers, path))} - {*todo}
-    return _changes(then, _read(root / "params.yaml"))
+        for change in _changes(stages[name].get("params", {}).get("params.yaml", {}), now):
+            found.setdefault(change.key, change)
+        deps = [dep["path"] for dep in stages[name].get("deps", ())]
+        todo += sorted({maker for path in deps if (maker := _maker(makers, path))} - {*todo})
+    return [found[key] for key in sorted(found)]
 
 
 def since_card(root: Path, band: str, card: dict) -> list[Change]:

@@ -130,13 +130,25 @@ def test_params_that_changed_since_training_by_key_values_and_cure(params, proje
     )
     told = [hazard.what for hazard in of_policy(params, project)]
     cure = f"since the policy was trained: `dvc repro {STAGE}` mends it"
-    assert told[0] == f"params.yaml: loss.median_window was 9, is 7, {cure}"
     held_out = "{'blocks': 0, 'length': 0.6}"
-    assert told[1] == f"params.yaml: loss.held_out was not there, is {held_out}, {cure}"
+    assert told[0] == f"params.yaml: loss.held_out was not there, is {held_out}, {cure}"
+    assert told[1] == f"params.yaml: loss.median_window was 9, is 7, {cure}"
     assert len(told) == 2
     edit(project, "max_force: 30.0", "max_force: 25.0")
     last = of_policy(params, project)[-1]
     assert last.what == f"params.yaml: setup.max_force was 30.0, is 25.0, {cure}"
+
+
+def test_a_stage_that_ran_anew_hides_no_change_of_one_that_did_not(params, project) -> None:
+    """θ was identified with today's mass, the policy trained before."""
+    card(project)
+    new = params.bands["band1"].model_dump()
+    theta, made = "theta@band1-least_squares", ["data/theta/band1/least_squares.json"]
+    ran = {theta: {"params": {"bands.band1": new}, "outs": made}}
+    ran[STAGE] = {"params": {"bands.band1": new | {"mass": 0.05}}, "deps": made}
+    lock(project, **ran)
+    (found,) = of_policy(params, project)
+    assert "bands.band1.mass was 0.05, is 0.023" in found.what
 
 
 def test_many_changes_are_three_and_the_names_of_the_others(params, project) -> None:

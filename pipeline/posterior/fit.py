@@ -23,7 +23,7 @@ from pipeline.posterior.likelihood import Expansion, Failed, Likelihood
 ITERATIONS = 14  # at most
 BINNED = 4  # of them sort the points into bins anew; then the density keeps its form
 LONGEST = 20.0  # of a step, in those of the finite differences
-STILL = 0.05  # of a last step, in standard deviations given the other coordinates
+STILL = 0.2  # of a last step, in standard deviations: no interval is 2 % wider by as much
 LEAST = 1e-12  # of a precision
 DAMP, HARDER, EASIER, HARDEST = 1e-3, 10.0, 0.2, 1e4  # Levenberg's, relative to the diagonal
 
@@ -114,8 +114,8 @@ def fit(
 
 
 def _size(fit: Fit, step: np.ndarray) -> float:
-    """Of a step (D,), in standard deviations of a coordinate given the others."""
-    return float((np.abs(step) * np.sqrt(np.diag(fit.hessian))).max())
+    """Of a step (D,), in standard deviations along it: Mahalanobis's distance."""
+    return float(np.sqrt(step @ fit.hessian @ step))
 
 
 def _steps(coordinates: Coordinates, phi: np.ndarray) -> np.ndarray:

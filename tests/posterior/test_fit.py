@@ -34,8 +34,9 @@ def test_it_finds_scipys_minimum(count):
     np.testing.assert_allclose(found.hessian, sum(one.hessian for one in found.expansions))
 
 
-def test_a_bound_holds_the_mode_and_the_others_give_way():
+def test_a_bound_holds_the_mode_and_the_others_give_way(monkeypatch):
     """A minimum beyond zero: at zero, and the rest where SciPy's bounded minimum has it."""
+    monkeypatch.setattr(module, "STILL", 0.05)
     seen = [Curve(curve(np.array([8.0, 9.0, -0.5]) * SIZE))]
     box = space()
     found = fit(seen, box, START)

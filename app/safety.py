@@ -66,13 +66,14 @@ def of_draw(params, band: str, draw: tuple[float, float], root: Path) -> Iterato
                 f" [{low:g}, {high:g}], where the arm reaches",
             )
     folder = Layout(root).episodes(band)
-    episodes = [Episode.load(one.parent) for one in sorted(folder.glob("*/signals.parquet"))]
-    if not episodes:
+    try:
+        episodes = Episode.load_all(folder)
+    except NotMade:
         yield Hazard("stretch", f"{folder} is missing, so nothing tells how far the band was drawn")
         return
     sizes = params.setup.fork_width, params.bands[band].rest_length
     asked = float(stretch_of(np.array([[0.0, *draw]]), *sizes)[0])
-    recorded = max(recorded_stretch(episode, *sizes) for episode in episodes)
+    recorded = recorded_stretch(episodes, *sizes)
     if asked > recorded + ROUNDING:
         yield Hazard(
             "stretch",

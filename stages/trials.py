@@ -33,7 +33,7 @@ def main() -> None:
     layout = Layout()
     theta = load_theta(layout.theta(band, method), band)
     samples = load_samples(layout.confidence(band, method))
-    episode = Episode.load(layout.episode(band))
+    episodes = Episode.load_all(layout.episodes(band))
 
     expect_apart(layout, band)
     stored, targets = Stored(band, method), params.trials.targets
@@ -53,7 +53,7 @@ def main() -> None:
         predicted=launches,
         intervals=intervals,
         stretch=stretch_of(np.insert(draws, 0, 0, axis=1), fork_width, about.rest_length),
-        recorded=recorded_stretch(episode, fork_width, about.rest_length),
+        recorded=recorded_stretch(episodes, fork_width, about.rest_length),
     )
     trials.save(table, layout.trials(band, method))
     counts = [f"{batch.kind} {len(batch.draws)}" for batch in batches]

@@ -240,7 +240,9 @@ def test_readme_is_short_and_its_results_are_those_of_the_report() -> None:
     wanted = {
         band: [float(errors[band, name]) for name in names] for band in ("band1", "band2", "band3")
     }
-    wanted["mean of the bands"] = [sum(column) / len(column) for column in zip(*wanted.values(), strict=True)]
+    wanted["mean of the bands"] = [
+        sum(column) / len(column) for column in zip(*wanted.values(), strict=True)
+    ]
     for row, numbers in wanted.items():
         line = next(one for one in readme.splitlines() if re.match(rf"\| {row}\b", one))
         cells = line.removesuffix(" |").split(" | ")[1:]

@@ -60,6 +60,7 @@ def fit(
     name = name or name_of(recordings)
     told = [] if launches is None else evidence.read(launches)
     if recordings:
+        say(f"checking {', '.join(map(str, recordings))}")
         say(brought_in(params, layout, recordings, name, band))
         params = load(root / "params.yaml")
     expect_running(params, name)

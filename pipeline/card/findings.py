@@ -50,6 +50,7 @@ def findings(known: Known) -> Findings:
         off=float((landing - scored.predicted_y).abs().mean()) if len(scored) else 0.0,
         kind=" and ".join(dict.fromkeys(scored.kind)),
         left=max(left, default=0.0),
+        observed=len(left),
     )
 
 

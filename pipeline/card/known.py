@@ -104,8 +104,7 @@ def known(params, band: str, method: str, root: str | Path = ".") -> Known:
     samples = np.array(posterior.samples, float)
     samples = samples.reshape(len(samples), len(posterior.names))
     stored = Stored(band, method, layout.root)
-    folders = sorted(layout.episodes(band).glob("[0-9]*"), key=lambda one: int(one.name))
-    episodes = [Episode.load(one) for one in folders or [layout.episode(band)]]
+    episodes = Episode.load_all(layout.episodes(band))
     stretch = partial(stretch_of, fork_width=params.setup.fork_width, rest_length=about.rest_length)
     launcher = simulator(params, band, theta, root=root)
     target = np.array(params.trials.targets, float)
@@ -121,9 +120,7 @@ def known(params, band: str, method: str, root: str | Path = ".") -> Known:
         policy=stored.card(),
         trials=pd.read_parquet(made(layout.trials(band, method))),
         aims=aims(launcher, target, stored.draws(target), samples, stretch, params),
-        recorded_stretch=max(
-            recorded_stretch(one, params.setup.fork_width, about.rest_length) for one in episodes
-        ),
+        recorded_stretch=recorded_stretch(episodes, params.setup.fork_width, about.rest_length),
     )
 
 

@@ -89,6 +89,14 @@ class Episode:
                 pq.write_table(table, temporary)
 
     @classmethod
+    def load_all(cls, folder: Path) -> list[Episode]:
+        """All pulls of a band, by the name of the recording, then by time. Raises as `load`."""
+        found = [cls.load(folder / "1")]
+        while (one := folder / str(len(found) + 1)).is_dir():
+            found.append(cls.load(one))
+        return found
+
+    @classmethod
     def load(cls, folder: Path) -> Episode:
         """Read an episode that `save` wrote. Raises NotMade or ValueError."""
         paths = [made(folder / f"{name}.parquet") for name in ("signals", "clouds")]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from pipeline.episode.episode import Episode
@@ -17,7 +19,10 @@ def stretch_of(points: np.ndarray, fork_width: float, rest_length: float) -> np.
     return np.linalg.norm(points[:, None] - tips, axis=2).sum(1) / rest_length
 
 
-def recorded_stretch(episode: Episode, fork_width: float, rest_length: float) -> float:
-    """The largest stretch that the recording shows."""
-    held = (episode.time >= episode.grasp_time) & (episode.time <= episode.release_time)
-    return float(stretch_of(episode.position[held], fork_width, rest_length).max())
+def recorded_stretch(episodes: Iterable[Episode], fork_width: float, rest_length: float) -> float:
+    """The largest stretch that the recordings show."""
+    held = [
+        one.position[(one.time >= one.grasp_time) & (one.time <= one.release_time)]
+        for one in episodes
+    ]
+    return float(stretch_of(np.concatenate(held), fork_width, rest_length).max())

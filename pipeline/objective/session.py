@@ -87,8 +87,5 @@ def load_episode(band: str) -> Episode:
 
 
 def load_episodes(band: str) -> list[Episode]:
-    """All of a band: by the name of the recording, then by time. Raises NotMade."""
-    layout, found = Layout(), [load_episode(band)]
-    while (folder := layout.episode(band, len(found) + 1)).is_dir():
-        found.append(Episode.load(folder))
-    return found
+    """All of a band. Raises NotMade."""
+    return Episode.load_all(Layout().episodes(band))

@@ -21,4 +21,4 @@ def test_the_recorded_stretch_counts_only_while_the_band_is_held() -> None:
     episode = Episode(
         "toy", time, position, nothing, nothing, time, time, [], 1.0, 3.0, np.zeros(3)
     )
-    assert recorded_stretch(episode, 6.0, 8.0) == pytest.approx(10 / 8)
+    assert recorded_stretch([episode], 6.0, 8.0) == pytest.approx(10 / 8)

@@ -46,7 +46,7 @@ class Recorded:
         draws = table[["draw_y_m", "draw_z_m"]].to_numpy()
         setup, length = self.params.setup, self.params.bands[BAND].rest_length
         stretch = stretch_of(np.insert(draws, 0, 0, axis=1), setup.fork_width, length)
-        inside = stretch <= recorded_stretch(self.episode, setup.fork_width, length)
+        inside = stretch <= recorded_stretch([self.episode], setup.fork_width, length)
         self.draws, self.landing = draws[inside], table.landing_y_m.to_numpy()[inside]
 
     def errors(self, method: str, seed: int = 1, *, episode=None, params=None) -> tuple:

@@ -12,7 +12,8 @@ from tests.card.conftest import trials
 GOOD = Findings(
     settled=True, force=0.05, held=8e-4, recoil=2e-3, disagreement=1.1, odd="", at_sides=(),
     stretch=1.5, recorded_stretch=1.6, hold_force=9.0, max_force=30.0, failures=(), converged=True,
-    miss=0.004, half_width=0.1, outside=1, scores=15, off=0.03, kind="virtual", left=0.01, observed=0,
+    miss=0.004, half_width=0.1, outside=1, scores=15, off=0.03, kind="virtual", left=0.01,
+    observed=0,
 )  # fmt: skip
 CASES = [
     ({"settled": None}, CARE, "does not tell how sure"),

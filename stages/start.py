@@ -58,6 +58,8 @@ def remedy(error: NotMade) -> str:
     if known is None:
         return ""
     folder, band, method = known
+    if folder == "raw" and band not in load().run.rig:
+        return f"`sling add-recording --band {band} FILE.mcap` puts a recording there"
     step, params = STEPS.get(folder, folder), load()
     stage = f"{step}@{band}" if method is None else stage_of(params, step, band, method)
     if stage is None:

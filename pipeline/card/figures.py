@@ -16,6 +16,7 @@ from pipeline.episode.episode import Episode
 
 CUT = (520, 470)  # pixels of each camera picture
 MOVED = 0.005  # s after the release: in a picture from then on the band has left the hand
+MOST_SPAN = 1.5  # m of landings on which targets find room for their names
 AROUND = (-0.3, 0.4)  # of the release, magnified [s]
 BARS = "#0072b2"  # beside black and magenta, told apart by any eye
 TITLE = {"fontsize": 11, "fontweight": "bold"}
@@ -27,7 +28,7 @@ def moments(episode: Episode, simulated: Simulated, pictures: Pictures) -> dict[
     taken, release = pictures.time + simulated.camera, simulated.release
     hanging = pictures.latest(max(episode.grasp_time - 0.1, 0.0))
     drawn = pictures.latest(release - simulated.camera - 1e-3)
-    recoil = int(np.searchsorted(taken, release + MOVED))
+    recoil = min(int(np.searchsorted(taken, release + MOVED)), len(taken) - 1)
     before, after = 1000 * (release - taken[drawn]), 1000 * (taken[recoil] - release)
     return {
         "hanging": hanging,
@@ -159,14 +160,15 @@ def _aimed(ax: plt.Axes, aims: Aims) -> None:
     bars = (aims.interval.T - aims.landing) * 100
     _bars(ax, aims.landing, bars, color=SIMULATED, lw=6, alpha=0.35)
     ax.plot(aims.landing, 0 * aims.landing, "o", color=SIMULATED, ms=5, zorder=3)
+    ax.margins(x=0.12, y=0.15)
+    crowded = np.ptp(ax.get_xlim()) > MOST_SPAN
     for x, target, high in zip(aims.landing, aims.target, bars[1], strict=True):
-        if np.isfinite(x + high):
+        if np.isfinite(x + high) and not crowded:
             place, offset = (x, high), (0, 4)
             ax.annotate(
                 f"target {target:g} m", place, offset, textcoords="offset points", ha="center",
                 fontsize=8, color=SIMULATED,
             )  # fmt: skip
-    ax.margins(x=0.12, y=0.15)
 
 
 def _bars(ax: plt.Axes, x: np.ndarray, ends: np.ndarray, **style) -> None:

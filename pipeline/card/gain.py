@@ -81,12 +81,12 @@ class LandingModel:
         told = self.covariance[:, which]
         return self.covariance - told @ np.linalg.solve(told[which], told.T)
 
-    def pulled(self) -> np.ndarray:
-        """Covariance after another pull that tells as much as those that are there."""
+    def pulled(self, pulls: int = 1) -> np.ndarray:
+        """Covariance after another pull that tells as much as each of the `pulls` did."""
         prior = self._prior()
         values, vectors = np.linalg.eigh(np.linalg.inv(self.covariance) - prior)
         told = (vectors * np.maximum(values, 0)) @ vectors.T
-        return np.linalg.inv(np.linalg.inv(self.covariance) + told)
+        return np.linalg.inv(np.linalg.inv(self.covariance) + told / pulls)
 
     def _prior(self) -> np.ndarray:
         """Precision (D, D) of what is known without any pull; a bound tells as its own spread."""

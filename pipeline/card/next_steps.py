@@ -36,14 +36,14 @@ def next_steps(
     reasons: Sequence[Reason],
     model: LandingModel | None,
     targets,
-    episode: Episode,
+    episodes: Sequence[Episode],
     launches: int = 0,
 ) -> list[str]:
     """Sentences, the most helpful first; one that says so where nothing helps.
 
     Args:
         targets: Of the landings [m], shape (T,).
-        launches: That are evidence already.
+        episodes, launches: Pulls, and the number of launches, that are evidence already.
     """
     found = list(dict.fromkeys(reason.cure for reason in reasons if reason.cure))
     if model is not None:
@@ -51,7 +51,7 @@ def next_steps(
         before = model.half_width[aim]
         words = {"band": band, "a": "another" if launches else "a"}
         words |= {"at": f"at {targets[aim]:g} m", "before": f"±{_cm(before)} cm"}
-        for gain in sorted(_gains(model, aim, episode), key=lambda gain: gain.width):
+        for gain in sorted(_gains(model, aim, episodes), key=lambda gain: gain.width):
             if gain.width < (1 - LEAST) * before:
                 found.append(gain.text.format(**words, after=f"±{_cm(gain.width)} cm"))
     if not found:
@@ -59,30 +59,30 @@ def next_steps(
     return found[:MOST]
 
 
-def _gains(model: LandingModel, aim: int, episode: Episode) -> Iterator[Gain]:
+def _gains(model: LandingModel, aim: int, episodes: Sequence[Episode]) -> Iterator[Gain]:
     one, more = (model.after(model.launched(aim, TAPE, count))[aim] for count in (1, LAUNCHES))
     yield Gain(
-        "Measure {a} launch and tell it with `sling observe --band {band}`: {at} {before} become"
+        "Measure {a} launch and tell it with `sling observe --band {band}`: {before} {at} become"
         f" {{after}}, with {LAUNCHES} launches ±{_cm(more)} cm.",
         one,
     )
     yield Gain(
-        "Record another pull like those that you have: {at} {before} become about {after}.",
-        model.after(model.pulled())[aim],
+        "Record another pull like those that you have: {before} {at} become about {after}.",
+        model.after(model.pulled(len(episodes)))[aim],
     )
     yield Gain(
         "Take more pictures of the recoil, by a faster camera or by pulls that are seen at other"
-        " moments: with damping and drag known exactly, {at} {before} become {after}.",
+        " moments: with damping and drag known exactly, {before} {at} become {after}.",
         model.after(model.exact(RECOIL))[aim],
     )
-    if relaxing(episode):
+    if any(map(relaxing, episodes)):
         yield Gain(
             "Pause longer before the release, for the force was still falling: with stiffness and"
-            " relaxation known exactly, {at} {before} become {after}.",
+            " relaxation known exactly, {before} {at} become {after}.",
             model.after(model.exact(PULL))[aim],
         )
     yield Gain(
-        "Draw more exactly: by an arm without error, {at} {before} become {after}.",
+        "Draw more exactly: by an arm without error, {before} {at} become {after}.",
         model.after(draw=0.0)[aim],
     )
 

@@ -43,7 +43,7 @@ def residuals(known: Known, found: Findings) -> str:
     if not known.confidence:
         return "This method does not tell how near it comes; the report has its loss.\n"
     pictures = known.confidence["recordings"][0]["pictures"]
-    seen = " and ".join(f"{1000 * time:.0f} ms" for time in pictures)
+    seen = " and ".join(f"{1000 * time:.0f} ms" for time in pictures) or "too long"
     return f"""\
 What is left, as a root mean square; the sensor's bias and what the camera's calibration leaves
 open are taken out:

@@ -37,7 +37,7 @@ def write(params, band: str, method: str, root: str | Path = ".") -> dict:
     reasons, shown = reasons_of(found, against), values(told.theta, about.fixed)
     model = LandingModel.of(told.names, told.samples, told.aims)
     launches = len(told.confidence.get("launches", []))
-    steps = next_steps(band, against, model, told.aims.target, episode, launches)
+    steps = next_steps(band, against, model, told.aims.target, told.episodes, launches)
     card = content(told, verdict, reasons, shown, steps)
     text = told, found, verdict, reasons, shown, steps
 

@@ -68,6 +68,8 @@ def test_another_pull_counts_its_evidence_twice_and_the_prior_once() -> None:
     twice = np.vstack([design, design])
     expected = np.linalg.inv(twice.T @ twice + prior)
     np.testing.assert_allclose(model.pulled(), expected, rtol=1e-6, atol=1e-12)
+    half = np.linalg.inv(1.5 * told + prior)  # of two, one more
+    np.testing.assert_allclose(model.pulled(2), half, rtol=1e-6, atol=1e-12)
 
 
 def test_a_model_is_read_off_samples() -> None:
@@ -105,12 +107,12 @@ def test_a_force_that_still_falls_is_seen() -> None:
 
 def test_steps_are_cures_and_then_gains_the_largest_first(model) -> None:
     reasons = [Reason(False, "why", "Do this."), Reason(False, "too", "Do this.")]
-    steps = next_steps("toy", reasons, model, np.array([1.7, 1.9]), still(0.0))
+    steps = next_steps("toy", reasons, model, np.array([1.7, 1.9]), [still(0.0)])
     assert steps[0] == "Do this." and steps.count("Do this.") == 1
     after = [float(step.split("±")[2].split()[0]) for step in steps[1:]]
     assert len(after) >= 2 and after == sorted(after)
     assert "Measure a launch and tell it with `sling observe --band toy`" in " ".join(steps)
-    more = next_steps("toy", reasons, model, np.array([1.7, 1.9]), still(0.0), launches=2)
+    more = next_steps("toy", reasons, model, np.array([1.7, 1.9]), [still(0.0)], launches=2)
     assert "Measure another launch" in " ".join(more)
     assert "1.9 m" in steps[1]
 
@@ -118,8 +120,8 @@ def test_steps_are_cures_and_then_gains_the_largest_first(model) -> None:
 def test_where_nothing_helps_it_says_so() -> None:
     known = LandingModel(NAMES, 1e-12 * np.eye(4), GRADIENT, np.zeros(2), np.ones(2))
     exact = LandingModel(NAMES, 1e-12 * np.eye(4), GRADIENT, np.full(2, 1e-9), np.ones(2))
-    assert next_steps("toy", [], None, np.array([1.7]), still(0.0)) == [
+    assert next_steps("toy", [], None, np.array([1.7]), [still(0.0)]) == [
         "Nothing more would narrow the landings by much: launch."
     ]
     assert known.after(draw=0.0)[0] == pytest.approx(1.0)
-    assert len(next_steps("toy", [], exact, np.array([1.7, 1.9]), still(0.0))) >= 1
+    assert len(next_steps("toy", [], exact, np.array([1.7, 1.9]), [still(0.0)])) >= 1

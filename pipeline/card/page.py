@@ -48,7 +48,8 @@ def content(episode: Episode, simulated: Simulated, setup) -> dict:
         thinned(cloud, POINTS if abs(since) < NEAR else FEW)
         for cloud, since in zip(episode.clouds, stamps, strict=True)
     ]
-    lines = np.stack([smooth(simulated.place, nodes, NODES) for nodes in simulated.nodes])
+    nodes = np.moveaxis(simulated.nodes, 0, 1)  # all states at once
+    lines = np.moveaxis(smooth(simulated.place, nodes, NODES), 1, 0)
     moving = lines[np.abs(simulated.time - release) < NEAR]
     low, high = moving.min(axis=(0, 1)), moving.max(axis=(0, 1))
     return {

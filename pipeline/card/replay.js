@@ -130,6 +130,13 @@
   });
   slider.addEventListener("input", () => { stop(); time = Number(slider.value); draw(); });
   find("play").addEventListener("click", () => (playing === null ? play() : stop()));
+  find("next").addEventListener("click", () => {  // the first one again after the last
+    stop();
+    const [begin, end] = WINDOWS[find("part").value];
+    const taken = data.stamps.filter((stamp) => stamp >= begin && stamp <= end);
+    time = taken.find((stamp) => stamp > time + 1e-6) ?? taken[0] ?? time;
+    draw();
+  });
   find("part").addEventListener("change", () => {
     stop();
     find("speed").value = find("part").value === "all" ? "1" : "0.02";

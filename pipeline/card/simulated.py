@@ -49,7 +49,10 @@ class Simulated:
 
 
 def smooth(place: np.ndarray, nodes: np.ndarray, points: int = POINTS) -> np.ndarray:
-    """A spline through nodes (L, 3) along the band, which goes round the hand without overshoot."""
+    """A spline through nodes (L, ...) along the band, which goes round the hand without overshoot.
+
+    Shape (points, ...).
+    """
     along = np.linspace(place[0], place[-1], points)
     return Akima1DInterpolator(place, nodes, axis=0, method="makima")(along)
 

@@ -109,11 +109,12 @@ def _listed(sentences: list[str], bullet: str) -> str:
 
 def _values(shown: list[ShownValue]) -> str:
     lines = ["| | value | 90 % interval |", "| --- | --- | --- |"]
-    for one in shown:
-        told = "fixed" if one.fixed else "not known"
-        interval = told if one.low is None else f"{one.low:g} to {one.high:g}"
-        lines.append(f"| {one.label} | {one.value:g} {one.unit} | {interval} |".replace("  ", " "))
-    return "\n".join(lines) + "\n"
+    for one in (one for one in shown if not one.fixed):
+        interval = "not known" if one.low is None else f"{one.low:g} to {one.high:g}"
+        lines.append(f"| {one.label} | {f'{one.value:g} {one.unit}'.strip()} | {interval} |")
+    fixed = ", ".join(f"{one.label} {one.value:g}" for one in shown if one.fixed)
+    told = f"\nFixed, for no pull shows them: {fixed}.\n" if fixed else ""
+    return "\n".join(lines) + "\n" + told
 
 
 def _draws(known: Known) -> str:

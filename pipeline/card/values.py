@@ -22,7 +22,7 @@ class Label(NamedTuple):
 LABELS = {
     "youngs_modulus": Label("Young's modulus", "kPa", 1e-3),
     "mooney_share": Label("Mooney share"),
-    "relaxation": Label("relaxation", "% a half decade", 100.0),
+    "relaxation": Label("relaxation a half decade", "%", 100.0),
     "elasticity_damping": Label("damping time", "ms", 1e3),
     "damping_scale": Label("damping scale"),
     "poissons_ratio": Label("Poisson's ratio"),

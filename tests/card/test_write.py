@@ -138,6 +138,11 @@ def test_the_replay_runs_alone(folder, width: int) -> None:
         assert clock() == "t = −30.0 ms"
         first, later = page.evaluate(PIXELS), slid(0.05)
         assert clock() == "t = +50.0 ms" and first != later
+        page.click("#next")
+        assert clock() == "t = +70.3 ms"  # the truth's pictures are 1/15 s apart
+        page.click("#next")
+        assert page.evaluate(PIXELS) != later
+        slid(0.05)
         page.focus("#view")
         page.keyboard.press("ArrowLeft")
         turned = page.evaluate(PIXELS)

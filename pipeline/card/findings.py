@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.card.known import Known
-from pipeline.card.values import LABELS, boxes
+from pipeline.card.values import LABELS, boxes, rounded
 from pipeline.card.verdict import FURTHER, Findings
 
 SIDE = 0.01  # of a box's width: as near is at its side
@@ -63,8 +63,8 @@ def _odd(recordings: list[dict]) -> str:
     return f"pull {source.get('pull', 1)} of {source.get('file', '?')}"
 
 
-def _at_sides(known: Known) -> list[str]:
-    """Searched parameters at a side of their box that nature does not set."""
+def _at_sides(known: Known) -> list[tuple[str, str]]:
+    """Searched parameters at a side of their box that nature does not set: label and side."""
     found, searched = [], boxes(known.params, known.method)
     for name, value in known.theta["theta"].items():
         if name not in searched:
@@ -75,13 +75,11 @@ def _at_sides(known: Known) -> list[str]:
             ends = np.log(ends)
         place = (ends[0] - ends[1]) / (ends[2] - ends[1])
         sides = {"lower": place < SIDE and low != 0, "upper": place > 1 - SIDE}
+        about = LABELS[name]
+        box = " to ".join(f"{rounded(about.factor * end):.6g}" for end in (low, high))
         found += [
-            f"{LABELS[name].text} is at the {side} side of its box ({_of(low, high)})"
+            (about.text, f"{side} side of its box, {f'{box} {about.unit}'.strip()}")
             for side, there in sides.items()
             if there
         ]
     return found
-
-
-def _of(low: float, high: float) -> str:
-    return f"{low:g} to {high:g}"

@@ -46,7 +46,8 @@ def next_steps(
         episodes, launches: Pulls, and the number of launches, that are evidence already.
     """
     found = list(dict.fromkeys(reason.cure for reason in reasons if reason.cure))
-    if model is not None:
+    mended_first = any(reason.against and reason.cure for reason in reasons)
+    if model is not None and not mended_first:
         aim = len(targets) // 2
         before = model.half_width[aim]
         words = {"band": band, "a": "another" if launches else "a"}

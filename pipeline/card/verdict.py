@@ -43,7 +43,7 @@ class Findings:
         settled: Whether the density's last step was small; None where the method has no density.
         force, held, recoil: Worst root mean squares of all recordings [N], [m], [m].
         disagreement: Birge's ratio; `odd` names the recording that the others predict worst.
-        at_sides: Parameters at a side of their box, in words.
+        at_sides: Parameters at a side of their box: label, and which side.
         stretch, recorded_stretch: Of the launches' draws, and of the pulls.
         hold_force, max_force: Of the draws, and of the arm [N].
         failures: Of the launches, in words.
@@ -62,7 +62,7 @@ class Findings:
     recoil: float
     disagreement: float
     odd: str
-    at_sides: Sequence[str]
+    at_sides: Sequence[tuple[str, str]]
     stretch: float
     recorded_stretch: float
     hold_force: float
@@ -135,11 +135,11 @@ def _identified(found: Findings):
             "Find out what was different in the odd recording (another band, draw, clock or"
             " calibration), and leave it out if it is wrong.",
         )
-    for side in found.at_sides:
+    for label, side in found.at_sides:
         yield Reason(
             False,
-            f"{side}, so the true value may lie beyond.",
-            "Widen that box in params.yaml, or check mass and size of the band.",
+            f"The value of {label} is at the {side}; the true one may lie beyond.",
+            f"Widen the box of {label} in params.yaml, or check mass and size of the band.",
         )
 
 
@@ -156,7 +156,7 @@ def _launches(found: Findings):
             f" to {found.recorded_stretch:.2f}: beyond it the simulator guesses.",
             f"Record a pull that stretches the band to {found.stretch:.2f} times its length.",
         )
-    if found.hold_force > NEAR_LIMIT * found.max_force:
+    if NEAR_LIMIT < found.hold_force / found.max_force <= 1:  # beyond, the launch fails
         yield Reason(
             False,
             f"Holding a draw takes {found.hold_force:.1f} N, and the arm may hold"

@@ -117,6 +117,12 @@ def test_steps_are_cures_and_then_gains_the_largest_first(model) -> None:
     assert "1.9 m" in steps[1]
 
 
+def test_what_speaks_against_any_use_is_mended_first(model) -> None:
+    reasons = [Reason(True, "why", "Do this."), Reason(False, "too", "And that.")]
+    asked = "toy", reasons, model, np.array([1.7, 1.9]), [still(0.0)]
+    assert next_steps(*asked) == ["Do this.", "And that."]
+
+
 def test_where_nothing_helps_it_says_so() -> None:
     known = LandingModel(NAMES, 1e-12 * np.eye(4), GRADIENT, np.zeros(2), np.ones(2))
     exact = LandingModel(NAMES, 1e-12 * np.eye(4), GRADIENT, np.full(2, 1e-9), np.ones(2))

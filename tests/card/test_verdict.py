@@ -24,7 +24,7 @@ CASES = [
     ({"recoil": 8e-3}, CARE, "recoil: 8 mm off"),
     ({"recoil": 0.03}, NO, "does not meet the recoil"),
     ({"disagreement": 2.6, "odd": "pull 2 of b.mcap"}, CARE, "pull 2 of b.mcap"),
-    ({"at_sides": ("relaxation is at the upper side of its box",)}, CARE, "relaxation"),
+    ({"at_sides": (("relaxation", "upper side of its box, 0 to 5 %"),)}, CARE, "relaxation"),
     ({"stretch": 1.7}, CARE, "1.70 times its length, the recording only to 1.60"),
     ({"stretch": 2.2}, NO, "2.20 times"),
     ({"hold_force": 28.0}, CARE, "28.0 N"),
@@ -82,6 +82,4 @@ def test_findings_see_a_bad_score_a_side_and_odd_evidence(told) -> None:
     found = findings(replace(told, trials=rows, theta=theta))
     assert (found.outside, found.left, found.force) == (1, 0.07, 0.3)
     assert found.odd == "pull 3 of 0.3.mcap"
-    assert found.at_sides == [
-        "relaxation a half decade is at the upper side of its box (0 to 0.05)"
-    ]
+    assert found.at_sides == [("relaxation a half decade", "upper side of its box, 0 to 5 %")]

@@ -1,16 +1,20 @@
 """Where points of frame O are seen: against the truth of a recording, and OpenCV with a lens."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.base.layout import Layout, NotMade
+from pipeline.card import camera
 from pipeline.card.camera import Pictures
 from pipeline.card.camera_view import CameraView
 from pipeline.card.simulated import Simulated, simulate
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.frames import Transform
+from pipeline.recording.input.reader import read_recording
 from tests.card.conftest import BAND, METHOD, TRUTH
 
 
@@ -90,3 +94,16 @@ def test_a_simulated_pull_holds_the_hand_and_its_states_are_smooth(told, card_pa
     np.testing.assert_allclose(between, np.mean(ends, axis=0), atol=3e-4)
     assert simulated.force.shape == told.episode.force.shape
     assert simulated.force[(told.episode.time > 2.5) & (told.episode.time < 2.9), 1].min() > 3
+
+
+def test_a_colour_camera_beside_the_depth_camera(told, project, monkeypatch) -> None:
+    """What lies before the depth camera is seen where the colour camera's own frame has it."""
+    path = Layout(project).raw(BAND) / "seen.mcap"
+    real = camera.geometry_of
+    beside = Transform(Rotation.from_rotvec([0.02, -0.05, 0.01]), np.array([0.06, 0.01, -0.02]))
+    monkeypatch.setattr(camera, "geometry_of", lambda *given: replace(real(*given), color=beside))
+    pictures = Pictures.of(path, told.episode, told.params.setup)
+    before = np.array([[0.1, -0.05, 0.9], [-0.2, 0.1, 1.3]])  # the depth camera
+    fork = real(read_recording(path, told.params.setup), told.params.setup).camera.apply(before)
+    expected = pictures.camera.project(beside.apply(before))
+    np.testing.assert_allclose(pictures.project(fork), expected, atol=1e-6)

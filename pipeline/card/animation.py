@@ -43,6 +43,7 @@ def animate(
     taken = pictures.time + simulated.camera
     new = taken[(taken > times[0]) & (taken < times[-1])]
     times = np.union1d(times, new)
+    times = times[times <= new[-1]] if len(new) else times  # it ends as it compares
     lasts = np.diff(times, append=times[-1] + STEP) * 1000 * SLOWER
     lasts[np.isin(times, new)] += LOOK
     lasts[-1] = LAST

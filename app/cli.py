@@ -23,8 +23,13 @@ def main() -> None:
     run(lambda: execute(arguments))
 
 
-BAND = flag("--band", required=True, metavar="NAME", help="a band of params.yaml")
-METHOD = flag("--method", metavar="NAME", default=DEFAULT_METHOD, help=f"default {DEFAULT_METHOD}")
+BAND = flag("--band", required=True, metavar="NAME", help="band of params.yaml")
+METHOD = flag(
+    "--method",
+    metavar="NAME",
+    default=DEFAULT_METHOD,
+    help=f"of params.yaml; default {DEFAULT_METHOD}",
+)
 DRAW = flag(
     "--draw",
     type=kinds.draw,
@@ -32,22 +37,22 @@ DRAW = flag(
     metavar="Y,Z",
     help="drawn position in metres, frame O; write it with =, --draw=-0.30,-0.17",
 )
-MASS = {"type": kinds.mass, "metavar": "KG", "help": "of the band, in kilograms"}
+MASS = {"type": kinds.mass, "metavar": "KG", "help": "mass of the band, in kilograms"}
 THICK = {"type": kinds.diameter, "metavar": "M"}
-THICK["help"] = f"of the band, in metres; default {DIAMETER:g}"
+THICK["help"] = f"diameter of the band, in metres; default {DIAMETER:g}"
 LONG = {"type": kinds.rest_length, "metavar": "M"}
-LONG["help"] = f"of the band between its clamps, in metres; default {REST_LENGTH:g}"
+LONG["help"] = f"of the band between the clamps, in metres; default {REST_LENGTH:g}"
 
 
 @command(
     "identify a band from its recordings, train its policy, write its card",
     "my.mcap --mass 0.0408 --name orange",
-    flag("recordings", type=Path, nargs="*", metavar="FILE.mcap", help="of one band"),
+    flag("recordings", type=Path, nargs="*", metavar="FILE.mcap", help="recordings of one band"),
     flag("--mass", **MASS),
-    flag("--name", metavar="NAME", help="of the band; default from the first file's name"),
+    flag("--name", metavar="NAME", help="what to call the band; default: as the first file"),
     flag("--diameter", **THICK),
     flag("--rest-length", **LONG),
-    flag("--launches", type=Path, metavar="CSV", help="measured launches, as evidence"),
+    flag("--launches", type=Path, metavar="CSV", help="measured launches to learn from"),
     JSON,
 )
 def fit(arguments: argparse.Namespace) -> Done:
@@ -98,10 +103,10 @@ def add_recording(arguments: argparse.Namespace) -> Done:
     "say whether a recording can be used, what is missing and what costs accuracy",
     "my.mcap --rest-length 0.52 --sheet my.png",
     flag("recording", type=Path, metavar="FILE.mcap"),
-    flag("--band", metavar="NAME", help="of params.yaml: its diameter and rest length"),
+    flag("--band", metavar="NAME", help="band of params.yaml, for its diameter and rest length"),
     flag("--diameter", **THICK),
     flag("--rest-length", **LONG),
-    flag("--pull", type=kinds.count, metavar="N", help="of several; default: first that is usable"),
+    flag("--pull", type=kinds.count, metavar="N", help="which pull; default: the first usable one"),
     flag("--sheet", type=Path, metavar="OUT.png", help="draw six moments, force and coverage"),
     flag("--rrd", type=Path, metavar="OUT.rrd", help="write one timeline for Rerun's viewer"),
     flag("--frames", action="store_true", help="with --json, also a row for each picture"),
@@ -128,18 +133,16 @@ def check(arguments: argparse.Namespace) -> Done:
 @command(
     "plan the pull that a robot is to record, and check it against limits",
     "--mass 0.0408 --diameter 0.010 --rest-length 0.52 --recording earlier.mcap",
-    flag("--band", metavar="NAME", help="of params.yaml; with sizes: what to call a new one"),
+    flag("--band", metavar="NAME", help="of params.yaml; or with --mass: a new name"),
     flag("--mass", **MASS),
     flag("--diameter", **THICK),
     flag("--rest-length", **LONG),
     flag("--draw", type=kinds.draw, metavar="Y,Z", help="in metres, frame O; default plan.draw"),
-    flag("--theta", type=Path, metavar="FILE", help="θ file: says the force to hold the draw"),
-    flag(
-        "--recording", type=Path, metavar="FILE.mcap", help="earlier one: robot's base, and force"
-    ),
-    flag("--pulls", type=kinds.count, default=1, metavar="N", help="in one recording, default 1"),
+    flag("--theta", type=Path, metavar="FILE", help="θ file that tells the force to hold"),
+    flag("--recording", type=Path, metavar="FILE.mcap", help="earlier one, for base and force"),
+    flag("--pulls", type=kinds.count, default=1, metavar="N", help="in one recording; default 1"),
     flag("--out", type=Path, metavar="FOLDER", help="default data/plans/<band>"),
-    flag("--rate", type=kinds.rate, default=100.0, metavar="HZ", help="of the CSV, default 100"),
+    flag("--rate", type=kinds.rate, default=100.0, metavar="HZ", help="of the CSV; default 100"),
     JSON,
 )
 def plan(arguments: argparse.Namespace) -> Done:
@@ -181,8 +184,10 @@ def launch(arguments: argparse.Namespace) -> Done:
     "--band band1 --target 1.925",
     BAND,
     METHOD,
-    flag("--target", type=kinds.target, required=True, metavar="M", help="on the floor, in metres"),
-    flag("--force", action="store_true", help="answer also where the draw misses by over 5 cm"),
+    flag(
+        "--target", type=kinds.target, required=True, metavar="M", help="along the floor, in metres"
+    ),
+    flag("--force", action="store_true", help="answer even if the draw misses by over 5 cm"),
     JSON,
 )
 def aim(arguments: argparse.Namespace) -> Done:
@@ -200,11 +205,17 @@ def aim(arguments: argparse.Namespace) -> Done:
 
 
 @command(
-    "tell a launch that you measured, then identify and train anew with it",
+    "learn from a launch that you measured: identify and train again with it",
     "--band band1 --draw=-0.30,-0.17 --landing 2.21",
     BAND,
     DRAW,
-    flag("--landing", type=kinds.landing, required=True, metavar="M", help="on the floor, metres"),
+    flag(
+        "--landing",
+        type=kinds.landing,
+        required=True,
+        metavar="M",
+        help="along the floor, in metres",
+    ),
     flag(
         "--draw-error",
         type=kinds.draw_error,
@@ -212,7 +223,7 @@ def aim(arguments: argparse.Namespace) -> Done:
         help="standard deviation of the draw, in metres; default trials.actuation_error",
     ),
     METHOD,
-    flag("--no-run", action="store_true", help="only write it down"),
+    flag("--no-run", action="store_true", help="only write the launch down"),
     JSON,
 )
 def observe(arguments: argparse.Namespace) -> Done:

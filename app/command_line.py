@@ -18,7 +18,7 @@ from pipeline.base.errors import UserError
 Done = str | tuple[str, int]  # what to print, and an exit status that is not 0
 EXITS = {
     0: "done",
-    1: "a mistake in what was given, or a recording that cannot be used: one line says which",
+    1: "bad input, a stage that failed, or a recording that cannot be used: one line says what",
     2: "a command line that cannot be understood",
     3: "refused: a draw that misses its target, or fails, in simulation (`sling aim`)",
     130: "interrupted",

@@ -10,11 +10,16 @@ from app.command_line import JSON, Done, command, flag
 
 
 @command(
-    "run the stages that are stale in parallel, seen in the Prefect UI",
+    "run all stale stages in parallel, and show them in the Prefect UI",
     "--workers 2",
-    flag("--workers", type=kinds.count, metavar="N", help="stages at a time; default all cores"),
+    flag(
+        "--workers",
+        type=kinds.count,
+        metavar="N",
+        help="stages at a time; default: as many as cores",
+    ),
     flag("--gpus", type=kinds.count, metavar="N", help="GPU stages at a time; default 1"),
-    flag("--cluster", type=kinds.address, metavar="ADDRESS", help="Dask: tcp://10.0.0.5:8786"),
+    flag("--cluster", type=kinds.address, metavar="ADDRESS", help="Dask, as tcp://10.0.0.5:8786"),
 )
 def flow(arguments: argparse.Namespace) -> Done:
     from app.flow import run as flow
@@ -36,7 +41,7 @@ def flow(arguments: argparse.Namespace) -> Done:
 
 
 @command(
-    "serve the Prefect UI of this project, on this machine's loopback",
+    "serve the Prefect UI of this project, for this machine alone",
     "--port 4201",
     flag("--port", type=kinds.count, metavar="N", help="default 4200"),
 )
@@ -47,7 +52,7 @@ def ui(arguments: argparse.Namespace) -> Done:
 
 
 @command(
-    "hold the simulator against closed forms, finer steps, other engines",
+    "compare the simulator with closed forms, finer steps and other engines",
     "--device cpu",
     flag("--device", default="cpu", help="cpu (default) or cuda:0"),
 )
@@ -63,7 +68,7 @@ def verify(arguments: argparse.Namespace) -> Done:
 
 
 @command(
-    "measure rollouts and launches a second",
+    "measure rollouts and launches per second",
     "--law rubber --json",
     flag("--device", help="cpu (default), cuda:0, cuda:0,cuda:1, or cuda: all GPUs"),
     flag(
@@ -71,13 +76,13 @@ def verify(arguments: argparse.Namespace) -> Done:
         nargs="?",
         const="",
         metavar="BAND",
-        help="several GPUs against one, on a band's recording or the yardstick",
+        help="several GPUs against one, on a band's recording or on the yardstick",
     ),
     flag("--peers", action="store_const", const=True, help="MuJoCo and Newton beside ours"),
-    flag("--recording", type=Path, metavar="FILE.mcap", help="time how it becomes clouds"),
-    flag("--methods", nargs="*", metavar="METHOD", help="time searches, all or of these methods"),
-    flag("--budget", choices=("laptop", "large"), help="of --methods, default laptop"),
-    flag("--law", choices=("neo_hookean", "rubber"), help="of the band, default neo_hookean"),
+    flag("--recording", type=Path, metavar="FILE.mcap", help="time how a recording becomes clouds"),
+    flag("--methods", nargs="*", metavar="METHOD", help="time searches: all, or these methods"),
+    flag("--budget", choices=("laptop", "large"), help="of --methods; default laptop"),
+    flag("--law", choices=("neo_hookean", "rubber"), help="of the band; default neo_hookean"),
     JSON,
 )
 def bench(arguments: argparse.Namespace) -> Done:

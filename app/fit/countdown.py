@@ -9,10 +9,10 @@ from pipeline.base.progress import parse
 
 STEPS = {  # seconds on two cores for a recording of 9 s, and what happens
     "record": (45, "the virtual rig records a pull"),
-    "episode": (14, "recordings to force and point clouds"),
-    "mounting": (5, "how the band hangs in its clamps"),
+    "episode": (14, "reading force and point clouds"),
+    "mounting": (5, "fitting how the band hangs"),
     "history": (6, "exploring the box of parameters"),
-    "theta": (8, "the density of the parameters"),
+    "theta": (8, "fitting the parameters"),
     "policy": (13, "training the policy"),
     "trials": (5, "predicting its launches"),
     "card": (11, "drawing the card"),

@@ -58,9 +58,7 @@ def _of_file(report: CheckReport) -> Iterator[Caution]:
             yield Caution("checksums", note, "let the recorder write chunk CRCs, its default")
     if report.losses:
         count = len(report.losses)
-        what = (
-            f"{count} {'things were' if count > 1 else 'thing was'} lost or mended, as said above"
-        )
+        what = f"{count} {'things were' if count > 1 else 'thing was'} lost or mended, see below"
         cure = "see whether it touches the pull; copy the file again, or record again"
         yield Caution("losses", what, cure)
 
@@ -77,16 +75,16 @@ def _of_topics(report: CheckReport, done: Processed) -> Iterator[Caution]:
             yield Caution("missing", f"{row.missing} messages of {row.topic} are missing", reliable)
         yield from _of_rate(row, roles)
     if not done.recording.gripper:
-        what = "the gripper was not recorded: the grasp is told from the lift"
+        what = "the gripper was not recorded, so the grasp is read from the lift"
         yield Caution("gripper", what, "record its joint states")
 
 
 def _of_rate(row: Topic, roles: list[str]) -> Iterator[Caution]:
     if "wrench" in roles and row.rate < FORCE_RATE:
-        what = f"the force comes at {row.rate:.0f} Hz, and tells the release that coarsely"
+        what = f"the force comes at {row.rate:.0f} Hz, so the release is known only that coarsely"
         yield Caution("force_rate", what, "record it at 1 kHz")
     if "depth" in roles and row.rate < PICTURE_RATE:
-        what = f"pictures come at {row.rate:.0f} Hz, and few of them show the recoil"
+        what = f"pictures come at {row.rate:.0f} Hz, so few of them show the recoil"
         yield Caution("picture_rate", what, "record 30 a second or more")
 
 
@@ -96,10 +94,10 @@ def _of_clocks(report: CheckReport) -> Iterator[Caution]:
         if row.role and not -most <= row.clock_offset <= AHEAD:
             yield Caution(
                 "clock",
-                f"the stamps of {row.topic} are {row.clock_offset:+.3f} s off the force's by the"
-                " times of receipt",
-                "stamp all topics by one clock (chrony or PTP between computers), when it is"
-                " measured",
+                f"the stamps of {row.topic} are {row.clock_offset:+.3f} s off the force's, judged"
+                " by the times of receipt",
+                "stamp all topics by one clock (chrony or PTP between computers), at the"
+                " moment of measuring",
             )
     for role, delay in report.delays.items():
         value, error = delay["value_s"] or 0.0, delay["error_s"] or 0.0
@@ -224,15 +222,15 @@ def _of_sensor(done: Processed) -> Iterator[Caution]:
     if frame not in known and not done.geometry.sensor_is_fixed:
         yield Caution(
             "sensor",
-            f"/tf_static does not know the force's frame {frame!r}, it is taken for the hand's",
-            "publish how the sensor is turned against the tool centre point",
+            f"/tf_static does not know the force's frame {frame!r}, so it is taken as the hand's",
+            "publish how the sensor is turned relative to the tool centre point",
         )
 
 
 def _of_frames(report: CheckReport) -> Iterator[Caution]:
     facts = report.extrinsics
     if not facts:
-        what = "too few pictures of the drawn band tell how far the fork tips are off"
+        what = "too few pictures of the drawn band to tell how far the fork tips are off"
         yield Caution("extrinsics", what, "pull slowly, and further")
         return
     off, error = facts["off_m"], facts["off_error_m"]

@@ -1,8 +1,8 @@
 """What README and docs say is so: links, commands, stages, keys, Python, and the results on top."""
 
 import ast
-import csv
 import importlib.util
+import json
 import re
 import shlex
 import subprocess
@@ -229,24 +229,21 @@ def imported(node: ast.AST) -> list[tuple[str, str]]:
 def test_readme_is_short_and_its_results_are_those_of_the_report() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(readme.splitlines()) <= 160
-    with (ROOT / "reports/tables/table1.csv").open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["target_m"] == "all"]
-    errors = {
-        (row["band"], row["method"]): row["mean_error_cm"]
-        for row in rows
-        if row["source"].startswith("virtual")
-    }
-    names = "least_squares", "sling2sim2real", "actuation floor"
-    wanted = {
-        band: [float(errors[band, name]) for name in names] for band in ("band1", "band2", "band3")
-    }
-    wanted["mean of the bands"] = [
-        sum(column) / len(column) for column in zip(*wanted.values(), strict=True)
-    ]
-    for row, numbers in wanted.items():
-        line = next(one for one in readme.splitlines() if re.match(rf"\| {row}\b", one))
-        cells = line.removesuffix(" |").split(" | ")[1:]
-        assert cells == [f"{number:.1f} cm" for number in numbers], row
+    report = (ROOT / "reports/README.md").read_text(encoding="utf-8")
+    summary = json.loads((ROOT / "reports/summary.json").read_text(encoding="utf-8"))
+    wanted = {}
+    for band in ("band1", "band2", "band3"):
+        row = next(line for line in report.splitlines() if line.startswith(f"| {band} |"))
+        wanted[band] = [float(cell) for cell in row.split(" | ")[2:5]]
+        assert abs(wanted[band][0] - summary[f"{band}_cm"]) < 0.051
+    ours, _, floor = zip(*wanted.values(), strict=True)
+    wanted["mean of the bands"] = [sum(ours) / 3, summary["paper_cm"], sum(floor) / 3]
+    for name, numbers in wanted.items():
+        row = next(line for line in readme.splitlines() if re.match(rf"\| {name}\b", line))
+        cells = row.removesuffix(" |").split(" | ")[1:]
+        assert cells == [f"{number:.1f} cm" for number in numbers], name
+    inside, width = (f"{summary[name]:.0f} %" for name in ("in_90_%", "width_%"))
+    assert f"{inside} landed inside their 90 % intervals, which are {width} of" in readme
 
 
 def test_what_commands_say_is_quoted_as_they_say_it() -> None:

@@ -15,7 +15,8 @@ from app.cli import parser
 from tests.project import ROOT
 
 LINK = re.compile(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)")
-CODE = re.compile(r"`((?:app|docs|pipeline|reports|stages|tests|tools|validation)/[\w./-]+)`")
+OURS = "app|docs|examples|pipeline|reports|sling2sim2real|stages|tests|tools|validation"
+CODE = re.compile(rf"`((?:{OURS})/[\w./-]+)`")
 SPAN = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SETTING = re.compile(r"\w+=\S*")  # of the environment, before a command

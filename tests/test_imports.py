@@ -12,7 +12,7 @@ from packaging.requirements import Requirement
 
 from tests.project import ROOT
 
-OURS = {"app", "pipeline", "stages", "tests", "tools", "validation"}
+OURS = {"app", "examples", "pipeline", "sling2sim2real", "stages", "tests", "tools", "validation"}
 # By path, extras that come beside what everybody has.
 EXTRAS = {
     "app/cluster/": "cluster",

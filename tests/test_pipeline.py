@@ -145,8 +145,24 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
 def test_the_python_of_the_readme_runs(project: Copy) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     said = project("python", "-c", text.split("```python\n")[1].split("```")[0]).splitlines()
-    assert "clouds, peak force" in said[0]
-    assert len(said[1].strip("[]").split()) == 2
+    assert " Pa, nine of ten from " in said[0]
+    assert float(said[1]) > 0 and len(said[2].strip("()").split(",")) == 2
+
+
+def test_python_identifies_what_the_stage_does(project: Copy) -> None:
+    """From the same episode and launch, without the project's files."""
+    code = """
+from pathlib import Path
+import sling2sim2real as s2s
+run = s2s.Identification.of_run("band1")
+episode = s2s.Episode.load(Path("data/episodes/band1/1"))
+error = run.settings.trials.actuation_error
+seen = s2s.Observed((-0.3, -0.17), error, 2.0)
+found = s2s.identify([episode], run.band, launches=[seen], settings=run.settings)
+assert found.theta == run.theta, (found.theta, run.theta)
+assert (found.samples == run.samples).all() and found.intervals == run.intervals
+"""
+    project("python", "-c", code)
 
 
 def test_a_second_run_does_nothing(project: Copy) -> None:

@@ -20,7 +20,7 @@ from pathlib import Path
 from ruamel.yaml import YAML
 
 ROOT = Path(__file__).parents[1]
-CODE = ("pipeline/", "stages/", "app/", "validation/")
+CODE = ("pipeline/", "stages/", "app/", "sling2sim2real/", "validation/")
 UNTRACKED = ("pipeline/params/", "stages/start.py")
 NESTED = ("pipeline/rig/",)  # folders whose own folders are concerns of their own
 NATIVE = (".h", ".cpp", ".html", ".css", ".js")

@@ -87,6 +87,29 @@ assert not {"pipeline", "rsl_rl"} & set(sys.modules)
         np.testing.assert_allclose(draws, expected, rtol=0, atol=1e-5)
 
 
+def test_the_example_asks_a_policy_where_this_project_is_not(trained, stored, tmp_path) -> None:
+    """With onnxruntime and NumPy alone; it reads units, frames and limits off the card."""
+    files = stored.folder / "policy.onnx", ROOT / "examples" / "policy_elsewhere.py"
+    for file in files:
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    content = written(trained, {**FIGURES, "converged": False})
+    content["launch"] = {"pull_time_s": 4.0, "pause_s": 2.0, "second_more_m": 0.0}
+    (tmp_path / "card.json").write_text(json.dumps(content))
+    code = """
+import runpy, sys
+ours = "app", "examples", "pipeline", "sling2sim2real", "stages", "tests", "torch", "onnx"
+sys.modules |= dict.fromkeys(ours)  # whoever imports one of them fails
+sys.argv = ["policy_elsewhere.py", ".", "2.6"]
+runpy.run_path("policy_elsewhere.py", run_name="__main__")
+"""
+    said = apart(code, tmp_path)
+    y, z = stored.draws(np.array([2.6]))[0]
+    assert said.startswith(f"draw to y = {y:.3f} m, z = {z:.3f} m\n")
+    assert "frame: origin midway between the fork tips, y towards the target, z up" in said
+    assert "trained for targets from 1.425 to 2.425 m" in said and "did not converge" in said
+    assert "the arm may hold 30 N" in said and "draw in 4.0 s, wait 2.0 s" in said
+
+
 def test_equal_networks_give_equal_bytes(trained, folder, tmp_path) -> None:
     """In another process, whose sets are in another order; torch numbers what one has scripted."""
     torch.save(trained.policy, tmp_path / "network.pickle")

@@ -160,7 +160,7 @@ def interact(sling: Sling, episode, theta, step: float = 5e-4, **mesh) -> FlexIn
 
 
 @dataclass(frozen=True)
-class Launch:
+class FlexLaunch:
     """Outcome of one launch, as in sling.launch; NaN where the projectile never left."""
 
     landing_y: float
@@ -170,7 +170,7 @@ class Launch:
     separation_time: float
 
 
-def launch(sling: Sling, theta, draw, step: float = 2.5e-4, **mesh) -> Launch:
+def launch(sling: Sling, theta, draw, step: float = 2.5e-4, **mesh) -> FlexLaunch:
     """Launch the projectile, spread over the middle section, from a draw (y, z) at rest.
 
     It leaves where its acceleration along the launch direction no longer takes a push.
@@ -204,14 +204,14 @@ def launch(sling: Sling, theta, draw, step: float = 2.5e-4, **mesh) -> Launch:
             part = before / max(before - contact, 1e-9)
             _, y, z = last + part * (position - last)
             _, vy, vz = old + part * (velocity - old)
-            return Launch(
+            return FlexLaunch(
                 landing_y=float(ballistic_landing(y, z, vy, vz, -sling.fork_height)),
                 speed=float(np.hypot(vy, vz)),
                 angle=float(np.arctan2(vz, vy)),
                 hold_force=hold_force,
                 separation_time=(i + part) * step,
             )
-    return Launch(np.nan, np.nan, np.nan, hold_force, np.nan)
+    return FlexLaunch(np.nan, np.nan, np.nan, hold_force, np.nan)
 
 
 def _mujoco():

@@ -1,0 +1,49 @@
+"""Ask an exported policy for a draw, on a machine that does not have this project.
+
+    python policy_elsewhere.py FOLDER TARGET      # such as data/policies/band1/least_squares 1.925
+
+Wants onnxruntime and NumPy alone. FOLDER holds policy.onnx and card.json, which a run exported.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+
+
+def main(folder: str, target: str) -> None:
+    card = json.loads(Path(folder, "card.json").read_text(encoding="utf-8"))
+    policy = onnxruntime.InferenceSession(
+        str(Path(folder, "policy.onnx")), providers=["CPUExecutionProvider"]
+    )
+    wanted, given = card["input"], card["output"]
+
+    targets = np.array([[float(target)]], np.float32)  # (batch, 1), metres
+    draws = policy.run([given["name"]], {wanted["name"]: targets})[0]  # (batch, 2), metres
+    y, z = draws[0].tolist()
+    print(f"draw to y = {y:.3f} {given['unit']}, z = {z:.3f} {given['unit']}")
+    print(f"frame: {given['frame']}; {given['meaning']}")
+
+    # The network answers whatever it is asked: these are for you to check.
+    low, high = wanted["trained_range"]
+    if not low <= float(target) <= high:
+        print(f"warning: trained for targets from {low:g} to {high:g} {wanted['unit']}")
+    training, setup = card["training"], card["setup"]
+    if not training["converged"]:
+        print(f"warning: did not converge ({training['criterion']})")
+    print(f"the arm may hold {card['max_force_n']:g} N")
+    print(
+        f"band: {1e3 * setup['band_mass_kg']:g} g, {1e3 * setup['band_diameter_m']:g} mm,"
+        f" {setup['band_rest_length_m']:g} m; fork: {setup['fork_width_m']:g} m wide, tips"
+        f" {setup['fork_height_m']:g} m high; projectile: {1e3 * setup['projectile_mass_kg']:g} g"
+    )
+    if hand := card["launch"]:
+        print(f"draw in {hand['pull_time_s']:.1f} s, wait {hand['pause_s']:.1f} s, let go")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
+    main(*sys.argv[1:])

@@ -1,0 +1,276 @@
+"""Identify a band from its recorded pulls and, where there are any, measured launches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_json
+from pipeline.base.layout import Layout
+from pipeline.base.machine import cores, devices, workers
+from pipeline.base.schema import explained, read_json
+from pipeline.episode.episode import Episode
+from pipeline.episode.pull import launch_history
+from pipeline.launches.stretch import recorded_stretch
+from pipeline.objective.clamps import calibrate_clamps
+from pipeline.objective.evaluate import Evaluator
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.objective.space import Space
+from pipeline.params.identification import LAWS, LEAST_SQUARES
+from pipeline.posterior import identify as posterior
+from pipeline.posterior.launches import Observed
+from pipeline.search.history import History
+from pipeline.search.loop import Free, budget, search
+from pipeline.search.optimizers import explorer
+from pipeline.sling.load import Mounting
+from pipeline.sling.material import THETA
+from pipeline.sling.model import LaunchHistory, Sling
+from pipeline.sling.theta import ThetaFile, load_samples, load_theta
+from sling2sim2real.model import Band, Model, Theta, known
+from sling2sim2real.settings import Settings
+
+METHOD = "least_squares"
+
+
+@dataclass(frozen=True)
+class Interval:
+    """What is known of one parameter.
+
+    Attributes:
+        value: The most likely one.
+        low, high: Nine of ten compatible values lie between them.
+        identifiable: False where the data tell nothing: it is fixed, or the interval fills its box.
+        unit: SI; "" for a plain number.
+    """
+
+    value: float
+    low: float
+    high: float
+    identifiable: bool
+    unit: str
+
+
+@dataclass(frozen=True)
+class Identification(Model):
+    """An identified band: a `Model`, and how sure it is.
+
+    Attributes:
+        intervals: By parameter; of derived values too, such as damping_product and returned_share.
+        samples: θ that are compatible with the data, each as likely as the others, shape (M, P);
+            columns are `theta.names`. None where the method has none.
+        settled: Whether the fit has converged; if not, do not trust the intervals.
+        stretch: The largest that the recordings show: length over rest length. Beyond it a launch
+            is extrapolated.
+    """
+
+    intervals: dict[str, Interval] = field(default_factory=dict, repr=False)
+    samples: np.ndarray | None = field(default=None, repr=False, compare=False)
+    settled: bool = False
+    stretch: float | None = None
+
+    def save(self, path: str | Path) -> None:
+        """Write all of it as one JSON file, settings included."""
+        samples = None if self.samples is None else self.samples.tolist()
+        content = {
+            **self.theta.content(self.band.name, self.history),
+            "sizes": vars(self.band),
+            "mounting": self.mounting and self.mounting.model_dump(),
+            "intervals": {name: vars(one) for name, one in self.intervals.items()},
+            "samples": samples,
+            "settled": self.settled,
+            "stretch": self.stretch,
+            "settings": self.settings.model_dump(),
+        }
+        write_json(Path(path), content)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Identification:
+        """Read what `save` wrote.
+
+        Raises:
+            UserError: There is no such file, or it is damaged.
+        """
+        file = read_json(Path(path), ThetaFile)
+        try:
+            mounting, samples = file.mounting, file.samples
+            return cls(
+                band=Band(**file.sizes),
+                theta=Theta.of_file(file),
+                mounting=mounting and Mounting.model_validate(mounting),
+                history=file.history and LaunchHistory(**file.history.model_dump()),
+                settings=Settings.model_validate(file.settings),
+                intervals={name: Interval(**one) for name, one in file.intervals.items()},
+                samples=None if samples is None else np.array(samples, float),
+                settled=file.settled,
+                stretch=file.stretch,
+            )
+        except (AttributeError, TypeError, ValueError) as error:
+            said = explained(error, Settings) if isinstance(error, ValidationError) else error
+            raise UserError(f"{path}: was not written by Identification.save ({said})") from error
+
+    @classmethod
+    def of_run(cls, band: str, method: str = METHOD, root: str | Path = ".") -> Identification:
+        """What `sling fit` or `dvc repro` found, of a project whose params.yaml is in `root`.
+
+        Raises:
+            UserError: The project has no such band or method, or has not run yet.
+        """
+        layout, settings = Layout(Path(root)), Settings.load(Path(root, "params.yaml"))
+        if band not in settings.bands:
+            raise UserError(f"{band}: params.yaml has {', '.join(settings.bands)}")
+        about = settings.bands[band]
+        content = load_theta(layout.theta(band, method), band)
+        file = ThetaFile.model_validate(content)
+        path, told = layout.mounting(band), content.get("confidence")
+        there = layout.episode(band).is_dir()
+        episodes = Episode.load_all(layout.episodes(band)) if there else []
+        return cls(
+            band=Band(about.mass, about.diameter, about.rest_length, band),
+            theta=Theta.of_file(file),
+            mounting=read_json(path, Mounting) if path.exists() else None,
+            history=file.history and LaunchHistory(**file.history.model_dump()),
+            settings=settings,
+            intervals=_intervals(content, told) if told else {},
+            samples=load_samples(layout.confidence(band, method)),
+            settled=bool(told and told["settled"]),
+            stretch=_stretch(episodes, settings, about),
+        )
+
+
+def identify(
+    episodes: Sequence[Episode],
+    band: Band,
+    *,
+    launches: Sequence[Observed] = (),
+    settings: Settings | None = None,
+    start: Model | None = None,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Identification:
+    """Identify a band as the method `least_squares` of a run does; half a minute a recording.
+
+    Three steps: how the band hangs, from the first episode before it is taut; the best of a design
+    over the whole box of parameters; from there the mode of one density over all episodes and
+    launches, with samples of it. docs/identification.md says what is fitted. SLING_WORKERS says on
+    how many cores, which changes no result.
+
+    >>> from sling2sim2real import Band, Model, Observed, Settings, Theta
+    >>> from sling2sim2real import episode_from_arrays, identify, rehearse
+    >>> band, settings = Band(0.023, 0.010, 0.52), Settings.coarse()
+    >>> true = Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6, mooney_share=0.1, relaxation=0.004)
+    >>> world = Model(band, true, settings=settings)
+    >>> episode = episode_from_arrays(**rehearse(world))
+    >>> found = identify([episode], band, settings=settings, start=world)
+    >>> young = found.intervals["youngs_modulus"]
+    >>> young.low < 2.0e5 < young.high
+    True
+
+    Args:
+        episodes: Of this band, at least one.
+        band: What was weighed and measured.
+        launches: Measured, as evidence; at a draw (y, z), its error, the landing [m].
+        settings: Boxes, budget, lab; None: `Settings.default()`.
+        start: A model of the band to start from: without it, the first two steps.
+        progress: Is told a line at each step.
+
+    Raises:
+        UserError: No episode; a recording that no simulation can follow.
+    """
+    settings = known(settings or Settings.default(), band)
+    if not episodes:
+        raise UserError("identify: give at least one episode")
+    for episode in episodes:
+        launch_history(episode)  # refuses one without a pull
+    for launch in launches:
+        if not (launch.landing > 0 and launch.draw[0] < 0 and launch.error >= 0):
+            raise UserError(
+                f"launches: {launch}: draw y < 0, error >= 0 and landing > 0 are needed"
+            )
+    if start is None:
+        mounting = _mounting(episodes[0], band, settings)
+        progress(f"mounting: clamps at {mounting.clamp_angle_deg:.0f} degrees")
+        sling = _sling(band, settings, mounting)
+        point, rollouts = _explored(episodes[0], sling, settings)
+        progress(f"explored {rollouts} points")
+    else:
+        mounting, theta = start.mounting, start.theta
+        names = (*THETA, *LAWS[settings.methods[METHOD].law])
+        point = np.array([getattr(theta, name) or 0.0 for name in names])
+        sling = _sling(band, settings, mounting)
+    found = posterior.identify(
+        settings,
+        METHOD,
+        sling,
+        episodes,
+        point,
+        observed=launches,
+        workers=workers() or cores(),
+        progress=lambda fit: progress(f"expansion {fit.steps}: misfit {fit.misfit:.2f}"),
+    )
+    content = posterior.theta_content(found, band.name, METHOD)
+    told = posterior.confidence(found, settings.parameters)
+    file = ThetaFile.model_validate(content)
+    return Identification(
+        band=band,
+        theta=Theta.of_file(file),
+        mounting=mounting,
+        history=file.history and LaunchHistory(**file.history.model_dump()),
+        settings=settings,
+        intervals=_intervals(content, told),
+        samples=found.points,
+        settled=told["settled"],
+        stretch=_stretch(episodes, settings, band),
+    )
+
+
+def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> Sling:
+    sling = Sling.of(band, settings.setup, settings.sling, mounting and mounting.model_dump())
+    return replace(sling, law=settings.methods[METHOD].law)
+
+
+def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
+    sling = Sling.of(band, settings.setup, settings.sling, as_rod=True)
+    found = calibrate_clamps(
+        sling,
+        episode,
+        lambda part: EpisodeLoss.plain(settings, part, sling),
+        workers=cores(),
+    )
+    return Mounting.model_validate(found)
+
+
+def _explored(episode: Episode, sling: Sling, settings: Settings) -> tuple[np.ndarray, int]:
+    """The best point (P,) of a design over the box, and of how many."""
+    about, space = settings.methods[METHOD], Space.of_method(settings, METHOD)
+    loss = EpisodeLoss.of(settings, METHOD, episode, sling)
+    evaluate = Evaluator(episode, sling, loss, space, devices=devices(), workers=workers())
+    free, history = Free.of(space, about.fixed), History(METHOD, space.names)
+    rollouts, _ = budget(settings.optimizer, LEAST_SQUARES)
+    optimizer = explorer(about, settings.optimizer, len(free.axes), rollouts)
+    search(optimizer, evaluate, history, rollouts=rollouts, free=free)
+    best = history.best()
+    return np.array([best[name] for name in space.names]), rollouts
+
+
+def _intervals(content: dict, told: dict) -> dict[str, Interval]:
+    """Of a θ file's content and its confidence."""
+    found = {}
+    for name, one in told["parameters"].items():
+        value, unit = content["theta"][name], UNITS.get(name, "")
+        found[name] = Interval(value, one["low"], one["high"], one["identifiable"], unit)
+    for name, one in told["derived"].items():
+        value, low, high = (float(one[key]) for key in ("value", "low", "high"))
+        found[name] = Interval(value, low, high, True, one["unit"])
+    return found
+
+
+UNITS = {"youngs_modulus": "Pa", "elasticity_damping": "s"}
+
+
+def _stretch(episodes: Sequence[Episode], settings: Settings, band) -> float | None:
+    sizes = settings.setup.fork_width, band.rest_length
+    return recorded_stretch(episodes, *sizes) if episodes else None

@@ -1,0 +1,205 @@
+"""Launch from a draw, and find the draw for a target, in the calibrated simulator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.base.errors import UserError
+from pipeline.launches.spread import landing_intervals
+from pipeline.launches.stretch import stretch_of
+from pipeline.launches.trials import limited
+from sling2sim2real.model import Model
+
+FINE = 201  # nodes along y and z, between which a target is sought on the map
+INSET = 2e-3  # m from the edge of the box, which leaves room for those launches
+NEAR = 2e-4  # m of landing that count as a hit
+TRIES = 8  # launches at most to get there from the map
+ROUNDING = 1e-3  # of a stretch
+
+
+@dataclass(frozen=True)
+class Launch:
+    """A predicted launch, frame O, SI units; NaN where `failure` says why there is none.
+
+    Attributes:
+        draw: Where the arm is sent to with the projectile (y, z).
+        landing: Where the projectile meets the floor, along y.
+        speed, angle: As it leaves the pouch [m/s, rad above the horizon].
+        separation: Where it leaves (y, z).
+        hold_force: Of the drawn band on the hand; known for most failed launches too.
+        failure: None, or why it does not land beyond the fork, or may not be drawn.
+    """
+
+    draw: tuple[float, float]
+    landing: float
+    speed: float
+    angle: float
+    separation: tuple[float, float]
+    hold_force: float
+    failure: str | None
+
+
+@dataclass(frozen=True)
+class Aim:
+    """Where to draw for a target.
+
+    Attributes:
+        target: Asked for, along y on the floor [m].
+        draw: Where to send the arm (y, z), frame O [m].
+        launch: What the simulator predicts there.
+        interval_90: Nine of ten landings lie in it [m]: θ's samples, and an error of
+            `settings.trials.actuation_error` along each axis of the draw. None where too many
+            launches beside the predicted one fail.
+        pull_and_pause: In how long the hand must draw and how long it must wait [s]; None where
+            the law does not remember it.
+        warnings: What the numbers do not rest on; read them before a robot moves.
+    """
+
+    target: float
+    draw: tuple[float, float]
+    launch: Launch
+    interval_90: tuple[float, float] | None
+    pull_and_pause: tuple[float, float] | None
+    warnings: tuple[str, ...]
+
+
+def launch(model: Model, draw: tuple[float, float]) -> Launch:
+    """Launch the projectile from one draw; `Model.launches` takes many at once.
+
+    >>> from sling2sim2real import Band, Model, Theta, launch
+    >>> band = Band(mass=0.023, diameter=0.010, rest_length=0.52)
+    >>> model = Model(band, Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6))
+    >>> shot = launch(model, draw=(-0.30, -0.15))
+    >>> print(f"{shot.landing:.1f} m, {shot.hold_force:.0f} N")
+    2.0 m, 8 N
+
+    Args:
+        model: From `identify`, or written by hand.
+        draw: (y, z) in frame O, y < 0, above the floor [m].
+
+    Raises:
+        UserError: No such draw can be. A launch that fails says so in `failure`.
+    """
+    floor = -model.settings.setup.fork_height
+    if not (np.shape(draw) == (2,) and draw[0] < 0 and draw[1] > floor):
+        raise UserError(
+            f"draw: must be (y, z) with y < 0 and z > {floor:g} (the floor), got {draw}"
+        )
+    done = limited(model.launches(draw), model.settings.setup.max_force)
+    return Launch(
+        draw=(float(draw[0]), float(draw[1])),
+        landing=float(done.landing_y[0]),
+        speed=float(done.speed[0]),
+        angle=float(done.angle[0]),
+        separation=(float(done.separation_y[0]), float(done.separation_z[0])),
+        hold_force=float(done.hold_force[0]),
+        failure=done.failure[0],
+    )
+
+
+def aim(model: Model, target: float) -> Aim:
+    """The gentlest draw that lands on a target: of all in the box that do, that of least force.
+
+    No policy is trained: launches over the box are simulated once a model
+    (`Model.landing_map`), the target's curve is read off them, and a few more launches along the
+    draw's own line bring it to the target. `sling aim` asks a trained policy instead; both are
+    judged by launches of the same simulator.
+
+    >>> from sling2sim2real import Band, Model, Settings, Theta, aim
+    >>> band = Band(mass=0.023, diameter=0.010, rest_length=0.52)
+    >>> model = Model(band, Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6), settings=Settings.coarse())
+    >>> aimed = aim(model, target=2.0)
+    >>> print(f"{aimed.launch.landing:.2f} m")
+    2.00 m
+    >>> low, high = aimed.interval_90
+    >>> low < 2.0 < high
+    True
+    >>> aimed.warnings
+    ('no samples of θ: the interval holds the error of the draw alone',)
+
+    Args:
+        model: From `identify`, whose samples make the interval; or written by hand.
+        target: Along y, on the floor [m].
+
+    Raises:
+        UserError: No draw in the box and within the arm's force lands there.
+    """
+    start = _gentlest(model, target)
+    draw = _refined(model, start, target)
+    found = launch(model, tuple(draw))
+    if found.failure:
+        raise UserError(f"target {target:g} m: the draw for it fails: {found.failure}")
+    samples = getattr(model, "samples", None)
+    error = model.settings.trials.actuation_error
+    low, high = landing_intervals(model.launches, draw, samples, error)[0].tolist()
+    interval, history = ((low, high) if low == low else None), model.sling.history
+    return Aim(
+        target=float(target),
+        draw=found.draw,
+        launch=found,
+        interval_90=interval,
+        pull_and_pause=history and (history.pull_time, history.pause),
+        warnings=tuple(_warnings(model, found.draw, samples, interval)),
+    )
+
+
+def _gentlest(model: Model, target: float) -> np.ndarray:
+    """Of draws that the map lands on the target that of least force, (2,). Raises UserError."""
+    surface = model.landing_map
+    axes = [
+        np.linspace(one[0] + INSET, one[-1] - INSET, FINE)
+        for one in (surface.draw_y, surface.draw_z)
+    ]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+    landing = surface(grid.reshape(-1, 2)).landing_y.reshape(FINE, FINE)
+    off = landing - target
+    here, next_ = off[:-1], off[1:]
+    hit = np.nonzero((here * next_ <= 0) & (here != next_))
+    if not len(hit[0]):
+        reach = "none of them lands"
+        if np.isfinite(landing).any():
+            reach = f"they land from {np.nanmin(landing):.2f} to {np.nanmax(landing):.2f} m"
+        raise UserError(
+            f"target {target:g} m: no draw of the box (setup.draw_y, draw_z) that the arm can hold"
+            f" lands there; {reach}"
+        )
+    part = (here[hit] / (here[hit] - next_[hit]))[:, None]
+    draws = (1 - part) * grid[:-1][hit] + part * grid[1:][hit]
+    return draws[np.argmin(surface(draws).hold_force)]
+
+
+def _refined(model: Model, draw: np.ndarray, target: float) -> np.ndarray:
+    """The draw (2,) on the line through the fork that lands NEAR the target, by secants."""
+
+    def off(length: float) -> float:
+        return float(model.launches(length * draw).landing_y[0]) - target
+
+    length, gap, slope = 1.0, off(1.0), 2 * target  # a landing grows about as the draw squared
+    for _ in range(TRIES):
+        if not abs(gap) > NEAR:
+            break
+        before, length = (length, gap), length - gap / slope
+        gap = off(length)
+        slope = (gap - before[1]) / (length - before[0])
+        if not slope > 0:  # a longer draw lands further
+            break
+    return length * draw
+
+
+def _warnings(model: Model, draw: tuple[float, float], samples, interval):
+    if samples is None:
+        yield "no samples of θ: the interval holds the error of the draw alone"
+    elif not model.settled:
+        yield "the fit has not converged: do not trust the interval"
+    if interval is None:
+        yield "no interval: too many launches beside the predicted one fail"
+    sizes = model.settings.setup.fork_width, model.band.rest_length
+    asked = float(stretch_of(np.array([[0.0, *draw]]), *sizes)[0])
+    known = getattr(model, "stretch", None)
+    if known is not None and asked > known + ROUNDING:
+        yield (
+            f"the draw stretches the band by {100 * (asked - 1):.1f} %, its recordings by"
+            f" {100 * (known - 1):.1f} % at most: force and landing are extrapolated"
+        )

@@ -1,0 +1,228 @@
+"""A band in the simulator: its sizes, its parameters, how it hangs and how a hand draws it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+
+from pipeline.base.errors import UserError
+from pipeline.base.machine import cores
+from pipeline.base.schema import explained, read_json
+from pipeline.landing.landing_map import LandingMap
+from pipeline.params.identification import LAWS
+from pipeline.sling.launch import Launches
+from pipeline.sling.launch import launch as launch_many
+from pipeline.sling.load import Mounting
+from pipeline.sling.material import THETA
+from pipeline.sling.model import LaunchHistory, Sling
+from pipeline.sling.rubber import NEO_HOOKEAN, RUBBER
+from pipeline.sling.theta import EXTRA, ThetaFile, at_points
+from sling2sim2real.settings import Settings
+
+ADDED = tuple(LAWS[RUBBER])  # parameters that the law rubber has beside the five
+
+
+@dataclass(frozen=True)
+class Band:
+    """What a scale, a calliper and a ruler say of a band.
+
+    >>> from sling2sim2real import Band
+    >>> Band(mass=0.023, diameter=0.010, rest_length=0.52).name
+    'band'
+
+    Attributes:
+        mass: Between the clamps [kg].
+        diameter: Unstretched [m].
+        rest_length: Between the clamps, without force [m].
+        name: Stands in messages and in episodes.
+    """
+
+    mass: float
+    diameter: float
+    rest_length: float
+    name: str = "band"
+
+
+@dataclass(frozen=True)
+class Theta:
+    """The parameters θ of a band; the five are the paper's.
+
+    With `mooney_share` and `relaxation` the material is of the law rubber, without them it is
+    neo-Hookean. A value that no material has is a UserError.
+
+    >>> from sling2sim2real import Theta
+    >>> five = Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6)
+    >>> five.law
+    'neo_hookean'
+    >>> Theta(2.0e5, 0.55, 2.4e-3, 0.7, 0.6)
+    Traceback (most recent call last):
+    ...
+    pipeline.base.errors.UserError: theta.poissons_ratio: must be between 0 and 0.495, got 0.55
+
+    Attributes:
+        youngs_modulus: For small strains, relaxed [Pa].
+        poissons_ratio: As usual.
+        elasticity_damping: Viscous stress over the rate of the elastic one [s].
+        dynamic_friction: Between finger pads and band.
+        damping_scale: Of the part of the damping that brakes changes of shape, 0 to 1.
+        mooney_share: Of rubber, Mooney's second constant over the sum of both.
+        relaxation: Of rubber, weight of each relaxing branch.
+        air_drag: Beyond a cylinder's: force for mass and speed [1/s].
+        turn_damping: Share of the damping that brakes turns without stretch.
+        returned_share: Energy that a launch gets over what the law gives it.
+    """
+
+    youngs_modulus: float
+    poissons_ratio: float
+    elasticity_damping: float
+    dynamic_friction: float
+    damping_scale: float
+    mooney_share: float | None = None
+    relaxation: float | None = None
+    air_drag: float = 0.0
+    turn_damping: float = 0.0
+    returned_share: float = 1.0
+
+    def __post_init__(self) -> None:
+        for one in fields(self):  # NumPy's numbers are as good
+            value = getattr(self, one.name)
+            if isinstance(value, (np.generic, int)) and not isinstance(value, bool):
+                object.__setattr__(self, one.name, float(value))
+        try:
+            ThetaFile.model_validate(self.content("band", LaunchHistory(1.0, 0.0)))
+        except ValidationError as error:
+            raise UserError(explained(error, ThetaFile)) from error
+
+    @property
+    def law(self) -> str:
+        """Of the material: neo_hookean or rubber."""
+        return RUBBER if any(getattr(self, one) is not None for one in ADDED) else NEO_HOOKEAN
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of what `point` holds."""
+        return (*THETA, *LAWS[self.law], *EXTRA)
+
+    @property
+    def point(self) -> np.ndarray:
+        """All of it in one vector, by `names`, shape (P,)."""
+        return np.array([getattr(self, name) for name in self.names], float)
+
+    @classmethod
+    def of(cls, names: Sequence[str], point: np.ndarray) -> Theta:
+        """Of a vector (P,) by its names; the inverse of `point`."""
+        return cls(**dict(zip(names, np.asarray(point, float).tolist(), strict=True)))
+
+    def content(self, band: str, history: LaunchHistory | None = None) -> dict:
+        """What a θ file holds (`sling launch --theta`)."""
+        named = {name: getattr(self, name) for name in (*THETA, *ADDED)}
+        known = {}
+        if self.law == RUBBER:
+            known = {"law": RUBBER, "history": history and vars(history)}
+        return {
+            "band": band,
+            **known,
+            "theta": {name: value for name, value in named.items() if value is not None},
+            "nuisances": {"air_drag": self.air_drag},
+            "turn_damping": self.turn_damping,
+            "returned_share": self.returned_share,
+        }
+
+    @classmethod
+    def load(cls, path: str | Path) -> Theta:
+        """From a θ file, which a run or a person wrote. Raises UserError."""
+        return cls.of_file(read_json(Path(path), ThetaFile))
+
+    @classmethod
+    def of_file(cls, file: ThetaFile) -> Theta:
+        """From a θ file's content, checked."""
+        return cls(
+            **file.theta.model_dump(),
+            air_drag=file.nuisances.air_drag or 0.0,
+            turn_damping=file.turn_damping,
+            returned_share=file.returned_share,
+        )
+
+
+@dataclass(frozen=True)
+class Model:
+    """A band that can be simulated; what `identify` returns is one, with intervals.
+
+    >>> from sling2sim2real import Band, Model, Theta
+    >>> band = Band(mass=0.023, diameter=0.010, rest_length=0.52)
+    >>> model = Model(band, Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6))
+    >>> model.settings.setup.fork_width
+    0.275
+
+    Attributes:
+        band, theta: Sizes and parameters.
+        mounting: How the band leaves its clamps, and its bending stiffness; None: as
+            `settings.setup` says, and a solid round band's.
+        history: How long a hand draws a launched band and how long it pauses [s]; the law rubber
+            remembers that. None: the band has forgotten everything. What `settings.launch` says
+            goes first.
+        settings: The lab and the simulator's resolution.
+    """
+
+    band: Band
+    theta: Theta
+    mounting: Mounting | None = None
+    history: LaunchHistory | None = None
+    settings: Settings = field(default_factory=Settings.default, repr=False)
+
+    def __post_init__(self) -> None:
+        known(self.settings, self.band)
+
+    @cached_property
+    def sling(self) -> Sling:
+        """What the simulator takes, with all that θ says beside the five."""
+        sling, _ = self.at(self.theta.point[None])
+        return sling
+
+    @cached_property
+    def landing_map(self) -> LandingMap:
+        """Launches over the box of draws (`settings.setup`), and splines that read between them."""
+        setup = self.settings.setup
+        return LandingMap.simulate(
+            self.launches,
+            draw_y=setup.draw_y,
+            draw_z=setup.draw_z,
+            size=self.settings.policy.map_size,
+            max_force=setup.max_force,
+            checks=0,
+        )
+
+    def launches(self, draws: np.ndarray, points: np.ndarray | None = None) -> Launches:
+        """Launch draws (N, 2) [m], each by θ or by a point of its own (N, P) as `Theta.point`.
+
+        No arm limits the force here.
+        """
+        draws = np.atleast_2d(np.asarray(draws, float))
+        points = self.theta.point[None] if points is None else points
+        sling, five = self.at(np.broadcast_to(points, (len(draws), points.shape[-1])))
+        return launch_many(sling, five, draws, workers=cores())
+
+    def at(self, points: np.ndarray) -> tuple[Sling, np.ndarray]:
+        """Sling and the five (N, 5) of points (N, P)."""
+        mounting = self.mounting and self.mounting.model_dump()
+        sling = Sling.of(self.band, self.settings.setup, self.settings.sling, mounting)
+        sling = replace(sling, law=self.theta.law, history=self._history())
+        return at_points(sling, points)
+
+    def _history(self) -> LaunchHistory | None:
+        told = dict(vars(self.history)) if self.history else {}
+        told |= {name: value for name, value in self.settings.launch if value is not None}
+        return LaunchHistory(**told) if self.theta.law == RUBBER and len(told) == 2 else None
+
+
+def known(settings: Settings, band: Band) -> Settings:
+    """Settings that know the band by its name. Raises UserError where it cannot be."""
+    sizes = {name: float(getattr(band, name)) for name in ("mass", "diameter", "rest_length")}
+    there = settings.bands.get(band.name)
+    source = there.source if there else "recording"
+    return settings.changed(bands={band.name: {"source": source, **sizes}})

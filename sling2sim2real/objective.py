@@ -1,0 +1,113 @@
+"""A loss over the box of parameters, for an optimiser of your own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.base.errors import UserError
+from pipeline.base.machine import devices, workers
+from pipeline.episode.episode import Episode
+from pipeline.objective.evaluate import Evaluator
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.objective.space import Space
+from pipeline.search.loop import Free
+from sling2sim2real.model import Model, Theta
+from sling2sim2real.simulation import Simulation, simulate_batch
+
+
+class Objective:
+    """The loss of an episode at points of the unit cube, whose axes are a method's free parameters.
+
+    A point that no simulation can follow has an infinite loss.
+
+    >>> import numpy as np
+    >>> from sling2sim2real import Band, Model, Objective, Settings, Theta
+    >>> from sling2sim2real import episode_from_arrays, rehearse
+    >>> band = Band(mass=0.023, diameter=0.010, rest_length=0.52)
+    >>> model = Model(band, Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6), settings=Settings.coarse())
+    >>> episode = episode_from_arrays(**rehearse(model))
+    >>> objective = Objective(model, [episode])
+    >>> objective.names  # doctest: +NORMALIZE_WHITESPACE
+    ('youngs_modulus', 'poissons_ratio', 'elasticity_damping', 'dynamic_friction', 'damping_scale')
+    >>> here, middle = objective(np.stack([objective.unit(model.theta), np.full(5, 0.5)]))
+    >>> bool(here < middle)
+    True
+
+    Attributes:
+        names: Of the axes, length D.
+        low, high: Physical bounds, shape (D,).
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        episodes: Sequence[Episode],
+        *,
+        method: str = "sling2sim2real",
+        loss: Callable[[Simulation, Episode], float] | None = None,
+    ) -> None:
+        """Prepare the loss; several episodes count alike.
+
+        Args:
+            model: The band, its mounting and settings; its own θ is not used.
+            episodes: At least one.
+            method: Of `settings.methods`: its law, box, fixed parameters and weights.
+            loss: Your own, of a simulation; None: the paper's, of geometry, force and work.
+
+        Raises:
+            UserError: No such method, or no episode.
+        """
+        methods = model.settings.methods
+        if method not in methods:
+            raise UserError(f"method {method}: settings.methods has {', '.join(methods)}")
+        if not episodes:
+            raise UserError("episodes: give at least one")
+        self._space = Space.of_method(model.settings, method)
+        self._free = Free.of(self._space, methods[method].fixed)
+        self.names = self._free.names
+        self.low, self.high = (
+            ends[self._free.axes] for ends in (self._space.low, self._space.high)
+        )
+        self._model, self._own, self._episodes = model, loss, list(episodes)
+        self._evaluators = [] if loss else [self._evaluator(one, method) for one in episodes]
+
+    def _evaluator(self, episode: Episode, method: str) -> Evaluator:
+        law = self._model.settings.methods[method].law
+        sling = replace(self._model.sling, law=law)
+        loss = EpisodeLoss.of(self._model.settings, method, episode, sling)
+        return Evaluator(episode, sling, loss, self._space, devices=devices(), workers=workers())
+
+    def __call__(self, unit: np.ndarray) -> np.ndarray:
+        """Losses (N,) of points of the unit cube (N, D); +inf where a simulation fails.
+
+        Raises:
+            UserError: They have another shape, or lie outside the cube.
+        """
+        unit = np.asarray(unit, float)
+        if unit.ndim != 2 or unit.shape[1] != len(self.names) or not len(unit):
+            raise UserError(f"points: must have shape (N, {len(self.names)}), got {unit.shape}")
+        if not ((unit >= 0) & (unit <= 1)).all():
+            raise UserError("points: must lie in the unit cube, 0 to 1")
+        if self._own is None:
+            whole = self._free.fill(unit)
+            return np.sum([evaluate(whole).total for evaluate in self._evaluators], axis=0)
+        thetas = [self.theta(one) for one in unit]
+        model = replace(self._model, theta=thetas[0])
+        total = np.zeros(len(unit))
+        for episode in self._episodes:
+            for i, one in enumerate(simulate_batch(model, episode, thetas)):
+                total[i] += np.inf if one.failure else self._own(one, episode)
+        return total
+
+    def theta(self, unit: np.ndarray) -> Theta:
+        """θ at a point of the unit cube (D,)."""
+        whole = self._free.fill(np.asarray(unit, float)[None])[0]
+        return Theta.of(self._space.names, self._space.to_physical(whole))
+
+    def unit(self, theta: Theta) -> np.ndarray:
+        """The point (D,) of θ; fixed parameters are left out."""
+        values = np.array([getattr(theta, name) for name in self._space.names], float)
+        return self._space.to_unit(values)[self._free.axes]

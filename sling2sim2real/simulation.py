@@ -1,0 +1,181 @@
+"""Simulate a recorded, planned or rehearsed pull."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.base.errors import UserError
+from pipeline.base.machine import cores
+from pipeline.episode.episode import Episode
+from pipeline.episode.signal import as_recorded, cutoff_hz
+from pipeline.sling.initial import hanging_guess
+from pipeline.sling.interaction import interact
+from sling2sim2real.model import Model, Theta
+
+LANES = 16  # rollouts that cost as much as one
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A simulated pull, on the episode's clock, frame O, SI units.
+
+    Attributes:
+        time: Middle of each sample, shape (T,).
+        force: Of the band on the gripper, filtered and averaged as a recorded one, shape (T, 3).
+        step_time: Ends of the simulator's steps, irregular, shape (S,).
+        step_force: The force there, unfiltered, shape (S, 3).
+        cloud_time: Stamps of the camera frames, shape (K,).
+        center_line: Nodes of the band at those, shape (K, L, 3).
+        failure: None, or why the simulation counts for nothing.
+    """
+
+    time: np.ndarray
+    force: np.ndarray
+    step_time: np.ndarray
+    step_force: np.ndarray
+    cloud_time: np.ndarray
+    center_line: np.ndarray
+    failure: str | None
+
+
+def simulate(model: Model, episode: Episode) -> Simulation:
+    """Simulate an episode's pull: the hand goes where it went there, and lets go when it did.
+
+    >>> from sling2sim2real import Band, Model, Settings, Theta, pull, simulate
+    >>> band = Band(mass=0.023, diameter=0.010, rest_length=0.52)
+    >>> model = Model(band, Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6), settings=Settings.coarse())
+    >>> simulated = simulate(model, pull(model, draw=(-0.40, 0.0)))
+    >>> simulated.force.shape, simulated.center_line.shape
+    ((166, 3), (148, 17, 3))
+    >>> print(f"{simulated.force[:, 1].max():.0f} N")
+    13 N
+
+    Args:
+        model: The band.
+        episode: Recorded (`read_mcap`, `episode_from_arrays`) or planned (`pull`).
+
+    Raises:
+        UserError: The episode has no pull. A simulation that fails says so in `failure`.
+    """
+    return simulate_batch(model, episode, [model.theta])[0]
+
+
+def simulate_batch(model: Model, episode: Episode, thetas: Sequence[Theta]) -> list[Simulation]:
+    """The same for many θ of one law, 16 for the price of one, on all cores.
+
+    >>> from sling2sim2real import Band, Model, Settings, Theta, pull, simulate_batch
+    >>> thetas = [Theta(young, 0.47, 2.4e-3, 0.7, 0.6) for young in (1e5, 2e5)]
+    >>> band = Band(mass=0.023, diameter=0.010, rest_length=0.52)
+    >>> model = Model(band, thetas[0], settings=Settings.coarse())
+    >>> soft, stiff = simulate_batch(model, pull(model), thetas)
+    >>> print(f"{stiff.force[:, 1].max() / soft.force[:, 1].max():.1f}")
+    2.0
+
+    Args:
+        model: The band; its own θ is not used.
+        episode: As for `simulate`.
+        thetas: N, all neo-Hookean or all of rubber, as `model.theta` is.
+
+    Raises:
+        UserError: They are not of one law, or the episode has no pull.
+    """
+    if not thetas or {one.law for one in thetas} != {model.theta.law}:
+        raise UserError(f"thetas: give some, all of the model's law, {model.theta.law}")
+    points = np.stack([one.point for one in thetas])
+    cutoff = cutoff_hz(model.settings.force.cutoff, model.settings.force.cutoff_unit)
+    start = episode.time[0] - episode.sample_period / 2
+
+    def part(some: np.ndarray) -> list[Simulation]:
+        sling, five = model.at(some)
+        done = interact(sling, episode, five)
+        steps = np.moveaxis(done.force, 0, 1)  # (S, N, 3)
+        sampling = start, episode.sample_period, len(episode.time)
+        force = np.moveaxis(as_recorded(done.times, steps, cutoff, *sampling), 0, 1)
+        return [
+            Simulation(
+                time=episode.time,
+                force=force[i],
+                step_time=done.times,
+                step_force=done.force[i],
+                cloud_time=episode.cloud_time,
+                center_line=done.center_line[i],
+                failure=why,
+            )
+            for i, why in enumerate(done.failure)
+        ]
+
+    with ThreadPoolExecutor(cores()) as pool:
+        some = [points[i : i + LANES] for i in range(0, len(points), LANES)]
+        return [one for each in pool.map(part, some) for one in each]
+
+
+def pull(
+    model: Model,
+    draw: tuple[float, float] = (-0.40, 0.0),
+    *,
+    pull_time: float = 1.5,
+    pause: float = 1.0,
+    frame_rate: float = 30.0,
+) -> Episode:
+    """A planned pull: the hand takes the hanging band, lifts it, draws it, pauses and lets go.
+
+    It has no force and no clouds: simulate it. `sling plan` writes one for a robot.
+
+    >>> from sling2sim2real import Band, Model, Theta, pull
+    >>> band = Band(mass=0.023, diameter=0.010, rest_length=0.52)
+    >>> planned = pull(Model(band, Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6)), draw=(-0.35, -0.10))
+    >>> planned.position[planned.time < planned.release_time][-1].round(2).tolist()
+    [0.0, -0.35, -0.1]
+
+    Args:
+        model: Whose band hangs in the fork.
+        draw: Where the middle is drawn to (y, z), frame O [m].
+        pull_time: For the way there [s].
+        pause: From there to the release [s].
+        frame_rate: Of the camera [Hz].
+
+    Raises:
+        UserError: A time or a rate is not above 0.
+    """
+    if min(pull_time, pause, frame_rate) <= 0:
+        raise UserError("pull: pull_time, pause and frame_rate must be above 0")
+    about = model.settings.episode
+    period = about.duration / about.samples
+    hanging = hanging_guess(model.sling)[model.sling.middle, 2]
+    grasp, lifted = REST, REST + LIFT_TIME
+    drawn = lifted + pull_time
+    release = drawn + pause
+    end = release + about.tail + SPARE
+    time = period * (np.arange(int(end / period)) + 0.5)
+    start, below, there = (np.array(one) for one in ([0, 0, hanging], [0, 0, 0], [0, *draw]))
+    position = start + np.outer(_eased(time, grasp + GRASP_TIME, lifted), below - start)
+    position += np.outer(_eased(time, lifted, drawn), there)
+    frames = np.arange(int(time[-1] * frame_rate)) / frame_rate
+    return Episode(
+        band=model.band.name,
+        time=time,
+        position=position,
+        velocity=np.gradient(position, period, axis=0),
+        force=np.zeros_like(position),
+        opening=np.full(len(time), np.nan),
+        cloud_time=frames,
+        clouds=[np.zeros((0, 3), np.float32)] * len(frames),
+        grasp_time=grasp,
+        release_time=release,
+        camera=np.array(CAMERA),
+        metadata={"input": {"file": "planned"}},
+    )
+
+
+REST, GRASP_TIME, LIFT_TIME, SPARE = 0.3, 0.1, 1.2, 0.3  # s, of a planned pull
+CAMERA = (0.80, 0.32, 0.50)  # m, where a planned pull is looked at from
+
+
+def _eased(time: np.ndarray, start: float, end: float) -> np.ndarray:
+    """From 0 to 1, at rest at both ends, with continuous acceleration, shape (T,)."""
+    part = np.clip((time - start) / (end - start), 0, 1)
+    return part**3 * (10 - 15 * part + 6 * part**2)

@@ -1,0 +1,57 @@
+"""Each public name has an example in its docstring, and the examples are so."""
+
+import doctest
+import importlib
+import inspect
+import pkgutil
+
+import pytest
+
+import sling2sim2real
+from pipeline.episode.episode import Episode
+from tests.project import ROOT
+
+MODULES = [one.name for one in pkgutil.iter_modules(sling2sim2real.__path__)]
+RESULTS = {"Aim", "Episode", "Identification", "Interval", "Launch", "Simulation"}  # of functions
+OTHERS = {"LaunchHistory", "Mounting", "Observed", "UserError"}  # the library's, passed on
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_are_so(name: str) -> None:
+    module = importlib.import_module(f"sling2sim2real.{name}")
+    done = doctest.testmod(module, optionflags=doctest.ELLIPSIS)
+    assert done.attempted > 3 and done.failed == 0
+
+
+def test_every_public_name_has_a_docstring_and_every_function_an_example() -> None:
+    for name in sling2sim2real.__all__:
+        thing = getattr(sling2sim2real, name)
+        assert inspect.getdoc(thing), name
+        if name not in RESULTS | OTHERS:
+            assert ">>> " in thing.__doc__, f"{name} has no example"
+    assert sling2sim2real.Episode is Episode
+
+
+def test_functions_say_what_they_take_and_raise() -> None:
+    for name, thing in vars(sling2sim2real).items():
+        if inspect.isfunction(thing):
+            said = thing.__doc__
+            assert "Args:" in said and "Raises:" in said, name
+            lacking = [one for one in inspect.signature(thing).parameters if one not in said]
+            assert not lacking, f"{name}: {lacking}"
+
+
+def test_the_page_of_it_runs(tmp_path, monkeypatch, capsys) -> None:
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    exec(page.split("```python\n")[1].split("```")[0], {})
+    stiffness, aimed = capsys.readouterr().out.splitlines()
+    assert float(stiffness.split()[0]) == pytest.approx(2.2e5, rel=0.1)
+    assert "has not converged" not in aimed and (tmp_path / "my_band.json").exists()
+
+
+def test_the_page_names_all_there_is() -> None:
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    parts = {"Interval", "LaunchHistory", "Mounting"}  # of results
+    for name in {*sling2sim2real.__all__} - parts:
+        assert f"{name}" in page, name

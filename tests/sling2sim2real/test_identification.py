@@ -1,0 +1,65 @@
+"""A band that the simulator made is found again; what is found is kept whole."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.base.errors import UserError
+from sling2sim2real import Identification, Observed, aim, identify, launch
+
+FITTED = "youngs_modulus", "elasticity_damping", "mooney_share", "relaxation"
+
+
+@pytest.fixture(scope="module")
+def found(band, settings, world, episode) -> Identification:
+    return identify([episode], band, settings=settings, start=world)
+
+
+@pytest.mark.slow
+def test_a_known_band_is_found_without_a_start(band, settings, world, episode) -> None:
+    told = []
+    found = identify([episode], band, settings=settings, progress=told.append)
+    assert found.settled
+    for name in FITTED:
+        one = found.intervals[name]
+        assert one.low < getattr(world.theta, name) < one.high
+        assert one.value == getattr(found.theta, name) and one.identifiable
+    assert not found.intervals["dynamic_friction"].identifiable
+    assert found.samples.shape == (200, len(found.theta.names))
+    assert [line.split()[0] for line in told[:3]] == ["mounting:", "explored", "expansion"]
+    assert abs(np.degrees(np.arcsin(found.mounting.clamp_direction[0]))) < 10
+
+
+def test_launches_move_what_is_found(band, settings, world, episode, found) -> None:
+    draw = aim(found, 2.0).draw
+    before = launch(found, draw).landing
+    short = Observed(draw, error=1e-3, landing=before - 0.1)
+    after = identify([episode], band, launches=[short], settings=settings, start=found)
+    assert before - 0.1 < launch(after, draw).landing < before - 0.02
+    wide, narrow = (np.ptp(aim(one, 2.0).interval_90) for one in (found, after))
+    assert narrow < wide
+
+
+def test_what_is_saved_is_loaded(found, tmp_path) -> None:
+    path = tmp_path / "mine.json"
+    found.save(path)
+    again = Identification.load(path)
+    assert again == found and np.array_equal(again.samples, found.samples)
+    assert aim(again, 2.0) == aim(found, 2.0)
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"sizes": {"mass": 1}}))
+    with pytest.raises(UserError, match="was not written by Identification.save"):
+        Identification.load(path)
+    with pytest.raises(UserError, match="missing"):
+        Identification.load(tmp_path / "nothing.json")
+
+
+def test_wrong_evidence_is_refused(band, settings, world, episode) -> None:
+    with pytest.raises(UserError, match="at least one episode"):
+        identify([], band)
+    with pytest.raises(UserError, match="draw y < 0, error >= 0 and landing > 0"):
+        identify([episode], band, launches=[Observed((0.3, 0.0), 0.0, 2.0)])
+    still = replace(episode, position=np.zeros_like(episode.position))
+    with pytest.raises(UserError, match="lets go at the fork"):
+        identify([still], band, settings=settings, start=world)

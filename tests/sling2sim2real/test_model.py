@@ -1,0 +1,88 @@
+"""A model launches what the library launches, and θ passes through its file."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.base.errors import UserError
+from pipeline.landing.simulator import simulator
+from pipeline.sling.theta import load_theta
+from sling2sim2real import Band, LaunchHistory, Model, Mounting, Settings, Theta
+from sling2sim2real.model import known
+
+DRAWS = np.array([[-0.30, -0.15], [-0.35, -0.20]])
+EXTRA = {"air_drag": 0.5, "turn_damping": 0.2, "returned_share": 0.97}
+HISTORY = LaunchHistory(pull_time=2.0, pause=1.0)
+
+
+def test_launches_are_those_of_a_run_with_the_same_theta_file(world, tmp_path, settings) -> None:
+    model = replace(
+        world,
+        theta=replace(world.theta, **EXTRA),
+        history=HISTORY,
+        mounting=Mounting(clamp_direction=(0.6, 0.0, -0.8), flexural_rigidity=2e-4),
+    )
+    mounting = tmp_path / "data" / "mounting" / "band.json"
+    mounting.parent.mkdir(parents=True)
+    mounting.write_text(model.mounting.model_dump_json())
+    content = model.theta.content("band", HISTORY)
+    theirs = simulator(known(model.settings, model.band), "band", content, root=tmp_path)(DRAWS)
+    ours = model.launches(DRAWS)
+    assert np.array_equal(ours.landing_y, theirs.landing_y)
+    assert not np.array_equal(world.launches(DRAWS).landing_y, ours.landing_y)
+
+
+def test_launch_settings_go_before_the_recordings_history(world) -> None:
+    asked = Settings.coarse(launch={"pause": 5.0})
+    assert replace(world, history=HISTORY, settings=asked).sling.history == replace(
+        HISTORY, pause=5.0
+    )
+    assert world.sling.history is None
+    neo = Theta(2.2e5, 0.47, 2.4e-3, 0.7, 0.6)
+    assert replace(world, theta=neo, history=HISTORY).sling.history is None
+
+
+def test_points_of_their_own(world) -> None:
+    stiff = replace(world, theta=replace(world.theta, youngs_modulus=3e5))
+    both = world.launches(DRAWS, np.stack([world.theta.point, stiff.theta.point]))
+    assert both.landing_y[0] == world.launches(DRAWS[0]).landing_y[0]
+    assert both.landing_y[1] == stiff.launches(DRAWS[1]).landing_y[0]
+
+
+@pytest.mark.parametrize("rubber", [{}, {"mooney_share": 0.2, "relaxation": 0.01}])
+def test_theta_is_read_as_it_is_written(tmp_path, rubber) -> None:
+    theta = Theta(2e5, 0.47, 2.4e-3, 0.7, 0.6, **rubber, **EXTRA)
+    path = tmp_path / "theta.json"
+    path.write_text(json.dumps(theta.content("band", HISTORY)))
+    assert Theta.load(path) == theta
+    assert load_theta(path, "band")["band"] == "band"
+    assert Theta.of(theta.names, theta.point) == theta
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"youngs_modulus": -1.0}, "theta.youngs_modulus: must be between"),
+        ({"youngs_modulus": "2e5"}, "theta.youngs_modulus: must be a number"),
+        ({"mooney_share": 0.1}, "theta: of the law rubber it must have exactly"),
+        ({"returned_share": 0.0}, "returned_share: must be between"),
+    ],
+)
+def test_a_theta_that_cannot_be(values: dict, said: str) -> None:
+    with pytest.raises(UserError, match=said):
+        replace(Theta(2e5, 0.47, 2.4e-3, 0.7, 0.6), **values)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (Band(23.0, 0.010, 0.52), "bands.band.mass: must be between"),
+        (Band(0.023, 0.010, 0.20), "rest_length"),
+        (Band(0.023, 0.010, 0.52, name="my band"), "a name has at most"),
+    ],
+)
+def test_a_band_that_cannot_be(wrong: Band, said: str, world) -> None:
+    with pytest.raises(UserError, match=said):
+        Model(wrong, world.theta)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -188,7 +189,12 @@ def _refined(model: Model, draw: np.ndarray, target: float) -> np.ndarray:
     return length * draw
 
 
-def _warnings(model: Model, draw: tuple[float, float], samples, interval):
+def _warnings(
+    model: Model,
+    draw: tuple[float, float],
+    samples: np.ndarray | None,
+    interval: tuple[float, float] | None,
+) -> Iterator[str]:
     if samples is None:
         yield "no samples of θ: the interval holds the error of the draw alone"
     elif not model.settled:

@@ -89,10 +89,8 @@ class Theta:
     returned_share: float = 1.0
 
     def __post_init__(self) -> None:
-        for one in fields(self):  # NumPy's numbers are as good
-            value = getattr(self, one.name)
-            if isinstance(value, (np.generic, int)) and not isinstance(value, bool):
-                object.__setattr__(self, one.name, float(value))
+        for one in fields(self):
+            object.__setattr__(self, one.name, _plain(getattr(self, one.name)))
         try:
             ThetaFile.model_validate(self.content("band", LaunchHistory(1.0, 0.0)))
         except ValidationError as error:
@@ -222,7 +220,12 @@ class Model:
 
 def known(settings: Settings, band: Band) -> Settings:
     """Settings that know the band by its name. Raises UserError where it cannot be."""
-    sizes = {name: float(getattr(band, name)) for name in ("mass", "diameter", "rest_length")}
+    sizes = {name: _plain(getattr(band, name)) for name in ("mass", "diameter", "rest_length")}
     there = settings.bands.get(band.name)
     source = there.source if there else "recording"
     return settings.changed(bands={band.name: {"source": source, **sizes}})
+
+
+def _plain(value: object) -> object:
+    """NumPy's numbers as Python's; anything else as it is, for the schema to judge."""
+    return float(value) if isinstance(value, np.number) else value

@@ -59,6 +59,7 @@ def test_theta_is_read_as_it_is_written(tmp_path, rubber) -> None:
     assert Theta.load(path) == theta
     assert load_theta(path, "band")["band"] == "band"
     assert Theta.of(theta.names, theta.point) == theta
+    assert replace(theta, youngs_modulus=np.float32(200000)) == theta
 
 
 @pytest.mark.parametrize(
@@ -79,6 +80,7 @@ def test_a_theta_that_cannot_be(values: dict, said: str) -> None:
     ("wrong", "said"),
     [
         (Band(23.0, 0.010, 0.52), "bands.band.mass: must be between"),
+        (Band("23 g", 0.010, 0.52), "bands.band.mass: must be a number"),
         (Band(0.023, 0.010, 0.20), "rest_length"),
         (Band(0.023, 0.010, 0.52, name="my band"), "a name has at most"),
     ],

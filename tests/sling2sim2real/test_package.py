@@ -10,9 +10,11 @@ import pytest
 from tests.project import ROOT, copy_project
 
 ASK = """
-import sling2sim2real as s2s, sys
+import sys
+import sling2sim2real as s2s
 band = s2s.Band(mass=0.023, diameter=0.010, rest_length=0.52)
 model = s2s.Model(band, s2s.Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6), settings=s2s.Settings.coarse())
+assert not {"torch", "open3d", "cv2", "pandas"} & {*sys.modules}  # heavy, and not needed yet
 print(s2s.__file__)
 print(round(s2s.launch(model, (-0.30, -0.15)).landing, 3))
 """
@@ -37,6 +39,7 @@ def test_a_wheel_has_all_that_it_needs(tmp_path) -> None:
     (wheel,) = wheels.glob("sling2sim2real-*.whl")
     with zipfile.ZipFile(wheel) as file:
         assert file.read("sling2sim2real/params.yaml") == (ROOT / "params.yaml").read_bytes()
+        assert "sling2sim2real/py.typed" in file.namelist()
         file.extractall(installed)
     work = tmp_path / "work"
     work.mkdir()

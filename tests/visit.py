@@ -2,10 +2,12 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+
+from pipeline.base.errors import UserError
 
 DESKTOP, PHONE = 1360, 390  # widths [px]
 
@@ -16,16 +18,17 @@ def visited(page: Path, width: int = DESKTOP) -> Iterator:
 
     Skips the test where there is no browser, unless SLING_BROWSER=required (`make validate`).
     """
-    try:
-        from tools.browser import UserError, browsing
+    with ExitStack() as stack:
+        try:
+            from tools.browser import browsing
 
-        with browsing(width=width) as browser:
-            browser.open(page.as_uri(), settling=0.5)
-            yield browser
-    except (ImportError, UserError) as error:
-        if os.environ.get("SLING_BROWSER") == "required":
-            raise
-        pytest.skip(str(error))
+            browser = stack.enter_context(browsing(width=width))
+        except (ImportError, UserError) as error:
+            if os.environ.get("SLING_BROWSER") == "required":
+                raise
+            pytest.skip(str(error))
+        browser.open(page.as_uri(), settling=0.5)
+        yield browser
 
 
 def overflow(browser) -> int:

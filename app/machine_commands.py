@@ -25,8 +25,8 @@ def flow(arguments: argparse.Namespace) -> Done:
     from app.flow import run as flow
     from pipeline.params import load
 
-    if Path("params.yaml").is_file():
-        load()  # a mistake in it is told once, and not by each stage
+    if Path("stages").is_dir():  # whose scripts read params.yaml
+        load()  # a mistake in it is told once, and not by each of them
     root, workers, gpus = Path.cwd(), arguments.workers, arguments.gpus
     if arguments.cluster is None:
         return flow.run(root, workers=workers, gpus=gpus)

@@ -242,6 +242,23 @@ def observe(arguments: argparse.Namespace) -> Done:
     return kinds.shown(answer, True) if arguments.json else observe.shown(answer, arguments.landing)
 
 
+@command(
+    "write an identified band for another engine, matched to the calibrated simulation",
+    "--band band1 --to mjcf",
+    BAND,
+    METHOD,
+    flag("--to", required=True, choices=kinds.ENGINES, help="MuJoCo's XML, or plain numbers"),
+    flag("--out", type=Path, metavar="FOLDER", help="default data/exports/<band>/<target>"),
+    JSON,
+)
+def export(arguments: argparse.Namespace) -> Done:
+    from app.export.export import of_run, shown
+    from pipeline.params import load
+
+    done = of_run(load(), arguments.band, arguments.method, arguments.to, arguments.out)
+    return kinds.shown(done.card, True) if arguments.json else shown(done)
+
+
 from app import machine_commands  # noqa: E402, F401 - they come last in the help
 
 if __name__ == "__main__":

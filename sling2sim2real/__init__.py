@@ -20,6 +20,7 @@ from pipeline.posterior.launches import Observed
 from pipeline.sling.load import Mounting
 from pipeline.sling.model import LaunchHistory
 from sling2sim2real.episodes import episode_from_arrays, read_mcap
+from sling2sim2real.exporting import Exported, export
 from sling2sim2real.identification import Identification, Interval, identify
 from sling2sim2real.launching import Aim, Launch, aim, launch
 from sling2sim2real.model import Band, Model, Theta
@@ -32,6 +33,7 @@ __all__ = [
     "Aim",
     "Band",
     "Episode",
+    "Exported",
     "Identification",
     "Interval",
     "Launch",
@@ -46,6 +48,7 @@ __all__ = [
     "UserError",
     "aim",
     "episode_from_arrays",
+    "export",
     "identify",
     "launch",
     "pull",

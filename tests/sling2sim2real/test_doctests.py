@@ -12,7 +12,15 @@ from pipeline.episode.episode import Episode
 from tests.project import ROOT
 
 MODULES = [one.name for one in pkgutil.iter_modules(sling2sim2real.__path__)]
-RESULTS = {"Aim", "Episode", "Identification", "Interval", "Launch", "Simulation"}  # of functions
+RESULTS = {
+    "Aim",
+    "Episode",
+    "Exported",
+    "Identification",
+    "Interval",
+    "Launch",
+    "Simulation",
+}  # of functions
 OTHERS = {"LaunchHistory", "Mounting", "Observed", "UserError"}  # the library's, passed on
 
 

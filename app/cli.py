@@ -255,8 +255,9 @@ def export(arguments: argparse.Namespace) -> Done:
     from app.export.export import of_run, shown
     from pipeline.params import load
 
-    done = of_run(load(), arguments.band, arguments.method, arguments.to, arguments.out)
-    return kinds.shown(done.card, True) if arguments.json else shown(done)
+    band, method = arguments.band, arguments.method
+    folder, card = of_run(load(), band, method, arguments.to, arguments.out)
+    return kinds.shown(card, True) if arguments.json else shown(folder, card)
 
 
 from app import machine_commands  # noqa: E402, F401 - they come last in the help

@@ -53,4 +53,5 @@ def export(model: Model, to: str, out: str | Path, *, episode: Episode | None = 
     """
     from app.export.export import write
 
-    return write(model, to, out, episode)
+    card = write(model, to, Path(out), episode)
+    return Exported(Path(out), card.get("met"), card)

@@ -18,7 +18,16 @@ from pipeline.params import load
 from validation.benchmarks.timing import environment
 
 REPORT = Path("reports/validation/export-mjcf.json")
-KEPT = ("met", "proof", "matched", "time_step_s", "time_step_error", "springs_error", "pull", "match")
+KEPT = (
+    "met",
+    "proof",
+    "matched",
+    "time_step_s",
+    "time_step_error",
+    "springs_error",
+    "pull",
+    "match",
+)
 
 
 def main(bands: list[str]) -> None:
@@ -26,9 +35,9 @@ def main(bands: list[str]) -> None:
     params, found = load(), {}
     for band in bands or params.run.bands:
         with tempfile.TemporaryDirectory() as folder:
-            done = of_run(params, band, params.run.methods[0], "mjcf", Path(folder))
-        found[band] = {name: done.card[name] for name in KEPT}
-        print(f"{band}: {'met' if done.met else 'NOT met'}", flush=True)
+            _, card = of_run(params, band, params.run.methods[0], "mjcf", Path(folder))
+        found[band] = {name: card[name] for name in KEPT}
+        print(f"{band}: {'met' if card['met'] else 'NOT met'}", flush=True)
     about = environment("cpu", "python -m validation.exports")
     about["versions"] |= {"mujoco": version("mujoco")}
     met = all(one["met"] for one in found.values())

@@ -6,22 +6,21 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 from app.export import values as about
-from app.export.chain import MATCHED, Chain
-from app.export.match import Compared
+from app.export.chain import MATCHED, SpringChain
+from app.export.match import HOLD, LANDING, DrawCompared
 from app.export.pull import PullCompared
 from pipeline.card.values import LABELS, rounded
 from sling2sim2real.model import Model
 
-HOLD, LANDING = 0.02, 0.03  # asked of the proof's draws
 UNITS = {"hold_force": "n", "speed": "m_s", "landing": "m"}  # in names of keys
 ASKED = (
-    f"On three draws that took no part in the match: hold force within {HOLD:.0%}, landing within"
-    f" {LANDING:.0%} of the calibrated simulation."
+    f"On three draws that took no part in the match: hold force within {100 * HOLD:g} %, landing"
+    f" within {100 * LANDING:g} % of the calibrated simulation."
 )
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Matched:
     """What the match and the proof came to.
 
     Attributes:
@@ -33,9 +32,9 @@ class Outcome:
         engine: Name and version.
     """
 
-    chain: Chain
-    match: Sequence[Compared]
-    proof: Sequence[Compared]
+    chain: SpringChain
+    match: Sequence[DrawCompared]
+    proof: Sequence[DrawCompared]
     pull: PullCompared
     finer: float
     engine: str
@@ -48,7 +47,7 @@ class Outcome:
         )
 
 
-def content(model: Model, done: Outcome, target: str, files: dict[str, str]) -> dict:
+def content(model: Model, done: Matched, target: str, files: dict[str, str]) -> dict:
     """What card.json holds."""
     chain = done.chain
     return {
@@ -82,7 +81,7 @@ def content(model: Model, done: Outcome, target: str, files: dict[str, str]) -> 
     }
 
 
-def _row(one: Compared) -> dict:
+def _row(one: DrawCompared) -> dict:
     row = {"draw_y_m": rounded(one.draw[0], 6), "draw_z_m": rounded(one.draw[1], 6)}
     for name, error in one.errors.items():
         ours, theirs = getattr(one, name)
@@ -109,15 +108,18 @@ def readme(card: dict, how: str) -> str:
     wait = ""
     if history:
         wait = (
-            f"\nIt holds for a pull of {history['pull_time_s']:.1f} s and a pause of"
-            f" {history['pause_s']:.1f} s before the release."
+            "\nThe springs hold what the band holds after a pull of"
+            f" {history['pull_time_s']:.1f} s and a pause of {history['pause_s']:.1f} s."
         )
     return f"""\
 # {card["band"]} for {card["engine"].split()[0]}
 
-{card["asked"]} {verdict} ({card["engine"]}): {worst["hold_force"]:.1%} and
-{worst["landing"]:.1%} at worst. The calibrated simulation is the one that was identified from
-recordings; how far it is from the real band, its own card says.
+{card["asked"]}
+{verdict}: {100 * worst["hold_force"]:.1f} and {100 * worst["landing"]:.1f} % at worst
+({card["engine"]}).
+
+The calibrated simulation is the one that was identified from recordings; how far it is from the
+band itself, the band's own card says.
 
 {how}
 
@@ -193,7 +195,7 @@ def _compared(rows: list[dict]) -> str:
 def _pairs(row: dict) -> str:
     """Our values and how far the target's are off."""
     return "".join(
-        f"| {row[f'{name}_{unit}']:.2f} | {row[f'{name}_error']:+.1%} "
+        f"| {row[f'{name}_{unit}']:.2f} | {100 * row[f'{name}_error']:+.1f} % "
         for name, unit in UNITS.items()
     ).rstrip()
 

@@ -27,7 +27,7 @@ KNEE = 0.25  # of the largest strain: from there on a second spring helps the fi
 
 
 @dataclass(frozen=True)
-class Chain:
+class SpringChain:
     """Geometry, masses and springs, SI units, frame O.
 
     Attributes:
@@ -56,10 +56,10 @@ class Chain:
     step: float
 
     @classmethod
-    def of(cls, model: Model, draws: np.ndarray, hold_force: np.ndarray) -> Chain:
+    def of(cls, model: Model, draws: np.ndarray, hold_force: np.ndarray) -> SpringChain:
         """A first guess: straight halves that pull with `hold_force` (N,) at draws (N, 2).
 
-        Its time step is the largest that is stable with twice its damping.
+        Its damping time is θ's, its time step the largest that is stable with that.
         """
         setup, band, theta = model.settings.setup, model.band, model.theta
         distance = np.linalg.norm(draws, axis=1)
@@ -82,7 +82,7 @@ class Chain:
             largest_strain=float(stretch.max() - 1),
             step=STEPS[-1],
         )
-        return replace(chain, step=replace(chain, damping_time=2 * chain.damping_time).stable_step)
+        return replace(chain, step=chain.stable_step)
 
     @property
     def matched(self) -> dict[str, float]:
@@ -116,12 +116,21 @@ class Chain:
     @property
     def stable_step(self) -> float:
         """The largest of STEPS with which explicit steps are stable. Raises UserError."""
-        fastest = 4 * self.strength / self.spring_length / self.node_mass
-        braked = 4 * self.damping / self.node_mass
+        fastest = self._fastest
         for step in STEPS:
-            if step**2 * fastest / 2 + step * braked <= STABLE:
+            if step * fastest * (step / 2 + self.damping_time) <= STABLE:
                 return step
         raise UserError(f"a chain of this band needs time steps below {STEPS[-1]:g} s")
+
+    @property
+    def most_damping(self) -> float:
+        """Damping time with which its time step is just stable [s]."""
+        return 1.5 * STABLE / (self.step * self._fastest) - self.step / 2
+
+    @property
+    def _fastest(self) -> float:
+        """Square of the fastest mode's rate [1/s^2]: neighbours that go against each other."""
+        return 4 * self.strength / self.spring_length / self.node_mass
 
     def cubic_springs(self) -> tuple[np.ndarray, np.ndarray, float, float]:
         """The pull as that of two springs of cubic pull, the second beyond a knee.

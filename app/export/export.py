@@ -10,42 +10,47 @@ from pathlib import Path
 from app.arguments import ENGINES
 from app.export import card, mjcf, mjcf_card, yaml_file
 from app.export.match import compared, draws_of, matched, proof_draws
-from app.export.mujoco_replay import Replay, mujoco
+from app.export.mujoco_replay import MujocoBand, mujoco
 from app.export.pull import compare_pull
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder, write_json, write_text
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.params import expect_known
-from sling2sim2real.exporting import Exported
 from sling2sim2real.identification import Identification
 from sling2sim2real.model import Model
 from sling2sim2real.simulation import pull
 
 
-def write(model: Model, to: str, out: str | Path, episode: Episode | None = None) -> Exported:
-    """What sling2sim2real.export does; `to` is a key of TARGETS. Raises UserError."""
+def write(model: Model, to: str, folder: Path, episode: Episode | None = None) -> dict:
+    """What sling2sim2real.export does; what card.json holds. `to` is a key of TARGETS.
+
+    Raises UserError.
+    """
     if to not in TARGETS:
         raise UserError(f"to: must be one of {', '.join(TARGETS)}, got {to!r}")
-    folder = Path(out)
     if folder.exists() and not (folder / "card.json").is_file() and any_in(folder):
         raise UserError(f"{folder}: holds something else than an export; name an empty folder")
     with replacing_folder(folder) as temporary:
         content = TARGETS[to](model, temporary, episode)
         write_json(temporary / "card.json", content)
-    return Exported(folder, content.get("met"), content)
+    return content
 
 
 def of_run(
     params, band: str, method: str, to: str, out: Path | None = None, root: str | Path = "."
-) -> Exported:
-    """Export a band of a project, as `sling fit` or `dvc repro` found it. Raises UserError."""
+) -> tuple[Path, dict]:
+    """Export a band of a project, as `sling fit` or `dvc repro` found it: folder and card.
+
+    Raises UserError.
+    """
     expect_known(params, "band", band)
     expect_known(params, "method", method)
     found, layout = Identification.of_run(band, method, root), Layout(Path(root))
     there = layout.episode(band).is_dir()
     episodes = Episode.load_all(layout.episodes(band)) if there else [None]
-    return write(found, to, out or layout.data / "exports" / band / to, episodes[0])
+    folder = out or layout.data / "exports" / band / to
+    return folder, write(found, to, folder, episodes[0])
 
 
 def any_in(folder: Path) -> bool:
@@ -59,16 +64,16 @@ def to_mjcf(model: Model, folder: Path, episode: Episode | None) -> dict:
     path, proof = folder / f"{name}.xml", proof_draws(model)
     write_text(path, mjcf.text(name, chain, _keys(name, chain, proof)))
 
-    replay = Replay(path, chain)
+    replay = MujocoBand(path, chain)
     draws = draws_of(model)
     shots = [replay.launch(draw, fly=True) for draw in proof]
     half = replace(chain, step=chain.step / 2)
-    finer = Replay(mjcf.text(name, half), half)
+    finer = MujocoBand(mjcf.text(name, half), half)
     moved = [
         finer.launch(draw).landing / shot.landing - 1
         for draw, shot in zip(proof, shots, strict=True)
     ]
-    done = card.Outcome(
+    done = card.Matched(
         chain=chain,
         match=compared(model, draws, [replay.launch(draw) for draw in draws]),
         proof=compared(model, proof, shots),
@@ -86,7 +91,7 @@ def to_mjcf(model: Model, folder: Path, episode: Episode | None) -> dict:
 
 def _keys(name: str, chain, proof) -> dict[str, dict]:
     """Keyframes: hanging, and drawn for each draw of the proof."""
-    replay, keys = Replay(mjcf.text(name, chain), chain), {}
+    replay, keys = MujocoBand(mjcf.text(name, chain), chain), {}
     replay.hang()
     keys["hanging"] = replay.key()
     for i, draw in enumerate(proof, 1):
@@ -99,19 +104,19 @@ Target = Callable[[Model, Path, Episode | None], dict]
 TARGETS: dict[str, Target] = dict(zip(ENGINES, (to_mjcf, yaml_file.to_yaml), strict=True))
 
 
-def shown(done: Exported) -> str:
+def shown(folder: Path, content: dict) -> str:
     """What `sling export` prints."""
-    lines = [f"{done.folder}: {', '.join(sorted([*done.card['files'], 'card.json']))}"]
-    if done.met is None:
-        return lines[0]
-    for row in done.card["proof"]:
+    lines = [f"{folder}: {', '.join(sorted([*content['files'], 'card.json']))}"]
+    for row in content.get("proof", []):
         lines.append(
             f"draw {row['draw_y_m']:.3f}, {row['draw_z_m']:.3f} m:"
-            f" hold {row['hold_force_n']:.2f} N ({row['hold_force_error']:+.1%} there),"
-            f" landing {row['landing_m']:.2f} m ({row['landing_error']:+.1%} there)"
+            f" hold {row['hold_force_n']:.2f} N ({100 * row['hold_force_error']:+.1f} % there),"
+            f" landing {row['landing_m']:.2f} m ({100 * row['landing_error']:+.1f} % there)"
         )
-    lines.append(
-        f"{done.card['engine']}, draws that took no part in the match: asked"
-        f" {card.HOLD:.0%} and {card.LANDING:.0%}, {'met' if done.met else 'NOT met'}"
-    )
+    if "proof" in content:
+        lines.append(
+            f"{content['engine']}, draws that took no part in the match: asked"
+            f" {100 * card.HOLD:g} and {100 * card.LANDING:g} %, "
+            + ("met" if content["met"] else "NOT met")
+        )
     return "\n".join(lines)

@@ -8,22 +8,25 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from app.export import mjcf
-from app.export.chain import MATCHED, Chain
-from app.export.mujoco_replay import Replay, Shot
+from app.export.chain import MATCHED, SpringChain
+from app.export.mujoco_replay import MujocoBand, Shot
 from pipeline.base.errors import UserError
+from pipeline.sling.launch import Launches
 from sling2sim2real.model import Model
 
 GRID = 5  # draws along y and z over the box
-AROUND = 2.0  # times nearer and farther than policy.targets: where launches are matched
+AROUND = 1.6  # times nearer and farther than policy.targets: where launches are matched
 LEAST = 4  # of them that must land
 DEPTHS = (0.15, 0.35, 0.55)  # of the box along y, for the proof: none is on the grid
 FINE = 41  # places along z for it
-LOST = 1.0  # error of a launch that nothing leaves
+LOST = 1.0  # relative error of a launch that nothing leaves
+HOLD, LANDING = 0.02, 0.03  # relative errors that weigh as much as each other: what is asked
+STRONGER, SHARE = 0.4, 0.6  # how far a match may go from its guess: logarithm, difference
 TURNS = 12  # of the search, at most
 
 
 @dataclass(frozen=True)
-class Compared:
+class DrawCompared:
     """A draw in both simulations: (calibrated, target's), SI units."""
 
     draw: tuple[float, float]
@@ -58,11 +61,11 @@ def draws_of(model: Model) -> np.ndarray:
     return draws[good]
 
 
-def compared(model: Model, draws: np.ndarray, shots: list[Shot]) -> list[Compared]:
+def compared(model: Model, draws: np.ndarray, shots: list[Shot]) -> list[DrawCompared]:
     """Shots of draws (N, 2) beside what the calibrated simulation does there."""
     done = model.launches(draws)
     return [
-        Compared(
+        DrawCompared(
             draw=tuple(map(float, draw)),
             hold_force=(float(done.hold_force[i]), shot.hold_force),
             speed=(float(done.speed[i]), shot.speed),
@@ -72,38 +75,46 @@ def compared(model: Model, draws: np.ndarray, shots: list[Shot]) -> list[Compare
     ]
 
 
-def matched(model: Model) -> Chain:
-    """The chain whose held forces and landings over the box are nearest to ours, relatively.
+def matched(model: Model) -> SpringChain:
+    """The chain whose held forces and landings around the targets are nearest to ours.
 
     Raises:
         UserError: MuJoCo is not installed, or too few draws of the box land.
     """
     draws = draws_of(model)
     ours = model.launches(draws)
-    start = Chain.of(model, draws, ours.hold_force)
+    chain = _fitted(SpringChain.of(model, draws, ours.hold_force), draws, ours)
+    while (step := chain.stable_step) < chain.step:  # it is braked more than was thought
+        chain = _fitted(replace(chain, step=step), draws, ours)
+    return chain
 
-    def chain_at(point: np.ndarray) -> Chain:
-        factor = np.exp(point[[0, 2]] - 1)
+
+def _fitted(start: SpringChain, draws: np.ndarray, ours: Launches) -> SpringChain:
+    """The best chain with the time step of `start`."""
+
+    def chain_at(point: np.ndarray) -> SpringChain:
+        strength, damping = np.exp(point[[0, 2]] - 1)
         return replace(
             start,
-            strength=start.strength * factor[0],
-            mooney_share=start.mooney_share + point[1] - 1,
-            damping_time=start.damping_time * factor[1],
+            strength=float(start.strength * strength),
+            mooney_share=float(start.mooney_share + point[1] - 1),
+            damping_time=float(start.damping_time * damping),
         )
 
     def errors(point: np.ndarray) -> np.ndarray:
         chain = chain_at(point)
-        replay = Replay(mjcf.text(model.band.name, chain), chain)
+        replay = MujocoBand(mjcf.text("band", chain), chain)
         shots = [replay.launch(draw) for draw in draws]
         both = [
-            [shot.hold_force / hold - 1, shot.landing / landing - 1]
+            [(shot.hold_force / hold - 1) / HOLD, (shot.landing / landing - 1) / LANDING]
             for shot, hold, landing in zip(shots, ours.hold_force, ours.landing_y, strict=True)
         ]
-        return np.nan_to_num(np.ravel(both), nan=LOST)
+        return np.nan_to_num(np.ravel(both), nan=LOST / LANDING)
 
-    limits = np.array([np.log(4), 1.0, np.log(20)])
+    most = start.most_damping / start.damping_time
+    limits = np.array([[-STRONGER, -SHARE, -np.log(20)], [STRONGER, SHARE, np.log(most)]])
     found = least_squares(
-        errors, np.ones(len(MATCHED)), bounds=(1 - limits, 1 + limits),  # steps are relative
+        errors, np.ones(len(MATCHED)), bounds=1 + limits,  # about 1: steps are relative
         diff_step=1e-2, x_scale=[0.1, 0.1, 1.0], xtol=1e-5, ftol=1e-6, max_nfev=TURNS,
     )  # fmt: skip
     return chain_at(found.x)

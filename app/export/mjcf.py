@@ -7,7 +7,7 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
-from app.export.chain import Chain
+from app.export.chain import SpringChain
 from pipeline.sling.model import GRAVITY
 
 VERSION = "3.7"  # of MuJoCo: the first whose springs may be cubic
@@ -17,7 +17,7 @@ BALL = 0.02  # m: radius of the projectile's picture
 AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 
 
-def text(name: str, chain: Chain, keys: Mapping[str, Mapping] | None = None) -> str:
+def text(name: str, chain: SpringChain, keys: Mapping[str, Mapping] | None = None) -> str:
     """The model's XML.
 
     Args:
@@ -57,7 +57,7 @@ def text(name: str, chain: Chain, keys: Mapping[str, Mapping] | None = None) -> 
     return xml.tostring(root, encoding="unicode") + "\n"
 
 
-def _defaults(root: xml.Element, chain: Chain) -> None:
+def _defaults(root: xml.Element, chain: SpringChain) -> None:
     """Springs pull and never push; what is tied is tied within two steps."""
     defaults = xml.SubElement(root, "default")
     xml.SubElement(defaults, "geom", contype="0", conaffinity="0")
@@ -75,7 +75,7 @@ def _defaults(root: xml.Element, chain: Chain) -> None:
         xml.SubElement(springs, "tendon", springlength=slack, **numbers, **look)
 
 
-def _bodies(world: xml.Element, chain: Chain) -> None:
+def _bodies(world: xml.Element, chain: SpringChain) -> None:
     floor = {"type": "plane", "size": "5 5 0.1", "rgba": "0.8 0.8 0.8 1"}
     xml.SubElement(world, "geom", name="floor", pos=_shown([0, 0, chain.floor]), **floor)
     xml.SubElement(world, "light", pos="0 0 3")
@@ -104,5 +104,5 @@ def _moving(world: xml.Element, name: str, place, **options: str) -> xml.Element
 
 
 def _shown(values) -> str:
-    """Numbers as XML has them, to nine digits."""
-    return " ".join(f"{value + 0.0:.9g}" for value in np.atleast_1d(values))
+    """Numbers as XML has them, to nine digits and 1e-12."""
+    return " ".join(f"{value:.9g}" for value in np.round(np.atleast_1d(values), 12) + 0.0)

@@ -50,8 +50,7 @@ print(f"landing {{data.body('projectile').xpos[1]:.3f}} m")
 - Nothing collides: floor and projectile are pictures. Give them `contype` and `conaffinity` if they
   are to.
 - **Time step {1e3 * step:g} ms, integrator Euler.** The springs are explicit, so that no speed is
-  lost. Half the step moves the proof's landings by {finer:.2%} at most; a larger one may not be
-  stable.
+  lost. Half the step moves the proof's landings by {100 * finer:.2f} % at most. A larger one may
+  not be stable.
 - Each spring is two tendons of cubic pull, the second beyond a knee. Together they are within
-  {springs:.1%} of the pull below.
-"""
+  {100 * springs:.1f} % of the pull below."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.export.chain import Chain
+from app.export.chain import SpringChain
 from app.export.mjcf import HAND_MASS, STIFF
 from pipeline.base.errors import UserError
 from pipeline.sling.launch import ballistic_landing
@@ -37,7 +37,7 @@ class Pulled:
     line: np.ndarray
 
 
-class Replay:
+class MujocoBand:
     """One model in MuJoCo.
 
     Args:
@@ -45,7 +45,7 @@ class Replay:
         chain: Whose model it is.
     """
 
-    def __init__(self, source: Path | str, chain: Chain):
+    def __init__(self, source: Path | str, chain: SpringChain):
         mj = mujoco()
         load = mj.MjModel.from_xml_path if isinstance(source, Path) else mj.MjModel.from_xml_string
         self.chain, self.model = chain, load(str(source))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.export.mujoco_replay import Replay
+from app.export.mujoco_replay import MujocoBand
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from sling2sim2real.model import Model
@@ -35,7 +35,7 @@ class PullCompared:
     taut_rms: float | None
 
 
-def compare_pull(model: Model, episode: Episode, replay: Replay) -> PullCompared:
+def compare_pull(model: Model, episode: Episode, replay: MujocoBand) -> PullCompared:
     """Pull as in `episode`, in both. Raises UserError where our simulation fails."""
     ours, chain = simulate(model, episode), replay.chain
     if ours.failure:

@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.export.chain import STEPS, Chain
+from app.export.chain import STEPS, SpringChain
 from pipeline.base.errors import UserError
 from sling2sim2real import Band, Model, Theta
 
 
 @pytest.fixture(scope="module")
-def chain() -> Chain:
-    return Chain(
+def chain() -> SpringChain:
+    return SpringChain(
         edges=20, rest_length=0.52, mass=0.023, half_width=0.1375, floor=-0.52,
         projectile_mass=0.039, arm_stiffness=None, strength=17.0, mooney_share=0.4,
         damping_time=1.5e-3, largest_strain=1.1, step=1e-4,
     )  # fmt: skip
 
 
-def pulled_by_two(chain: Chain, strain: np.ndarray) -> np.ndarray:
+def pulled_by_two(chain: SpringChain, strain: np.ndarray) -> np.ndarray:
     """What the two cubic springs of an edge pull by, as MuJoCo computes it [N]."""
     first, second, knee, _ = chain.cubic_springs()
     rest, powers = chain.spring_length, np.arange(1, 4)
@@ -38,20 +38,20 @@ def test_two_cubic_springs_pull_as_the_law(chain, share) -> None:
 
 
 def test_the_first_guess_is_the_law_of_a_stretched_string() -> None:
-    """Without relaxation and weight: E A, and Mooney's share."""
+    """Without relaxation: E A, and Mooney's share."""
     theta = Theta(2.2e5, 0.47, 2e-3, 0.7, 0.6, mooney_share=0.3, relaxation=0.0)
     model = Model(Band(mass=0.023, diameter=0.010, rest_length=0.52), theta)
     draws = np.array([[-0.30, 0.0], [-0.35, 0.0], [-0.40, 0.0]])
-    chain = Chain.of(model, draws, model.launches(draws).hold_force)
-    assert chain.strength == pytest.approx(2.2e5 * np.pi * 0.005**2, rel=0.01)
+    chain = SpringChain.of(model, draws, model.launches(draws).hold_force)
+    assert chain.strength == pytest.approx(2.2e5 * np.pi * 0.005**2, rel=0.02)
     assert (chain.mooney_share, chain.floor) == (0.3, -0.52)
     assert 1 + chain.largest_strain == pytest.approx(2 * np.hypot(0.1375, 0.40) / 0.52)
 
 
 def test_a_stiffer_band_needs_shorter_steps(chain) -> None:
-    steps = [replace(chain, strength=k).stable_step for k in (17.0, 170.0, 1700.0)]
+    steps = [replace(chain, strength=k).stable_step for k in (17.0, 51.0, 170.0)]
     assert steps == sorted(steps, reverse=True) and {*steps} <= {*STEPS}
-    assert replace(chain, damping_time=0.1).stable_step < steps[0]
+    assert replace(chain, damping_time=5e-3).stable_step < steps[0]
     with pytest.raises(UserError, match="time steps below"):
         _ = replace(chain, strength=1e9).stable_step
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from app.export import mjcf
-from app.export.card import HOLD, LANDING, Outcome
-from app.export.chain import Chain
+from app.export.card import HOLD, LANDING, Matched
+from app.export.chain import SpringChain
 from app.export.match import compared, draws_of, proof_draws
-from app.export.mujoco_replay import Replay
+from app.export.mujoco_replay import MujocoBand
 from sling2sim2real import UserError, export
 
 mujoco = pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[validation]'")
@@ -24,9 +24,9 @@ def done(model, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def chain(model, done) -> Chain:
+def chain(model, done) -> SpringChain:
     draws = draws_of(model)
-    start = Chain.of(model, draws, model.launches(draws).hold_force)
+    start = SpringChain.of(model, draws, model.launches(draws).hold_force)
     return replace(start, **{row["name"]: row["value"] for row in done.card["matched"]})
 
 
@@ -66,10 +66,10 @@ def test_another_band_would_be_noticed(model, chain) -> None:
     """5 % more pull, or three times the damping, does not pass the proof."""
     draws = proof_draws(model)
 
-    def met(chain: Chain) -> bool:
-        replay = Replay(mjcf.text("toy", chain), chain)
+    def met(chain: SpringChain) -> bool:
+        replay = MujocoBand(mjcf.text("toy", chain), chain)
         proof = compared(model, draws, [replay.launch(draw) for draw in draws])
-        return Outcome(chain, [], proof, None, 0.0, "").met
+        return Matched(chain, [], proof, None, 0.0, "").met
 
     assert met(chain)
     assert not met(replace(chain, strength=1.05 * chain.strength))
@@ -89,7 +89,7 @@ def test_the_file_has_the_band_of_the_card(done, chain) -> None:
 
 
 def test_drawn_it_pulls_as_its_springs_and_hanging_it_is_slack(chain) -> None:
-    replay = Replay(mjcf.text("toy", chain), chain)
+    replay = MujocoBand(mjcf.text("toy", chain), chain)
     draw = np.array([-0.35, -0.15])
     replay.draw(draw)
     middle = replay.line[chain.edges // 2]

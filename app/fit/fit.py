@@ -15,8 +15,10 @@ from app.flow import child
 from app.preflight.add_band import NAME, add_band
 from app.preflight.recordings import add_recording, digests
 from pipeline.base.errors import UserError
+from pipeline.base.launch_table import expect_apart
 from pipeline.base.layout import Layout
 from pipeline.params import Params, load
+from pipeline.posterior.evidence import read_evidence
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,8 @@ def fit(
     if told:
         count = evidence.add(layout, name, params, told, again=True)
         say(f"{layout.evidence / name}.csv: {count} launches as evidence")
+    read_evidence(layout.evidence, name, params)  # what is wrong with it is said now
+    expect_apart(layout, name)
     countdown = Countdown(params.bands[name].source)
     child.repro(root, f"card@{name}", countdown.line, countdown.begins)
     countdown.ends()

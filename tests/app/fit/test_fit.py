@@ -181,3 +181,12 @@ def test_the_command(project, monkeypatch, capsys) -> None:
     assert cli.execute(arguments) == 0
     answer = json.loads(capsys.readouterr().out)
     assert {"band", "verdict", "draws", "card"} <= answer.keys()
+
+
+def test_evidence_that_is_wrong_is_said_before_any_stage(project) -> None:
+    file = project.recording("a.mcap", "a")
+    project.layout.evidence.mkdir(parents=True)
+    (project.layout.evidence / "gone.csv").write_text(LAUNCHES)
+    with pytest.raises(UserError, match=r"gone.csv: no band of params.yaml goes by that name"):
+        project.run(file, mass=0.04)
+    assert project.asked == []

@@ -247,7 +247,12 @@ def observe(arguments: argparse.Namespace) -> Done:
     "--band band1 --to mjcf",
     BAND,
     METHOD,
-    flag("--to", required=True, choices=kinds.ENGINES, help="MuJoCo's XML, or plain numbers"),
+    flag(
+        "--to",
+        required=True,
+        choices=kinds.ENGINES,
+        help="MuJoCo's XML, plain numbers, PhysX's USD",
+    ),
     flag("--out", type=Path, metavar="FOLDER", help="default data/exports/<band>/<target>"),
     JSON,
 )

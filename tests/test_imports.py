@@ -31,7 +31,10 @@ EXTRAS = {
     "validation/": "validation",
     "validation/campaigns/": "dev",
 }
-INSTALLED_AS = {"rerun": {"rerun-sdk"}}  # packages of extras whose distribution is called otherwise
+INSTALLED_AS = {
+    "pxr": {"usd-core"},
+    "rerun": {"rerun-sdk"},
+}  # packages of extras whose distribution is called otherwise
 INDIRECT = {
     "fastapi": "newer ones break Prefect's server",
     "onnxscript": "torch's ONNX exporter imports it",

@@ -62,11 +62,7 @@ class SpringChain:
         Its damping time is θ's, its time step the largest that is stable with that.
         """
         setup, band, theta = model.settings.setup, model.band, model.theta
-        distance = np.linalg.norm(draws, axis=1)
-        half = np.hypot(setup.fork_width / 2, distance)
-        stretch = 2 * half / band.rest_length
-        weight = (setup.projectile_mass + band.mass / 2) * GRAVITY
-        tension = (hold_force - weight * draws[:, 1] / distance) * half / (2 * distance)
+        tension, stretch = cls.tension(model, draws, hold_force)
         share = theta.mooney_share or 0.0
         chain = cls(
             edges=EDGES,
@@ -83,6 +79,16 @@ class SpringChain:
             step=STEPS[-1],
         )
         return replace(chain, step=chain.stable_step)
+
+    @staticmethod
+    def tension(model: Model, draws: np.ndarray, hold_force: np.ndarray) -> np.ndarray:
+        """Pull [N] and stretch, shape (2, N), of straight halves that the hand holds at draws."""
+        setup, band = model.settings.setup, model.band
+        distance = np.linalg.norm(draws, axis=1)
+        half = np.hypot(setup.fork_width / 2, distance)
+        weight = (setup.projectile_mass + band.mass / 2) * GRAVITY
+        pull = (hold_force - weight * draws[:, 1] / distance) * half / (2 * distance)
+        return np.stack([pull, 2 * half / band.rest_length])
 
     @property
     def matched(self) -> dict[str, float]:

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from app.arguments import ENGINES
-from app.export import card, mjcf, mjcf_card, yaml_file
+from app.export import card, mjcf, mjcf_card, usd, yaml_file
 from app.export.match import compared, draws_of, matched, proof_draws
 from app.export.mujoco_replay import MujocoBand, mujoco
 from app.export.pull import compare_pull
@@ -101,7 +101,9 @@ def _keys(name: str, chain, proof) -> dict[str, dict]:
 
 
 Target = Callable[[Model, Path, Episode | None], dict]
-TARGETS: dict[str, Target] = dict(zip(ENGINES, (to_mjcf, yaml_file.to_yaml), strict=True))
+TARGETS: dict[str, Target] = dict(
+    zip(ENGINES, (to_mjcf, yaml_file.to_yaml, usd.to_usd), strict=True)
+)
 
 
 def shown(folder: Path, content: dict) -> str:

@@ -30,12 +30,15 @@ EXTRAS = {
     "tools/browser.py": "validation",
     "validation/": "validation",
     "validation/campaigns/": "dev",
+    "validation/engines/physx/": "physx",
 }
 INSTALLED_AS = {
     "pxr": {"usd-core"},
     "rerun": {"rerun-sdk"},
 }  # packages of extras whose distribution is called otherwise
 INDIRECT = {
+    "newton-usd-schemas": "ovphysx reads scenes by it",
+    "physx-usd-schemas": "the same",
     "fastapi": "newer ones break Prefect's server",
     "onnxscript": "torch's ONNX exporter imports it",
     "pytest-xdist": "a plug-in of pytest's",

@@ -1,0 +1,88 @@
+"""PhysX's law: its stress is its energy's slope, and a straight string pulls by its closed form."""
+
+import numpy as np
+import pytest
+
+from pipeline.params import load
+from pipeline.sling.model import Sling
+from validation.engines.mesh import Tube
+from validation.engines.physx import law
+
+YOUNG, POISSON = 2.2e5, 0.45
+
+
+@pytest.fixture(scope="module")
+def sling():
+    params = load()
+    return Sling.of(params.bands["band1"], params.setup, params.sling)
+
+
+def turn(seed: int) -> np.ndarray:
+    left, _, right = np.linalg.svd(np.random.default_rng(seed).standard_normal((3, 3)))
+    return left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
+
+
+def energy(gradient: np.ndarray) -> float:
+    mu, lam = law.lame(YOUNG, POISSON)
+    left, _, right = np.linalg.svd(gradient)
+    rotation = left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
+    volume = np.linalg.det(gradient)
+    return mu * ((gradient - rotation) ** 2).sum() + lam / 2 * (volume - 1) ** 2
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_stress_is_the_slope_of_the_energy(seed):
+    random = np.random.default_rng(seed)
+    gradient = turn(seed) @ (np.eye(3) + 0.3 * random.standard_normal((3, 3)))
+    slope = np.empty((3, 3))
+    for i, j in np.ndindex(3, 3):
+        step = np.zeros((3, 3))
+        step[i, j] = 1e-6
+        slope[i, j] = (energy(gradient + step) - energy(gradient - step)) / 2e-6
+    assert law.stress(gradient, YOUNG, POISSON) == pytest.approx(slope, rel=1e-5, abs=YOUNG / 1e6)
+
+
+def test_a_turn_costs_nothing_and_a_stress_turns_with_its_body():
+    assert law.stress(turn(4), YOUNG, POISSON) == pytest.approx(np.zeros((3, 3)), abs=1e-6)
+    stretched = np.diag([1.8, 0.8, 0.7])
+    turned = law.stress(turn(5) @ stretched, YOUNG, POISSON)
+    assert turned == pytest.approx(turn(5) @ law.stress(stretched, YOUNG, POISSON), rel=1e-9)
+
+
+def test_a_small_stretch_pulls_by_youngs_modulus():
+    assert law.nominal(1 + 1e-6, YOUNG, POISSON) == pytest.approx(1e-6 * YOUNG, rel=1e-4)
+
+
+@pytest.mark.parametrize("poisson", [0.30, 0.45, 0.49])
+def test_a_straight_string_is_free_of_stress_across(sling, poisson):
+    """The force of its tetrahedra, of two bands at once, is the closed form's."""
+    tube, stretch = Tube.of(sling, edges=6, grading=1.0), 1.9
+    mu, lam = law.lame(YOUNG, poisson)
+    ratio = np.linspace(0.4, 1, 200_001)  # across, where the stress across is least
+    across = ratio[
+        np.abs(2 * mu * (ratio - 1) + lam * (stretch * ratio**2 - 1) * stretch * ratio).argmin()
+    ]
+    pull = law.nominal(stretch, YOUNG, poisson) * sling.area
+    positions = np.stack([tube.rest, tube.rest * [stretch, across, across]])
+    young = np.array([YOUNG, YOUNG])
+    first, inside, last = (
+        law.force_on(tube, sections, positions, young, np.full(2, poisson))
+        for sections in ([0], [3], [len(tube.rest) - 1])
+    )
+    assert first[0] == pytest.approx(np.zeros(3), abs=1e-9)
+    assert first[1] == pytest.approx([pull, 0, 0], rel=1e-4, abs=1e-6)
+    assert last[1] == pytest.approx([-pull, 0, 0], rel=1e-4, abs=1e-6)
+    assert inside == pytest.approx(np.zeros((2, 3)), abs=1e-6)
+
+
+def test_it_is_stiffer_than_ours_when_stretched(sling):
+    theta = [YOUNG, POISSON, 3e-3, 1.0, 1.0]
+    factor = law.equal_modulus(sling, theta, np.array([1.0001, 1.5, 2.0]))
+    assert factor[0] == pytest.approx(1, abs=1e-3)
+    assert factor[0] > factor[1] > factor[2] > 0.7
+
+
+def test_with_our_force_at_full_draw_it_has_less_energy(sling):
+    theta = [YOUNG, POISSON, 3e-3, 1.0, 1.0]
+    assert law.energy_left(sling, theta, 1.0001) == pytest.approx(0, abs=1e-3)
+    assert -0.08 < law.energy_left(sling, theta, 1.9) < law.energy_left(sling, theta, 1.5) < -0.03

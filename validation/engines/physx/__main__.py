@@ -1,0 +1,39 @@
+"""`python -m validation.engines.physx`: write reports/validation/physx.json."""
+
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_json
+from pipeline.params import load
+from validation.benchmarks.timing import environment
+from validation.engines.physx import bands, study
+from validation.simulator.finding import Bench, unmet
+
+REPORT = Path("reports/validation/physx.json")
+DEVICE = "cuda:0"
+
+
+def main() -> None:
+    """Compare, time, write. Raises UserError."""
+    version = bands.release()
+    about = environment(DEVICE, "python -m validation.engines.physx")
+    bench = Bench(load(), device=DEVICE)
+    speeds = study.speeds(bench)
+    checks = study.pulls(bench)
+    about["versions"] |= {"ovphysx": version}
+    content = {
+        "asked": study.ASK,
+        "met": not unmet(checks) and study.fast_enough(speeds),
+        "checks": [asdict(one) | {"met": one.met} for one in checks],
+        "speeds": speeds,
+    }
+    write_json(REPORT, content | about)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except UserError as error:
+        sys.exit(f"error: {error}")

@@ -1,0 +1,94 @@
+"""The law of PhysX's deformable volumes, as its public source has it.
+
+softBodyGM.cu of PhysX 5.6 (tetrahedronsSolveGM, the model eCO_ROTATIONAL, which USD cannot change)
+holds two constraints in each tetrahedron, |F - R| = 0 and J = 1, with compliances 1 / (2 mu V) and
+1 / (lam V). Their energy is
+
+    W = mu |F - R|^2 + lam/2 (J - 1)^2,    P = 2 mu (F - R) + lam (J - 1) cof F
+
+with Lame's own mu and lam, and R the rotation in F. It is stiffer than the neo-Hookean law when
+stretched: per E, 1.27 times at twice the length. elasticityDamping is a time in seconds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.sling.model import Sling
+from validation.engines.mesh import Tube
+from validation.simulator.closed import String
+
+
+def lame(young, poisson) -> tuple:
+    """Return mu and lam [Pa]."""
+    return young / (2 * (1 + poisson)), young * poisson / ((1 + poisson) * (1 - 2 * poisson))
+
+
+def stress(gradient: np.ndarray, young, poisson) -> np.ndarray:
+    """Nominal stress P [Pa] at deformation gradients (..., 3, 3); the moduli fit (...)."""
+    mu, lam = (np.asarray(one)[..., None, None] for one in lame(young, poisson))
+    left, _, right = np.linalg.svd(gradient)
+    left[..., 2] *= np.linalg.det(left @ right)[..., None]  # a rotation, no reflection
+    first, second, third = (gradient[..., i] for i in range(3))
+    cofactor = np.stack(
+        [np.cross(second, third), np.cross(third, first), np.cross(first, second)], axis=-1
+    )
+    volume = np.linalg.det(gradient)[..., None, None]
+    return 2 * mu * (gradient - left @ right) + lam * (volume - 1) * cofactor
+
+
+def force_on(tube: Tube, sections: list[int], positions: np.ndarray, young, poisson) -> np.ndarray:
+    """Elastic force of bands on what holds some of their sections [N].
+
+    Args:
+        positions: Of bands, shape (..., sections, V, 3).
+        young, poisson: One a band or one for all; fit (...).
+
+    Returns:
+        Shape (..., 3).
+    """
+    held = np.zeros(tube.rest.shape[:2], bool)
+    held[sections] = True
+    near = tube.tetrahedra[held.ravel()[tube.tetrahedra].any(axis=1)]
+    before, now = (
+        np.swapaxes(corners[..., 1:, :] - corners[..., :1, :], -1, -2)
+        for corners in (
+            vertices.reshape(*vertices.shape[:-3], -1, 3)[..., near, :]
+            for vertices in (tube.rest, positions)
+        )
+    )
+    inverse = np.linalg.inv(before)
+    moduli = (np.asarray(one)[..., None] for one in (young, poisson))
+    nominal = stress(now @ inverse, *moduli)
+    shares = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
+    kept = shares * held.ravel()[near][..., None]
+    return -np.einsum("t,...tij,tkj->...i", np.linalg.det(before) / 6, nominal, kept)
+
+
+def nominal(stretch, young: float, poisson: float) -> np.ndarray:
+    """Pull of a straight string over its area at rest [Pa], free to contract.
+
+    No stress across, 2 mu (q - 1) + lam (l q^2 - 1) l q = 0, gives the section's ratio q: the one
+    root between 0 and 1 + 1/l, by Newton's method from above.
+    """
+    mu, lam = lame(young, poisson)
+    length = np.asarray(stretch, float)
+    across = 1 + 1 / length
+    for _ in range(60):
+        value = 2 * mu * (across - 1) + lam * (length * across**2 - 1) * length * across
+        across = across - value / (2 * mu + lam * length * (3 * length * across**2 - 1))
+    return 2 * mu * (length - 1) + lam * (length * across**2 - 1) * across**2
+
+
+def equal_modulus(sling: Sling, theta, stretch) -> np.ndarray:
+    """Factor on Young's modulus with which PhysX's law pulls as ours does at a stretch."""
+    ours = String.of(sling, theta).force(stretch) / sling.area
+    return ours / nominal(stretch, *theta[:2])
+
+
+def energy_left(sling: Sling, theta, stretch: float) -> float:
+    """Energy to a stretch under PhysX's law that pulls there as ours does, over ours, less 1."""
+    to = np.linspace(1, stretch, 1001)
+    theirs = nominal(to, *theta[:2]) * sling.area * equal_modulus(sling, theta, stretch)
+    ours = String.of(sling, theta).force(to)
+    return float(np.trapezoid(theirs, to) / np.trapezoid(ours, to) - 1)

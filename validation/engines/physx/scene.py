@@ -1,0 +1,107 @@
+"""Bands as deformable volumes in USD's text form, by the schemas of PhysX and Omni Physics."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from pipeline.sling.model import GRAVITY
+from validation.engines.mesh import Tube
+
+SPACING = np.array([1.0, 2.5])  # m along x and y from band to band: none reaches the next
+COLUMNS = 32
+HEADER = """#usda 1.0
+(
+    defaultPrim = "World"
+    metersPerUnit = 1
+    upAxis = "Z"
+)
+
+def Xform "World"
+{
+    def PhysicsScene "PhysicsScene" (prepend apiSchemas = ["PhysxSceneAPI"])
+    {
+        vector3f physics:gravityDirection = (0, 0, -1)
+        float physics:gravityMagnitude = %(gravity)g
+        bool physxScene:enableGPUDynamics = 1
+        token physxScene:broadphaseType = "GPU"
+        token physxScene:solverType = "TGS"
+        uint physxScene:timeStepsPerSecond = %(rate)d
+    }
+"""
+BAND = """
+    def Material "M%(name)s" (prepend apiSchemas = ["PhysicsMaterialAPI",
+        "OmniPhysicsDeformableMaterialAPI", "PhysxDeformableMaterialAPI"])
+    {
+        float omniphysics:dynamicFriction = %(friction)g
+        float omniphysics:poissonsRatio = %(poisson).9g
+        float omniphysics:youngsModulus = %(young).9g
+        float physxDeformableMaterial:elasticityDamping = %(damping).9g
+    }
+
+    def TetMesh "B%(name)s" (prepend apiSchemas = ["OmniPhysicsDeformableBodyAPI",
+        "OmniPhysicsVolumeDeformableSimAPI", "OmniPhysicsDeformablePoseAPI:default",
+        "PhysicsCollisionAPI", "MaterialBindingAPI", "PhysxBaseDeformableBodyAPI"])
+    {
+        bool omniphysics:deformableBodyEnabled = 1
+        float omniphysics:mass = %(mass).9g
+        uint physxDeformableBody:solverPositionIterationCount = %(iterations)d
+        float physxDeformableBody:settlingDamping = 0
+        float physxDeformableBody:sleepThreshold = 0
+        point3f[] deformablePose:default:omniphysics:points = %(points)s
+        uniform token[] deformablePose:default:omniphysics:purposes = ["bindPose"]
+        point3f[] omniphysics:restShapePoints = %(points)s
+        int4[] omniphysics:restTetVtxIndices = %(tetrahedra)s
+        rel material:binding:physics = </World/M%(name)s> (
+            bindMaterialAs = "weakerThanDescendants"
+        )
+        point3f[] points = %(points)s
+        int3[] surfaceFaceVertexIndices = %(faces)s
+        int4[] tetVertexIndices = %(tetrahedra)s
+        float3 xformOp:translate = (%(x)g, %(y)g, 0)
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+    }
+"""
+
+
+def offsets(count: int) -> np.ndarray:
+    """Where each band's origin stands [m], shape (count, 3)."""
+    row, column = np.divmod(np.arange(count), COLUMNS)
+    return np.stack([column * SPACING[0], row * SPACING[1], 0.0 * row], axis=1)
+
+
+def surface(tetrahedra: np.ndarray) -> np.ndarray:
+    """Faces (F, 3) that belong to one tetrahedron only, seen counter-clockwise from outside."""
+    faces = tetrahedra[:, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]].reshape(-1, 3)
+    keys = [tuple(face) for face in np.sort(faces, axis=1)]
+    count = Counter(keys)
+    return faces[[count[key] == 1 for key in keys]]
+
+
+def text(tube: Tube, thetas: np.ndarray, rate: int, iterations: int) -> str:
+    """The scene.
+
+    Args:
+        thetas: The five parameters of each band, shape (N, 5); the damping scale has no slot.
+        rate: Steps a second.
+        iterations: Of the solver a step.
+    """
+    mesh = {
+        "points": _tuples(tube.rest.reshape(-1, 3), ".9g"),
+        "tetrahedra": _tuples(tube.tetrahedra, "d"),
+        "faces": _tuples(surface(tube.tetrahedra), "d"),
+        "mass": tube.mass.sum(),
+        "iterations": iterations,
+    }
+    parts = [HEADER % {"gravity": GRAVITY, "rate": rate}]
+    for i, ((young, poisson, damping, friction, _), (x, y, _)) in enumerate(
+        zip(thetas, offsets(len(thetas)), strict=True)
+    ):
+        names = {"young": young, "poisson": poisson, "damping": damping, "friction": friction}
+        parts.append(BAND % {**mesh, **names, "name": f"{i:05d}", "x": x, "y": y})
+    return "".join(parts) + "}\n"
+
+
+def _tuples(rows: np.ndarray, form: str) -> str:
+    return "[" + ", ".join(f"({', '.join(format(v, form) for v in row)})" for row in rows) + "]"

@@ -1,0 +1,122 @@
+"""Simulate one job with PhysX: `python worker.py FOLDER`, with nothing of this project.
+
+FOLDER has scene.usda and job.npz (what bands.py writes), and gets result.npz. A stage's driven
+vertices cannot be freed again, so each phase attaches the scene anew and goes on from the nodes'
+places and velocities at the end of the last.
+"""
+
+import os
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+DEVICE = "cuda:0"
+AS_WRITTEN = 2e-3  # m: attaching takes one step, in which a band falls by less
+
+
+class Attached:
+    """An attached scene of N bands of V vertices."""
+
+    def __init__(self, physx, path: Path, number: int):
+        import ovstage
+        import warp as wp
+        from ovphysx.types import TensorType
+
+        began = time.perf_counter()
+        self._physx, self._stage = physx, ovstage.Stage(f"phase {number}")
+        ovstage.population.open_usd(
+            self._stage, str(path), ordinal=1, domains=ovstage.PopulationDomain.ALL
+        )
+        self._stage.advance_write_floor(ordinal=1).wait()
+        physx.wait_task(physx.attach_ovstage(self._stage, read_ordinal=1))
+        physx.wait_all()
+        self._views = [
+            physx.create_tensor_binding(pattern="/World/B*", tensor_type=kind)
+            for kind in (
+                TensorType.DEFORMABLE_SIM_NODAL_POSITION,
+                TensorType.DEFORMABLE_SIM_NODAL_VELOCITY,
+                TensorType.DEFORMABLE_SIM_KINEMATIC_TARGET,
+            )
+        ]
+        self._buffers = [
+            wp.zeros(one.shape, dtype=wp.float32, device=DEVICE) for one in self._views
+        ]
+        self.state()  # takes the first step
+        self.seconds = time.perf_counter() - began
+
+    def state(self) -> list[np.ndarray]:
+        """Places [m] and velocities [m/s] of the nodes, shape (N, V, 3) each."""
+        for view, buffer in zip(self._views[:2], self._buffers[:2], strict=True):
+            view.read(buffer)
+        return [buffer.numpy().copy() for buffer in self._buffers[:2]]
+
+    def write(self, which: int, values: np.ndarray) -> None:
+        """Places (0), velocities (1) or targets with their flag, 0 for a driven node (2)."""
+        self._buffers[which].assign(np.ascontiguousarray(values, np.float32))
+        self._views[which].write(self._buffers[which])
+
+    def close(self) -> None:
+        for one in self._views:
+            one.destroy()
+        self._physx.wait_task(self._physx.detach_ovstage())
+        self._stage.destroy()
+
+
+def main(folder: Path) -> None:
+    """Simulate the job's phases one after the other."""
+    import ovphysx
+    import ovstage
+    import warp as wp
+    from ovphysx import PhysX, PhysXConfig
+    from ovphysx.samples.python_samples.schema_support import physx_schema_paths
+
+    if not wp.is_cuda_available():
+        sys.exit("deformable volumes need an NVIDIA GPU; there is none here")
+    schemas = [*map(str, physx_schema_paths()), str(ovphysx.newton_schema_root())]
+    ovstage.population.register_usd_schemas(schemas)
+    physx = PhysX(config=PhysXConfig(carbonite_overrides={"/physics/suppressReadback": True}))
+
+    job = dict(np.load(folder / "job.npz"))
+    offset, step = job["offsets"][:, None], float(job["step"])
+    place, velocity = job["start"] + offset, np.zeros_like(job["start"])
+    result = {}
+    for phase in range(int(job["phases"])):
+        scene = Attached(physx, folder / "scene.usda", phase)
+        expected = np.broadcast_to(job["rest"] + offset, place.shape)
+        if np.abs(scene.state()[0] - expected).max() > AS_WRITTEN:
+            sys.exit("PhysX has other nodes than the scene, or in another order")
+        for which, values in enumerate((place, velocity)):
+            scene.write(which, values)
+        vertices, targets, fade, keep = (
+            job[f"{name}_{phase}"] for name in ("vertices", "targets", "fade", "keep")
+        )
+        flags = np.ones((*place.shape[:2], 1))
+        flags[:, vertices] = 0.0
+        drive = np.concatenate([place, flags], axis=2)
+        begin = place[:, vertices] - offset - targets[0]
+        kept = []
+        wp.synchronize()
+        began = time.perf_counter()
+        for target, share, kept_one in zip(targets, fade, keep, strict=True):
+            drive[:, vertices, :3] = offset + target + share * begin
+            scene.write(2, drive)
+            physx.step_sync(step)
+            if kept_one:
+                kept.append(scene.state()[0] - offset)
+        wp.synchronize()
+        result[f"seconds_{phase}"] = time.perf_counter() - began
+        result[f"attach_seconds_{phase}"] = scene.seconds
+        place, velocity = scene.state()
+        shape = (0, *place.shape)
+        result[f"positions_{phase}"] = np.array(kept or np.zeros(shape), np.float32)
+        result[f"velocities_{phase}"] = velocity
+        scene.close()
+    np.savez(folder / "result.npz", **result, version=ovphysx.__version__)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
+    sys.stdout.flush()
+    os._exit(0)  # PhysX's own end can hang

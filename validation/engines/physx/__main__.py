@@ -1,5 +1,6 @@
 """`python -m validation.engines.physx`: write reports/validation/physx.json."""
 
+import math
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -9,7 +10,7 @@ from pipeline.base.files import write_json
 from pipeline.params import load
 from validation.benchmarks.timing import environment
 from validation.engines.physx import bands, study
-from validation.simulator.finding import Bench, unmet
+from validation.simulator.finding import Bench, Finding, unmet
 
 REPORT = Path("reports/validation/physx.json")
 DEVICE = "cuda:0"
@@ -26,10 +27,15 @@ def main() -> None:
     content = {
         "asked": study.ASK,
         "met": not unmet(checks) and study.fast_enough(speeds),
-        "checks": [asdict(one) | {"met": one.met} for one in checks],
+        "checks": [_plain(one) for one in checks],
         "speeds": speeds,
     }
     write_json(REPORT, content | about)
+
+
+def _plain(check: Finding) -> dict:
+    value = check.value if math.isfinite(check.value) else None
+    return asdict(check) | {"met": check.met, "value": value}
 
 
 if __name__ == "__main__":

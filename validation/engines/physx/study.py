@@ -200,6 +200,9 @@ def pulls(bench: Bench) -> list[Finding]:
             )
         matched = np.array([_scaled(theta[nu], factors[nu]) for nu in POISSON])
         if not np.isfinite(matched).all():
+            title = f"force held by some modulus, {rate} Hz, {iterations} iterations"
+            about = f"ours lies outside of what {FACTORS[0]:g} to {FACTORS[-1]:g} of E hold"
+            found.append(Finding(title, "our simulator", np.nan, "", 0.0, about))
             continue
         courses = bands.simulate(tube, matched, course, **size)
         left = balance(tube, matched, courses)

@@ -1,10 +1,13 @@
 """PhysX's law: its stress is its energy's slope, and a straight string pulls by its closed form."""
 
+import re
+
 import numpy as np
 import pytest
 
 from pipeline.params import load
 from pipeline.sling.model import Sling
+from tests.project import ROOT
 from validation.engines.mesh import Tube
 from validation.engines.physx import law
 
@@ -86,3 +89,14 @@ def test_with_our_force_at_full_draw_it_has_less_energy(sling):
     theta = [YOUNG, POISSON, 3e-3, 1.0, 1.0]
     assert law.energy_left(sling, theta, 1.0001) == pytest.approx(0, abs=1e-3)
     assert -0.08 < law.energy_left(sling, theta, 1.9) < law.energy_left(sling, theta, 1.5) < -0.03
+
+
+def test_the_page_has_its_figures(sling):
+    page = (ROOT / "docs/simulator.md").read_text()
+    rows = (
+        re.search(rf"^\| {name} \|(.*)\|$", page, re.M)[1].split("|")
+        for name in ("stretch", "factor on E")
+    )
+    stretch, factor = (np.array(row, float) for row in rows)
+    theta = [YOUNG, POISSON, 3e-3, 1.0, 1.0]
+    assert law.equal_modulus(sling, theta, stretch) == pytest.approx(factor, abs=5.1e-3)

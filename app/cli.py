@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 
 from app import arguments as kinds
-from app.command_line import JSON, Done, Refusal, command, execute, flag, parser
+from app.command_line import JSON, REFUSED, Done, Refusal, command, execute, flag, parser
 from app.sizes import DIAMETER, REST_LENGTH
 from pipeline.base.layout import Layout
 from stages.start import run
@@ -200,7 +200,11 @@ def aim(arguments: argparse.Namespace) -> Done:
     answer = aim(params, band, arguments.method, arguments.target)
     if not arguments.force and (why := why_refused(answer)):
         safety.tell(one for one in answer["warnings"] if one.what != why)
-        raise Refusal(f"no draw for {arguments.target:g} m: {why}; --force answers all the same")
+        refusal = f"no draw for {arguments.target:g} m: {why}; --force answers all the same"
+        if not arguments.json:
+            raise Refusal(refusal)
+        told = {"refused": refusal, "warnings": safety.as_json(answer["warnings"])}
+        return kinds.shown(told, True), REFUSED
     return safety.shown(posed(answer, params, band), arguments.json)
 
 

@@ -26,18 +26,30 @@ def read(path: Path) -> list[Launch]:
     return [(*one.draw, one.error, one.landing) for one in found]
 
 
-def add(
-    layout: Layout, band: str, params, launches: Sequence[Launch], *, again: bool = False
-) -> int:
+def add(layout: Layout, band: str, launches: Sequence[Launch], *, again: bool = False) -> int:
     """Write launches below the band's others; how many there are then.
 
     Args:
-        params: The whole of params.yaml.
-        again: Whether a launch that is there already is passed over, instead of refused.
+        again: Whether as many equal launches as are there already are passed over, instead of
+            refused: so that a table may be added again.
 
     Raises:
         UserError: One of them is there already, or is a score; nothing is written.
     """
+    rows, new = joined(layout, band, launches, again=again)
+    if new:
+        text = io.StringIO()
+        writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        write_text(layout.evidence / f"{band}.csv", text.getvalue())
+    return len(rows)
+
+
+def joined(
+    layout: Layout, band: str, launches: Sequence[Launch], *, again: bool = False
+) -> tuple[list[dict], int]:
+    """Rows of the band's table with launches below them, and how many are new. As `add`."""
     path = layout.evidence / f"{band}.csv"
     scores = table.scores(layout, band)
     there = table.rows(path, *table.EVIDENCE) if path.is_file() else []
@@ -48,16 +60,12 @@ def add(
         if table.among(launch, scores):
             raise UserError(table.told_twice(launch, path, layout.measured / path.name))
         if table.among(launch, known):
-            if again:
-                continue
-            raise UserError(f"{path}: this launch is there already; `dvc repro` runs what is stale")
-        known.append(launch)
+            if not again:
+                raise UserError(
+                    f"{path}: this launch is there already; `dvc repro` runs what is stale"
+                )
+            known.remove(next(one for one in known if table.among(launch, [one])))
+            continue
         values = (*draw, "" if error is None else error, landing)
         rows.append(dict(zip(COLUMNS, values, strict=True)))
-    if len(rows) > before:
-        text = io.StringIO()
-        writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-        write_text(path, text.getvalue())
-    return len(rows)
+    return rows, len(rows) - before

@@ -61,7 +61,7 @@ def observe(
     layout = Layout(Path(root))
     expect_above_floor(params, draw)
     stage = policy_stage(params, band, method) if run else None
-    number = evidence.add(layout, band, params, [(*draw, error, landing)])
+    number = evidence.add(layout, band, [(*draw, error, landing)])
     answer = {"file": str(layout.evidence / f"{band}.csv"), "launches": number}
     answer["before"] = known(params, band, method, draw, layout.root, error)
     doubts = list(doubted(answer["before"], landing, answer["file"]))

@@ -113,7 +113,11 @@ def of_identification(params, content: dict, path: Path, root: Path) -> Iterator
     known = owner(path)
     if known and known[2]:
         stage = stage_of(params, "theta", content["band"], known[2])
-        yield from _of_changes(since_run(root, stage) or [], "θ was identified", _mended(stage))
+        changes = since_run(root, stage)
+        if changes is None:
+            what = f"nothing tells with which params.yaml θ was identified: {_mended(stage)}"
+            yield Hazard("params", what)
+        yield from _of_changes(changes or [], "θ was identified", _mended(stage))
 
 
 def of_policy(params, band: str, method: str, content: dict, root: Path) -> Iterator[Hazard]:
@@ -125,8 +129,8 @@ def of_policy(params, band: str, method: str, content: dict, root: Path) -> Iter
     except NotMade as error:
         yield Hazard("params", f"{error}, so nothing tells what the policy was trained with")
         card = {"theta": content["theta"]}
-    if changes is None:
-        changes = since_card(root, band, card)
+    told = {change.key: change for change in (*since_card(root, band, card), *(changes or ()))}
+    changes = list(told.values())
     yield from _of_changes(changes, "the policy was trained", _mended(stage))
     if card.get("theta") != content["theta"]:
         what = f"the policy was trained with another θ than there is now: {_mended(stage)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from importlib.metadata import version
@@ -29,7 +30,7 @@ def write(model: Model, to: str, folder: Path, episode: Episode | None = None) -
     """
     if to not in TARGETS:
         raise UserError(f"to: must be one of {', '.join(TARGETS)}, got {to!r}")
-    if folder.exists() and not (folder / "card.json").is_file() and any_in(folder):
+    if folder.exists() and not replaceable(folder):
         raise UserError(f"{folder}: holds something else than an export; name an empty folder")
     with replacing_folder(folder) as temporary:
         content = TARGETS[to](model, temporary, episode)
@@ -53,8 +54,17 @@ def of_run(
     return folder, write(found, to, folder, episodes[0])
 
 
-def any_in(folder: Path) -> bool:
-    return not folder.is_dir() or any(folder.iterdir())
+def replaceable(folder: Path) -> bool:
+    """Whether a folder holds nothing but an earlier export."""
+    if not folder.is_dir():
+        return False
+    there = {file.name for file in folder.iterdir()}
+    try:
+        card = json.loads((folder / "card.json").read_text("utf-8"))
+    except (OSError, ValueError):
+        return not there
+    known = set(card.get("files", ())) if isinstance(card, dict) and "target" in card else set()
+    return there <= known | {"card.json", "README.md"} and bool(known)
 
 
 def to_mjcf(model: Model, folder: Path, episode: Episode | None) -> dict:

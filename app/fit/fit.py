@@ -15,10 +15,11 @@ from app.flow import child
 from app.preflight.add_band import NAME, add_band
 from app.preflight.recordings import add_recording, digests
 from pipeline.base.errors import UserError
-from pipeline.base.launch_table import expect_apart
+from pipeline.base.launch_table import expect_apart, file_of
 from pipeline.base.layout import Layout
 from pipeline.params import Params, load
 from pipeline.posterior.evidence import read_evidence
+from pipeline.recording.input.container import expect_file
 
 
 @dataclass(frozen=True)
@@ -61,16 +62,20 @@ def fit(
     layout, params = Layout(root), load(root / "params.yaml")
     name = name or name_of(recordings)
     told = [] if launches is None else evidence.read(launches)
+    for file in recordings:
+        expect_file(file)
+    file_of(layout.evidence, name, [*params.bands, name])
+    expect_apart(layout, name)
+    evidence.joined(layout, name, told, again=True)  # what is wrong is said before any change
     if recordings:
         say(f"checking {', '.join(map(str, recordings))}")
         say(brought_in(params, layout, recordings, name, band))
         params = load(root / "params.yaml")
     expect_running(params, name)
     if told:
-        count = evidence.add(layout, name, params, told, again=True)
+        count = evidence.add(layout, name, told, again=True)
         say(f"{layout.evidence / name}.csv: {count} launches as evidence")
-    read_evidence(layout.evidence, name, params)  # what is wrong with it is said now
-    expect_apart(layout, name)
+    read_evidence(layout.evidence, name, params)
     countdown = Countdown(params.bands[name].source)
     child.repro(root, f"card@{name}", countdown.line, countdown.begins)
     countdown.ends()
@@ -124,6 +129,8 @@ def brought_in(
     new = [file for digest, file in given.items() if digest not in there]
     if there and new and there.keys() <= given.keys():
         return add_recording(name, new, params_path=at, root=layout.root)
+    if not new and name in params.run.bands:
+        return f"{name} is there already, with {len(there)} recordings: goes on"
     values = {what: getattr(known, what) for what in ("mass", "diameter", "rest_length")}
     return add_band(name, recordings, **values, params_path=at, root=layout.root)
 

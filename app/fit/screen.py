@@ -34,7 +34,9 @@ def _draw(about: dict) -> str:
     text = f"  {about['target_m']:.3f} m    {at}"
     if about["predicted_landing_m"] is None:
         return f"{text}    the launch fails in simulation"
-    low, high = about["interval_90_m"] or (float("nan"),) * 2
-    force = about["hold_force_n"]
-    landing = f"{about['predicted_landing_m']:.3f} m   {low:.3f} to {high:.3f} m"
-    return f"{text}    {landing}    {force:.1f} N"
+    ends = about["interval_90_m"]
+    interval = f"{ends[0]:.3f} to {ends[1]:.3f} m" if ends else "not known       "
+    return (
+        f"{text}    {about['predicted_landing_m']:.3f} m   {interval}"
+        f"    {about['hold_force_n']:.1f} N"
+    )

@@ -30,6 +30,7 @@ def findings(known: Known) -> Findings:
         force=worst("force_rms"),
         held=worst("held_rms"),
         recoil=worst("recoil_rms"),
+        recoil_seen=any(one["pictures"] for one in recordings) or not recordings,
         disagreement=told.get("disagreement", 1.0),
         odd=_odd(recordings),
         at_sides=_at_sides(known),

@@ -31,9 +31,10 @@ def reasons_of(found: Findings, reasons: list[Reason]) -> list[str]:
 
 
 def _met(found: Findings) -> str:
+    recoil = f", the recoil within {1000 * found.recoil:.1f} mm" if found.recoil_seen else ""
     return (
         f"the force within {found.force:.2f} N, the band in the hand within"
-        f" {1000 * found.held:.1f} mm, the recoil within {1000 * found.recoil:.1f} mm"
+        f" {1000 * found.held:.1f} mm{recoil}"
     )
 
 
@@ -43,16 +44,20 @@ def residuals(known: Known, found: Findings) -> str:
     if not known.confidence:
         return "This method does not tell how near it comes; the report has its loss.\n"
     pictures = known.confidence["recordings"][0]["pictures"]
-    seen = " and ".join(f"{1000 * time:.0f} ms" for time in pictures) or "too long"
+    seen = " and ".join(f"{1000 * time:.0f} ms" for time in pictures)
+    recoil = (
+        f"- The **recoil** is met within {1000 * found.recoil:.1f} mm. It is seen {seen} after the"
+        " release;\n  later pictures show the slack band, which no launch depends on.\n"
+    )
+    if not pictures:
+        recoil = "- The **recoil** is in no picture that tells.\n"
     return f"""\
 What is left, as a root mean square; the sensor's bias and what the camera's calibration leaves
 open are taken out:
 
 - The **force** of the pull is met within {found.force:.2f} N of {peak:.1f} N.
 - The **band in the hand** lies within {1000 * found.held:.1f} mm of the camera's points.
-- The **recoil** is met within {1000 * found.recoil:.1f} mm. It is seen {seen} after the release;
-  later pictures show the slack band, which no launch depends on.
-"""
+{recoil}"""
 
 
 def card_text(

@@ -33,6 +33,7 @@ WIDE = 0.3 * HALF_AREA
 # the law, so that counts alone speak against no use: they must be off by as much as WIDE too.
 UNLUCKY = 0.05
 ODD_LAUNCH = 0.05  # of an evidence launch that the density leaves: a draw's error is some 2 %
+FAR_LAUNCH = 0.25  # of one: then the density has not taken it up
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,7 @@ class Findings:
     Attributes:
         settled: Whether the density's last step was small; None where the method has no density.
         force, held, recoil: Worst root mean squares of all recordings [N], [m], [m].
+        recoil_seen: Whether any picture shows the recoil.
         disagreement: Birge's ratio; `odd` names the recording that the others predict worst.
         at_sides: Parameters at a side of their box: label, and which side.
         stretch, recorded_stretch: Of the launches' draws, and of the pulls.
@@ -60,6 +62,7 @@ class Findings:
     force: float
     held: float
     recoil: float
+    recoil_seen: bool
     disagreement: float
     odd: str
     at_sides: Sequence[tuple[str, str]]
@@ -126,6 +129,12 @@ def _identified(found: Findings):
                 f" {factor * limit:.2g} {unit} are expected."
             )
             yield Reason(size > NO_FIT * limit, text, cure)
+    if not found.recoil_seen:
+        yield Reason(
+            False,
+            "No picture shows the recoil: its damping is only what other rubbers have.",
+            "Record another pull with the camera on until a second after the release.",
+        )
     if found.disagreement > DISAGREE:
         odd = f"; {found.odd} is the one that the others predict worst" if found.odd else ""
         yield Reason(
@@ -192,17 +201,17 @@ def _tried(found: Findings):
             " pull shows: of the virtual rubbers that we tried, those landed a quarter short.",
         )
     if found.scores:
-        chance = binom.sf(found.outside - 1, found.scores, 1 - LEVEL)
-        if chance < UNLUCKY:
+        unlucky = binom.sf(found.outside - 1, found.scores, 1 - LEVEL) < UNLUCKY
+        if unlucky or (found.outside and found.off > WIDE):  # few launches are soon luck
             yield Reason(
-                found.off > WIDE,
+                found.off > (WIDE if unlucky else HALF_AREA),
                 f"{found.outside} of {found.scores} {found.kind} launches landed outside their"
                 f" {100 * LEVEL:.0f} % intervals, {100 * found.off:.0f} cm off in the mean.",
                 "Tell the simulator of a launch with `sling observe`.",
             )
     if found.left > ODD_LAUNCH:
         yield Reason(
-            False,
+            found.left > FAR_LAUNCH,
             f"A launch that is evidence is {100 * found.left:.0f} % off what all evidence together"
             " says.",
             "Measure that launch again: its draw or its landing may be wrong.",

@@ -10,7 +10,8 @@ from pipeline.card.verdict import CARE, NO, TRUSTED, Findings, judge
 from tests.card.conftest import trials
 
 GOOD = Findings(
-    settled=True, force=0.05, held=8e-4, recoil=2e-3, disagreement=1.1, odd="", at_sides=(),
+    settled=True, force=0.05, held=8e-4, recoil=2e-3, recoil_seen=True, disagreement=1.1, odd="",
+    at_sides=(),
     stretch=1.5, recorded_stretch=1.6, hold_force=9.0, max_force=30.0, failures=(), converged=True,
     miss=0.004, half_width=0.1, outside=1, scores=15, off=0.03, kind="virtual", left=0.01,
     observed=0,
@@ -37,6 +38,10 @@ CASES = [
     ({"outside": 6}, CARE, "6 of 15 virtual launches"),
     ({"outside": 6, "off": 0.3}, NO, "30 cm off in the mean"),
     ({"left": 0.09}, CARE, "9 % off"),
+    ({"left": 0.4}, NO, "40 % off"),
+    ({"scores": 1, "outside": 1, "off": 0.3}, CARE, "30 cm off"),
+    ({"scores": 1, "outside": 1, "off": 1.2}, NO, "120 cm off"),
+    ({"recoil": 0.0, "recoil_seen": False}, CARE, "No picture shows the recoil"),
     ({"outside": 0, "scores": 0}, CARE, "No launch was measured"),
 ]
 

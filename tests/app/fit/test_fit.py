@@ -83,23 +83,32 @@ def test_further_recordings_join_those_that_are_there(project) -> None:
     project.run(first, mass=0.04)
     project.run(first, second, name="a")
     assert [file.name for file in project.layout.recordings("a")] == ["a.mcap", "b.mcap"]
+    project.run(first, name="a")  # the same command goes on
     with pytest.raises(UserError, match="other recordings already"):
         project.run(project.recording("c.mcap", "c"), name="a")
+    with pytest.raises(UserError, match="none.mcap"):
+        project.run(first.with_name("none.mcap"), name="a")
 
 
 def test_launches_become_evidence_once(project) -> None:
     file = project.recording("a.mcap", "a")
-    launches = project.recording("landings.csv", LAUNCHES)
+    launches = project.recording("landings.csv", LAUNCHES + "-0.3,-0.17,2.2\n")
     for _ in range(2):
         project.run(file, mass=0.04, launches=launches)
         assert (project.layout.evidence / "a.csv").read_text() == (
-            "draw_y_m,draw_z_m,draw_error_m,landing_y_m\n-0.3,-0.17,,2.2\n-0.32,-0.2,,3.0\n"
+            "draw_y_m,draw_z_m,draw_error_m,landing_y_m\n"
+            "-0.3,-0.17,,2.2\n-0.32,-0.2,,3.0\n-0.3,-0.17,,2.2\n"
         )
     project.layout.measured.mkdir(parents=True)
     (project.layout.measured / "a.csv").write_text(LAUNCHES.replace("3.0", "3.1"))
     more = project.recording("more.csv", LAUNCHES.replace("3.0", "3.1"))
     with pytest.raises(UserError, match="evidence or a score, never both"):
         project.run(file, launches=more)
+    other = project.recording("other.mcap", "b")
+    (project.layout.measured / "other.csv").write_text(LAUNCHES)
+    with pytest.raises(UserError, match="evidence or a score, never both"):
+        project.run(other, mass=0.04, launches=launches)
+    assert "other" not in load().bands  # nothing has changed
 
 
 @pytest.mark.parametrize(

@@ -186,6 +186,10 @@ def test_aim_prints_one_json_object(tmp_path: Path) -> None:
     done = python("-m", "app.cli", *arguments, "--json", folder=tmp_path)
     assert (done.returncode, done.stdout, done.stderr.count("\nerror: ")) == (3, "", 1)
     assert re.search("off the target; --force answers all the same\n$", done.stderr)
+    done = python("-m", "app.cli", *arguments, "--json", folder=tmp_path)
+    answer = json.loads(done.stdout)
+    assert done.returncode == 3 and answer.keys() == {"refused", "warnings"}
+    assert "miss" in [one["about"] for one in answer["warnings"]]
 
     done = python("-m", "app.cli", *arguments, "--json", "--force", folder=tmp_path)
     assert done.returncode == 0

@@ -183,7 +183,7 @@ def test_aim_prints_one_json_object(tmp_path: Path) -> None:
     """The keys that scripts rely on, and the pose in the robot's base; the text has them too."""
     aimable(tmp_path)
     arguments = ("aim", "--band", "band1", "--target", "1.9")
-    done = python("-m", "app.cli", *arguments, "--json", folder=tmp_path)
+    done = python("-m", "app.cli", *arguments, folder=tmp_path)
     assert (done.returncode, done.stdout, done.stderr.count("\nerror: ")) == (3, "", 1)
     assert re.search("off the target; --force answers all the same\n$", done.stderr)
     done = python("-m", "app.cli", *arguments, "--json", folder=tmp_path)

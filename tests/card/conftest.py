@@ -7,20 +7,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import torch
 from ruamel.yaml import YAML
-from torch import nn
 
 from pipeline.base.layout import Layout
 from pipeline.card.known import Known, known
-from pipeline.landing.landing_map import LandingMap, validation
 from pipeline.params import Params, load
-from pipeline.policy.export import write_onnx
-from pipeline.policy.train import Policy
 from pipeline.recording.build import build_episodes
 from pipeline.sling.theta import EXTRA
 from tests import once
-from tests.policy import toy
+from tests.policy.stored import write_stored
 from tests.project import ROOT, ROUGH
 from tests.recording.bag import Truth, write_bag
 
@@ -108,19 +103,7 @@ def make(root: Path) -> None:
         path.write_text(json.dumps(told))
     layout.trials(BAND, METHOD).parent.mkdir(parents=True)
     trials().to_parquet(layout.trials(BAND, METHOD))
-    folder = layout.policy(BAND, METHOD)
-    folder.mkdir(parents=True)
-    chart = LandingMap.simulate(
-        toy.launch, draw_y=toy.DRAW_Y, draw_z=toy.DRAW_Z, size=(9, 9), max_force=15.0
-    )
-    card = {
-        "training": {"converged": True, "mean_error_m": 0.004, "max_error_m": 0.01},
-        "landing_map": validation(chart, (1.425, 2.425)),
-    }
-    (folder / "card.json").write_text(json.dumps(card))
-    torch.manual_seed(0)
-    network = nn.Sequential(nn.Linear(1, 8), nn.ELU(), nn.Linear(8, 2))
-    write_onnx(Policy(network, (1.425, 2.425), chart.surface), folder / "policy.onnx")
+    write_stored(layout.policy(BAND, METHOD))
 
 
 @pytest.fixture(scope="session")

@@ -7,19 +7,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import torch
 from ruamel.yaml import YAML
-from torch import nn
 
 from pipeline.episode.episode import Episode
-from pipeline.landing.landing_map import LandingMap, validation
 from pipeline.params import load
-from pipeline.policy.export import write_onnx
-from pipeline.policy.train import Policy
 from pipeline.report.results import Result, Results, gather
 from pipeline.search.regions import Region, save_regions
 from pipeline.sling.material import THETA as NAMES
-from tests.policy import toy
+from tests.policy.stored import write_stored
 
 BAND, METHOD = "toy", "sling2sim2real"
 THETA = {
@@ -148,21 +143,11 @@ def template(tmp_path_factory) -> Path:
     (data / "confidence" / BAND / f"{METHOD}.json").write_text(json.dumps(posterior()))
 
     folder = data / "policies" / BAND / METHOD
-    chart = LandingMap.simulate(
-        toy.launch, draw_y=toy.DRAW_Y, draw_z=toy.DRAW_Z, size=(9, 9), max_force=15.0
-    )
+    chart = write_stored(folder)
     chart.save(folder / "map.parquet")
     pd.DataFrame({"iteration": [1, 2], "mean_error": [0.3, 0.004]}).to_parquet(
         folder / "training.parquet"
     )
-    card = {
-        "training": {"converged": True, "mean_error_m": 0.004, "max_error_m": 0.01},
-        "landing_map": validation(chart, (1.425, 2.425)),
-    }
-    (folder / "card.json").write_text(json.dumps(card))
-    torch.manual_seed(0)
-    network = nn.Sequential(nn.Linear(1, 8), nn.ELU(), nn.Linear(8, 2))
-    write_onnx(Policy(network, (1.425, 2.425), chart.surface), folder / "policy.onnx")
     launches().to_parquet(data / "trials" / BAND / f"{METHOD}.parquet")
     return root
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from app.export import usd
 from pipeline.sling.model import Sling
 from validation.engines.mesh import Tube
 from validation.simulator.closed import String
@@ -66,18 +67,8 @@ def force_on(tube: Tube, sections: list[int], positions: np.ndarray, young, pois
 
 
 def nominal(stretch, young: float, poisson: float) -> np.ndarray:
-    """Pull of a straight string over its area at rest [Pa], free to contract.
-
-    No stress across, 2 mu (q - 1) + lam (l q^2 - 1) l q = 0, gives the section's ratio q: the one
-    root between 0 and 1 + 1/l, by Newton's method from above.
-    """
-    mu, lam = lame(young, poisson)
-    length = np.asarray(stretch, float)
-    across = 1 + 1 / length
-    for _ in range(60):
-        value = 2 * mu * (across - 1) + lam * (length * across**2 - 1) * length * across
-        across = across - value / (2 * mu + lam * length * (3 * length * across**2 - 1))
-    return 2 * mu * (length - 1) + lam * (length * across**2 - 1) * across**2
+    """Pull of a straight string over its area at rest [Pa], free to contract."""
+    return young * usd.nominal(stretch, poisson)
 
 
 def equal_modulus(sling: Sling, theta, stretch) -> np.ndarray:

@@ -1,5 +1,5 @@
 # Each target works first on a fresh clone: it sets up .venv where that is missing or out of date.
-.PHONY: help setup demo run large paper ui test lint validate clean
+.PHONY: help setup demo run large ui test lint validate clean
 .DEFAULT_GOAL := run
 
 help:                 # this list
@@ -16,7 +16,7 @@ demo: setup           # one virtual band from recording to card, as `sling fit` 
 run: setup            # everything that is stale, as `dvc repro` does it, on all cores
 	PATH="$(CURDIR)/.venv/bin:$$PATH" sling flow
 
-large paper: setup    # the same with ten times the rollouts a method; an hour and more
+large: setup          # the same with ten times the rollouts a method; an hour and more
 	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/python tools/large.py
 
 ui: setup             # what `sling flow` does, in a browser on this machine: http://127.0.0.1:4200

@@ -82,7 +82,7 @@ def verify(arguments: argparse.Namespace) -> Done:
     flag("--peers", action="store_const", const=True, help="MuJoCo and Newton beside ours"),
     flag("--recording", type=Path, metavar="FILE.mcap", help="time how a recording becomes clouds"),
     flag("--methods", nargs="*", metavar="METHOD", help="time searches: all, or these methods"),
-    flag("--budget", choices=("laptop", "large"), help="of --methods; default laptop"),
+    flag("--budget", choices=("laptop", "large"), help="of --methods, --scaling; default laptop"),
     flag("--law", choices=("neo_hookean", "rubber"), help="of the band; default neo_hookean"),
     JSON,
 )

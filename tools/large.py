@@ -2,8 +2,9 @@
 
     python tools/large.py        # as `make large`; arguments go to `sling flow`
 
-The budget of validation/benchmarks/methods.py is written into params.yaml, for `git diff` to show
-and `git checkout params.yaml reports dvc.lock` to take back; then `sling flow`. Killed, it goes on
+Both budgets are this project's: the paper gives none. The large one, of
+validation/benchmarks/methods.py, is written into params.yaml, for `git diff` to show and
+`git checkout params.yaml reports dvc.lock` to take back; then `sling flow`. Killed, it goes on
 where it was, and `seconds` in reports/run.js adds up its stretches.
 """
 

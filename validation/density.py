@@ -15,7 +15,7 @@ from pipeline.episode.episode import Episode
 from pipeline.episode.signal import cutoff_hz
 from pipeline.launches.spread import landing_intervals
 from pipeline.objective.evaluate import Evaluator
-from pipeline.objective.loss import EpisodeLoss
+from pipeline.objective.loss import TERMS, EpisodeLoss
 from pipeline.objective.space import Space
 from pipeline.params.identification import LAWS, LEAST_SQUARES
 from pipeline.posterior import identify
@@ -61,14 +61,18 @@ def found(
     episodes: Sequence[Episode],
     observed: Sequence[Observed] = (),
 ) -> tuple[Calibrated, dict]:
-    """What a method finds, and says of it: least squares takes all, others the first."""
+    """What a method finds, and says of it: least squares takes all, others the first.
+
+    Of another search than least squares it says "loss": the terms and the total of the best.
+    """
     about, space = params.methods[method], Space.of_method(params, method)
     loss = EpisodeLoss.of(params, method, episodes[0], sling)
     evaluate = Evaluator(episodes[0], sling, loss, space, workers=WORKERS)
     best = complete(params, method, params.optimizer, evaluate).best()
     start = np.array([best[name] for name in space.names])
     if about.search != LEAST_SQUARES:
-        return Calibrated(identify.launched(sling, episodes[0]), start, None), {}
+        told = {"loss": {name: best[name] for name in (*TERMS, "total")}}
+        return Calibrated(identify.launched(sling, episodes[0]), start, None), told
     one = identify.identify(
         params, method, sling, episodes, start, observed=observed, workers=WORKERS
     )

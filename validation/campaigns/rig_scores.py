@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,8 +23,6 @@ from pipeline.objective.loss import EpisodeLoss
 from pipeline.oracle.aim import hit, least_sensitive_draw
 from pipeline.oracle.world import World
 from pipeline.posterior.launches import Observed
-from pipeline.recording.build import build_episodes
-from pipeline.rig.recorder.record import record
 from pipeline.sling.model import Sling
 from validation.density import Calibrated, found
 
@@ -33,6 +32,9 @@ MAP = 17, 13  # simulated launches that tell where to seek
 
 def recorded(params, band: str, folder: Path) -> Episode:
     """The episode of a recording that the rig makes, clamps beside it; kept in `folder`."""
+    from pipeline.recording.build import build_episodes  # both need Open3D, scores do not
+    from pipeline.rig.recorder.record import record
+
     mounting = folder / "mounting.json"
     if not mounting.exists():
         raw = folder / f"{band}.mcap"
@@ -61,8 +63,8 @@ def sling_of(params, band: str, method: str, folder: Path) -> Sling:
     return replace(sling, law=params.methods[method].law)
 
 
-def aimed(outcome: Calibrated, params) -> np.ndarray:
-    """Draws (T, 2) that a perfect policy would choose for TARGETS; NaN where it finds none."""
+def aimed(outcome: Calibrated, params, targets: Sequence[float] = TARGETS) -> np.ndarray:
+    """Draws (T, 2) that a perfect policy would choose for targets; NaN where it finds none."""
     setup = params.setup
     box = {"draw_y": setup.draw_y, "draw_z": setup.draw_z, "max_force": setup.max_force}
     landing_map = LandingMap.simulate(outcome, **box, size=MAP, checks=0)
@@ -71,10 +73,10 @@ def aimed(outcome: Calibrated, params) -> np.ndarray:
         done = outcome(draw[None])
         return float(done.landing_y[0]) if done.failure[0] is None else float("nan")
 
-    starts = [least_sensitive_draw(landing_map, target) for target in TARGETS]
+    starts = [least_sensitive_draw(landing_map, target) for target in targets]
     draws = [
         hit(land, target, start) if np.isfinite(start).all() else start
-        for target, start in zip(TARGETS, starts, strict=True)
+        for target, start in zip(targets, starts, strict=True)
     ]
     return np.array(draws)
 

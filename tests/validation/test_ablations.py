@@ -1,0 +1,110 @@
+"""The ablations' campaign: its statistics, its plain searches, and what it makes of results."""
+
+import numpy as np
+import pytest
+
+from pipeline.search.loop import latin_hypercube
+from pipeline.search.optimizers import build
+from validation.campaigns.ablations import FIRST, LAST, PAPER, Job, jobs_of, summary
+from validation.paired import compared, holm, mean_interval
+
+
+def test_holm_is_the_textbook_one() -> None:
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.6, 0.7]) == pytest.approx([1, 1])
+
+
+def test_pairs_are_compared_by_signed_ranks() -> None:
+    base = np.arange(10.0)
+    shifted = base + 1 + 0.01 * np.arange(10)
+    broken = np.where(base < 9, shifted, np.nan)
+    found = compared({"a": base, "shifted": shifted, "broken": broken, "same": base}, "a")
+    assert found["shifted"]["p"] == pytest.approx(2 / 2**10)  # all ranks of one sign
+    assert found["broken"]["n"] == 9
+    assert found["broken"]["p"] == pytest.approx(2 / 2**9)
+    assert found["same"]["p_holm"] == 1
+    assert found["shifted"]["p_holm"] == pytest.approx(3 * 2 / 2**10)
+    assert found["shifted"]["low"] < found["shifted"]["mean"] < found["shifted"]["high"]
+
+
+def test_an_interval_holds_the_mean_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(3)
+    told = [mean_interval(rng.normal(size=40)) for _ in range(200)]
+    inside = np.mean([one["low"] < 0 < one["high"] for one in told])
+    assert 0.88 < inside < 0.99
+    assert mean_interval([np.nan])["mean"] is None
+
+
+def spent(optimizer, rollouts: int) -> tuple[np.ndarray, list[tuple[str, int]]]:
+    """All points of a search of a tilted bowl, and its batches' phases and sizes."""
+    points, batches = [], []
+    while rollouts > 0:
+        asked = optimizer.ask()
+        batches.append((optimizer.phase, len(asked)))
+        optimizer.tell(bowl(asked))
+        points.append(asked)
+        rollouts -= len(asked)
+    return np.concatenate(points), batches
+
+
+def bowl(points: np.ndarray) -> np.ndarray:
+    return np.sum((points - 0.3) ** 2, axis=1)
+
+
+def test_plain_starts_explore_alike_and_begin_as_wide_balls() -> None:
+    about = {"rollouts": 160, "seed": 4, "population": 10}
+    settings = {"generations": 3, "k_top": 2, "delta": 0.1, "cma_population": 60}
+    points, batches = spent(build("validation.searches:PlainStarts", 3, **about, **settings), 160)
+    explored, _ = spent(build("de", 3, **about), 40)
+    assert batches == [("de", 10)] * 4 + [("cma", 120)]
+    assert np.array_equal(points[:40], explored)
+    centre = explored[np.argmin(bowl(explored))]
+    first = points[40:100]  # of the best region's solver; reflected at the box's faces
+    assert np.abs(first - centre).std() > 0.1
+    assert np.corrcoef(first.T)[np.triu_indices(3, 1)] == pytest.approx(0, abs=0.4)
+
+
+def test_small_batches_see_every_point() -> None:
+    about = {"rollouts": 16, "seed": 1, "population": 8}
+    optimizer = build("validation.searches:SmallBatches", 2, **about)
+    points, batches = spent(optimizer, 16)
+    assert [size for _, size in batches] == [8, 4, 4]
+    assert optimizer._points >= len(points)
+
+
+def test_plain_adam_descends_from_one_point() -> None:
+    about = {"rollouts": 240, "seed": 2, "population": 20}
+    points, batches = spent(build("validation.searches:PlainAdam", 3, **about), 240)
+    assert {size for _, size in batches} == {4}
+    assert points[0] == pytest.approx(latin_hypercube(3, 1, 2)[0])
+    assert bowl(points[-1:])[0] < 0.01 < bowl(points[:1])[0]
+
+
+def results(offset: dict[str, float]) -> list[dict]:
+    """Of every job of two recordings of a band, misses of 1, 2, ... cm and a method's offset."""
+    found = []
+    for job in jobs_of(["band1"], [*offset], 2, 3):
+        miss = 0.01 * (job.recording - FIRST + job.seed + offset[job.method])
+        about = {"theta": {"youngs_modulus": 2e5}, "loss": None, "seconds": 1.0}
+        found.append(vars(job) | about | {"error_m": [miss, -miss, None]})
+    return found
+
+
+def test_a_summary_pairs_recordings_and_spreads_seeds() -> None:
+    methods = [PAPER, "bo"]
+    of = results({PAPER: 0, "bo": 3})
+    of.append(vars(Job("band1", FIRST + 2, PAPER, 1)) | {"failed": "no simulation"})
+    band = summary(of, ["band1"], methods)["band1"]
+    ours = band["methods"][PAPER]
+    assert ours["miss_cm"]["mean"] == pytest.approx(1.5)  # 1 and 2 cm
+    assert ours["bias_cm"]["mean"] == pytest.approx(0)
+    assert ours["seeds_on_one_recording"]["mean"] == pytest.approx(2)  # 1, 2 and 3 cm
+    assert (ours["run"], ours["without_landing"], ours["targets_out_of_reach"]) == (3, 1, 2)
+    assert band[f"less_{PAPER}"]["bo"]["mean"] == pytest.approx(3)
+    assert band[f"less_{PAPER}"]["bo"]["n"] == 2
+
+
+def test_jobs_are_distinct_and_the_slow_ones_last() -> None:
+    jobs = jobs_of(["band1", "band2"], [LAST, PAPER], 10, 5)
+    assert len({*jobs}) == len(jobs) == 2 * 2 * (10 + 4)
+    assert all(job.method == LAST for job in jobs[28:])

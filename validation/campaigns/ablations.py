@@ -1,0 +1,315 @@
+"""Ablations and baselines on new recordings of the virtual rig, with error bars.
+
+    python -m validation.campaigns.ablations --record          # episodes; needs Open3D
+    python -m validation.campaigns.ablations --workers 16      # identifications, then the report
+
+Recordings have rig seeds from 1001 on, which took part in no choice. Every method identifies each
+with one search seed, and the first of each band with five. What it found is aimed at the targets of
+the trials, as a perfect policy would, and launched on the rig without errors: the distance from the
+target is what the identification (and the law) costs. One file a result in --work: a run that was
+killed goes on from there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from concurrent.futures import as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_json
+from pipeline.base.machine import cores
+from pipeline.base.pool import Pool
+from pipeline.episode.episode import Episode
+from pipeline.objective.space import Space
+from pipeline.params import expect_known, load
+from pipeline.rig.physics.launch import launch
+from pipeline.sling.model import Sling
+from validation.benchmarks.timing import environment
+from validation.campaigns.rig_scores import aimed, plain, recorded, sling_of
+from validation.density import found
+from validation.paired import LEVEL, compared, mean_interval
+
+WORK = Path("data/ablations")
+REPORT = Path("reports/validation/ablations.json")
+FIRST, SEEDS = 1001, 5  # rig seed of the first recording; search seeds on it
+PAPER, NO_CLAMPS = "sling2sim2real", "no_clamp_calibration"
+LAST = "plain_bo"  # takes as long as all others
+
+
+@dataclass(frozen=True)
+class Job:
+    """One identification: by a method, of a band's recording, with a seed of the search."""
+
+    band: str
+    recording: int
+    method: str
+    seed: int
+
+    def path(self, work: Path) -> Path:
+        name = f"{self.band}-{self.recording}-{self.method}-{self.seed}.json"
+        return work / "results" / name
+
+
+def with_variants(params):
+    """params.yaml's methods, and the paper's with one thing plain or left out."""
+    one, optimizer = params.methods[PAPER], params.optimizer
+    names = ("generations", "delta", "cma_population", "recombination")
+    starts = {name: getattr(optimizer, name) for name in names}
+    low, high = optimizer.mutation
+    starts |= {"mutation_low": low, "mutation_high": high}
+
+    def variant(kind: str, **settings):
+        search = f"validation.searches:{kind}"
+        return one.model_copy(update={"search": search, "settings": settings})
+
+    methods = dict(params.methods.items()) | {
+        "no_covariance_plain": variant("PlainStarts", k_top=optimizer.k_top, **starts),
+        "no_covariance_no_multistart_plain": variant("PlainStarts", k_top=1, **starts),
+        LAST: variant("SmallBatches"),
+        "plain_adam": variant("PlainAdam"),
+        NO_CLAMPS: one,
+    }
+    return params.model_copy(update={"methods": methods})
+
+
+def jobs_of(bands, methods, recordings: int, seeds: int) -> list[Job]:
+    """Every identification, those first that tell most and cost least."""
+    first = [
+        Job(band, FIRST + number, method, 1)
+        for number in range(recordings)
+        for method in methods
+        for band in bands
+    ]
+    spread = [
+        Job(band, FIRST, method, seed)
+        for seed in range(2, seeds + 1)
+        for method in methods
+        for band in bands
+    ]
+    return sorted(first + spread, key=lambda job: job.method == LAST)
+
+
+def place(work: Path, band: str, recording: int) -> Path:
+    return work / "episodes" / band / str(recording)
+
+
+def record(where: tuple[str, int, Path]) -> None:
+    """Make a recording's episode, with its clamps; what is there stays."""
+    band, number, work = where
+    params = load()
+    params = params.model_copy(update={"rig": params.rig.model_copy(update={"seed": number})})
+    recorded(params, band, place(work, band, number))
+
+
+def identified(job: Job, params, folder: Path) -> dict:
+    """What one identification found of the episode in `folder`, and where its launches land."""
+    optimizer = params.optimizer.model_copy(update={"seed": job.seed})
+    params = params.model_copy(update={"optimizer": optimizer})
+    sling = sling_of(params, job.band, job.method, folder)
+    if job.method == NO_CLAMPS:
+        sling = Sling.of(params.bands[job.band], params.setup, params.sling)
+    start, targets = time.perf_counter(), params.trials.targets
+    outcome, told = found(params, job.method, sling, [Episode.load(folder / "episode")])
+    seconds = time.perf_counter() - start
+    names = Space.of_method(params, job.method).names
+    draws = aimed(outcome, params, targets)
+    landing = [
+        np.nan if np.isnan(draw).any() else launch(job.band, params, tuple(draw), None).landing_y
+        for draw in draws
+    ]
+    return {
+        "theta": dict(zip(names, outcome.point.tolist(), strict=False)),
+        "loss": told.get("loss"),
+        "draws_m": draws,
+        "error_m": np.array(landing) - targets,
+        "seconds": seconds,
+    }
+
+
+_params = None  # of this process
+
+
+def _begin() -> None:
+    global _params
+    _params = with_variants(load())
+
+
+def work_on(job: Job, work: Path) -> None:
+    """Identify, and keep the result; a recording that no simulation can follow is one too."""
+    try:
+        result = identified(job, _params, place(work, job.band, job.recording))
+    except UserError as error:
+        result = {"failed": str(error)}
+    path = job.path(work)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_json(path, plain(vars(job) | result))
+
+
+def scores(results: list[dict], name: str) -> np.ndarray:
+    """One number a result: the mean miss [cm] over targets that were reached, loss, or E [Pa]."""
+    values = {
+        "miss_cm": lambda one: 100 * np.nanmean(np.abs(np.array(one["error_m"], float))),
+        "loss": lambda one: (one["loss"] or {}).get("total", np.nan),
+        "youngs_modulus": lambda one: one["theta"]["youngs_modulus"],
+    }[name]
+    return np.array([np.nan if lost(one) else values(one) for one in results])
+
+
+def lost(one: dict) -> bool:
+    """Whether no launch of a result landed."""
+    return "failed" in one or not np.isfinite(np.array(one["error_m"], float)).any()
+
+
+def summary(results: list[dict], bands, methods) -> dict:
+    """Of each band, and of all: methods' means, and how each compares with the paper's."""
+    by = {(r["band"], r["recording"], r["method"], r["seed"]): r for r in results}
+
+    def picked(band: str, method: str, keys) -> list[dict]:
+        """A result each; one that is not there counts as failed, and leaves its pair out."""
+        return [by.get((band, rec, method, seed), {"failed": "not run"}) for rec, seed in keys]
+
+    single = sorted({(r["recording"], r["seed"]) for r in results if r["seed"] == 1})
+    spread = [(FIRST, seed) for seed in sorted({r["seed"] for r in results})]
+    figures = {}
+    for band in [*bands, "all"]:
+        of = bands if band == "all" else [band]
+        rows = {m: [r for b in of for r in picked(b, m, single)] for m in methods}
+        miss = {method: scores(own, "miss_cm") for method, own in rows.items()}
+        figures[band] = {"methods": {}, f"less_{PAPER}": compared(miss, PAPER)}
+        for method, own in rows.items():
+            run = [one for one in own if one.get("failed") != "not run"]
+            signed = [np.nan if lost(one) else mean_of(one["error_m"]) for one in own]
+            figures[band]["methods"][method] = {
+                "miss_cm": mean_interval(miss[method]),
+                "bias_cm": mean_interval(100 * np.array(signed, float)),
+                "youngs_modulus": mean_interval(scores(own, "youngs_modulus")),
+                "loss": mean_interval(scores(own, "loss")),
+                "run": len(run),
+                "without_landing": sum(map(lost, run)),
+                "targets_out_of_reach": sum(
+                    value is None for one in run for value in one.get("error_m", [])
+                ),
+                "miss_cm_each": miss[method],
+                "seconds": mean_of([one.get("seconds") for one in run]),
+            }
+            if band != "all":
+                seeds = scores(picked(band, method, spread), "miss_cm")
+                figures[band]["methods"][method]["seeds_on_one_recording"] = mean_interval(seeds)
+    return figures
+
+
+def mean_of(values) -> float:
+    """The mean of what is finite; NaN where nothing is."""
+    values = np.array(values, float)
+    return float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
+
+
+def report(args, params) -> None:
+    """Write what the results in the work folder say."""
+    paths = sorted((args.work / "results").glob("*.json"))
+    results = [json.loads(path.read_text()) for path in paths]
+    wanted = set(jobs_of(args.bands, args.methods, args.recordings, args.seeds))
+    keys = ("band", "recording", "method", "seed")
+    results = [one for one in results if Job(*(one[key] for key in keys)) in wanted]
+    if not results:
+        raise UserError(f"{args.work}: holds no result of these bands and methods")
+    command = f"python -m validation.campaigns.ablations {' '.join(sys.argv[1:])}".strip()
+    content = {
+        "kind": "virtual",
+        "asked": "What each part of the paper's method, and each baseline, changes in the distance"
+        " between landing and target on recordings of the virtual rig that took part in no choice;"
+        " launches without errors, aimed as a perfect policy would.",
+        "settings": {
+            "targets_m": params.trials.targets,
+            "recordings": [FIRST + number for number in range(args.recordings)],
+            "search_seeds": list(range(1, args.seeds + 1)),
+            "optimizer": params.optimizer.model_dump(),
+            "methods": {name: params.methods[name].model_dump() for name in args.methods},
+            "without_clamp_calibration": [NO_CLAMPS],
+            "intervals": f"{100 * LEVEL:.0f} %, percentile bootstrap over recordings (or seeds)",
+            "tests": f"Wilcoxon signed-rank, two-sided, against {PAPER} on the same recordings;"
+            " Holm's correction over the methods, within a band and within all bands together",
+        },
+        "jobs": len(wanted),
+        "done": len(results),
+        "figures": summary(results, args.bands, args.methods),
+        **environment("cpu", command),
+    }
+    args.report.parent.mkdir(parents=True, exist_ok=True)
+    write_json(args.report, plain(content))
+    print(f"{args.report}: {len(results)} of {len(wanted)} results", flush=True)
+
+
+def run(args) -> None:
+    """Work through the jobs that have no file yet, until the time is over."""
+    end = time.monotonic() + 60 * args.minutes
+    jobs = [
+        job
+        for job in jobs_of(args.bands, args.methods, args.recordings, args.seeds)
+        if (place(args.work, job.band, job.recording) / "mounting.json").exists()
+        and not job.path(args.work).exists()
+    ]
+    print(f"{len(jobs)} identifications on {args.workers} processes", flush=True)
+    if not jobs:
+        return
+    _begin()
+    work_on(jobs[0], args.work)  # compiles, once
+    with Pool(_begin, workers=args.workers) as pool:
+        waiting = {pool.submit(work_on, job, args.work): job for job in jobs[1:]}
+        try:
+            left = max(end - time.monotonic(), 0)
+            for count, done in enumerate(as_completed(waiting, timeout=left), 2):
+                done.result()
+                if count % 20 == 0:
+                    print(f"{count} of {len(jobs)}: {waiting[done]}", flush=True)
+        except TimeoutError:
+            print("the time is over; run it again to go on", flush=True)
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def main() -> None:
+    params = with_variants(load())
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--record", action="store_true", help="make the episodes, nothing else")
+    parser.add_argument("--report-only", action="store_true", help="of what is there")
+    parser.add_argument("--workers", type=int, default=cores(), help="processes (default: cores)")
+    parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
+    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
+    parser.add_argument("--bands", nargs="+", default=list(params.run.rig))
+    parser.add_argument("--methods", nargs="+", default=list(params.methods))
+    parser.add_argument("--recordings", type=int, default=10, help="a band (default: 10)")
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="on the first (default: 5)")
+    parser.add_argument("--minutes", type=float, default=1e4, help="then stop and report")
+    args = parser.parse_args()
+    for kind in ("band", "method"):
+        for name in getattr(args, f"{kind}s"):
+            expect_known(params, kind, name)
+    if PAPER not in args.methods:
+        raise UserError(f"--methods: {PAPER} must be among them, all are compared with it")
+    for name in ("SLING_WORKERS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"  # of the processes that are started from here
+    if args.record:
+        numbers = range(FIRST, FIRST + args.recordings)
+        every = [(band, number, args.work) for number in numbers for band in args.bands]
+        with Pool(workers=args.workers) as pool:
+            for (band, number, _), _ in zip(every, pool.map(record, every), strict=True):
+                print(f"{band} {number}", flush=True)
+        return
+    if not args.report_only:
+        run(args)
+    report(args, params)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except UserError as error:
+        sys.exit(f"error: {error}")

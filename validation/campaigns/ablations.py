@@ -6,8 +6,8 @@
 Recordings have rig seeds from 1001 on, which took part in no choice. Every method identifies each
 with one search seed, and the first of each band with five. What it found is aimed at the targets of
 the trials, as a perfect policy would, and launched on the rig without errors: the distance from the
-target is what the identification (and the law) costs. One file a result in --work: a run that was
-killed goes on from there.
+target is what the identification (and the law) costs. Results are lines of results.jsonl in --work:
+a run that was killed goes on from there.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import os
 import sys
 import time
 from concurrent.futures import as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -53,9 +53,10 @@ class Job:
     method: str
     seed: int
 
-    def path(self, work: Path) -> Path:
-        name = f"{self.band}-{self.recording}-{self.method}-{self.seed}.json"
-        return work / "results" / name
+    @classmethod
+    def of(cls, result: dict) -> Job:
+        """The one that a result is of."""
+        return cls(*(result[one.name] for one in fields(cls)))
 
 
 def with_variants(params):
@@ -142,15 +143,36 @@ def _begin() -> None:
     _params = with_variants(load())
 
 
-def work_on(job: Job, work: Path) -> None:
-    """Identify, and keep the result; a recording that no simulation can follow is one too."""
+def work_on(job: Job, work: Path) -> dict:
+    """A result; that no simulation can follow the recording is one too."""
     try:
         result = identified(job, _params, place(work, job.band, job.recording))
     except UserError as error:
         result = {"failed": str(error)}
-    path = job.path(work)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_json(path, plain(vars(job) | result))
+    return plain(vars(job) | result)
+
+
+class Results:
+    """Lines of JSON in a file; the last may be cut short, where a run was killed."""
+
+    def __init__(self, work: Path) -> None:
+        self.path = work / "results.jsonl"
+
+    def all(self) -> dict[Job, dict]:
+        """Each job's, as it was written last."""
+        found = {}
+        for line in self.path.read_text().splitlines() if self.path.exists() else []:
+            try:
+                result = json.loads(line)
+            except json.JSONDecodeError:
+                continue
+            found[Job.of(result)] = result
+        return found
+
+    def add(self, result: dict) -> None:
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with self.path.open("a") as file:  # an empty line ends one that was cut
+            file.write(f"\n{json.dumps(result)}\n")
 
 
 def scores(results: list[dict], name: str) -> np.ndarray:
@@ -214,11 +236,8 @@ def mean_of(values) -> float:
 
 def report(args, params) -> None:
     """Write what the results in the work folder say."""
-    paths = sorted((args.work / "results").glob("*.json"))
-    results = [json.loads(path.read_text()) for path in paths]
     wanted = set(jobs_of(args.bands, args.methods, args.recordings, args.seeds))
-    keys = ("band", "recording", "method", "seed")
-    results = [one for one in results if Job(*(one[key] for key in keys)) in wanted]
+    results = [one for job, one in Results(args.work).all().items() if job in wanted]
     if not results:
         raise UserError(f"{args.work}: holds no result of these bands and methods")
     command = f"python -m validation.campaigns.ablations {' '.join(sys.argv[1:])}".strip()
@@ -229,8 +248,11 @@ def report(args, params) -> None:
         " launches without errors, aimed as a perfect policy would.",
         "settings": {
             "targets_m": params.trials.targets,
-            "recordings": [FIRST + number for number in range(args.recordings)],
-            "search_seeds": list(range(1, args.seeds + 1)),
+            "recordings": {
+                band: sorted({one["recording"] for one in results if one["band"] == band})
+                for band in args.bands
+            },
+            "search_seeds_on_the_first": sorted({one["seed"] for one in results}),
             "optimizer": params.optimizer.model_dump(),
             "methods": {name: params.methods[name].model_dump() for name in args.methods},
             "without_clamp_calibration": [NO_CLAMPS],
@@ -249,25 +271,26 @@ def report(args, params) -> None:
 
 
 def run(args) -> None:
-    """Work through the jobs that have no file yet, until the time is over."""
-    end = time.monotonic() + 60 * args.minutes
+    """Work through the jobs that have no result yet, until the time is over."""
+    end, results = time.monotonic() + 60 * args.minutes, Results(args.work)
+    there = results.all()
     jobs = [
         job
         for job in jobs_of(args.bands, args.methods, args.recordings, args.seeds)
         if (place(args.work, job.band, job.recording) / "mounting.json").exists()
-        and not job.path(args.work).exists()
+        and job not in there
     ]
     print(f"{len(jobs)} identifications on {args.workers} processes", flush=True)
     if not jobs:
         return
     _begin()
-    work_on(jobs[0], args.work)  # compiles, once
+    results.add(work_on(jobs[0], args.work))  # compiles, once
     with Pool(_begin, workers=args.workers) as pool:
         waiting = {pool.submit(work_on, job, args.work): job for job in jobs[1:]}
         try:
             left = max(end - time.monotonic(), 0)
             for count, done in enumerate(as_completed(waiting, timeout=left), 2):
-                done.result()
+                results.add(done.result())
                 if count % 20 == 0:
                     print(f"{count} of {len(jobs)}: {waiting[done]}", flush=True)
         except TimeoutError:

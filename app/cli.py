@@ -255,7 +255,7 @@ def observe(arguments: argparse.Namespace) -> Done:
         "--to",
         required=True,
         choices=kinds.ENGINES,
-        help="MuJoCo's XML, plain numbers, PhysX's USD",
+        help="MuJoCo's XML, numbers and a loader for Newton, plain numbers, PhysX's USD",
     ),
     flag("--out", type=Path, metavar="FOLDER", help="default data/exports/<band>/<target>"),
     JSON,

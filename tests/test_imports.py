@@ -17,6 +17,7 @@ OURS = {"app", "examples", "pipeline", "sling2sim2real", "stages", "tests", "too
 EXTRAS = {
     "app/cluster/": "cluster",
     "app/export/mujoco_replay.py": "validation",
+    "app/export/newton_band.py": "validation",
     "app/preflight/timeline.py": "rerun",
     "pipeline/recording/masks/sam3.py": "sam3",
     "tests/": "dev",

@@ -1,10 +1,11 @@
-"""`python -m validation.exports [BAND...]`: write reports/validation/export-mjcf.json.
+"""`python -m validation.exports [--to newton] [BAND...]`: reports/validation/export-<target>.json.
 
-Each band that a run has identified is exported to MuJoCo and replayed there.
+Each band that a run has identified is exported to MuJoCo or Newton and replayed there, on the CPU.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import tempfile
 from importlib.metadata import version
@@ -17,9 +18,15 @@ from pipeline.base.files import write_json
 from pipeline.params import load
 from validation.benchmarks.timing import environment
 
-REPORT = Path("reports/validation/export-mjcf.json")
+REPORTS = Path("reports/validation")
+PACKAGES = {"mjcf": ("mujoco",), "newton": ("newton", "mujoco")}  # the match is MuJoCo's
+COMMANDS = {
+    "mjcf": "python -m validation.exports",
+    "newton": "python -m validation.exports --to newton",
+}
 KEPT = (
     "met",
+    "engine",
     "proof",
     "matched",
     "time_step_s",
@@ -30,22 +37,27 @@ KEPT = (
 )
 
 
-def main(bands: list[str]) -> None:
+def main(target: str, bands: list[str]) -> None:
     """Export, replay, write. Raises UserError."""
     params, found = load(), {}
     for band in bands or params.run.bands:
         with tempfile.TemporaryDirectory() as folder:
-            _, card = of_run(params, band, params.run.methods[0], "mjcf", Path(folder))
-        found[band] = {name: card[name] for name in KEPT}
+            _, card = of_run(params, band, params.run.methods[0], target, Path(folder))
+        found[band] = {name: card[name] for name in KEPT if name in card}
         print(f"{band}: {'met' if card['met'] else 'NOT met'}", flush=True)
-    about = environment("cpu", "python -m validation.exports")
-    about["versions"] |= {"mujoco": version("mujoco")}
+    about = environment("cpu", COMMANDS[target])
+    about["versions"] |= {name: version(name) for name in PACKAGES[target]}
     met = all(one["met"] for one in found.values())
-    write_json(REPORT, {"asked": ASKED, "met": met, "bands": found, **about})
+    report = REPORTS / f"export-{target}.json"
+    write_json(report, {"asked": ASKED, "met": met, "bands": found, **about})
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(prog="python -m validation.exports")
+    parser.add_argument("--to", choices=COMMANDS, default="mjcf")
+    parser.add_argument("bands", nargs="*", metavar="BAND")
+    arguments = parser.parse_args()
     try:
-        main(sys.argv[1:])
+        main(arguments.to, arguments.bands)
     except UserError as error:
         sys.exit(f"error: {error}")

@@ -9,7 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from app.arguments import ENGINES
-from app.export import card, mjcf, mjcf_card, usd, yaml_file
+from app.export import card, mjcf, mjcf_card, newton_file, usd, yaml_file
 from app.export.match import compared, draws_of, matched, proof_draws
 from app.export.mujoco_replay import MujocoBand, mujoco
 from app.export.pull import compare_pull
@@ -112,7 +112,7 @@ def _keys(name: str, chain, proof) -> dict[str, dict]:
 
 Target = Callable[[Model, Path, Episode | None], dict]
 TARGETS: dict[str, Target] = dict(
-    zip(ENGINES, (to_mjcf, yaml_file.to_yaml, usd.to_usd), strict=True)
+    zip(ENGINES, (to_mjcf, newton_file.to_newton, yaml_file.to_yaml, usd.to_usd), strict=True)
 )
 
 

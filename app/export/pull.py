@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.export.mujoco_replay import MujocoBand
+from app.export.newton_replay import NewtonReplay
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from sling2sim2real.model import Model
@@ -35,7 +36,7 @@ class PullCompared:
     taut_rms: float | None
 
 
-def compare_pull(model: Model, episode: Episode, replay: MujocoBand) -> PullCompared:
+def compare_pull(model: Model, episode: Episode, replay: MujocoBand | NewtonReplay) -> PullCompared:
     """Pull as in `episode`, in both. Raises UserError where our simulation fails."""
     ours, chain = simulate(model, episode), replay.chain
     if ours.failure:

@@ -32,7 +32,7 @@ def test_plain_numbers_are_those_of_the_simulation(model, tmp_path) -> None:
 
 
 def test_what_it_refuses(model, tmp_path, monkeypatch) -> None:
-    with pytest.raises(UserError, match="to: must be one of mjcf, yaml, usd, got 'drake'"):
+    with pytest.raises(UserError, match="to: must be one of mjcf, newton, yaml, usd, got 'drake'"):
         export(model, "drake", tmp_path / "toy")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").touch()

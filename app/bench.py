@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from pathlib import Path
 
 METHOD = "sling2sim2real"  # of --scaling
 # What each benchmark takes beside --json and the flag that asks for it; "" is the plain form.
@@ -13,6 +14,13 @@ TAKES = {
     "peers": ("device",),
     "methods": ("budget", "device"),
     "": ("law", "device"),
+}
+SCRIPTS = {  # in validation/benchmarks
+    "": "throughput",
+    "recording": "clouds",
+    "scaling": "scaling",
+    "methods": "methods",
+    "peers": "engines",
 }
 
 
@@ -27,7 +35,8 @@ def bench(arguments: argparse.Namespace, what: str) -> str:
         return table(result)
     device = "cpu" if what == "recording" else device
     command = f"sling bench {command} --json" if command else ""
-    return json.dumps(timing.environment(device, command) | result)
+    script = Path(timing.__file__).with_name(f"{SCRIPTS[what]}.py")
+    return json.dumps(timing.environment(device, command, script) | result)
 
 
 def asked(arguments: argparse.Namespace) -> str:

@@ -94,3 +94,15 @@ def bench(arguments: argparse.Namespace) -> Done:
     except argparse.ArgumentTypeError as error:
         arguments.refuse(str(error))
     return bench(arguments, what)
+
+
+@command(
+    "say of which code each JSON under reports/ is, and whether it meets what it asks",
+    "--json",
+    JSON,
+)
+def figures(arguments: argparse.Namespace) -> Done:
+    from app.figures import as_json, listed, shown
+
+    found = listed(Path.cwd())
+    return as_json(found) if arguments.json else shown(found)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from ruamel.yaml import YAML
 
-from tools.closure import CODE, NESTED, ROOT, closure, files_of, folders, imports, script_of
+from tools.closure import folders, script_of
+from validation.code import CODE, NESTED, ROOT, closure, files_of, imports
 
 STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
 HIDDEN = "pipeline/rig/"

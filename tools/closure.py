@@ -13,77 +13,23 @@ and stages/start.py, which reads the arguments.
 from __future__ import annotations
 
 import argparse
-import ast
 import sys
 from pathlib import Path
 
 from ruamel.yaml import YAML
 
 ROOT = Path(__file__).parents[1]
-CODE = ("pipeline/", "stages/", "app/", "sling2sim2real/", "validation/")
-UNTRACKED = ("pipeline/params/", "stages/start.py")
-NESTED = ("pipeline/rig/",)  # folders whose own folders are concerns of their own
-NATIVE = (".h", ".cpp", ".html", ".css", ".js")
+sys.path.insert(0, str(ROOT))
 
-
-def files_of(module: str, root: Path = ROOT) -> list[Path]:
-    """Files that `import module` runs: the module and its packages; none if it is not ours."""
-    parts = module.split(".")
-    packages = [root.joinpath(*parts[:n], "__init__.py") for n in range(1, len(parts) + 1)]
-    leaf = root.joinpath(*parts).with_suffix(".py")
-    if not (leaf.is_file() or packages[-1].is_file()):
-        return []
-    return [file for file in (*packages, leaf) if file.is_file()]
-
-
-class _WithoutTypes(ast.NodeTransformer):
-    """Leaves out what `if TYPE_CHECKING:` imports: no program runs it."""
-
-    def visit_If(self, node: ast.If) -> ast.AST | None:
-        typed = isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
-        return None if typed else self.generic_visit(node)
-
-
-def imports(file: Path, root: Path = ROOT) -> set[Path]:
-    """Project files that `file` imports itself, with native sources that lie beside a module."""
-    package = file.relative_to(root).parent.parts
-    found: set[Path] = set()
-    tree = ast.parse(file.read_text(encoding="utf-8"), str(file))
-    for node in ast.walk(_WithoutTypes().visit(tree)):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            base = [*package[: len(package) + 1 - node.level]] if node.level else []
-            base = ".".join([*base, *filter(None, [node.module])])
-            names = [base, *(f"{base}.{alias.name}" for alias in node.names)]
-        else:
-            continue
-        found.update(file for name in names for file in files_of(name, root))
-    return found
-
-
-def closure(script: Path, root: Path = ROOT) -> list[str]:
-    """All project files that `script` may run, itself included, sorted, relative to `root`."""
-    seen: set[Path] = set()
-    queue = {script}
-    while queue:
-        file = queue.pop()
-        seen.add(file)
-        queue |= imports(file, root) - seen
-    native = {
-        beside for file in seen for beside in file.parent.iterdir() if beside.suffix in NATIVE
-    }
-    return sorted(file.relative_to(root).as_posix() for file in seen | native)
+from validation.code import CODE, UNTRACKED, closure, concern  # noqa: E402
 
 
 def folders(script: Path, root: Path = ROOT) -> list[str]:
     """The concerns that `script` runs, as dvc.yaml lists them: folders, and the script itself."""
     found = {script.relative_to(root).as_posix()}
     for file in closure(script, root):
-        parts = file.split("/")
-        depth = 3 if file.startswith(NESTED) else 2
-        if len(parts) > depth and not file.startswith(UNTRACKED):
-            found.add("/".join(parts[:depth]))
+        if concern(file) != file and not file.startswith(UNTRACKED):
+            found.add(concern(file))
     return sorted(found)
 
 

@@ -21,7 +21,7 @@ from tests.project import ROOT, python
 from tests.search import toy
 from tests.search.functions import NAMES, Evaluate, quadratic
 from tests.search.killed import ROLLOUTS, VALLEY, searched
-from tools.closure import closure
+from validation.code import closure
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import sys
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,6 +16,7 @@ import numpy as np
 import pipeline.sling
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import commit, gpus, named, processor
+from validation.code import digests
 
 REPEATS = 3  # the best of them counts: others may use the machine too
 SIMULATOR = fingerprint(Path(pipeline.sling.__file__).parent)[:12]  # as it is imported
@@ -48,13 +50,15 @@ def available(device: str) -> bool:
     return device in {"cpu", *gpus()}
 
 
-def environment(device: str, command: str = "") -> dict:
-    """What a figure belongs to: device, its name, command, versions, commit and simulator.
+def environment(device: str, command: str = "", *scripts: Path) -> dict:
+    """What a figure belongs to: device, its name, command, versions, commit and code.
 
-    `simulator` is a digest of pipeline/sling, which tells also where there is no git.
+    `code` has a digest of each folder that `scripts` import, by default the file that calls this;
+    it tells also where there is no git. `simulator` is that of pipeline/sling.
     """
     import warp as wp
 
+    scripts = scripts or (Path(sys._getframe(1).f_code.co_filename),)
     devices, name = named(device, "--device"), processor()
     if device != "cpu":
         name = wp.get_device(devices[0]).name
@@ -67,6 +71,7 @@ def environment(device: str, command: str = "") -> dict:
         "command": command or f"sling bench --device {device} --json",
         "commit": commit(Path(__file__).parent),
         "simulator": SIMULATOR,
+        "code": digests(*scripts),
         "versions": {"python": platform.python_version()}
         | {package: version(package) for package in packages},
     }

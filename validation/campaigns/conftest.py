@@ -3,7 +3,7 @@
 A campaign writes its file before it asserts, so that a claim that fails leaves its figures too.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -36,11 +36,20 @@ def progress(capsys) -> Callable[[str], None]:
 def record(request) -> Callable[..., None]:
     """Write reports/validation/<name>.json.
 
-    `simulator` in it is a digest of pipeline/sling: another one than today's means old figures.
+    `code` in it has digests of what the campaign imports, and what `also`, scripts that it runs as
+    processes, do: `sling figures` tells which are older.
     """
 
-    def write(name: str, *, asked: str, met: bool, settings: dict, figures: dict) -> None:
-        about = environment("cpu", "make validate") | {
+    def write(
+        name: str,
+        *,
+        asked: str,
+        met: bool,
+        settings: dict,
+        figures: dict,
+        also: Iterable[Path] = (),
+    ) -> None:
+        about = environment("cpu", "make validate", request.path, *also) | {
             "alone": "python -m pytest -m validation -n 0"
             f" validation/campaigns/{request.path.name}",
         }

@@ -17,7 +17,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from tests.app.flow.killing import PROMPT, SLING, Run, told
-from tests.project import wait
+from tests.project import ROOT, wait
 from tests.test_pipeline import TINY, Copy
 
 pytestmark = pytest.mark.validation
@@ -157,6 +157,7 @@ def test_a_flow_killed_again_and_again_ends_in_the_same_bytes(tmp_path, progress
         f" process lives {PROMPT:g} s later, no lock or temporary file stays, and every output"
         " and every digest in dvc.lock is that of an undisturbed `dvc repro`.",
         met=met,
+        also=[ROOT / "app/flow/run.py", *(ROOT / "stages").glob("[a-z]*.py")],
         settings={"kills": KILLS, "seed": SEED, "latest_s": LONGEST, "budget": TINY},
         figures={
             "undisturbed_s": seconds,

@@ -5,6 +5,7 @@ Another device than the CPU has pages of its own, such as reports/simulator-cuda
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 import tempfile
@@ -103,8 +104,9 @@ def verify(
         for picture in sorted(Path(figures).glob("*.png")):
             with replacing(root / "reports" / name / picture.name) as temporary:
                 temporary.write_bytes(picture.read_bytes())
-    known = environment(device)
-    kept = ("device", "simulator") if device == "cpu" else ("device", "device_name", "simulator")
+    scripts = [Path(inspect.getfile(one)) for one in (verify, *(extra or {}).values())]
+    known = environment(device, f"sling verify --device {device}", *scripts)
+    kept = ("device", "simulator", "code") + (() if device == "cpu" else ("device_name",))
     about = {name: known[name] for name in kept}
     write_text(root / f"reports/{name}.md", markdown(sections, about, name))
     write_json(root / f"reports/{name}.json", about | {"sections": list(map(_entry, sections))})

@@ -240,7 +240,8 @@ def report(args, params) -> None:
     results = [one for job, one in Results(args.work).all().items() if job in wanted]
     if not results:
         raise UserError(f"{args.work}: holds no result of these bands and methods")
-    command = f"python -m validation.campaigns.ablations {' '.join(sys.argv[1:])}".strip()
+    command = "python -m validation.campaigns.ablations"
+    command += f" --workers {args.workers} --recordings {args.recordings} --seeds {args.seeds}"
     content = {
         "kind": "virtual",
         "asked": "What each part of the paper's method, and each baseline, changes in the distance"

@@ -2,12 +2,14 @@
 
 A file with `code` (validation/benchmarks/timing.environment) is compared folder by folder. One
 that a stage writes is compared by DVC. For the others the digest of the simulator and the commit
-decide, as far as they can: any change under pipeline/ or validation/ makes such a file older.
+decide, as far as they can: any change since then of what its command's script imports makes such a
+file older, and where the command names no script, any change under pipeline/ or validation/.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -15,7 +17,7 @@ from pathlib import Path
 
 from pipeline.base.errors import UserError
 from pipeline.base.fingerprint import fingerprint
-from validation.code import CODE, ROOT, digest
+from validation.code import CODE, ROOT, digest, digests
 
 TODAY, OLDER = "today", "older code"
 UNKNOWN = "unknown: written before digests"
@@ -23,6 +25,7 @@ NOT_TOLD = "unknown: DVC cannot tell"
 PATTERNS = ("summary.json", "bands/*/card.json", "simulator*.json", "*/*.json")
 SIMULATOR = "pipeline/sling"
 PARTS = ("pipeline", "validation")  # whose changes since a commit count
+SCRIPT = re.compile(r"\bvalidation[./][\w./]+")  # in a command, as a module or as a file
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,7 @@ def _figures(file: Path, root: Path, code: Path, state: str | None) -> Committed
     if not state and changed:
         state = OLDER
     elif not state:
-        state = TODAY if content.get("code") else _by_commit(content.get("commit"), code)
+        state = TODAY if content.get("code") else _by_commit(content, code)
     return CommittedFigures(name, state, _together(known), changed, _met(content))
 
 
@@ -116,18 +119,30 @@ def _met(content: dict) -> bool | None:
     return all(limited) if limited else None
 
 
-def _by_commit(commit: str | None, code: Path) -> str:
+def _by_commit(content: dict, code: Path) -> str:
     """By what Git says of the sources since then; a dirty commit is known to be older at most."""
+    commit = content.get("commit")
     if not isinstance(commit, str):
         return UNKNOWN
     clean = commit.removesuffix("-dirty")
     try:
-        asked = ["git", "diff", "--quiet", "--end-of-options", clean, "--", *PARTS]
+        asked = ["git", "diff", "--quiet", "--end-of-options", clean, "--", *_parts(content, code)]
         status = subprocess.run(asked, cwd=code, capture_output=True, check=False).returncode
     except OSError:
         return UNKNOWN
     same = TODAY if clean == commit else UNKNOWN
     return {0: same, 1: OLDER}.get(status, UNKNOWN)
+
+
+def _parts(content: dict, code: Path) -> list[str]:
+    """What the script of a figure's command imports today, if it names one."""
+    command = f"{content.get('alone', '')} {content.get('command', '')}"
+    for name in SCRIPT.findall(command):
+        script = name.removesuffix(".py").replace(".", "/")
+        for file in (code / f"{script}.py", code / script / "__main__.py"):
+            if file.is_file():
+                return [*digests(file, root=code)]
+    return [*PARTS]
 
 
 def _stage(file: Path, root: Path) -> str | None:

@@ -75,6 +75,22 @@ def test_without_digests_the_simulator_and_the_commit_decide(project: Path) -> N
         assert (only(project).state, only(project).changed) == (OLDER, [])
 
 
+def test_since_the_commit_only_what_the_command_names_counts(project: Path) -> None:
+    commit = git(project, "rev-parse", "--short", "HEAD")
+    (project / "pipeline/sling/solver.py").write_text("a = 5\n")
+    for command, state in (
+        ("python -m validation.bench band1", TODAY),
+        ("python -m pytest -n 0 validation/bench.py", TODAY),
+        ("python -m validation.none", OLDER),
+        ("sling bench --json", OLDER),
+    ):
+        write(project, "validation/x.json", commit=commit, command=command)
+        assert only(project).state == state, command
+    (project / "validation/bench.py").write_text("import pipeline.sling.solver\n")
+    write(project, "validation/x.json", commit=commit, command="python -m validation.bench")
+    assert only(project).state == OLDER
+
+
 def test_a_verification_is_met_if_all_its_limits_are_kept(project: Path) -> None:
     for values, met in (([True, None], True), ([True, False], False), ([None], None)):
         checks = [{"met": value} for value in values]

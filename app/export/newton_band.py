@@ -172,14 +172,13 @@ class SpringBands:
         )
         self._brake = wp.zeros(1, dtype=wp.float32, device=device)
         self._landing = wp.zeros(count, dtype=wp.float32, device=device)
-        self.device, self._graph = device, None
+        self.device = device
         self.drive(self.arm_stiffness)
 
     def drive(self, stiffness: float) -> None:
         """How stiff the hand's drive is [N/m]."""
         self._n.stiffness = stiffness
         self._n.hand_damping = 2 * np.sqrt(stiffness * HAND_MASS)
-        self._graph = None
 
     def draw(self, draws) -> np.ndarray:
         """Hold the bands with projectiles, at rest; hands are sent to (y, z), `draws` (N, 2).
@@ -242,29 +241,17 @@ class SpringBands:
         return self._on_hand.numpy().astype(float)
 
     def run(self, steps: int) -> None:
-        """Advance by an even number of steps."""
-        if wp.get_device(self.device).is_cuda and self._graph is None:
-            self._pair()  # compiles, which no capture may
-            steps -= 2
-            with wp.ScopedCapture(self.device) as capture:
-                self._pair()
-            self._graph = capture.graph
+        """Advance by an even number of steps; the first state is the current one again."""
+        now, after = self.states
         for _ in range(steps // 2):
-            if self._graph is None:
-                self._pair()
-            else:
-                wp.capture_launch(self._graph)
+            self.advance(now, after)
+            self.advance(after, now)
 
     def _until(self, done, longest: float) -> None:
         for _ in range(int(longest / self.step_size / LOOK) + 1):
             if done():
                 return
             self.run(LOOK)
-
-    def _pair(self) -> None:
-        """Two steps, after which the first state is the current one again."""
-        for now, after in (self.states, self.states[::-1]):
-            self.advance(now, after)
 
     def advance(self, now: newton.State, after: newton.State) -> None:
         """One step."""

@@ -40,5 +40,4 @@ for force, landing in zip(forces, landings):
 - Nothing collides.
 - **Time step {1e3 * step:g} ms.** The springs are explicit, so that no speed is lost. Half the step
   moves the proof's landings by {100 * finer:.2f} % at most. A larger one may not be stable.
-- It was run on the CPU. With `device="cuda:0"` two steps are captured as a CUDA graph; its use is
-  many bands at once."""
+- It was run on the CPU only. `device="cuda:0"` is taken, and was not tried."""

@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.export import mjcf, mujoco_replay
 from app.export.card import HOLD, LANDING, Matched
 from app.export.chain import SpringChain
 from app.export.match import compared, draws_of, proof_draws
 from app.export.newton_replay import NewtonReplay, loader, numbers
 from pipeline.sling.launch import ballistic_landing
+from pipeline.sling.model import GRAVITY
 from sling2sim2real import UserError, export
 from tests.app.export.test_mjcf import _paths
 
@@ -72,6 +74,15 @@ def test_another_band_would_be_noticed(model, chain) -> None:
     assert met(chain)
     assert not met(replace(chain, strength=1.05 * chain.strength))
     assert not met(replace(chain, damping_time=3 * chain.damping_time))
+
+
+def test_it_is_held_as_in_mujoco() -> None:
+    """The loader imports nothing of the project, so that it has constants of its own."""
+    own = loader()
+    assert (own.SETTLE, own.BRAKE, own.LONGEST) == (
+        mujoco_replay.SETTLE, mujoco_replay.BRAKE, mujoco_replay.LONGEST,
+    )  # fmt: skip
+    assert (own.HAND_MASS, own.STIFF, own.GRAVITY) == (mjcf.HAND_MASS, mjcf.STIFF, GRAVITY)
 
 
 @pytest.mark.parametrize("stiffness", [1.2e4, None])

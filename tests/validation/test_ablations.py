@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.search.loop import latin_hypercube
 from pipeline.search.optimizers import build
-from validation.campaigns.ablations import FIRST, LAST, PAPER, Job, Results, jobs_of, summary
+from validation.campaigns.ablations import FIRST, LAST, PAPER, Job, ResultLines, jobs_of, summary
 from validation.paired import compared, holm, mean_interval
 
 
@@ -112,7 +112,7 @@ def test_jobs_are_distinct_and_the_slow_ones_last() -> None:
 
 def test_a_result_that_was_cut_short_is_done_again(tmp_path) -> None:
     first, second = results({PAPER: 0})[:2]
-    kept = Results(tmp_path)
+    kept = ResultLines(tmp_path)
     kept.add(first)
     with kept.path.open("a") as file:
         file.write('{"band": "band1", "reco')

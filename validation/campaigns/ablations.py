@@ -152,7 +152,7 @@ def work_on(job: Job, work: Path) -> dict:
     return plain(vars(job) | result)
 
 
-class Results:
+class ResultLines:
     """Lines of JSON in a file; the last may be cut short, where a run was killed."""
 
     def __init__(self, work: Path) -> None:
@@ -237,7 +237,7 @@ def mean_of(values) -> float:
 def report(args, params) -> None:
     """Write what the results in the work folder say."""
     wanted = set(jobs_of(args.bands, args.methods, args.recordings, args.seeds))
-    results = [one for job, one in Results(args.work).all().items() if job in wanted]
+    results = [one for job, one in ResultLines(args.work).all().items() if job in wanted]
     if not results:
         raise UserError(f"{args.work}: holds no result of these bands and methods")
     command = "python -m validation.campaigns.ablations"
@@ -273,7 +273,7 @@ def report(args, params) -> None:
 
 def run(args) -> None:
     """Work through the jobs that have no result yet, until the time is over."""
-    end, results = time.monotonic() + 60 * args.minutes, Results(args.work)
+    end, results = time.monotonic() + 60 * args.minutes, ResultLines(args.work)
     there = results.all()
     jobs = [
         job

@@ -1,5 +1,7 @@
 """A band with parameters written by hand, coarsely simulated; nothing of a run is needed."""
 
+import sys
+
 import pytest
 
 from sling2sim2real import Band, LaunchHistory, Model, Settings, Theta
@@ -10,3 +12,11 @@ def model() -> Model:
     theta = Theta(2.2e5, 0.47, 2.4e-3, 0.7, 0.6, mooney_share=0.45, relaxation=0.02)
     band = Band(mass=0.023, diameter=0.010, rest_length=0.52, name="toy")
     return Model(band, theta, history=LaunchHistory(4.0, 2.0), settings=Settings.coarse())
+
+
+@pytest.fixture(scope="session")
+def outside() -> list[str]:
+    """Where other packages lie, but not this project."""
+    return [one for one in sys.path if one.endswith(("-packages", "lib-dynload", ".zip"))] + [
+        one for one in sys.path if one.rstrip("/").endswith(f"python3.{sys.version_info.minor}")
+    ]

@@ -15,7 +15,6 @@ from app.export.newton_replay import NewtonReplay, loader, numbers
 from pipeline.sling.launch import ballistic_landing
 from pipeline.sling.model import GRAVITY
 from sling2sim2real import UserError, export
-from tests.app.export.test_mjcf import _paths
 
 pytest.importorskip("newton", reason="newton: pip install -e '.[validation]'")
 pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[validation]'")
@@ -47,10 +46,10 @@ def test_it_is_proven_on_draws_that_took_no_part(model, done) -> None:
         assert row["hold_force_there_n"] == pytest.approx(ours.hold_force[0], rel=HOLD)
 
 
-def test_what_its_card_says_runs_without_this_project(done) -> None:
+def test_what_its_card_says_runs_without_this_project(done, outside) -> None:
     """In a process that cannot import it, in the folder of the export."""
     code = (done.folder / "README.md").read_text().split("```python\n")[1].split("```")[0]
-    start = f"import sys; sys.path[:] = ['.', *{_paths()}]\n"
+    start = f"import sys; sys.path[:] = ['.', *{outside}]\n"
     command = [sys.executable, "-I", "-c", start + code]
     run = subprocess.run(command, cwd=done.folder, capture_output=True, text=True, timeout=240)
     assert run.returncode == 0, run.stderr

@@ -21,8 +21,9 @@ def main() -> None:
     version = bands.release()
     about = environment(DEVICE, "python -m validation.engines.physx")
     bench = Bench(load(), device=DEVICE)
-    speeds = study.speeds(bench)
-    checks = study.pulls(bench)
+    with bands.Engine() as engine:
+        speeds = study.speeds(bench, engine)
+        checks = study.pulls(bench, engine)
     about["versions"] |= {"ovphysx": version}
     content = {
         "asked": study.ASK,

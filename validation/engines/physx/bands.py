@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from validation.engines.mesh import Tube
-from validation.engines.physx import scene
+from validation.engines.physx import scene, worker
 
 INTERPRETER = "SLING_PHYSX"  # the Python that has ovphysx; this one by default
 PACKAGES = "'ovphysx>=0.7,<0.8' physx-usd-schemas newton-usd-schemas"  # extra `physx`
@@ -59,43 +60,73 @@ class Course:
     attach_seconds: float
 
 
-def simulate(
-    tube: Tube, thetas: np.ndarray, phases: list[Drive], *, rate: int, iterations: int
-) -> list[Course]:
-    """Bands of the thetas (N, 5), each from the straight U in which `tube` hangs.
+class Engine:
+    """PhysX in a process of its own, which simulates one scene after the other.
 
-    Args:
-        rate: Steps a second.
-        iterations: Of the solver a step.
-
-    Raises:
-        UserError: PhysX is not installed, or there is no GPU, or it failed.
+    Raises UserError, here and in `simulate`: PhysX is not installed, or there is no GPU, or it
+    failed.
     """
-    thetas = np.atleast_2d(np.asarray(thetas, float))
-    job = {
-        "step": 1 / rate,
-        "phases": len(phases),
-        "offsets": scene.offsets(len(thetas)),
-        "rest": tube.rest.reshape(-1, 3),
-        "start": np.tile(tube.hanging.reshape(-1, 3), (len(thetas), 1, 1)),
-    }
-    for i, phase in enumerate(phases):
-        job |= {f"{name}_{i}": value for name, value in vars(phase).items()}
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        (folder / "scene.usda").write_text(scene.text(tube, thetas, rate, iterations))
-        np.savez(folder / "job.npz", **job)
-        _call(str(Path(__file__).with_name("worker.py")), name)
-        done = dict(np.load(folder / "result.npz"))
-    return [
-        Course(
-            done[f"positions_{i}"].reshape(-1, len(thetas), *tube.rest.shape).astype(float),
-            done[f"velocities_{i}"].reshape(-1, *tube.rest.shape).astype(float),
-            float(done[f"seconds_{i}"]),
-            float(done[f"attach_seconds_{i}"]),
-        )
-        for i in range(len(phases))
-    ]
+
+    def __init__(self) -> None:
+        release()
+        self._said = tempfile.TemporaryFile("w+")
+        self._process = subprocess.Popen(
+            [_python(), str(Path(worker.__file__))],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said, text=True,
+        )  # fmt: skip
+
+    def __enter__(self) -> Engine:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._process.kill()
+        self._process.wait()
+        self._said.close()
+
+    def simulate(
+        self, tube: Tube, thetas: np.ndarray, phases: list[Drive], *, rate: int, iterations: int
+    ) -> list[Course]:
+        """Bands of the thetas (N, 5), each from the straight U in which `tube` hangs.
+
+        Args:
+            rate: Steps a second.
+            iterations: Of the solver a step.
+        """
+        thetas = np.atleast_2d(np.asarray(thetas, float))
+        job = {
+            "step": 1 / rate,
+            "phases": len(phases),
+            "offsets": scene.offsets(len(thetas)),
+            "rest": tube.rest.reshape(-1, 3),
+            "start": np.tile(tube.hanging.reshape(-1, 3), (len(thetas), 1, 1)),
+        }
+        for i, phase in enumerate(phases):
+            job |= {f"{name}_{i}": value for name, value in vars(phase).items()}
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            (folder / "scene.usda").write_text(scene.text(tube, thetas, rate, iterations))
+            np.savez(folder / "job.npz", **job)
+            self._run(folder)
+            done = dict(np.load(folder / "result.npz"))
+        return [
+            Course(
+                done[f"positions_{i}"].reshape(-1, len(thetas), *tube.rest.shape).astype(float),
+                done[f"velocities_{i}"].reshape(-1, *tube.rest.shape).astype(float),
+                float(done[f"seconds_{i}"]),
+                float(done[f"attach_seconds_{i}"]),
+            )
+            for i in range(len(phases))
+        ]
+
+    def _run(self, folder: Path) -> None:
+        with suppress(BrokenPipeError):
+            self._process.stdin.write(f"{folder}\n")
+            self._process.stdin.flush()
+        for line in self._process.stdout:  # PhysX has words of its own there
+            if line.strip() == worker.DONE:
+                return
+        self._said.seek(0)
+        raise UserError(f"PhysX: {_last_line(self._said.read())}")
 
 
 def release() -> str:
@@ -105,17 +136,25 @@ def release() -> str:
 
 def _call(*arguments: str) -> str:
     """What the interpreter with PhysX prints. Raises UserError with its last line."""
-    python = os.environ.get(INTERPRETER) or sys.executable
+    python = _python()
     try:
         done = subprocess.run([python, *arguments], capture_output=True, text=True)
     except OSError as error:
         raise UserError(f"{INTERPRETER}={python}: {error.strerror}") from error
     if done.returncode:
-        said = [line for line in done.stderr.splitlines() if line.strip()] or ["no reason given"]
-        if "NotFoundError" in said[-1]:
+        said = _last_line(done.stderr)
+        if "NotFoundError" in said:
             raise UserError(
-                f"PhysX is not installed ({said[-1].partition(': ')[2]}): make an environment of"
+                f"PhysX is not installed ({said.partition(': ')[2]}): make an environment of"
                 f" its own, pip install {PACKAGES} there, and set {INTERPRETER} to its python"
             )
-        raise UserError(f"PhysX: {said[-1]}")
+        raise UserError(f"PhysX: {said}")
     return done.stdout
+
+
+def _python() -> str:
+    return os.environ.get(INTERPRETER) or sys.executable
+
+
+def _last_line(text: str) -> str:
+    return ([line for line in text.splitlines() if line.strip()] or ["no reason given"])[-1]

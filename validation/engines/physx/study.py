@@ -12,8 +12,7 @@ from pipeline.sling.model import GRAVITY, Sling
 from validation.benchmarks.timing import timed
 from validation.engines import checks
 from validation.engines.mesh import Tube
-from validation.engines.physx import bands
-from validation.engines.physx.bands import Course, Drive
+from validation.engines.physx.bands import Course, Drive, Engine
 from validation.engines.physx.law import energy_left, equal_modulus, force_on
 from validation.simulator.finding import Bench, Finding, off
 from validation.synthetic import pull_and_release, yardstick
@@ -73,7 +72,8 @@ def phases(tube: Tube, episode, rate: int, marked: bool = True) -> list[Drive]:
     hang = steps(SETTLE)
     held = steps(episode.release_time - episode.grasp_time)
     free = steps(episode.time[-1] - episode.release_time)
-    path = CubicSpline(episode.time, episode.position)(episode.grasp_time + held)
+    times = episode.release_time - held[-1] + held
+    path = CubicSpline(episode.time, episode.position)(times)
     led = path[:, None] + tube.rest[tube.middle] * [0.0, 1.0, 1.0]
     part = np.minimum(held / GRASP_BLEND, 1)
     return [
@@ -158,7 +158,7 @@ def compared(setting: str, ours: BandMotion, theirs: BandMotion, limits: bool) -
     ]  # fmt: skip
 
 
-def pulls(bench: Bench) -> list[Finding]:
+def pulls(bench: Bench, engine: Engine) -> list[Finding]:
     """The same pull in both engines, at each of SETTINGS, with our modulus and with a matched one.
 
     Raises:
@@ -179,7 +179,7 @@ def pulls(bench: Bench) -> list[Finding]:
         size = {"rate": rate, "iterations": iterations}
         course = phases(tube, episode, rate)
         scan = np.array([_scaled(theta[nu], f) for nu in POISSON for f in FACTORS])
-        scanned = motions(tube, scan, bands.simulate(tube, scan, course, **size))
+        scanned = motions(tube, scan, engine.simulate(tube, scan, course, **size))
         factors = {}
         for nu in POISSON:
             tried = [m for m, one in zip(scanned, scan, strict=True) if one[1] == nu]
@@ -204,7 +204,7 @@ def pulls(bench: Bench) -> list[Finding]:
             about = f"ours lies outside of what {FACTORS[0]:g} to {FACTORS[-1]:g} of E hold"
             found.append(Finding(title, "our simulator", np.nan, "", 0.0, about))
             continue
-        courses = bands.simulate(tube, matched, course, **size)
+        courses = engine.simulate(tube, matched, course, **size)
         left = balance(tube, matched, courses)
         for nu, motion, rest in zip(POISSON, motions(tube, matched, courses), left, strict=True):
             title = f"Poisson's ratio {nu:.2f}, {rate} Hz, {iterations} iterations, modulus matched"
@@ -221,7 +221,7 @@ def pulls(bench: Bench) -> list[Finding]:
     return found
 
 
-def speeds(bench: Bench) -> list[dict]:
+def speeds(bench: Bench, engine: Engine) -> list[dict]:
     """Rollouts a second of the yardstick of `sling bench`, PhysX's and ours on one device.
 
     A rollout of PhysX is the hold, loading the scene anew at the release, and the free flight.
@@ -235,7 +235,7 @@ def speeds(bench: Bench) -> list[dict]:
     entries = []
     for count in ENVIRONMENTS:
         thetas = np.tile(checks.THETA, (count, 1))
-        _, held, free = bands.simulate(tube, thetas, course, rate=rate, iterations=iterations)
+        _, held, free = engine.simulate(tube, thetas, course, rate=rate, iterations=iterations)
         interact(sling, episode, thetas, device=bench.device)  # compiles
         wall = timed(lambda n=thetas: interact(sling, episode, n, device=bench.device))[2]
         steps = len(course[1].targets) + len(course[2].targets)

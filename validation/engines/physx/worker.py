@@ -1,8 +1,8 @@
-"""Simulate one job with PhysX: `python worker.py FOLDER`, with nothing of this project.
+"""Simulate jobs with PhysX: `python worker.py`, with nothing of this project.
 
-FOLDER has scene.usda and job.npz (what bands.py writes), and gets result.npz. A stage's driven
-vertices cannot be freed again, so each phase attaches the scene anew and goes on from the nodes'
-places and velocities at the end of the last.
+Each line of standard input names a folder with scene.usda and job.npz (what bands.py writes); it
+gets result.npz, and DONE is said. A stage's driven vertices cannot be freed again, so each phase
+attaches the scene anew and goes on from the nodes' places and velocities at the end of the last.
 """
 
 import os
@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 DEVICE = "cuda:0"
+DONE = "the job is done"
 AS_WRITTEN = 2e-3  # m: attaching takes one step, in which a band falls by less
 
 
@@ -64,8 +65,8 @@ class Attached:
         self._stage.destroy()
 
 
-def main(folder: Path) -> None:
-    """Simulate the job's phases one after the other."""
+def start():
+    """PhysX, ready for scenes."""
     import ovphysx
     import ovstage
     import warp as wp
@@ -76,7 +77,12 @@ def main(folder: Path) -> None:
         sys.exit("deformable volumes need an NVIDIA GPU; there is none here")
     schemas = [*map(str, physx_schema_paths()), str(ovphysx.newton_schema_root())]
     ovstage.population.register_usd_schemas(schemas)
-    physx = PhysX(config=PhysXConfig(carbonite_overrides={"/physics/suppressReadback": True}))
+    return PhysX(config=PhysXConfig(carbonite_overrides={"/physics/suppressReadback": True}))
+
+
+def simulate(physx, folder: Path) -> None:
+    """Simulate a job's phases one after the other."""
+    import warp as wp
 
     job = dict(np.load(folder / "job.npz"))
     offset, step = job["offsets"][:, None], float(job["step"])
@@ -104,19 +110,20 @@ def main(folder: Path) -> None:
             scene.write(2, drive)
             physx.step_sync(step)
             if kept_one:
-                kept.append(scene.state()[0] - offset)
+                kept.append((scene.state()[0] - offset).astype(np.float32))
         wp.synchronize()
         result[f"seconds_{phase}"] = time.perf_counter() - began
         result[f"attach_seconds_{phase}"] = scene.seconds
         place, velocity = scene.state()
-        shape = (0, *place.shape)
-        result[f"positions_{phase}"] = np.array(kept or np.zeros(shape), np.float32)
+        result[f"positions_{phase}"] = np.array(kept or np.zeros((0, *place.shape)), np.float32)
         result[f"velocities_{phase}"] = velocity
         scene.close()
-    np.savez(folder / "result.npz", **result, version=ovphysx.__version__)
+    np.savez(folder / "result.npz", **result)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
-    sys.stdout.flush()
+    engine = start()
+    for line in sys.stdin:
+        simulate(engine, Path(line.strip()))
+        print(DONE, flush=True)
     os._exit(0)  # PhysX's own end can hang

@@ -106,7 +106,8 @@ def test_a_pull_holds_and_lets_go(sling, tube):
         pytest.skip("PhysX simulates deformable volumes on an NVIDIA GPU only")
     episode = checks.episode_of(sling)
     course = study.phases(tube, episode, 200)
-    courses = bands.simulate(tube, THETA[None], course, rate=200, iterations=64)
+    with bands.Engine() as engine:
+        courses = engine.simulate(tube, THETA[None], course, rate=200, iterations=64)
     (motion,) = study.motions(tube, THETA[None], courses)
     assert motion.held > 10 and motion.recoil > 2
     assert study.balance(tube, THETA[None], courses)[0] < 10

@@ -1,0 +1,68 @@
+"""The recorded interaction in PhysX, as the search's evaluator asks for it.
+
+The paper's settings. The hand holds a section of the band and lets go of it at once: an attachment,
+not pads, so that friction has no effect; the damping scale has no slot in today's PhysX.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.sling.interaction import Rollouts
+from pipeline.sling.model import GRAVITY
+from validation.engines.checks import SAME_MESH
+from validation.engines.mesh import Tube
+from validation.engines.physx.bands import Engine
+from validation.engines.physx.study import MARK, motions, phases
+
+RATE, ITERATIONS = MARK, 64  # the paper's steps a second, and the solver's iterations
+SPACE = 10.0  # m: a band that leaves it has burst
+BURST = "the band burst in PhysX"
+
+
+def simulate_with(engine: Engine):
+    """What an `Evaluator` calls as simulate(sling, episode=, thetas=, device=)."""
+
+    def simulated(sling, *, episode, thetas: np.ndarray, device: str) -> Rollouts:
+        tube = Tube.of(sling, **SAME_MESH)
+        course = phases(tube, episode, RATE)
+        courses = engine.simulate(tube, thetas, course, rate=RATE, iterations=ITERATIONS)
+        return rollouts(sling, tube, episode, thetas, courses)
+
+    return simulated
+
+
+def rollouts(sling, tube: Tube, episode, thetas: np.ndarray, courses) -> Rollouts:
+    """Forces and centre lines of the courses that `study.phases` makes, on the episode's clock.
+
+    Before the grasp the band hangs and nothing pulls at the hand; after the release, neither.
+    """
+    with np.errstate(all="ignore"):  # burst bands
+        bands = motions(tube, thetas, courses)
+    held, free = (len(one.positions) for one in courses[1:])
+    marks = episode.release_time + np.arange(1 - held, free + 1) / RATE
+    times = [episode.grasp_time - 1 / RATE, *marks[:held]]
+    times += [episode.release_time + sling.finger_opening_time, marks[-1]]
+    section = tube.mass.reshape(tube.rest.shape[:2])[tube.middle].sum()
+    force, lines, failure = [], [], []
+    for band in bands:
+        sound = np.isfinite(band.lines).all() and np.abs(band.lines).max() < SPACE
+        pull = (band.force if sound else np.nan * band.force) - [0, 0, section * GRAVITY]
+        force.append(np.concatenate([np.zeros((1, 3)), pull, np.zeros((2, 3))]))
+        lines.append(_at(episode.cloud_time, marks, _between(sling.arc, tube.arc, band.lines)))
+        failure.append(None if sound else BURST)
+    line = np.array(lines, np.float32)
+    return Rollouts(np.array(times), np.array(force), episode.cloud_time, line, failure)
+
+
+def _between(arc: np.ndarray, places: np.ndarray, lines: np.ndarray) -> np.ndarray:
+    """Centre lines (S, L, 3), given at places (L,) along the band, at arc (M,)."""
+    return _at(arc, places, lines.swapaxes(0, 1)).swapaxes(0, 1)
+
+
+def _at(wanted: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (K, ...) at known (K,), interpolated along the first axis; beyond it the outermost."""
+    after = np.searchsorted(known, wanted).clip(1, len(known) - 1)
+    part = ((wanted - known[after - 1]) / (known[after] - known[after - 1])).clip(0, 1)
+    part = part.reshape(-1, *[1] * (values.ndim - 1))
+    return (1 - part) * values[after - 1] + part * values[after]

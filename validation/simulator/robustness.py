@@ -47,12 +47,14 @@ def ranges(thetas: list[dict[str, float]], names=THETA) -> str:
     return ", ".join(told(name) for name in names)
 
 
-def survey(bench: Bench, sling: Sling, thetas: np.ndarray, progress=print) -> dict:
-    """Roll all thetas out, batch by batch, and count what comes of them."""
+def survey(
+    bench: Bench, sling: Sling, thetas: np.ndarray, progress=print, batch: int = BATCH
+) -> dict:
+    """Roll thetas (N, 5), or points with what the law adds, out; count what comes of them."""
     episode = pull_and_release("band", bench.params.episode, sling)
     reasons, bad, farthest, failed = Counter(), 0, 0.0, []
-    for first in range(0, len(thetas), BATCH):
-        part = thetas[first : first + BATCH]
+    for first in range(0, len(thetas), batch):
+        part = thetas[first : first + batch]
         own, theta = at_points(sling, part)
         done = interact(own, episode, theta, device=bench.device, workers=bench.workers)
         good = np.array([reason is None for reason in done.failure])
@@ -65,7 +67,7 @@ def survey(bench: Bench, sling: Sling, thetas: np.ndarray, progress=print) -> di
             for k in np.flatnonzero(~good)
             if done.failure[k] == UNCONVERGED
         ]
-        if first // BATCH % 4 == 3:
+        if first // batch % 4 == 3:
             progress(f"  {first + len(part)}/{len(thetas)} rollouts, {dict(reasons)}")
     return {
         "rollouts": len(thetas),
@@ -82,7 +84,8 @@ def survey_launches(bench: Bench, sling: Sling, thetas: np.ndarray) -> dict:
     draws = np.column_stack(
         [rng.uniform(*box, len(thetas)) for box in (setup.draw_y, setup.draw_z)]
     )
-    done = launch(sling, thetas, draws, device=bench.device, workers=bench.workers)
+    own, theta = at_points(sling, thetas)
+    done = launch(own, theta, draws, device=bench.device, workers=bench.workers)
     good = np.array([reason is None for reason in done.failure])
     outcome = np.column_stack([done.landing_y, done.speed, done.angle, done.hold_force])
     return {

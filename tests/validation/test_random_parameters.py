@@ -1,0 +1,42 @@
+"""The campaign of random parameter sets: what it draws, and that it counts what is not marked."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.params import load
+from pipeline.sling.rubber import NEO_HOOKEAN, RUBBER
+from validation.campaigns import random_parameters
+from validation.simulator import robustness
+from validation.simulator.finding import Bench
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    return Bench(load())
+
+
+def test_the_sets_fill_the_box_of_each_law(bench) -> None:
+    points = random_parameters.points(bench, RUBBER, 500)
+    boxes = [(box.low, box.high) for _, box in bench.params.parameters]
+    boxes += [(-0.3, 0.9), (0.0, 0.05)]
+    low, high = np.array(boxes).T
+    assert points.shape == (500, 7)
+    assert ((low <= points) & (points <= high)).all()
+    assert (np.ptp(points[:, 5:], axis=0) > 0.9 * (high - low)[5:]).all()
+    assert random_parameters.points(bench, NEO_HOOKEAN, 3).shape == (3, 5)
+
+
+def test_what_is_not_finite_and_not_marked_is_counted(bench, monkeypatch) -> None:
+    sound = random_parameters.surveyed(bench, NEO_HOOKEAN, 8)
+    assert [one["not_finite"] for one in sound.values()] == [0, 0, 0]
+    true = robustness.interact
+
+    def broken(*args, **options):
+        done = true(*args, **options)
+        return replace(done, force=np.nan * done.force, failure=[None] * len(done.failure))
+
+    monkeypatch.setattr(robustness, "interact", broken)
+    found = random_parameters.surveyed(bench, NEO_HOOKEAN, 8)
+    assert [found[name]["not_finite"] for name in ("held_fast", "default_grip")] == [4, 4]

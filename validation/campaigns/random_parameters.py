@@ -1,0 +1,84 @@
+"""Random parameter sets of both laws: each rollout and launch is finite, or says why not.
+
+    python -m validation.campaigns.random_parameters --count 10000
+    python -m validation.campaigns.random_parameters --count 100000 --device cuda:0
+
+The sets fill the box of params.yaml, and for the law `rubber` the bounds of our method. Half of the
+rollouts have pads that hold anything, half those of the setup; as many launches go with them.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.base import errors
+from pipeline.base.files import write_json
+from pipeline.base.machine import cores
+from pipeline.params import load
+from pipeline.params.identification import LAWS
+from pipeline.sling.rubber import NEO_HOOKEAN, RUBBER
+from validation.benchmarks.timing import environment, timed
+from validation.simulator.agreement import random_thetas
+from validation.simulator.experiment import band_of
+from validation.simulator.finding import Bench
+from validation.simulator.robustness import HELD_FAST, SEED, survey, survey_launches
+
+METHOD = "least_squares"  # whose bounds the law `rubber` has
+BATCH = 2_000
+REPORT = "reports/validation/random-parameters-{}.json"
+
+
+def points(bench: Bench, law: str, count: int) -> np.ndarray:
+    """Random points (count, 5 + what the law adds) of the box."""
+    bounds = bench.params.methods[METHOD].bounds
+    boxes = np.array([bounds[name] for name in LAWS[law]]).reshape(-1, 2)
+    own = np.random.default_rng(SEED).uniform(*boxes.T, (count, len(boxes)))
+    return np.hstack([random_thetas(bench, count, SEED), own])
+
+
+def surveyed(bench: Bench, law: str, count: int, progress=print) -> dict:
+    """What comes of `count` rollouts and as many launches of one law, and the seconds they took."""
+    sling, sets = replace(band_of(bench), law=law), points(bench, law, count)
+    fast = replace(sling, grip_force=HELD_FAST)
+    half = count // 2
+    tasks = {
+        "held_fast": lambda: survey(bench, fast, sets[:half], progress, BATCH),
+        "default_grip": lambda: survey(bench, sling, sets[half:], progress, BATCH),
+        "launches": lambda: survey_launches(bench, sling, sets),
+    }
+    found = {}
+    for name, task in tasks.items():
+        content, _, wall = timed(task)
+        found[name] = content | {"seconds": wall}
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--count", type=int, default=10_000, help="sets of each law")
+    parser.add_argument("--device", default="cpu")
+    asked = parser.parse_args()
+    bench = Bench(load(), device=asked.device, workers=cores())
+    laws = {law: surveyed(bench, law, asked.count) for law in (NEO_HOOKEAN, RUBBER)}
+    unmarked = sum(one["not_finite"] for law in laws.values() for one in law.values())
+    command = "python -m validation.campaigns.random_parameters"
+    content = {
+        "asked": "No rollout and no launch that is not finite and not marked as failed.",
+        "sets": asked.count,
+        "seed": SEED,
+        "unmarked": unmarked,
+        "met": unmarked == 0,
+        "laws": laws,
+        **environment(asked.device, f"{command} --count {asked.count} --device {asked.device}"),
+    }
+    path = Path(REPORT.format(asked.device.replace(":", "-")))
+    write_json(path, content)
+    print(f"{path}: {unmarked} unmarked")
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -132,7 +132,7 @@ class Identification(Model):
         return cls(
             band=Band(about.mass, about.diameter, about.rest_length, band),
             theta=Theta.of_file(file),
-            mounting=read_json(path, Mounting) if path.exists() else None,
+            mounting=read_json(path, Mounting) if file.mounted and path.exists() else None,
             history=file.history and LaunchHistory(**file.history.model_dump()),
             settings=settings,
             intervals=_intervals(content, told) if told else {},
@@ -191,8 +191,10 @@ def identify(
                 f"launches: {launch}: draw y < 0, error >= 0 and landing > 0 are needed"
             )
     if start is None:
-        mounting = _mounting(episodes[0], band, settings)
-        progress(f"mounting: clamps at {mounting.clamp_angle_deg:.0f} degrees")
+        mounting = None
+        if settings.methods[METHOD].mounting:
+            mounting = _mounting(episodes[0], band, settings)
+            progress(f"mounting: clamps at {mounting.clamp_angle_deg:.0f} degrees")
         sling = _sling(band, settings, mounting)
         point, rollouts = _explored(episodes[0], sling, settings)
         progress(f"explored {rollouts} points")

@@ -35,7 +35,7 @@ from pipeline.search.history import History, theta_content
 from pipeline.search.loop import Free, search
 from pipeline.search.optimizers.multistart import Multistart
 from pipeline.search.regions import Region, regions_of, save_regions
-from pipeline.sling.load import load_sling
+from pipeline.sling.load import sling_of_method
 from pipeline.sling.material import THETA
 from pipeline.sling.rubber import RUBBER
 from pipeline.sling.theta import calibrated
@@ -72,7 +72,7 @@ def searched(params, band: str, method: str, free: Free, regions: list[Region]) 
     sources = layout.history(band, method), layout.refined(band, method)
     history = History.load(method, (*THETA, *LAWS[law]), *sources)
     known = {"law": RUBBER, "history": launch_history(load_episode(band))} if law == RUBBER else {}
-    return theta_content(history, band, known)
+    return theta_content(history, band, known | unmounted(params, method))
 
 
 def fitted(params, band: str, method: str) -> tuple[dict, dict]:
@@ -81,7 +81,7 @@ def fitted(params, band: str, method: str) -> tuple[dict, dict]:
     explored = History.load(method, names, layout.history(band, method))
     best = explored.best()
     expect_apart(layout, band)
-    sling = load_sling(params, band, law=params.methods[method].law)
+    sling = sling_of_method(params, band, method)
     found = identify.identify(
         params,
         method,
@@ -94,7 +94,7 @@ def fitted(params, band: str, method: str) -> tuple[dict, dict]:
             f"{band} {method}: expansion {fit.steps}, misfit {fit.misfit:.2f}", flush=True
         ),
     )
-    content = identify.theta_content(found, band, method)
+    content = identify.theta_content(found, band, method) | unmounted(params, method)
     content["confidence"] = identify.confidence(found, params.parameters)
     content["rollouts"] = len(explored.total) + found.rollouts
 
@@ -129,6 +129,11 @@ def promising(about, optimizer, explored: History) -> tuple[list[Region], int]:
         return [], 0
     explored.best()  # says why, where all failed
     return regions_of(about, optimizer, explored)
+
+
+def unmounted(params, method: str) -> dict:
+    """What a θ file says where the method leaves out the calibration of the clamps."""
+    return {} if params.methods[method].mounting else {"mounted": False}
 
 
 def _trust(about: dict) -> str:

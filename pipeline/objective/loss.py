@@ -22,6 +22,7 @@ from pipeline.episode.episode import Episode
 from pipeline.episode.phases import held_out_blocks, reach, within
 from pipeline.episode.signal import as_recorded, cutoff_hz
 from pipeline.objective.chamfer import Chamfer
+from pipeline.objective.clouds import CloudDistance
 from pipeline.objective.device_terms import DeviceTerms
 
 TERMS = ("geom", "force", "work")
@@ -46,7 +47,7 @@ class EpisodeLoss:
         weights: dict[str, float],
         cutoff: float,
         median_window: int = 7,
-        symmetric: bool = True,
+        chamfer: str = "symmetric",
         held_out: np.ndarray | None = None,
     ) -> None:
         """Prepare the recorded side.
@@ -56,7 +57,8 @@ class EpisodeLoss:
             weights: Of each of TERMS; a term that weighs nothing is still computed.
             cutoff: Of the low-pass that the recorded force went through [Hz].
             median_window: Samples of the median filter on forces and velocity, odd.
-            symmetric: Chamfer distance both ways, or measured to simulated alone.
+            chamfer: "symmetric": between the cloud and the tube both ways; "measured": measured to
+                simulated alone; "clouds": between two clouds, as the paper prints it.
             held_out: Begin and end [s] of blocks that are not fitted, shape (B, 2). Samples nearer
                 to them than the force's filters reach count nowhere; clouds pass no filter.
 
@@ -69,12 +71,12 @@ class EpisodeLoss:
         self.time, self.period = episode.time, episode.sample_period
         self.velocity = self.smooth(episode.velocity)
         self.force = self.smooth(episode.force)
-        self.chamfer = Chamfer(
-            episode.clouds,
-            episode.camera,
-            radius=radius,
-            rest_length=rest_length,
-            symmetric=symmetric,
+        seen_as = episode.clouds, episode.camera
+        sizes = {"radius": radius, "rest_length": rest_length}
+        self.chamfer = (
+            CloudDistance(*seen_as, **sizes)
+            if chamfer == "clouds"
+            else Chamfer(*seen_as, **sizes, symmetric=chamfer == "symmetric")
         )
         blocks = np.zeros((0, 2)) if held_out is None else np.asarray(held_out, float)
         guard = reach(self.period, cutoff, median_window)
@@ -85,7 +87,7 @@ class EpisodeLoss:
         self.held_frames = within(episode.cloud_time, blocks) & seen
         pull = np.array([[episode.grasp_time, episode.release_time - guard]])
         self._pull = within(self.time, pull), within(episode.cloud_time, pull)
-        self._on_device = DeviceTerms(
+        self._on_device = isinstance(self.chamfer, Chamfer) and DeviceTerms(
             self.chamfer,
             force=self.force,
             velocity=self.velocity,
@@ -109,7 +111,7 @@ class EpisodeLoss:
             weights=dict(params.methods[method].weights),
             cutoff=cutoff,
             median_window=params.loss.median_window,
-            symmetric=params.loss.chamfer == "symmetric",
+            chamfer=params.loss.chamfer,
             held_out=held_out_blocks(episode, held.blocks, held.length, guard),
         )
 
@@ -123,16 +125,16 @@ class EpisodeLoss:
             weights={"geom": 1.0, "force": 1.0, "work": 0.0},
             cutoff=cutoff_hz(params.force.cutoff, params.force.cutoff_unit),
             median_window=params.loss.median_window,
-            symmetric=params.loss.chamfer == "symmetric",
+            chamfer=params.loss.chamfer,
         )
 
     def terms(self, rollouts) -> dict[str, np.ndarray]:
         """Each term of N rollouts, shape (N,); NaN or infinite where a rollout is.
 
-        They are computed on the device that holds the rollouts. A rollout's terms are the same to
-        the bit in any batch.
+        They are computed on the device that holds the rollouts, but between two clouds on the CPU.
+        A rollout's terms are the same to the bit in any batch.
         """
-        if not isinstance(rollouts.force, np.ndarray):
+        if self._on_device and not isinstance(rollouts.force, np.ndarray):
             found = self._on_device(rollouts, self._filter(rollouts.times))
             return dict(zip(TERMS, found.T, strict=True))
         gap, frames = self._gap(rollouts), self.frames(rollouts)

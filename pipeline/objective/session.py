@@ -17,7 +17,7 @@ from pipeline.objective.cache import EvaluationCache
 from pipeline.objective.evaluate import Evaluation, Evaluator
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
-from pipeline.sling.load import load_sling
+from pipeline.sling.load import sling_of_method
 
 PIPELINE = Path(__file__).parents[1]
 SOURCES = (  # the code that a term of the loss hangs on
@@ -52,9 +52,10 @@ def service(stage: str, band: str, method: str, params, rollouts: int) -> Loggin
     """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
     evaluate, layout = evaluator(params, band, method), Layout()
     sections = (params.bands[band], params.setup, params.sling, params.force, params.loss)
+    mounted = params.methods[method].mounting
     cache = EvaluationCache(
         evaluate,
-        Path(".checkpoints", band),
+        Path(".checkpoints", band if mounted else f"{band}-unmounted"),
         fingerprint(
             *SOURCES,
             *(layout.episode(band) / f"{name}.parquet" for name in ("signals", "clouds")),
@@ -70,7 +71,7 @@ def service(stage: str, band: str, method: str, params, rollouts: int) -> Loggin
 def evaluator(params, band: str, method: str) -> Evaluator:
     """The evaluator of a recorded band, on the devices that the environment names."""
     episode = load_episode(band)
-    sling = load_sling(params, band, law=params.methods[method].law)
+    sling = sling_of_method(params, band, method)
     return Evaluator(
         episode,
         sling,

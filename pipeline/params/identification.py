@@ -74,7 +74,7 @@ class HeldOut(Section):
 
 
 class LossParams(Section):
-    chamfer: Literal["symmetric", "measured"]
+    chamfer: Literal["symmetric", "measured", "clouds"]
     median_window: Annotated[int, Range(1, 101)]
     held_out: HeldOut
 
@@ -153,6 +153,7 @@ class MethodDefaults(Section):
     fixed: dict[str, Value]
     bounds: dict[str, Bounds]
     k_top: KTop | None
+    mounting: bool
     covariance: bool
 
 

@@ -62,3 +62,4 @@ class CloudParams(Section):
     statistical_ratio: Annotated[float, Range(0.1, 100)]
     radius: Annotated[float, Range(1e-4, 1)]
     radius_neighbors: Annotated[int, Range(1, 1000)]
+    sampling: Literal["after_filters", "before_filters"]

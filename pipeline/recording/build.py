@@ -103,7 +103,7 @@ def episode_of(done: Processed, band_name: str, params: object) -> Episode:
     def of_streams(name: str) -> dict:
         return {role: getattr(stream, name) for role, stream in recording.streams.items()}
 
-    removal = "statistical_neighbors", "statistical_ratio", "radius", "radius_neighbors"
+    removal = "statistical_neighbors", "statistical_ratio", "radius", "radius_neighbors", "sampling"
     metadata = {
         "setup": {
             **_named(params.setup, "fork_width", "fork_height"),

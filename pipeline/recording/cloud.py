@@ -1,4 +1,7 @@
-"""Masked depth to clouds: outliers off first, because farthest point sampling would pick them."""
+"""Masked depth to clouds: outliers off first, because farthest point sampling would pick them.
+
+`cloud.sampling: before_filters` samples first, in the paper's order.
+"""
 
 from __future__ import annotations
 
@@ -81,7 +84,9 @@ def cloud_of(view: View, frame: Frame, found: np.ndarray, cloud: object) -> np.n
 
 
 def sample(points: np.ndarray, cloud: object, density: float = np.inf) -> np.ndarray:
-    """Statistical and radius outlier removal, then at most cloud.points of them, (P, 3) float32.
+    """Statistical and radius outlier removal, and at most cloud.points of them, (P, 3) float32.
+
+    Which of both comes first, cloud.sampling says.
 
     Args:
         points: Shape (S, 3).
@@ -96,11 +101,16 @@ def sample(points: np.ndarray, cloud: object, density: float = np.inf) -> np.nda
 
     if len(points) <= cloud.statistical_neighbors:
         return np.zeros((0, 3), np.float32)
+
+    def sampled(dense):
+        more = len(dense.points) > cloud.points
+        return dense.farthest_point_down_sample(cloud.points) if more else dense
+
     dense = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points.astype(np.float64)))
+    if cloud.sampling == "before_filters":
+        dense = sampled(dense)
     dense, _ = dense.remove_statistical_outlier(
         cloud.statistical_neighbors, cloud.statistical_ratio
     )
     dense, _ = dense.remove_radius_outlier(neighbors, cloud.radius)
-    if len(dense.points) > cloud.points:
-        dense = dense.farthest_point_down_sample(cloud.points)
-    return np.asarray(dense.points, np.float32).reshape(-1, 3)
+    return np.asarray(sampled(dense).points, np.float32).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""The sling of a band of params.yaml, as its recording has calibrated the clamps."""
+"""The sling of a band of params.yaml, with the clamps as its recording has calibrated them."""
 
 from __future__ import annotations
 
@@ -19,12 +19,24 @@ class Mounting(JsonRecord):
     flexural_rigidity: Annotated[float, Range(0, 1e3)]
 
 
-def load_sling(params, band: str, root: str | Path = ".", law: str = NEO_HOOKEAN) -> Sling:
+def load_sling(
+    params, band: str, root: str | Path = ".", law: str = NEO_HOOKEAN, *, mounted: bool = True
+) -> Sling:
     """The sling of a band of params.yaml, mounted as its recording shows where that was fitted.
+
+    Args:
+        mounted: False leaves out what was fitted: the band hangs as `setup` says.
 
     Raises NotMade where the file of the mounting is damaged.
     """
-    path = Layout(Path(root)).mounting(band)
-    mounting = read_json(path, Mounting).model_dump() if path.exists() else None
+    path, mounting = Layout(Path(root)).mounting(band), None
+    if mounted and path.exists():
+        mounting = read_json(path, Mounting).model_dump()
     sling = Sling.of(params.bands[band], params.setup, params.sling, mounting)
     return replace(sling, law=law)
+
+
+def sling_of_method(params, band: str, method: str, root: str | Path = ".") -> Sling:
+    """The sling of a band as a method of params.yaml takes it: with its law, mounted or not."""
+    about = params.methods[method]
+    return load_sling(params, band, root, about.law, mounted=about.mounting)

@@ -4,7 +4,8 @@
 "law": "rubber", θ has its parameters too and "history" {"pull_time", "pause"} says in how many
 seconds the recording's hand drew the band and how long it waited. Where a stage wrote it, also
 "method", "nuisances": {"air_drag": ...}, "turn_damping", "returned_share", "loss":
-{"geom", "force", "work", "total"}, "rollouts", "confidence"
+{"geom", "force", "work", "total"}, "rollouts", "confidence"; "mounted": false where the method
+leaves out the calibration of the clamps.
 
 What its confidence rests on, samples of θ, lies beside in data/confidence/.
 """
@@ -62,6 +63,7 @@ class ThetaFile(JsonRecord):
     nuisances: Nuisances = Nuisances()
     turn_damping: Annotated[float, Range(0, 1)] = 0.0
     returned_share: Annotated[float, Range(0.1, 10)] = 1.0
+    mounted: bool = True
 
     @model_validator(mode="after")
     def _keys_of_its_law(self) -> ThetaFile:
@@ -123,7 +125,8 @@ def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Slin
     extra["turn_damping"] = content.get("turn_damping", 0.0)
     extra["returned_share"] = content.get("returned_share", 1.0)
     extra["history"] = launch_history(params, content)
-    return replace(load_sling(params, band, root, law), **extra)
+    sling = load_sling(params, band, root, law, mounted=content.get("mounted", True))
+    return replace(sling, **extra)
 
 
 def launch_history(params, content: dict) -> LaunchHistory | None:

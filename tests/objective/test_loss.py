@@ -23,8 +23,8 @@ def test_a_perfect_simulation_costs_nothing_and_one_unit_reads_one() -> None:
     for name in ("geom", "force", "work"):
         np.testing.assert_allclose(terms[name], np.zeros(3), atol=1e-2)
     lines = toy.rollouts(episode, shift=(0, 0, -0.01))
-    for symmetric in (True, False):
-        terms = loss_of(episode, symmetric=symmetric).terms(lines)
+    for chamfer in ("symmetric", "measured"):
+        terms = loss_of(episode, chamfer=chamfer).terms(lines)
         assert terms["geom"][0] == pytest.approx(1.0, abs=0.01)
     for force in ((1, 0, 0), (0, -1, 0), (0.6, 0, 0.8)):
         terms = loss_of(episode).terms(toy.rollouts(episode, force=force))

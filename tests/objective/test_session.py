@@ -63,6 +63,15 @@ def test_other_params_of_the_terms_start_over(evaluators: list[Evaluate]) -> Non
     assert [one.count for one in evaluators] == [1, 0, 1, 1, 1, 1]
 
 
+def test_without_the_clamps_nothing_is_shared_and_nothing_lost(evaluators) -> None:
+    bare = PARAMS.methods["sling2sim2real"].model_copy(update={"mounting": False})
+    methods = {**PARAMS.methods, "bare": bare}
+    params = PARAMS.model_copy(update={"methods": methods})
+    for method in ("sling2sim2real", "bare", "sling2sim2real", "bare"):
+        serve(method, params)
+    assert [one.count for one in evaluators] == [1, 1, 0, 0]
+
+
 def test_another_number_of_gpus_does_not(evaluators: list[Evaluate], monkeypatch) -> None:
     """A GPU instead of the CPU does: it rounds differently."""
     monkeypatch.setattr(machine, "gpus", lambda: ("cuda:0", "cuda:1"))

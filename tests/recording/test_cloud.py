@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from pipeline.base.errors import UserError
 from pipeline.params import load
@@ -34,6 +35,38 @@ def test_strays_are_removed_and_the_band_is_covered() -> None:
     gaps = np.diff(np.sort(points[:, 0]))  # the farthest points first: no gap is left
     assert gaps.max() < 0.01
     assert np.ptp(points[:, 0]) > 0.39
+
+
+def test_the_papers_order_samples_first_and_so_keeps_more_strays() -> None:
+    """Both orders against NumPy and SciPy; strays are farthest, so that all of them are sampled."""
+    random = np.random.default_rng(0)
+    strays = random.uniform([0, 0.05, 0.05], [0.4, 0.3, 0.3], (40, 3))
+    points = np.concatenate([tube(4000, random), strays])
+    settings = SETTINGS.model_copy(update={"points": 300, "radius_neighbors": 2})
+    literal = settings.model_copy(update={"sampling": "before_filters"})
+
+    def filtered(cloud: np.ndarray) -> np.ndarray:
+        tree = cKDTree(cloud)
+        mean = tree.query(cloud, settings.statistical_neighbors)[0].mean(axis=1)
+        limit = mean.mean() + settings.statistical_ratio * mean.std(ddof=1)
+        cloud = cloud[mean < limit]
+        near = cKDTree(cloud).query_ball_point(cloud, settings.radius, return_length=True)
+        return cloud[near > settings.radius_neighbors]  # itself is one of them
+
+    def sampled(cloud: np.ndarray) -> np.ndarray:
+        chosen, away = [0], np.full(len(cloud), np.inf)
+        while len(chosen) < settings.points:
+            away = np.minimum(away, ((cloud - cloud[chosen[-1]]) ** 2).sum(axis=1))
+            chosen.append(int(away.argmax()))
+        return cloud[chosen]
+
+    def rows(cloud: np.ndarray) -> set:
+        return {tuple(row) for row in np.asarray(cloud, np.float32).tolist()}
+
+    ours, papers = (rows(cloud.sample(points, one)) for one in (settings, literal))
+    assert ours == rows(sampled(filtered(points)))
+    assert papers == rows(filtered(sampled(points)))
+    assert len(ours) == settings.points > len(papers) > 0.5 * settings.points
 
 
 def test_few_points_are_no_cloud() -> None:

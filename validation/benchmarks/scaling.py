@@ -20,7 +20,7 @@ from pipeline.params import expect_known
 from pipeline.search.history import History
 from pipeline.search.loop import latin_hypercube
 from pipeline.sling.launch import Launches, launch
-from pipeline.sling.load import load_sling
+from pipeline.sling.load import sling_of_method
 from pipeline.sling.theta import at_points
 from validation.benchmarks.methods import BUDGETS, evaluator, time_search
 from validation.benchmarks.timing import REPEATS, seconds, timed
@@ -65,8 +65,7 @@ def scaling(params, devices: Sequence[str], band: str | None, method: str, size:
     expect_known(params, "method", method)
     if band:
         expect_known(params, "band", band)
-        law = params.methods[method].law
-        sling, episode = load_sling(params, band, law=law), load_episode(band)
+        sling, episode = sling_of_method(params, band, method), load_episode(band)
     else:
         sling, episode = recorded_yardstick(params)
     optimizer = params.optimizer.model_copy(update=BUDGETS[size])

@@ -31,7 +31,6 @@ from pipeline.episode.episode import Episode
 from pipeline.objective.space import Space
 from pipeline.params import expect_known, load
 from pipeline.rig.physics.launch import launch
-from pipeline.sling.model import Sling
 from validation.benchmarks.timing import environment
 from validation.campaigns.rig_scores import aimed, plain, recorded, sling_of
 from validation.density import found
@@ -40,7 +39,7 @@ from validation.paired import LEVEL, compared, mean_interval
 WORK = Path("data/ablations")
 REPORT = Path("reports/validation/ablations.json")
 FIRST, SEEDS = 1001, 5  # rig seed of the first recording; search seeds on it
-PAPER, NO_CLAMPS = "sling2sim2real", "no_clamp_calibration"
+PAPER = "sling2sim2real"
 LAST = "plain_bo"  # takes as long as all others
 
 
@@ -76,7 +75,7 @@ def with_variants(params):
         "no_covariance_no_multistart_plain": variant("PlainStarts", k_top=1, **starts),
         LAST: variant("SmallBatches"),
         "plain_adam": variant("PlainAdam"),
-        NO_CLAMPS: one,
+        "no_clamp_calibration": one.model_copy(update={"mounting": False}),
     }
     return params.model_copy(update={"methods": methods})
 
@@ -115,8 +114,6 @@ def identified(job: Job, params, folder: Path) -> dict:
     optimizer = params.optimizer.model_copy(update={"seed": job.seed})
     params = params.model_copy(update={"optimizer": optimizer})
     sling = sling_of(params, job.band, job.method, folder)
-    if job.method == NO_CLAMPS:
-        sling = Sling.of(params.bands[job.band], params.setup, params.sling)
     start, targets = time.perf_counter(), params.trials.targets
     outcome, told = found(params, job.method, sling, [Episode.load(folder / "episode")])
     seconds = time.perf_counter() - start
@@ -256,7 +253,6 @@ def report(args, params) -> None:
             "search_seeds_on_the_first": sorted({one["seed"] for one in results}),
             "optimizer": params.optimizer.model_dump(),
             "methods": {name: params.methods[name].model_dump() for name in args.methods},
-            "without_clamp_calibration": [NO_CLAMPS],
             "intervals": f"{100 * LEVEL:.0f} %, percentile bootstrap over recordings (or seeds)",
             "tests": f"Wilcoxon signed-rank, two-sided, against {PAPER} on the same recordings;"
             " Holm's correction over the methods, within a band and within all bands together",

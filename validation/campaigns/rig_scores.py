@@ -57,10 +57,11 @@ def calibrated_clamps(params, band: str, episode: Episode, folder: Path) -> None
 
 
 def sling_of(params, band: str, method: str, folder: Path) -> Sling:
-    """The band as a method takes it, with the clamps of its first recording."""
-    mounting = json.loads((folder / "mounting.json").read_text())
+    """The band as a method takes it, with or without the clamps of its first recording."""
+    about = params.methods[method]
+    mounting = json.loads((folder / "mounting.json").read_text()) if about.mounting else None
     sling = Sling.of(params.bands[band], params.setup, params.sling, mounting)
-    return replace(sling, law=params.methods[method].law)
+    return replace(sling, law=about.law)
 
 
 def aimed(outcome: Calibrated, params, targets: Sequence[float] = TARGETS) -> np.ndarray:

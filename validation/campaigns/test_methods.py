@@ -15,7 +15,7 @@ from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.launches.stretch import recorded_stretch, stretch_of
 from pipeline.params import load
-from pipeline.sling.load import load_sling
+from pipeline.sling.load import sling_of_method
 from validation.benchmarks.methods import LARGE
 from validation.campaigns.test_orange import (
     BAND,
@@ -54,7 +54,7 @@ class Recorded:
         params = params or self.params
         optimizer = params.optimizer.model_copy(update={"seed": seed})
         params = params.model_copy(update={"optimizer": optimizer})
-        sling = load_sling(params, BAND, self._project, params.methods[method].law)
+        sling = sling_of_method(params, BAND, method, self._project)
         outcome, _ = found(params, method, sling, [episode or self.episode])
         return outcome(self.draws).landing_y / self.landing - 1, outcome.point
 

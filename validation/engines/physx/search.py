@@ -33,7 +33,7 @@ from pipeline.params import load
 from pipeline.search.history import History
 from pipeline.search.loop import budget
 from pipeline.sling.launch import launch
-from pipeline.sling.load import load_sling
+from pipeline.sling.load import sling_of_method
 from validation.benchmarks.methods import complete
 from validation.benchmarks.timing import environment
 from validation.engines.physx.bands import Engine, release
@@ -50,7 +50,7 @@ class Comparison:
     def __init__(self, params, band: str, engine: Engine) -> None:
         self.params, self.band = params, band
         self.episode = Episode.load(Layout().episode(band))
-        self.sling = load_sling(params, band, law=params.methods[METHOD].law)
+        self.sling = sling_of_method(params, band, METHOD)
         self.space = Space.of_method(params, METHOD)
         self._loss = EpisodeLoss.of(params, METHOD, self.episode, self.sling)
         self._simulate = {OURS: simulated, PHYSX: simulate_with(engine)}

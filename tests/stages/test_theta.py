@@ -1,0 +1,51 @@
+"""From an episode to θ by both stages of a search, with the calibrated clamps and without them."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+from pipeline.base.files import write_json
+from pipeline.base.layout import Layout
+from pipeline.params import load
+from pipeline.sling.theta import calibrated, load_theta
+from sling2sim2real.identification import Identification
+from stages import history, theta
+from tests.objective.own_law import own_law_episode
+from tests.project import ROOT
+from validation.synthetic import recorded_yardstick
+
+BUDGET = {"population": 5, "generations": 2, "k_top": 1, "k_nn": 6, "cma_population": 4}
+SHOWN = {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}
+
+
+@pytest.mark.parametrize("mounting", [True, False])
+def test_what_a_method_leaves_out_is_left_out_everywhere(
+    mounting: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    yaml = YAML()
+    content = yaml.load(ROOT / "params.yaml")
+    content["optimizer"].update({**BUDGET, "cma_rollouts": 4})
+    content["methods"]["sling2sim2real"]["mounting"] = mounting
+    yaml.dump(content, tmp_path / "params.yaml")
+    params, layout = load(), Layout()
+    sling, episode = recorded_yardstick(params)
+    truth = np.array([2e5, 0.45, 2e-3, 0.7, 0.6])
+    episode = own_law_episode(sling, episode, truth, cutoff=35.0)
+    episode.save(layout.episode("band1"))
+    write_json(layout.mounting("band1"), SHOWN)
+    monkeypatch.setattr(sys, "argv", ["stage", "band1", "sling2sim2real"])
+    history.main()
+    theta.main()
+    path = layout.theta("band1", "sling2sim2real")
+    found = load_theta(path, "band1")
+    assert json.loads(path.read_text()).get("mounted") == (None if mounting else False)
+    assert (calibrated(params, "band1", found).flexural_rigidity == 2e-3) == mounting
+    told = Identification.of_run("band1", "sling2sim2real")
+    assert (told.mounting is not None) == mounting
+    folders = {folder.name for folder in Path(".checkpoints").iterdir()}
+    assert folders == {"band1" if mounting else "band1-unmounted"}

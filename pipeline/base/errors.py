@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # a disk that takes no more
 
 
 class UserError(Exception):
@@ -17,7 +20,7 @@ def one_line(said: object) -> str:
 
 
 def run(main: Callable[[], int | None]) -> None:
-    """Run a command: a UserError becomes one line on stderr and exit status 1."""
+    """Run a command: a UserError, or a full disk, becomes one line on stderr and exit status 1."""
     try:
         status = main()
         sys.stdout.flush()
@@ -26,6 +29,12 @@ def run(main: Callable[[], int | None]) -> None:
         sys.exit(1)
     except BrokenPipeError:  # the reader, such as head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        what = f"{error.filename}:" if error.filename else "a file"
+        print(f"error: {what} cannot be written ({os.strerror(error.errno)})", file=sys.stderr)
         sys.exit(1)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)

@@ -1,38 +1,37 @@
-"""Whole files or none: everything is written to a temporary name and then renamed."""
+"""Whole files or none: everything is written to a temporary name and then renamed.
+
+It is on the disk before it bears its name, and its name is there before anything goes on: what a
+later run finds is whole after a power cut too.
+"""
 
 from __future__ import annotations
 
-import errno
 import glob
 import json
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
-from pipeline.base.errors import UserError
-
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # a disk that takes no more
+from pipeline.base.errors import FULL, UserError
 
 
 @contextmanager
 def replacing_folder(path: Path) -> Iterator[Path]:
     """Give an empty folder beside `path`, which takes its place on success, whatever was there.
 
-    What killed processes left of `path` is removed too.
+    What killed processes left of `path` is removed too. Raises UserError where the disk is full.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    _remove_abandoned(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
+    with _temporary(path) as temporary:
         temporary.mkdir()
         yield temporary
+        for one in (*temporary.rglob("*"), temporary):
+            _sync(one)
         shutil.rmtree(path, ignore_errors=True)
         os.replace(temporary, path)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        _sync(path.parent)
 
 
 @contextmanager
@@ -40,23 +39,40 @@ def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary path beside `path`; rename it to `path` on success, remove it on failure.
 
     What killed processes left of `path` is removed too. Raises UserError where the disk is full.
-    It is renamed once it is on the disk: else a power cut leaves some file systems an empty file.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    _remove_abandoned(path)
+    with _temporary(path) as temporary:
+        yield temporary
+        _sync(temporary)
+        os.replace(temporary, path)
+        _sync(path.parent)
+
+
+@contextmanager
+def _temporary(path: Path) -> Iterator[Path]:
+    """A free name beside `path`; whatever bears it in the end is removed."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _remove_abandoned(path)
         yield temporary
-        with temporary.open("r+b") as file:
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
     except OSError as error:
         if error.errno not in FULL:
             raise
         raise UserError(f"{path}: cannot be written ({os.strerror(error.errno)})") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        shutil.rmtree(temporary, True) if temporary.is_dir() else temporary.unlink(missing_ok=True)
+
+
+def _sync(path: Path) -> None:
+    """Wait until a file's contents, or the names in a folder, are on the disk."""
+    number = os.open(path, os.O_RDONLY)
+    try:
+        # A folder's: some network file systems know no such thing.
+        with suppress(OSError) if path.is_dir() else nullcontext():
+            os.fsync(number)
+    finally:
+        os.close(number)
 
 
 def _remove_abandoned(path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import torch
@@ -30,5 +31,7 @@ class Checkpoint:
 
     def save(self, state: dict) -> None:
         """Keep a state of tensors, numbers, texts, lists and dictionaries."""
+        saved = io.BytesIO()  # PyTorch itself would not say that a disk is full
+        torch.save({"fingerprint": self.fingerprint, "state": state}, saved)
         with replacing(self.path) as temporary:
-            torch.save({"fingerprint": self.fingerprint, "state": state}, temporary)
+            temporary.write_bytes(saved.getvalue())

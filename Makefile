@@ -1,5 +1,5 @@
 # Each target works first on a fresh clone: it sets up .venv where that is missing or out of date.
-.PHONY: help setup demo run large ui test lint validate clean
+.PHONY: help setup demo run large paper ui test lint validate clean
 .DEFAULT_GOAL := run
 
 help:                 # this list
@@ -17,7 +17,10 @@ run: setup            # everything that is stale, as `dvc repro` does it, on all
 	PATH="$(CURDIR)/.venv/bin:$$PATH" sling flow
 
 large: setup          # the same with ten times the rollouts a method; an hour and more
-	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/python tools/large.py
+	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/python tools/preset.py large
+
+paper: setup          # the same as the paper prints it (presets/paper.yaml)
+	PATH="$(CURDIR)/.venv/bin:$$PATH" .venv/bin/python tools/preset.py paper
 
 ui: setup             # what `sling flow` does, in a browser on this machine: http://127.0.0.1:4200
 	@.venv/bin/sling ui

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
-from ruamel.yaml.nodes import ScalarNode
-from ruamel.yaml.representer import RoundTripRepresenter
 
+from app.params_file import edited
 from app.preflight import recordings as files
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
@@ -86,24 +83,15 @@ def add_band(
     return files.told(f"{name} added", reports)
 
 
-def _null(representer: RoundTripRepresenter, _: None) -> ScalarNode:
-    """Written out as it stands in the file, where ruamel would leave it empty."""
-    return representer.represent_scalar("tag:yaml.org,2002:null", "null")
-
-
 def _with_band(path: Path, name: str, band: dict[str, object]) -> str:
     """The text of params.yaml with the band in `bands` and in `run.bands`, all else as it was."""
-    yaml = YAML()
-    yaml.preserve_quotes = True
-    yaml.width = 10_000
-    yaml.representer.add_representer(type(None), _null)
-    content = yaml.load(path.read_text(encoding="utf-8"))
-    if name not in content["bands"]:
-        entry = CommentedMap(band)
-        entry.fa.set_flow_style()
-        content["bands"][name] = entry
-    if name not in content["run"]["bands"]:
-        content["run"]["bands"].append(name)
-    stream = io.StringIO()
-    yaml.dump(content, stream)
-    return stream.getvalue()
+
+    def add(content: CommentedMap) -> None:
+        if name not in content["bands"]:
+            entry = CommentedMap(band)
+            entry.fa.set_flow_style()
+            content["bands"][name] = entry
+        if name not in content["run"]["bands"]:
+            content["run"]["bands"].append(name)
+
+    return edited(path.read_text(encoding="utf-8"), add)

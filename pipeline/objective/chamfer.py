@@ -14,6 +14,7 @@ import numpy as np
 
 LANES = {"cpu": 16, "cuda": 32}
 SAMPLES = 3  # simulated points an edge
+RINGS, AROUND = 125, 8  # vertices along the band and around it: as many as a measured cloud has
 
 
 class Chamfer:
@@ -63,13 +64,12 @@ class Chamfer:
         import warp as wp
 
         from pipeline.base.native import launch
-        from pipeline.objective.kernel import chamfer_kernel
 
         count, frames, nodes, _ = center_line.shape
         if frames != self.frames:
             raise ValueError(f"{frames} simulated frames, {self.frames} measured")
         lanes = LANES["cuda" if device.startswith("cuda") else "cpu"]
-        kernel, kind = chamfer_kernel(nodes - 1, SAMPLES, self.symmetric, lanes, self.culled)
+        kernel, kind = self._kernel(nodes - 1, lanes)
         with self._lock:
             if device not in self._packed:
                 arrays = _pack(self.clouds, lanes)
@@ -89,6 +89,25 @@ class Chamfer:
         arrays.errors = errors = wp.empty(count * frames * 2, dtype=wp.float32, device=device)
         launch(kernel, count * frames, [arrays], device)
         return errors
+
+    def _kernel(self, edges: int, lanes: int):
+        from pipeline.objective.kernel import chamfer_kernel
+
+        return chamfer_kernel(edges, SAMPLES, self.symmetric, lanes, self.culled)
+
+
+class CloudDistance(Chamfer):
+    """The Chamfer distance as the paper prints it: between two clouds, of which one is simulated.
+
+    That is the mean of both directions' mean distances to the nearest point of the other cloud. The
+    simulated cloud is a mesh's: vertices all around the tube, in rings that are evenly spaced along
+    the unstretched band, on the side that no camera sees too.
+    """
+
+    def _kernel(self, edges: int, lanes: int):
+        from pipeline.objective.kernel import clouds_kernel
+
+        return clouds_kernel(edges, RINGS, AROUND, lanes, self.culled)
 
 
 def _pack(clouds: list[np.ndarray], lanes: int) -> tuple[np.ndarray, ...]:

@@ -1,5 +1,6 @@
-"""chamfer.h and terms.h as Warp kernels. (Warp reads annotations: no postponed ones here.)"""
+"""The texts of this folder as Warp kernels. (Warp reads annotations: no postponed ones here.)"""
 
+import math
 from pathlib import Path
 
 import warp as wp
@@ -16,6 +17,24 @@ def chamfer_kernel(
     Returns:
         The kernel, and the structure of arrays that it takes.
     """
+    macros = {"SAMPLES": samples, "BOTH": int(both)}
+    return _cloud_kernel("chamfer.h", EDGES=edges, CULLED=int(culled), CPU_LANES=lanes, **macros)
+
+
+@built_once
+def clouds_kernel(
+    edges: int, rings: int, around: int, lanes: int, culled: bool = True
+) -> tuple[wp.Kernel, type]:
+    """Compile clouds.h for a mesh; as `chamfer_kernel`."""
+    angles = [2 * math.pi * k / around for k in range(around)]
+    macros = {"RINGS": rings, "AROUND": around}
+    for name, turn in (("COSINES", math.cos), ("SINES", math.sin)):
+        macros[name] = "{" + ", ".join(f"{turn(angle):.9f}f" for angle in angles) + "}"
+    return _cloud_kernel("clouds.h", EDGES=edges, CULLED=int(culled), CPU_LANES=lanes, **macros)
+
+
+def _cloud_kernel(file: str, **macros) -> tuple[wp.Kernel, type]:
+    """Of points.h and a text after it, for the arrays of `Chamfer`."""
     floats, integers = wp.array(dtype=wp.float32), wp.array(dtype=wp.int32)
 
     @wp.struct
@@ -31,9 +50,8 @@ def chamfer_kernel(
         camera: wp.vec3
         errors: floats
 
-    macros = {"BOTH": int(both), "CULLED": int(culled), "CPU_LANES": lanes}
-    path = Path(__file__).with_name("chamfer.h")
-    text = text_of(path, arrays=CloudArrays, EDGES=edges, SAMPLES=samples, **macros)
+    paths = (Path(__file__).with_name(name) for name in ("points.h", file))
+    text = text_of(*paths, arrays=CloudArrays, **macros)
 
     @wp.func_native(text)
     def distances(tid: int, arrays: CloudArrays): ...

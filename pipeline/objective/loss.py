@@ -21,8 +21,7 @@ from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.episode.phases import held_out_blocks, reach, within
 from pipeline.episode.signal import as_recorded, cutoff_hz
-from pipeline.objective.chamfer import Chamfer
-from pipeline.objective.clouds import CloudDistance
+from pipeline.objective.chamfer import Chamfer, CloudDistance
 from pipeline.objective.device_terms import DeviceTerms
 
 TERMS = ("geom", "force", "work")
@@ -71,12 +70,13 @@ class EpisodeLoss:
         self.time, self.period = episode.time, episode.sample_period
         self.velocity = self.smooth(episode.velocity)
         self.force = self.smooth(episode.force)
-        seen_as = episode.clouds, episode.camera
-        sizes = {"radius": radius, "rest_length": rest_length}
-        self.chamfer = (
-            CloudDistance(*seen_as, **sizes)
-            if chamfer == "clouds"
-            else Chamfer(*seen_as, **sizes, symmetric=chamfer == "symmetric")
+        distance = CloudDistance if chamfer == "clouds" else Chamfer
+        self.chamfer = distance(
+            episode.clouds,
+            episode.camera,
+            radius=radius,
+            rest_length=rest_length,
+            symmetric=chamfer != "measured",
         )
         blocks = np.zeros((0, 2)) if held_out is None else np.asarray(held_out, float)
         guard = reach(self.period, cutoff, median_window)
@@ -87,7 +87,7 @@ class EpisodeLoss:
         self.held_frames = within(episode.cloud_time, blocks) & seen
         pull = np.array([[episode.grasp_time, episode.release_time - guard]])
         self._pull = within(self.time, pull), within(episode.cloud_time, pull)
-        self._on_device = isinstance(self.chamfer, Chamfer) and DeviceTerms(
+        self._on_device = DeviceTerms(
             self.chamfer,
             force=self.force,
             velocity=self.velocity,
@@ -131,10 +131,10 @@ class EpisodeLoss:
     def terms(self, rollouts) -> dict[str, np.ndarray]:
         """Each term of N rollouts, shape (N,); NaN or infinite where a rollout is.
 
-        They are computed on the device that holds the rollouts, but between two clouds on the CPU.
-        A rollout's terms are the same to the bit in any batch.
+        They are computed on the device that holds the rollouts. A rollout's terms are the same to
+        the bit in any batch.
         """
-        if self._on_device and not isinstance(rollouts.force, np.ndarray):
+        if not isinstance(rollouts.force, np.ndarray):
             found = self._on_device(rollouts, self._filter(rollouts.times))
             return dict(zip(TERMS, found.T, strict=True))
         gap, frames = self._gap(rollouts), self.frames(rollouts)

@@ -58,10 +58,11 @@ def loss_of(episode, **options) -> EpisodeLoss:
     [
         {},
         {"chamfer": "measured", "median_window": 1},
+        {"chamfer": "clouds"},
         {"median_window": 5},
         {"held_out": np.array([[1.2, 1.3]])},
     ],
-    ids=("plain", "measured", "narrow median", "held out"),
+    ids=("plain", "measured", "clouds", "narrow median", "held out"),
 )
 def test_terms_are_those_of_numpy(options: dict) -> None:
     episode, rollouts = recoiling()
@@ -112,7 +113,7 @@ def test_the_text_compiles_for_a_gpu(tmp_path) -> None:
 
 
 @pytest.mark.skipif(not gpus(), reason="no CUDA device on this machine")
-@pytest.mark.parametrize("chamfer", ["symmetric", "measured"])
+@pytest.mark.parametrize("chamfer", ["symmetric", "measured", "clouds"])
 def test_terms_of_a_gpu_are_those_of_the_cpu(chamfer: str) -> None:
     """64 rollouts of the CPU, compared there and on the GPU with clouds of noise; to 1e-4."""
     params = load("params.yaml")

@@ -1,0 +1,126 @@
+"""Presets in params.yaml; how long the run took, though it was killed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from pipeline.base.errors import UserError
+from pipeline.params import load
+from tests.project import ROOT, until
+from tools.preset import KEPT, PRESETS, preset, timed, write_preset
+from validation.benchmarks.methods import LARGE
+
+RUN = ["sh", "-c", "test -e finish || exec sleep 60"]
+TOLD = "import sys; from pathlib import Path; from tools.preset import timed;"
+
+
+def seconds(folder: Path) -> float:
+    """That are noted of the first stretch."""
+    kept = folder / KEPT
+    return json.loads(kept.read_text())["stretches"][0] if kept.is_file() else -1.0
+
+
+def test_stretches_add_up_over_a_kill_until_a_run_succeeds(tmp_path: Path) -> None:
+    code = f"{TOLD} timed({RUN}, Path({str(tmp_path)!r}), tick=0.05)"
+    with subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, start_new_session=True) as first:
+        try:
+            until(lambda: first.poll() is None and seconds(tmp_path) >= 0.3)
+        finally:
+            os.killpg(first.pid, signal.SIGKILL)
+    (tmp_path / "finish").touch()
+    status, (before, last) = timed(RUN, tmp_path)
+    assert status == 0 and 0.3 <= before < 60 and last < 0.3
+    assert not (tmp_path / KEPT).exists()
+    assert len(timed(RUN, tmp_path)[1]) == 1
+
+
+def test_a_run_that_fails_keeps_its_time_and_another_command_begins_anew(tmp_path: Path) -> None:
+    fails = ["sh", "-c", "exit 3"]
+    assert [timed(fails, tmp_path) for _ in range(2)][1] == (3, [0.0, 0.0])
+    assert len(timed(["true"], tmp_path)[1]) == 1
+
+
+def leaves(node: dict, *path: str) -> dict[tuple, object]:
+    """Values by their keys' paths; a list is one value."""
+    found = {}
+    for key, value in node.items():
+        found |= leaves(value, *path, key) if isinstance(value, dict) else {(*path, key): value}
+    return found
+
+
+@pytest.mark.parametrize("name", sorted(one.stem for one in PRESETS.glob("*.yaml")))
+def test_a_presets_keys_are_all_that_changes(name: str, tmp_path: Path) -> None:
+    before, path = (ROOT / "params.yaml").read_text(encoding="utf-8"), tmp_path / "params.yaml"
+    path.write_text(before, encoding="utf-8")
+    write_preset(path, preset(name))
+    load(path)  # is valid
+    after = path.read_text(encoding="utf-8")
+    old, new = (leaves(YAML(typ="safe").load(text)) for text in (before, after))
+    changed = leaves(preset(name))
+    assert set(changed) <= set(old)  # each key stands in params.yaml, so that one sees it change
+    assert new == old | changed and all(old[key] != value for key, value in changed.items())
+    differ = [
+        (one, other)
+        for one, other in zip(before.splitlines(), after.splitlines(), strict=True)
+        if one != other
+    ]
+    assert len(differ) == len(changed)
+    assert all(one.partition("#")[2] == other.partition("#")[2] for one, other in differ)
+    write_preset(path, preset(name))  # again, as after a kill
+    assert path.read_text(encoding="utf-8") == after
+
+
+def test_the_large_preset_is_the_large_budget() -> None:
+    assert preset("large") == {"optimizer": LARGE}
+
+
+def test_the_papers_preset_has_no_method_of_ours_and_searches_the_whole_box(tmp_path: Path) -> None:
+    path = tmp_path / "params.yaml"
+    path.write_text((ROOT / "params.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    write_preset(path, preset("paper"))
+    params = load(path)
+    run = [params.methods[name] for name in (*params.run.methods, *params.run.ablations.methods)]
+    assert not any(one.mounting for one in run)
+    assert {one.law for one in run} == {"neo_hookean"} and not any(one.bounds for one in run)
+    assert not params.methods["sling2sim2real"].fixed
+
+
+def test_what_is_no_preset_or_spoils_params_is_refused_and_nothing_changes(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="^huge: no such preset; there are large, paper$"):
+        preset("huge")
+    path, text = tmp_path / "params.yaml", (ROOT / "params.yaml").read_text(encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
+    for wrong, told in (
+        ({"optimizer": {"populatoin": 64}}, "optimizer.populatoin"),
+        ({"optimizer": {"population": "many"}}, "optimizer.population"),
+    ):
+        with pytest.raises(UserError, match=told):
+            write_preset(path, wrong)
+        assert path.read_text(encoding="utf-8") == text
+
+
+def test_another_presets_stretches_do_not_count(tmp_path: Path) -> None:
+    fails = ["sh", "-c", "exit 3"]
+    timed(fails, tmp_path, label="large")
+    assert len(timed(fails, tmp_path, label="large")[1]) == 2
+    assert len(timed(fails, tmp_path, label="paper")[1]) == 1
+
+
+def test_a_termination_ends_the_run_as_well(tmp_path: Path) -> None:
+    code = f"import sys; {TOLD} sys.exit(timed({RUN}, Path({str(tmp_path)!r}), tick=0.05)[0] != 0)"
+    process = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, start_new_session=True)
+    try:
+        until(lambda: seconds(tmp_path) >= 0)
+        process.terminate()
+        assert process.wait(20) == 1
+        with pytest.raises(ProcessLookupError):
+            os.killpg(process.pid, 0)  # nobody is left
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)

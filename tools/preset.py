@@ -1,0 +1,110 @@
+"""Run everything with a preset of presets/, and say how long it took.
+
+    python tools/preset.py large    # as `make large`; further arguments go to `sling flow`
+
+The preset's keys are written into params.yaml, for `git diff` to show and
+`git checkout params.yaml reports dvc.lock` to take back; then `sling flow`. Killed, it goes on
+where it was, and `seconds` in reports/run.js adds up its stretches.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from ruamel.yaml import YAML
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from app.params_file import edited  # noqa: E402
+from pipeline.base import errors  # noqa: E402
+from pipeline.base.errors import UserError  # noqa: E402
+from pipeline.base.files import write_json, write_text  # noqa: E402
+from pipeline.params import parse  # noqa: E402
+from pipeline.report.run import write_run  # noqa: E402
+
+PRESETS = ROOT / "presets"
+KEPT = Path(".checkpoints", "preset.json")  # "runs" and the "stretches" [s] of a run without an end
+TICK = 10.0  # s, that a kill may lose of its stretch
+
+
+def preset(name: str) -> dict:
+    """What presets/<name>.yaml holds. Raises UserError."""
+    path = PRESETS / f"{name}.yaml"
+    if not path.is_file():
+        known = ", ".join(sorted(one.stem for one in PRESETS.glob("*.yaml")))
+        raise UserError(f"{name}: no such preset; there are {known}")
+    return YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+
+
+def write_preset(path: Path, changes: dict) -> None:
+    """Write a preset's keys into params.yaml, whose comments stay. Raises UserError."""
+    text = edited(path.read_text(encoding="utf-8"), lambda content: _merge(content, changes))
+    parse(text, str(path))
+    write_text(path, text)
+
+
+def _merge(content: dict, changes: dict) -> None:
+    for key, value in changes.items():
+        if isinstance(value, dict) and isinstance(content.get(key), dict):
+            _merge(content[key], value)
+        elif isinstance(value, list) and isinstance(content.get(key), list):
+            content[key][:] = value  # it stays on its line
+        else:
+            content[key] = value
+
+
+def timed(
+    run: list[str], root: Path = ROOT, tick: float = TICK, label: str = ""
+) -> tuple[int, list[float]]:
+    """Exit status of a command, and the seconds of its stretches [s], those before a kill first.
+
+    They are kept until it succeeds; another command, or another label, begins anew.
+    """
+    kept, runs = root / KEPT, [label, *run]
+    try:
+        content = json.loads(kept.read_text(encoding="utf-8"))
+        before = content["stretches"] if content["runs"] == runs else []
+    except (OSError, ValueError, KeyError, TypeError):
+        before = []
+    start, status = time.monotonic(), None
+    process = subprocess.Popen(run, cwd=root)
+    earlier = signal.signal(signal.SIGTERM, lambda *_: process.terminate())
+    while status is None:
+        with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):  # Ctrl-C ends the flow as well
+            status = process.wait(tick)
+        stretches = [*before, round(time.monotonic() - start, 1)]
+        with suppress(UserError):  # a full disk, of which the flow itself will tell
+            write_json(kept, {"runs": runs, "stretches": stretches})
+    signal.signal(signal.SIGTERM, earlier)
+    if status == 0:
+        kept.unlink(missing_ok=True)
+    return status, stretches
+
+
+def main() -> int:
+    if len(sys.argv) < 2:
+        raise UserError("usage: python tools/preset.py NAME [arguments of `sling flow`]")
+    name, *more = sys.argv[1:]
+    run = ["sling", "flow", *more]
+    write_preset(ROOT / "params.yaml", preset(name))
+    status, stretches = timed(run, label=name)
+    if status == 0:
+        took = {
+            "runs": " ".join(run),
+            "preset": name,
+            "seconds": round(sum(stretches)),
+            "stretches": len(stretches),
+        }
+        print(json.dumps(write_run(ROOT / "reports", **took), indent=2))
+    return status
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -20,8 +20,10 @@ def main(folder: str, target: str) -> None:
     )
     wanted, given = card["input"], card["output"]
 
-    targets = np.array([[float(target)]], np.float32)  # (batch, 1), metres
-    draws = policy.run([given["name"]], {wanted["name"]: targets})[0]  # (batch, 2), metres
+    inputs = {wanted["name"]: np.array([[float(target)]], np.float32)}  # (batch, 1), metres
+    if projectile := card.get("projectile"):  # a policy that sees it: (batch, 2), metres
+        inputs[projectile["name"]] = np.array([projectile["trained_at"]], np.float32)
+    draws = policy.run([given["name"]], inputs)[0]  # (batch, 2), metres
     y, z = draws[0].tolist()
     print(f"draw to y = {y:.3f} {given['unit']}, z = {z:.3f} {given['unit']}")
     print(f"frame: {given['frame']}; {given['meaning']}")

@@ -3,7 +3,7 @@
     python -m stages.policy band1 sling2sim2real
 
 Reads data/theta/<band>/<method>.json; writes data/policies/<band>/<method>/: policy.onnx and
-policy.pt (metres to metres), card.json, map.parquet (the simulated launches) and training.parquet.
+policy.pt (metres to metres), card.json, map.parquet (launches over the box) and training.parquet.
 A killed training goes on from .checkpoints/policy/.
 SLING_DEVICE says where launches are simulated; PPO runs on one thread of the CPU.
 """
@@ -18,9 +18,11 @@ from pipeline.base.layout import Layout
 from pipeline.base.machine import devices, kind
 from pipeline.base.progress import Progress
 from pipeline.landing.landing_map import LandingMap, validation
+from pipeline.landing.simulated import SimulatedLandings
 from pipeline.landing.simulator import asked_of_the_hand, simulator
 from pipeline.landing.stored import Stored
 from pipeline.policy.check import check, figures, verdict
+from pipeline.policy.environment import projectile_start
 from pipeline.policy.export import export
 from pipeline.policy.train import train
 from pipeline.sling.theta import load_theta
@@ -45,9 +47,14 @@ def main() -> None:
     kept = Path(".checkpoints/policy", f"{band}-{method}.pt")
     title = f"policy-{band}-{method}"
     progress = Progress(title, params.policy.iterations, "iterations", every=EVERY)
-    trained = train(landing_map.surface, params.policy, kept, progress)
+    surface, settings = landing_map.surface, params.policy
+    if settings.landings == "simulated":  # the map then shows what the simulator does, no more
+        surface = SimulatedLandings(launcher, surface)
+    seen = settings.state == "projectile_target"
+    start = projectile_start(params.setup, params.bands[band]) if seen else None
+    trained = train(surface, settings, kept, progress, projectile=start)
     checked = check(trained.policy, launcher, params)
-    training = figures(trained, checked)
+    training = figures(trained, checked, settings.landings)
 
     stored = Stored(band, method)
     landing_map.save(stored.folder / "map.parquet", {"band": band, "method": method})

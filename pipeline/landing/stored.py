@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from pipeline.base.layout import Layout, NotMade, made
-from pipeline.base.schema import JsonRecord, read_json
+from pipeline.base.schema import LIST, JsonRecord, read_json
 
 
 class Training(JsonRecord):
@@ -32,11 +33,16 @@ class LandingMapErrors(JsonRecord):
     target_range: MapError
 
 
+class Projectile(JsonRecord):
+    trained_at: Annotated[tuple[float, float], LIST]  # (y, z), m
+
+
 class Card(JsonRecord):
     """As much of a policy's card (policy/export.py) as is read."""
 
     training: Training
     landing_map: LandingMapErrors
+    projectile: Projectile | None = None  # of a policy that sees it
 
 
 @dataclass(frozen=True)
@@ -72,11 +78,23 @@ class Stored:
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         options.log_severity_level = 4  # what is wrong is said below
-        targets = np.asarray(targets, np.float32)[:, None]
+        given = {"target": np.asarray(targets, np.float32)[:, None]}
         try:
             session = onnxruntime.InferenceSession(
                 path.read_bytes(), options, providers=["CPUExecutionProvider"]
             )
-            return session.run(["draw"], {"target": targets})[0].astype(float)
+            if "projectile" in {port.name for port in session.get_inputs()}:
+                at = np.array(self._projectile(), np.float32)
+                given["projectile"] = np.tile(at, (len(given["target"]), 1))
+            return session.run(["draw"], given)[0].astype(float)
+        except NotMade:
+            raise
         except Exception as error:  # onnxruntime has an error of its own for each kind of damage
             raise NotMade(path, "damaged") from error
+
+    def _projectile(self) -> tuple[float, float]:
+        """Where the projectile starts (y, z) [m], as the policy was trained with."""
+        about = self.card()["projectile"]
+        if about is None:
+            raise NotMade(self.folder / "card.json", "lacks the policy's input `projectile`")
+        return about["trained_at"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pipeline.base.schema import ASCENDING, FILLED, LIST, UNIQUE, Range, Section, Seed
 
@@ -29,6 +29,9 @@ Width = Annotated[int, Range(1, 4096)]
 class PolicyParams(Section):
     seed: Seed
     targets: Annotated[tuple[Distance, Distance], LIST, ASCENDING]
+    landings: Literal["map", "simulated"]
+    exploration: Literal["scheduled", "learned"]
+    state: Literal["target", "projectile_target"]
     map_size: Annotated[tuple[Nodes, Nodes], LIST]
     envs: Annotated[int, Range(2, 1_000_000)]
     steps: Annotated[int, Range(2, 10_000)]  # with 2 envs: one sample a mini-batch

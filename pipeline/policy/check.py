@@ -54,8 +54,13 @@ def check(policy: Policy, launcher: Launcher, params) -> Check:
     )
 
 
-def figures(trained: Trained, checked: Check) -> dict:
-    """What a card tells of a training; errors are |y_p - g| of the deterministic policy [m]."""
+def figures(trained: Trained, checked: Check, landings: str = "map") -> dict:
+    """What a card tells of a training; errors are |y_p - g| of the deterministic policy [m].
+
+    Args:
+        landings: What it was trained on (`policy.landings` of params.yaml).
+    """
+    by_map = trained.mean_error if landings == "map" else None
     return {
         "converged": not checked.failures and checked.mean_error <= CONVERGED,
         "criterion": CRITERION,
@@ -64,7 +69,7 @@ def figures(trained: Trained, checked: Check) -> dict:
         "mean_error_m": checked.mean_error,  # launched in the calibrated simulator
         "max_error_m": checked.max_error,
         "failed_targets": sum(checked.failures.values()),
-        "map_mean_error_m": trained.mean_error,  # the same by the interpolated landing map
+        "map_mean_error_m": by_map,  # the same by the interpolated landing map
         "failed_launches": trained.failures,  # exploring ones, by reason
     }
 

@@ -1,15 +1,17 @@
 """The slingshot as a one-step decision problem, batched, in the interface of rsl_rl.
 
-    state  g           target displacement along y on the floor [m], uniform over a range
+    state  g           target displacement along y on the floor [m], uniform over a range;
+                       where the policy is to see it, also the projectile's position (y, z) [m]
     action a in R²     draw = centre of the box + half its size * tanh(a)
     reward             height * exp(-|y_p - g| / scale), or -penalty for a failed launch
 
-Every step ends the episode, so discounting plays no part. Observations are normalised to [-1, 1]
-over the range of targets.
+Every step ends the episode, so discounting plays no part. Observed targets are normalised to
+[-1, 1] over their range, positions as draws over their box.
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
 import numpy as np
@@ -17,13 +19,15 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from pipeline.landing.response_surface import Landings, ResponseSurface
+from pipeline.landing.response_surface import Landings
+from pipeline.landing.simulated import Source
 
 
 class SlingshotEnv(VecEnv):
     """One launch an episode, `num_envs` at a time.
 
     Attributes:
+        groups: Of observations, in the order in which a network sees them.
         failures: How often each reason of failure has occurred since the last `take_failures`.
     """
 
@@ -32,18 +36,20 @@ class SlingshotEnv(VecEnv):
 
     def __init__(
         self,
-        surface: ResponseSurface,
+        surface: Source,
         *,
         targets: tuple[float, float],
         num_envs: int,
         reward,
         seed: int,
+        projectile: tuple[float, float] | None = None,
     ):
         """Set targets.
 
         Args:
             targets: Range they are drawn from [m].
             reward: Its height, scale [m] and penalty (`policy.reward` of params.yaml).
+            projectile: Where it starts (y, z) [m], if that is observed.
         """
         self.surface = surface
         self.targets = targets
@@ -54,14 +60,20 @@ class SlingshotEnv(VecEnv):
         self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long)
         self.failures: Counter[str] = Counter()
         self._random = torch.Generator().manual_seed(seed)
-        self._box = draw_box(surface)
+        self._box = center, half = draw_box(surface)
+        self._fixed: dict[str, torch.Tensor] = {}
+        if projectile is not None:
+            position = ((torch.tensor(projectile) - center) / half).expand(num_envs, 2)
+            self._fixed["projectile"] = position
+        self.groups = [*self._fixed, "target"]
         self._goal = self._new_goals()
 
     def get_observations(self) -> TensorDict:
-        """Normalised targets, group "target", shape (num_envs, 1)."""
+        """Normalised, by group: "target", shape (num_envs, 1), and maybe "projectile", (.., 2)."""
         low, high = self.targets
         target = (2 * self._goal - (low + high)) / (high - low)
-        return TensorDict({"target": target[:, None]}, batch_size=[self.num_envs])
+        seen = {**self._fixed, "target": target[:, None]}
+        return TensorDict(seen, batch_size=[self.num_envs])
 
     def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict]:
         """Launch, then set new targets. Actions have shape (num_envs, 2); every episode ends."""
@@ -99,7 +111,7 @@ class SlingshotEnv(VecEnv):
 
 
 def rewarded(
-    surface: ResponseSurface, draws: np.ndarray, targets: np.ndarray, reward
+    surface: Source, draws: np.ndarray, targets: np.ndarray, reward
 ) -> tuple[np.ndarray, Landings]:
     """Rewards, shape (N,), and landings of draws (N, 2) [m] for targets (N,) [m]."""
     launched = surface(draws)
@@ -107,7 +119,18 @@ def rewarded(
     return np.where(launched.failure > 0, -reward.penalty, hit), launched
 
 
-def draw_box(surface: ResponseSurface) -> tuple[torch.Tensor, torch.Tensor]:
+def draw_box(surface: Source) -> tuple[torch.Tensor, torch.Tensor]:
     """Centre and half size of the box of draws [m], each of shape (2,)."""
     low, high = (torch.tensor(one, dtype=torch.float32) for one in (surface.low, surface.high))
     return (low + high) / 2, (high - low) / 2
+
+
+def projectile_start(setup, band) -> tuple[float, float]:
+    """Where the projectile is before the hand draws it (y, z) [m]: in the slack band's middle.
+
+    Each half of the band hangs straight from its tip.
+
+    Args:
+        setup, band: `setup` and the band's section of params.yaml.
+    """
+    return 0.0, -math.sqrt(band.rest_length**2 - setup.fork_width**2) / 2

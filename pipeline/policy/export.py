@@ -1,7 +1,8 @@
 """Write a trained policy as ONNX and TorchScript, with a JSON card that says what it is.
 
 Both files take targets in metres, shape (batch, 1), and give draws in metres, shape (batch, 2): the
-normalisation is inside. Equal networks give equal bytes, so the cache sees when nothing changed.
+normalisation is inside. A policy that sees the projectile takes its position (y, z) before the
+target. Equal networks give equal bytes, so the cache sees when nothing changed.
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ import torch
 from torch import nn
 
 from pipeline.base.files import replacing, write_json
-from pipeline.policy.train import Policy, Trained
+from pipeline.policy.train import Policy, ProjectilePolicy, Trained
 from pipeline.sling.rubber import NEO_HOOKEAN
 
 OPSET, IR_VERSION = 18, 10  # any onnxruntime from 1.18 (2024) on reads these
 INPUT, OUTPUT = "target", "draw"
+PROJECTILE = "projectile"  # a second input, of a policy that sees it
+FRAME = "origin midway between the fork tips, y towards the target, z up"
 USED = ("sling2sim2real", "torch", "rsl-rl-lib", "onnx", "numpy")
 
 
@@ -52,10 +55,10 @@ def write_onnx(policy: Policy, path: Path) -> None:
     import onnx
     from onnx import TensorProto, helper, numpy_helper
 
-    nodes, weights = [], []
+    nodes, weights = [], {}
 
     def tensor(name: str, values: torch.Tensor) -> str:
-        weights.append(numpy_helper.from_array(values.detach().numpy(), name))
+        weights[name] = numpy_helper.from_array(values.detach().numpy(), name)
         return name
 
     def node(kind: str, *inputs: str, **attributes) -> str:
@@ -65,6 +68,12 @@ def write_onnx(policy: Policy, path: Path) -> None:
 
     value = node("Sub", INPUT, tensor("target_center", policy.target_center))
     value = node("Div", value, tensor("target_half", policy.target_half))
+    ports, seen = {INPUT: 1}, "target displacement along y [m]"
+    if isinstance(policy, ProjectilePolicy):
+        ports, seen = {PROJECTILE: 2, **ports}, f"projectile position (y, z) [m] and {seen}"
+        position = node("Sub", PROJECTILE, tensor("draw_center", policy.draw_center))
+        position = node("Div", position, tensor("draw_half", policy.draw_half))
+        value = node("Concat", position, value, axis=1)
     for number, layer in enumerate(policy.network):
         if isinstance(layer, nn.Linear):
             weight = tensor(f"weight_{number}", layer.weight)
@@ -79,10 +88,13 @@ def write_onnx(policy: Policy, path: Path) -> None:
     )
     graph = helper.make_graph(
         nodes,
-        "slingshot policy: target displacement along y [m] to drawn position (y, z) [m]",
-        [helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["batch", 1])],
+        f"slingshot policy: {seen} to drawn position (y, z) [m]",
+        [
+            helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", columns])
+            for name, columns in ports.items()
+        ],
         [helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["batch", 2])],
-        weights,
+        list(weights.values()),
     )
     model = helper.make_model(
         graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION
@@ -148,13 +160,14 @@ def card(
             "meaning": "displacement of the target along y, on the floor",
             "trained_range": list(params.policy.targets),
         },
+        **_projectile(policy),
         "output": {
             "name": OUTPUT,
             "unit": "m",
             "shape": ["batch", 2],
             "axes": ["y", "z"],
             "meaning": "where the arm is sent to draw the projectile",
-            "frame": "origin midway between the fork tips, y towards the target, z up",
+            "frame": FRAME,
             "low": low,
             "high": high,
         },
@@ -173,6 +186,22 @@ def card(
         "trained_on": {"device": device},
         "versions": {name: version(name).partition("+")[0] for name in USED},
     }
+
+
+def _projectile(policy: Policy) -> dict:
+    """Of the card: the input that a policy has which sees the projectile."""
+    if not isinstance(policy, ProjectilePolicy):
+        return {}
+    about = {
+        "name": PROJECTILE,
+        "unit": "m",
+        "shape": ["batch", 2],
+        "axes": ["y", "z"],
+        "meaning": "where the projectile hangs in the slack band before it is drawn",
+        "frame": FRAME,
+        "trained_at": np.round(policy.projectile.tolist(), 6).tolist(),  # there alone
+    }
+    return {PROJECTILE: about}
 
 
 def _strict(value: object) -> object:

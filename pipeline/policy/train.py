@@ -1,8 +1,8 @@
-"""Train the slingshot policy with PPO (rsl_rl) on a response surface.
+"""Train the slingshot policy with PPO (rsl_rl) on a response surface or on simulated launches.
 
-That is the simulator read between simulated launches (landing_map.py), so what the policy
-learns is the calibrated simulator's own landing. Training keeps the network whose deterministic
-draws earn most over 256 targets spread over the trained range.
+The surface is the simulator read between simulated launches (landing_map.py), so what the policy
+learns is the calibrated simulator's own landing in both cases. Training keeps the network whose
+deterministic draws earn most over 256 targets spread over the trained range.
 """
 
 from __future__ import annotations
@@ -21,16 +21,18 @@ from torch import nn
 
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.progress import Progress
-from pipeline.landing import response_surface
-from pipeline.landing.response_surface import ResponseSurface
+from pipeline.landing import response_surface, simulated
+from pipeline.landing.simulated import Source
 from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.environment import SlingshotEnv, draw_box, rewarded
+from pipeline.policy.ppo import settings
 
 CHECKED_TARGETS = 256
 KEPT_EVERY = 5  # iterations; a checkpoint takes some 10 ms
 SOURCES = [
-    *(Path(__file__).with_name(f"{name}.py") for name in ("environment", "train")),
+    *(Path(__file__).with_name(f"{name}.py") for name in ("environment", "ppo", "train")),
     Path(response_surface.__file__),
+    Path(simulated.__file__),
 ]
 PACKAGES = ("torch", "rsl-rl-lib", "tensordict", "numpy", "scipy")
 
@@ -38,7 +40,7 @@ PACKAGES = ("torch", "rsl-rl-lib", "tensordict", "numpy", "scipy")
 class Policy(nn.Module):
     """Target in metres to draw in metres; the normalisation of both is part of it."""
 
-    def __init__(self, network: nn.Module, targets: tuple[float, float], surface: ResponseSurface):
+    def __init__(self, network: nn.Module, targets: tuple[float, float], surface: Source):
         super().__init__()
         low, high = targets
         center, half = draw_box(surface)
@@ -57,6 +59,34 @@ class Policy(nn.Module):
         """The same for arrays, shapes (N,) and (N, 2)."""
         with torch.inference_mode():
             return self(torch.as_tensor(targets, dtype=torch.float32)[:, None]).double().numpy()
+
+
+class ProjectilePolicy(Policy):
+    """The same for a state as the paper prints it: where the projectile is, and the target."""
+
+    def __init__(
+        self,
+        network: nn.Module,
+        targets: tuple[float, float],
+        surface: Source,
+        projectile: tuple[float, float],
+    ):
+        """Set `projectile`, where it starts (y, z) [m]."""
+        super().__init__(network, targets, surface)
+        self.register_buffer("projectile", torch.tensor(projectile))
+
+    def forward(self, projectile: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
+        """Draws (y, z) [m], shape (N, 2), for positions [m], (N, 2), and targets [m], (N, 1)."""
+        position = (projectile - self.draw_center) / self.draw_half
+        goal = (target - self.target_center) / self.target_half
+        action = self.network(torch.cat([position, goal], 1))
+        return self.draw_center + self.draw_half * torch.tanh(action)
+
+    def draws(self, targets: np.ndarray) -> np.ndarray:
+        """For targets (N,) [m] and the projectile where it starts, shape (N, 2)."""
+        goals = torch.as_tensor(targets, dtype=torch.float32)[:, None]
+        with torch.inference_mode():
+            return self(self.projectile.expand(len(goals), 2), goals).double().numpy()
 
 
 @dataclass(frozen=True)
@@ -82,13 +112,20 @@ class Trained:
 
 
 def train(
-    surface: ResponseSurface, params, kept: Path | None = None, progress: Progress | None = None
+    surface: Source,
+    params,
+    kept: Path | None = None,
+    progress: Progress | None = None,
+    *,
+    projectile: tuple[float, float] | None = None,
 ) -> Trained:
     """Train with the settings of `params` (the `policy:` section of params.yaml).
 
     Args:
+        surface: Says where draws land: read off a map, or simulated.
         kept: File of the checkpoint, which the caller removes once it has written what it wants.
         progress: Is told of each iteration.
+        projectile: Where it starts (y, z) [m], for a policy that sees it.
 
     Runs on one thread with seeded generators: the same input gives the same network, bit for bit,
     on one machine, also where a training was killed and goes on from its checkpoint.
@@ -103,11 +140,13 @@ def train(
             num_envs=params.envs,
             reward=params.reward,
             seed=params.seed,
+            projectile=projectile,
         )
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
-            runner = OnPolicyRunner(env, _runner_config(params), log_dir=None, device="cpu")
-        checkpoint = kept and Checkpoint(kept, _stamp(surface, params))
-        training = _Training(runner, env, params, checkpoint, progress)
+            configured = settings(params, env.groups)
+            runner = OnPolicyRunner(env, configured, log_dir=None, device="cpu")
+        checkpoint = kept and Checkpoint(kept, _stamp(surface, params, projectile))
+        training = _Training(runner, env, params, checkpoint, progress, projectile)
         runner.logger = training
         training.resume()
         # Once: a second call would start from stale observations.
@@ -127,7 +166,7 @@ def one_thread() -> Iterator[None]:
 
 
 def earned(
-    surface: ResponseSurface, draws: np.ndarray, targets: np.ndarray, reward
+    surface: Source, draws: np.ndarray, targets: np.ndarray, reward
 ) -> tuple[float, float, int]:
     """Mean reward and |y_p - g| [m] (NaN if all fail) of draws for targets, and failed targets."""
     rewards, launched = rewarded(surface, draws, targets, reward)
@@ -142,10 +181,10 @@ def told(error: float) -> str:
     return "every launch fails" if np.isnan(error) else f"mean error {100 * error:.2f} cm"
 
 
-def _stamp(surface: ResponseSurface, params) -> str:
+def _stamp(surface: Source, params, projectile: tuple[float, float] | None) -> str:
     """Of everything that a training hangs on."""
     versions = (f"{name} {version(name)}" for name in PACKAGES)
-    return fingerprint(*SOURCES, surface.fingerprint(), repr(params), *versions)
+    return fingerprint(*SOURCES, surface.fingerprint(), repr((params, projectile)), *versions)
 
 
 class _Training:
@@ -153,8 +192,8 @@ class _Training:
     best, narrows the exploration, and now and then writes a checkpoint.
 
     rsl_rl's own mean reward covers the last 100 episodes only, and its log folder copies git diffs.
-    The exploration narrows geometrically from init_std to final_std: left to itself PPO narrows it
-    so slowly that the mean still wanders by centimetres of landing at the end.
+    A scheduled exploration narrows geometrically from init_std to final_std: left to itself PPO
+    narrows it so slowly that the mean still wanders by centimetres of landing at the end.
     """
 
     writer = None
@@ -167,14 +206,20 @@ class _Training:
         params,
         checkpoint: Checkpoint | None,
         progress: Progress | None,
+        projectile: tuple[float, float] | None,
     ):
         self.runner, self.env, self.checkpoint, self.progress = runner, env, checkpoint, progress
-        spread = np.log([params.init_std, params.final_std])
-        schedule = np.linspace(*spread, params.iterations)
-        self.log_std = np.append(schedule, schedule[-1])  # of each iteration, and after the last
+        self.log_std = None
+        if params.exploration == "scheduled":
+            spread = np.log([params.init_std, params.final_std])
+            schedule = np.linspace(*spread, params.iterations)
+            self.log_std = np.append(
+                schedule, schedule[-1]
+            )  # of each iteration, and after the last
         network = runner.alg.get_policy()
         self.distribution = network.distribution
-        self.policy = Policy(network.mlp, env.targets, env.surface)
+        about = network.mlp, env.targets, env.surface
+        self.policy = Policy(*about) if projectile is None else ProjectilePolicy(*about, projectile)
         self.checked = np.linspace(*env.targets, CHECKED_TARGETS)
         self.rewards: list[float] = []
         self.rows: list[dict] = []
@@ -204,8 +249,9 @@ class _Training:
             }
         )
         self.rewards.clear()
-        with torch.no_grad():
-            self.distribution.log_std_param.fill_(self.log_std[it + 1])
+        if self.log_std is not None:
+            with torch.no_grad():
+                self.distribution.log_std_param.fill_(self.log_std[it + 1])
         if self.best is None or worth > self.best["earned"]:
             weights = copy.deepcopy(self.policy.state_dict())
             self.best = {"earned": worth, "row": it, "weights": weights}
@@ -251,31 +297,3 @@ class _Training:
             mean_error=row["mean_error"],
             failures=dict(sorted(self.reasons.items())),
         )
-
-
-def _runner_config(params) -> dict:
-    network = {"class_name": "MLPModel", "hidden_dims": list(params.hidden), "activation": "elu"}
-    exploration = {
-        "class_name": "GaussianDistribution",
-        "init_std": params.init_std,
-        "std_type": "log",
-        "learn_std": False,
-    }
-    return {
-        "num_steps_per_env": params.steps,
-        "save_interval": params.iterations,
-        "obs_groups": {"actor": ["target"], "critic": ["target"]},
-        "actor": {**network, "distribution_cfg": exploration},
-        "critic": dict(network),
-        "algorithm": {
-            "class_name": "PPO",
-            "learning_rate": params.learning_rate,
-            "gamma": 0.0,  # one step: the return is the reward
-            "lam": 0.0,
-            "entropy_coef": 0.0,
-            "num_learning_epochs": 5,
-            "num_mini_batches": 2,
-            "schedule": "adaptive",
-            "desired_kl": 0.01,
-        },
-    }

@@ -55,6 +55,7 @@ TRAINING = {
     "map_mean_error_m": ERROR,
     "failed_launches": {"type": "object", "additionalProperties": COUNT},
 }
+PROJECTILE = port("projectile", 2, axes={"const": ["y", "z"]}, frame=TEXT, trained_at=PAIR)
 SCHEMA = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     **exactly(
@@ -74,3 +75,4 @@ SCHEMA = {
         versions=all_in("sling2sim2real torch rsl-rl-lib onnx numpy", TEXT),
     ),
 }
+SCHEMA["properties"]["projectile"] = PROJECTILE  # where the policy sees it

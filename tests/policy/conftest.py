@@ -10,6 +10,7 @@ from tests.policy import toy
 SETTINGS = SimpleNamespace(
     seed=1,
     targets=(1.425, 2.425),
+    exploration="scheduled",
     envs=256,
     steps=4,
     iterations=40,
@@ -42,3 +43,14 @@ def trained(toy_map, tmp_path_factory: pytest.TempPathFactory):
         return train(toy_map.surface, SETTINGS)
 
     return once.value(tmp_path_factory, "trained", make)
+
+
+@pytest.fixture(scope="session")
+def seeing(toy_map, tmp_path_factory: pytest.TempPathFactory):
+    """A policy that sees the projectile too."""
+    from pipeline.policy.train import train
+
+    def make(_: Path):
+        return train(toy_map.surface, SETTINGS, projectile=toy.START)
+
+    return once.value(tmp_path_factory, "seeing", make)

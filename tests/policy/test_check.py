@@ -30,6 +30,7 @@ def test_it_launches_the_draws_themselves(trained) -> None:
     assert told["converged"] and told["mean_error_m"] <= CONVERGED
     assert told["map_mean_error_m"] == trained.mean_error != told["mean_error_m"]
     assert verdict(told, found.failures).startswith("converged, mean |y_p - g| 0.")
+    assert figures(trained, found, "simulated")["map_mean_error_m"] is None
 
 
 def test_a_launch_off_the_map_is_no_convergence(trained) -> None:

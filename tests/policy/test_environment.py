@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from pipeline.landing.response_surface import TOO_MUCH_FORCE, ResponseSurface
-from pipeline.policy.environment import SlingshotEnv
+from pipeline.policy.environment import SlingshotEnv, projectile_start
 from tests.policy import toy
 
 TARGETS = (1.425, 2.425)
@@ -75,6 +75,23 @@ def test_each_part_of_the_reward_counts(toy_map) -> None:
     np.testing.assert_allclose(reward(height=10.0)[~failed], 2 * usual[~failed], rtol=1e-6)
     np.testing.assert_allclose(reward(scale=1.0)[~failed], np.sqrt(5 * usual[~failed]), rtol=1e-5)
     np.testing.assert_array_equal(reward(penalty=3.0)[failed], -3.0)
+
+
+def test_the_projectile_is_seen_where_it_starts(toy_map, env) -> None:
+    """In half boxes of draws, beside the same targets; the same in every step."""
+    seeing = make(toy_map.surface, projectile=(-0.25, -0.30))
+    assert (env.groups, seeing.groups) == (["target"], ["projectile", "target"])
+    first = seeing.get_observations()
+    second, *_ = seeing.step(torch.zeros(400, 2))
+    for seen in (first, second):
+        np.testing.assert_allclose(seen["projectile"], [[1.0, -1.0]] * 400, atol=1e-5)
+    assert (first["target"] == env.get_observations()["target"]).all()
+
+
+def test_a_projectile_hangs_as_far_from_the_tips_as_half_the_band() -> None:
+    setup, band = SimpleNamespace(fork_width=0.275), SimpleNamespace(rest_length=0.52)
+    y, z = projectile_start(setup, band)
+    assert y == 0 and z < 0 and np.hypot(z, 0.275 / 2) == pytest.approx(0.26)
 
 
 def test_it_goes_on_from_a_state(env, toy_map) -> None:

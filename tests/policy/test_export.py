@@ -11,6 +11,7 @@ import onnxruntime
 import pytest
 import torch
 
+from pipeline.base.files import write_json
 from pipeline.landing.stored import Stored
 from pipeline.params import load
 from pipeline.policy.check import Check, figures
@@ -56,6 +57,30 @@ def test_onnx_and_torchscript_agree_with_the_network(trained, stored, folder) ->
     np.testing.assert_array_equal(stored.draws(TARGETS[:, 0]), graph.astype(float))
     landing = toy.launch(graph.astype(float)).landing_y
     assert np.abs(landing - TARGETS[:, 0]).mean() < 0.02
+
+
+def test_a_policy_that_sees_the_projectile_agrees_too(seeing, tmp_path) -> None:
+    """With positions other than the one it was trained at: the input is one."""
+    stored = Stored("toy", "seeing", tmp_path)
+    write_onnx(seeing.policy, stored.folder / "policy.onnx")
+    write_torchscript(seeing.policy, stored.folder / "policy.pt")
+    write_json(stored.folder / "card.json", written(seeing, FIGURES))
+    onnx.checker.check_model(onnx.load(stored.folder / "policy.onnx"), full_check=True)
+    random = np.random.default_rng(1)
+    places = random.uniform((-0.2, -0.3), (0.1, -0.1), (1000, 2)).astype(np.float32)
+    given = {"projectile": places, "target": TARGETS}
+    tensors = [torch.from_numpy(one) for one in given.values()]
+    with torch.inference_mode():
+        network = seeing.policy(*tensors).numpy()
+        script = torch.jit.load(stored.folder / "policy.pt")(*tensors).numpy()
+    session = onnxruntime.InferenceSession(stored.folder / "policy.onnx")
+    assert [port.name for port in session.get_inputs()] == list(given)
+    graph = session.run(["draw"], given)[0]
+    np.testing.assert_allclose(script, network, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(graph, network, rtol=0, atol=1e-5)
+    draws = stored.draws(TARGETS[:, 0])
+    np.testing.assert_allclose(draws, seeing.policy.draws(TARGETS[:, 0]), rtol=0, atol=1e-5)
+    assert np.abs(draws - graph).max() > 1e-3  # so the position counts
 
 
 def test_one_file_each_without_paths(folder) -> None:
@@ -184,6 +209,14 @@ def test_the_card_tells_units_ranges_and_the_air(trained) -> None:
     assert content["setup"]["band_mass_kg"] == 0.023
     assert content["versions"]["torch"] == torch.__version__.partition("+")[0]
     assert written(trained, FIGURES)["nuisances"] == {}
+
+
+def test_the_card_names_the_projectile_as_an_input_where_it_is_one(trained, seeing) -> None:
+    content = written(seeing, FIGURES)
+    jsonschema.validate(content, SCHEMA, jsonschema.Draft202012Validator)
+    assert content["projectile"]["trained_at"] == pytest.approx(toy.START)
+    assert content["input"] == written(trained, FIGURES)["input"]
+    assert "projectile" not in written(trained, FIGURES)
 
 
 def test_a_policy_that_never_hits_has_no_errors_in_its_card(trained) -> None:

@@ -1,5 +1,6 @@
 """The stage from θ file to exported policy, on the toy slingshot and a short training."""
 
+import json
 import sys
 from pathlib import Path
 
@@ -28,11 +29,12 @@ def project(tmp_path, monkeypatch):
     yaml = YAML()
     content = yaml.load(ROOT / "params.yaml")
     content["policy"].update({"envs": 64, "iterations": 12, "map_size": [9, 7]})
-    yaml.dump(content, tmp_path / "params.yaml")
     theta = {"band": "band1", "theta": dict(zip(THETA, POINT, strict=True))}
     write_json(Path("data/theta/band1/least_squares.json"), theta)
 
-    def run(launch=toy.launch) -> None:
+    def run(launch=toy.launch, **changes) -> None:
+        content["policy"].update(changes)
+        yaml.dump(content, tmp_path / "params.yaml")
         monkeypatch.setattr(policy, "simulator", lambda *args, **kwargs: launch)
         monkeypatch.setattr(sys, "argv", ["policy.py", "band1", "least_squares"])
         policy.main()
@@ -60,4 +62,25 @@ def test_a_theta_whose_launches_all_fail_is_said_not_to_converge(project, capsys
     assert "NOT converged; 256 of 256 targets fail: the simulation did not converge 256" in line
     told = STORED.card()["training"]
     assert told["converged"] is False and told["mean_error_m"] is None
+    assert np.isfinite(STORED.draws(np.array([1.9]))).all()
+
+
+USUAL = {"landings": "map", "exploration": "scheduled", "state": "target"}
+PRINTED = {"landings": "simulated", "exploration": "learned", "state": "projectile_target"}
+
+
+def test_as_the_paper_prints_it(project) -> None:
+    """Each switch alone gives another policy; all at once, one with an honest card."""
+    project()
+    networks = {(FOLDER / "policy.onnx").read_bytes()}
+    assert "projectile" not in json.loads((FOLDER / "card.json").read_text())
+    for name, value in PRINTED.items():
+        project(**(USUAL | {name: value}))
+        networks.add((FOLDER / "policy.onnx").read_bytes())
+    assert len(networks) == 4
+    project(**PRINTED)
+    content = json.loads((FOLDER / "card.json").read_text())
+    assert content["projectile"]["trained_at"] == [0.0, -0.220667]  # (0.26² - 0.1375²)^½
+    assert content["training"]["map_mean_error_m"] is None
+    assert content["training"]["mean_error_m"] is not None
     assert np.isfinite(STORED.draws(np.array([1.9]))).all()

@@ -9,6 +9,8 @@ import torch
 
 from pipeline.base.progress import Progress, parse
 from pipeline.landing.landing_map import LandingMap
+from pipeline.landing.response_surface import TOO_MUCH_FORCE
+from pipeline.landing.simulated import SimulatedLandings
 from pipeline.policy import train as module
 from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.train import Trained, train
@@ -25,6 +27,7 @@ CHANGES = {
     "learning_rate": [1e-4],
     "init_std": [0.3],
     "final_std": [0.1],
+    "exploration": ["learned"],
 }
 REWARDS = ((5.0, 0.2, 1.0), (2.0, 1.0, 1.0), (5.0, 1.0, 3.0))
 
@@ -66,6 +69,58 @@ def test_the_same_settings_give_the_same_training_and_each_counts(toy_map, setti
     for name, values in others.items():
         for value in values:
             assert train(surface, short(settings, **{name: value})).curve != once.curve, name
+
+
+def error_of(trained: Trained) -> float:
+    """Mean |y_p - g| [m] by the closed form; every launch is within the force."""
+    targets = np.linspace(1.425, 2.425, 256)
+    truth = toy.launch(trained.policy.draws(targets))
+    assert (truth.hold_force <= 15.0).all()
+    return float(np.abs(truth.landing_y - targets).mean())
+
+
+def test_on_simulated_launches_it_hits_without_a_map(toy_map, settings) -> None:
+    """Each transition is one launch, and each deterministic check one for every target."""
+    launched = []
+
+    def counting(draws: np.ndarray):
+        launched.append(len(draws))
+        return toy.launch(draws)
+
+    source = SimulatedLandings(counting, toy_map.surface)
+    trained = train(source, settings)
+    steps, iterations = [settings.envs] * settings.steps, settings.iterations
+    assert launched == [*steps, 256] * iterations
+    assert error_of(trained) == pytest.approx(trained.mean_error) and trained.mean_error <= 0.01
+    assert trained.failures.keys() == {TOO_MUCH_FORCE}
+
+
+def test_simulated_launches_give_the_same_training_again_and_another_than_the_map(
+    toy_map, settings
+) -> None:
+    def one() -> Trained:
+        return train(SimulatedLandings(toy.launch, toy_map.surface), short(settings))
+
+    once, by_map = one(), train(toy_map.surface, short(settings))
+    assert same(once, one()) and not same(once, by_map)
+
+
+def test_a_learned_exploration_narrows_by_itself(toy_map, settings) -> None:
+    learned = SimpleNamespace(**{**vars(settings), "exploration": "learned"})
+    trained = train(toy_map.surface, learned)
+    std = np.array(trained.curve["std"])
+    assert std[0] == pytest.approx(settings.init_std, rel=0.1)
+    assert settings.final_std < std[-1] < 0.8 * std[0]
+    other = SimpleNamespace(**{**vars(learned), "final_std": 0.1, "iterations": 2})
+    start = train(toy_map.surface, other).curve["std"]
+    assert start == trained.curve["std"][:2]  # there is no schedule
+    assert error_of(trained) < 0.1
+
+
+def test_a_policy_that_sees_the_projectile_hits_too(seeing, trained, settings) -> None:
+    assert error_of(seeing) <= 0.03
+    first = seeing.policy.network[0].weight
+    assert first.shape == (settings.hidden[0], 3) and not same(seeing, trained)
 
 
 def test_without_a_launch_that_lands_it_says_so(settings) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 STIFFNESS, MASS, GRAVITY = 24.0, 0.0565, 9.81
 FORK_WIDTH, FORK_HEIGHT, REST_LENGTH = 0.275, 0.52, 0.52
 DRAW_Y, DRAW_Z = (-0.45, -0.25), (-0.30, -0.10)
+START = (0.0, -0.22)  # of the projectile
 
 
 def launch(draws: np.ndarray) -> SimpleNamespace:

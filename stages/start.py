@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
+from threading import Thread
 
 from pipeline.base import errors
 from pipeline.base.errors import UserError
@@ -19,6 +23,9 @@ STEPS = {  # that make a folder of another name
     "confidence": "theta",
     "policies": "policy",
 }
+
+OF_DVC = "DVC_STAGE"  # in the environment of what DVC runs
+GRACE = 5.0  # s from the interrupt to the end
 
 
 def arguments(*names: str) -> list[str]:
@@ -49,7 +56,28 @@ def run(main: Callable[[], int | None]) -> None:
         except NotMade as error:
             raise UserError("; ".join(filter(None, (str(error), remedy(error))))) from error
 
+    if OF_DVC in os.environ:
+        Thread(target=_end_with_dvc, daemon=True).start()
     errors.run(explained)
+
+
+def _end_with_dvc() -> None:
+    """A stage whose DVC was killed would write beside the one that DVC starts next."""
+    import psutil
+
+    try:
+        inner = psutil.Process()  # or the shell around us, if it stays
+        while (dvc := inner.parent()) and OF_DVC in dvc.environ():
+            inner = dvc
+        while dvc is None or inner.ppid() == dvc.pid:
+            time.sleep(0.5)
+    except psutil.AccessDenied:
+        return
+    except psutil.NoSuchProcess:  # the shell was killed too
+        pass
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(GRACE)
+    os._exit(130)
 
 
 def remedy(error: NotMade) -> str:

@@ -2,7 +2,9 @@
 
 import pickle
 import runpy
+import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,7 +18,7 @@ from pipeline.objective.space import Space
 from pipeline.params import load
 from pipeline.search.history import History
 from stages.start import remedy
-from tests.project import ROOT, python
+from tests.project import ROOT, alive, environment, python, until
 
 OF_A_BAND = ("record", "episode", "mounting")
 OF_A_METHOD = ("history", "theta", "policy", "trials", "card")
@@ -146,3 +148,29 @@ def test_a_stage_imports_no_library_that_it_does_not_use() -> None:
         code += f"print(*set({heavy.split()}) & sys.modules.keys())"
         done = python("-c", code)
         assert (done.returncode, done.stdout.strip()) == (0, ""), (stages, done)
+
+
+@pytest.mark.parametrize("after", ["", "; true"])  # with it the shell stays around the stage
+@pytest.mark.parametrize("deaf", [False, True])  # to an interrupt, as in a shell's background
+def test_a_stage_ends_with_its_dvc(after: str, deaf: bool, tmp_path: Path) -> None:
+    """What stands for DVC starts it as DVC does."""
+    (tmp_path / "stage.py").write_text(f"""
+import os, pathlib, signal, time
+from stages import start
+if {deaf}:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def main():
+    pathlib.Path("pid").write_text(str(os.getpid()))
+    time.sleep(60)
+start.run(main)
+""")
+    command = ["/bin/sh", "-c", f"{sys.executable} stage.py{after}"]
+    code = f"import os, subprocess; os.environ['DVC_STAGE'] = 'a'; subprocess.run({command})"
+    dvc = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, env=environment())
+    until(lambda: (tmp_path / "pid").is_file() and (tmp_path / "pid").read_text())
+    pid = int((tmp_path / "pid").read_text())
+    time.sleep(1)
+    assert alive(pid)
+    dvc.kill()
+    dvc.wait()
+    until(lambda: not alive(pid), 30)

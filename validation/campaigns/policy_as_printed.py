@@ -1,0 +1,199 @@
+"""What each way to train a policy as the paper prints it changes in the landing.
+
+    python -m validation.campaigns.policy_as_printed --bands band1 band2
+
+A policy of each band is trained in the simulator of one θ file (data/theta/<band>/<method>.json):
+with the settings of params.yaml, with each of the paper's alone, and with all of them. Its draws
+are launched in the same simulator, so nothing but the training differs. Results lie in --work, one
+file a training: a run that was killed goes on from there, and a training within it too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.base import errors
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_json
+from pipeline.base.fingerprint import fingerprint
+from pipeline.base.progress import Progress
+from pipeline.landing.landing_map import LandingMap
+from pipeline.landing.simulated import SimulatedLandings
+from pipeline.landing.simulator import simulator
+from pipeline.params import expect_known, load
+from pipeline.policy.check import check
+from pipeline.policy.environment import projectile_start
+from pipeline.policy.train import train
+from pipeline.sling.theta import load_theta
+from validation.benchmarks.timing import environment, timed
+from validation.code import ROOT, digest
+from validation.paired import mean_interval
+
+WORK = Path("data/policy_as_printed")
+REPORT = Path("reports/validation/policy-as-printed.json")
+METHOD = "sling2sim2real"  # whose θ: the paper's
+USUAL = {"landings": "map", "exploration": "scheduled", "state": "target"}
+PRINTED = {"landings": "simulated", "exploration": "learned", "state": "projectile_target"}
+SWITCHES = {"usual": {}, **{name: {name: PRINTED[name]} for name in PRINTED}, "all": PRINTED}
+TRAINING = "pipeline/landing", "pipeline/policy", "pipeline/sling"  # code that a result hangs on
+SEEDS = 11, 12, 13  # that took part in no choice
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """One training: of a band, with a switch turned, from a seed."""
+
+    band: str
+    switch: str
+    seed: int
+
+    def settings(self, params):
+        """`policy` of params.yaml, with the switches as this has them."""
+        changes = USUAL | SWITCHES[self.switch] | {"seed": self.seed}
+        return params.policy.model_copy(update=changes)
+
+
+def taught(lesson: Lesson, params, theta: dict, kept: Path, progress: Progress | None) -> dict:
+    """How a policy hits that is trained so, and what the training took."""
+    settings, setup = lesson.settings(params), params.setup
+    launcher = simulator(params, lesson.band, theta)
+    box = {"draw_y": setup.draw_y, "draw_z": setup.draw_z, "max_force": setup.max_force}
+    surface = LandingMap.simulate(launcher, **box, size=settings.map_size, checks=0).surface
+    if settings.landings == "simulated":
+        surface = SimulatedLandings(launcher, surface)
+    seen = settings.state == "projectile_target"
+    start = projectile_start(setup, params.bands[lesson.band]) if seen else None
+    trained, cpu, wall = timed(lambda: train(surface, settings, kept, progress, projectile=start))
+    checked = check(trained.policy, launcher, params)
+    targets = np.array(params.trials.targets)
+    launched = launcher(trained.policy.draws(targets))
+    fails = [
+        bool(reason) or not force <= setup.max_force
+        for reason, force in zip(launched.failure, launched.hold_force, strict=True)
+    ]
+    return {
+        "error_m": np.where(fails, np.nan, np.abs(launched.landing_y - targets)).tolist(),
+        "range_mean_error_m": checked.mean_error,
+        "range_failures": checked.failures,
+        "iteration": trained.iteration,
+        "last_error_m": trained.curve["mean_error"][-1],
+        "std": trained.curve["std"][-1],
+        "cpu_s": cpu,
+        "wall_s": wall,
+    }
+
+
+def result(lesson: Lesson, params, work: Path, method: str) -> dict:
+    """Of the file in `work`; trained where it is missing, or of another θ, settings or code."""
+    theta = load_theta(Path("data/theta", lesson.band, f"{method}.json"), lesson.band)
+    about = theta, lesson.settings(params).model_dump(), params.setup.model_dump()
+    code = [digest(ROOT / part) for part in TRAINING]
+    stamp = fingerprint(json.dumps([about, params.trials.targets, code], sort_keys=True))
+    name = f"{lesson.band}-{lesson.switch}-{lesson.seed}"
+    path = work / f"{name}.json"
+    kept = json.loads(path.read_text()) if path.is_file() else {}
+    if kept.get("stamp") != stamp:
+        checkpoint = work / f"{name}.pt"
+        progress = Progress(name, params.policy.iterations, "iterations", every=10)
+        found = taught(lesson, params, theta, checkpoint, progress)
+        kept = plain({"stamp": stamp, **asdict(lesson), **found})
+        write_json(path, kept)
+        checkpoint.unlink(missing_ok=True)
+    return {key: value for key, value in kept.items() if key != "stamp"}
+
+
+def plain(found: dict) -> dict:
+    """As strict JSON has it: null for what is not a number."""
+    text = json.dumps(found, default=float)
+    return json.loads(text, parse_constant=lambda _: None)
+
+
+def summary(results: list[dict]) -> dict:
+    """By band and switch: |y - g| in cm, means over seeds, each of the mean over the targets."""
+    figures: dict[str, dict] = {}
+    for one in results:
+        figures.setdefault(one["band"], {}).setdefault(one["switch"], []).append(one)
+    return {
+        band: {switch: _of_seeds(own) for switch, own in switches.items()}
+        for band, switches in figures.items()
+    }
+
+
+def _of_seeds(own: list[dict]) -> dict:
+    errors_cm = 100 * np.array([one["error_m"] for one in own], float)  # null becomes NaN
+    return {
+        "miss_cm": mean_interval(errors_cm.mean(axis=1)),
+        "miss_cm_each": plain({"": errors_cm.tolist()})[""],  # a row for each seed
+        "range_miss_cm": mean_interval(
+            100 * np.array([one["range_mean_error_m"] for one in own], float)
+        ),
+        "range_failures": sum(sum(one["range_failures"].values()) for one in own),
+        "last_miss_cm": mean_interval(100 * np.array([one["last_error_m"] for one in own], float)),
+        "std": [one["std"] for one in own],
+        "wall_s": mean_interval(np.array([one["wall_s"] for one in own])),
+    }
+
+
+def main() -> None:
+    params = load()
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--bands", nargs="+", default=list(params.run.bands))
+    parser.add_argument("--method", default=METHOD, help=f"whose θ (default: {METHOD})")
+    parser.add_argument("--seeds", nargs="+", type=int, default=SEEDS)
+    parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
+    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
+    args = parser.parse_args()
+    if min(args.seeds) < 1:
+        raise UserError("--seeds: from 1 on")
+    expect_known(params, "method", args.method)
+    for band in args.bands:
+        expect_known(params, "band", band)
+    args.work.mkdir(parents=True, exist_ok=True)
+    lessons = [
+        Lesson(band, switch, seed)
+        for seed in args.seeds
+        for switch in SWITCHES
+        for band in args.bands
+    ]
+    results = []
+    for lesson in lessons:
+        results.append(result(lesson, params, args.work, args.method))
+        write_report(args, params, results, len(lessons))
+
+
+def write_report(args, params, results: list[dict], wanted: int) -> None:
+    command = "python -m validation.campaigns.policy_as_printed"
+    command += f" --bands {' '.join(args.bands)} --method {args.method}"
+    content = {
+        "kind": "virtual",
+        "asked": "What each way to train as the paper prints it changes in |y - g| of the policy's"
+        " launches in the simulator that it was trained in; every other setting as in params.yaml.",
+        "settings": {
+            "targets_m": list(params.trials.targets),
+            "seeds": list(args.seeds),
+            "switches": {name: USUAL | changed for name, changed in SWITCHES.items()},
+            "policy": params.policy.model_dump(mode="json"),
+            "theta_of": args.method,
+            "miss_cm": "mean over the targets, then over seeds; range_miss_cm: over 256 targets of"
+            " policy.targets; last_miss_cm: the same for the last network, not the best one",
+        },
+        "trainings": wanted,
+        "done": len(results),
+        "figures": summary(results),
+        "results": results,
+        **environment("cpu", f"{command} --seeds {' '.join(map(str, args.seeds))}"),
+    }
+    args.report.parent.mkdir(parents=True, exist_ok=True)
+    write_json(args.report, content)
+    last = results[-1]
+    told = f"{last['band']} {last['switch']} {last['seed']}: {last['error_m']}"
+    print(f"{len(results)} of {wanted}, {told}", flush=True)
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -12,7 +12,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from pipeline.base.files import write_json
@@ -23,6 +22,7 @@ from pipeline.recording.build import build_episodes
 from tests.project import ROOT
 from validation import density
 from validation.campaigns.rig_scores import calibrated_clamps, result, sling_of, summary
+from validation.orange import landings, with_orange
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
 pytestmark = pytest.mark.validation
@@ -129,8 +129,7 @@ def test_rubbers_that_were_sealed(params, progress, record) -> None:
 )
 def test_recordings_that_this_project_did_not_make(params, progress, record) -> None:
     params = with_orange(params)
-    landings = pd.read_csv(RECORDINGS_OF_ORANGE / "orange_landings.csv").to_numpy(float)
-    draws, measured = landings[:, :2], landings[:, 2]
+    draws, measured = landings(RECORDINGS_OF_ORANGE)
     names = ("orange", "orange_2", "orange_3")
     episodes = [orange_episode(params, name) for name in names]
     figures = {}
@@ -161,14 +160,6 @@ def test_recordings_that_this_project_did_not_make(params, progress, record) -> 
         figures=figures,
     )
     assert all(one["inside"] >= 0.85 * one["launches"] for one in figures.values())
-
-
-def with_orange(params):
-    """params.yaml with that band, whose hand was where its pose says."""
-    content = params.model_dump(mode="json", exclude_unset=True)
-    about = {"source": "recording", "mass": 0.0408, "diameter": 0.010, "rest_length": 0.52}
-    content["bands"]["orange"], content["setup"]["arm_stiffness"] = about, None
-    return type(params).model_validate(content)
 
 
 def orange_episode(params, name: str):

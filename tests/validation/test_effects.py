@@ -1,0 +1,61 @@
+"""What a setting changes, from results whose effect is known."""
+
+import numpy as np
+import pytest
+
+from validation.effects import AS_IS, KEY, cell, effects
+
+BANDS, SEEDS = ["one", "two"], [1, 2]
+
+
+def result(band: str, switch: str, seed: int, **more) -> dict:
+    factor = {"one": 1.0, "two": 10.0}[band]
+    content = {"youngs_modulus": 1e5 * factor, "peak_force": 0.01, "loss": 1.0, "miss": 0.05}
+    key = {"method": "m", "band": band, "recording": 0, "switch": switch, "seed": seed}
+    return key | content | more
+
+
+def all_of(switch: str, **more) -> list[dict]:
+    return [result(band, switch, seed, **more) for band in BANDS for seed in SEEDS]
+
+
+def test_a_setting_is_compared_band_by_band_and_seed_by_seed() -> None:
+    changed = [
+        one | {"youngs_modulus": 1.2 * one["youngs_modulus"], "peak_force": -0.02, "miss": 0.08}
+        for one in all_of("other")
+    ]
+    found = effects(all_of(AS_IS) + changed, [AS_IS, "other", "never run"], ["m"], BANDS)["m"]
+    assert set(found["rig"]) == {AS_IS, "other"}
+    other = found["rig"]["other"]
+    assert other["runs"] == 4 and other["failed"] == 0
+    assert other["youngs_modulus_change"]["mean"] == pytest.approx(0.2)
+    assert other["youngs_modulus_change"]["std"] == pytest.approx(0, abs=1e-12)
+    assert other["miss_change"]["mean"] == pytest.approx(0.03)
+    assert cell(found, "other") == "E +20 %, force +1.0 → −2.0 %, rig 5.0 → 8.0 cm"
+    assert cell(found, "never run") == ""
+
+
+def test_a_band_that_is_not_of_the_rig_stands_by_itself() -> None:
+    more = {
+        "band": "orange",
+        "method": "m",
+        "recording": 0,
+        "seed": 1,
+        "peak_force": 0.0,
+        "youngs_modulus": 1e6,
+    }
+    orange = [more | {"switch": AS_IS, "miss": 0.02}, more | {"switch": "other", "miss": 0.04}]
+    found = effects(all_of(AS_IS) + all_of("other") + orange, [AS_IS, "other"], ["m"], BANDS)["m"]
+    assert found["rig"]["other"]["miss"]["mean"] == pytest.approx(0.05)
+    assert cell(found, "other").endswith("rig 5.0 → 5.0 cm, orange 2.0 → 4.0 %")
+
+
+def test_what_failed_or_missed_is_counted_and_takes_no_part() -> None:
+    results = all_of(AS_IS) + all_of("other", miss=0.07)
+    results[-1] = {key: results[-1][key] for key in KEY}
+    results[-1]["failed"] = "no simulation converges"
+    results[-2]["miss"] = None
+    other = effects(results, [AS_IS, "other"], ["m"], BANDS)["m"]["rig"]["other"]
+    assert (other["runs"], other["failed"], other["miss"]["n"]) == (4, 1, 2)
+    assert other["youngs_modulus"]["n"] == 3
+    assert np.isclose(other["miss_change"]["mean"], 0.02)

@@ -1,0 +1,266 @@
+"""What each departure from the paper changes by itself: E, predicted force, landings, loss.
+
+    python -m validation.campaigns.deviations --orange FOLDER
+
+One setting at a time is put as the paper has it, for the paper's method with several search seeds
+and for ours. What they find in recordings of the rig, which took part in no choice, is aimed at the
+targets of the trials, as a perfect policy would, and launched on the rig without errors. Of the
+band `orange`, FOLDER has the recordings and the measured landings, which no fit sees. Policies are
+trained on what the paper's method found, with one setting at a time, and their draws launched.
+Results are files in --work: a run that was killed goes on from there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from concurrent.futures import as_completed
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_json
+from pipeline.base.machine import cores
+from pipeline.base.pool import Pool
+from pipeline.episode.episode import Episode
+from pipeline.landing.landing_map import LandingMap
+from pipeline.landing.simulated import SimulatedLandings
+from pipeline.objective.space import Space
+from pipeline.params import load
+from pipeline.posterior.identify import launched
+from validation import orange
+from validation.benchmarks.timing import environment
+from validation.campaigns.deviation_scores import (
+    MESH,
+    OURS,
+    PAPER,
+    POLICIES,
+    SWITCHES,
+    forces,
+    launches,
+    misses,
+    params_of,
+)
+from validation.campaigns.rig_scores import calibrated_clamps, plain, sling_of
+from validation.density import Calibrated, found
+from validation.effects import AS_IS, effects
+from validation.paired import LEVEL
+
+WORK, REPORT = Path("data/deviations"), Path("reports/validation/deviations.json")
+FIRST, RECORDINGS, SEEDS = 1001, 3, 2  # rig seed; a band; search seeds of the paper's method
+RECORDED_ANEW = "cloud.sampling: before_filters", "force.cutoff_unit: rad/s", "loss.chamfer: clouds"
+POLICY = "policy"  # stands for the method of a case that trains one
+
+
+@dataclass(frozen=True)
+class Case:
+    """One identification, or one training with `method` POLICY."""
+
+    band: str
+    recording: int
+    switch: str
+    method: str
+    seed: int
+
+    def path(self, work: Path) -> Path:
+        name = "-".join(map(str, vars(self).values()))
+        return work / "results" / f"{''.join(c if c.isalnum() else '_' for c in name)}.json"
+
+    def episode(self, work: Path, switch: str | None = None) -> Path:
+        """Where its episode lies, or that of another setting, with the clamps."""
+        return place(work, self.band, self.recording, switch or self.switch)
+
+
+def cases_of(bands: list[str], recordings: int, seeds: int) -> list[Case]:
+    """Every identification: ours has one start; tetrahedra, which are slow, one of each band."""
+    return [
+        Case(band, recording, switch, method, seed)
+        for switch in SWITCHES
+        for seed in range(1, seeds + 1)
+        for recording in range(recordings)
+        for band in bands
+        for method in (PAPER, OURS)
+        if (method == PAPER or seed == 1)
+        and (switch != MESH or (method, recording, seed) == (PAPER, 0, 1))
+    ]
+
+
+def place(work: Path, band: str, recording: int, switch: str) -> Path:
+    number = 1 + RECORDED_ANEW.index(switch) if switch in RECORDED_ANEW else 0
+    return work / "episodes" / f"{band}_{recording}" / str(number)
+
+
+def prepare(where: tuple[str, int], work: Path, recordings: Path | None) -> None:
+    """Make a recording's episodes with their clamps; where they are refused, with the default's."""
+    from pipeline.recording.build import build_episodes  # both need Open3D
+    from pipeline.rig.recorder.record import record
+
+    band, number = where
+    folders = {switch: place(work, band, number, switch) for switch in (AS_IS, *RECORDED_ANEW)}
+    if all((folder / "mounting.json").exists() for folder in folders.values()):
+        return
+    if band == orange.NAME:
+        raw = recordings / (f"{band}_{number + 1}.mcap" if number else f"{band}.mcap")
+    else:
+        raw, params = folders[AS_IS].parent / f"{band}.mcap", params_of(band, AS_IS)
+        rig = params.rig.model_copy(update={"seed": FIRST + number})
+        raw.parent.mkdir(parents=True, exist_ok=True)
+        record(params.model_copy(update={"rig": rig}), band, raw)
+    for switch, folder in folders.items():
+        params = params_of(band, switch)
+        episode = build_episodes(raw, band, params)[0][0]
+        try:
+            calibrated_clamps(params, band, episode, folder)
+        except UserError as error:  # as printed, the low pass leaves no slack part
+            clamps = json.loads((folders[AS_IS] / "mounting.json").read_text())
+            write_json(folder / "mounting.json", clamps | {"refused": str(error)})
+    if band != orange.NAME:
+        raw.unlink()
+
+
+def identified(case: Case, work: Path, recordings: Path | None) -> dict:
+    """What one identification found, and how near its forces and launches are."""
+    params, folder = params_of(case.band, case.switch), case.episode(work)
+    optimizer = params.optimizer.model_copy(update={"seed": case.seed})
+    params = params.model_copy(update={"optimizer": optimizer})
+    start, sling = time.perf_counter(), sling_of(params, case.band, case.method, folder)
+    outcome, told = found(params, case.method, sling, [Episode.load(folder / "episode")])
+    seconds, names = time.perf_counter() - start, Space.of_method(params, case.method).names
+    theta = dict(zip(names, outcome.point.tolist(), strict=False))
+    about = {"theta": theta, "youngs_modulus": theta["youngs_modulus"], "seconds": seconds}
+    about |= {"point": outcome.point, "own_loss": told.get("loss", {}).get("total")}
+    seen = Episode.load(case.episode(work, AS_IS) / "episode")
+    return about | forces(case.band, outcome, seen) | misses(case.band, outcome, seen, recordings)
+
+
+def trained(case: Case, work: Path) -> dict:
+    """Launches of a policy that was trained on what the paper's method found."""
+    from pipeline.policy.check import check
+    from pipeline.policy.environment import projectile_start
+    from pipeline.policy.train import train
+
+    params, band = params_of(case.band, AS_IS), case.band
+    update = {**POLICIES[case.switch], "seed": case.seed}
+    settings = params.policy.model_copy(update=update)
+    folder = case.episode(work, AS_IS)
+    known = json.loads(Case(band, case.recording, AS_IS, PAPER, 1).path(work).read_text())
+    sling = launched(sling_of(params, band, PAPER, folder), Episode.load(folder / "episode"))
+    outcome, start = Calibrated(sling, np.array(known["point"]), None), time.perf_counter()
+    box = {name: getattr(params.setup, name) for name in ("draw_y", "draw_z", "max_force")}
+    surface = LandingMap.simulate(outcome, **box, size=settings.map_size).surface
+    source = surface if settings.landings == "map" else SimulatedLandings(outcome, surface)
+    seen = settings.state == "projectile_target"
+    where = projectile_start(params.setup, params.bands[band]) if seen else None
+    policy = train(source, settings, projectile=where).policy
+    seconds, checked = time.perf_counter() - start, check(policy, outcome, params)
+    simulated = {"simulated_miss": checked.mean_error, "failures": checked.failures}
+    draws = policy.draws(np.array(params.trials.targets))
+    return launches(band, params, draws) | simulated | {"seconds": seconds}
+
+
+def work_on(case: Case, work: Path, recordings: Path | None) -> None:
+    """Keep a result; that no simulation can follow the recording is one too."""
+    if case.path(work).exists():
+        return
+    try:
+        done = trained(case, work) if case.method == POLICY else identified(case, work, recordings)
+    except UserError as error:
+        done = {"failed": str(error)}
+    case.path(work).parent.mkdir(parents=True, exist_ok=True)
+    write_json(case.path(work), plain(vars(case) | done))
+
+
+def run(args, cases: list[Case], policies: list[Case]) -> None:
+    """Episodes, identifications, then trainings; each on its own process."""
+    recordings = [*dict.fromkeys((case.band, case.recording) for case in cases)]
+    make = partial(prepare, work=args.work, recordings=args.orange)
+    keep = partial(work_on, work=args.work, recordings=args.orange)
+    with Pool(workers=args.workers) as pool:
+        for work, todo in ((make, recordings), (keep, cases), (keep, policies)):
+            waiting = [pool.submit(work, one) for one in todo]
+            for number, done in enumerate(as_completed(waiting), 1):
+                done.result()
+                print(f"{work.func.__name__} {number} of {len(todo)}", flush=True)
+
+
+def report(args, cases: list[Case], policies: list[Case]) -> None:
+    """Write what the results in the work folder say."""
+    there = [one.path(args.work) for one in (*cases, *policies)]
+    results = [json.loads(path.read_text()) for path in there if path.exists()]
+    if not results:
+        raise UserError(f"{args.work}: holds no result")
+    params, rig = load(), [band for band in args.bands if band != orange.NAME]
+    command = f"python -m validation.campaigns.deviations --workers {args.workers}"
+    command += f" --recordings {args.recordings} --seeds {args.seeds}"
+    content = {
+        "kind": "virtual",
+        "asked": "What each departure from the paper changes by itself. Launches without errors, of"
+        " the paper's and our method aimed as a perfect policy would; of policies, their draws.",
+        "settings": {
+            "switches": [*SWITCHES],
+            "policies": POLICIES,
+            "targets_m": params.trials.targets,
+            "optimizer": params.optimizer.model_dump(),
+            "recordings": args.recordings,
+            "rig_seeds": [FIRST + number for number in range(args.recordings)],
+            "search_seeds": {PAPER: args.seeds, OURS: 1},
+            "intervals": f"{100 * LEVEL:.0f} %, bootstrap over bands, recordings and search seeds",
+            "miss": "mean |landing - target| [m]; of orange, mean error of predicted landings as a"
+            " share of the distance, within the recorded stretch",
+            "clamps_refused": refused(args),
+        },
+        "cases": len(cases) + len(policies),
+        "done": len(results),
+        "figures": effects(results, [*SWITCHES], [PAPER, OURS], rig)
+        | effects(results, [*POLICIES], [POLICY], rig),
+        "results": results,
+        **environment("cpu", command + (" --orange FOLDER" if args.orange else "")),
+    }
+    args.report.parent.mkdir(parents=True, exist_ok=True)
+    write_json(args.report, plain(content))
+    print(f"{args.report}: {len(results)} of {len(cases) + len(policies)} results", flush=True)
+
+
+def refused(args) -> dict:
+    """Why a recording's clamps were not calibrated under a setting, so that others' were taken."""
+    told = {}
+    for band in args.bands:
+        for switch in RECORDED_ANEW:
+            path = place(args.work, band, 0, switch) / "mounting.json"
+            reason = json.loads(path.read_text()).get("refused") if path.exists() else None
+            told |= {f"{band}, {switch}": reason} if reason else {}
+    return told
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--orange", type=Path, help="folder of its recordings and landings")
+    parser.add_argument("--report-only", action="store_true", help="of what is there")
+    parser.add_argument("--workers", type=int, default=cores(), help="processes (default: cores)")
+    parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
+    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
+    parser.add_argument("--bands", nargs="+", default=list(load().run.rig), help="of the rig")
+    parser.add_argument("--recordings", type=int, default=RECORDINGS, help="a band (default: 3)")
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="of searches (default: 2)")
+    args = parser.parse_args()
+    policies = [Case(band, 0, switch, POLICY, 1) for switch in POLICIES for band in args.bands]
+    args.bands += [orange.NAME] * (args.orange is not None)
+    cases = cases_of(args.bands, args.recordings, args.seeds)
+    for name in ("SLING_WORKERS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"  # of the processes that are started from here
+    if not args.report_only:
+        run(args, cases, policies)
+    report(args, cases, policies)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except UserError as error:
+        sys.exit(f"error: {error}")

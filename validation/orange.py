@@ -1,0 +1,24 @@
+"""The band `orange`: recorded and launched by an engine that this project did not make."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+NAME = "orange"
+ABOUT = {"source": "recording", "mass": 0.0408, "diameter": 0.010, "rest_length": 0.52}
+
+
+def with_orange(params):
+    """params.yaml with that band, whose hand was where its pose says."""
+    content = params.model_dump(mode="json", exclude_unset=True)
+    content["bands"][NAME], content["setup"]["arm_stiffness"] = ABOUT, None
+    return type(params).model_validate(content)
+
+
+def landings(folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Draws (N, 2) and measured landings (N,) [m] of orange_landings.csv."""
+    table = pd.read_csv(folder / f"{NAME}_landings.csv").to_numpy(float)
+    return table[:, :2], table[:, 2]

@@ -8,7 +8,7 @@ from ruamel.yaml import YAML
 from pipeline.params import check, load
 from tests.project import ROOT
 from validation.campaigns import deviations
-from validation.campaigns.deviations import PAPER, POLICIES, POLICY, SWITCHES, Case
+from validation.campaigns.deviations import PAPER, SWITCHES
 from validation.effects import AS_IS
 
 
@@ -37,20 +37,9 @@ def test_a_switch_is_the_key_that_it_is_called_by(switch: str) -> None:
     assert found != load()
 
 
-def test_policies_switches_are_keys_of_params() -> None:
-    policy = load().policy
-    for name, values in POLICIES.items():
-        changed = policy.model_copy(update=values)
-        type(policy).model_validate(changed.model_dump(mode="json"))
-        assert (changed == policy) == (name == AS_IS)
-        if name.startswith("policy."):
-            assert name == "policy." + ": ".join(*values.items())
-
-
 def test_every_case_has_a_file_of_its_own(tmp_path: Path) -> None:
     cases = deviations.cases_of(["band1", "orange"], 3, 2)
-    cases += [Case("band1", 0, switch, POLICY, 1) for switch in POLICIES]
     assert len({case.path(tmp_path) for case in cases}) == len(cases) == len(set(cases))
     assert {case.method for case in cases if "tetrahedra" in case.switch} == {PAPER}
     places = {deviations.place(tmp_path, "band1", 0, switch) for switch in SWITCHES}
-    assert len(places) == 1 + len(deviations.RECORDED_ANEW)
+    assert len(places) == 1 + len(deviations.EPISODES_ANEW)

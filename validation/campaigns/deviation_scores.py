@@ -28,17 +28,6 @@ SWITCHES = {  # section and values, as the paper has them
     "sling.mesh: tetrahedra": ("sling", {"mesh": "tetrahedra"}),
 }
 MESH = [*SWITCHES][-1]
-POLICIES = {
-    AS_IS: {},
-    "policy.landings: simulated": {"landings": "simulated"},
-    "policy.exploration: learned": {"exploration": "learned"},
-    "policy.state: projectile_target": {"state": "projectile_target"},
-    "all three": {
-        "landings": "simulated",
-        "exploration": "learned",
-        "state": "projectile_target",
-    },
-}
 
 
 def params_of(band: str, switch: str):

@@ -5,9 +5,9 @@
 One setting at a time is put as the paper has it, for the paper's method with several search seeds
 and for ours. What they find in recordings of the rig, which took part in no choice, is aimed at the
 targets of the trials, as a perfect policy would, and launched on the rig without errors. Of the
-band `orange`, FOLDER has the recordings and the measured landings, which no fit sees. Policies are
-trained on what the paper's method found, with one setting at a time, and their draws launched.
-Results are files in --work: a run that was killed goes on from there.
+band `orange`, FOLDER has the recordings and the measured landings, which no fit sees. What trains
+policies has a campaign of its own, policy_as_printed. Results are files in --work: a run that was
+killed goes on from there.
 """
 
 from __future__ import annotations
@@ -22,45 +22,37 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.machine import cores
 from pipeline.base.pool import Pool
 from pipeline.episode.episode import Episode
-from pipeline.landing.landing_map import LandingMap
-from pipeline.landing.simulated import SimulatedLandings
 from pipeline.objective.space import Space
 from pipeline.params import load
-from pipeline.posterior.identify import launched
 from validation import orange
 from validation.benchmarks.timing import environment
 from validation.campaigns.deviation_scores import (
     MESH,
     OURS,
     PAPER,
-    POLICIES,
     SWITCHES,
     forces,
-    launches,
     misses,
     params_of,
 )
 from validation.campaigns.rig_scores import calibrated_clamps, plain, sling_of
-from validation.density import Calibrated, found
+from validation.density import found
 from validation.effects import AS_IS, effects
 from validation.paired import LEVEL
 
 WORK, REPORT = Path("data/deviations"), Path("reports/validation/deviations.json")
 FIRST, RECORDINGS, SEEDS = 1001, 3, 2  # rig seed; a band; search seeds of the paper's method
-RECORDED_ANEW = "cloud.sampling: before_filters", "force.cutoff_unit: rad/s", "loss.chamfer: clouds"
-POLICY = "policy"  # stands for the method of a case that trains one
+EPISODES_ANEW = "cloud.sampling: before_filters", "force.cutoff_unit: rad/s", "loss.chamfer: clouds"
 
 
 @dataclass(frozen=True)
 class Case:
-    """One identification, or one training with `method` POLICY."""
+    """One identification."""
 
     band: str
     recording: int
@@ -92,7 +84,7 @@ def cases_of(bands: list[str], recordings: int, seeds: int) -> list[Case]:
 
 
 def place(work: Path, band: str, recording: int, switch: str) -> Path:
-    number = 1 + RECORDED_ANEW.index(switch) if switch in RECORDED_ANEW else 0
+    number = 1 + EPISODES_ANEW.index(switch) if switch in EPISODES_ANEW else 0
     return work / "episodes" / f"{band}_{recording}" / str(number)
 
 
@@ -102,7 +94,7 @@ def prepare(where: tuple[str, int], work: Path, recordings: Path | None) -> None
     from pipeline.rig.recorder.record import record
 
     band, number = where
-    folders = {switch: place(work, band, number, switch) for switch in (AS_IS, *RECORDED_ANEW)}
+    folders = {switch: place(work, band, number, switch) for switch in (AS_IS, *EPISODES_ANEW)}
     if all((folder / "mounting.json").exists() for folder in folders.values()):
         return
     if band == orange.NAME:
@@ -112,9 +104,14 @@ def prepare(where: tuple[str, int], work: Path, recordings: Path | None) -> None
         rig = params.rig.model_copy(update={"seed": FIRST + number})
         raw.parent.mkdir(parents=True, exist_ok=True)
         record(params.model_copy(update={"rig": rig}), band, raw)
+    built = []
     for switch, folder in folders.items():
         params = params_of(band, switch)
-        episode = build_episodes(raw, band, params)[0][0]
+        how = params.cloud, params.force
+        episode = next((one for known, one in built if known == how), None)
+        if episode is None:
+            episode = build_episodes(raw, band, params)[0][0]
+            built.append((how, episode))
         try:
             calibrated_clamps(params, band, episode, folder)
         except UserError as error:  # as printed, the low pass leaves no slack part
@@ -139,59 +136,34 @@ def identified(case: Case, work: Path, recordings: Path | None) -> dict:
     return about | forces(case.band, outcome, seen) | misses(case.band, outcome, seen, recordings)
 
 
-def trained(case: Case, work: Path) -> dict:
-    """Launches of a policy that was trained on what the paper's method found."""
-    from pipeline.policy.check import check
-    from pipeline.policy.environment import projectile_start
-    from pipeline.policy.train import train
-
-    params, band = params_of(case.band, AS_IS), case.band
-    update = {**POLICIES[case.switch], "seed": case.seed}
-    settings = params.policy.model_copy(update=update)
-    folder = case.episode(work, AS_IS)
-    known = json.loads(Case(band, case.recording, AS_IS, PAPER, 1).path(work).read_text())
-    sling = launched(sling_of(params, band, PAPER, folder), Episode.load(folder / "episode"))
-    outcome, start = Calibrated(sling, np.array(known["point"]), None), time.perf_counter()
-    box = {name: getattr(params.setup, name) for name in ("draw_y", "draw_z", "max_force")}
-    surface = LandingMap.simulate(outcome, **box, size=settings.map_size).surface
-    source = surface if settings.landings == "map" else SimulatedLandings(outcome, surface)
-    seen = settings.state == "projectile_target"
-    where = projectile_start(params.setup, params.bands[band]) if seen else None
-    policy = train(source, settings, projectile=where).policy
-    seconds, checked = time.perf_counter() - start, check(policy, outcome, params)
-    simulated = {"simulated_miss": checked.mean_error, "failures": checked.failures}
-    draws = policy.draws(np.array(params.trials.targets))
-    return launches(band, params, draws) | simulated | {"seconds": seconds}
-
-
 def work_on(case: Case, work: Path, recordings: Path | None) -> None:
     """Keep a result; that no simulation can follow the recording is one too."""
     if case.path(work).exists():
         return
     try:
-        done = trained(case, work) if case.method == POLICY else identified(case, work, recordings)
+        done = identified(case, work, recordings)
     except UserError as error:
         done = {"failed": str(error)}
     case.path(work).parent.mkdir(parents=True, exist_ok=True)
     write_json(case.path(work), plain(vars(case) | done))
 
 
-def run(args, cases: list[Case], policies: list[Case]) -> None:
-    """Episodes, identifications, then trainings; each on its own process."""
+def run(args, cases: list[Case]) -> None:
+    """Episodes, then identifications, one a process."""
     recordings = [*dict.fromkeys((case.band, case.recording) for case in cases)]
     make = partial(prepare, work=args.work, recordings=args.orange)
     keep = partial(work_on, work=args.work, recordings=args.orange)
     with Pool(workers=args.workers) as pool:
-        for work, todo in ((make, recordings), (keep, cases), (keep, policies)):
+        for work, todo in ((make, recordings), (keep, cases)):
             waiting = [pool.submit(work, one) for one in todo]
             for number, done in enumerate(as_completed(waiting), 1):
                 done.result()
                 print(f"{work.func.__name__} {number} of {len(todo)}", flush=True)
 
 
-def report(args, cases: list[Case], policies: list[Case]) -> None:
+def report(args, cases: list[Case]) -> None:
     """Write what the results in the work folder say."""
-    there = [one.path(args.work) for one in (*cases, *policies)]
+    there = [one.path(args.work) for one in cases]
     results = [json.loads(path.read_text()) for path in there if path.exists()]
     if not results:
         raise UserError(f"{args.work}: holds no result")
@@ -200,11 +172,10 @@ def report(args, cases: list[Case], policies: list[Case]) -> None:
     command += f" --recordings {args.recordings} --seeds {args.seeds}"
     content = {
         "kind": "virtual",
-        "asked": "What each departure from the paper changes by itself. Launches without errors, of"
-        " the paper's and our method aimed as a perfect policy would; of policies, their draws.",
+        "asked": "What each departure from the paper changes by itself, in the paper's method and"
+        " in ours; launches without errors, aimed as a perfect policy would.",
         "settings": {
             "switches": [*SWITCHES],
-            "policies": POLICIES,
             "targets_m": params.trials.targets,
             "optimizer": params.optimizer.model_dump(),
             "recordings": args.recordings,
@@ -215,23 +186,22 @@ def report(args, cases: list[Case], policies: list[Case]) -> None:
             " share of the distance, within the recorded stretch",
             "clamps_refused": refused(args),
         },
-        "cases": len(cases) + len(policies),
+        "cases": len(cases),
         "done": len(results),
-        "figures": effects(results, [*SWITCHES], [PAPER, OURS], rig)
-        | effects(results, [*POLICIES], [POLICY], rig),
+        "figures": effects(results, [*SWITCHES], [PAPER, OURS], rig),
         "results": results,
         **environment("cpu", command + (" --orange FOLDER" if args.orange else "")),
     }
     args.report.parent.mkdir(parents=True, exist_ok=True)
     write_json(args.report, plain(content))
-    print(f"{args.report}: {len(results)} of {len(cases) + len(policies)} results", flush=True)
+    print(f"{args.report}: {len(results)} of {len(cases)} results", flush=True)
 
 
 def refused(args) -> dict:
     """Why a recording's clamps were not calibrated under a setting, so that others' were taken."""
     told = {}
     for band in args.bands:
-        for switch in RECORDED_ANEW:
+        for switch in EPISODES_ANEW:
             path = place(args.work, band, 0, switch) / "mounting.json"
             reason = json.loads(path.read_text()).get("refused") if path.exists() else None
             told |= {f"{band}, {switch}": reason} if reason else {}
@@ -249,14 +219,13 @@ def main() -> None:
     parser.add_argument("--recordings", type=int, default=RECORDINGS, help="a band (default: 3)")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="of searches (default: 2)")
     args = parser.parse_args()
-    policies = [Case(band, 0, switch, POLICY, 1) for switch in POLICIES for band in args.bands]
     args.bands += [orange.NAME] * (args.orange is not None)
     cases = cases_of(args.bands, args.recordings, args.seeds)
     for name in ("SLING_WORKERS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"  # of the processes that are started from here
     if not args.report_only:
-        run(args, cases, policies)
-    report(args, cases, policies)
+        run(args, cases)
+    report(args, cases)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -62,6 +63,7 @@ class Evaluator:
         devices: Sequence[str] = ("cpu",),
         workers: int | None = None,
         simulate=simulated,
+        whole: bool = False,
     ) -> None:
         """Keep what every batch needs.
 
@@ -69,15 +71,16 @@ class Evaluator:
             devices: Of one kind; they share each batch evenly, in their order.
             workers: Threads on the CPU (the kernels release the interpreter); None: all cores.
             simulate: Called as `simulate(sling, episode=, thetas=, device=)`.
+            whole: One call a batch, on the first device.
         """
         self.space, self.loss = space, loss
         self._sling = sling
         self._simulate = partial(simulate, episode=episode)
         on_gpu = devices[0].startswith("cuda")
-        self._slice = SLICE["cuda" if on_gpu else "cpu"]
+        self._slice = sys.maxsize if whole else SLICE["cuda" if on_gpu else "cpu"]
         threads = 1 if on_gpu else workers or os.cpu_count()
-        self._devices = devices
-        self._pools = [ThreadPoolExecutor(threads) for _ in devices]
+        self._devices = devices[:1] if whole else devices
+        self._pools = [ThreadPoolExecutor(threads) for _ in self._devices]
 
     def __call__(self, unit: np.ndarray) -> Evaluation:
         """Evaluate points of the unit cube, shape (N, D)."""

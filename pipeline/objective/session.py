@@ -14,9 +14,11 @@ from pipeline.base.machine import devices, kind, workers
 from pipeline.base.progress import Progress
 from pipeline.episode.episode import Episode
 from pipeline.objective.cache import EvaluationCache
+from pipeline.objective.engine import simulate_of, sources_of
 from pipeline.objective.evaluate import Evaluation, Evaluator
 from pipeline.objective.loss import EpisodeLoss
 from pipeline.objective.space import Space
+from pipeline.params.identification import OUR_ENGINE
 from pipeline.sling.load import sling_of_method
 
 PIPELINE = Path(__file__).parents[1]
@@ -52,14 +54,14 @@ def service(stage: str, band: str, method: str, params, rollouts: int) -> Loggin
     """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
     evaluate, layout = evaluator(params, band, method), Layout()
     sections = (params.bands[band], params.setup, params.sling, params.force, params.loss)
-    mounted = params.methods[method].mounting
     cache = EvaluationCache(
         evaluate,
-        Path(".checkpoints", band if mounted else f"{band}-unmounted"),
+        Path(".checkpoints", "-".join(_folder(band, params.methods[method]))),
         fingerprint(
             *SOURCES,
             *(layout.episode(band) / f"{name}.parquet" for name in ("signals", "clouds")),
             layout.mounting(band),
+            *sources_of(params.methods[method].engine),
             *(section.model_dump_json() for section in sections),
             *(f"{package} {version(package)}" for package in ("warp-lang", "numpy", "scipy")),
             kind(),  # of the devices, not how many: that changes nothing
@@ -68,9 +70,15 @@ def service(stage: str, band: str, method: str, params, rollouts: int) -> Loggin
     return LoggingEvaluator(cache, Progress(f"{stage}-{band}-{method}", rollouts, "rollouts"))
 
 
+def _folder(band: str, method) -> list[str]:
+    """Words that tell methods apart whose rollouts differ."""
+    words = [band] if method.mounting else [band, "unmounted"]
+    return words if method.engine == OUR_ENGINE else [*words, method.engine.replace(":", ".")]
+
+
 def evaluator(params, band: str, method: str) -> Evaluator:
     """The evaluator of a recorded band, on the devices that the environment names."""
-    episode = load_episode(band)
+    episode, engine = load_episode(band), params.methods[method].engine
     sling = sling_of_method(params, band, method)
     return Evaluator(
         episode,
@@ -79,6 +87,8 @@ def evaluator(params, band: str, method: str) -> Evaluator:
         Space.of_method(params, method),
         devices=devices(),
         workers=workers(),
+        simulate=simulate_of(engine),
+        whole=engine != OUR_ENGINE,
     )
 
 

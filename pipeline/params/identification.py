@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Generic, Literal, TypeVar
 
 from pydantic import AfterValidator, model_validator
 
+from pipeline.base.imported import is_import
 from pipeline.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
 
 Step = Annotated[float, Range(1e-5, 0.05)]
@@ -19,6 +19,8 @@ LAWS = {  # of the band's material: what each has beside the five, and how far i
 LEAST_SQUARES = "least_squares"
 UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
 SEARCHES = ("multistart", LEAST_SQUARES, "de", "bo", "adam")
+OUR_ENGINE = "sling"
+ENGINES = OUR_ENGINE, "physx"
 
 
 class SlingParams(Section):
@@ -127,9 +129,14 @@ class Weights(Section):
 
 
 def _is_search(text: str) -> str:
-    own = all(part.isidentifier() for part in re.split("[.:]", text)) and text.count(":") == 1
-    if text not in SEARCHES and not own:
+    if text not in SEARCHES and not is_import(text):
         raise refusal(f"must be {', '.join(SEARCHES)} or package.module:Class, got {text!r}")
+    return text
+
+
+def _is_engine(text: str) -> str:
+    if text not in ENGINES and not is_import(text):
+        raise refusal(f"must be {', '.join(ENGINES)} or package.module:function, got {text!r}")
     return text
 
 
@@ -149,6 +156,7 @@ class MethodDefaults(Section):
 
     law: Literal[tuple(LAWS)]
     search: Annotated[str, AfterValidator(_is_search)]
+    engine: Annotated[str, AfterValidator(_is_engine)]
     settings: dict[str, Setting]
     fixed: dict[str, Value]
     bounds: dict[str, Bounds]
@@ -182,6 +190,12 @@ class MethodParams(MethodDefaults):
             )
         if self.search == LEAST_SQUARES and self.settings:
             raise refusal(f"settings: {LEAST_SQUARES} has none")
+        return self
+
+    @model_validator(mode="after")
+    def _least_squares_is_ours(self) -> MethodParams:
+        if self.search == LEAST_SQUARES and self.engine != OUR_ENGINE:
+            raise refusal(f"search: {LEAST_SQUARES} wants engine: {OUR_ENGINE}")
         return self
 
     @model_validator(mode="after")

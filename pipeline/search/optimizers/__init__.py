@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
-import sys
-from pathlib import Path
 
 from pipeline.base.errors import UserError, one_line
+from pipeline.base.imported import imported
 from pipeline.params.identification import LEAST_SQUARES
 from pipeline.search.loop import Optimizer
 
@@ -58,7 +56,7 @@ def build(
     """
     settings = {"rollouts": rollouts, "seed": seed, "population": population, **settings}
     try:
-        kind = _class(name)
+        kind = imported(OURS.get(name, name))
     except Exception as error:  # a module of the user's may raise anything
         raise _refusal(name, f"cannot be imported ({type(error).__name__}: {error})") from error
     try:
@@ -84,10 +82,3 @@ def _refusal(name: str, what: str) -> UserError:
     return UserError(
         f"optimiser {name}: {one_line(what)}; see `search` under `methods` in params.yaml"
     )
-
-
-def _class(name: str) -> type:
-    if str(Path.cwd()) not in sys.path:  # a command's is where it is installed
-        sys.path.append(str(Path.cwd()))
-    module, _, attribute = OURS.get(name, name).partition(":")
-    return getattr(importlib.import_module(module), attribute)

@@ -1,4 +1,4 @@
-"""The recorded interaction in PhysX, as the search's evaluator asks for it.
+"""`engine: physx`: the recorded interaction in PhysX, as the search's evaluator asks for it.
 
 The paper's settings. The hand holds a section of the band and lets go of it at once: an attachment,
 not pads, so that friction has no effect; the damping scale has no slot in today's PhysX.
@@ -6,10 +6,15 @@ not pads, so that friction has no effect; the damping scale has no slot in today
 
 from __future__ import annotations
 
+import atexit
+from functools import cache
+
 import numpy as np
 
+from pipeline.base.errors import UserError
 from pipeline.sling.interaction import Rollouts
 from pipeline.sling.model import GRAVITY
+from pipeline.sling.rubber import NEO_HOOKEAN
 from validation.engines.checks import SAME_MESH
 from validation.engines.mesh import Tube
 from validation.engines.physx.bands import Engine
@@ -20,16 +25,25 @@ SPACE = 10.0  # m: a band that leaves it has burst
 BURST = "the band burst in PhysX"
 
 
-def simulate_with(engine: Engine):
-    """What an `Evaluator` calls as simulate(sling, episode=, thetas=, device=)."""
+@cache
+def _engine() -> Engine:
+    """One for all batches of this process."""
+    engine = Engine()
+    atexit.register(engine.__exit__)
+    return engine
 
-    def simulated(sling, *, episode, thetas: np.ndarray, device: str) -> Rollouts:
-        tube = Tube.of(sling, **SAME_MESH)
-        course = phases(tube, episode, RATE)
-        courses = engine.simulate(tube, thetas, course, rate=RATE, iterations=ITERATIONS)
-        return rollouts(sling, tube, episode, thetas, courses)
 
-    return simulated
+def simulate(sling, *, episode, thetas: np.ndarray, device: str) -> Rollouts:
+    """Rollouts of thetas (N, 5) on PhysX's own device, whatever `device` says.
+
+    Raises UserError: as `Engine`, or for a law that PhysX does not have.
+    """
+    if sling.law != NEO_HOOKEAN:
+        raise UserError(f"engine: physx has no law {sling.law}; set law: {NEO_HOOKEAN}")
+    tube = Tube.of(sling, **SAME_MESH)
+    course = phases(tube, episode, RATE)
+    courses = _engine().simulate(tube, thetas, course, rate=RATE, iterations=ITERATIONS)
+    return rollouts(sling, tube, episode, thetas, courses)
 
 
 def rollouts(sling, tube: Tube, episode, thetas: np.ndarray, courses) -> Rollouts:

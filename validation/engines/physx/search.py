@@ -2,92 +2,72 @@
 
     python -m validation.engines.physx.search band1 [--params FILE] [--landings CSV]
 
-The paper's method with the budget of params.yaml, once with rollouts in PhysX and once with ours:
-same episode, mesh of clamps, loss, optimisers and seed. Then each theta* in both engines, and the
-launches of both in ours. Writes reports/validation/physx-<band>.json. What was simulated is kept in
-.checkpoints/physx/, so that a search that was killed goes on.
+The paper's method with the budget of params.yaml, once with `engine: physx` and once with ours:
+same episode, clamps, loss, optimisers and seed. Then each theta* in both engines, and launches of
+both in ours. Writes reports/validation/physx-<band>.json. What was simulated is kept in
+.checkpoints, so that a search that was killed goes on. SLING_DEVICE names the device of ours.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from pipeline.base.errors import UserError
+from pipeline.base import errors
 from pipeline.base.files import write_json
-from pipeline.base.fingerprint import fingerprint
-from pipeline.base.layout import Layout
-from pipeline.base.progress import Progress
-from pipeline.episode.episode import Episode
-from pipeline.objective.cache import EvaluationCache
-from pipeline.objective.evaluate import Evaluator, simulated
-from pipeline.objective.loss import TERMS, EpisodeLoss
-from pipeline.objective.session import SOURCES, LoggingEvaluator
+from pipeline.base.machine import devices
+from pipeline.objective.loss import TERMS
+from pipeline.objective.session import service
 from pipeline.objective.space import Space
 from pipeline.params import load
+from pipeline.params.identification import OUR_ENGINE
 from pipeline.search.history import History
 from pipeline.search.loop import budget
 from pipeline.sling.launch import launch
 from pipeline.sling.load import sling_of_method
 from validation.benchmarks.methods import complete
 from validation.benchmarks.timing import environment
-from validation.engines.physx.bands import Engine, release
-from validation.engines.physx.rollouts import ITERATIONS, RATE, simulate_with
+from validation.engines.physx.bands import release
+from validation.engines.physx.rollouts import ITERATIONS, RATE
 
 METHOD = "sling2sim2real"
-DEVICE = "cuda:0"
 OURS, PHYSX = "ours", "physx"
+ENGINES = {OURS: OUR_ENGINE, PHYSX: "physx"}
+
+
+def with_engines(params):
+    """params.yaml with a method for each of ENGINES: the paper's, simulated there."""
+    paper = params.methods[METHOD]
+    both = {name: paper.model_copy(update={"engine": one}) for name, one in ENGINES.items()}
+    return params.model_copy(update={"methods": dict(params.methods.items()) | both})
 
 
 class Comparison:
     """The same search of one band in both engines."""
 
-    def __init__(self, params, band: str, engine: Engine) -> None:
-        self.params, self.band = params, band
-        self.episode = Episode.load(Layout().episode(band))
-        self.sling = sling_of_method(params, band, METHOD)
-        self.space = Space.of_method(params, METHOD)
-        self._loss = EpisodeLoss.of(params, METHOD, self.episode, self.sling)
-        self._simulate = {OURS: simulated, PHYSX: simulate_with(engine)}
-
-    def evaluator(self, engine: str) -> EvaluationCache:
-        """Of points of the unit cube, with what the engine simulated before."""
-        evaluate = Evaluator(
-            self.episode,
-            self.sling,
-            self._loss,
-            self.space,
-            devices=[DEVICE],
-            simulate=self._simulate[engine],
-        )
-        of = fingerprint(
-            *SOURCES,
-            Path(__file__).parent,
-            Layout().episode(self.band) / "signals.parquet",
-            Layout().mounting(self.band),
-            self.params.model_dump_json(),
-        )
-        return EvaluationCache(evaluate, Path(".checkpoints/physx", f"{self.band}-{engine}"), of)
+    def __init__(self, params, band: str) -> None:
+        self.params, self.band = with_engines(params), band
+        self.sling = sling_of_method(self.params, band, OURS)
+        self.space = Space.of_method(self.params, OURS)
 
     def search(self, engine: str) -> tuple[History, float]:
         """Everything that was evaluated, and the seconds that it took (less what was recalled)."""
-        total = sum(budget(self.params.optimizer, self.params.methods[METHOD].search))
-        progress = Progress(f"{engine}-{self.band}-{METHOD}", total, "rollouts")
-        evaluate, began = self.evaluator(engine), time.perf_counter()
-        logged = LoggingEvaluator(evaluate, progress)
-        history = complete(self.params, METHOD, self.params.optimizer, logged)
+        optimizer = self.params.optimizer
+        total = sum(budget(optimizer, self.params.methods[engine].search))
+        evaluate = service("search", self.band, engine, self.params, total)
+        began = time.perf_counter()
+        history = complete(self.params, engine, optimizer, evaluate)
         return history, time.perf_counter() - began
 
     def losses(self, thetas: np.ndarray) -> dict[str, list[dict]]:
         """Terms of the loss of thetas (N, 5) by engine; None where one failed."""
         unit, found = self.space.to_unit(thetas), {}
         for engine in (OURS, PHYSX):
-            done = self.evaluator(engine)(unit)
+            done = service("losses", self.band, engine, self.params, len(unit))(unit)
             found[engine] = [
                 {"total": _plain(done.total[i]), "failure": done.failure[i]}
                 | {name: _plain(done.terms[name][i]) for name in TERMS}
@@ -117,7 +97,7 @@ def main() -> None:
     parser.add_argument("--landings", help="CSV of measured launches of this band")
     asked = parser.parse_args()
     params, version = load(asked.params), release()
-    about = environment(DEVICE, f"python -m validation.engines.physx.search {asked.band}")
+    about = environment(devices()[0], f"python -m validation.engines.physx.search {asked.band}")
     if asked.landings:
         table = pd.read_csv(asked.landings)
         draws, measured = table[["draw_y_m", "draw_z_m"]].to_numpy(), table.landing_y_m
@@ -125,23 +105,20 @@ def main() -> None:
         box = params.setup
         low, high = np.array([box.draw_y, box.draw_z]).T
         draws, measured = low + np.array([[0.25], [0.5], [0.75]]) * (high - low), None
-    content = {}
-    with Engine() as engine:
-        comparison = Comparison(params, asked.band, engine)
-        thetas = []
-        for name in (OURS, PHYSX):
-            history, seconds = comparison.search(name)
-            best = history.best()
-            thetas.append([best[one] for one in comparison.space.names])
-            content[name] = {
-                "theta": dict(zip(comparison.space.names, thetas[-1], strict=True)),
-                "rollouts": len(history.total),
-                "failed": int(np.isinf(history.total).sum()),
-                "seconds": seconds,
-            }
-        losses = comparison.losses(np.array(thetas))
-    for i, name in enumerate((OURS, PHYSX)):
-        content[name]["loss_in"] = {where: rows[i] for where, rows in losses.items()}
+    comparison, content, thetas = Comparison(params, asked.band), {}, []
+    for name in (OURS, PHYSX):
+        history, seconds = comparison.search(name)
+        best = history.best()
+        thetas.append([best[one] for one in comparison.space.names])
+        content[name] = {
+            "theta": dict(zip(comparison.space.names, thetas[-1], strict=True)),
+            "rollouts": len(history.total),
+            "failed": int(np.isinf(history.total).sum()),
+            "seconds": seconds,
+        }
+    for where, rows in comparison.losses(np.array(thetas)).items():
+        for name, row in zip((OURS, PHYSX), rows, strict=True):
+            content[name].setdefault("loss_in", {})[where] = row
     content |= {
         "band": asked.band,
         "method": METHOD,
@@ -158,7 +135,4 @@ def _plain(value: float) -> float | None:
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except UserError as error:
-        sys.exit(f"error: {error}")
+    errors.run(main)

@@ -12,6 +12,7 @@ from pipeline.drawing.styles import Styles, drawn, styles
 from pipeline.landing.stored import Stored
 from pipeline.params import Params
 from pipeline.report.paper import METHOD
+from pipeline.report.repeated import Repeated
 from pipeline.report.replay import Replay, replay
 from pipeline.report.results import Result, Results, gather
 
@@ -23,6 +24,7 @@ class Report:
     Attributes:
         replays: By band and method; of the methods that are drawn, of all where data are held out.
         styles: By method.
+        repeated: The campaign on more recordings of the rig, where its bands ran.
         root: Of the project, with data/ and reports/.
     """
 
@@ -30,6 +32,7 @@ class Report:
     results: Results
     replays: dict[str, dict[str, Replay]]
     styles: Styles
+    repeated: Repeated | None
     root: Path
 
     @classmethod
@@ -38,7 +41,8 @@ class Report:
         results = gather(params, root)
         named = styles(dict.fromkeys(result.method for result in results))
         replays = {band: _replays(params, results, band) for band in params.run.bands}
-        return cls(params, results, replays, named, root)
+        repeated = Repeated.load(root) if results.floors else None
+        return cls(params, results, replays, named, repeated, root)
 
     @property
     def folder(self) -> Path:

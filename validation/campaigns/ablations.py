@@ -17,15 +17,17 @@ import json
 import os
 import sys
 import time
+from collections import Counter
 from concurrent.futures import as_completed
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import spearmanr
 
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
-from pipeline.base.machine import cores
+from pipeline.base.machine import cores, processor
 from pipeline.base.pool import Pool
 from pipeline.episode.episode import Episode
 from pipeline.objective.space import Space
@@ -146,7 +148,7 @@ def work_on(job: Job, work: Path) -> dict:
         result = identified(job, _params, place(work, job.band, job.recording))
     except UserError as error:
         result = {"failed": str(error)}
-    return plain(vars(job) | result)
+    return plain(vars(job) | {"processor": processor()} | result)
 
 
 class ResultLines:
@@ -225,6 +227,26 @@ def summary(results: list[dict], bands, methods) -> dict:
     return figures
 
 
+def rank_correlations(results: list[dict], methods) -> np.ndarray:
+    """Spearman's, of loss and miss over searches of one loss on the same recording; one each.
+
+    Positive: the lower the loss that a search reached, the nearer its launches land.
+    """
+    found = {}
+    for one in results:
+        if one["method"] in methods and one["seed"] == 1 and not lost(one):
+            found.setdefault((one["band"], one["recording"]), []).append(one)
+    several = [some for some in found.values() if len(some) > 2]
+    pairs = [(scores(some, "loss"), scores(some, "miss_cm")) for some in several]
+    return np.array([spearmanr(*pair).statistic for pair in pairs])
+
+
+def _of_one_loss(method, params) -> bool:
+    """Whether a method minimises what the paper's does, over the same simulations."""
+    names = ("weights", "law", "mounting", "fixed", "bounds")
+    return all(getattr(method, name) == getattr(params.methods[PAPER], name) for name in names)
+
+
 def mean_of(values) -> float:
     """The mean of what is finite; NaN where nothing is."""
     values = np.array(values, float)
@@ -237,6 +259,7 @@ def report(args, params) -> None:
     results = [one for job, one in ResultLines(args.work).all().items() if job in wanted]
     if not results:
         raise UserError(f"{args.work}: holds no result of these bands and methods")
+    same = [name for name in args.methods if _of_one_loss(params.methods[name], params)]
     command = "python -m validation.campaigns.ablations"
     command += f" --workers {args.workers} --recordings {args.recordings} --seeds {args.seeds}"
     content = {
@@ -259,6 +282,11 @@ def report(args, params) -> None:
         },
         "jobs": len(wanted),
         "done": len(results),
+        "processors": dict(Counter(one.get("processor", "not told") for one in results)),
+        "rank_correlation_of_loss_and_miss": {
+            "methods": same,
+            "over_recordings": mean_interval(rank_correlations(results, same)),
+        },
         "figures": summary(results, args.bands, args.methods),
         **environment("cpu", command),
     }

@@ -22,7 +22,12 @@ def run(*some, floors=None, unused=None) -> SimpleNamespace:
     named = styles(dict.fromkeys(one.method for one in some))
     params = SimpleNamespace(trials=load().trials)
     return SimpleNamespace(
-        results=found, styles=named, params=params, main=references[0], references=references
+        results=found,
+        styles=named,
+        params=params,
+        main=references[0],
+        references=references,
+        repeated=None,
     )
 
 

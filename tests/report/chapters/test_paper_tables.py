@@ -22,7 +22,9 @@ def written(tmp_path):
     def run(*some, floors=None) -> str:
         ran = results(*some, floors=floors)
         return paper_tables(
-            SimpleNamespace(params=PARAMS, results=ran, styles=NAMED, folder=tmp_path)
+            SimpleNamespace(
+                params=PARAMS, results=ran, styles=NAMED, folder=tmp_path, repeated=None
+            )
         )
 
     return run

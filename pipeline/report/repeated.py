@@ -1,0 +1,100 @@
+"""The committed campaign of ablations and baselines: ten recordings of each band of the rig.
+
+What it is and how it is made: validation/campaigns/ablations.py. It is no part of a run.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.base.errors import UserError
+
+FILE = Path("reports", "validation", "ablations.json")
+ALL = "all"  # the bands together
+LEVEL = 0.05  # of the corrected p below which a difference counts
+
+
+@dataclass(frozen=True)
+class MeanInterval:
+    """A mean over `count` recordings, with its 95 % interval."""
+
+    mean: float
+    low: float
+    high: float
+    count: int
+
+
+@dataclass(frozen=True)
+class Against:
+    """By how much a method misses more than the paper's on the same recordings [cm].
+
+    Attributes:
+        p: Of Wilcoxon's signed-rank test, with Holm's correction.
+    """
+
+    mean: float
+    low: float
+    high: float
+    p: float
+
+    @property
+    def real(self) -> bool:
+        return self.p < LEVEL
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """What came of the campaign.
+
+    Attributes:
+        miss: Mean distance from the target [cm] by band (or ALL) and method.
+        against: The same beside the paper's method.
+        ranks: Rank correlation of loss and miss on one recording, over searches of one loss.
+    """
+
+    miss: dict[str, dict[str, MeanInterval]]
+    against: dict[str, dict[str, Against]]
+    ranks: MeanInterval
+
+    @classmethod
+    def load(cls, root: Path) -> Repeated | None:
+        """None where there is no such file. Raises UserError where it is another's."""
+        path = root / FILE
+        if not path.exists():
+            return None
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+            figures, paper = content["figures"], "less_sling2sim2real"
+            return cls(
+                {band: _intervals(one["methods"]) for band, one in figures.items()},
+                {band: _differences(one[paper]) for band, one in figures.items()},
+                _interval(content["rank_correlation_of_loss_and_miss"]["over_recordings"]),
+            )
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            raise UserError(
+                f"{path}: is not what validation.campaigns.ablations writes ({error!r});"
+                " `git checkout` it"
+            ) from error
+
+    @property
+    def bands(self) -> list[str]:
+        return sorted(band for band in self.miss if band != ALL)
+
+
+def _intervals(methods: dict) -> dict[str, MeanInterval]:
+    """Of the methods that have a mean."""
+    return {name: _interval(one["miss_cm"]) for name, one in methods.items() if one["miss_cm"]["n"]}
+
+
+def _interval(one: dict) -> MeanInterval:
+    return MeanInterval(*(one[key] for key in ("mean", "low", "high", "n")))
+
+
+def _differences(methods: dict) -> dict[str, Against]:
+    return {
+        name: Against(*(one[key] for key in ("mean", "low", "high", "p_holm")))
+        for name, one in methods.items()
+        if one["n"]
+    }

@@ -1,6 +1,7 @@
 """From an episode to θ by both stages of a search, with the calibrated clamps and without them."""
 
 import json
+import runpy
 import sys
 from pathlib import Path
 
@@ -13,7 +14,6 @@ from pipeline.base.layout import Layout
 from pipeline.params import load
 from pipeline.sling.theta import calibrated, load_theta
 from sling2sim2real.identification import Identification
-from stages import history, theta
 from tests.objective.own_law import own_law_episode
 from tests.project import ROOT
 from validation.synthetic import recorded_yardstick
@@ -39,8 +39,10 @@ def test_what_a_method_leaves_out_is_left_out_everywhere(
     episode.save(layout.episode("band1"))
     write_json(layout.mounting("band1"), SHOWN)
     monkeypatch.setattr(sys, "argv", ["stage", "band1", "sling2sim2real"])
-    history.main()
-    theta.main()
+    for stage in ("history", "theta"):
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_module(f"stages.{stage}", run_name="__main__")
+        assert not ended.value.code
     path = layout.theta("band1", "sling2sim2real")
     found = load_theta(path, "band1")
     assert json.loads(path.read_text()).get("mounted") == (None if mounting else False)

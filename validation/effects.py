@@ -58,17 +58,45 @@ def _effect(by: dict, method: str, switch: str, bands: list[str]) -> dict | None
 
 
 def cell(figures: dict, switch: str) -> str:
-    """A table's cell of one method: E's change, the peak force's error, rig and orange misses."""
-    rig = figures["rig"]
-    if switch not in rig:
-        return ""
-    one, plain = rig[switch], rig[AS_IS]
-    young = 100 * one["youngs_modulus_change"]["mean"]
-    force, was = (100 * each["peak_force"]["mean"] for each in (one, plain))
-    miss, before = (100 * each["miss"]["mean"] for each in (one, plain))
-    text = f"E {young:+.0f} %, force {was:+.1f} → {force:+.1f} %, rig {before:.1f} → {miss:.1f} cm"
-    for name in sorted(figures):
-        if name != "rig" and switch in figures[name]:
-            here, there = (100 * figures[name][key]["miss"]["mean"] for key in (switch, AS_IS))
-            text += f", {name} {there:.1f} → {here:.1f} %"
-    return text.replace("-", "−")
+    """A table's cell of one method: how far launches miss with and without a setting."""
+    return ", ".join(
+        f"{group} {_of(found[AS_IS], 'miss'):.1f} → {_of(found[switch], 'miss'):.1f} {unit}"
+        for group, found, unit in _groups(figures)
+        if switch in found
+    )
+
+
+def table(figures: dict, switches: list[str]) -> list[str]:
+    """Lines of Markdown: a row for each setting and group of bands, of one method."""
+    lines = [
+        "| setting | bands | E | peak force, off the recorded | loss | miss | change of the miss |",
+        "|---|---|---:|---:|---:|---:|---:|",
+    ]
+    for switch in switches:
+        for group, found, unit in _groups(figures):
+            if switch not in found:
+                continue
+            one, plain = found[switch], switch == AS_IS
+            young = f"{_of(one, 'youngs_modulus') / 1e5:.0f} kPa"
+            if not plain:
+                young = f"{_of(one, 'youngs_modulus_change'):+.1f} %"
+            low, mean, high = (_of(one, "miss_change", end) for end in ("low", "mean", "high"))
+            moved = "" if plain else f"{mean:+.1f} {unit} [{low:+.1f}, {high:+.1f}]"
+            lines.append(
+                f"| {switch if plain else f'`{switch}`'} | {group} | {young} |"
+                f" {_of(one, 'peak_force'):+.1f} % | {_of(one, 'loss') / 100:.2f} |"
+                f" {_of(one, 'miss'):.1f} {unit} | {moved} |"
+            )
+    return [line.replace("-", "−") if number > 1 else line for number, line in enumerate(lines)]
+
+
+def _groups(figures: dict):
+    """Name, figures and the unit of a miss: of the rig first."""
+    for name in ("rig", *sorted({*figures} - {"rig"})):
+        yield name, figures[name], "cm" if name == "rig" else "%"
+
+
+def _of(figures: dict, name: str, end: str = "mean") -> float:
+    """A hundred times a figure's mean, or an end of its interval; 0 is not -0."""
+    value = figures[name][end]
+    return round(100 * (np.nan if value is None else value), 6) + 0.0

@@ -1,5 +1,6 @@
 """The campaign of the departures: its settings are keys of params.yaml."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -8,8 +9,8 @@ from ruamel.yaml import YAML
 from pipeline.params import check, load
 from tests.project import ROOT
 from validation.campaigns import deviations
-from validation.campaigns.deviations import PAPER, SWITCHES
-from validation.effects import AS_IS
+from validation.campaigns.deviations import OURS, PAPER, REPORT, SWITCHES
+from validation.effects import AS_IS, cell, table
 
 
 @pytest.fixture(autouse=True)
@@ -43,3 +44,18 @@ def test_every_case_has_a_file_of_its_own(tmp_path: Path) -> None:
     assert {case.method for case in cases if "tetrahedra" in case.switch} == {PAPER}
     places = {deviations.place(tmp_path, "band1", 0, switch) for switch in SWITCHES}
     assert len(places) == 1 + len(deviations.EPISODES_ANEW)
+
+
+@pytest.mark.skipif(not (ROOT / REPORT).exists(), reason="the campaign has not run yet")
+def test_the_page_has_the_campaigns_figures() -> None:
+    """docs/paper.md: each row of a setting its cell, and both methods' tables whole."""
+    figures = json.loads((ROOT / REPORT).read_text(encoding="utf-8"))["figures"]
+    page = (ROOT / "docs/paper.md").read_text(encoding="utf-8").splitlines()
+    for switch in SWITCHES:
+        rows = [line for line in page if f"`{switch}`" in line and line.endswith("|")]
+        expected = cell(figures[PAPER], switch)
+        assert switch == AS_IS or any(expected in line for line in rows), (switch, expected)
+    for method in (PAPER, OURS):
+        lines = table(figures[method], [*SWITCHES])
+        start = page.index(lines[2])
+        assert page[start - 2 : start - 2 + len(lines)] == lines

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validation.effects import AS_IS, KEY, cell, effects
+from validation.effects import AS_IS, KEY, cell, effects, table
 
 BANDS, SEEDS = ["one", "two"], [1, 2]
 
@@ -31,8 +31,12 @@ def test_a_setting_is_compared_band_by_band_and_seed_by_seed() -> None:
     assert other["youngs_modulus_change"]["mean"] == pytest.approx(0.2)
     assert other["youngs_modulus_change"]["std"] == pytest.approx(0, abs=1e-12)
     assert other["miss_change"]["mean"] == pytest.approx(0.03)
-    assert cell(found, "other") == "E +20 %, force +1.0 → −2.0 %, rig 5.0 → 8.0 cm"
+    assert cell(found, "other") == "rig 5.0 → 8.0 cm"
     assert cell(found, "never run") == ""
+    plain, row = table(found, [AS_IS, "other", "never run"])[2:]
+    assert plain == "| as it is | rig | 550 kPa | +1.0 % | 1.00 | 5.0 cm |  |"
+    changes = "+20.0 % | −2.0 % | 1.00 | 8.0 cm | +3.0 cm [+3.0, +3.0]"
+    assert row == f"| `other` | rig | {changes} |"
 
 
 def test_a_band_that_is_not_of_the_rig_stands_by_itself() -> None:
@@ -47,7 +51,8 @@ def test_a_band_that_is_not_of_the_rig_stands_by_itself() -> None:
     orange = [more | {"switch": AS_IS, "miss": 0.02}, more | {"switch": "other", "miss": 0.04}]
     found = effects(all_of(AS_IS) + all_of("other") + orange, [AS_IS, "other"], ["m"], BANDS)["m"]
     assert found["rig"]["other"]["miss"]["mean"] == pytest.approx(0.05)
-    assert cell(found, "other").endswith("rig 5.0 → 5.0 cm, orange 2.0 → 4.0 %")
+    assert cell(found, "other") == "rig 5.0 → 5.0 cm, orange 2.0 → 4.0 %"
+    assert table(found, ["other"])[-1].endswith("| 4.0 % | +2.0 % [+2.0, +2.0] |")
 
 
 def test_what_failed_or_missed_is_counted_and_takes_no_part() -> None:

@@ -42,7 +42,7 @@ from validation.campaigns.deviation_scores import (
 )
 from validation.campaigns.rig_scores import calibrated_clamps, plain, sling_of
 from validation.density import found
-from validation.effects import AS_IS, effects
+from validation.effects import AS_IS, effects, table
 from validation.paired import LEVEL
 
 WORK, REPORT = Path("data/deviations"), Path("reports/validation/deviations.json")
@@ -195,6 +195,8 @@ def report(args, cases: list[Case]) -> None:
     args.report.parent.mkdir(parents=True, exist_ok=True)
     write_json(args.report, plain(content))
     print(f"{args.report}: {len(results)} of {len(cases)} results", flush=True)
+    for method in (PAPER, OURS):
+        print(f"\n{method}\n", *table(content["figures"][method], [*SWITCHES]), sep="\n")
 
 
 def refused(args) -> dict:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from pipeline.card.findings import Findings
@@ -148,7 +150,7 @@ def _draws(known: Known) -> str:
 def _rests(known: Known) -> str:
     count, launches = len(known.episodes), len(known.confidence.get("launches", []))
     pulls = (
-        f"{count} pull{'s' * (count != 1)} in {', '.join(f'`{one}`' for one in known.recordings)}"
+        f"{count} pull{'s' * (count != 1)} in {', '.join(_code(one) for one in known.recordings)}"
     )
     told = f"{launches} launch{'es' * (launches != 1)}" if launches else "no launch"
     launched = known.launched.kind.value_counts()
@@ -158,3 +160,10 @@ def _rests(known: Known) -> str:
 - Method: `{known.method}`; values in `data/theta/{known.band}/{known.method}.json`.
 - Landings held against predictions: {tried}.
 """
+
+
+def _code(name: str) -> str:
+    """A file's name as code, whatever is in it."""
+    shown = "".join(c if c.isprintable() else "?" for c in name)
+    fence = "`" * (1 + max(map(len, re.findall("`+", shown)), default=0))
+    return f"{fence} {shown} {fence}" if "`" in shown else f"`{shown}`"

@@ -21,7 +21,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -32,7 +32,7 @@ from mcap.opcode import Opcode
 from pipeline.base.errors import UserError
 from pipeline.recording.input import records as of
 from pipeline.recording.input.records import Damaged, Record
-from pipeline.recording.input.words import counted, few
+from pipeline.recording.input.words import counted, few, printable
 
 MOST = 2**30  # bytes of messages that are held at once
 OVERHEAD = 256  # bytes that a message costs beside its payload
@@ -122,10 +122,8 @@ class _Contents:
             self._settle(record)
         trusted = self._summary_holds()
         for one in self.summary if trusted else ():
-            if isinstance(one, kinds.Schema):
-                self.schemas.setdefault(one.id, one)
-            elif isinstance(one, kinds.Channel):
-                self.definitions.setdefault(one.id, one)
+            if isinstance(one, kinds.Schema | kinds.Channel):
+                self._name(one)
         channels, orphans = self._joined()
         losses = [*self._losses(), *(self._compared() if trusted else ()), *orphans]
         return Container(self.path, channels, losses, self._notes(trusted))
@@ -170,16 +168,22 @@ class _Contents:
         if opcode == Opcode.MESSAGE:
             self._message(content, 0, len(content))
         elif opcode == Opcode.SCHEMA:
-            self.schemas.setdefault(content.id, content)
+            self._name(content)
         elif opcode == Opcode.CHANNEL:
-            known = self.definitions.setdefault(content.id, content)
-            if _meaning(known) != _meaning(content):
+            known = self._name(content)
+            if _meaning(known) != _meaning(replace(content, topic=printable(content.topic))):
                 self.ambiguous.setdefault(content.id, 0)
         elif opcode == Opcode.CHUNK:
             try:
                 self._open(of.unpack(content))
             except Damaged:
                 self.dropped.append((content.message_start_time, content.message_end_time))
+
+    def _name(self, one: kinds.Schema | kinds.Channel) -> kinds.Schema | kinds.Channel:
+        """The first schema or channel of its number, by a name that can be shown."""
+        if isinstance(one, kinds.Schema):
+            return self.schemas.setdefault(one.id, replace(one, name=printable(one.name)))
+        return self.definitions.setdefault(one.id, replace(one, topic=printable(one.topic)))
 
     def _open(self, data: bytes) -> None:
         """The records of a chunk. Raises Damaged."""

@@ -16,10 +16,12 @@ from pipeline.base.errors import UserError
 from pipeline.recording.input.container import Channel
 
 Decoder = Callable[[bytes], object]
+LONGEST = {"json": 2**25}  # bytes of one message: objects of JSON take fifty times as much
+USUAL = 2**27
 
 
 def decoder(channel: Channel) -> Decoder:
-    """A function from payload to a message with attributes.
+    """A function from payload to a message with attributes; it raises whatever damage makes it.
 
     Raises:
         UserError: where the encoding is not known or the schema is bad, in one line.
@@ -32,11 +34,19 @@ def decoder(channel: Channel) -> Decoder:
             f"topic {channel.topic}: {what} with messages {channel.encoding!r} cannot be read,"
             f" record one of: {known}"
         )
+    most = LONGEST.get(channel.encoding, USUAL)
     try:
-        return _compiled(schema.encoding, channel.encoding, schema.name, schema.data)
+        read = _compiled(schema.encoding, channel.encoding, schema.name, schema.data)
     except Exception as error:  # the parsers raise many kinds
         reason = str(error).partition("\n")[0]
         raise UserError(f"topic {channel.topic}: bad schema {schema.name} ({reason})") from error
+
+    def bounded(payload: bytes) -> object:
+        if len(payload) > most:
+            raise ValueError("a message that is too long")
+        return read(payload)
+
+    return bounded
 
 
 @lru_cache(64)
@@ -47,6 +57,8 @@ def _compiled(kind: str, encoding: str, name: str, data: bytes) -> Decoder:
 def _ros(schema: Schema) -> Decoder:
     """By types of this schema alone, because recordings may mix versions of a type."""
     text = schema.data.decode()
+    if re.search(r"\[\s*\d{5,}\s*\]", text):  # rosbags writes code for each element
+        raise ValueError("an array of a fixed length beyond 9999")
     # As rosbags has it: with the `msg` that ROS 1 leaves out.
     name = re.sub("^([^/:]+)(/|::)([^/:]+)$", r"\1/msg/\3", schema.name).replace("::", "/")
     store = get_typestore(Stores.EMPTY)

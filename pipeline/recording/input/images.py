@@ -16,6 +16,8 @@ from pipeline.recording.input.readings import Picture
 DEPTH_HEADER = struct.Struct("<iff")
 PNG_CHUNK = struct.Struct(">I4s")  # length, type
 RVL_SIZE = struct.Struct("<II")  # columns, rows
+SCANS = 100  # of a JPEG, of which each asks to go over all its pixels again
+LARGEST_RVL = 2**22  # pixels, whose decoding takes a hundred bytes for each
 LARGEST = 2**24  # pixels; a damaged size must not ask for more memory than this
 COLORS = {
     "rgb8": (3, cv2.COLOR_RGB2BGR),
@@ -107,13 +109,13 @@ def rvl(data: np.ndarray) -> np.ndarray:
         raise Undecodable("RVL without a picture")
     width, height = RVL_SIZE.unpack_from(data)
     pixels = width * height
-    if not 0 < pixels <= LARGEST:
-        raise Undecodable(f"RVL of {width} x {height} pixels")
+    if not 0 < pixels <= LARGEST_RVL or len(data) > RVL_SIZE.size + 4 * pixels + 4:
+        raise Undecodable(f"RVL of {len(data)} bytes, {width} x {height} pixels")
     words = data[RVL_SIZE.size :][: (len(data) - RVL_SIZE.size) // 4 * 4].reshape(-1, 4)
     octets = words[:, ::-1].ravel()  # the nibbles of a word begin at its highest bits
     nibbles = np.stack([octets >> 4, octets & 15], axis=1).ravel()
     # A value is its nibbles' lower three bits, the lowest first; the last one lacks the bit 8.
-    ends = np.flatnonzero(nibbles < 8)
+    ends = np.flatnonzero(nibbles < 8)[: 3 * pixels + 2]  # each run, of at least a pixel, has two
     starts = np.concatenate([[0], ends[:-1] + 1])
     lengths = ends - starts
     if not len(ends) or lengths.max() > 9:  # more than 30 bits
@@ -166,6 +168,8 @@ def _unpacked(data: np.ndarray, flags: int, kind: str) -> np.ndarray:
         raise Undecodable(f"damaged image, or neither JPEG nor PNG ({kind})")
     if data[0] == 0xFF and b"\xff\xd9" not in data[-4096:].tobytes():
         raise Undecodable("JPEG is cut off")  # OpenCV would fill it up with grey
+    if data[0] == 0xFF and data.tobytes().count(b"\xff\xda") > SCANS:
+        raise Undecodable(f"JPEG of more than {SCANS} scans")
     if data[0] != 0xFF and not _chunks_fit(data):
         raise Undecodable(f"damaged PNG ({kind})")
     try:

@@ -19,8 +19,10 @@ from pipeline.recording.input.frames import TransformTree
 from pipeline.recording.input.streams import Stream, streams_of
 from pipeline.recording.input.topics import camera_of, choose
 from pipeline.recording.input.transforms import transforms_of
+from pipeline.recording.input.words import printable, shortened
 
 SHOWN = 3  # losses in an error
+LINE, LOSS = 1000, 300  # characters of an error and of a loss in it
 CAMERAS = ("color", "depth")
 ROLES = ("wrench", "pose", "twist", "gripper", *CAMERAS)
 
@@ -111,6 +113,7 @@ def recording_of(container: Container, setup: object) -> Recording:
         cameras = {f"{role}_camera": camera_of(chosen, role) for role in CAMERAS}
         found = {role: chosen[role] for role in ROLES if role in chosen}
         streams, remarks = streams_of(found)
+        transforms = transforms_of(container)
     except UserError as error:
         raise explained(error, container.path, container.losses) from None
     lost = [f"{stream.topic}: {note}" for stream in streams.values() for note in stream.notes]
@@ -118,7 +121,7 @@ def recording_of(container: Container, setup: object) -> Recording:
         path=container.path,
         **{role: streams.get(role) for role in ROLES},
         **cameras,
-        transforms=transforms_of(container),
+        transforms=transforms,
         losses=[*container.losses, *lost],
         notes=[*container.notes, *remarks],
         choices={role: choice.why for role, choice in chosen.items()},
@@ -129,7 +132,8 @@ def recording_of(container: Container, setup: object) -> Recording:
 def explained(error: UserError, path: Path, losses: list[str], pull: str = "") -> UserError:
     """The error with the file's name, the pull, and with what was lost, which may be its cause."""
     text = str(error).removeprefix(f"{path}: ")
-    text = f"{pull}: {text}" if pull else text
+    text = shortened(f"{pull}: {text}" if pull else text, LINE)
     text = text if str(path) in text else f"{path}: {text}"
-    shown = losses[:SHOWN] + ["and more"] * (len(losses) > SHOWN)
-    return UserError(f"{text} ({'; '.join(shown)})" if losses else text)
+    shown = [shortened(one, LOSS) for one in losses[:SHOWN]]
+    shown += ["and more"] * (len(losses) > SHOWN)
+    return UserError(printable(f"{text} ({'; '.join(shown)})" if losses else text))

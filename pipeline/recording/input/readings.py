@@ -18,6 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pipeline.recording.input.words import printable
+
 LATEST = 2**62  # ns; a stamp beyond it is damage
 FRANKA_BASE = "franka_base"  # frame of Franka states whose header names none, as franka_ros writes
 
@@ -95,7 +97,7 @@ def stamp_of(message: object) -> int | None:
 
 def frame_of(message: object) -> str:
     header = getattr(message, "header", message)
-    return str(getattr(header, "frame_id", "")).lstrip("/")
+    return printable(str(getattr(header, "frame_id", ""))).lstrip("/")
 
 
 def read_wrench(message: object) -> Reading:

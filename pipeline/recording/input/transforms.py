@@ -12,9 +12,11 @@ from pipeline.recording.input.decode import decoder
 from pipeline.recording.input.frames import Transform, TransformTree
 from pipeline.recording.input.readings import kind_of, quaternion_of
 from pipeline.recording.input.roles import readable
+from pipeline.recording.input.words import printable
 
 Edge = tuple[str, str]
 FOXGLOVE = ("FrameTransform", "FrameTransforms")
+MOST = 500  # frames; an arm, its hand and cameras have a tenth of them
 STILL = 1e-9  # m and quaternion: a transform that changes by more is no static one
 
 
@@ -22,6 +24,7 @@ def transforms_of(container: Container) -> TransformTree:
     """All of tf_static; of Foxglove's transforms, which share one topic, those that keep still.
 
     Messages that cannot be read are left out: a transform that is missed is asked for later.
+    Raises UserError for more frames than a rig has.
     """
     poses: dict[Edge, np.ndarray] = {}
     moving: set[Edge] = set()
@@ -42,10 +45,12 @@ def transforms_of(container: Container) -> TransformTree:
             if not static and np.abs(poses.setdefault(edge, pose) - pose).max() > STILL:
                 moving.add(edge)
             poses[edge] = pose
+    still = {edge: pose for edge, pose in poses.items() if edge not in moving}
+    if len(still) > MOST:
+        raise UserError(f"more than {MOST} fixed frames: record /tf_static of this rig alone")
     tree = TransformTree()
-    for edge, pose in poses.items():
-        if edge not in moving:
-            tree.add(*edge, Transform.of(pose))
+    for edge, pose in still.items():
+        tree.add(*edge, Transform.of(pose))
     return tree
 
 
@@ -63,5 +68,5 @@ def _edges(message: object) -> list[tuple[Edge, np.ndarray]]:
         except ValueError:  # some publishers leave the quaternion at zero
             continue
         if np.isfinite(numbers).all():
-            found.append((tuple(map(str, edge)), numbers))
+            found.append((tuple(printable(str(name)) for name in edge), numbers))
     return found

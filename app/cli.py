@@ -100,6 +100,20 @@ def add_recording(arguments: argparse.Namespace) -> Done:
 
 
 @command(
+    "say whether a band changed: each recording identified alone, drawn over time",
+    "band1",
+    flag("band", metavar="BAND", help="of params.yaml, with two recordings or more"),
+    JSON,
+)
+def drift(arguments: argparse.Namespace) -> Done:
+    from app.drift.drift import drift, shown
+    from sling2sim2real.settings import Settings
+
+    content = drift(Settings.load("params.yaml"), arguments.band)
+    return kinds.shown(content, True) if arguments.json else shown(content)
+
+
+@command(
     "say whether a recording can be used, what is missing and what costs accuracy",
     "my.mcap --rest-length 0.52 --sheet my.png",
     flag("recording", type=Path, metavar="FILE.mcap"),

@@ -1,0 +1,155 @@
+"""Whether a band has changed from one recording to the next: `sling drift`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from app.drift.change import FALSE_ALARM, ChangeOfBand, changes, newest
+from app.drift.picture import AXES, over_time
+from app.drift.recordings import COMPARED, IdentifiedRecording, identified, in_time
+from app.sizes import DIAMETER, REST_LENGTH
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_json
+from pipeline.base.layout import Layout
+from pipeline.params import expect_known
+from sling2sim2real.identification import METHOD
+from sling2sim2real.model import Band
+from sling2sim2real.settings import Settings
+from validation.benchmarks.timing import environment
+
+SAME = "no change beyond the intervals"
+SHORT = {"youngs_modulus": "E", "damping_product": "damping s·d"}
+UNITS = {"youngs_modulus": "kPa", "damping_product": "ms"}
+BECAME = {
+    "youngs_modulus": ("softened", "stiffened"),
+    "damping_product": ("damps less", "damps more"),
+}
+BY_TIME, BY_NAME = "time of recording", "file name"
+
+
+def drift(settings: Settings, band: str, root: Path | str = ".") -> dict:
+    """Identify each recording of a band alone and hold them against each other.
+
+    Writes reports/drift/<band>.png and .json; what is the same as in an earlier .json is taken
+    from there.
+
+    Returns:
+        What the JSON says.
+
+    Raises:
+        UserError: An unknown band, fewer than two recordings, or one that cannot be used.
+    """
+    expect_known(settings, "band", band)
+    layout = Layout(Path(root))
+    files, written = layout.recordings(band), layout.root / "reports" / "drift" / f"{band}.json"
+    if len(files) < 2:
+        raise UserError(
+            f"{layout.raw(band)}: holds {'one recording' if files else 'no recording'}, two or more"
+            f" are needed; `sling add-recording --band {band} FILE.mcap` adds one"
+        )
+    about, sizes = environment("cpu", f"sling drift {band}"), settings.bands[band]
+    own = Band(sizes.mass, sizes.diameter, sizes.rest_length, band)
+    found = identified(files, own, settings, about["code"], written)
+    dated = in_time(found)
+    found = dated or found
+    settled = [number for number, one in enumerate(found) if one.settled]
+    for one in found:
+        if not one.settled:
+            print(f"warning: left out: the fit of {one.file} had not settled", file=sys.stderr)
+    if len(settled) < 2:
+        raise UserError(f"{band}: fewer than two of the recordings could be fitted")
+    values = {name: [found[i].values[name] for i in settled] for name in COMPARED}
+    changed = [
+        replace(one, earlier=settled[one.earlier], later=settled[one.later])
+        for one in changes(values)
+    ]
+    new = newest(changed)
+    verdict = [_changed(band, one, found, bool(dated)) for one in _first(changed)] or [SAME]
+    fresh = [layout.raw(band) / one.file for one in found[new:] if one.settled]
+    content = about | {
+        "band": band,
+        "method": METHOD,
+        "order": BY_TIME if dated else BY_NAME,
+        "recordings": [
+            one.model_dump() | {"date": one.date if dated else None, "new": bool(new) and i >= new}
+            for i, one in enumerate(found)
+        ],
+        "false_alarm": FALSE_ALARM,
+        "changes": [asdict(one) for one in changed],
+        "verdict": verdict,
+        "next": anew(own, fresh) if changed else None,
+    }
+    titles = [f"{SHORT[one.quantity]} {_percent(one)}" for one in _first(changed)] or [SAME]
+    title = f"{band}: {', '.join(titles)}"
+    over_time(written.with_suffix(".png"), found, bool(dated), changed, new, title)
+    write_json(written, content)
+    return content
+
+
+def _first(changed: Sequence[ChangeOfBand]) -> list[ChangeOfBand]:
+    """The surest of each quantity."""
+    return [
+        next(one for one in changed if one.quantity == name)
+        for name in COMPARED
+        if any(one.quantity == name for one in changed)
+    ]
+
+
+def _changed(
+    band: str, change: ChangeOfBand, found: Sequence[IdentifiedRecording], dated: bool
+) -> str:
+    name, unit = change.quantity, UNITS[change.quantity]
+    one, other = found[change.earlier], found[change.later]
+    before, after = (f"on {each.date}" if dated else f"in {each.file}" for each in (one, other))
+    return (
+        f"{SHORT[name]} of {band} changed: {_interval(one, name)} {unit} {before},"
+        f" {_interval(other, name)} {after}: {_percent(change)};"
+        f" it {BECAME[name][change.ratio > 1]}"
+    )
+
+
+def _percent(change: ChangeOfBand) -> str:
+    return f"{100 * (change.ratio - 1):+.0f} %"
+
+
+def _interval(one: IdentifiedRecording, name: str) -> str:
+    value, factor = one.values[name], AXES[name][1]
+    middle, low, high = (f"{factor * x:.3g}" for x in (value.value, value.low, value.high))
+    return f"{middle} ({low} to {high})"
+
+
+def anew(band: Band, files: Sequence[Path]) -> str:
+    """The command that identifies the band by these recordings alone, under another name."""
+    words = ["sling fit", *(file.as_posix() for file in files), f"--mass {band.mass:g}"]
+    if band.diameter != DIAMETER:
+        words.append(f"--diameter {band.diameter:g}")
+    if band.rest_length != REST_LENGTH:
+        words.append(f"--rest-length {band.rest_length:g}")
+    return " ".join([*words, f"--name {band.name}_new"])
+
+
+def shown(content: dict) -> str:
+    """A table, and below it what came out."""
+    dated = content["order"] == BY_TIME
+    rows = [("recording", *(f"{SHORT[name]} [{UNITS[name]}]" for name in COMPARED), "")]
+    for row in content["recordings"]:
+        one = IdentifiedRecording.model_validate(row)
+        left = "" if one.settled else "not settled, left out"
+        rows.append(
+            (
+                f"{one.date}  {one.file}" if dated else one.file,
+                *(_interval(one, name) for name in COMPARED),
+                left,
+            )
+        )
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+    if not dated:
+        lines.append("in the order of their names: their stamps are no wall clock's, or overlap")
+    lines += ["", *content["verdict"]]
+    if content["next"]:
+        lines.append(f"identify it anew with the newer recordings: {content['next']}")
+    return "\n".join([*lines, f"picture: reports/drift/{content['band']}.png"])

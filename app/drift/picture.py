@@ -1,0 +1,89 @@
+"""E and damping of a band over its recordings, in one picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
+
+from app.drift.change import ChangeOfBand
+from app.drift.recordings import IdentifiedRecording
+from pipeline.drawing.canvas import key, mark, picture
+from pipeline.drawing.styles import INK, KNOWN
+
+AXES = {
+    "youngs_modulus": ("Young's modulus E [kPa]", 1e-3),
+    "damping_product": ("damping s·d [ms]", 1e3),
+}
+CROWDED = 0.01  # of the whole time: recordings nearer than that would lie on one another
+NAMED = 8  # recordings that find room for their names
+LINE = 75  # letters side by side
+NEW, LEFT_OUT = KNOWN["least_squares"][1], "0.65"
+
+
+@picture(dpi=130)
+def over_time(
+    found: Sequence[IdentifiedRecording],
+    dated: bool,
+    changed: Sequence[ChangeOfBand],
+    new: int,
+    title: str,
+) -> plt.Figure:
+    """A panel for each quantity, with 90 % intervals.
+
+    Args:
+        dated: Whether the stamps tell the time.
+        changed: Surest first; the first of each quantity is drawn.
+        new: From which recording on the band is as it is now; 0: it is as it was.
+        title: What came out.
+    """
+    places, true_times = _places(found, dated)
+    figure, axes = plt.subplots(len(AXES), 1, figsize=(8.4, 5.2), sharex=True)
+    for ax, (name, (label, factor)) in zip(axes, AXES.items(), strict=True):
+        for number, (place, one) in enumerate(zip(places, found, strict=True)):
+            value = one.values[name]
+            ends = factor * np.array([[value.value - value.low], [value.high - value.value]])
+            color = LEFT_OUT if not one.settled else NEW if new and number >= new else INK
+            style = {"fmt": "o", "color": color, "ms": 5, "capsize": 4, "lw": 1.6}
+            ax.errorbar(place, factor * value.value, ends, **style)
+        if change := next((one for one in changed if one.quantity == name), None):
+            numbers = [change.earlier, change.later]
+            ends = [factor * found[number].values[name].value for number in numbers]
+            ax.plot([places[number] for number in numbers], ends, color=NEW, lw=1, ls=":")
+            middle = np.mean([places[number] for number in numbers]), np.mean(ends)
+            said = f"{100 * (change.ratio - 1):+.0f} %"
+            about = {"xytext": (6, 6), "textcoords": "offset points", "color": NEW}
+            ax.annotate(said, middle, weight="bold", **about)
+        ax.set_ylabel(label)
+        ax.margins(x=0.08, y=0.15)
+    if true_times:
+        locator = AutoDateLocator(maxticks=NAMED)
+        ax.xaxis.set_major_locator(locator)
+        ax.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    else:
+        shown = range(0, len(found), -(-len(found) // NAMED))
+        names = [found[i].date.removesuffix(" UTC") if dated else found[i].file for i in shown]
+        ax.set_xticks([places[i] for i in shown], names)
+        if sum(map(len, names)) > LINE:
+            ax.tick_params(axis="x", rotation=30)
+    ax.set_xlabel("time of the recording (UTC)" if dated else "recording, by its file's name")
+    figure.suptitle(title, fontsize=11, fontweight="bold")
+    style = {"marker": "o", "ls": "-", "lw": 1.6, "ms": 5}
+    entries = [("one recording alone, 90 % interval", mark(color=INK, **style))]
+    if new:
+        entries.append(("as the band is now", mark(color=NEW, **style)))
+    if not all(one.settled for one in found):
+        entries.append(("not settled, left out", mark(color=LEFT_OUT, **style)))
+    key(figure, entries)
+    return figure
+
+
+def _places(found: Sequence[IdentifiedRecording], dated: bool) -> tuple[list[float], bool]:
+    """Along the axis, and whether they are dates: else recordings stand evenly, in order."""
+    times = date2num([datetime.fromtimestamp(one.begin / 1e9, UTC) for one in found])
+    if dated and np.diff(times).min() > CROWDED * np.ptp(times):
+        return times.tolist(), True
+    return [float(number) for number in range(len(found))], False

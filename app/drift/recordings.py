@@ -1,0 +1,124 @@
+"""Each recording of a band identified alone, and their order in time."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from app.drift.change import ValueOfRecording
+from pipeline.base.fingerprint import fingerprint
+from pipeline.base.layout import NotMade
+from pipeline.base.schema import JsonRecord, read_json
+from pipeline.recording.input.container import sha256
+from sling2sim2real.episodes import read_mcap
+from sling2sim2real.identification import Identification, identify
+from sling2sim2real.model import Band
+from sling2sim2real.settings import Settings
+
+COMPARED = "youngs_modulus", "damping_product"  # what a taut band feels of theta
+USED = "setup", "episode", "force", "cloud", "sling", "parameters", "loss", "optimizer", "methods"
+CLOCK_SET = datetime(2000, 1, 1, tzinfo=UTC).timestamp() * 1e9  # a simulation counts from 0
+
+
+class IdentifiedRecording(JsonRecord):
+    """What a recording says by itself.
+
+    Attributes:
+        file: Its name.
+        key: Of all that the values hang on.
+        begin, end: Of its pulls' windows, by its own stamps [ns].
+        pulls: That could be used.
+        settled: Whether the fit has converged.
+        values: Of COMPARED, by name.
+    """
+
+    file: str
+    key: str
+    begin: int
+    end: int
+    pulls: int
+    settled: bool
+    values: dict[str, ValueOfRecording]
+
+    @property
+    def date(self) -> str:
+        when = datetime.fromtimestamp(self.begin / 1e9, UTC)
+        return f"{when:%Y-%m-%d %H:%M} UTC"
+
+
+class KeptRecordings(JsonRecord):
+    """Of a drift.json, what the next one may take over."""
+
+    recordings: list[IdentifiedRecording]
+
+
+def identified(
+    files: Sequence[Path], band: Band, settings: Settings, code: dict[str, str], kept: Path
+) -> list[IdentifiedRecording]:
+    """Each file identified alone, by its own mounting, exploration and nuisances.
+
+    Args:
+        code: Digests of the code that does it.
+        kept: JSON of an earlier call, from which what is the same is taken.
+
+    Raises:
+        UserError: A recording cannot be used.
+    """
+    try:
+        known = {one.key: one for one in read_json(kept, KeptRecordings).recordings}
+    except NotMade:
+        known = {}
+    about = json.dumps([vars(band), settings.model_dump(mode="json", include=set(USED)), code])
+    found = []
+    for file in files:
+        key = fingerprint(about, sha256(file))
+        if not (one := known.get(key)):
+            print(f"{file}: identifying it alone ...", file=sys.stderr, flush=True)
+            one = _alone(file, key, band, settings)
+        found.append(one.model_copy(update={"file": file.name}))
+    return found
+
+
+def _alone(file: Path, key: str, band: Band, settings: Settings) -> IdentifiedRecording:
+    episodes = read_mcap(file, band, settings=settings)
+    begins = [one.metadata["input"]["start_ns"] for one in episodes]
+    found = identify(episodes, band, settings=settings)
+    return IdentifiedRecording(
+        file=file.name,
+        key=key,
+        begin=begins[0],
+        end=begins[-1] + int(1e9 * episodes[-1].sample_period * len(episodes[-1].time)),
+        pulls=len(episodes),
+        settled=found.settled,
+        values=values_of(found),
+    )
+
+
+def values_of(found: Identification) -> dict[str, ValueOfRecording]:
+    """Of COMPARED, by name."""
+    columns = dict(zip(found.theta.names, found.samples.T, strict=True))
+    columns["damping_product"] = columns["elasticity_damping"] * columns["damping_scale"]
+    return {
+        name: ValueOfRecording(
+            value=found.intervals[name].value,
+            low=found.intervals[name].low,
+            high=found.intervals[name].high,
+            deviation=float(np.log(columns[name]).std()),
+        )
+        for name in COMPARED
+    }
+
+
+def in_time(found: Sequence[IdentifiedRecording]) -> list[IdentifiedRecording] | None:
+    """By their stamps; None where those are no wall clock's.
+
+    A simulation's clock begins at 0, or each time anew: then recordings are of the same time.
+    """
+    ordered = sorted(found, key=lambda one: one.begin)
+    apart = all(one.end <= after.begin for one, after in zip(ordered, ordered[1:], strict=False))
+    return ordered if apart and ordered[0].begin > CLOCK_SET else None

@@ -1,0 +1,169 @@
+"""`sling drift` on bands of our own simulator: one that keeps, and one that has softened."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from PIL import Image
+
+from app.drift import recordings
+from app.drift.change import ValueOfRecording
+from app.drift.drift import BY_NAME, BY_TIME, SAME, anew, drift, shown
+from app.drift.recordings import IdentifiedRecording, in_time
+from pipeline.base.errors import UserError
+from sling2sim2real import Band, Model, Settings, Theta, episode_from_arrays, rehearse
+from tests.project import ROOT, SLING, python
+
+BAND = Band(0.023, 0.010, 0.52, "mine")
+SECOND, DAY = 10**9, 86400 * 10**9
+MAY = 1_777_800_000 * SECOND  # 3 May 2026
+
+
+@pytest.fixture(scope="module")
+def settings() -> Settings:
+    sizes = {"mass": BAND.mass, "diameter": BAND.diameter, "rest_length": BAND.rest_length}
+    return Settings.coarse(bands={"mine": {"source": "recording", **sizes}})
+
+
+@pytest.fixture(scope="module")
+def episodes(settings) -> dict:
+    """Two of one band and one of it 15 % softer, each with noise of its own; by content of file."""
+    found = {}
+    for seed, (name, young) in enumerate({"a": 2.2e5, "b": 2.2e5, "soft": 1.87e5}.items()):
+        theta = Theta(young, 0.47, 2.4e-3, 0.7, 0.6, mooney_share=0.3, relaxation=0.01)
+        arrays = rehearse(Model(BAND, theta, settings=settings), seed=seed)
+        found[name] = episode_from_arrays(**arrays, name="mine", settings=settings)
+    return found
+
+
+@pytest.fixture
+def lab(tmp_path, settings, episodes, monkeypatch):
+    """A project whose recordings hold their episode's name; `read` are those that were opened."""
+    raw, begins, read = tmp_path / "data/raw/mine", {}, []
+    raw.mkdir(parents=True)
+
+    def read_mcap(path, band, settings):
+        read.append(path.name)
+        about = {"input": {"file": path.name, "start_ns": begins[path.name]}}
+        return [replace(episodes[path.read_text()], metadata=about)]
+
+    monkeypatch.setattr(recordings, "read_mcap", read_mcap)
+
+    def put(file: str, content: str, begin: int) -> None:
+        (raw / file).write_text(content)
+        begins[file] = begin
+
+    def run() -> dict:
+        return drift(settings, "mine", tmp_path)
+
+    return SimpleNamespace(put=put, read=read, root=tmp_path, drift=run)
+
+
+def test_a_softened_band_is_told_and_one_that_keeps_is_not(lab) -> None:
+    lab.put("z.mcap", "a", MAY)
+    lab.put("y.mcap", "b", MAY + 7 * DAY)
+    same = lab.drift()
+    assert same["verdict"] == [SAME] and same["next"] is None and same["order"] == BY_TIME
+    assert [one["file"] for one in same["recordings"]] == ["z.mcap", "y.mcap"]
+    young = same["recordings"][0]["values"]["youngs_modulus"]
+    assert young["low"] < 2.2e5 < young["high"]
+
+    lab.put("x.mcap", "soft", MAY + 37 * DAY)
+    lab.read.clear()
+    content = lab.drift()
+    assert lab.read == ["x.mcap"]  # the others are known
+    assert content["recordings"][:2] == same["recordings"]
+    (line,) = content["verdict"]
+    assert line.startswith("E of mine changed: ") and line.endswith("; it softened")
+    assert "kPa on 2026-05-" in line and "on 2026-06-09" in line
+    change = content["changes"][0]
+    assert (change["quantity"], change["later"]) == ("youngs_modulus", 2)
+    assert change["ratio"] == pytest.approx(0.85, abs=0.03)
+    assert [one["new"] for one in content["recordings"]] == [False, False, True]
+    assert content["next"].endswith("data/raw/mine/x.mcap --mass 0.023 --name mine_new")
+
+    folder = lab.root / "reports/drift"
+    assert sorted(one.name for one in folder.iterdir()) == ["mine.json", "mine.png"]
+    assert json.loads((folder / "mine.json").read_text()) == json.loads(json.dumps(content))
+    with Image.open(folder / "mine.png") as image:
+        assert min(image.size) > 500
+    told = shown(content).splitlines()
+    assert told[3].startswith("2026-06-09") and "x.mcap" in told[3]
+    assert told[-2] == f"identify it anew with the newer recordings: {content['next']}"
+
+
+def recorded(file: str, begin: int, end: int) -> IdentifiedRecording:
+    value = ValueOfRecording(value=1.0, low=0.9, high=1.1, deviation=0.06)
+    values = dict.fromkeys(recordings.COMPARED, value)
+    about = {"key": file, "pulls": 1, "settled": True, "values": values}
+    return IdentifiedRecording(file=file, begin=begin, end=end, **about)
+
+
+def test_stamps_order_recordings_unless_they_are_a_simulations() -> None:
+    first, second = recorded("b", MAY, MAY + SECOND), recorded("a", MAY + DAY, MAY + DAY + SECOND)
+    assert in_time([second, first]) == [first, second]
+    assert in_time([second, first, recorded("c", MAY, MAY + SECOND)]) is None
+    assert in_time([recorded("a", 0, SECOND), recorded("b", 2 * SECOND, 3 * SECOND)]) is None
+
+
+def files(root: Path, names: str) -> None:
+    (root / "data/raw/mine").mkdir(parents=True)
+    for name in names:
+        (root / f"data/raw/mine/{name}.mcap").write_text(name)
+
+
+def test_without_a_clock_names_decide(settings, tmp_path, monkeypatch) -> None:
+    files(tmp_path, "ab")
+    monkeypatch.setattr(recordings, "_alone", lambda file, *rest: recorded(file.name, 0, SECOND))
+    content = drift(settings, "mine", tmp_path)
+    assert content["order"] == BY_NAME
+    assert "in the order of their names" in shown(content)
+    assert [one["date"] for one in content["recordings"]] == [None, None]
+
+
+def test_what_had_not_settled_is_left_out(settings, tmp_path, monkeypatch, capsys) -> None:
+    soft = ValueOfRecording(value=0.5, low=0.49, high=0.51, deviation=0.01)
+    said = {
+        "a": recorded("a.mcap", MAY, MAY + SECOND),
+        "b": recorded("b.mcap", MAY + DAY, MAY + DAY + SECOND).model_copy(
+            update={"settled": False, "values": dict.fromkeys(recordings.COMPARED, soft)}
+        ),
+        "c": recorded("c.mcap", MAY + 2 * DAY, MAY + 2 * DAY + SECOND),
+    }
+    files(tmp_path, "abc")
+    monkeypatch.setattr(recordings, "_alone", lambda file, *rest: said[file.stem])
+    content = drift(settings, "mine", tmp_path)
+    assert content["verdict"] == [SAME]
+    assert "b.mcap had not settled" in capsys.readouterr().err
+    assert "not settled, left out" in shown(content).splitlines()[2]
+    (tmp_path / "data/raw/mine/c.mcap").unlink()
+    with pytest.raises(UserError, match="fewer than two"):
+        drift(settings, "mine", tmp_path)
+
+
+def test_the_command_names_sizes_that_are_not_the_usual_ones() -> None:
+    assert anew(BAND, []) == "sling fit --mass 0.023 --name mine_new"
+    other = replace(BAND, diameter=0.008, rest_length=0.5)
+    assert "--diameter 0.008 --rest-length 0.5" in anew(other, [])
+
+
+def test_a_mistake_is_one_line(tmp_path) -> None:
+    (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
+
+    def told(band: str) -> str:
+        done = python(*SLING, "drift", band, folder=tmp_path)
+        assert done.returncode == 1 and done.stdout == ""
+        (line,) = (one for one in done.stderr.splitlines() if not one.endswith(" ..."))
+        return line
+
+    assert told("none").startswith("error: band none: not in params.yaml")
+    assert "holds no recording, two or more are needed" in told("band1")
+    (tmp_path / "data/raw/band1").mkdir(parents=True)
+    (tmp_path / "data/raw/band1/band1.mcap").write_bytes(b"")
+    assert "holds one recording" in told("band1")
+    assert not (tmp_path / "reports").exists()
+    (tmp_path / "data/raw/band1/band1_2.mcap").write_bytes(b"no recording")
+    assert told("band1").startswith("error: data/raw/band1/band1.mcap: ")
+    assert not (tmp_path / "reports").exists()

@@ -179,6 +179,16 @@ def test_held_out_data_have_a_table_where_params_hold_some_out(root, params, tex
     assert "| toy | Sling2Sim2Real | 0.200 | – | – |" in text
 
 
+def test_says_of_a_policy_what_it_was_trained_on(root, params, text_alone) -> None:
+    maps, samples = "reads landings off maps", "512 × 4 samples each"
+    text = written(root, params)
+    assert maps in text and samples in text
+    policy = params.policy.model_copy(update={"landings": "simulated"})
+    text = written(root, params.model_copy(update={"policy": policy}))
+    assert maps not in text and samples not in text
+    assert "Training simulates every launch" in text and "512 × 4 simulated launches each" in text
+
+
 def test_names_the_input_that_is_missing(root, params) -> None:
     for name in (
         f"episodes/{BAND}/1/signals.parquet",

@@ -44,6 +44,16 @@ error of the mechanical work (work). Per cent: what a term weighs in the method'
 totals compare only between equal weights. The *printed loss*, geom + force + work as in the paper,
 is one measure for all.
 """
+TRAINED = {  # by policy.landings: what training reads, and what a sample of it is
+    "map": (
+        "Training reads landings off maps of simulated launches; the maps' own error comes next.",
+        "samples",
+    ),
+    "simulated": (
+        "Training simulates every launch. Maps are for this report alone; their error comes next.",
+        "simulated launches",
+    ),
+}
 
 
 def appendix(report: Report) -> str:
@@ -191,8 +201,7 @@ def _policies(report: Report) -> list[str]:
         "### Policies\n",
         f"PPO on the launches of each calibrated simulator, targets {low:g} – {high:g} m."
         " Converged: the policy misses by at most 1 cm on average over 256 targets, launched in its"
-        " own simulator. Training reads landings off maps of simulated launches; the maps' own"
-        " error comes next.\n",
+        f" own simulator. {TRAINED[params.policy.landings][0]}\n",
         markdown(policies(results, styles), repeats=False),
         report.picture("training", "training error by iteration", policy.training, curves, styles),
         f"Where draws land in the simulator that {styles[report.main].name} calibrated:\n",
@@ -203,6 +212,7 @@ def _policies(report: Report) -> list[str]:
 def _budget(report: Report) -> list[str]:
     params = report.params
     optimizer, policy_, trials = params.optimizer, params.policy, params.trials
+    _, samples = TRAINED[policy_.landings]
     explored = optimizer.population * (optimizer.generations + 1)
     virtual = ""
     if params.run.rig:
@@ -216,7 +226,7 @@ def _budget(report: Report) -> list[str]:
   {optimizer.generations} times), then {optimizer.cma_rollouts} of CMA-ES shared by the regions; a
   search of one phase spends both. Rollouts really spent are in the table of losses.
 - Policy: {policy_.map_size[0]} × {policy_.map_size[1]} simulated launches, then
-  {policy_.iterations} iterations of PPO with {policy_.envs} × {policy_.steps} samples each.
+  {policy_.iterations} iterations of PPO with {policy_.envs} × {policy_.steps} {samples} each.
 - Launches: {len(trials.targets)} targets{virtual}.
 - Seeds: search {optimizer.seed}, policy {policy_.seed}, trials {trials.seed}.
 """

@@ -1,0 +1,259 @@
+"""How long set-up, a run, a fit and the tests take, and their memory and disk.
+
+    python -m validation.benchmarks.times --folder FOLDER --recording my.mcap --mass 0.0408
+
+clones the commit that is checked out here into FOLDER, with caches of its own, so that everything
+is downloaded and compiled, and measures each step there. What succeeded is not measured again: the
+same command goes on where it was killed. It writes reports/benchmarks/times.json, and its table
+into docs/times.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.base import errors
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_json, write_text
+from pipeline.base.fingerprint import fingerprint
+from pipeline.base.machine import commit
+from validation.benchmarks.command import disk, measured
+from validation.benchmarks.timing import environment
+from validation.code import ROOT, digests
+
+REPORT, PAGE = Path("reports/benchmarks/times.json"), Path("docs/times.md")
+BEGIN, END = "<!-- times: begin -->\n", "<!-- times: end -->\n"
+BAND = "measured"  # of the recording
+CHANGES = ("PYTHONPATH", "VIRTUAL_ENV", "UV_CACHE_DIR", "PIP_CACHE_DIR", "WARP_CACHE_PATH")
+STAGE = re.compile(r"^([a-z]+)(?:@[\w-]+)? \| done \((?:(\d+) min )?([\d.]+) s\)$", re.MULTILINE)
+ABLATION = re.compile("^ablation_", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class MeasuredStep:
+    """A command in the clone.
+
+    Attributes:
+        name: Of its files in FOLDER.
+        what: In the table.
+        command: Its words.
+        says: A pattern that its output has where it did what it is to be timed for.
+        makes: What the table counts as its disk, from the clone's folder.
+        needs: The step that must have succeeded.
+    """
+
+    name: str
+    what: str
+    command: tuple[str, ...]
+    says: str = ""
+    makes: tuple[str, ...] = ()
+    needs: str = ""
+
+
+def steps(recording: Path | None, mass: float) -> list[MeasuredStep]:
+    """All steps, in their order; a fit, which adds a band to params.yaml, comes last."""
+    sling = ".venv/bin/sling"
+    file = str(recording.resolve()) if recording else "FILE.mcap"
+    mass = ("--mass", f"{mass:g}")
+    made = ("data", ".dvc/cache", ".prefect")
+    rows = [
+        ("setup", "`make setup`, nothing downloaded yet", ("make", "setup"), "", (".venv",)),
+        ("run", "`make run`, after set-up", ("make", "run"), "[1-9][0-9]* ran", made, "setup"),
+        ("again", "`sling flow`, nothing stale", (sling, "flow"), "are fresh", (), "run"),
+        ("test", "`make test`, after set-up", ("make", "test"), "[0-9] passed", (), "setup"),
+        ("check", "`sling check`", (sling, "check", file), "", (), "setup"),
+        ("fit", "`sling fit`", (sling, "fit", file, *mass, "--name", BAND), "", (), "setup"),
+        ("refit", "`sling fit`, nothing stale", (sling, "fit", "--name", BAND), "", (), "fit"),
+    ]
+    return [MeasuredStep(*row) for row in rows]
+
+
+NEED_RECORDING = ("check", "fit", "refit")
+
+
+def cloned(folder: Path, root: Path = ROOT) -> Path:
+    """A clone of what is checked out in `root`; one that is there stays."""
+    clone = folder / "project"
+    if not clone.is_dir():
+        temporary = folder / "project.tmp"
+        shutil.rmtree(temporary, ignore_errors=True)
+        words = ["git", "clone", "--quiet", "--no-hardlinks", str(root), str(temporary)]
+        done = subprocess.run(words, capture_output=True, text=True)
+        if done.returncode:
+            raise UserError(f"{root}: cannot be cloned: {errors.one_line(done.stderr)}")
+        write_json(folder / "clone.json", {"commit": commit(temporary)})
+        temporary.rename(clone)
+    return clone
+
+
+def surroundings(folder: Path) -> dict[str, str]:
+    """The environment of a step: caches in `folder`, no Python of ours and no setting of SLING_."""
+    ours = {name: value for name, value in os.environ.items() if not name.startswith("SLING_")}
+    for name in CHANGES:
+        ours.pop(name, None)
+    if sys.prefix != sys.base_prefix:
+        own = str(Path(sys.prefix, "bin"))
+        ours["PATH"] = os.pathsep.join(one for one in ours["PATH"].split(os.pathsep) if one != own)
+    cache = folder / "cache"
+    return {**ours, "XDG_CACHE_HOME": str(cache), "DVC_SITE_CACHE_DIR": str(cache / "dvc")}
+
+
+def seconds_of_stages(log: str) -> dict[str, dict]:
+    """Seconds of the stages that a flow ran, by their script: how many, the median, the longest."""
+    found: dict[str, list[float]] = {}
+    for step, minutes, seconds in STAGE.findall(ABLATION.sub("", log)):
+        found.setdefault(step, []).append(60 * int(minutes or 0) + float(seconds))
+    return {
+        step: {"count": len(own), "median_s": statistics.median(own), "most_s": max(own)}
+        for step, own in found.items()
+    }
+
+
+def perform(step: MeasuredStep, done: dict[str, dict], folder: Path) -> dict:
+    """What a step's file in `folder` says; measured now where it is not there or failed."""
+    kept, log = folder / f"{step.name}.json", folder / f"{step.name}.log"
+    if kept.is_file() and (result := json.loads(kept.read_text(encoding="utf-8")))["ok"]:
+        return result
+    if step.needs and not done[step.needs].get("ok"):
+        return {"ok": False, "why": f"needs {step.needs}"}
+    clone = folder / "project"
+    result = measured(step.command, clone, surroundings(folder), log)
+    said = log.read_text(encoding="utf-8", errors="replace")
+    result["ok"] = result["status"] == 0 and bool(re.search(step.says, said))
+    if not result["ok"]:
+        last = (said.strip().splitlines() or [""])[-1]
+        result["why"] = f"status {result['status']}: {errors.one_line(last)[:200]}"
+    result["disk_bytes"] = {name: disk(clone / name) for name in step.makes}
+    if found := seconds_of_stages(said):
+        result["stages"] = found
+    write_json(kept, result)
+    return result
+
+
+def table(report: dict) -> str:
+    """The block of docs/times.md."""
+    done = {name: report["steps"][name] for name in report["order"]}
+    share = max((one.get("others_share", 0) for one in done.values()), default=0)
+    rows = [
+        "| what | time | CPU time | memory, at most | on the disk afterwards |",
+        "|---|---:|---:|---:|---|",
+    ]
+    rows += [_row(one) for one in done.values()]
+    took = done.get("run", {}).get("stages", {})
+    lines = [
+        BEGIN.rstrip(),
+        f"Measured on {report['cores']} cores of an {report['device_name']}, no GPU, of which other"
+        f" programs took {100 * share:.0f} % at most, by",
+        f"`{report['command']}`:",
+        "",
+        *rows,
+    ]
+    if took:
+        lines += [
+            "",
+            "Of `make run`, seconds per stage (median), while another runs beside it:",
+            "",
+            f"| stage | {' | '.join(f'`{name}`' for name in took)} |",
+            f"|---|{'---:|' * len(took)}",
+            f"| s | {' | '.join(format(one['median_s'], '.0f') for one in took.values())} |",
+            f"| how many | {' | '.join(str(one['count']) for one in took.values())} |",
+        ]
+    return "\n".join([*lines, END])
+
+
+def _row(one: dict) -> str:
+    if not one["ok"]:
+        return f"| {one['what']} | {one.get('skipped') or 'failed: ' + one['why']} | | | |"
+    parts = [f"`{name}` {_size(size)}" for name, size in one["disk_bytes"].items()]
+    cells = [
+        one["what"],
+        _duration(one["seconds"]),
+        _duration(one["cpu_seconds"]),
+        _size(one["peak_memory_bytes"]),
+        ", ".join(parts),
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds >= 600 else f"{seconds / 60:.1f} min"
+
+
+def _size(count: float) -> str:
+    return f"{count / 1e9:.1f} GB" if count >= 1e8 else f"{count / 1e6:.0f} MB"
+
+
+def with_block(page: str, block: str) -> str:
+    """A page with `block` in the place of what is between its marks. Raises UserError."""
+    if page.count(BEGIN) != 1 or page.count(END) != 1:
+        raise UserError(f"{PAGE}: has not one {BEGIN.strip()} and one {END.strip()}")
+    head, rest = page.split(BEGIN)
+    return head + block + rest.split(END)[1]
+
+
+def times(
+    todo: Sequence[MeasuredStep], folder: Path, root: Path, skipped: dict[str, str], command: str
+) -> dict:
+    """Measure the steps and write report and page of `root`; what the report says. UserError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    clone, done = cloned(folder, root), {}
+    for step in todo:
+        if step.name in skipped:
+            done[step.name] = {"ok": False, "skipped": skipped[step.name]}
+        else:
+            print(f"{step.name}: {' '.join(step.command)}", file=sys.stderr, flush=True)
+            done[step.name] = perform(step, done, folder)
+            done[step.name].pop("status", None)
+        done[step.name] |= {"what": step.what}
+        one = done[step.name]
+        told = one.get("why") or one.get("skipped") or f"{one['seconds']:.0f} s"
+        print(f"{step.name}: {told}", file=sys.stderr, flush=True)
+    scripts = [clone / "app/cli.py", *sorted((clone / "stages").glob("[a-z]*.py"))]
+    report = environment("cpu", command) | {
+        "about": "Each step in one fresh clone with a new .venv and caches of its own. Memory is"
+        " the peak of the process tree (PSS, looked at once a second); others_share is the share of"
+        " the cores that other programs took meanwhile. `sling check` and `sling fit` are of one"
+        " recording that was not made here.",
+        "commit": json.loads((folder / "clone.json").read_text(encoding="utf-8"))["commit"],
+        "simulator": fingerprint(clone / "pipeline/sling")[:12],
+        "code": digests(*(one for one in scripts if one.is_file()), root=clone),
+        "steps": done,
+        "order": [step.name for step in todo],
+        "met": all(one["ok"] or "skipped" in one for one in done.values()),
+    }
+    write_json(root / REPORT, report)
+    page = root / PAGE
+    write_text(page, with_block(page.read_text(encoding="utf-8"), table(report)))
+    return report
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--folder", type=Path, required=True, help="of the clone and what is kept")
+    parser.add_argument("--recording", type=Path, help="MCAP of a band, for `sling fit`")
+    parser.add_argument("--mass", type=float, default=0.0408, help="of that band, in kg")
+    arguments = parser.parse_args()
+    file, command = arguments.recording, "python -m validation.benchmarks.times --folder FOLDER"
+    if file and not file.is_file():
+        raise UserError(f"{file}: no such file")
+    skipped = {} if file else dict.fromkeys(NEED_RECORDING, "no --recording was given")
+    command += f" --recording {file.name} --mass {arguments.mass:g}" if file else ""
+    todo = steps(file, arguments.mass)
+    report = times(todo, arguments.folder.resolve(), ROOT, skipped, command)
+    return 0 if report["met"] else 1
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -102,12 +102,7 @@ class Engine:
         }
         for i, phase in enumerate(phases):
             job |= {f"{name}_{i}": value for name, value in vars(phase).items()}
-        with tempfile.TemporaryDirectory() as name:
-            folder = Path(name)
-            (folder / "scene.usda").write_text(scene.text(tube, thetas, rate, iterations))
-            np.savez(folder / "job.npz", **job)
-            self._run(folder)
-            done = dict(np.load(folder / "result.npz"))
+        done = self.run(scene.text(tube, thetas, rate, iterations), job)
         return [
             Course(
                 done[f"positions_{i}"].reshape(-1, len(thetas), *tube.rest.shape).astype(float),
@@ -118,7 +113,16 @@ class Engine:
             for i in range(len(phases))
         ]
 
-    def _run(self, folder: Path) -> None:
+    def run(self, text: str, job: dict) -> dict[str, np.ndarray]:
+        """What the worker makes of a scene in USD's text form and of a job like `simulate`'s."""
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            (folder / "scene.usda").write_text(text)
+            np.savez(folder / "job.npz", **job)
+            self._work(folder)
+            return dict(np.load(folder / "result.npz"))
+
+    def _work(self, folder: Path) -> None:
         with suppress(BrokenPipeError):
             self._process.stdin.write(f"{folder}\n")
             self._process.stdin.flush()

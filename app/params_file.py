@@ -7,8 +7,10 @@ from collections.abc import Callable
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.error import CommentMark
 from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.representer import RoundTripRepresenter
+from ruamel.yaml.tokens import CommentToken
 
 
 def edited(text: str, change: Callable[[CommentedMap], None]) -> str:
@@ -22,6 +24,21 @@ def edited(text: str, change: Callable[[CommentedMap], None]) -> str:
     stream = io.StringIO()
     yaml.dump(content, stream)
     return stream.getvalue()
+
+
+def append(entries: CommentedMap, name: str, value: object) -> None:
+    """Add an entry right below the last one, above the blank lines that follow it.
+
+    ruamel keeps these with the last entry's comment, and would write them before the new one.
+    """
+    last = next(reversed(entries), None)
+    comment = (entries.ca.items.get(last) or [None, None, None])[2]
+    entries[name] = value
+    if comment is not None:
+        own, _, blank = comment.value.partition("\n")
+        comment.value = f"{own}\n"
+        if blank:
+            entries.ca.items[name] = [None, None, CommentToken(f"\n{blank}", CommentMark(0)), None]
 
 
 def _null(representer: RoundTripRepresenter, _: None) -> ScalarNode:

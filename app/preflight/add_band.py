@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ruamel.yaml.comments import CommentedMap
 
-from app.params_file import edited
+from app.params_file import append, edited
 from app.preflight import recordings as files
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
@@ -90,7 +90,7 @@ def _with_band(path: Path, name: str, band: dict[str, object]) -> str:
         if name not in content["bands"]:
             entry = CommentedMap(band)
             entry.fa.set_flow_style()
-            content["bands"][name] = entry
+            append(content["bands"], name, entry)
         if name not in content["run"]["bands"]:
             content["run"]["bands"].append(name)
 

@@ -45,6 +45,8 @@ def test_a_band_is_added_and_nothing_else_changes(project, seen, blind) -> None:
     lines = [x for x in difflib.ndiff(before, after) if x[0] in "+-"]
     assert len([x for x in lines if x[0] == "-"]) == 1  # run.bands
     assert len([x for x in lines if x[0] == "+"]) == 2
+    where = next(i for i, line in enumerate(after) if line.lstrip().startswith("red:"))
+    assert after[where - 1].lstrip().startswith(f"{bands[-1]}:") and after[where + 1] == ""
     params = load(project / "params.yaml")
     assert params.run.bands == (*bands, "red")
     band = params.bands["red"]

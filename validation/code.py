@@ -17,6 +17,7 @@ CODE = ("pipeline/", "stages/", "app/", "sling2sim2real/", "validation/")
 UNTRACKED = ("pipeline/params/", "stages/start.py")  # nobody's dependency: see tools/closure.py
 UNCOUNTED = {"pipeline/params", "stages/start.py", "validation/code.py"}  # among digests
 NESTED = ("pipeline/rig/",)  # folders whose own folders are concerns of their own
+SINGLE = ("validation/",)  # whose scripts know little of each other: each file is a concern
 NATIVE = (".h", ".cpp", ".html", ".css", ".js")
 
 
@@ -71,7 +72,9 @@ def closure(script: Path, root: Path = ROOT) -> list[str]:
 
 
 def concern(file: str) -> str:
-    """The folder that a file counts to, relative to the root, or the file itself if it has none."""
+    """What a file counts to, relative to the root: its folder, or the file by itself."""
+    if file.startswith(SINGLE):
+        return file
     depth = 3 if file.startswith(NESTED) else 2
     return "/".join(file.split("/")[:depth])
 

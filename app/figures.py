@@ -22,7 +22,13 @@ from validation.code import CODE, ROOT, digest, digests
 TODAY, OLDER = "today", "older code"
 UNKNOWN = "unknown: written before digests"
 NOT_TOLD = "unknown: DVC cannot tell"
-PATTERNS = ("summary.json", "bands/*/card.json", "simulator*.json", "*/*.json")
+PATTERNS = (
+    "summary.json",
+    "bands/*/card.json",
+    "simulator*.json",
+    "*/*.json",
+    "validation/*/*.json",
+)
 SIMULATOR = "pipeline/sling"
 PARTS = ("pipeline", "validation")  # whose changes since a commit count
 SCRIPT = re.compile(r"\bvalidation[./][\w./]+")  # in a command, as a module or as a file

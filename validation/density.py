@@ -60,14 +60,16 @@ def found(
     sling: Sling,
     episodes: Sequence[Episode],
     observed: Sequence[Observed] = (),
+    devices: Sequence[str] = ("cpu",),
 ) -> tuple[Calibrated, dict]:
     """What a method finds, and says of it: least squares takes all, others the first.
 
+    Searches have their rollouts on `devices`, the fit of least squares on the CPU.
     Of another search than least squares it says "loss": the terms and the total of the best.
     """
     about, space = params.methods[method], Space.of_method(params, method)
     loss = EpisodeLoss.of(params, method, episodes[0], sling)
-    evaluate = Evaluator(episodes[0], sling, loss, space, workers=WORKERS)
+    evaluate = Evaluator(episodes[0], sling, loss, space, workers=WORKERS, devices=devices)
     best = complete(params, method, params.optimizer, evaluate).best()
     start = np.array([best[name] for name in space.names])
     if about.search != LEAST_SQUARES:

@@ -55,6 +55,12 @@ def test_digests_of_folders_decide_where_a_file_has_them(project: Path) -> None:
     assert only(project).changed == [*parts]
 
 
+def test_a_campaign_may_have_a_folder(project: Path) -> None:
+    code = {"pipeline/sling": digest(project / "pipeline/sling")}
+    write(project, "validation/machines/one.json", code=code)
+    assert only(project).file == "reports/validation/machines/one.json"
+
+
 def test_without_digests_the_simulator_and_the_commit_decide(project: Path) -> None:
     commit, sling = git(project, "rev-parse", "--short", "HEAD"), project / "pipeline/sling"
     for about, state in (

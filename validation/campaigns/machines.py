@@ -1,0 +1,233 @@
+"""How far processors and GPUs round apart: the same episodes identified and launched on several.
+
+    python -m validation.campaigns.machines --device cuda:0 --report NAME.json
+    python -m validation.campaigns.machines --compare reports/validation/machines/*.json
+    python -m validation.campaigns.machines --twice dvc.lock other/dvc.lock
+
+The first identifies each band, by our method and by the paper's, from what a run has left under
+data/episodes and data/mounting, and launches fixed draws in the simulator. A GPU has the rollouts
+of searches, and the launches; the fit of least squares is on the CPU anywhere. The second prints
+how far machines differ, and fails where our landings do by more than 0.2 %; of the paper's method,
+whose search takes another way after the first other bit, it only tells. The third compares what
+two runs wrote.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from pipeline.base import errors
+from pipeline.base.errors import UserError, one_line
+from pipeline.base.files import write_json
+from pipeline.base.fingerprint import fingerprint
+from pipeline.base.layout import Layout, made
+from pipeline.base.machine import named, processor
+from pipeline.base.pool import Pool
+from pipeline.base.schema import JsonRecord, read_json
+from pipeline.episode.episode import Episode
+from pipeline.objective.loss import EpisodeLoss
+from pipeline.params import expect_known, load
+from pipeline.params.identification import LAWS
+from pipeline.sling.interaction import interact
+from pipeline.sling.launch import launch
+from pipeline.sling.load import sling_of_method
+from pipeline.sling.material import THETA
+from pipeline.sling.theta import EXTRA, at_points
+from validation.benchmarks.timing import environment
+from validation.density import found
+
+FOLDER = Path("reports/validation/machines")
+OURS, PAPER = "least_squares", "sling2sim2real"
+DRAWS = [*product((-0.36, -0.31, -0.27), (-0.20, -0.15, -0.11))]  # (y, z) [m], all in the box
+LIMIT = 2e-3  # of a landing of ours, relative
+ALONE = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"  # one each, as stages have
+
+
+class MachineLandings(JsonRecord):
+    """What a method found in a band on a machine; None where a launch fails."""
+
+    theta: dict[str, float]
+    loss: float | None
+    landing: list[float | None]
+    seconds: float
+
+
+class MachineReport(JsonRecord):
+    """As much of a machine's JSON as is compared."""
+
+    processor: str
+    device: str
+    device_name: str
+    inputs: dict[str, str]
+    code: dict[str, str | None]
+    draws: list[list[float]]
+    bands: dict[str, dict[str, MachineLandings]]
+
+
+def inputs(params, band: str, root: Path) -> str:
+    """A digest of all that a band's identification hangs on but the code. Raises NotMade."""
+    layout = Layout(root)
+    names = ("signals", "clouds")
+    files = [layout.episode(band) / f"{name}.parquet" for name in names]
+    about = (params.bands[band], params.setup, params.sling, params.force, params.loss)
+    about += (params.parameters, params.optimizer, params.methods[OURS], params.methods[PAPER])
+    texts = [one.model_dump_json() for one in about]
+    return fingerprint(*map(made, [*files, layout.mounting(band)]), *texts)
+
+
+def identified(band: str, method: str, root: Path, device: str) -> dict:
+    """θ of a band, its loss, and where DRAWS land with it [m], as JSON has them."""
+    params = load(root / "params.yaml")
+    devices, start = named(device, "--device"), time.perf_counter()
+    sling = sling_of_method(params, band, method, root)
+    episode = Episode.load(Layout(root).episode(band))
+    outcome, _ = found(params, method, sling, [episode], devices=devices)
+    seconds = time.perf_counter() - start
+    sling, theta = at_points(outcome.sling, outcome.point[None])
+    loss = EpisodeLoss.of(params, method, episode, sling)
+    terms = loss.terms(interact(sling, episode, theta, device=devices[0], fetch=False))
+    total = float(loss.total(terms)[0])
+    landed = launch(sling, theta, np.array(DRAWS), device=devices)
+    names = [*THETA, *LAWS[sling.law], *EXTRA]
+    return {
+        "theta": dict(zip(names, outcome.point.tolist(), strict=False)),
+        "loss": total if np.isfinite(total) else None,
+        "landing": [one if np.isfinite(one) else None for one in landed.landing_y.tolist()],
+        "failure": landed.failure,
+        "seconds": seconds,
+    }
+
+
+def measure(bands: Sequence[str], root: Path, device: str) -> dict:
+    """What a machine's JSON holds of a project, but what `environment` adds. Raises UserError."""
+    params = load(root / "params.yaml")
+    bands = bands or params.run.bands
+    for band in bands:
+        expect_known(params, "band", band)
+    digests = {band: inputs(params, band, root) for band in bands}
+    for name in ALONE:
+        os.environ[name] = "1"  # of the process that is started from here
+    content = {band: {} for band in bands}
+    with Pool(workers=1) as pool:
+        for band, method in product(bands, (OURS, PAPER)):
+            done = pool.submit(identified, band, method, root, device).result()
+            content[band][method] = done
+            print(f"{band} {method}: loss {done['loss']}, {done['seconds']:.0f} s", flush=True)
+    return {
+        "kind": "virtual",
+        "asked": "How far processors and GPUs round apart: parameters identified from the same"
+        " episodes, and launches of the same draws.",
+        "processor": processor(),
+        "inputs": digests,
+        "draws": DRAWS,
+        "bands": content,
+    }
+
+
+def compared(reports: dict[str, MachineReport]) -> tuple[list[str], bool]:
+    """A table of machines by name, and whether our landings differ by at most LIMIT.
+
+    Raises UserError where they are not of the same inputs, draws and code.
+    """
+    if len(reports) < 2:
+        raise UserError(f"{', '.join(reports) or 'nothing'}: two machines at least are compared")
+    first, *others = reports
+    for other, what in product(others, ("inputs", "draws", "code")):
+        if _comparable(reports[first], what) != _comparable(reports[other], what):
+            raise UserError(f"{first} and {other}: of different {what}, which nobody can compare")
+    lines = ["| machine | processor | device |", "|---|---|---|"]
+    lines += [f"| {n} | {one.processor} | {one.device_name} |" for n, one in reports.items()]
+    lines += ["", "| band | method | machine | E [kPa] | loss | landings, off the first | time |"]
+    lines += ["|---|---|---|---:|---:|---:|---:|"]
+    bands, largest = reports[first].bands, dict.fromkeys((OURS, PAPER), 0.0)
+    for band, method, name in product(bands, largest, reports):
+        one, reference = (reports[n].bands[band][method] for n in (name, first))
+        lines.append(
+            f"| {band} | {method} | {name} | {one.theta['youngs_modulus'] / 1e3:.3f} |"
+            f" {one.loss} | {100 * apart([reference, one]):.4f} % | {one.seconds:.0f} s |"
+        )
+    for band, method in product(bands, largest):
+        told = [one.bands[band][method] for one in reports.values()]
+        largest[method] = max(largest[method], apart(told))
+    met = largest[OURS] <= LIMIT
+    lines += ["", f"{OURS}: landings of any two differ by {100 * largest[OURS]:.4f} % at most;"]
+    lines[-1] += f" {'within' if met else 'MORE than'} {100 * LIMIT:g} %"
+    lines += [f"{PAPER}: by {100 * largest[PAPER]:.4f} % at most; nothing is asked of it"]
+    return lines, met
+
+
+def apart(told: list[MachineLandings]) -> float:
+    """The largest relative difference of a landing; infinite where only some machines have it."""
+    landings = np.array([one.landing for one in told], float)  # None is NaN
+    lacks = np.isnan(landings)
+    if (lacks.any(axis=0) != lacks.all(axis=0)).any():
+        return np.inf
+    there = landings[:, ~lacks.any(axis=0)]
+    low, high = there.min(axis=0), there.max(axis=0)
+    return float((high / low - 1).max(initial=0.0))
+
+
+def _comparable(report: MachineReport, what: str) -> object:
+    """Of the code, what computes: pipeline/."""
+    value = getattr(report, what)
+    if what != "code":
+        return value
+    return {part: digest for part, digest in value.items() if part.startswith("pipeline/")}
+
+
+def outputs(lock: Path) -> dict[str, str]:
+    """The digest of every output of a run, by its path, as its dvc.lock has it."""
+    try:
+        stages = YAML(typ="safe").load(lock.read_text(encoding="utf-8"))["stages"].values()
+        return {out["path"]: out["md5"] for stage in stages for out in stage.get("outs", ())}
+    except (OSError, ValueError, YAMLError, KeyError, TypeError, AttributeError) as error:
+        raise UserError(f"{lock}: no dvc.lock of a run: {one_line(error)}") from error
+
+
+def differing(locks: list[Path]) -> list[str]:
+    """Outputs of two runs that are not the same, or that only one has; sorted."""
+    one, other = map(outputs, locks)
+    return sorted(path for path in {*one, *other} if one.get(path) != other.get(path))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--report", type=Path, help="measure here and write this file")
+    what.add_argument("--compare", type=Path, nargs="+", metavar="JSON", help="of machines")
+    what.add_argument("--twice", type=Path, nargs=2, metavar="LOCK", help="dvc.lock of two runs")
+    parser.add_argument("--project", type=Path, default=Path(), help="folder (default: this)")
+    parser.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
+    parser.add_argument(
+        "--bands", nargs="+", default=(), help="(default: those of params.yaml's `run`)"
+    )
+    args = parser.parse_args()
+    if args.compare:
+        reports = {path.stem: read_json(path, MachineReport) for path in args.compare}
+        lines, met = compared(reports)
+        print(*lines, sep="\n")
+        return 0 if met else 1
+    if args.twice:
+        others = differing(args.twice)
+        count = len(outputs(args.twice[0]))
+        print(*others, f"{len(others)} outputs differ; the first run has {count}", sep="\n")
+        return 1 if others else 0
+    content = measure(args.bands, args.project, args.device)
+    command = f"python -m validation.campaigns.machines --device {args.device}"
+    command += f" --report {FOLDER / args.report.name}"
+    write_json(args.report, content | environment(args.device, command))
+    print(args.report)
+    return 0
+
+
+if __name__ == "__main__":
+    errors.run(main)

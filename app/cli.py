@@ -123,6 +123,7 @@ def drift(arguments: argparse.Namespace) -> Done:
     flag("--pull", type=kinds.count, metavar="N", help="which pull; default: the first usable one"),
     flag("--sheet", type=Path, metavar="OUT.png", help="draw six moments, force and coverage"),
     flag("--rrd", type=Path, metavar="OUT.rrd", help="write one timeline for Rerun's viewer"),
+    flag("--pictures", type=Path, metavar="FOLDER", help="write the pictures to mask elsewhere"),
     flag("--frames", action="store_true", help="with --json, also a row for each picture"),
     JSON,
 )
@@ -140,6 +141,7 @@ def check(arguments: argparse.Namespace) -> Done:
         frames=arguments.frames,
         sheet=arguments.sheet,
         rrd=arguments.rrd,
+        pictures=arguments.pictures,
         pull=arguments.pull,
     )
 

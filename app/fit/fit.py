@@ -13,7 +13,7 @@ from app import evidence
 from app.fit.countdown import Countdown
 from app.flow import child
 from app.preflight.add_band import NAME, add_band
-from app.preflight.recordings import add_recording, digests
+from app.preflight.recordings import add_recording, digests, renew_masks
 from pipeline.base.errors import UserError
 from pipeline.base.launch_table import expect_apart, file_of
 from pipeline.base.layout import Layout
@@ -128,8 +128,11 @@ def brought_in(
     given = digests(recordings)
     new = [file for digest, file in given.items() if digest not in there]
     if there and new and there.keys() <= given.keys():
-        return add_recording(name, new, params_path=at, root=layout.root)
+        done = add_recording(name, new, params_path=at, root=layout.root)
+        renew_masks(recordings, there)
+        return done
     if not new and name in params.run.bands:
+        renew_masks(recordings, there)
         return f"{name} is there already, with {len(there)} recordings: goes on"
     values = {what: getattr(known, what) for what in ("mass", "diameter", "rest_length")}
     return add_band(name, recordings, **values, params_path=at, root=layout.root)

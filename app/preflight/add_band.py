@@ -66,18 +66,21 @@ def add_band(
     text = _with_band(params_path, name, band)
     after = parse(text, str(params_path))
     new = files.targets(recordings, layout.raw(name))
-    there = layout.recordings(name)
-    same = there and files.digests(there).keys() == files.digests(recordings).keys()
+    there = files.digests(layout.recordings(name))
+    same = there and there.keys() == files.digests(recordings).keys()
     if there and not same:
         raise UserError(
             f"{layout.raw(name)} holds other recordings already: choose another name, or"
             f" `sling add-recording --band {name}`"
         )
     if same and known and name in before.run.bands:
+        files.renew_masks(recordings, there)
         return f"{name} is there already: nothing to do"
 
     reports = files.checked(recordings, after, name)
-    if not same:
+    if same:
+        files.renew_masks(recordings, there)
+    else:
         files.copy(new)
     write_text(params_path, text)
     return files.told(f"{name} added", reports)

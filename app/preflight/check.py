@@ -27,6 +27,7 @@ from pipeline.recording.view import Scene
 
 __all__ = ["Look", "check_recording", "coverage", "look_at"]
 
+COMMON = SimpleNamespace(diameter=DIAMETER, rest_length=REST_LENGTH)
 ASSUMED = "assumed: give --band, or --diameter and --rest-length"
 
 
@@ -68,7 +69,7 @@ def look_at(
         pull: Which of several; None for the first that can be used, if there is one.
     """
     container = read_container(Path(path))
-    about = band or SimpleNamespace(diameter=DIAMETER, rest_length=REST_LENGTH)
+    about = band or COMMON
     report = CheckReport(
         path=str(path),
         sha256=sha256(path),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.preflight.check import band_of, look_at
+from app.preflight.check import COMMON, band_of, look_at
 from app.preflight.output import expect_writable, written
 
 
@@ -19,6 +19,7 @@ def check(
     frames: bool = False,
     sheet: Path | None = None,
     rrd: Path | None = None,
+    pictures: Path | None = None,
     pull: int | None = None,
 ) -> tuple[str, int]:
     """Look at a recording; draw it where that is asked for.
@@ -31,6 +32,7 @@ def check(
         as_json: The report as JSON, with what was drawn under `written`.
         frames: There, a row a picture under `coverage`.
         sheet, rrd: Files to write.
+        pictures: Folder to write, of what `cloud.mask: folder` wants masks of.
         pull: Which of several; None for the first that can be used, if there is one.
 
     Returns:
@@ -43,7 +45,12 @@ def check(
         expect_writable(sheet, ".png")
     if rrd:
         expect_writable(rrd, ".rrd")
-    look = look_at(recording, params, *band_of(params, band, diameter, rest_length), pull)
+    if pictures:
+        from app.preflight.pictures import expect_new, write_pictures
+
+        expect_new(pictures)
+    about, source = band_of(params, band, diameter, rest_length)
+    look = look_at(recording, params, about, source, pull)
     if sheet:
         from app.preflight.sheet import draw_sheet
 
@@ -54,5 +61,9 @@ def check(
 
         with written(rrd):
             look.report.written.append(write_timeline(look, params, rrd))
+    if pictures:
+        with written(pictures):
+            said = write_pictures(recording, about or COMMON, params, pictures)
+        look.report.written.append(said)
     report = look.report
     return report.to_json(frames) if as_json else report.to_text(), int(not report.usable)

@@ -12,14 +12,20 @@ from pipeline.base.errors import UserError
 
 def expect_writable(path: Path, suffix: str) -> None:
     """Raises UserError where `path` cannot become a file of that kind."""
-    folder = path.parent
     if path.suffix.lower() != suffix:
         raise UserError(f"{path}: must end with {suffix}")
     if path.is_dir():
         raise UserError(f"{path}: is a folder, name a file in it")
-    if not folder.is_dir():
-        raise UserError(f"{path}: there is no folder {folder}, make it first")
-    if not os.access(folder, os.W_OK) or (path.exists() and not os.access(path, os.W_OK)):
+    expect_folder(path)
+    if path.exists() and not os.access(path, os.W_OK):
+        raise UserError(f"{path}: may not be written here, choose another folder")
+
+
+def expect_folder(path: Path) -> None:
+    """Raises UserError where nothing can be made beside `path`."""
+    if not path.parent.is_dir():
+        raise UserError(f"{path}: there is no folder {path.parent}, make it first")
+    if not os.access(path.parent, os.W_OK):
         raise UserError(f"{path}: may not be written here, choose another folder")
 
 

@@ -10,10 +10,11 @@ from pathlib import Path
 from app.preflight.check import check_recording
 from app.preflight.report import CheckReport
 from pipeline.base.errors import UserError
-from pipeline.base.files import replacing
+from pipeline.base.files import replacing, replacing_folder
 from pipeline.base.layout import Layout
 from pipeline.params import Params, expect_known, load
 from pipeline.recording.input.container import expect_file, sha256
+from pipeline.recording.masks.folder import MASK_NAME, masks_beside
 
 
 def add_recording(
@@ -75,10 +76,32 @@ def checked(recordings: Sequence[Path], params: Params, band: str) -> list[Check
 
 
 def copy(files: dict[Path, Path]) -> None:
-    """All files to their targets, or none."""
+    """All files to their targets, with the masks beside them, or none."""
     with ExitStack() as stack:
         for file, target in files.items():
             shutil.copyfile(file, stack.enter_context(replacing(target)))
+            _copy_masks(file, target, stack)  # they get their names before the recording does
+
+
+def renew_masks(recordings: Sequence[Path], there: dict[str, Path]) -> None:
+    """Masks beside these recordings, those that are there, take the place of what lies there."""
+    with ExitStack() as stack:
+        for digest, file in digests(recordings).items():
+            if digest in there:
+                _copy_masks(file, there[digest], stack)
+
+
+def _copy_masks(file: Path, target: Path, stack: ExitStack) -> None:
+    source, goal = masks_beside(file), masks_beside(target)
+    if not source.is_dir() or (goal.exists() and goal.samefile(source)):
+        return
+    folder = stack.enter_context(replacing_folder(goal))
+    try:
+        for mask in source.iterdir():
+            if MASK_NAME.fullmatch(mask.name) and mask.is_file():
+                shutil.copyfile(mask, folder / mask.name)
+    except OSError as error:
+        raise UserError(f"{source}: cannot be copied ({error.strerror})") from error
 
 
 def told(done: str, reports: Sequence[CheckReport]) -> str:

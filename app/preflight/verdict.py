@@ -182,7 +182,7 @@ def pause(signals: Signals) -> tuple[float, float]:
 
 
 def _of_pictures(report: CheckReport) -> Iterator[Caution]:
-    look = "look at --sheet; nearer camera, more light, another background, or cloud.mask sam3"
+    look = "look at --sheet; nearer camera, more light, another background, or cloud.mask folder"
     for row in report.phases:
         if row["coverage"] < COVERAGE.get(row["phase"], 0.0):
             yield Caution(

@@ -56,7 +56,7 @@ class Sam3(Section):
 
 class CloudParams(Section):
     points: Annotated[int, Range(10, 100_000)]
-    mask: Literal["opencv", "sam3"]
+    mask: Literal["opencv", "sam3", "folder"]
     sam3: Sam3
     statistical_neighbors: Annotated[int, Range(1, 1000)]
     statistical_ratio: Annotated[float, Range(0.1, 100)]

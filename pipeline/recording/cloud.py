@@ -67,9 +67,10 @@ def clouds_of(view: View, cloud: object) -> Clouds:
         view.unpaired,
     )
     if clouds.empty > MOST_EMPTY * len(times):
+        cure = "the masks" if cloud.mask == "folder" else "the band's diameter and rest_length"
         raise UserError(
             f"{path}: empty mask, the band is not found in {clouds.empty} of {len(times)} frames:"
-            " check the camera's extrinsics and the band's diameter and rest_length"
+            f" check the camera's extrinsics and {cure}"
         )
     return clouds
 

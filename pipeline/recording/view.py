@@ -165,6 +165,20 @@ class View:
         except images.Undecodable:
             return None
 
+    def stamp(self, number: int) -> int:
+        """Of a colour picture's header, as it was recorded [ns]."""
+        return self.recording.color.values[self.index[number][1]].stamp
+
+    def marked(self, picture: np.ndarray, frame: Frame) -> np.ndarray:
+        """What a mask of the colour picture marks where the band can be: (H, W) as in `frame`.
+
+        Args:
+            picture: Of the colour camera's size, bool.
+        """
+        seen = picture.astype(np.float32)
+        seen = seen[self.window] if frame.pixels is None else onto_depth(seen, frame.pixels)
+        return (seen > 0.5) & frame.near
+
     def frame_of(
         self,
         number: int,

@@ -1,10 +1,15 @@
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from pipeline.params import Params, load
+from pipeline.recording.build import process
+from pipeline.recording.masks.ridge import RidgeMask
 from tests import once
 from tests.recording.bag import Truth, write_bag
 
@@ -21,6 +26,23 @@ def params() -> Params:
 def seen(tmp_path_factory):
     """(path, truth) of a recording with pictures."""
     return written(tmp_path_factory, "seen.mcap")
+
+
+@pytest.fixture(scope="session")
+def masked(seen, params, tmp_path_factory) -> Path:
+    """`seen`, with the masks that RidgeMask made of it beside it; to be read only."""
+
+    def make(folder: Path) -> None:
+        shutil.copy(seen[0], folder / "masked.mcap")
+        (folder / "masked.masks").mkdir()
+        view = process(seen[0], params.bands["band1"], params).view
+        ridge = RidgeMask(view)
+        for number, frame in view.frames():
+            whole = np.zeros(view.depth(number).shape, np.uint8)
+            whole[view.window] = 255 * ridge.mask(frame)
+            Image.fromarray(whole).save(folder / "masked.masks" / f"{view.stamp(number)}.png")
+
+    return once.folder(tmp_path_factory, "masked", make) / "masked.mcap"
 
 
 @pytest.fixture(scope="session")

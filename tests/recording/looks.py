@@ -6,7 +6,7 @@ time-of-flight camera, JPEG. Nothing of pipeline/rig: what is tested here did no
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -296,6 +296,7 @@ def view_of(look: Look, stamps: np.ndarray, seed: int = 0) -> tuple[View, list[T
 def assemble(look: Look, stamps: np.ndarray, colors: list, depths: list) -> View:
     """A view of these pictures, as if they had been read of a recording."""
     nanoseconds = np.round(stamps * 1e9).astype(np.int64)
+    colors = [replace(one, stamp=int(t)) for one, t in zip(colors, nanoseconds, strict=True)]
     apart = look.offset is not None
     recording = Recording(
         path=Path("look.mcap"),

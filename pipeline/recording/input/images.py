@@ -87,6 +87,16 @@ def depth(picture: Picture) -> np.ndarray:
     return _metres(quantised.astype(np.float32))
 
 
+def grey(data: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """A grey PNG of this width and height to uint8, shape (H, W). Raises Undecodable."""
+    found, mode = _header(data)
+    if mode not in ("L", "1") or data[0] == 0xFF:
+        raise Undecodable("is not a grey PNG of 8 bits or 1")
+    if found != size:
+        raise Undecodable("is of {} x {} pixels, not of {} x {}".format(*found, *size))
+    return _unpacked(data, cv2.IMREAD_GRAYSCALE, "png")
+
+
 def size_of(picture: Picture) -> tuple[int, int] | None:
     """Width and height without decoding; None where the header is damaged or not known."""
     if not picture.format:

@@ -34,6 +34,7 @@ class Picture:
         data: uint8, shape (bytes,).
         height, width: Pixels; 0 where packed, as are `step` and `is_bigendian`.
         step: Bytes a row, with its padding.
+        stamp: Of its header, as it was recorded [ns].
     """
 
     encoding: str
@@ -43,6 +44,7 @@ class Picture:
     width: int = 0
     step: int = 0
     is_bigendian: bool = False
+    stamp: int = 0
 
     @property
     def kind(self) -> tuple:
@@ -162,12 +164,13 @@ def joints_reader(names: tuple[str, ...], frame: str) -> Callable[[object], Read
 
 def read_image(message: object) -> Reading:
     """Image and foxglove.RawImage, CompressedImage and foxglove.CompressedImage."""
-    data = _bytes(message.data)
+    data, stamp = _bytes(message.data), stamp_of(message) or 0
     if hasattr(message, "format"):
-        return _reading(message, Picture("", str(message.format) or "unnamed", data))
+        packed = Picture("", str(message.format) or "unnamed", data, stamp=stamp)
+        return _reading(message, packed)
     size = (int(message.height), int(message.width), int(message.step))
     swapped = bool(getattr(message, "is_bigendian", False))
-    return _reading(message, Picture(str(message.encoding), "", data, *size, swapped))
+    return _reading(message, Picture(str(message.encoding), "", data, *size, swapped, stamp))
 
 
 def joints_of(message: object) -> dict[str, float]:

@@ -6,6 +6,7 @@ A backend is made for one view, learns once from its frames, and then masks each
 from __future__ import annotations
 
 from pipeline.base.errors import UserError
+from pipeline.recording.masks.folder import FolderMask
 from pipeline.recording.masks.ridge import RidgeMask
 from pipeline.recording.view import View
 
@@ -20,6 +21,8 @@ def masker(name: str, view: View, sam3: object | None = None) -> object:
     """
     if name == "opencv":
         return RidgeMask(view)
+    if name == "folder":
+        return FolderMask(view)
     if name == "sam3" and sam3 is not None:
         from pipeline.recording.masks.sam3 import Sam3Mask
 

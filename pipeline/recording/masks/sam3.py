@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from pipeline.base.errors import UserError
-from pipeline.recording.view import Frame, View, onto_depth
+from pipeline.recording.view import Frame, View
 
 TOKENS = 32  # of a prompt
 NOTHING = -10.0  # logit of a mask that is not there
@@ -39,12 +39,7 @@ class Sam3Mask:
     def mask(self, frame: Frame) -> np.ndarray:
         camera = self.view.recording.color_camera
         logits = cv2.resize(self.logits[frame.number], (camera.width, camera.height))
-        sees = (logits > 0).astype(np.float32)
-        if frame.pixels is None:
-            sees = sees[self.view.window]
-        else:
-            sees = onto_depth(sees, frame.pixels)
-        return (sees > 0.5) & frame.near
+        return self.view.marked(logits > 0, frame)
 
     def _track(self, model, tokenizer, settings: object) -> list[np.ndarray]:
         """Logits (h, w) of each picture."""

@@ -3,9 +3,9 @@
 import pytest
 
 from app.preflight.check import Look, look_at
-from tests.recording.conftest import blind, params, seen
+from tests.recording.conftest import blind, masked, params, seen
 
-__all__ = ["blind", "params", "seen"]
+__all__ = ["blind", "masked", "params", "seen"]
 
 
 @pytest.fixture(scope="session")

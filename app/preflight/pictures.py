@@ -1,0 +1,57 @@
+"""The pictures that `cloud.mask: folder` wants masks of, for the tool that makes them."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+import cv2
+
+from app.preflight.output import expect_folder
+from pipeline.base.errors import UserError
+from pipeline.base.files import replacing_folder
+from pipeline.recording.build import view_of
+from pipeline.recording.input.reader import read_recording
+from pipeline.recording.masks.folder import mask_name
+from pipeline.recording.pulls import pulls_of
+
+
+def expect_new(folder: Path) -> None:
+    """Raises UserError where `folder` cannot be made, or is there."""
+    expect_folder(folder)
+    if os.path.lexists(folder):
+        raise UserError(f"{folder}: is there already, name a folder that is not")
+
+
+def write_pictures(recording: Path, band: object, params: object, folder: Path) -> str:
+    """Write the colour pictures of each pull's window as PNG, named as their masks are to be.
+
+    Args:
+        recording: The MCAP file.
+        band: Has diameter and rest_length [m].
+        params: The whole params.
+        folder: A new one.
+
+    Returns:
+        What was written, in words.
+
+    Raises:
+        UserError: where `folder` cannot be made or is there.
+    """
+    expect_new(folder)
+    views = []
+    with suppress(UserError):  # the report says why there is nothing to see
+        for pull in pulls_of(read_recording(recording, params.setup), params.setup):
+            with suppress(UserError):
+                views.append(view_of(pull, band, params)[0])
+    if not views:
+        return f"{folder} was not written: no pull is understood"
+    with replacing_folder(folder) as temporary:
+        for view in views:
+            for number in range(len(view)):
+                if (picture := view.color(number)) is not None:
+                    _, packed = cv2.imencode(".png", picture)
+                    (temporary / mask_name(view.stamp(number))).write_bytes(packed.tobytes())
+        count = sum(1 for _ in temporary.iterdir())
+    return f"{folder}: {count} pictures to mask"

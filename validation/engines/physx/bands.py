@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +33,8 @@ class Drive:
 
     Attributes:
         vertices: Those that are led, shape (D,).
-        targets: Where they are at the end of each step [m], shape (S, D, 3), in every band.
+        targets: Where they are at the end of each step [m], shape (S, D, 3) in every band, or
+            (S, N, D, 3), one for each; with (1, ...) for all steps.
         fade: How much of their distance from targets[0] at the phase's begin is left, shape (S,).
         keep: Steps after which the nodes' places are kept, shape (S,), bool.
     """
@@ -84,13 +86,22 @@ class Engine:
         self._said.close()
 
     def simulate(
-        self, tube: Tube, thetas: np.ndarray, phases: list[Drive], *, rate: int, iterations: int
+        self,
+        tube: Tube,
+        thetas: np.ndarray,
+        phases: list[Drive],
+        *,
+        rate: int,
+        iterations: int,
+        steer: Callable[[np.ndarray], np.ndarray | None] | None = None,
     ) -> list[Course]:
         """Bands of the thetas (N, 5), each from the straight U in which `tube` hangs.
 
         Args:
             rate: Steps a second.
             iterations: Of the solver a step.
+            steer: Goes on with the last phase: from the nodes' places (N, sections, V, 3) [m] to
+                the targets (N, D, 3) at the end of the next step, or None, which ends it.
         """
         thetas = np.atleast_2d(np.asarray(thetas, float))
         job = {
@@ -102,7 +113,9 @@ class Engine:
         }
         for i, phase in enumerate(phases):
             job |= {f"{name}_{i}": value for name, value in vars(phase).items()}
-        done = self.run(scene.text(tube, thetas, rate, iterations), job)
+        shape = (len(thetas), *tube.rest.shape)
+        led = steer and (lambda nodes: steer(nodes.reshape(shape).astype(float)))
+        done = self.run(scene.text(tube, thetas, rate, iterations), job, led)
         return [
             Course(
                 done[f"positions_{i}"].reshape(-1, len(thetas), *tube.rest.shape).astype(float),
@@ -113,24 +126,35 @@ class Engine:
             for i in range(len(phases))
         ]
 
-    def run(self, text: str, job: dict) -> dict[str, np.ndarray]:
-        """What the worker makes of a scene in USD's text form and of a job like `simulate`'s."""
+    def run(self, text: str, job: dict, steer=None) -> dict[str, np.ndarray]:
+        """What the worker makes of a scene in USD's text form and of a job like `simulate`'s.
+
+        `steer` is `simulate`'s, but for the nodes' shape (N, sections V, 3).
+        """
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             (folder / "scene.usda").write_text(text)
-            np.savez(folder / "job.npz", **job)
-            self._work(folder)
+            np.savez(folder / "job.npz", **job, steered=steer is not None)
+            self._work(folder, steer)
             return dict(np.load(folder / "result.npz"))
 
-    def _work(self, folder: Path) -> None:
-        with suppress(BrokenPipeError):
-            self._process.stdin.write(f"{folder}\n")
-            self._process.stdin.flush()
+    def _work(self, folder: Path, steer) -> None:
+        self._say(folder)
         for line in self._process.stdout:  # PhysX has words of its own there
             if line.strip() == worker.DONE:
                 return
+            if line.strip() == worker.NEXT:
+                targets = steer(np.load(folder / "nodes.npy"))
+                if targets is not None:
+                    np.save(folder / "targets.npy", targets)
+                self._say("no more" if targets is None else worker.ON)
         self._said.seek(0)
         raise UserError(f"PhysX: {_last_line(self._said.read())}")
+
+    def _say(self, line: object) -> None:
+        with suppress(BrokenPipeError):
+            self._process.stdin.write(f"{line}\n")
+            self._process.stdin.flush()
 
 
 def release() -> str:

@@ -28,22 +28,46 @@ def lame(young, poisson) -> tuple:
 def stress(gradient: np.ndarray, young, poisson) -> np.ndarray:
     """Nominal stress P [Pa] at deformation gradients (..., 3, 3); the moduli fit (...)."""
     mu, lam = (np.asarray(one)[..., None, None] for one in lame(young, poisson))
-    left, _, right = np.linalg.svd(gradient)
-    left[..., 2] *= np.linalg.det(left @ right)[..., None]  # a rotation, no reflection
-    first, second, third = (gradient[..., i] for i in range(3))
-    cofactor = np.stack(
-        [np.cross(second, third), np.cross(third, first), np.cross(first, second)], axis=-1
+    off, volume, cofactor = _strain(gradient)
+    return 2 * mu * off + lam * (volume - 1) * cofactor
+
+
+def viscous(before: np.ndarray, gradient: np.ndarray, delay, young, poisson) -> np.ndarray:
+    """Stress [Pa] of a step from gradients `before` (..., 3, 3), by elasticityDamping.
+
+    Each constraint C pulls as C + d C' would, J with d 2 mu / lam (compute_deltaLambdaXgradC).
+
+    Args:
+        delay: The damping d over the step's duration; fits (...), as the moduli do.
+    """
+    mu, delay = (np.asarray(one)[..., None, None] for one in (lame(young, poisson)[0], delay))
+    (off, volume, cofactor), (off_before, volume_before, _) = map(_strain, (gradient, before))
+    size, size_before = (
+        np.linalg.norm(one, axis=(-2, -1), keepdims=True) for one in (off, off_before)
     )
-    volume = np.linalg.det(gradient)[..., None, None]
-    return 2 * mu * (gradient - left @ right) + lam * (volume - 1) * cofactor
+    along = off / np.maximum(size, 1e-12)
+    return 2 * mu * delay * ((size - size_before) * along + (volume - volume_before) * cofactor)
 
 
-def force_on(tube: Tube, sections: list[int], positions: np.ndarray, young, poisson) -> np.ndarray:
-    """Elastic force of bands on what holds some of their sections [N].
+def energy(tube: Tube, positions: np.ndarray, young, poisson) -> np.ndarray:
+    """Elastic energy of bands at positions (..., sections, V, 3) [J], shape (...)."""
+    mu, lam = (np.asarray(one)[..., None] for one in lame(young, poisson))
+    before, gradient = _gradients(tube, tube.tetrahedra, positions)
+    off, volume, _ = _strain(gradient)
+    density = mu * (off**2).sum(axis=(-2, -1)) + lam / 2 * (volume[..., 0, 0] - 1) ** 2
+    return density @ (np.linalg.det(before) / 6)
+
+
+def force_on(
+    tube: Tube, sections: list[int], positions: np.ndarray, young, poisson, *, step=None
+) -> np.ndarray:
+    """Force of bands on what holds some of their sections [N].
 
     Args:
         positions: Of bands, shape (..., sections, V, 3).
         young, poisson: One a band or one for all; fit (...).
+        step: The positions a step before and the delay, as `viscous` takes it: with the viscous
+            force; None: the elastic one alone.
 
     Returns:
         Shape (..., 3).
@@ -51,6 +75,32 @@ def force_on(tube: Tube, sections: list[int], positions: np.ndarray, young, pois
     held = np.zeros(tube.rest.shape[:2], bool)
     held[sections] = True
     near = tube.tetrahedra[held.ravel()[tube.tetrahedra].any(axis=1)]
+    before, gradient = _gradients(tube, near, positions)
+    inverse = np.linalg.inv(before)
+    moduli = [np.asarray(one)[..., None] for one in (young, poisson)]
+    nominal = stress(gradient, *moduli)
+    if step is not None:
+        earlier, delay = step
+        past = _gradients(tube, near, earlier)[1]
+        nominal = nominal + viscous(past, gradient, np.asarray(delay)[..., None], *moduli)
+    shares = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
+    kept = shares * held.ravel()[near][..., None]
+    return -np.einsum("t,...tij,tkj->...i", np.linalg.det(before) / 6, nominal, kept)
+
+
+def _strain(gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """F - R (..., 3, 3), J (..., 1, 1) and cof F (..., 3, 3)."""
+    left, _, right = np.linalg.svd(gradient)
+    left[..., 2] *= np.linalg.det(left @ right)[..., None]  # a rotation, no reflection
+    first, second, third = (gradient[..., i] for i in range(3))
+    cofactor = np.stack(
+        [np.cross(second, third), np.cross(third, first), np.cross(first, second)], axis=-1
+    )
+    return gradient - left @ right, np.linalg.det(gradient)[..., None, None], cofactor
+
+
+def _gradients(tube: Tube, near: np.ndarray, positions: np.ndarray) -> tuple:
+    """Edges at rest (T, 3, 3) of tetrahedra `near` (T, 4), and their gradients (..., T, 3, 3)."""
     before, now = (
         np.swapaxes(corners[..., 1:, :] - corners[..., :1, :], -1, -2)
         for corners in (
@@ -58,12 +108,7 @@ def force_on(tube: Tube, sections: list[int], positions: np.ndarray, young, pois
             for vertices in (tube.rest, positions)
         )
     )
-    inverse = np.linalg.inv(before)
-    moduli = (np.asarray(one)[..., None] for one in (young, poisson))
-    nominal = stress(now @ inverse, *moduli)
-    shares = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
-    kept = shares * held.ravel()[near][..., None]
-    return -np.einsum("t,...tij,tkj->...i", np.linalg.det(before) / 6, nominal, kept)
+    return before, now @ np.linalg.inv(before)
 
 
 def nominal(stretch, young: float, poisson: float) -> np.ndarray:

@@ -4,8 +4,9 @@
 
 The paper's method with the budget of params.yaml, once with `engine: physx` and once with ours:
 same episode, clamps, loss, optimisers and seed. Then each theta* in both engines, and launches of
-both in ours. Writes reports/validation/physx-<band>.json. What was simulated is kept in
-.checkpoints, so that a search that was killed goes on. SLING_DEVICE names the device of ours.
+both in ours. Writes reports/validation/physx-<band>.json; then, into the same file, launches of
+both in both, in PhysX also with steps that are finer. What was simulated is kept in .checkpoints,
+so that a search that was killed goes on. SLING_DEVICE names the device of ours.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.base import errors
+from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.machine import devices
 from pipeline.objective.loss import TERMS
@@ -31,7 +33,8 @@ from pipeline.sling.launch import launch
 from pipeline.sling.load import sling_of_method
 from validation.benchmarks.methods import complete
 from validation.benchmarks.timing import environment
-from validation.engines.physx.bands import release
+from validation.engines.physx.bands import Engine, release
+from validation.engines.physx.launches import FINE, alike, draws_of, launch_in_physx
 from validation.engines.physx.rollouts import ITERATIONS, RATE
 
 METHOD = "sling2sim2real"
@@ -88,6 +91,47 @@ class Comparison:
                 rows[-1]["measured_m"] = float(measured[i])
         return rows
 
+    def launched(self, where: str, thetas: np.ndarray, draws: np.ndarray, rate: int) -> dict:
+        """Launches of the draws (L, 2) with each theta by an engine: lists (L,) by theta.
+
+        Raises UserError, as `Engine`.
+        """
+        sling = alike(self.sling)
+        each, every = np.repeat(thetas, len(draws), axis=0), np.tile(draws, (len(thetas), 1))
+        gained = [None] * len(every)
+        if where == OURS:
+            done = launch(sling, each, every)
+        else:
+            with Engine() as engine:
+                pushed = launch_in_physx(engine, sling, each, every, rate=rate)
+            done, gained = pushed.launches, [_plain(one) for one in pushed.gained]
+        columns = {
+            "landing_m": [_plain(one) for one in done.landing_y],
+            "speed_m_per_s": [_plain(one) for one in done.speed],
+            "hold_force_n": [_plain(one) for one in done.hold_force],
+            "energy_gained": gained,
+            "failure": done.failure,
+        }
+        count = len(draws)
+        return {
+            name: {key: column[i * count : (i + 1) * count] for key, column in columns.items()}
+            for i, name in enumerate((OURS, PHYSX))
+        }
+
+
+def side_by_side(done: dict[str, dict], draws: np.ndarray, measured) -> list[dict]:
+    """A row for each of the draws (L, 2): what each engine of `done` says with each theta."""
+    rows = []
+    for i, draw in enumerate(draws.tolist()):
+        row = {"draw_m": draw} | ({} if measured is None else {"measured_m": float(measured[i])})
+        for where, by_theta in done.items():
+            row[f"in_{where}_by_theta_of"] = {
+                name: {key: column[i] for key, column in columns.items()}
+                for name, columns in by_theta.items()
+            }
+        rows.append(row)
+    return rows
+
 
 def main() -> None:
     """Search, compare, write. Raises UserError."""
@@ -102,9 +146,7 @@ def main() -> None:
         table = pd.read_csv(asked.landings)
         draws, measured = table[["draw_y_m", "draw_z_m"]].to_numpy(), table.landing_y_m
     else:
-        box = params.setup
-        low, high = np.array([box.draw_y, box.draw_z]).T
-        draws, measured = low + np.array([[0.25], [0.5], [0.75]]) * (high - low), None
+        draws, measured = draws_of(params.setup), None
     comparison, content, thetas = Comparison(params, asked.band), {}, []
     for name in (OURS, PHYSX):
         history, seconds = comparison.search(name)
@@ -127,7 +169,20 @@ def main() -> None:
         "launches_in_our_simulator": comparison.launches(np.array(thetas), draws, measured),
     }
     about["versions"] |= {"ovphysx": version}
-    write_json(Path("reports/validation") / f"physx-{asked.band}.json", content | about)
+    path = Path("reports/validation") / f"physx-{asked.band}.json"
+    write_json(path, content | about)
+    done, failures = {}, {}
+    for where, rate in ((OURS, RATE), (PHYSX, RATE), (f"{PHYSX}_{FINE}_hz", FINE)):
+        try:
+            done[where] = comparison.launched(where, np.array(thetas), draws, rate)
+        except UserError as error:
+            failures[where] = str(error)
+        content["launches"] = {
+            "arm": "does not give way",
+            "failed_engines": failures,
+            "draws": side_by_side(done, draws, measured),
+        }
+        write_json(path, content | about)
 
 
 def _plain(value: float) -> float | None:

@@ -54,14 +54,29 @@ class BandMotion:
         return float(np.linalg.norm(np.diff(free, axis=0), axis=1).max() * MARK)
 
 
+def clamped(tube: Tube) -> tuple[np.ndarray, np.ndarray]:
+    """The vertices in the clamps, shape (D,), and where these hold them [m], shape (D, 3)."""
+    rows = np.arange(tube.mass.size).reshape(tube.rest.shape[:2])
+    clamps = rows[[0, 1, -2, -1]].ravel()
+    return clamps, tube.clamped.reshape(-1, 3)[clamps]
+
+
+def hanging(tube: Tube, rate: int) -> Drive:
+    """The ends are led into the clamps, then the band comes to rest."""
+    clamps, ends = clamped(tube)
+    times = _steps(SETTLE, rate)
+    return Drive(
+        clamps,
+        np.tile(ends, (len(times), 1, 1)),
+        0.5 + 0.5 * np.cos(np.pi * np.minimum(times / LEAD, 1)),
+        np.zeros(len(times), bool),
+    )
+
+
 def phases(tube: Tube, episode, rate: int, marked: bool = True) -> list[Drive]:
     """Hang, hold and fly free, in steps of 1 / rate; places are kept at the marks, if `marked`."""
-    rows = np.arange(tube.mass.size).reshape(tube.rest.shape[:2])
-    clamps, hand = rows[[0, 1, -2, -1]].ravel(), rows[tube.middle]
-    ends = tube.clamped.reshape(-1, 3)[clamps]
-
-    def steps(duration: float) -> np.ndarray:
-        return np.arange(1, round(duration * rate) + 1) / rate
+    clamps, ends = clamped(tube)
+    hand = np.arange(tube.mass.size).reshape(tube.rest.shape[:2])[tube.middle]
 
     def still(times: np.ndarray) -> np.ndarray:
         return np.tile(ends, (len(times), 1, 1))
@@ -69,20 +84,14 @@ def phases(tube: Tube, episode, rate: int, marked: bool = True) -> list[Drive]:
     def keep(times: np.ndarray) -> np.ndarray:
         return marked & (np.arange(1, len(times) + 1) * MARK % rate == 0)
 
-    hang = steps(SETTLE)
-    held = steps(episode.release_time - episode.grasp_time)
-    free = steps(episode.time[-1] - episode.release_time)
+    held = _steps(episode.release_time - episode.grasp_time, rate)
+    free = _steps(episode.time[-1] - episode.release_time, rate)
     times = episode.release_time - held[-1] + held
     path = CubicSpline(episode.time, episode.position)(times)
     led = path[:, None] + tube.rest[tube.middle] * [0.0, 1.0, 1.0]
     part = np.minimum(held / GRASP_BLEND, 1)
     return [
-        Drive(
-            clamps,
-            still(hang),
-            0.5 + 0.5 * np.cos(np.pi * np.minimum(hang / LEAD, 1)),
-            np.zeros(len(hang), bool),
-        ),
+        hanging(tube, rate),
         Drive(
             np.concatenate([clamps, hand]),
             np.concatenate([still(held), led], axis=1),
@@ -255,6 +264,11 @@ def fast_enough(entries: list[dict]) -> bool:
     """Whether 64 bands at once make the rollouts a second that were asked for."""
     named = {one["environments"]: one["physx_rollouts_per_s"] for one in entries}
     return named[ENVIRONMENTS[1]] >= ASKED
+
+
+def _steps(duration: float, rate: int) -> np.ndarray:
+    """Ends of the steps of 1 / rate [s]."""
+    return np.arange(1, round(duration * rate) + 1) / rate
 
 
 def _marked(episode):

@@ -3,6 +3,8 @@
 Each line of standard input names a folder with scene.usda and job.npz (what bands.py writes); it
 gets result.npz, and DONE is said. A stage's driven vertices cannot be freed again, so each phase
 attaches the scene anew and goes on from the nodes' places and velocities at the end of the last.
+A steered job's last phase goes on while there are targets: NEXT is said, with the nodes in
+nodes.npy, and answered by a line, ON with the targets in targets.npy, or another that ends it.
 """
 
 import os
@@ -13,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 DEVICE = "cuda:0"
-DONE = "the job is done"
+DONE, NEXT, ON = "the job is done", "the next targets?", "on"
 AS_WRITTEN = 2e-3  # m: attaching takes one step, in which a band falls by less
 
 
@@ -80,6 +82,14 @@ def start():
     return PhysX(config=PhysXConfig(carbonite_overrides={"/physics/suppressReadback": True}))
 
 
+def asked(folder: Path, nodes: np.ndarray) -> np.ndarray | None:
+    """Targets (N, D, 3) of the next step for nodes (N, V, 3) [m]; None: the phase is over."""
+    np.save(folder / "nodes.npy", nodes.astype(np.float32))
+    print(f"\n{NEXT}", flush=True)  # PhysX may not have ended its line
+    on = sys.stdin.readline().strip() == ON
+    return np.load(folder / "targets.npy") if on else None
+
+
 def simulate(physx, folder: Path) -> None:
     """Simulate a job's phases one after the other."""
     import warp as wp
@@ -102,6 +112,7 @@ def simulate(physx, folder: Path) -> None:
         flags[:, vertices] = 0.0
         drive = np.concatenate([place, flags], axis=2)
         begin = place[:, vertices] - offset - targets[0]
+        targets = np.broadcast_to(targets, (len(fade), *targets.shape[1:]))
         kept = []
         wp.synchronize()
         began = time.perf_counter()
@@ -114,6 +125,13 @@ def simulate(physx, folder: Path) -> None:
         wp.synchronize()
         result[f"seconds_{phase}"] = time.perf_counter() - began
         result[f"attach_seconds_{phase}"] = scene.seconds
+        while job["steered"] and phase + 1 == job["phases"]:
+            targets = asked(folder, scene.state()[0] - offset)
+            if targets is None:
+                break
+            drive[:, vertices, :3] = offset + targets
+            scene.write(2, drive)
+            physx.step_sync(step)
         place, velocity = scene.state()
         result[f"positions_{phase}"] = np.array(kept or np.zeros((0, *place.shape)), np.float32)
         result[f"velocities_{phase}"] = velocity
@@ -121,9 +139,14 @@ def simulate(physx, folder: Path) -> None:
     np.savez(folder / "result.npz", **result)
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Jobs until there are no more."""
     engine = start()
-    for line in sys.stdin:
+    for line in iter(sys.stdin.readline, ""):
         simulate(engine, Path(line.strip()))
-        print(DONE, flush=True)
+        print(f"\n{DONE}", flush=True)
     os._exit(0)  # PhysX's own end can hang
+
+
+if __name__ == "__main__":
+    main()

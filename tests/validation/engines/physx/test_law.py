@@ -52,6 +52,34 @@ def test_a_turn_costs_nothing_and_a_stress_turns_with_its_body():
     assert turned == pytest.approx(turn(5) @ law.stress(stretched, YOUNG, POISSON), rel=1e-9)
 
 
+def test_the_force_on_a_section_is_the_slope_of_the_bands_energy(sling):
+    tube, random = Tube.of(sling, edges=6, grading=1.0), np.random.default_rng(6)
+    positions = tube.rest * 1.3 + 2e-4 * random.standard_normal((2, *tube.rest.shape))
+    moduli = np.array([YOUNG, 2 * YOUNG]), np.array([POISSON, 0.3])
+    slope = np.empty((2, 3))
+    for axis in range(3):
+        moved = [positions.copy(), positions.copy()]
+        for sign, one in zip((-1, 1), moved, strict=True):
+            one[:, tube.middle, :, axis] += sign * 1e-7
+        slope[:, axis] = np.subtract(*(law.energy(tube, one, *moduli) for one in moved)) / 2e-7
+    assert law.force_on(tube, [tube.middle], positions, *moduli) == pytest.approx(slope, rel=1e-5)
+
+
+def test_damping_brakes_a_stretch_and_no_turn(sling):
+    grown = np.diag([1e-4, -3e-5, 2e-5])
+    brake = law.viscous(np.eye(3), np.eye(3) + grown, 3.0, YOUNG, POISSON)
+    mu = YOUNG / (2 * (1 + POISSON))
+    expected = 2 * mu * 3.0 * (grown + np.trace(grown) * np.eye(3))  # both constraints, 2 mu each
+    assert brake == pytest.approx(expected, rel=1e-3, abs=1e-3 * np.abs(expected).max())
+    stretched = np.diag([1.8, 0.8, 0.7])
+    turned = law.viscous(stretched, turn(7) @ stretched, 3.0, YOUNG, POISSON)
+    assert turned == pytest.approx(np.zeros((3, 3)), abs=1e-6 * YOUNG)
+    tube, delay = Tube.of(sling, edges=6, grading=1.0), np.array([0.0, 2.0, 4.0])
+    before, now = (np.tile(tube.rest * one, (3, 1, 1, 1)) for one in (1.3, 1.2))
+    elastic, *braked = law.force_on(tube, [0], now, YOUNG, POISSON, step=(before, delay))[:, 0]
+    assert braked[0] < elastic and braked[1] - elastic == pytest.approx(2 * (braked[0] - elastic))
+
+
 def test_a_small_stretch_pulls_by_youngs_modulus():
     assert law.nominal(1 + 1e-6, YOUNG, POISSON) == pytest.approx(1e-6 * YOUNG, rel=1e-4)
 

@@ -1,0 +1,213 @@
+"""Launches in PhysX: a spring in place of its bands throws as far as the closed form says."""
+
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.base.errors import UserError
+from pipeline.base.failures import DRAGGED, NEVER_LEFT, SLACK
+from pipeline.params import load
+from pipeline.sling.load import load_sling
+from pipeline.sling.model import GRAVITY
+from validation.engines.checks import SAME_MESH
+from validation.engines.mesh import Tube
+from validation.engines.physx import bands, flight, launches, worker
+from validation.engines.physx.rollouts import BURST
+
+DRAWS = np.array([[-0.34, -0.21], [-0.40, -0.15], [-0.30, -0.30]])
+THETAS = np.array([[k, 0.45, 2e-3, 1.0, 1.0] for k in (80.0, 60.0, 120.0)])  # E: the spring's [N/m]
+PROCESS = """
+import sys, types
+import numpy as np
+sys.path.insert(0, {folder!r})
+sys.modules["warp"] = types.SimpleNamespace(synchronize=lambda: None)
+import worker
+
+class Attached:
+    seconds = 0.0
+    def __init__(self, physx, path, number):
+        job = np.load(path.parent / "job.npz")
+        self.values = [job["rest"] + job["offsets"][:, None], np.zeros_like(job["start"])]
+    def state(self):
+        return [one.copy() for one in self.values]
+    def write(self, which, values):
+        if which < 2:
+            self.values[which] = values.copy()
+        else:  # what is led is there, and the rest stays
+            self.values[0] = np.where(values[..., 3:] == 0, values[..., :3], self.values[0])
+    def close(self):
+        pass
+
+worker.Attached = Attached
+worker.start = lambda: types.SimpleNamespace(step_sync=lambda step: print("PhysX talks", end=""))
+worker.main()
+"""
+
+
+@pytest.fixture(scope="module")
+def sling():
+    return launches.alike(load_sling(load(), "band1"))
+
+
+@pytest.fixture(scope="module")
+def tube(sling):
+    return Tube.of(sling, **SAME_MESH)
+
+
+@pytest.fixture
+def engine(tmp_path, monkeypatch):
+    """bands.Engine with a process in which nothing but the led nodes moves."""
+    folder = str(worker.__file__).rpartition("/")[0]
+    (tmp_path / "fake.py").write_text(PROCESS.format(folder=folder))
+    monkeypatch.setenv(bands.INTERPRETER, sys.executable)
+    monkeypatch.setattr(bands, "release", lambda: "0")
+    fake = {**vars(worker), "__file__": str(tmp_path / "fake.py")}
+    monkeypatch.setattr(bands, "worker", SimpleNamespace(**fake))
+    with bands.Engine() as engine:
+        yield engine
+
+
+@pytest.fixture
+def springs(monkeypatch):
+    """Bands pull the pouch to the fork's middle with E [N/m]."""
+
+    def force_on(tube, sections, nodes, young, poisson, step):
+        return -young[:, None] * nodes[:, sections[0]].mean(axis=1)
+
+    def energy(tube, nodes, young, poisson):
+        return young / 2 * (nodes[:, tube.middle].mean(axis=1) ** 2).sum(axis=1)
+
+    monkeypatch.setattr(flight, "force_on", force_on)
+    monkeypatch.setattr(flight, "energy", energy)
+
+
+def closed_form(sling, tube, stiffness: float, draw: np.ndarray) -> tuple[float, float, float]:
+    """Landing [m], time and speed at the separation [s, m/s]."""
+    mass = sling.projectile_mass + tube.mass.reshape(tube.rest.shape[:2])[tube.middle].sum()
+    pulse, ahead = np.sqrt(stiffness / mass), -draw / np.linalg.norm(draw)
+    rest = np.array([0.0, -mass * GRAVITY / stiffness])
+    phase = np.arccos(-(rest @ ahead) / ((draw - rest) @ ahead))
+    y, z = rest + (draw - rest) * np.cos(phase)
+    vy, vz = velocity = -pulse * (draw - rest) * np.sin(phase)
+    flight = (vz + np.sqrt(vz**2 + 2 * GRAVITY * (z + sling.fork_height))) / GRAVITY
+    return y + vy * flight, phase / pulse, np.linalg.norm(velocity)
+
+
+def flown(sling, tube, thetas, draws, rate=1000, spoil=lambda nodes, step: nodes):
+    """As by an engine whose nodes are at the band's rest, but for the led ones."""
+    flying = flight.Flight(sling, tube, thetas, draws, rate)
+    targets, nodes = flight.led_to(tube, flying.place), np.tile(tube.rest, (len(draws), 1, 1, 1))
+    for step in range(10_000):
+        nodes[:, tube.middle] = targets[:, -tube.rest.shape[1] :]
+        targets = flying(spoil(nodes.copy(), step))
+        if targets is None:
+            return flying.outcome()
+    raise AssertionError("it never ended")
+
+
+@pytest.mark.parametrize("rate", [200, 1000])
+def test_springs_throw_as_far_as_the_closed_form_says(sling, tube, engine, springs, rate):
+    """Several of them, through worker.py; leapfrog's error is (pulse x step)^2 / 24, and small."""
+    done = launches.launch_in_physx(engine, sling, THETAS, DRAWS, rate=rate)
+    assert done.launches.failure == [None] * 3
+    for i, (theta, draw) in enumerate(zip(THETAS, DRAWS, strict=True)):
+        landing, time, speed = closed_form(sling, tube, theta[0], draw)
+        error = theta[0] / sling.projectile_mass / rate**2 / 8
+        assert done.launches.landing_y[i] == pytest.approx(landing, rel=error)
+        assert done.launches.separation_time[i] == pytest.approx(time, rel=error)
+        assert done.launches.speed[i] == pytest.approx(speed, rel=error)
+        assert done.launches.hold_force[i] == pytest.approx(theta[0] * np.linalg.norm(draw))
+        assert done.gained[i] == pytest.approx(1, abs=error + 0.01)  # a bit is left where they part
+
+
+def test_the_process_takes_job_after_job(sling, tube, engine):
+    """Targets of each band reach its own nodes, and a steered job ends in step with its giver."""
+    seen, course = [], launches.course(tube, DRAWS, 200)
+
+    def steer(nodes):
+        seen.append(nodes[:, tube.middle].mean(axis=1))
+        return flight.led_to(tube, seen[-1] + 0.01) if len(seen) % 4 else None
+
+    for _ in range(2):
+        size = {"rate": 200, "iterations": 64}
+        _, last = engine.simulate(tube, THETAS, course, **size, steer=steer)
+        assert last.positions.shape == (0, 3, *tube.rest.shape)
+    places = np.column_stack([np.zeros(3), DRAWS])
+    expected = [places + 0.01 * step for step in (0, 1, 2, 3)] * 2
+    assert np.array(seen) == pytest.approx(np.array(expected), abs=1e-5)
+
+
+class Chain:
+    """Masses between springs and dampers, drawn straight, in steps of 10 us."""
+
+    COUNT, LENGTH, STIFFNESS, DAMPING, MASS = 24, 0.24, 70.0, 3e-3, 0.011
+
+    def __init__(self, drawn: float) -> None:
+        self.x, self.v = np.linspace(0, drawn, self.COUNT + 1), np.zeros(self.COUNT + 1)
+
+    def tension(self) -> np.ndarray:
+        each = np.diff(self.x) - self.LENGTH / self.COUNT + self.DAMPING * np.diff(self.v)
+        return self.STIFFNESS * self.COUNT * each
+
+    def advance(self, seconds: float, end_mass: float = np.inf) -> None:
+        pulls = np.array([np.inf, *[self.MASS / self.COUNT] * (self.COUNT - 1), end_mass])
+        for _ in range(round(seconds / 1e-5)):
+            self.v += 1e-5 * np.diff(self.tension(), prepend=0, append=0) / pulls
+            self.x += 1e-5 * self.v
+
+
+@pytest.mark.parametrize(("rate", "error"), [(200, 0.015), (1000, 0.0025)])
+def test_beside_a_band_with_mass_it_is_as_fast_as_within(sling, tube, monkeypatch, rate, error):
+    """A chain that carries the projectile, and the same chain led by it, step after step."""
+    one, led = (Chain(np.linalg.norm(DRAWS[0])) for _ in range(2))
+    seen = [np.diff(led.x)[-1]]
+
+    def force_on(tube, sections, nodes, young, poisson, step):
+        """As law.force_on: damped by what a whole step has changed."""
+        place = nodes[0, sections[0]].mean(axis=0)
+        led.v[-1] = (np.linalg.norm(place) - led.x[-1]) * rate
+        if step is not None:
+            led.advance(1 / rate)
+        seen.append(np.diff(led.x)[-1])
+        change = 0 if step is None else (seen[-1] - seen[-2]) * rate * led.DAMPING
+        pull = seen[-1] - led.LENGTH / led.COUNT + change
+        return -led.STIFFNESS * led.COUNT * pull * place[None] / np.linalg.norm(place)
+
+    monkeypatch.setattr(flight, "force_on", force_on)
+    monkeypatch.setattr(flight, "energy", lambda *_: np.ones(1))
+    monkeypatch.setattr(flight, "GRAVITY", 0.0)
+    flying = flown(sling, tube, THETAS[:1], DRAWS[:1], rate).launches
+    mass = flight.Flight(sling, tube, THETAS[:1], DRAWS[:1], rate).mass
+    while one.tension()[-1] > 0:
+        one.advance(1e-5, mass)
+    assert flying.failure == [None] and flying.speed[0] == pytest.approx(-one.v[-1], rel=error)
+
+
+def test_a_launch_that_does_not_land_says_why(sling, tube, springs):
+    slack = np.array([[-0.12, -0.1]])
+    assert flown(sling, tube, THETAS[:1], slack).launches.failure == [SLACK]
+    weak = THETAS[:1] * [1e-3, 1, 1, 1, 1]
+    assert flown(sling, tube, weak, DRAWS[:1]).launches.failure == [DRAGGED]
+    high = replace(sling, fork_height=50.0)
+    done = flown(high, tube, weak, DRAWS[:1])
+    assert done.launches.failure == [NEVER_LEFT] and np.isnan(done.launches.landing_y[0])
+
+
+def test_a_band_that_bursts_leaves_the_others_as_they_are(sling, tube, springs):
+    def spoil(nodes, step):
+        if step >= 5:
+            nodes[1, 3, 2] = np.nan if step % 2 else 1e9
+        return nodes
+
+    alone, done = (flown(sling, tube, THETAS, DRAWS, spoil=one) for one in (lambda n, _: n, spoil))
+    assert done.launches.failure == [None, BURST, None]
+    assert np.isnan(done.launches.landing_y[1]) and np.isnan(done.gained[1])
+    assert (done.launches.landing_y == alone.launches.landing_y).tolist() == [True, False, True]
+
+
+def test_a_law_that_physx_lacks_is_refused(sling):
+    with pytest.raises(UserError, match="no law rubber"):
+        launches.launch_in_physx(None, replace(sling, law="rubber"), THETAS, DRAWS)

@@ -1,0 +1,110 @@
+"""Launches in PhysX: the band pushes a projectile that is simulated beside it.
+
+    python -m validation.engines.physx.launches band1 --theta 2.2e5,0.45,3e-3,1,1 [--rate 200]
+
+PhysX cannot free what it leads, so the pouch stays led: where a projectile would go that feels the
+band's force by PhysX's law (law.py) and gravity, with the mass of the held section. A step of the
+projectile follows each step of PhysX (leapfrog), until the band no longer pushes along the launch;
+the projectile then flies as ours does. In both engines alike the arm does not give way. PhysX's
+band feels no air.
+"""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from app.arguments import count
+from pipeline.base import errors
+from pipeline.base.errors import UserError
+from pipeline.params import load
+from pipeline.sling.launch import launch
+from pipeline.sling.load import load_sling
+from pipeline.sling.model import Sling
+from pipeline.sling.rubber import NEO_HOOKEAN
+from validation.engines.checks import SAME_MESH
+from validation.engines.mesh import Tube
+from validation.engines.physx.bands import Drive, Engine
+from validation.engines.physx.flight import Flight, Pushed, led_to
+from validation.engines.physx.rollouts import ITERATIONS, RATE
+from validation.engines.physx.study import clamped, hanging
+
+PULL, REST = 1.5, 1.0  # s: the way to the draw, and at rest there before the release
+FINE = 1000  # steps a second, to see what the paper's 200 do to a launch
+COLUMNS = "draw_y_m", "draw_z_m", "ours_m", "physx_m", "ours_N", "physx_N", "gained"
+
+
+def alike(sling: Sling) -> Sling:
+    """The sling as both engines launch it: the arm does not give way."""
+    return replace(sling, arm_stiffness=None)
+
+
+def launch_in_physx(
+    engine: Engine, sling: Sling, thetas: np.ndarray, draws: np.ndarray, *, rate: int = RATE
+) -> Pushed:
+    """Launch from draws (N, 2) with thetas (N, 5), all at once, in steps of 1 / rate.
+
+    Raises UserError: as `Engine`, or for a law that PhysX does not have.
+    """
+    if sling.law != NEO_HOOKEAN:
+        raise UserError(f"PhysX has no law {sling.law}; set law: {NEO_HOOKEAN}")
+    tube = Tube.of(sling, **SAME_MESH)
+    flight, phases = Flight(sling, tube, thetas, draws, rate), course(tube, draws, rate)
+    engine.simulate(tube, thetas, phases, rate=rate, iterations=ITERATIONS, steer=flight)
+    return flight.outcome()
+
+
+def course(tube: Tube, draws: np.ndarray, rate: int) -> list[Drive]:
+    """Hang; then led straight to each of the draws (N, 2), and at rest there."""
+    hand = np.arange(tube.mass.size).reshape(tube.rest.shape[:2])[tube.middle]
+    times = np.arange(1, round((PULL + REST) * rate) + 1) / rate
+    part = np.minimum(times / PULL, 1)
+    fade = 1 - part**3 * (10 - 15 * part + 6 * part**2)
+    targets = led_to(tube, np.column_stack([np.zeros(len(draws)), draws]))[None]
+    led = np.concatenate([clamped(tube)[0], hand])
+    return [hanging(tube, rate), Drive(led, targets, fade, np.zeros(len(times), bool))]
+
+
+def draws_of(setup) -> np.ndarray:
+    """Three draws on the diagonal of the box, shape (3, 2)."""
+    low, high = np.array([setup.draw_y, setup.draw_z]).T
+    return low + np.array([[0.25], [0.5], [0.75]]) * (high - low)
+
+
+def theta_of(text: str) -> np.ndarray:
+    """The five parameters, shape (5,). Raises UserError."""
+    with suppress(ValueError):
+        theta = np.array(text.split(","), float)
+        if theta.shape == (5,) and theta[0] > 0 and 0 < theta[1] < 0.5 and (theta >= 0).all():
+            return theta
+    raise UserError(f"--theta {text}: needs E,nu,d,mu,s, five numbers, nu between 0 and 0.5")
+
+
+def main() -> None:
+    """Print where PhysX and ours land. Raises UserError."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("band")
+    parser.add_argument("--theta", required=True, help="E,nu,d,mu,s")
+    parser.add_argument("--rate", type=count, default=RATE, help="PhysX's steps a second")
+    parser.add_argument("--params", default="params.yaml")
+    asked = parser.parse_args()
+    params = load(asked.params)
+    if asked.band not in params.bands:
+        raise UserError(f"no band {asked.band} in {asked.params}")
+    sling, draws = alike(load_sling(params, asked.band)), draws_of(params.setup)
+    thetas = np.tile(theta_of(asked.theta), (len(draws), 1))
+    ours = launch(sling, thetas, draws)
+    with Engine() as engine:
+        theirs = launch_in_physx(engine, sling, thetas, draws, rate=asked.rate)
+    print(*(f"{name:>9}" for name in COLUMNS), " PhysX: why not")
+    done = theirs.launches
+    columns = *draws.T, ours.landing_y, done.landing_y, ours.hold_force, done.hold_force
+    for *row, why in zip(*columns, theirs.gained, done.failure, strict=True):
+        print(*(f"{one:9.3f}" for one in row), f" {why or ''}")
+
+
+if __name__ == "__main__":
+    errors.run(main)

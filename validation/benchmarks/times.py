@@ -33,7 +33,7 @@ from validation.code import ROOT, digests
 
 REPORT, PAGE = Path("reports/benchmarks/times.json"), Path("docs/times.md")
 BEGIN, END = "<!-- times: begin -->\n", "<!-- times: end -->\n"
-BAND = "measured"  # of the recording
+BAND = "timed"  # of the recording
 CHANGES = ("PYTHONPATH", "VIRTUAL_ENV", "UV_CACHE_DIR", "PIP_CACHE_DIR", "WARP_CACHE_PATH")
 STAGE = re.compile(r"^([a-z]+)(?:@[\w-]+)? \| done \((?:(\d+) min )?([\d.]+) s\)$", re.MULTILINE)
 ABLATION = re.compile("^ablation_", re.MULTILINE)

@@ -13,7 +13,7 @@ from importlib.metadata import distributions
 from pathlib import Path
 
 from app.cluster import exchange
-from app.flow import child
+from app.flow import child, locks
 from pipeline.base import machine
 from pipeline.base.errors import UserError
 
@@ -93,6 +93,7 @@ def work(order: Order, topic: str) -> tuple[bool, dict | None]:
         if differs := exchange.differing(copy, order.sources):
             raise UserError(f"{order.name}: refused by worker {worker.address}: {copy}: {differs}")
         exchange.expect_remote(copy)
+        locks.mend(copy)
         exchange.merge(copy, order.entries)
         exchange.transfer(copy, "pull", order.producers, cancelled)
         ran = run()

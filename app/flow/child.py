@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Event, Thread
 
-from app.flow import guard
+from app.flow import guard, locks
 from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 
@@ -95,6 +95,8 @@ def repro(
 ) -> None:
     """Let DVC run a stage and what it needs, as far as it is stale, on all cores.
 
+    What a killed DVC has left is cleared up before and after.
+
     Args:
         on_line, on_stage: As `dvc` has them.
 
@@ -108,9 +110,13 @@ def repro(
         on_stage(name)
 
     environment = stage_environment(cores())
-    status, said = dvc(
-        root, ("repro", stage), environment=environment, on_line=on_line, on_stage=begins
-    )
+    locks.mend(root)
+    try:
+        status, said = dvc(
+            root, ("repro", stage), environment=environment, on_line=on_line, on_stage=begins
+        )
+    finally:
+        locks.mend(root)
     if status:
         raise StageFailed(f"{running[-1]}: {reason(running[-1], said, status)}")
 

@@ -14,12 +14,14 @@ ENTRY = re.compile(r"^  [^ ]", re.MULTILINE)  # where a stage's entry of dvc.loc
 
 
 def mend(root: Path) -> None:
-    """Clear up in a working copy. Call it while no other flow runs there."""
+    """Clear up in a working copy, as far as no living DVC holds it."""
     from dvc.config import Config
     from dvc.exceptions import DvcException
     from dvc.lock import Lock, make_lock
 
     folder = Path(root, ".dvc", "tmp")
+    if not folder.is_dir():  # no DVC was here
+        return
 
     def lock(name: str):
         path = folder / name

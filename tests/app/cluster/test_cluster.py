@@ -156,6 +156,15 @@ def test_what_the_head_alone_has_is_pushed_first(copies, place) -> None:
     assert "Running stage" not in head("dvc", "repro", "train")
 
 
+def test_a_worker_mends_what_a_killed_one_left_in_its_copy(copies, place) -> None:
+    head, other = copies
+    other("dvc", "repro", "-q", "search@b")
+    lock = other.folder / "dvc.lock"
+    lock.write_text(lock.read_text()[:-30])
+    ran, _ = run(place(other.folder), "search@a")
+    assert ran and (head.folder / "data/search/a").is_file()
+
+
 def test_a_copy_with_other_code_or_none_is_refused(copies, place, tmp_path: Path) -> None:
     other = copies[1]
     (other.folder / "step.py").write_text("pass\n")

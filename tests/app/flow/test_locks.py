@@ -98,3 +98,13 @@ def test_a_dvc_lock_that_is_cut_off_anywhere_costs_its_last_entry(toy: Toy) -> N
     assert path.read_text() == conflict
     with pytest.raises(UserError, match="^DVC: [^\n]*dvc.lock[^\n]*$"):
         Graph(toy.folder)
+
+
+def test_a_fit_mends_a_dvc_lock_that_is_cut_off(toy: Toy) -> None:
+    """`sling fit` and `sling observe` have DVC run without a flow around it."""
+    assert toy.dvc("repro") == {"one", "two"}
+    path = toy.folder / "dvc.lock"
+    whole = path.read_text()
+    path.write_text(whole[: whole.index("  two:\n") + 30])
+    child.repro(toy.folder, "two", print)
+    assert path.read_text() == whole

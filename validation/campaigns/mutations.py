@@ -1,339 +1,226 @@
-"""A small recording, damaged in thousands of seeded ways, each run from file to episode.
+"""Damaged recordings of every family and in every container, each run from file to episode.
 
-    python -m validation.campaigns.mutations FOLDER FIRST COUNT KIND...
+    python -m validation.campaigns.mutations --count 20000 --workers 2
 
-prints two lines of JSON a mutation: which it is before it runs, what came of it after. A timer ends
-the process where one hangs; the last line then names the culprit.
+writes reports/validation/mutations.json. A run that was killed goes on where it was.
 
-The episode of a damaged file equals the undamaged one's, or the recording says what it lost. Where
-checksums were mended after the damage, or never were, nobody can ask for that; what remains is no
-traceback, no hang, no memory over 2 GB.
+The episode of a damaged recording equals the undamaged one's, or the recording says what it lost,
+or it is refused in one clear line. Where checksums were mended after the damage, or never were,
+nobody can ask for the first; what remains is no traceback, no hang, no memory over 2 GiB.
 """
 
-import faulthandler
+from __future__ import annotations
+
+import argparse
 import json
 import os
-import resource
-import signal
-import struct
 import subprocess
 import sys
 import time
-import zlib
 from collections import Counter
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from importlib.metadata import version
 from pathlib import Path
+from threading import Lock
 
-import numpy as np
-import zstandard
-from mcap.writer import CompressionType
-
+from pipeline.base import errors
 from pipeline.base.errors import UserError
-from pipeline.episode.episode import Episode
-from pipeline.params import Params, load
-from pipeline.recording.build import Processed, episode_of, process
-from tests.recording.bag import Lens, Truth, write_bag
+from pipeline.base.files import write_json
+from pipeline.base.fingerprint import fingerprint
+from pipeline.base.machine import cores
+from validation.benchmarks.timing import environment
+from validation.campaigns import outcomes
+from validation.campaigns.outcomes import FAULT, HANGS, MOST, name_of
+from validation.campaigns.small_recordings import CHECKED, CONTAINERS, FAMILIES, write_small
+from validation.code import digests
 
-KINDS = {
-    "zstd": {"compression": CompressionType.ZSTD},
-    "lz4": {"compression": CompressionType.LZ4},
-    "plain": {"compression": CompressionType.NONE},
-    "unchunked": {"use_chunking": False, "enable_data_crcs": True},
-    "unchecked": {"use_chunking": False},
-    "garbage": {"compression": CompressionType.ZSTD},  # inside of chunks, checksums mended
-}
-CHECKED = ("zstd", "lz4", "plain", "unchunked")  # damage must be noticed
-HANGS = 10.0  # s of the processor, which others may share
-BLOCKS = 120.0  # s on the clock
-MOST = 2 * 2**30  # bytes
-TRUTH = Truth(grasp=0.4, lifted=0.6, drawn=1.1, release=1.6003, end=2.2, radius=0.012)
 ROOT = Path(__file__).parents[2]
-HEAD = struct.Struct("<BQ")
-CHUNK, MESSAGE = 6, 5
-EXTREMES = [0, 1, 2, 255, 2**16, 2**31 - 1, 2**32 - 1, 2**40, 2**63 - 1, 2**63, 2**64 - 1]
+WORK, REPORT = Path("build/mutations"), Path("reports/validation/mutations.json")
+LIBRARIES = ("mcap", "mcap-ros2-support", "mcap-protobuf-support", "rosbags", "protobuf")
+LIBRARIES += ("foxglove-sdk", "zstandard", "lz4", "opencv-python-headless")
+SHARE = 250  # recordings a process: what one process held is known a share at a time
+TOLD = 500
+Result = dict[str, object]
 
 
-def write_small(path: Path, kind: str) -> None:
-    """About 100 kB that become an episode in about a tenth of a second."""
-    lens = Lens(size=(80, 60), focal=62.5, fps=8)
-    write_bag(
-        path, TRUTH, rate=200, pose_rate=50, lens=lens, **{"chunk_size": 12_000, **KINDS[kind]}
-    )
+def key(result: Result) -> tuple[str, str, int]:
+    return result["family"], result["container"], result["seed"]
 
 
-def small_params() -> Params:
-    """The project's, for a window, pictures and a band as small as the recording's."""
-    whole = load("params.yaml")
-    episode = {"duration": 2.0, "samples": 50, "tail": 0.3}
-    cloud = {"points": 50, "statistical_neighbors": 5, "radius": 0.05, "radius_neighbors": 2}
-    band = whole.bands["band1"].model_copy(update={"diameter": 2 * TRUTH.radius})
-    sections = {
-        "episode": whole.episode.model_copy(update=episode),
-        "cloud": whole.cloud.model_copy(update=cloud),
-        "bands": {"band1": band},
-    }
-    return whole.model_copy(update=sections)
+def shares(count: int, done: set[tuple]) -> list[tuple[str, str, int, int]]:
+    """Family, container, first seed and the one behind the last, of what is not done.
 
-
-def campaign(folder: Path, tasks: list[tuple], jobs: int) -> list[dict]:
-    """Results of all tasks, a process each: first seed, how many of each kind, the kinds.
-
-    Args:
-        jobs: Processes at once.
+    Every family is in every container as often, or once more.
     """
-    for kind in KINDS:
-        write_small(folder / f"{kind}.mcap", kind)
-    with ThreadPoolExecutor(jobs) as pool:
-        return [line for part in pool.map(lambda task: _run(folder, *task), tasks) for line in part]
-
-
-def _run(folder: Path, first: int, count: int, *kinds: str) -> list[dict]:
-    command = [sys.executable, "-m", "validation.campaigns.mutations"]
-    done = subprocess.run(
-        [*command, *map(str, (folder, first, count, *kinds))],
-        cwd=ROOT,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-    )
-    found: dict[tuple[str, int], dict] = {}
-    for line in map(json.loads, done.stdout.splitlines()):
-        found.setdefault((line["kind"], line["seed"]), {}).update(line)
-    if done.returncode:  # the last one hung, crashed or raised
-        kind, seed = last = next(reversed(found), (kinds[0], first))
-        found.setdefault(last, {"seed": seed, "kind": kind})
-        found[last].update(outcome="crashed", words=done.stderr[-3000:], s=HANGS, bytes=0)
-    return list(found.values())
-
-
-def failures(results: list[dict]) -> list[dict]:
-    """What may not be."""
-    return [
-        one
-        for one in results
-        if one["outcome"] in ("crashed", "unclear")
-        or (one["outcome"] == "silent" and one["kind"] in CHECKED)
-        or one["bytes"] > MOST
-    ]
-
-
-def counts(results: list[dict]) -> dict[str, dict[str, int]]:
-    return {
-        kind: dict(
-            sorted(Counter(one["outcome"] for one in results if one["kind"] == kind).items())
-        )
-        for kind in KINDS
-    }
-
-
-def mutated(content: bytes, kind: str, seed: int) -> bytes:
-    """A damaged copy."""
-    random = np.random.default_rng([seed, *kind.encode()])
-    if kind == "garbage":
-        return _garbage(content, random)
-    ways = [_flip, _bytes, _zeros, _ones, _copy, _cut_out, _insert, _truncate]
-    ways += [_swap_records, _again, _without, _field, _field, _opcode]
-    return ways[random.integers(len(ways))](content, random)
-
-
-def records(content: bytes) -> list[tuple[int, int, int]]:
-    """(opcode, start, end) of each record of an undamaged file, heads included."""
-    at, found = 8, []
-    while at < len(content) - 8:
-        opcode, length = HEAD.unpack_from(content, at)
-        found.append((opcode, at, at + HEAD.size + length))
-        at = found[-1][2]
+    cells = [(family, container) for family in FAMILIES for container in CONTAINERS]
+    found = []
+    for place, cell in enumerate(cells):
+        last = (count - place + len(cells) - 1) // len(cells)
+        todo = [seed for seed in range(last) if (*cell, seed) not in done]
+        while todo:
+            end = next((n for n, seed in enumerate(todo) if seed != todo[0] + n), len(todo))
+            end = min(end, SHARE)
+            found.append((*cell, todo[0], todo[0] + end))
+            todo = todo[end:]
     return found
 
 
-def _record(content: bytes, random: np.random.Generator, least: int = 1, most: int = 255):
-    found = [one for one in records(content) if least <= one[0] <= most]
-    return found[random.integers(len(found))][1:]
+def run(folder: Path, parts: list[tuple], workers: int, told: Callable[[Result], None]) -> None:
+    """Run shares, each in a process of its own, and tell of each recording.
+
+    Args:
+        folder: Where recordings are written.
+        parts: Of `shares`.
+        workers: Processes at once.
+        told: Called with each result, in threads.
+    """
+    for family, container in {part[:2]: None for part in parts}:
+        write_small(folder / f"{name_of(family, container)}.mcap", family, container)
+
+    def work(part: tuple) -> None:
+        for result in _results(folder, *part):
+            told(result)
+
+    with ThreadPoolExecutor(workers) as pool:
+        for _ in pool.map(work, parts):
+            pass
 
 
-def _place(content: bytes, random: np.random.Generator) -> int:
-    return int(random.integers(8, len(content)))
+def _results(folder: Path, family: str, container: str, first: int, end: int) -> Iterator[Result]:
+    """Of one share; where a process ends too early, its last recording is a fault."""
+    module, log = "validation.campaigns.outcomes", folder / f"{family}-{container}-{first}.log"
+    while first < end:
+        command = [sys.executable, "-m", module, folder, family, container, first, end]
+        started = None
+        with log.open("w") as said:
+            process = subprocess.Popen(
+                list(map(str, command)),
+                cwd=ROOT,
+                env={**os.environ, "OMP_NUM_THREADS": "1"},
+                stdout=subprocess.PIPE,
+                stderr=said,
+                text=True,
+            )
+            for started in map(json.loads, process.stdout):
+                if "outcome" in started:
+                    yield started
+                    first = started["seed"] + 1
+        if process.wait() and first < end:
+            if started is None:
+                raise RuntimeError(f"{' '.join(map(str, command))}: {log.read_text()}")
+            words = f"ended by {process.returncode}{_place(log.read_text())}"
+            yield {**started, "outcome": FAULT, "words": words, "s": HANGS, "bytes": 0}
+            first = started["seed"] + 1
+    log.unlink(missing_ok=True)
 
 
-def _span(content: bytes, random: np.random.Generator) -> tuple[int, int]:
-    start = _place(content, random)
-    return start, min(len(content), start + int(np.exp(random.uniform(0, np.log(30_000)))))
+def _place(log: str) -> str:
+    """Where a process was when it ended: what faulthandler wrote has the last call first."""
+    calls = [line.strip() for line in log.splitlines() if line.strip().startswith("File ")]
+    return f", {calls[0]}" if calls else ""
 
 
-def _flip(content: bytes, random: np.random.Generator) -> bytes:
-    data = bytearray(content)
-    for _ in range(random.integers(1, 4)):
-        data[_place(content, random)] ^= 1 << int(random.integers(8))
-    return bytes(data)
+class Ledger:
+    """Results as lines of JSON in a file; the last may be cut short, where a run was killed."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.results: dict[tuple, Result] = {}
+        self.lock = Lock()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for line in path.read_text().splitlines() if path.exists() else ():
+            with suppress(json.JSONDecodeError):
+                result = json.loads(line)
+                self.results[key(result)] = result
+
+    def add(self, result: Result) -> None:
+        with self.lock, self.path.open("a") as file:  # an empty line ends one that was cut
+            file.write(f"\n{json.dumps(result)}\n")
+            self.results[key(result)] = result
 
 
-def _bytes(content: bytes, random: np.random.Generator) -> bytes:
-    data = bytearray(content)
-    for _ in range(random.integers(1, 9)):
-        at = _place(content, random)
-        data[at] = int(random.integers(256))
-    return bytes(data)
+def faults(results: list[Result]) -> list[Result]:
+    """What may not be."""
+    return [one for one in results if one["outcome"] == FAULT]
 
 
-def _zeros(content: bytes, random: np.random.Generator) -> bytes:
-    a, b = _span(content, random)
-    return content[:a] + bytes(b - a) + content[b:]
+def counts(results: list[Result]) -> dict[str, dict[str, dict[str, int]]]:
+    """How many there were of each outcome, by family and container."""
+    found = {family: {container: Counter() for container in CONTAINERS} for family in FAMILIES}
+    for one in results:
+        found[one["family"]][one["container"]][one["outcome"]] += 1
+    return {
+        family: {name: dict(sorted(some.items())) for name, some in row.items()}
+        for family, row in found.items()
+    }
 
 
-def _ones(content: bytes, random: np.random.Generator) -> bytes:
-    a, b = _span(content, random)
-    return content[:a] + b"\xff" * (b - a) + content[b:]
+def summary(results: list[Result], wanted: int) -> dict:
+    """Of results in the order of their keys."""
+    failed = faults(results)
+    slowest = max(results, key=lambda one: one["s"])
+    largest = max(results, key=lambda one: one["bytes"])
+    return {
+        "asked": "Of every damaged recording comes the undamaged one's episode, or an episode and"
+        " what was lost, or one clear line; no traceback, no hang,"
+        f" at most {MOST / 2**30:g} GiB. Another episode, of which nothing is said, only where"
+        " the container has no checksums, or where they were mended after the damage.",
+        "met": not failed and len(results) >= wanted,
+        "settings": {
+            "wanted": wanted,
+            "hang_cpu_s": HANGS,
+            "without_checksums": sorted(set(CONTAINERS) - set(CHECKED)),
+            "versions": {name: version(name) for name in LIBRARIES},
+        },
+        "figures": {
+            "recordings": len(results),
+            "outcomes": dict(Counter(one["outcome"] for one in results)),
+            "by_family_and_container": counts(results),
+            "longest": {**_named(slowest), "cpu_s": slowest["s"]},
+            "most_memory": {**_named(largest), "mib": largest["bytes"] / 2**20},
+            "faults": failed,
+        },
+    }
 
 
-def _copy(content: bytes, random: np.random.Generator) -> bytes:
-    (a, b), at = _span(content, random), _place(content, random)
-    return content[:at] + content[a:b] + content[at:]
+def _named(one: Result) -> Result:
+    return {name: one[name] for name in ("family", "container", "seed")}
 
 
-def _cut_out(content: bytes, random: np.random.Generator) -> bytes:
-    a, b = _span(content, random)
-    return content[:a] + content[b:]
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--count", type=int, default=20_000, help="recordings (default: 20000)")
+    parser.add_argument("--workers", type=int, default=cores(), help="processes (default: cores)")
+    parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
+    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
+    args = parser.parse_args()
+    if min(args.count, args.workers) < 1:
+        raise UserError("--count, --workers: from 1 on")
+    code = fingerprint(json.dumps(digests(Path(outcomes.__file__))))[:12]
+    ledger = Ledger(args.work / code / "results.jsonl")
+    parts = shares(args.count, set(ledger.results))
+    start, before = time.monotonic(), len(ledger.results)
+    print(f"{before} recordings are done, {sum(b - a for *_, a, b in parts)} are to do", flush=True)
 
+    def told(result: Result) -> None:
+        ledger.add(result)
+        if result["outcome"] == FAULT:
+            print(json.dumps(result), flush=True)
+        if len(ledger.results) % TOLD == 0:
+            minutes = (time.monotonic() - start) / 60
+            failed = len(faults(list(ledger.results.values())))
+            print(f"{len(ledger.results)}, {minutes:.1f} min: {failed} faults", flush=True)
 
-def _insert(content: bytes, random: np.random.Generator) -> bytes:
-    a, b = _span(content, random)
-    return content[:a] + random.bytes(b - a) + content[a:]
-
-
-def _truncate(content: bytes, random: np.random.Generator) -> bytes:
-    return content[: _place(content, random)]
-
-
-def _swap_records(content: bytes, random: np.random.Generator) -> bytes:
-    found = [one for one in records(content) if one[0] in (CHUNK, MESSAGE)]
-    i, j = sorted(random.choice(len(found), 2, replace=False))
-    (_, a, b), (_, c, d) = found[i], found[j]
-    return content[:a] + content[c:d] + content[b:c] + content[a:b] + content[d:]
-
-
-def _again(content: bytes, random: np.random.Generator) -> bytes:
-    (a, b), (at, _) = _record(content, random), _record(content, random)
-    return content[:at] + content[a:b] + content[at:]
-
-
-def _without(content: bytes, random: np.random.Generator) -> bytes:
-    a, b = _record(content, random)
-    return content[:a] + content[b:]
-
-
-def _field(content: bytes, random: np.random.Generator) -> bytes:
-    """A number at the head of a record, where lengths, counts, times and checksums are."""
-    a, b = _record(content, random)
-    size = int(random.choice([2, 4, 8]))
-    at = a + 1 if random.random() < 0.3 else int(random.integers(a, min(b, a + 60)))
-    if random.random() < 0.5:
-        value = EXTREMES[random.integers(len(EXTREMES))]
-    else:
-        old = int.from_bytes(content[at : at + size], "little")
-        value = max(0, old + int(random.integers(-300, 300)))
-    return content[:at] + _packed(value, size) + content[at + size :]
-
-
-def _packed(value: int, size: int) -> bytes:
-    return (value % 2 ** (8 * size)).to_bytes(size, "little")
-
-
-def _opcode(content: bytes, random: np.random.Generator) -> bytes:
-    a, _ = _record(content, random)
-    return content[:a] + bytes([random.integers(256)]) + content[a + 1 :]
-
-
-def _garbage(content: bytes, random: np.random.Generator) -> bytes:
-    """The records of one chunk damaged and its checksum mended: what reads messages must cope."""
-    a, b = _record(content, random, CHUNK, CHUNK)
-    start, end, _, _, name = struct.unpack_from("<QQQII", content, a + 9)
-    data = bytes(8) + zstandard.ZstdDecompressor().decompress(content[a + 9 + 32 + name + 8 : b])
-    if random.random() < 0.5:  # one message, and its fields first of all
-        x, y = _record(data + bytes(8), random, 1, MESSAGE)
-        near = min(y - x, 130 if random.random() < 0.5 else y - x)
-        hurt = _hurt(bytes(8) + data[x : x + near], random)
-        data = data[:x] + hurt[8:] + data[x + near :]
-    else:
-        data = _hurt(data, random)
-    data = data[8:]
-    packed = zstandard.ZstdCompressor().compress(data)
-    fields = struct.pack("<QQQII", start, end, len(data), zlib.crc32(data), 4) + b"zstd"
-    body = fields + struct.pack("<Q", len(packed)) + packed
-    return content[:a] + HEAD.pack(CHUNK, len(body)) + body + content[b:]
-
-
-def _hurt(content: bytes, random: np.random.Generator) -> bytes:
-    ways = [_flip, _bytes, _zeros, _ones, _word]
-    return ways[random.integers(len(ways))](content, random)
-
-
-def _word(content: bytes, random: np.random.Generator) -> bytes:
-    at, size = _place(content, random), int(random.choice([1, 2, 4, 8]))
-    value = EXTREMES[random.integers(len(EXTREMES))]
-    return (content[:at] + _packed(value, size) + content[at + size :])[: len(content)]
-
-
-def same(a: Episode, b: Episode) -> bool:
-    """Whether two episodes hold the same numbers."""
-    names = ("time", "position", "velocity", "force", "opening", "cloud_time", "camera")
-    if any(not np.array_equal(getattr(a, n), getattr(b, n), equal_nan=True) for n in names):
-        return False
-    events = [(e.grasp_time, e.release_time, len(e.clouds)) for e in (a, b)]
-    clouds = zip(a.clouds, b.clouds, strict=False)
-    return events[0] == events[1] and all(np.array_equal(x, y) for x, y in clouds)
-
-
-def outcome(path: Path, params: Params, whole: Episode, usual: list[str]) -> tuple[str, str]:
-    """refused, same, said or silent; and the words beside the usual ones."""
-    try:
-        done = process(path, params.bands["band1"], params)
-        episode = episode_of(done, "band1", params)
-    except UserError as error:
-        line = str(error)
-        is_line = "\n" not in line and str(path) in line and len(line) < 2000
-        return ("refused" if is_line else "unclear"), line
-    words = [one for one in said(done) if one not in usual]
-    if words:
-        return "said", "; ".join(words)
-    return ("same" if same(episode, whole) else "silent"), ""
-
-
-def said(done: Processed) -> list[str]:
-    """Everything by which a user is told of damage."""
-    words = [*done.recording.losses, *done.recording.notes]
-    if done.clouds.damaged or done.clouds.unpaired:
-        words.append(f"{done.clouds.damaged} pictures damaged, {done.clouds.unpaired} unpaired")
-    return words
-
-
-def main(folder: Path, first: int, count: int, kinds: list[str]) -> None:
-    params = small_params()
-    for kind in kinds:
-        _mutate(folder, kind, range(first, first + count), params)
-
-
-def _mutate(folder: Path, kind: str, seeds: range, params: Params) -> None:
-    original = folder / f"{kind}.mcap"
-    content = original.read_bytes()
-    done = process(original, params.bands["band1"], params)
-    whole, usual = episode_of(done, "band1", params), said(done)
-    path = folder / f"{kind}-{seeds.start}-mutated.mcap"
-    for seed in seeds:
-        path.write_bytes(mutated(content, kind, seed))
-        about = {"seed": seed, "kind": kind}
-        print(json.dumps(about), flush=True)
-        signal.setitimer(signal.ITIMER_PROF, HANGS)
-        faulthandler.dump_traceback_later(BLOCKS, exit=True)
-        start = time.process_time()
-        came, words = outcome(path, params, whole, usual)
-        seconds = time.process_time() - start
-        faulthandler.cancel_dump_traceback_later()
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        bytes_held = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        line = {**about, "outcome": came, "words": words, "s": seconds, "bytes": bytes_held}
-        print(json.dumps(line), flush=True)
-    path.unlink(missing_ok=True)
+    run(ledger.path.parent, parts, args.workers, told)
+    results = [ledger.results[one] for one in sorted(ledger.results)]
+    command = f"python -m validation.campaigns.mutations --count {args.count}"
+    args.report.parent.mkdir(parents=True, exist_ok=True)
+    content = summary(results, args.count)
+    write_json(args.report, content | environment("cpu", f"{command} --workers {args.workers}"))
+    print(f"{args.report}: {len(results)} recordings, {len(faults(results))} faults", flush=True)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4:])
+    errors.run(main)

@@ -57,43 +57,65 @@ def _effect(by: dict, method: str, switch: str, bands: list[str]) -> dict | None
     return found
 
 
-def cell(figures: dict, switch: str) -> str:
-    """A table's cell of one method: how far launches miss with and without a setting."""
-    return ", ".join(
-        f"{group} {_of(found[AS_IS], 'miss'):.1f} → {_of(found[switch], 'miss'):.1f} {unit}"
-        for group, found, unit in _groups(figures)
-        if switch in found
-    )
+def table(figures: dict, rows: dict[str, str], methods: dict[str, str]) -> list[str]:
+    """Lines of Markdown: a row for each setting and group of bands, three columns a method.
+
+    Args:
+        figures: As `effects` gives them.
+        rows, methods: What settings and methods are called, in their order.
+    """
+    heads = [head for name in methods.values() for head in (f"{name}: E", "force", "miss")]
+    lines = [f"| as the paper has it | bands | {' | '.join(heads)} |"]
+    lines.append(f"|---|---{'|---:' * len(heads)}|")
+    groups = dict.fromkeys(group for own in figures.values() for group in own)
+    for switch, words in rows.items():
+        for group in sorted(groups, key=lambda name: (name != "rig", name)):
+            own = [figures[method].get(group, {}) for method in methods]
+            if any(switch in one for one in own):
+                cells = [cell for one in own for cell in _cells(one, switch, group)]
+                lines.append(f"| {words} | {group} | {' | '.join(cells)} |")
+    return lines
 
 
-def table(figures: dict, switches: list[str]) -> list[str]:
-    """Lines of Markdown: a row for each setting and group of bands, of one method."""
-    lines = [
-        "| setting | bands | E | peak force, off the recorded | loss | miss | change of the miss |",
-        "|---|---|---:|---:|---:|---:|---:|",
-    ]
-    for switch in switches:
-        for group, found, unit in _groups(figures):
-            if switch not in found:
-                continue
-            one, plain = found[switch], switch == AS_IS
-            young = f"{_of(one, 'youngs_modulus') / 1e5:.0f} kPa"
-            if not plain:
-                young = f"{_of(one, 'youngs_modulus_change'):+.1f} %"
-            low, mean, high = (_of(one, "miss_change", end) for end in ("low", "mean", "high"))
-            moved = "" if plain else f"{mean:+.1f} {unit} [{low:+.1f}, {high:+.1f}]"
-            lines.append(
-                f"| {switch if plain else f'`{switch}`'} | {group} | {young} |"
-                f" {_of(one, 'peak_force'):+.1f} % | {_of(one, 'loss') / 100:.2f} |"
-                f" {_of(one, 'miss'):.1f} {unit} | {moved} |"
-            )
-    return [line.replace("-", "−") if number > 1 else line for number, line in enumerate(lines)]
+def _cells(found: dict, switch: str, group: str) -> tuple[str, str, str]:
+    """E, force and miss of one method in a group of bands; changes where there is a setting."""
+    one, unit = found.get(switch), "cm" if group == "rig" else "%"
+    if one is None:
+        return "", "", ""
+    if not one["miss"]["n"] and not one["youngs_modulus"]["n"]:
+        return ("no θ",) * 3 if one["failed"] else ("", "", "")
+    young, force = _of(one, "youngs_modulus") / 1e5, f"{_of(one, 'peak_force'):+.1f} %"
+    miss = f"{_of(one, 'miss'):.1f} {unit}"
+    if switch == AS_IS:
+        return _typeset(f"{young:.0f} kPa", force, miss)
+    moved, low, high = (_of(one, "miss_change", end) for end in ("mean", "low", "high"))
+    change = f"{moved:+.1f}, {low:+.1f} to {high:+.1f}"
+    change = f"**{change}**" if low > 0 or high < 0 else change
+    return _typeset(f"{_of(one, 'youngs_modulus_change'):+.1f} %", force, f"{miss} ({change})")
 
 
-def _groups(figures: dict):
-    """Name, figures and the unit of a miss: of the rig first."""
-    for name in ("rig", *sorted({*figures} - {"rig"})):
-        yield name, figures[name], "cm" if name == "rig" else "%"
+def runs(figures: dict, rows: dict[str, str], methods: dict[str, str]) -> list[str]:
+    """Sentences: how many identifications are behind a row, and how many found nothing."""
+    told = []
+    for method, name in methods.items():
+        groups = [found for found in figures[method].values() if AS_IS in found]
+        counts = {
+            switch: sum(found[switch]["runs"] for found in groups if switch in found)
+            for switch in rows
+        }
+        usual = counts[AS_IS]
+        others = [f"{n} {rows[s]}" for s, n in counts.items() if n not in (0, usual)]
+        told.append(f"{name}: {usual} a row" + "".join(f", {other}" for other in others) + ".")
+        for switch, words in rows.items():
+            failed = sum(found[switch]["failed"] for found in groups if switch in found)
+            if failed:
+                told.append(f"{name}, {words}: {failed} of {counts[switch]} found no θ.")
+    return told
+
+
+def _typeset(*cells: str) -> tuple[str, ...]:
+    """With a minus, and nothing where there is no number."""
+    return tuple("–" if "nan" in one else one.replace("-", "−") for one in cells)
 
 
 def _of(figures: dict, name: str, end: str = "mean") -> float:

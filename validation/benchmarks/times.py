@@ -30,9 +30,10 @@ from pipeline.base.machine import commit
 from validation.benchmarks.command import disk, measured
 from validation.benchmarks.timing import environment
 from validation.code import ROOT, digests
+from validation.marked import marks, with_block
 
 REPORT, PAGE = Path("reports/benchmarks/times.json"), Path("docs/times.md")
-BEGIN, END = "<!-- times: begin -->\n", "<!-- times: end -->\n"
+BEGIN, END = marks("times")
 BAND = "timed"  # of the recording
 CHANGES = ("PYTHONPATH", "VIRTUAL_ENV", "UV_CACHE_DIR", "PIP_CACHE_DIR", "WARP_CACHE_PATH")
 STAGE = re.compile(r"^([a-z]+)(?:@[\w-]+)? \| done \((?:(\d+) min )?([\d.]+) s\)$", re.MULTILINE)
@@ -193,14 +194,6 @@ def _duration(seconds: float) -> str:
 
 def _size(count: float) -> str:
     return f"{count / 1e9:.1f} GB" if count >= 1e8 else f"{count / 1e6:.0f} MB"
-
-
-def with_block(page: str, block: str) -> str:
-    """A page with `block` in the place of what is between its marks. Raises UserError."""
-    if page.count(BEGIN) != 1 or page.count(END) != 1:
-        raise UserError(f"{PAGE}: has not one {BEGIN.strip()} and one {END.strip()}")
-    head, rest = page.split(BEGIN)
-    return head + block + rest.split(END)[1]
 
 
 def times(

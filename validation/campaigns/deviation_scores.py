@@ -28,6 +28,14 @@ SWITCHES = {  # section and values, as the paper has them
     "sling.mesh: tetrahedra": ("sling", {"mesh": "tetrahedra"}),
 }
 MESH = [*SWITCHES][-1]
+WORDS = {  # of a row of docs/paper.md
+    AS_IS: "nothing: as by default, the cut-off as we read it (0.224 rad per sample)",
+    "mounting: false": "clamps not calibrated: `mounting: false`",
+    "cloud.sampling: before_filters": "farthest points first: `cloud.sampling: before_filters`",
+    "loss.chamfer: clouds": "Chamfer distance of two clouds: `loss.chamfer: clouds`",
+    "force.cutoff_unit: rad/s": "the cut-off as printed: `force.cutoff_unit: rad/s`",
+    "sling.mesh: tetrahedra": "tetrahedra: `sling.mesh: tetrahedra`",
+}
 
 
 def params_of(band: str, switch: str):

@@ -1,6 +1,7 @@
 """What each departure from the paper changes by itself: E, predicted force, landings, loss.
 
     python -m validation.campaigns.deviations --orange FOLDER
+    python -m validation.campaigns.deviations --page    # the report's table into docs/paper.md
 
 One setting at a time is put as the paper has it, for the paper's method with several search seeds
 and for ours. What they find in recordings of the rig, which took part in no choice, is aimed at the
@@ -23,7 +24,8 @@ from functools import partial
 from pathlib import Path
 
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
+from pipeline.base.files import write_json, write_text
+from pipeline.base.layout import made
 from pipeline.base.machine import cores
 from pipeline.base.pool import Pool
 from pipeline.episode.episode import Episode
@@ -36,16 +38,20 @@ from validation.campaigns.deviation_scores import (
     OURS,
     PAPER,
     SWITCHES,
+    WORDS,
     forces,
     misses,
     params_of,
 )
 from validation.campaigns.rig_scores import calibrated_clamps, plain, sling_of
 from validation.density import found
-from validation.effects import AS_IS, effects, table
+from validation.effects import AS_IS, effects, runs, table
+from validation.marked import marks, with_block
 from validation.paired import LEVEL
 
 WORK, REPORT = Path("data/deviations"), Path("reports/validation/deviations.json")
+PAGE, BLOCK = Path("docs/paper.md"), "departures"  # and the name of its block
+METHODS = {PAPER: "paper's method", OURS: "ours"}  # heads of columns
 FIRST, RECORDINGS, SEEDS = 1001, 3, 2  # rig seed; a band; search seeds of the paper's method
 EPISODES_ANEW = "cloud.sampling: before_filters", "force.cutoff_unit: rad/s", "loss.chamfer: clouds"
 
@@ -90,13 +96,13 @@ def place(work: Path, band: str, recording: int, switch: str) -> Path:
 
 def prepare(where: tuple[str, int], work: Path, recordings: Path | None) -> None:
     """Make a recording's episodes with their clamps; where they are refused, with the default's."""
-    from pipeline.recording.build import build_episodes  # both need Open3D
-    from pipeline.rig.recorder.record import record
-
     band, number = where
     folders = {switch: place(work, band, number, switch) for switch in (AS_IS, *EPISODES_ANEW)}
     if all((folder / "mounting.json").exists() for folder in folders.values()):
         return
+    from pipeline.recording.build import build_episodes  # both need Open3D, the rest does not
+    from pipeline.rig.recorder.record import record
+
     if band == orange.NAME:
         raw = recordings / (f"{band}_{number + 1}.mcap" if number else f"{band}.mcap")
     else:
@@ -195,8 +201,26 @@ def report(args, cases: list[Case]) -> None:
     args.report.parent.mkdir(parents=True, exist_ok=True)
     write_json(args.report, plain(content))
     print(f"{args.report}: {len(results)} of {len(cases)} results", flush=True)
-    for method in (PAPER, OURS):
-        print(f"\n{method}\n", *table(content["figures"][method], [*SWITCHES]), sep="\n")
+    print(block(content))
+
+
+def block(content: dict) -> str:
+    """What docs/paper.md has between its marks, of a report's content."""
+    (begin, end), figures = marks(BLOCK), content["figures"]
+    seeds, number = content["settings"]["search_seeds"], content["settings"]["recordings"]
+    told = [
+        f"{number} recordings of each band; {seeds[PAPER]} search seeds of the paper's method, one"
+        " of ours.",
+        "Identifications:",
+        *runs(figures, WORDS, METHODS),
+    ]
+    refusals = content["settings"]["clamps_refused"]
+    if refusals:
+        bands = ", ".join(one.split(", ")[0] for one in refusals)
+        settings = ", ".join(sorted({f"`{one.split(', ')[1]}`" for one in refusals}))
+        told.append(f"With {settings} no slack part was found ({bands}): clamps are the default's.")
+    lines = [*table(figures, WORDS, METHODS), "", " ".join(told)]
+    return begin + "\n".join(lines) + "\n" + end
 
 
 def refused(args) -> dict:
@@ -214,6 +238,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--orange", type=Path, help="folder of its recordings and landings")
     parser.add_argument("--report-only", action="store_true", help="of what is there")
+    parser.add_argument("--page", action="store_true", help=f"only write its table into {PAGE}")
     parser.add_argument("--workers", type=int, default=cores(), help="processes (default: cores)")
     parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
     parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
@@ -221,6 +246,10 @@ def main() -> None:
     parser.add_argument("--recordings", type=int, default=RECORDINGS, help="a band (default: 3)")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="of searches (default: 2)")
     args = parser.parse_args()
+    if args.page:
+        content = json.loads(made(args.report).read_text(encoding="utf-8"))
+        write_text(PAGE, with_block(PAGE.read_text(encoding="utf-8"), block(content)))
+        return
     args.bands += [orange.NAME] * (args.orange is not None)
     cases = cases_of(args.bands, args.recordings, args.seeds)
     for name in ("SLING_WORKERS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):

@@ -114,7 +114,7 @@ def test_steps_are_measured_once_and_failures_again(project: Path, tmp_path: Pat
 
 def test_a_page_without_marks_is_refused() -> None:
     with pytest.raises(UserError, match="has not one <!-- times: begin -->"):
-        bench.with_block("# Times\n", "")
+        bench.with_block("# Times\n", f"{BEGIN}{END}")
 
 
 def test_the_table_of_the_docs_is_that_of_the_measurement() -> None:

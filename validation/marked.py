@@ -1,0 +1,22 @@
+"""Blocks of pages that a script writes: what stands between two marks."""
+
+from __future__ import annotations
+
+from pipeline.base.errors import UserError
+
+
+def marks(name: str) -> tuple[str, str]:
+    """The first and the last line of a block."""
+    return f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->\n"
+
+
+def with_block(page: str, block: str) -> str:
+    """A page with `block`, from its first mark to its last, in the place of the one that it has.
+
+    Raises UserError where the page has not each of the marks once.
+    """
+    begin, *_, end = block.splitlines(keepends=True)
+    if page.count(begin) != 1 or page.count(end) != 1:
+        raise UserError(f"the page has not one {begin.strip()} and one {end.strip()}")
+    head, rest = page.split(begin)
+    return head + block + rest.split(end)[1]

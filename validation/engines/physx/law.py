@@ -89,8 +89,9 @@ def force_on(
 
 
 def _strain(gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """F - R (..., 3, 3), J (..., 1, 1) and cof F (..., 3, 3)."""
-    left, _, right = np.linalg.svd(gradient)
+    """F - R (..., 3, 3), J (..., 1, 1) and cof F (..., 3, 3); not a number where F is none."""
+    sound = np.isfinite(gradient).all(axis=(-2, -1), keepdims=True)
+    left, _, right = np.linalg.svd(np.where(sound, gradient, np.eye(3)))  # it raises on NaN
     left[..., 2] *= np.linalg.det(left @ right)[..., None]  # a rotation, no reflection
     first, second, third = (gradient[..., i] for i in range(3))
     cofactor = np.stack(

@@ -128,3 +128,12 @@ def test_the_page_has_its_figures(sling):
     stretch, factor = (np.array(row, float) for row in rows)
     theta = [YOUNG, POISSON, 3e-3, 1.0, 1.0]
     assert law.equal_modulus(sling, theta, stretch) == pytest.approx(factor, abs=5.1e-3)
+
+
+def test_a_burst_band_has_no_force_and_the_others_keep_theirs(sling):
+    tube = Tube.of(sling, edges=8)
+    bands = np.stack([1.1 * tube.rest, np.full_like(tube.rest, np.nan), 1.1 * tube.rest])
+    with np.errstate(invalid="ignore"):
+        forces = law.force_on(tube, [0], bands, 2e5, 0.45)
+    assert np.isnan(forces[1]).all() and np.isfinite(forces[[0, 2]]).all()
+    assert forces[0] == pytest.approx(law.force_on(tube, [0], bands[0], 2e5, 0.45))

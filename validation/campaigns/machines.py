@@ -153,15 +153,16 @@ def compared(reports: dict[str, MachineReport]) -> tuple[list[str], bool]:
         one, reference = (reports[n].bands[band][method] for n in (name, first))
         lines.append(
             f"| {band} | {method} | {name} | {one.theta['youngs_modulus'] / 1e3:.3f} |"
-            f" {one.loss} | {100 * apart([reference, one]):.4f} % | {one.seconds:.0f} s |"
+            f" {one.loss or np.nan:.6f} | {100 * apart([reference, one]):.2g} % |"
+            f" {one.seconds:.0f} s |"
         )
     for band, method in product(bands, largest):
         told = [one.bands[band][method] for one in reports.values()]
         largest[method] = max(largest[method], apart(told))
     met = largest[OURS] <= LIMIT
-    lines += ["", f"{OURS}: landings of any two differ by {100 * largest[OURS]:.4f} % at most;"]
+    lines += ["", f"{OURS}: landings of any two differ by {100 * largest[OURS]:.2g} % at most;"]
     lines[-1] += f" {'within' if met else 'MORE than'} {100 * LIMIT:g} %"
-    lines += [f"{PAPER}: by {100 * largest[PAPER]:.4f} % at most; nothing is asked of it"]
+    lines += [f"{PAPER}: by {100 * largest[PAPER]:.2g} % at most; nothing is asked of it"]
     return lines, met
 
 

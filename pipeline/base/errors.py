@@ -16,7 +16,14 @@ class UserError(Exception):
 
 def one_line(said: object) -> str:
     """What somebody else said, such as a library's error, as one line."""
-    return " ".join(str(said).split())
+    return printable(" ".join(str(said).split()))
+
+
+def printable(text: str) -> str:
+    """What a file calls itself or holds, on one line, with nothing that a terminal obeys."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def run(main: Callable[[], int | None]) -> None:

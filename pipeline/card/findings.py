@@ -7,6 +7,7 @@ import numpy as np
 from pipeline.card.known import Known
 from pipeline.card.values import LABELS, boxes, rounded
 from pipeline.card.verdict import FURTHER, Findings
+from pipeline.drawing.markdown import as_code
 
 SIDE = 0.01  # of a box's width: as near is at its side
 
@@ -61,7 +62,7 @@ def _odd(recordings: list[dict]) -> str:
     if not told:
         return ""
     source = max(told, key=lambda one: one["without_it"]["misfit"])["source"]
-    return f"pull {source.get('pull', 1)} of {source.get('file', '?')}"
+    return f"pull {source.get('pull', 1)} of {as_code(source.get('file', '?'))}"
 
 
 def _at_sides(known: Known) -> list[tuple[str, str]]:

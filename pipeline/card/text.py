@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
 from pipeline.card.findings import Findings
 from pipeline.card.known import Known
 from pipeline.card.values import ShownValue
 from pipeline.card.verdict import CARE, NO, TRUSTED, Reason
+from pipeline.drawing.markdown import as_code
 
 SAID = {TRUSTED: "can be trusted", CARE: "use with care", NO: "do not use it"}
 
@@ -150,7 +149,7 @@ def _draws(known: Known) -> str:
 def _rests(known: Known) -> str:
     count, launches = len(known.episodes), len(known.confidence.get("launches", []))
     pulls = (
-        f"{count} pull{'s' * (count != 1)} in {', '.join(_code(one) for one in known.recordings)}"
+        f"{count} pull{'s' * (count != 1)} in {', '.join(as_code(one) for one in known.recordings)}"
     )
     told = f"{launches} launch{'es' * (launches != 1)}" if launches else "no launch"
     launched = known.launched.kind.value_counts()
@@ -160,10 +159,3 @@ def _rests(known: Known) -> str:
 - Method: `{known.method}`; values in `data/theta/{known.band}/{known.method}.json`.
 - Landings held against predictions: {tried}.
 """
-
-
-def _code(name: str) -> str:
-    """A file's name as code, whatever is in it."""
-    shown = "".join(c if c.isprintable() else "?" for c in name)
-    fence = "`" * (1 + max(map(len, re.findall("`+", shown)), default=0))
-    return f"{fence} {shown} {fence}" if "`" in shown else f"`{shown}`"

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.base.launch_table import file_of
-from pipeline.base.layout import Layout, made
+from pipeline.base.layout import Layout, NotMade, made
 from pipeline.base.schema import JsonRecord, read_json
 from pipeline.episode.episode import Episode
 from pipeline.landing.landing_map import LandingMap
@@ -119,15 +119,19 @@ def _unused(params, layout: Layout, band: str, methods: Collection[str]) -> int:
 
 def _result(layout: Layout, band: str, method: str) -> Result:
     steps = layout.history(band, method), layout.refined(band, method)
-    history = [pd.read_parquet(made(path)) for path in steps]
-    regions, axes = load_regions(layout.clusters(band, method))
+    parts = [pd.read_parquet(made(path)) for path in steps]
+    history = pd.concat([part for part in parts if len(part)], ignore_index=True)
+    found = layout.clusters(band, method)
+    regions, axes = load_regions(found)
+    if missing := [name for name in axes if f"unit_{name}" not in history]:
+        raise NotMade(found, f"names: {missing[0]} was not searched")
     theta = load_theta(layout.theta(band, method), band)
     stored, policy = Stored(band, method, layout.root), layout.policy(band, method)
     return Result(
         band=band,
         method=method,
         theta=theta,
-        history=pd.concat([part for part in history if len(part)], ignore_index=True),
+        history=history,
         regions=regions,
         axes=axes,
         card=stored.card(),

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydantic import model_validator
 
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
-from pipeline.base.schema import JsonRecord, read_json
+from pipeline.base.schema import JsonRecord, Name, read_json, refusal
 
 RIDGE = 1e-3  # of the mean variance, added to every variance
 LEAST_VARIANCE = 1e-6  # a thousandth of the box, where all neighbours are one point
@@ -123,8 +124,16 @@ class RegionEntry(JsonRecord):
 
 
 class RegionsFile(JsonRecord):
-    names: list[str]
+    names: list[Name]
     clusters: list[RegionEntry]
+
+    @model_validator(mode="after")
+    def _a_number_for_each_name(self) -> RegionsFile:
+        count = len(self.names)
+        for one in self.clusters:
+            if [len(one.mu), *map(len, one.Sigma)] != [count] * (1 + count):
+                raise refusal(f"clusters: mu must have {count} numbers, Sigma {count} rows of them")
+        return self
 
 
 def save_regions(path: Path, names: tuple[str, ...], regions: list[Region], asked: int) -> None:

@@ -5,7 +5,7 @@
 seconds the recording's hand drew the band and how long it waited. Where a stage wrote it, also
 "method", "nuisances": {"air_drag": ...}, "turn_damping", "returned_share", "loss":
 {"geom", "force", "work", "total"}, "rollouts", "confidence"; "mounted": false where the method
-leaves out the calibration of the clamps.
+leaves out the calibration of the clamps. What is read of "confidence": confidence.py.
 
 What its confidence rests on, samples of θ, lies beside in data/confidence/.
 """
@@ -19,11 +19,12 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import create_model, model_validator
 
-from pipeline.base.errors import UserError
+from pipeline.base.errors import UserError, printable
 from pipeline.base.layout import NotMade, owner
-from pipeline.base.schema import JsonRecord, Range, Section, read_json, refusal
+from pipeline.base.schema import JsonRecord, Name, Range, Section, read_json, refusal
 from pipeline.params import Parameters
 from pipeline.params.identification import LAWS
+from pipeline.sling.confidence import Confidence, Count
 from pipeline.sling.load import load_sling
 from pipeline.sling.material import THETA
 from pipeline.sling.model import LaunchHistory, Sling
@@ -64,6 +65,9 @@ class ThetaFile(JsonRecord):
     turn_damping: Annotated[float, Range(0, 1)] = 0.0
     returned_share: Annotated[float, Range(0.1, 10)] = 1.0
     mounted: bool = True
+    loss: dict[Name, float] = {}
+    rollouts: Count = 0
+    confidence: Confidence | None = None
 
     @model_validator(mode="after")
     def _keys_of_its_law(self) -> ThetaFile:
@@ -101,7 +105,7 @@ def load_theta(path: Path, band: str) -> dict:
         raise UserError(f"{path}: no such file; `dvc repro` writes those of data/theta/{band}/")
     content = read_json(path, ThetaFile)
     if content.band != band:
-        raise NotMade(path, f'band: must be "{band}", got "{content.band[:60]}"')
+        raise NotMade(path, f'band: must be "{band}", got "{printable(content.band[:60])}"')
     return content.model_dump(exclude_unset=True)
 
 

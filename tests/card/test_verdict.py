@@ -86,5 +86,5 @@ def test_findings_see_a_bad_score_a_side_and_odd_evidence(told) -> None:
     theta["confidence"] = theta["confidence"] | {"launches": launches, "recordings": recordings}
     found = findings(replace(told, trials=rows, theta=theta))
     assert (found.outside, found.left, found.force) == (1, 0.07, 0.3)
-    assert found.odd == "pull 3 of 0.3.mcap"
+    assert found.odd == "pull 3 of `0.3.mcap`"
     assert found.at_sides == [("relaxation a half decade", "upper side of its box, 0 to 5 %")]

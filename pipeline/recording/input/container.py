@@ -29,10 +29,10 @@ import numpy as np
 from mcap import records as kinds
 from mcap.opcode import Opcode
 
-from pipeline.base.errors import UserError
+from pipeline.base.errors import UserError, printable
 from pipeline.recording.input import records as of
 from pipeline.recording.input.records import Damaged, Record
-from pipeline.recording.input.words import counted, few, printable
+from pipeline.recording.input.words import counted, few
 
 MOST = 2**30  # bytes of messages that are held at once
 OVERHEAD = 256  # bytes that a message costs beside its payload

@@ -18,6 +18,8 @@ from pipeline.recording.input.container import Channel
 Decoder = Callable[[bytes], object]
 LONGEST = {"json": 2**25}  # bytes of one message: objects of JSON take fifty times as much
 USUAL = 2**27
+LONGEST_SCHEMA = 2**16  # characters of ROS, with all types within; those of robots have a tenth
+MOST_ELEMENTS = 9999
 
 
 def decoder(channel: Channel) -> Decoder:
@@ -57,8 +59,11 @@ def _compiled(kind: str, encoding: str, name: str, data: bytes) -> Decoder:
 def _ros(schema: Schema) -> Decoder:
     """By types of this schema alone, because recordings may mix versions of a type."""
     text = schema.data.decode()
-    if re.search(r"\[\s*\d{5,}\s*\]", text):  # rosbags writes code for each element
-        raise ValueError("an array of a fixed length beyond 9999")
+    if len(text) > LONGEST_SCHEMA:  # rosbags takes minutes for a megabyte
+        raise ValueError(f"longer than {LONGEST_SCHEMA} characters")
+    lengths = map(int, re.findall(r"\[\s*(\d+)\s*\]", text))
+    if sum(lengths) > MOST_ELEMENTS:  # it writes code for each
+        raise ValueError(f"arrays of fixed lengths that are together beyond {MOST_ELEMENTS}")
     # As rosbags has it: with the `msg` that ROS 1 leaves out.
     name = re.sub("^([^/:]+)(/|::)([^/:]+)$", r"\1/msg/\3", schema.name).replace("::", "/")
     store = get_typestore(Stores.EMPTY)

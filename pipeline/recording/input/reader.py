@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.base.errors import UserError
+from pipeline.base.errors import UserError, printable
 from pipeline.recording.input import images
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.container import Container, read_container, sha256
@@ -19,7 +19,7 @@ from pipeline.recording.input.frames import TransformTree
 from pipeline.recording.input.streams import Stream, streams_of
 from pipeline.recording.input.topics import camera_of, choose
 from pipeline.recording.input.transforms import transforms_of
-from pipeline.recording.input.words import printable, shortened
+from pipeline.recording.input.words import shortened
 
 SHOWN = 3  # losses in an error
 LINE, LOSS = 1000, 300  # characters of an error and of a loss in it

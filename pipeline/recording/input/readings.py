@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.recording.input.words import printable
+from pipeline.base.errors import printable
 
 LATEST = 2**62  # ns; a stamp beyond it is damage
 FRANKA_BASE = "franka_base"  # frame of Franka states whose header names none, as franka_ros writes

@@ -6,13 +6,12 @@ from itertools import chain
 
 import numpy as np
 
-from pipeline.base.errors import UserError
+from pipeline.base.errors import UserError, printable
 from pipeline.recording.input.container import Container
 from pipeline.recording.input.decode import decoder
 from pipeline.recording.input.frames import Transform, TransformTree
 from pipeline.recording.input.readings import kind_of, quaternion_of
 from pipeline.recording.input.roles import readable
-from pipeline.recording.input.words import printable
 
 Edge = tuple[str, str]
 FOXGLOVE = ("FrameTransform", "FrameTransforms")

@@ -1,4 +1,4 @@
-"""How messages count and list things, and how they show what a recording calls itself."""
+"""How messages count, list and shorten things."""
 
 from __future__ import annotations
 
@@ -11,13 +11,6 @@ def few(words: list[str], most: int) -> str:
     """The first of the words, and how many more there are."""
     more = len(words) - most
     return ", ".join(words[:most]) + (f" and {more} more" if more > 0 else "")
-
-
-def printable(name: str) -> str:
-    """A name that a recording gives, on one line, with nothing in it that a terminal obeys."""
-    if name.isprintable():
-        return name
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in name)
 
 
 def shortened(text: str, most: int) -> str:

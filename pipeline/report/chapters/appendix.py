@@ -170,7 +170,7 @@ def _confidence(report: Report) -> list[str]:
     trusted = {
         band: methods[report.main].confidence
         for band, methods in results.methods.items()
-        if methods[report.main].confidence
+        if methods[report.main].confidence.get("correlation")
     }
     if trusted:
         alt = "correlations of the density's coordinates"

@@ -209,9 +209,9 @@ def _wrong(one: Result) -> list[str]:
     if not one.confidence:
         return said
     if not one.confidence.get("settled", True):
+        steps = one.confidence.get("steps", "all its")
         said.append(
-            f"the fit had **not settled** after {one.confidence['steps']} steps; do not rely on"
-            " its intervals."
+            f"the fit had **not settled** after {steps} steps; do not rely on its intervals."
         )
     if not any(recording["pictures"] for recording in one.confidence["recordings"]):
         said.append(

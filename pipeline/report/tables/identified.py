@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pipeline.drawing.markdown import as_code, cell
 from pipeline.drawing.styles import Styles
 from pipeline.params.identification import LEAST_SQUARES
 from pipeline.report.replay import Replay
@@ -100,13 +101,13 @@ def recordings(results: Results, styles: Styles) -> Table | None:
     rows = []
     for result in results:
         for count, about in enumerate(result.confidence.get("recordings", []), 1):
-            source, without = about["source"], about.get("without_it")
+            file, without = about.get("source", {}).get("file"), about.get("without_it")
             moved = without and max(without["moved"].items(), key=lambda one: abs(one[1]))
             rows.append(
                 [
                     result.band,
                     styles[result.method].name,
-                    str(source.get("file", count)),
+                    cell(as_code(file)) if file else str(count),
                     _scaled(about["force_rms"], 1e3, ".0f"),
                     _scaled(about["held_rms"], 1e3, ".1f"),
                     _scaled(about["recoil_rms"], 1e3, ".1f"),

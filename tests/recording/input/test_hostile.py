@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from mcap.writer import Writer
 
-from pipeline.base.errors import UserError
+from pipeline.base.errors import UserError, printable
 from pipeline.params import load
 from pipeline.recording.input.reader import read_recording
-from pipeline.recording.input.words import printable, shortened
+from pipeline.recording.input.words import shortened
 from tests.recording.bag import blind_bag
 
 EVIL = "/../../x\x1b[2J\n\r\u202e<script>alert(1)</script>|`$(touch pwned)`"

@@ -1,0 +1,19 @@
+"""Names that others have given, such as those of files, in markdown."""
+
+from __future__ import annotations
+
+import re
+
+from pipeline.base.errors import printable
+
+
+def as_code(name: str) -> str:
+    """As code, whatever is in it: no markup of it counts."""
+    shown = printable(name)
+    fence = "`" * (1 + max(map(len, re.findall("`+", shown)), default=0))
+    return f"{fence} {shown} {fence}" if "`" in shown else f"{fence}{shown}{fence}"
+
+
+def cell(text: str) -> str:
+    """In a table, where a bar would end the cell, in code too."""
+    return text.replace("|", "\\|")

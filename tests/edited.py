@@ -1,0 +1,41 @@
+"""JSON files as a careless hand leaves them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import deepcopy
+
+GONE = object()
+JUNK = (GONE, None, float("nan"), -1e300, "<script>\x1b[2J\n", [], {}, True, [[1.0]], 10**400)
+
+
+def edits(content: dict) -> Iterator[tuple[str, dict]]:
+    """What was done, and the content: each value, at any depth, gone or replaced by each of JUNK.
+
+    Also with a key that nobody knows, and of another type than an object.
+    """
+    yield "unknown key", {**content, "\x1b[2J<b>": 1}
+    for path in _paths(content, ()):
+        for junk in JUNK:
+            edited = deepcopy(content)
+            place = edited
+            for key in path[:-1]:
+                place = place[key]
+            if junk is GONE:
+                del place[path[-1]]
+            else:
+                place[path[-1]] = junk
+            shown = "gone" if junk is GONE else f"{junk!r:.20}"
+            yield f"{'.'.join(map(str, path))}: {shown}", edited
+    yield "no object", [content]
+
+
+def _paths(value: object, above: tuple) -> Iterator[tuple]:
+    """Of all values below; of a list its first is enough."""
+    if isinstance(value, dict):
+        keys = list(value)
+    else:
+        keys = [0] if isinstance(value, list) and value else []
+    for key in keys:
+        yield (*above, key)
+        yield from _paths(value[key], (*above, key))

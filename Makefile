@@ -41,6 +41,7 @@ validate: setup       # slow campaigns, and tests by other engines and readers; 
 		tests/rig/recorder/test_record.py
 	.venv/bin/python -m validation.campaigns.mutations
 	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation
+	.venv/bin/python -m validation.campaigns.kills
 
 clean:                # all but data, checkpoints and DVC's cache
 	rm -rf .venv build *.egg-info .hypothesis .pytest_cache .ruff_cache

@@ -74,13 +74,14 @@ class Toy(toy.Toy):
 class Run:
     """Commands in a folder, whose processes all bear a mark in their environment."""
 
-    def __init__(self, folder: Path, **more: str) -> None:
+    def __init__(self, folder: Path, log: Path | None = None, **more: str) -> None:
         self.folder, self.mark = folder, uuid.uuid4().hex
+        self.log = log or folder.parent / "said.txt"
         self.environment = environment(SLING_TEST_RUN=self.mark, **more)
 
     def start(self, *command: str) -> subprocess.Popen:
-        """In a session of its own; its lines, errors among them, go to `folder`/../said.txt."""
-        with (self.folder.parent / "said.txt").open("w") as said:
+        """In a session of its own; its lines, errors among them, go to `log`."""
+        with self.log.open("w") as said:
             return subprocess.Popen(
                 command, cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
                 stdout=said, stderr=subprocess.STDOUT, start_new_session=True,
@@ -88,7 +89,7 @@ class Run:
 
     @property
     def said(self) -> str:
-        return (self.folder.parent / "said.txt").read_text(errors="replace")
+        return self.log.read_text(errors="replace")
 
     def alive(self) -> list[psutil.Process]:
         """Zombies apart, which wait for a parent to look at them."""

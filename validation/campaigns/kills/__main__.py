@@ -1,0 +1,288 @@
+"""Kills and full disks at random moments, over four commands: in the end the bytes are the same.
+
+    python -m validation.campaigns.kills --kills 100 --full-disks 20
+
+`dvc repro`, `sling flow`, `sling fit` and a flow on a cluster work through the whole project on a
+tiny budget. Each is killed (itself, one of its processes, or a process group) or finds its disk
+full at a random moment, and is begun again, until it ends well. What it has made then is compared
+with an undisturbed run's. Results are lines of results.jsonl in --work; the same command goes on
+where it was stopped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import time
+from collections import Counter
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+from pipeline.base import errors
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_json
+from pipeline.base.fingerprint import fingerprint
+from tests.app.flow.killing import PROMPT, send
+from tests.project import ROOT
+from validation.benchmarks.timing import environment
+from validation.campaigns.kills import compare, full_disk, strike
+from validation.campaigns.kills.commands import (
+    BUDGET,
+    COMMANDS,
+    RECORDING,
+    FitCopy,
+    ReproCopy,
+    StruckCopy,
+    orphans,
+    source,
+)
+from validation.code import digests
+
+WORK = Path("data/kills")
+REPORT = ROOT / "reports/validation/kills.json"
+SEED = 2
+CHECKS = ("files", "digests", "nothing_more", "no_temporaries", "no_locks", "cache_whole")
+ASKED = (
+    "{kills} SIGKILLs at random moments over `dvc repro`, `sling flow`, `sling fit` and a flow on a"
+    " cluster (the command, a process of it, a process group), and {disks} disks that become full:"
+    " one clear line of a full disk, no process {prompt:g} s later, and at the end of each round no"
+    " lock and no temporary file is left, and every file, every digest in dvc.lock and DVC's cache"
+    " are those of an undisturbed run."
+)
+
+
+class StruckLines:
+    """StruckLines of JSON in a file; the last may be cut short, where the campaign was stopped."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.all: list[dict] = []
+        for line in path.read_text().splitlines() if path.exists() else []:
+            try:
+                self.all.append(json.loads(line))
+            except json.JSONDecodeError:
+                continue
+
+    def of(self, what: str, name: str, disturbance: str) -> list[dict]:
+        """Those of a kind, of a command and of what disturbs it."""
+        asked = (what, name, disturbance)
+        return [one for one in self.all if (one["what"], one["name"], one["by"]) == asked]
+
+    def add(self, what: str, name: str, disturbance: str, result: dict) -> None:
+        line = {"what": what, "name": name, "by": disturbance, **result}
+        self.all.append(line)
+        with self.path.open("a") as file:
+            file.write(f"\n{json.dumps(line)}\n")
+
+
+def undisturbed(work: Path) -> dict[str, dict]:
+    """What `dvc repro` and `sling fit` make when nobody disturbs them; kept in `work`."""
+    kept = work / "undisturbed.json"
+    if kept.is_file():
+        return json.loads(kept.read_text())
+    found = {}
+    for kind in (ReproCopy, FitCopy):
+        copy = kind(work / "undisturbed" / kind.name.replace(" ", "-"), work)
+        copy.begin()
+        begun, start = compare.contents(copy.folder), time.monotonic()
+        copy(*copy.words)
+        found[kind.name] = {
+            "seconds": round(time.monotonic() - start, 1),
+            "begun": begun,
+            "files": compare.contents(copy.folder),
+            "locks": compare.locked(copy.folder),
+        }
+        say(f"undisturbed {kind.name}: {found[kind.name]['seconds']:.0f} s")
+        if kind is ReproCopy:
+            shutil.copy(copy.folder / "data/raw/band1/band1.mcap", work / RECORDING)
+    write_json(kept, found)
+    return found
+
+
+def say(line: str) -> None:
+    print(f"{time.strftime('%H:%M:%S')} {line}", flush=True)
+
+
+def ended(copy: StruckCopy, expected: dict) -> dict[str, bool]:
+    """At the end of a round: how what is there compares with the undisturbed run's."""
+    copies = copy.copies
+    caches = [one / ".dvc/cache" for one in copies] + [copy.disk / "remote"]
+    fresh = copy("dvc", "status", *copy.stages)
+    return {
+        "files": compare.contents(copy.folder) == expected["files"],
+        "digests": compare.locked(copy.folder) == expected["locks"],
+        "nothing_more": "up to date" in fresh,
+        "no_temporaries": not any(map(compare.temporaries, copies)),
+        "no_locks": not any(map(compare.held, copies)),
+        "cache_whole": not any(map(compare.broken, caches)),
+    }
+
+
+def disturb(
+    copy: StruckCopy,
+    by: str,
+    wanted: int,
+    lines: StruckLines,
+    expected: dict,
+    attempt: Callable[[int, int], dict],
+) -> None:
+    """Disturb a command so often, and let it end well then."""
+    name, going = copy.name, False
+    while True:
+        before = lines.of("attempt", name, by)
+        count = sum(map(disturbances, before))
+        whole = lines.of("round", name, by)
+        if count >= wanted and whole and whole[-1]["after"] == count:
+            return
+        if not going and not (before and not before[-1]["ended"] and copy.folder.is_dir()):
+            copy.begin()
+        going = True
+        one = attempt(len(before), wanted - count)
+        wholes = (expected["files"], expected["begun"])
+        for folder in copy.copies:
+            if halves := compare.halves(folder, *wholes):
+                one["faults"].append(f"neither as before nor as in the end: {halves[:5]}")
+        one["mended"] = copy.mend()
+        one["ended"] = one["status"] == 0
+        lines.add("attempt", name, by, one)
+        count += disturbances(one)
+        told = [kill["hit"] for kill in one.get("kills", ())] or one.get("said") or "not disturbed"
+        say(f"{name}, {by} {count} of {wanted}: {one['seconds']:.0f} s, {told}")
+        for fault in one["faults"]:
+            say(f"  fault: {fault}")
+        if one["ended"]:
+            same = ended(copy, expected)
+            tmp = sorted({one.name for one in (copy.place / "tmp").iterdir()})
+            lines.add("round", name, by, {"after": count, **same, "left_in_tmp": tmp})
+            say(f"{name}, {by}: whole after {count}: {same}")
+            going = False
+        elif not disturbances(one) and one["faults"]:
+            raise UserError(f"{name} fails though nothing disturbs it: {one['faults'][-1]}")
+
+
+def disturbances(attempt: dict) -> int:
+    """How many kills or full disks there were in an attempt."""
+    if "kills" in attempt:
+        return len(attempt["kills"])
+    return int(attempt["status"] != 0 and attempt["full_after_s"] is not None)
+
+
+def shares(count: int, names: list[str]) -> dict[str, int]:
+    """`count` shared out as evenly as can be."""
+    return {name: (count + place) // len(names) for place, name in enumerate(names)}
+
+
+def report(lines: StruckLines, kills: int, disks: int, expected: dict, names: list[str]) -> dict:
+    """What the lines come to."""
+    attempts = [one for one in lines.all if one["what"] == "attempt"]
+    rounds = [one for one in lines.all if one["what"] == "round"]
+    done = {
+        name: {
+            by: sum(map(disturbances, lines.of("attempt", name, by)))
+            for by in ("kill", "full disk")
+        }
+        for name in names
+    }
+    killed, filled = (sum(one[by] for one in done.values()) for by in ("kill", "full disk"))
+    faults = [
+        {"name": one["name"], "by": one["by"], "fault": fault}
+        for one in attempts
+        for fault in one["faults"]
+    ]
+    same = all(one[check] for one in rounds for check in CHECKS)
+    complete = killed >= kills and filled >= disks and all(
+        (whole := lines.of("round", name, by)) and whole[-1]["after"] == done[name][by]
+        for name in names
+        for by in ("kill", "full disk")
+        if done[name][by]
+    )  # fmt: skip
+    hits = Counter(kill["hit"] for one in attempts for kill in one.get("kills", ()))
+    return {
+        "asked": ASKED.format(kills=kills, disks=disks, prompt=PROMPT),
+        "met": complete and same and not faults,
+        "settings": {
+            "kills": kills,
+            "full_disks": disks,
+            "seed": SEED,
+            "latest_s": {"kill": strike.LONGEST, "full disk": full_disk.LONGEST},
+            "disk": f"tmpfs of {full_disk.SIZE} MB, mounted by root; at most {full_disk.ROOM} bytes"
+            " of it stay free until the command has ended",
+            "budget": BUDGET,
+        },
+        "figures": {
+            "kills": killed,
+            "full_disks": filled,
+            "of": done,
+            "hit": dict(hits.most_common()),
+            "half_lock_files_cut_back": sum(one["mended"] for one in attempts),
+            "attempts": len(attempts),
+            "seconds": round(sum(one["seconds"] for one in attempts), 1),
+            "undisturbed_s": {name: one["seconds"] for name, one in expected.items()},
+            "files": {name: len(one["files"]) for name, one in expected.items()},
+            "stages": {name: len(one["locks"]) for name, one in expected.items()},
+            "rounds": rounds,
+            "left_in_tmp": sorted({one for some in rounds for one in some["left_in_tmp"]}),
+            "said_of_full_disks": dict(Counter(one["said"] for one in attempts if one.get("said"))),
+            "faults": faults,
+        },
+    }
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--kills", type=int, default=100)
+    parser.add_argument("--full-disks", type=int, default=20)
+    parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
+    parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
+    parser.add_argument("--report", type=Path, default=REPORT)
+    arguments = parser.parse_args()
+    work, names = arguments.work.resolve(), arguments.commands
+    work.mkdir(parents=True, exist_ok=True)
+    for one in orphans(work):
+        send(one)
+    project = source(work)
+    lines, expected = StruckLines(work / "results.jsonl"), undisturbed(work)
+    todo = {
+        "kill": shares(arguments.kills, names),
+        "full disk": shares(arguments.full_disks, names),
+    }
+    for by, wanted in todo.items():
+        for name in names:
+            if not wanted[name]:
+                continue
+            place = work / by.replace(" ", "-") / name.replace(" ", "-")
+            copy = COMMANDS[name](place, work)
+            own = expected.get(name, expected[ReproCopy.name])
+            with ExitStack() as stack:
+                if by == "full disk":
+                    try:
+                        stack.enter_context(full_disk.small_disk(copy.disk))
+                    except UserError as error:  # the report will say that it has none
+                        say(str(error))
+                        break
+                stack.callback(copy.end)
+
+                def attempt(number: int, most: int, copy=copy, by=by) -> dict:
+                    if by == "kill":
+                        return strike.struck(copy, number, most, SEED)
+                    return full_disk.filled(copy, number, SEED, most > 0)
+
+                disturb(copy, by, wanted[name], lines, own, attempt)
+    content = report(lines, arguments.kills, arguments.full_disks, expected, names)
+    command = f"python -m validation.campaigns.kills --kills {arguments.kills}"
+    command += f" --full-disks {arguments.full_disks}"
+    ran = [project / "app/cli.py", *sorted((project / "stages").glob("[a-z]*.py"))]
+    about = environment("cpu", command) | {
+        "commit": json.loads((work / "source.json").read_text())["commit"],
+        "simulator": fingerprint(project / "pipeline/sling")[:12],
+        "code": digests(project / Path(__file__).relative_to(ROOT), *ran, root=project),
+    }
+    write_json(arguments.report, content | about)
+    say(f"{'met' if content['met'] else 'NOT met'}: {arguments.report}")
+    return 0 if content["met"] else 1
+
+
+if __name__ == "__main__":
+    errors.run(main)

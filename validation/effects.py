@@ -89,8 +89,10 @@ def _cells(found: dict, switch: str, group: str) -> tuple[str, str, str]:
     if switch == AS_IS:
         return _typeset(f"{young:.0f} kPa", force, miss)
     moved, low, high = (_of(one, "miss_change", end) for end in ("mean", "low", "high"))
-    change = f"{moved:+.1f}, {low:+.1f} to {high:+.1f}"
-    change = f"**{change}**" if low > 0 or high < 0 else change
+    change = f"{moved:+.1f}"
+    if one["miss_change"]["n"] > 1:  # a single pair has no interval
+        change += f", {low:+.1f} to {high:+.1f}"
+        change = f"**{change}**" if low > 0 or high < 0 else change
     return _typeset(f"{_of(one, 'youngs_modulus_change'):+.1f} %", force, f"{miss} ({change})")
 
 

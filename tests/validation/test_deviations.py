@@ -87,10 +87,10 @@ def test_the_report_is_written_into_the_page(tmp_path: Path, monkeypatch) -> Non
     deviations.main()
     page = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert page.startswith(f"# Page\n{begin}| as the paper") and page.endswith(f".\n{end}more\n")
-    cells = "+50.0 % | −10.0 % | 8.0 cm (**−2.0, −2.0 to −2.0**)"
+    cells = "+50.0 % | −10.0 % | 8.0 cm (−2.0)"
     assert f"`mounting: false` | rig | {cells} | {cells} |\n" in page
-    assert "2 search seeds of the paper's method" in page and "ours: 1 a row" in page
-    assert "With `force.cutoff_unit: rad/s` no slack part was found (band1)" in page
+    assert "Search seeds: 2 of the paper's method" in page and "ours: 1 a row" in page
+    assert "With `force.cutoff_unit: rad/s` no clamps can be calibrated (band1):" in page
     assert "old" not in page and "orange" not in page
     (tmp_path / REPORT).unlink()
     with pytest.raises(UserError, match="deviations.json: missing"):

@@ -63,7 +63,7 @@ def test_a_band_that_is_not_of_the_rig_stands_by_itself() -> None:
     assert figures["m"]["rig"]["other"]["miss"]["mean"] == pytest.approx(0.05)
     _, plain, _, other = table(figures, ROWS, {"m": "mine"})[-4:]
     assert plain == "| nothing | orange | 1000 kPa | +0.0 % | 2.0 % |"
-    assert other == "| `other` | orange | +0.0 % | +0.0 % | 4.0 % (**+2.0, +2.0 to +2.0**) |"
+    assert other == "| `other` | orange | +0.0 % | +0.0 % | 4.0 % (+2.0) |"
 
 
 def test_what_failed_or_missed_is_counted_and_takes_no_part() -> None:

@@ -209,16 +209,16 @@ def block(content: dict) -> str:
     (begin, end), figures = marks(BLOCK), content["figures"]
     seeds, number = content["settings"]["search_seeds"], content["settings"]["recordings"]
     told = [
-        f"{number} recordings of each band; {seeds[PAPER]} search seeds of the paper's method, one"
-        " of ours.",
-        "Identifications:",
+        f"Recordings of each band: {number}. Search seeds: {seeds[PAPER]} of the paper's method,"
+        " one of ours. Identifications:",
         *runs(figures, WORDS, METHODS),
     ]
     refusals = content["settings"]["clamps_refused"]
-    if refusals:
-        bands = ", ".join(one.split(", ")[0] for one in refusals)
-        settings = ", ".join(sorted({f"`{one.split(', ')[1]}`" for one in refusals}))
-        told.append(f"With {settings} no slack part was found ({bands}): clamps are the default's.")
+    for setting in dict.fromkeys(one.split(", ")[1] for one in refusals):
+        bands = ", ".join(
+            band for band, own in (one.split(", ") for one in refusals) if own == setting
+        )
+        told.append(f"With `{setting}` no clamps can be calibrated ({bands}): the default's serve.")
     lines = [*table(figures, WORDS, METHODS), "", " ".join(told)]
     return begin + "\n".join(lines) + "\n" + end
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from app import __version__
-from pipeline.base.errors import UserError
+from pipeline.base.errors import UserError, printable
 
 Done = str | tuple[str, int]  # what to print, and an exit status that is not 0
 EXITS = {
@@ -74,7 +74,7 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         if "--draw: expected one argument" in message:
             message += ", joined by = because it begins with -: --draw=-0.30,-0.17"
-        self.exit(2, f"error: {message} (see `{self.prog} --help`)\n")
+        self.exit(2, f"error: {printable(message)} (see `{self.prog} --help`)\n")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -111,7 +111,7 @@ def execute(arguments: argparse.Namespace) -> int:
         with contextlib.redirect_stdout(sys.stderr):
             done = arguments.command(arguments)
     except Refusal as refusal:
-        print(f"error: {refusal}", file=sys.stderr)
+        print(f"error: {printable(str(refusal))}", file=sys.stderr)
         return REFUSED
     text, status = done if isinstance(done, tuple) else (done, 0)
     print(text)

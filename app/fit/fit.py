@@ -14,7 +14,7 @@ from app.fit.countdown import Countdown
 from app.flow import child
 from app.preflight.add_band import NAME, add_band
 from app.preflight.recordings import add_recording, digests, renew_masks
-from pipeline.base.errors import UserError
+from pipeline.base.errors import UserError, printable
 from pipeline.base.launch_table import expect_apart, file_of
 from pipeline.base.layout import Layout
 from pipeline.params import Params, load
@@ -68,7 +68,7 @@ def fit(
     expect_apart(layout, name)
     evidence.joined(layout, name, told, again=True)  # what is wrong is said before any change
     if recordings:
-        say(f"checking {', '.join(map(str, recordings))}")
+        say(printable(f"checking {', '.join(map(str, recordings))}"))
         say(brought_in(params, layout, recordings, name, band))
         params = load(root / "params.yaml")
     expect_running(params, name)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from app.preflight.check import check_recording
 from app.preflight.report import CheckReport
-from pipeline.base.errors import UserError
+from pipeline.base.errors import UserError, printable
 from pipeline.base.files import replacing, replacing_folder
 from pipeline.base.layout import Layout
 from pipeline.params import Params, expect_known, load
@@ -109,7 +109,7 @@ def told(done: str, reports: Sequence[CheckReport]) -> str:
     lines = []
     for report in reports:
         for pull in report.pulls:
-            name = Path(report.path).name
+            name = printable(Path(report.path).name)
             name += f", pull {pull.number}" if len(report.pulls) > 1 else ""
             said = f"peak force {pull.peak_force_n:.2f} N, release at {pull.release_s:.3f} s"
             lines.append(f"  {name}: {said if pull.usable else f'left out, {pull.verdict}'}")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 
+from pipeline.base.errors import printable
+
 
 @dataclass
 class Topic:
@@ -136,7 +138,8 @@ class CheckReport:
 
     def to_text(self) -> str:
         """The verdict, what it rests on, and then everything else."""
-        lines = [f"{self.path}  sha256 {self.sha256[:16]}", "", *self._verdict(), *self._basis()]
+        lines = [f"{printable(self.path)}  sha256 {self.sha256[:16]}", "", *self._verdict()]
+        lines += self._basis()
         lines += ["", *self.written] if self.written else []
         lines += [f"lost or mended: {loss}" for loss in self.losses]
         lines += [f"note: {note}" for note in self.notes]

@@ -3,8 +3,6 @@
 import json
 from pathlib import Path
 
-import pytest
-
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.params import load

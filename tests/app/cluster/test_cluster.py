@@ -160,7 +160,7 @@ def test_a_worker_mends_what_a_killed_one_left_in_its_copy(copies, place) -> Non
     head, other = copies
     other("dvc", "repro", "-q", "search@b")
     lock = other.folder / "dvc.lock"
-    lock.write_text(lock.read_text()[:-30])
+    lock.write_text(lock.read_text().rpartition(":")[0])  # a word that ends nothing
     ran, _ = run(place(other.folder), "search@a")
     assert ran and (head.folder / "data/search/a").is_file()
 

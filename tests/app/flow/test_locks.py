@@ -105,6 +105,6 @@ def test_a_fit_mends_a_dvc_lock_that_is_cut_off(toy: Toy) -> None:
     assert toy.dvc("repro") == {"one", "two"}
     path = toy.folder / "dvc.lock"
     whole = path.read_text()
-    path.write_text(whole[: whole.index("  two:\n") + 30])
+    path.write_text(whole[: whole.rindex("deps:") + 4])
     child.repro(toy.folder, "two", print)
     assert path.read_text() == whole

@@ -17,8 +17,10 @@ import shutil
 import time
 from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
+from threading import Lock
 
 from pipeline.base import errors
 from pipeline.base.errors import UserError
@@ -57,7 +59,7 @@ class StruckLines:
     """StruckLines of JSON in a file; the last may be cut short, where the campaign was stopped."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        self.path, self._lock = path, Lock()
         self.all: list[dict] = []
         for line in path.read_text().splitlines() if path.exists() else []:
             try:
@@ -72,8 +74,8 @@ class StruckLines:
 
     def add(self, what: str, name: str, disturbance: str, result: dict) -> None:
         line = {"what": what, "name": name, "by": disturbance, **result}
-        self.all.append(line)
-        with self.path.open("a") as file:
+        with self._lock, self.path.open("a") as file:
+            self.all.append(line)
             file.write(f"\n{json.dumps(line)}\n")
 
 
@@ -174,6 +176,27 @@ def shares(count: int, names: list[str]) -> dict[str, int]:
     return {name: (count + place) // len(names) for place, name in enumerate(names)}
 
 
+def campaign(
+    name: str, by: str, wanted: int, work: Path, lines: StruckLines, expected: dict
+) -> None:
+    """All kills, or all full disks, of a command."""
+    copy = COMMANDS[name](work / by.replace(" ", "-") / name.replace(" ", "-"), work)
+
+    def attempt(number: int, most: int) -> dict:
+        if by == "kill":
+            return strike.struck(copy, number, most, SEED)
+        return full_disk.filled(copy, number, SEED, most > 0)
+
+    with ExitStack() as stack:
+        if by == "full disk":
+            try:
+                stack.enter_context(full_disk.small_disk(copy.disk))
+            except UserError as error:  # the report will say that it has none
+                return say(str(error))
+        stack.callback(copy.end)
+        disturb(copy, by, wanted, lines, expected.get(name, expected[ReproCopy.name]), attempt)
+
+
 def report(lines: StruckLines, kills: int, disks: int, expected: dict, names: list[str]) -> dict:
     """What the lines come to."""
     attempts = [one for one in lines.all if one["what"] == "attempt"]
@@ -235,6 +258,7 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--full-disks", type=int, default=20)
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
+    parser.add_argument("--at-once", type=int, default=2, help="commands at a time (default: 2)")
     parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
     parser.add_argument("--report", type=Path, default=REPORT)
     arguments = parser.parse_args()
@@ -248,28 +272,15 @@ def main() -> int:
         "kill": shares(arguments.kills, names),
         "full disk": shares(arguments.full_disks, names),
     }
-    for by, wanted in todo.items():
-        for name in names:
-            if not wanted[name]:
-                continue
-            place = work / by.replace(" ", "-") / name.replace(" ", "-")
-            copy = COMMANDS[name](place, work)
-            own = expected.get(name, expected[ReproCopy.name])
-            with ExitStack() as stack:
-                if by == "full disk":
-                    try:
-                        stack.enter_context(full_disk.small_disk(copy.disk))
-                    except UserError as error:  # the report will say that it has none
-                        say(str(error))
-                        break
-                stack.callback(copy.end)
-
-                def attempt(number: int, most: int, copy=copy, by=by) -> dict:
-                    if by == "kill":
-                        return strike.struck(copy, number, most, SEED)
-                    return full_disk.filled(copy, number, SEED, most > 0)
-
-                disturb(copy, by, wanted[name], lines, own, attempt)
+    with ThreadPoolExecutor(arguments.at_once) as pool:
+        asked = [
+            pool.submit(campaign, name, by, wanted[name], work, lines, expected)
+            for by, wanted in todo.items()
+            for name in names
+            if wanted[name]
+        ]
+        for one in asked:
+            one.result()
     content = report(lines, arguments.kills, arguments.full_disks, expected, names)
     command = f"python -m validation.campaigns.kills --kills {arguments.kills}"
     command += f" --full-disks {arguments.full_disks}"

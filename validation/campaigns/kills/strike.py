@@ -15,7 +15,7 @@ from tests.project import wait
 from validation.campaigns.kills.commands import StruckCopy
 
 VICTIMS = ("process", "group", "process", "command")
-LONGEST = 24.0  # s between two kills
+LONGEST = 20.0  # s between two kills
 ENDED = 1200.0  # s that a command may take without further kills
 
 

@@ -11,7 +11,7 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 
 from app.drift.change import ChangeOfBand
 from app.drift.recordings import IdentifiedRecording
-from pipeline.base.errors import printable
+from app.labels import as_label
 from pipeline.drawing.canvas import key, mark, picture
 from pipeline.drawing.styles import INK, KNOWN
 
@@ -67,7 +67,7 @@ def over_time(
     else:
         shown = range(0, len(found), -(-len(found) // NAMED))
         names = [found[i].date.removesuffix(" UTC") if dated else found[i].file for i in shown]
-        ax.set_xticks([places[i] for i in shown], map(printable, names), parse_math=False)
+        ax.set_xticks([places[i] for i in shown], map(as_label, names))
         if sum(map(len, names)) > LINE:
             ax.tick_params(axis="x", rotation=30)
     ax.set_xlabel("time of the recording (UTC)" if dated else "recording, by its file's name")

@@ -9,9 +9,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from app.labels import as_label
 from app.preflight.check import Look
 from app.preflight.output import expect_writable
-from pipeline.base.errors import printable
 from pipeline.base.files import replacing
 from pipeline.drawing.styles import COLORS, INK, THEME
 from pipeline.recording.build import Processed
@@ -60,8 +60,8 @@ def draw_sheet(look: Look, params: object, path: Path) -> str:
         else:
             _raw(figure, look.recording)
         verdict = look.report.verdict.removesuffix(", but:")
-        title = f"{printable(Path(look.report.path).name)}: {verdict}"
-        figure.suptitle(title, fontsize=12, wrap=True, parse_math=False)
+        title = as_label(f"{Path(look.report.path).name}: {verdict}")
+        figure.suptitle(title, fontsize=12, wrap=True)
         with replacing(path) as temporary:
             figure.savefig(temporary, format="png", metadata={"Software": None})
         plt.close(figure)

@@ -294,3 +294,11 @@ def test_any_damaged_text_is_accepted_or_refused_in_one_line(data: st.DataObject
         assert isinstance(parse(text), Params)
     except UserError as error:
         assert "\n" not in str(error)
+
+
+def test_names_with_control_characters_or_markup_are_refused_in_one_printable_line() -> None:
+    """A prompt and a topic may be any text; what shows them cares for itself."""
+    for place in (("bands",), ("methods",), ("setup",), ("setup", "topics")):
+        value = next(one for path, one in leaves(CONTENT) if path[: len(place)] == place)
+        for name in ("x\x1b[2J", "<script>", "../x", "a\nb", "$x$"):
+            assert refusal(changed((*place, name), value)).isprintable()

@@ -1,10 +1,12 @@
 """Tables of what was identified, against values by hand."""
 
+import re
 from types import SimpleNamespace
 
 import pytest
 
 from pipeline.drawing.styles import styles
+from pipeline.report.tables.cells import markdown
 from pipeline.report.tables.identified import (
     derived,
     held_out,
@@ -14,6 +16,7 @@ from pipeline.report.tables.identified import (
     recordings,
 )
 from pipeline.report.tables.policies import policies
+from tests.hostile import MARKUP
 from tests.report.conftest import BAND, METHOD, episode
 from tests.report.tables.toy_results import launches
 from tests.report.tables.toy_results import result as one
@@ -142,3 +145,13 @@ def test_policies_stand_with_their_errors() -> None:
     assert first[1:3] == ["Sling2Sim2Real", "**no**"]
     assert first[3:] == ["0.40", "1.00", "2", "0.03", "–"]
     assert other[2:4] == ["yes", "–"]
+
+
+@pytest.mark.parametrize("name", MARKUP)
+def test_a_file_of_any_name_has_one_cell(results, named, name) -> None:
+    about = results.methods[BAND][METHOD].theta["confidence"]
+    about["recordings"][0]["source"] = {"file": name}
+    heads, rows = recordings(results, named)
+    text = markdown((heads, rows))
+    assert text.replace("\n", "").isprintable() and text.count("\n") == 2 + len(rows)
+    assert len(re.findall(r"(?<!\\)\|", text.splitlines()[2])) == len(heads) + 1

@@ -199,4 +199,7 @@ def _server(root: Path, port: int) -> Iterator[subprocess.Popen]:
             process.wait(guard.GRACE + 5)
         except subprocess.TimeoutExpired:
             process.kill()
-            process.wait()
+        if process.wait() < 0:  # the guard was killed: a server that just starts may be deaf
+            first = _log(root).read_text(encoding="utf-8", errors="replace").partition("\n")[0]
+            if first.isdecimal():
+                guard.end_group(int(first), guard.GRACE)

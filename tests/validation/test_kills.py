@@ -105,7 +105,7 @@ print(subprocess.run([sys.executable, "-c", code, "stages.floor"], stderr=subpro
 
 
 def test_a_command_is_struck_and_what_lives_on_is_a_fault(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(strike, "LONGEST", 2.0)
+    monkeypatch.setattr(strike, "MEAN", 0.5)
     monkeypatch.setattr(strike, "PROMPT", 0.2)
     monkeypatch.setattr(strike, "VICTIMS", ("command",))
     one = strike.struck(Sleeper(tmp_path), 0, 3, 1)
@@ -143,7 +143,7 @@ def test_a_small_disk_is_filled_to_the_bytes_that_are_to_stay_free(disk: Path) -
 
 
 def test_a_command_that_is_quiet_about_a_full_disk_is_a_fault(disk: Path, monkeypatch) -> None:
-    monkeypatch.setattr(full_disk, "LONGEST", 0.0)
+    monkeypatch.setattr(full_disk, "MEAN", 0.0)
     said = full_disk.filled(Sleeper(disk.parent, 0, write=True), 0, 1, True)
     assert said["status"] == 0 and said["full_after_s"] is not None  # its child's failure is lost
     quiet = Sleeper(disk.parent)

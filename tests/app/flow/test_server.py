@@ -18,7 +18,7 @@ import pytest
 from app.flow import server
 from pipeline.base.errors import UserError
 from tests.app.flow.serving import SECONDS, ask, serving
-from tests.project import ROOT, until
+from tests.project import ROOT, alive, until
 
 HERE = Path(__file__).parent
 # Prefect's own reading of every setting, in a process that knows only our environment.
@@ -125,6 +125,25 @@ def test_a_port_that_another_program_has_is_refused(tmp_path: Path, monkeypatch)
             server.serve(tmp_path, port)
     with pytest.raises(UserError, match="--port"):
         server.serve(tmp_path, 70000)
+
+
+def test_a_deaf_server_whose_guard_was_killed_ends_all_the_same(tmp_path, monkeypatch) -> None:
+    """As one is that has just begun to start."""
+    deaf = "import pathlib, signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN)"
+    (tmp_path / "prefect").mkdir()
+    (tmp_path / "prefect/__init__.py").touch()
+    (tmp_path / "prefect/__main__.py").write_text(
+        f"{deaf}; pathlib.Path(__file__).with_name('ready').touch(); time.sleep(60)"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(server, "_home_at", lambda port: server.home(tmp_path))
+    monkeypatch.setattr(server.guard, "GRACE", 0.5)
+    with server._server(tmp_path, 1) as guard:
+        until((tmp_path / "prefect/ready").exists)
+        pid = int((tmp_path / ".prefect/server.log").read_text().split()[0])
+        guard.kill()
+        assert alive(pid)
+    until(lambda: not alive(pid), 5)
 
 
 def listening(pid: int) -> set[tuple[str, int]]:

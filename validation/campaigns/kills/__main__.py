@@ -229,7 +229,7 @@ def report(lines: StruckLines, kills: int, disks: int, expected: dict, names: li
             "kills": kills,
             "full_disks": disks,
             "seed": SEED,
-            "latest_s": {"kill": strike.LONGEST, "full disk": full_disk.LONGEST},
+            "mean_s": {"kill": strike.MEAN, "full disk": full_disk.MEAN},
             "disk": f"tmpfs of {full_disk.SIZE} MB, mounted by root; at most {full_disk.ROOM} bytes"
             " of it stay free until the command has ended",
             "budget": BUDGET,

@@ -21,7 +21,7 @@ from validation.campaigns.kills.strike import chance
 
 SIZE = 300  # MB
 ROOM = 100_000  # bytes at most that stay free
-LONGEST = 40.0  # s from the command's begin until the disk is full
+MEAN = 20.0  # s from the command's begin until the disk is full
 ENDED = 300.0  # s in which a command must notice
 SAYS = ("No space left on device", "disk is full", "disk full")
 
@@ -69,7 +69,7 @@ def filled(copy: StruckCopy, number: int, seed: int, full: bool) -> dict:
     command, start, since = copy.start(), time.monotonic(), None
     ended = lambda: command.poll() is not None  # noqa: E731
     faults = []
-    if full and not wait(ended, rng.uniform(0, LONGEST)):
+    if full and not wait(ended, rng.exponential(MEAN)):
         since = round(time.monotonic() - start, 1)
         fill(ballast, free)
         while not wait(ended, 0.2):

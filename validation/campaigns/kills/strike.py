@@ -15,7 +15,7 @@ from tests.project import wait
 from validation.campaigns.kills.commands import StruckCopy
 
 VICTIMS = ("process", "group", "process", "command")
-LONGEST = 20.0  # s between two kills
+MEAN = 15.0  # s until a kill, at any moment as likely
 ENDED = 1200.0  # s that a command may take without further kills
 
 
@@ -77,7 +77,7 @@ def struck(copy: StruckCopy, number: int, most: int, seed: int) -> dict:
     rng = chance(copy, number, seed)
     command, kills, start = copy.start(), [], time.monotonic()
     ended = lambda: command.poll() is not None  # noqa: E731
-    while len(kills) < most and not wait(ended, rng.uniform(0, LONGEST)):
+    while len(kills) < most and not wait(ended, rng.exponential(MEAN)):
         victim = VICTIMS[rng.integers(len(VICTIMS))]
         if hit := strike(copy.run, command, victim, rng):
             after = round(time.monotonic() - start, 1)

@@ -26,7 +26,7 @@ def measured(
     """
     log.parent.mkdir(parents=True, exist_ok=True)
     before, busy = getrusage(RUSAGE_CHILDREN), _busy()
-    start, peak, seen = time.perf_counter(), 0, {}
+    start, peak, seen = time.perf_counter(), 0, []
     with log.open("wb") as file:
         process = psutil.Popen(
             words, cwd=cwd, env=surroundings, stdin=subprocess.DEVNULL, stdout=file,
@@ -35,8 +35,8 @@ def measured(
         status = None
         try:
             while status is None:
-                seen |= {one.pid: one for one in _family(process, [*seen.values()])}
-                peak = max(peak, sum(map(_memory, seen.values())))
+                seen = _family(process, seen)
+                peak = max(peak, sum(map(_memory, seen)))
                 with suppress(psutil.TimeoutExpired):
                     status = process.wait(every)
         except BaseException:
@@ -62,13 +62,15 @@ def _busy() -> float:
 
 def _family(process: psutil.Process, seen: Iterable[psutil.Process]) -> list[psutil.Process]:
     """A process and its descendants, with those whose parents have ended since."""
-    found = []
+    found: dict[int, psutil.Process] = {}
     for one in (process, *seen):
+        if one.pid in found:
+            continue
         try:
-            found += [one, *one.children(recursive=True)]
+            found |= {each.pid: each for each in (one, *one.children(recursive=True))}
         except psutil.NoSuchProcess:
             continue
-    return found
+    return [*found.values()]
 
 
 def _memory(process: psutil.Process) -> int:

@@ -63,7 +63,8 @@ def replaceable(folder: Path) -> bool:
         card = json.loads((folder / "card.json").read_text("utf-8"))
     except (OSError, ValueError):
         return not there
-    known = set(card.get("files", ())) if isinstance(card, dict) and "target" in card else set()
+    files = card.get("files") if isinstance(card, dict) and "target" in card else None
+    known = set(files) if isinstance(files, dict) else set()
     return there <= known | {"card.json", "README.md"} and bool(known)
 
 

@@ -1,0 +1,77 @@
+"""Files edited by hand before a command reads them: an answer, or one clear line names the file."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from app.export.export import replaceable
+from app.launch import launched
+from app.observe import known
+from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout
+from pipeline.params import load
+from tests.card.conftest import POINT, THETA, confidence, samples
+from tests.edited import edits
+
+BAND, METHOD, DRAW = "band1", "least_squares", (-0.3, -0.15)
+
+
+@pytest.fixture(scope="module")
+def params():
+    return load(Path("params.yaml"))
+
+
+@pytest.fixture
+def layout(tmp_path: Path) -> Layout:
+    """A band that was identified."""
+    layout = Layout(tmp_path)
+    theta = {"band": BAND, "method": METHOD, "law": "rubber", "theta": THETA}
+    theta |= {"history": {"pull_time": 1.4, "pause": 0.6}, "nuisances": {"air_drag": 0.3}}
+    theta |= {"turn_damping": 0.2, "returned_share": 1.0, "confidence": confidence()}
+    for path, content in (
+        (layout.theta(BAND, METHOD), theta),
+        (layout.confidence(BAND, METHOD), {"names": [*POINT], "samples": samples()[:3].tolist()}),
+        (layout.mounting(BAND), {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}),
+    ):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(content))
+    return layout
+
+
+def answers(path: Path, ask: Callable[[], dict]) -> int:
+    """How many edits of a file are answered; all others must be refused."""
+    count = 0
+    for what, edited in edits(json.loads(path.read_text())):
+        path.write_text(json.dumps(edited))
+        try:
+            json.dumps(ask() | {"warnings": []}, allow_nan=False)
+            count += 1
+        except UserError as error:
+            line = str(error)
+            assert str(path) in line and line.isprintable() and len(line) < 500, what
+        except Exception as error:
+            pytest.fail(f"{what}: {error!r}")
+    return count
+
+
+@pytest.mark.parametrize("name", ["theta", "mounting"])
+def test_launch(params, layout, name) -> None:
+    theta = layout.theta(BAND, METHOD)
+    path = theta if name == "theta" else layout.mounting(BAND)
+    assert answers(path, lambda: launched(params, BAND, theta, DRAW, layout.root)) > 0
+
+
+def test_what_observe_says_before_and_after(params, layout) -> None:
+    path = layout.confidence(BAND, METHOD)
+    assert answers(path, lambda: known(params, BAND, METHOD, DRAW, layout.root)) > 0
+
+
+def test_an_export_is_replaced_where_its_card_says_so(tmp_path: Path) -> None:
+    card = {"target": "mjcf", "files": {"toy.xml": "the chain"}}
+    path = tmp_path / "card.json"
+    (tmp_path / "mine.txt").touch()
+    for what, edited in edits(card):
+        path.write_text(json.dumps(edited))
+        assert not replaceable(tmp_path), what

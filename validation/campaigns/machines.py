@@ -178,11 +178,15 @@ def apart(told: list[MachineLandings]) -> float:
 
 
 def _comparable(report: MachineReport, what: str) -> object:
-    """Of the code, what computes: pipeline/."""
+    """Of the code, what computes: pipeline/ without what it prints, stores and starts by."""
     value = getattr(report, what)
     if what != "code":
         return value
-    return {part: digest for part, digest in value.items() if part.startswith("pipeline/")}
+    return {
+        part: digest
+        for part, digest in value.items()
+        if part.startswith("pipeline/") and part != "pipeline/base"
+    }
 
 
 def outputs(lock: Path) -> dict[str, str]:

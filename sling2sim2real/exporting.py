@@ -43,7 +43,7 @@ def export(model: Model, to: str, out: str | Path, *, episode: Episode | None = 
     Args:
         model: From `identify`, or written by hand.
         to: `mjcf` for MuJoCo, which must be installed (extra `validation`); `yaml` for plain
-            numbers; `usd` for PhysX, which nobody has run there.
+            numbers; `usd` for PhysX, to be matched there.
         out: Folder; what an export wrote there before is replaced.
         episode: Whose pull is compared in both; None: a planned one.
 

@@ -32,7 +32,7 @@ EDGES, GRADING = 52, 1.0  # between the clamps: 18 tetrahedra each
 
 
 def to_usd(model: Model, folder: Path, episode: Episode | None) -> dict:
-    """<band>.usda, and README.md: what it is, and that nobody has run it."""
+    """<band>.usda, and README.md: what it is, and what it is not."""
     draws = draws_of(model)
     tension, stretch = SpringChain.tension(model, draws, model.launches(draws).hold_force)
     poisson = model.theta.poissons_ratio

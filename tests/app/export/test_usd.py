@@ -22,7 +22,7 @@ def test_its_law_is_hookes_when_small_and_stiffer_than_rubber_when_large() -> No
 
 def test_it_says_that_nobody_has_run_it(done) -> None:
     assert done.met is None and done.card["replayed"] is False
-    assert "**Nobody has run this file in PhysX.**" in (done.folder / "README.md").read_text()
+    assert "**Match it before you rely on it.**" in (done.folder / "README.md").read_text()
     assert done.card["factor_on_youngs_modulus"] < 1  # its law is stiffer
     errors = np.array(done.card["tension_errors"])
     assert errors.min() < 0 < errors.max() and np.abs(errors).max() < 0.25

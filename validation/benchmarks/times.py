@@ -38,6 +38,7 @@ BAND = "timed"  # of the recording
 CHANGES = ("PYTHONPATH", "VIRTUAL_ENV", "UV_CACHE_DIR", "PIP_CACHE_DIR", "WARP_CACHE_PATH")
 STAGE = re.compile(r"^([a-z]+)(?:@[\w-]+)? \| done \((?:(\d+) min )?([\d.]+) s\)$", re.MULTILINE)
 ABLATION = re.compile("^ablation_", re.MULTILINE)
+STAGES = "record episode mounting history theta policy trials floor card report".split()
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,8 @@ def table(report: dict) -> str:
         "|---|---:|---:|---:|---|",
     ]
     rows += [_row(one) for one in done.values()]
-    took = done.get("run", {}).get("stages", {})
+    ran = done.get("run", {}).get("stages", {})
+    took = {name: ran[name] for name in sorted(ran, key=[*STAGES, *ran].index)}
     lines = [
         BEGIN.rstrip(),
         f"Measured on {report['cores']} cores of an {report['device_name']}, no GPU, of which other"

@@ -177,7 +177,7 @@ def table(report: dict) -> str:
 def _row(one: dict) -> str:
     if not one["ok"]:
         return f"| {one['what']} | {one.get('skipped') or 'failed: ' + one['why']} | | | |"
-    parts = [f"`{name}` {_size(size)}" for name, size in one["disk_bytes"].items()]
+    parts = [f"`{name}` {_size(size)}" for name, size in sorted(one["disk_bytes"].items())]
     cells = [
         one["what"],
         _duration(one["seconds"]),

@@ -3,10 +3,11 @@
     python -m validation.engines.physx.search band1 [--params FILE] [--landings CSV]
 
 The paper's method with the budget of params.yaml, once with `engine: physx` and once with ours:
-same episode, clamps, loss, optimisers and seed. Then each theta* in both engines, and launches of
-both in ours. Writes reports/validation/physx-<band>.json; then, into the same file, launches of
-both in both, in PhysX also with steps that are finer. What was simulated is kept in .checkpoints,
-so that a search that was killed goes on. SLING_DEVICE names the device of ours.
+same episode, clamps, loss, optimisers and seed. Then each theta* in both engines, and launches with
+both in ours, whose arm gives way. Writes reports/validation/physx-<band>.json; then, into the same
+file, launches with both in both engines, where no arm gives way, in PhysX also with finer steps.
+What was simulated is kept in .checkpoints, so that a search that was killed goes on. SLING_DEVICE
+names the device of ours.
 """
 
 from __future__ import annotations
@@ -141,7 +142,9 @@ def main() -> None:
     parser.add_argument("--landings", help="CSV of measured launches of this band")
     asked = parser.parse_args()
     params, version = load(asked.params), release()
-    about = environment(devices()[0], f"python -m validation.engines.physx.search {asked.band}")
+    command = f"python -m validation.engines.physx.search {asked.band}"
+    command += " --landings CSV" if asked.landings else ""
+    about = environment(devices()[0], command)
     if asked.landings:
         table = pd.read_csv(asked.landings)
         draws, measured = table[["draw_y_m", "draw_z_m"]].to_numpy(), table.landing_y_m

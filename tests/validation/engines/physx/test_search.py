@@ -26,7 +26,8 @@ def searched(tmp_path, monkeypatch):
     monkeypatch.setattr(search.Comparison, "search", found)
     monkeypatch.setattr(search.Comparison, "losses", lambda self, thetas: {})
     monkeypatch.setattr(search, "release", lambda: "0")
-    monkeypatch.setattr(search, "environment", lambda *about: {"versions": {}})
+    about = {"versions": {}}
+    monkeypatch.setattr(search, "environment", lambda _, command: about | {"command": command})
     monkeypatch.setattr(sys, "argv", ["search", "band1", "--params", str(ROOT / "params.yaml")])
     monkeypatch.chdir(tmp_path)
     return tmp_path / "reports/validation/physx-band1.json"
@@ -86,3 +87,19 @@ def test_what_physx_lands_stands_with_its_theta_and_draw(searched, monkeypatch):
                 done = row[f"{name}_by_theta_of"][key]
                 assert done["landing_m"] == pytest.approx(theta[0] + row["draw_m"][0] + rate)
                 assert done["energy_gained"] is None and done["failure"] is None
+
+
+def test_measured_landings_stand_beside_their_draws(searched, monkeypatch, tmp_path):
+    def none(*_, **__):
+        raise UserError("PhysX: it fell over")
+
+    monkeypatch.setattr(search, "Engine", none)
+    table = tmp_path / "landings.csv"
+    table.write_text("draw_y_m,draw_z_m,landing_y_m\n-0.30,-0.17,2.2\n-0.32,-0.20,3.1\n")
+    monkeypatch.setattr(sys, "argv", [*sys.argv, "--landings", str(table)])
+    search.main()
+    content = json.loads(searched.read_text())
+    assert content["command"].endswith("search band1 --landings CSV")
+    for rows in (content["launches"]["draws"], content["launches_in_our_simulator"]):
+        told = [(*row["draw_m"], row["measured_m"]) for row in rows]
+        assert told == [(-0.30, -0.17, 2.2), (-0.32, -0.20, 3.1)]

@@ -137,8 +137,8 @@ class CheckReport:
         return json.dumps(content, indent=2, allow_nan=False)
 
     def to_text(self) -> str:
-        """The verdict, what it rests on, and then everything else."""
-        lines = [f"{printable(self.path)}  sha256 {self.sha256[:16]}", "", *self._verdict()]
+        """The verdict, what it rests on, and then everything else; names may be of any letters."""
+        lines = [f"{self.path}  sha256 {self.sha256[:16]}", "", *self._verdict()]
         lines += self._basis()
         lines += ["", *self.written] if self.written else []
         lines += [f"lost or mended: {loss}" for loss in self.losses]
@@ -148,7 +148,7 @@ class CheckReport:
             facts = getattr(self, title)
             if facts:
                 lines += ["", title, *(f"  {k:<22}{_shown(v)}" for k, v in facts.items())]
-        return "\n".join([*lines, "", *_topics(self.topics)])
+        return "\n".join(map(printable, [*lines, "", *_topics(self.topics)]))
 
     def _basis(self) -> list[str]:
         """The numbers that tell most, in words."""

@@ -8,9 +8,10 @@ import pytest
 
 from app.preflight.check import ASSUMED, band_of, check_recording
 from app.preflight.command import check
-from app.preflight.report import Caution
+from app.preflight.report import Caution, CheckReport
 from app.preflight.verdict import cautions_of, pause
-from pipeline.base.errors import UserError
+from pipeline.base.errors import UserError, printable
+from tests.hostile import MARKUP
 from tests.project import with_
 from tests.recording.bag import RADIUS, START, Truth, blind_bag, edit, head, write_bag
 
@@ -245,3 +246,14 @@ def test_the_whole_command(seen, params, tmp_path) -> None:
     content = json.loads(text)
     assert status == 0 and content["usable"] and sheet.exists()
     assert str(sheet) in content["written"][0] and "band1" in content["band"]["source"]
+
+
+@pytest.mark.parametrize("name", MARKUP)
+def test_a_name_of_any_letters_has_nothing_that_a_terminal_obeys(name: str) -> None:
+    """Also where an error names what lies beside the recording."""
+    problem, written = f"{name}.masks: there is no such folder", [f"{name}.png: six moments"]
+    lines = CheckReport(name, "", problem, [], [], written=written).to_text().split("\n")
+    assert all(line.isprintable() for line in lines)
+    shown = printable(name)
+    assert f"cannot be used: {shown}.masks: there is no such folder" in lines
+    assert f"{shown}.png: six moments" in lines

@@ -133,3 +133,9 @@ if "validation.campaigns.outcomes" in sys.orig_argv:
     (fault,) = mutations.faults(found)
     assert fault["seed"] == 4 and json.dumps(fault)
     assert ("sitecustomize.py" in fault["words"]) == (end == "hang")
+
+
+def test_nothing_begins_when_the_time_is_over(tmp_path) -> None:
+    results = []
+    mutations.run(tmp_path, [("ros2", "zstd", 0, 3)], 1, results.append, end=0.0)
+    assert results == [] and (tmp_path / "ros2-zstd.mcap").exists()

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import subprocess
 import sys
@@ -27,7 +28,7 @@ from threading import Lock
 
 from pipeline.base import errors
 from pipeline.base.errors import UserError
-from pipeline.base.files import write_json
+from pipeline.base.files import replacing, write_json
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import cores
 from validation.benchmarks.timing import environment
@@ -52,7 +53,8 @@ def key(result: Result) -> tuple[str, str, int]:
 def shares(count: int, done: set[tuple]) -> list[tuple[str, str, int, int]]:
     """Family, container, first seed and the one behind the last, of what is not done.
 
-    Every family is in every container as often, or once more.
+    Every family is in every container as often, or once more. Low seeds come first, so that a run
+    that is stopped has some of each.
     """
     cells = [(family, container) for family in FAMILIES for container in CONTAINERS]
     found = []
@@ -64,10 +66,16 @@ def shares(count: int, done: set[tuple]) -> list[tuple[str, str, int, int]]:
             end = min(end, SHARE)
             found.append((*cell, todo[0], todo[0] + end))
             todo = todo[end:]
-    return found
+    return sorted(found, key=lambda one: one[2] // SHARE)
 
 
-def run(folder: Path, parts: list[tuple], workers: int, told: Callable[[Result], None]) -> None:
+def run(
+    folder: Path,
+    parts: list[tuple],
+    workers: int,
+    told: Callable[[Result], None],
+    end: float = math.inf,
+) -> None:
     """Run shares, each in a process of its own, and tell of each recording.
 
     Args:
@@ -75,13 +83,19 @@ def run(folder: Path, parts: list[tuple], workers: int, told: Callable[[Result],
         parts: Of `shares`.
         workers: Processes at once.
         told: Called with each result, in threads.
+        end: When to stop, of time.monotonic() [s].
     """
     for family, container in {part[:2]: None for part in parts}:
-        write_small(folder / f"{name_of(family, container)}.mcap", family, container)
+        original = folder / f"{name_of(family, container)}.mcap"
+        if not original.exists():
+            with replacing(original) as temporary:
+                write_small(temporary, family, container)
 
     def work(part: tuple) -> None:
-        for result in _results(folder, *part):
+        for result in _results(folder, *part) if time.monotonic() < end else ():
             told(result)
+            if time.monotonic() > end:
+                break
 
     with ThreadPoolExecutor(workers) as pool:
         for _ in pool.map(work, parts):
@@ -103,10 +117,15 @@ def _results(folder: Path, family: str, container: str, first: int, end: int) ->
                 stderr=said,
                 text=True,
             )
-            for started in map(json.loads, process.stdout):
-                if "outcome" in started:
-                    yield started
-                    first = started["seed"] + 1
+            try:
+                for started in map(json.loads, process.stdout):
+                    if "outcome" in started:
+                        yield started
+                        first = started["seed"] + 1
+            except GeneratorExit:  # the time is over
+                process.kill()
+                process.wait()
+                raise
         if process.wait() and first < end:
             if started is None:
                 raise RuntimeError(f"{' '.join(map(str, command))}: {log.read_text()}")
@@ -193,6 +212,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=20_000, help="recordings (default: 20000)")
     parser.add_argument("--workers", type=int, default=cores(), help="processes (default: cores)")
+    parser.add_argument("--minutes", type=float, default=1e4, help="then stop and report")
     parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
     parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
     args = parser.parse_args()
@@ -213,7 +233,7 @@ def main() -> None:
             failed = len(faults(list(ledger.results.values())))
             print(f"{len(ledger.results)}, {minutes:.1f} min: {failed} faults", flush=True)
 
-    run(ledger.path.parent, parts, args.workers, told)
+    run(ledger.path.parent, parts, args.workers, told, start + 60 * args.minutes)
     results = [ledger.results[one] for one in sorted(ledger.results)]
     command = f"python -m validation.campaigns.mutations --count {args.count}"
     args.report.parent.mkdir(parents=True, exist_ok=True)

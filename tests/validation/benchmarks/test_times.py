@@ -62,7 +62,7 @@ def test_a_command_has_a_status_times_and_the_memory_of_its_children(tmp_path: P
     words = [sys.executable, "-c", work]
     found = measured(words, tmp_path, bench.surroundings(tmp_path), log, every=0.05)
     assert found["status"] == 3 and log.read_text() == "said\n"
-    assert 0.5 <= found["cpu_seconds"] < 1.5 and 0 <= found["others_share"] <= 1
+    assert found["cpu_seconds"] >= 0.5 and 0 <= found["others_share"] <= 1
 
 
 def test_the_disk_counts_a_file_with_two_names_once(tmp_path: Path) -> None:

@@ -16,11 +16,12 @@ import pytest
 
 from pipeline.base.errors import UserError
 from tests.app.flow.killing import Run
-from tests.project import until
+from tests.project import ROOT, until
 from validation.campaigns.kills import __main__ as campaign
 from validation.campaigns.kills import compare, full_disk, strike
 from validation.campaigns.kills.__main__ import StruckLines, disturb, report, shares
 
+CAME_OUT = ("files", "digests", "nothing_more", "cache_whole")
 EXPECTED = {"sling flow": {"seconds": 1.0, "files": {}, "begun": {}, "locks": {}}}
 SAME = dict.fromkeys(campaign.CHECKS, True) | {"left_in_tmp": []}
 
@@ -206,3 +207,16 @@ def test_disturbing_goes_on_where_it_was_and_ends_well(tmp_path: Path, monkeypat
 def test_kills_are_shared_out_evenly() -> None:
     assert sum(shares(100, ["a", "b", "c"]).values()) == 100
     assert shares(20, ["a", "b", "c", "d"]) == dict.fromkeys("abcd", 5)
+
+
+def test_the_docs_say_what_was_counted() -> None:
+    found = json.loads((ROOT / "reports/validation/kills.json").read_text(encoding="utf-8"))
+    counts = found["figures"]
+    page = " ".join((ROOT / "docs/flow.md").read_text(encoding="utf-8").split())
+    said = f"{counts['kills']} kills at random moments over `dvc repro`, `sling flow`, `sling fit`"
+    assert said in page and f"and {counts['full_disks']} disks that became full" in page
+    assert all(one[check] for one in counts["rounds"] for check in CAME_OUT)
+    assert all("Prefect's server does not start" in one["fault"] for one in counts["faults"])
+    left = [one for one in counts["rounds"] if not (one["no_temporaries"] and one["no_locks"])]
+    assert found["met"] is not bool(left or counts["faults"])
+    assert ("Two things were amiss there" in page) is not found["met"]

@@ -282,6 +282,8 @@ def main() -> int:
         for one in asked:
             one.result()
     content = report(lines, arguments.kills, arguments.full_disks, expected, names)
+    for one in content["figures"]["faults"]:  # wherever it ran
+        one["fault"] = one["fault"].replace(str(work), "WORK")
     command = f"python -m validation.campaigns.kills --kills {arguments.kills}"
     command += f" --full-disks {arguments.full_disks}"
     ran = [project / "app/cli.py", *sorted((project / "stages").glob("[a-z]*.py"))]

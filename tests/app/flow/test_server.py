@@ -146,6 +146,19 @@ def test_a_deaf_server_whose_guard_was_killed_ends_all_the_same(tmp_path, monkey
     until(lambda: not alive(pid), 5)
 
 
+def test_a_server_that_a_full_disk_keeps_from_starting_is_said_so(tmp_path, monkeypatch) -> None:
+    (tmp_path / "prefect").mkdir()
+    (tmp_path / "prefect/__init__.py").touch()
+    (tmp_path / "prefect/__main__.py").write_text("raise SystemExit(1)")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    usage = shutil.disk_usage(tmp_path)
+    for free, said in ((10_000, "No space left on device"), (10**8, "server.log says why")):
+        found = usage._replace(free=free)
+        monkeypatch.setattr(server.shutil, "disk_usage", lambda _, found=found: found)
+        with pytest.raises(UserError, match=said), server._server(tmp_path, 1):
+            pass
+
+
 def listening(pid: int) -> set[tuple[str, int]]:
     family = [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]
     sockets = [one for process in family for one in process.net_connections("inet")]

@@ -56,7 +56,7 @@ ASKED = (
 
 
 class StruckLines:
-    """StruckLines of JSON in a file; the last may be cut short, where the campaign was stopped."""
+    """Lines of JSON in a file; the last may be cut short, where the campaign was stopped."""
 
     def __init__(self, path: Path) -> None:
         self.path, self._lock = path, Lock()

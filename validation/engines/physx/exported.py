@@ -183,7 +183,8 @@ def main() -> None:
         rows = compared(band, launches, stiffness, engine)
     content = {"asked": ASKED, "met": met(rows), "band": name, "matched": card["matched"]}
     write_json(REPORT, content | {"draws": rows} | about)
-    worst = max((abs(one["hold_force_error"] or 1.0) for one in rows), default=np.nan)
+    errors_there = [one["hold_force_error"] for one in rows]
+    worst = max((np.inf if one is None else abs(one) for one in errors_there), default=np.nan)
     print(f"{REPORT}: {len(rows)} draws, held force off by at most {100 * worst:.1f} %")
 
 

@@ -55,7 +55,7 @@ def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
     """
     told = theta.get("confidence") or {}
     intervals = {**told.get("derived", {}), **told.get("parameters", {})}
-    known = theta["theta"] | {"air_drag": theta.get("nuisances", {}).get("air_drag", 0.0)}
+    known = theta["theta"] | {"air_drag": theta.get("nuisances", {}).get("air_drag") or 0.0}
     known |= {name: theta[name] for name in EXTRA if name in theta}
     if not told:  # nothing was searched but θ
         known = theta["theta"]

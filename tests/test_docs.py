@@ -227,9 +227,20 @@ def imported(node: ast.AST) -> list[tuple[str, str]]:
     )
 
 
-def test_readme_is_short_and_its_results_are_those_of_the_report() -> None:
+def changed(name: str) -> bool:
+    """Whether a file is another than the one that is checked out."""
+    git = ["git", "-C", str(ROOT), "diff", "--quiet", "HEAD", "--", name]
+    return subprocess.run(git, capture_output=True).returncode == 1
+
+
+def test_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 160
+
+
+def test_readme_has_the_results_of_the_report() -> None:
+    if changed("reports/README.md") and not changed("README.md"):
+        pytest.skip("reports/ are of a run of your own, README's results of the committed one")
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert len(readme.splitlines()) <= 160
     report = (ROOT / "reports/README.md").read_text(encoding="utf-8")
     summary = json.loads((ROOT / "reports/summary.json").read_text(encoding="utf-8"))
     wanted = {}

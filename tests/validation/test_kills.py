@@ -41,9 +41,11 @@ def test_half_files_and_what_is_left_are_seen(tmp_path: Path) -> None:
     assert sorted(whole) == ["data/a/b.json", "reports/c.md"]
     (tmp_path / "data/a/b.json").write_text("who")
     (tmp_path / "data/a/.b.json.17.tmp").write_text("who")
+    (tmp_path / "reports/.d.17.tmp").mkdir()
+    (tmp_path / "reports/.d.17.tmp/e.md").write_text("who")
     assert compare.halves(tmp_path, whole) == ["data/a/b.json"]
     assert compare.halves(tmp_path, whole, compare.contents(tmp_path)) == []
-    assert compare.temporaries(tmp_path) == ["data/a/.b.json.17.tmp"]
+    assert compare.temporaries(tmp_path) == ["data/a/.b.json.17.tmp", "reports/.d.17.tmp"]
     (tmp_path / "data/a/b.json").unlink()
     (tmp_path / "data/new.json").write_text("")
     assert compare.halves(tmp_path, whole) == ["data/new.json"]

@@ -25,13 +25,13 @@ LOCKS = (".dvc/tmp/lock", ".dvc/tmp/rwlock.lock", ".dvc/tmp/flow.lock")
 
 
 def contents(folder: Path) -> dict[str, str]:
-    """Digest of every file of a working copy, by its path, but those that are half a file by name.
+    """Digest of every file of a working copy, by its path, but temporaries (half by name).
 
     DVC's own, Git's, Python's and Prefect's files and what searches keep do not count.
     """
     found = {}
     for at, folders, names in os.walk(folder):
-        folders[:] = [one for one in folders if one not in PASSING]
+        folders[:] = [one for one in folders if not (one in PASSING or one.endswith(".tmp"))]
         for name in names:
             if name not in ELSEWHERE and not name.endswith(".tmp"):
                 file = Path(at, name)

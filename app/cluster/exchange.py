@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.flow import child
+from app.flow.disk import expect_room
 from pipeline.base.errors import UserError, one_line
 from pipeline.base.files import write_text
 
@@ -164,6 +165,7 @@ def transfer(
         root, (command, *force, *stages), environment=os.environ, cancelled=cancelled
     )
     if status:
+        expect_room(root)  # `dvc pull` names the file alone
         text = "\n".join(said)
         why = one_line(text.partition("ERROR: ")[2] or text)
         raise UserError(

@@ -10,22 +10,20 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import shutil
 import socket
 import subprocess
 import sys
 import time
 import urllib.request
 from collections.abc import Iterator
-from errno import ENOSPC
 from pathlib import Path
 
 from app.flow import guard
+from app.flow.disk import expect_room
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
 
 HOST, PORT = "127.0.0.1", 4200
-ROOM = 1_000_000  # bytes that a disk has at least on which a server starts
 STARTING, ASKING = 120.0, 5.0  # s, that a server may take to start, and to answer
 # What a page may load and ask: the V2 UI, to which a user may switch, would ask a counter of visits
 # on the Internet for its settings, whether or not telemetry is off.
@@ -189,8 +187,7 @@ def _server(root: Path, port: int) -> Iterator[subprocess.Popen]:
         deadline = time.monotonic() + STARTING
         while _home_at(port) != home(root):
             if time.monotonic() > deadline or process.poll() is not None:
-                if shutil.disk_usage(home(root)).free < ROOM:  # its log has no room to say so
-                    raise UserError(f"{home(root)}: cannot be written ({os.strerror(ENOSPC)})")
+                expect_room(home(root))  # its log has none to say so
                 raise UserError(f"Prefect's server does not start; {_log(root)} says why")
             time.sleep(0.2)
         for page in (home(root) / "ui").glob("*/index.html"):

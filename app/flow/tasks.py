@@ -13,6 +13,7 @@ from queue import SimpleQueue
 from threading import Event
 
 from app.flow import child, guard, reporter
+from app.flow.disk import expect_room
 from app.flow.graph import Graph, Stage
 from app.flow.scheduler import Scheduler
 from pipeline.base.errors import UserError, one_line
@@ -105,6 +106,7 @@ def perform(root: Path, scheduler: Scheduler, tasks: Tasks) -> None:
         if not (scheduler.waiting or scheduler.running or tasks.interrupted):
             say("Prefect's server went away before the end; its history lacks some of it")
         elif not tasks.interrupted:
+            expect_room(root)  # its server's answer is a bare 500
             raise UserError(
                 f"Prefect failed ({type(error).__name__}: {one_line(error)});"
                 " `dvc repro` does the same without it, one stage at a time"

@@ -118,3 +118,10 @@ def test_a_cancelled_transfer_does_not_begin(head: Copy) -> None:
 def test_a_transfer_that_fails_says_why_in_one_line(head: Copy) -> None:
     with pytest.raises(UserError, match="^[^\n]*: dvc push nothing: [^\n]*'nothing'[^\n]*$"):
         exchange.transfer(head.folder, "push", ("nothing",), lambda: False)
+
+
+def test_a_transfer_that_fails_on_a_full_disk_names_it(head: Copy, monkeypatch) -> None:
+    full = shutil.disk_usage(head.folder)._replace(free=10_000)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
+    with pytest.raises(UserError, match=f"^{head.folder}: .*No space left on device"):
+        exchange.transfer(head.folder, "push", ("nothing",), lambda: False)

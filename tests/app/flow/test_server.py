@@ -154,7 +154,7 @@ def test_a_server_that_a_full_disk_keeps_from_starting_is_said_so(tmp_path, monk
     usage = shutil.disk_usage(tmp_path)
     for free, said in ((10_000, "No space left on device"), (10**8, "server.log says why")):
         found = usage._replace(free=free)
-        monkeypatch.setattr(server.shutil, "disk_usage", lambda _, found=found: found)
+        monkeypatch.setattr(shutil, "disk_usage", lambda _, found=found: found)
         with pytest.raises(UserError, match=said), server._server(tmp_path, 1):
             pass
 

@@ -1,5 +1,6 @@
 """What becomes of a flow that Prefect ends before its time; the rest is in test_run.py."""
 
+import shutil
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -29,3 +30,21 @@ def test_a_flow_that_prefect_ends_early_is_an_error(monkeypatch: pytest.MonkeyPa
     ):
         with ends:
             tasks.perform(Path(), Scheduler(waiting, 1), SimpleNamespace(interrupted=interrupted))
+
+
+def test_prefects_failure_on_a_full_disk_is_the_disks(tmp_path, monkeypatch) -> None:
+    """Its server answers with a bare 500."""
+
+    def fails(*_) -> None:
+        raise RuntimeError("500 Internal Server Error")
+
+    for name, stub in (("_prepare", fails), ("_flush", lambda: None)):
+        monkeypatch.setattr(tasks, name, stub)
+    monkeypatch.setattr("app.flow.server.served", lambda root: nullcontext("nowhere"))
+    stage = Stage("one", "one", "", (), False)
+    usage = shutil.disk_usage(tmp_path)
+    for free, says in ((10_000, "No space left on device"), (10**8, "500 Internal")):
+        found = usage._replace(free=free)
+        monkeypatch.setattr(shutil, "disk_usage", lambda _, found=found: found)
+        with pytest.raises(UserError, match=says):
+            tasks.perform(tmp_path, Scheduler([stage], 1), SimpleNamespace(interrupted=False))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -26,6 +27,8 @@ STEPS = {  # that make a folder of another name
 
 OF_DVC = "DVC_STAGE"  # in the environment of what DVC runs
 GRACE = 5.0  # s from the interrupt to the end
+HALF = f".{22 * '?'}.tmp"  # what DVC calls a file until it has copied it to the end
+COPIES = (".dvc/cache", "data", "reports")  # where it copies to
 
 
 def arguments(*names: str) -> list[str]:
@@ -57,8 +60,18 @@ def run(main: Callable[[], int | None]) -> None:
             raise UserError("; ".join(filter(None, (str(error), remedy(error))))) from error
 
     if OF_DVC in os.environ:
+        _clear_up()
         Thread(target=_end_with_dvc, daemon=True).start()
     errors.run(explained)
+
+
+def _clear_up() -> None:
+    """What a killed `dvc repro` has copied in part, the next one leaves there for ever.
+
+    By a process of its own: no stage depends on how the flow does it.
+    """
+    if any(half for top in COPIES for half in Path(top).rglob(HALF)):
+        subprocess.run([sys.executable, "-m", "app.flow.locks"], check=False)
 
 
 def _end_with_dvc() -> None:

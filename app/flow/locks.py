@@ -1,4 +1,7 @@
-"""What killed DVC commands leave behind and DVC itself does not clear: locks, half files."""
+"""What killed DVC commands leave behind and DVC itself does not clear: locks, half files.
+
+`python -m app.flow.locks` clears up in the working directory.
+"""
 
 from __future__ import annotations
 
@@ -108,3 +111,7 @@ def _lives(holder: dict) -> bool:
     except psutil.AccessDenied:
         return True
     return holder["cmd"].partition(" ")[2] in " ".join(words)  # `python -m` renames the first
+
+
+if __name__ == "__main__":
+    mend(Path())

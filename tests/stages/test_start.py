@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from dvc.lock import Lock
 
 from pipeline.base.layout import NotMade
 from pipeline.objective.evaluate import Evaluation
@@ -174,3 +175,24 @@ start.run(main)
     dvc.kill()
     dvc.wait()
     until(lambda: not alive(pid), 30)
+
+
+def test_a_stage_clears_what_a_killed_dvc_has_copied_in_part(tmp_path: Path) -> None:
+    """Not while a DVC copies, which holds its lock then; DVC gives it up while a stage runs."""
+    locks = tmp_path / ".dvc/tmp"
+    half = ".s07oC0gt_BFYHCELvV-BVg.tmp"  # as DVC has named one
+    halves = [tmp_path / top / half for top in (".dvc/cache/files/md5/49", "data/history/band1")]
+    others = [tmp_path / "data/history/.band1.parquet.17.tmp", tmp_path / "data/half.tmp"]
+    for file in (locks / "lock", tmp_path / ".dvc/config", *halves, *others):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.touch()
+
+    def run_stage() -> list[bool]:
+        code = "from stages.start import run; run(lambda: None)"
+        done = python("-c", code, folder=tmp_path, DVC_STAGE="a")
+        assert (done.returncode, done.stderr) == (0, "")
+        return [one.exists() for one in (*halves, *others)]
+
+    with Lock(str(locks / "lock")):
+        assert run_stage() == [True, True, True, True]
+    assert run_stage() == [False, False, True, True]

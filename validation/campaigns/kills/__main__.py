@@ -156,8 +156,11 @@ def disturb(
             say(f"  fault: {fault}")
         if one["ended"]:
             same = ended(copy, expected)
-            tmp = sorted({one.name for one in (copy.place / "tmp").iterdir()})
-            lines.add("round", name, by, {"after": count, **same, "left_in_tmp": tmp})
+            left = {
+                "temporaries": [file for one in copy.copies for file in compare.temporaries(one)],
+                "left_in_tmp": sorted(one.name for one in (copy.place / "tmp").iterdir()),
+            }
+            lines.add("round", name, by, {"after": count, **same, **left})
             say(f"{name}, {by}: whole after {count}: {same}")
             going = False
         elif not disturbances(one) and one["faults"]:

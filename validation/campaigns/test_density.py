@@ -7,21 +7,29 @@ choosing the method, and by which rule.
 
 import json
 import os
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from pipeline.base.files import write_json
+from pipeline.base.machine import cores
+from pipeline.base.pool import Pool
 from pipeline.episode.episode import Episode
 from pipeline.launches.spread import landing_intervals
 from pipeline.params import load
 from pipeline.recording.build import build_episodes
 from tests.project import ROOT
 from validation import density
-from validation.campaigns.rig_scores import calibrated_clamps, result, sling_of, summary
+from validation.campaigns.rig_scores import (
+    calibrated_clamps,
+    recorded,
+    result,
+    sling_of,
+    summary,
+)
 from validation.orange import landings, with_orange
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
@@ -31,26 +39,94 @@ OURS, PAPER = "least_squares", "sling2sim2real"
 BANDS, FIVE = ("band1", "band2", "band3"), 5
 FOLDER = Path(os.environ.get("SLING_DENSITY", ROOT / ".checkpoints/density"))
 EPISODES = 240
+CORES = cores()
 RECORDINGS_OF_ORANGE = ROOT.parent / "shared/recordings"
 
 
-def results(params, seed: int, bands, numbers, method: str = OURS, **how) -> dict:
-    """Of several bands, each by each of its tuples of recordings."""
-    of = partial(with_rubbers, params, seed)
-    return {
-        band: summary([result(of, band, one, method, FOLDER, **how) for one in numbers])
-        for band in bands
+class Run(NamedTuple):
+    """Bands, each by each of its tuples of recordings.
+
+    Attributes:
+        seed: Of the rubbers.
+        known: Launches that are evidence.
+    """
+
+    seed: int
+    bands: tuple[str, ...]
+    numbers: tuple[tuple[int, ...], ...]
+    method: str = OURS
+    known: int = 0
+
+    def params(self, params):
+        """params.yaml of a recording, by its number."""
+        return partial(with_rubbers, params, self.seed)
+
+    @property
+    def folder(self) -> Path:
+        return FOLDER / str(self.seed)
+
+    def results(self, params) -> dict:
+        """Of each band; what is not there yet is made."""
+        return {
+            band: summary([self.result(params, band, one) for one in self.numbers])
+            for band in self.bands
+        }
+
+    def result(self, params, band: str, numbers: tuple[int, ...]) -> dict:
+        return result(self.params(params), band, numbers, self.method, self.folder, self.known)
+
+    def recording(self, params, band: str, number: int) -> None:
+        recorded(self.params(params)(number), band, self.folder / f"{band}_{number}")
+
+
+def one_by_one(count: int) -> tuple[tuple[int, ...], ...]:
+    return tuple((number,) for number in range(count))
+
+
+TOGETHER = (tuple(range(RECORDINGS)),)
+DEVELOPED, UNSEEN = tuple(rubbers(DEVELOP)), tuple(rubbers(SEALED))
+RUNS = {
+    **{("rig", how): Run(DEVELOP, BANDS, one_by_one(FIVE), how) for how in (OURS, PAPER)},
+    **{
+        ("develop", how): Run(DEVELOP, DEVELOPED, one_by_one(RECORDINGS), how)
+        for how in (OURS, PAPER)
+    },
+    "three": Run(DEVELOP, (*BANDS, *DEVELOPED), TOGETHER),
+    **{
+        ("launches", known): Run(DEVELOP, BANDS, one_by_one(RECORDINGS), known=known)
+        for known in (1, 3)
+    },
+    "sealed": Run(SEALED, UNSEEN, one_by_one(RECORDINGS)),
+    "sealed, three": Run(SEALED, UNSEEN, TOGETHER),
+    "sealed, a launch": Run(SEALED, UNSEEN, ((0,),), known=1),
+}
+
+
+def side_by_side(work, *lists) -> list:
+    """One process a core, each with one thread: results in order."""
+    for name in ("SLING_WORKERS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
+    with Pool(workers=CORES) as pool:
+        return list(pool.map(work, *lists))
+
+
+@pytest.fixture(scope="module")
+def results(params):
+    """Results by the names in RUNS: all are made first, then read."""
+    of_bands = [
+        (run, params, band, numbers)
+        for run in RUNS.values()
+        for band in run.bands
+        for numbers in run.numbers
+    ]
+    of_recordings = {
+        (run.seed, band, number): (run, params, band, number)
+        for run, _, band, numbers in of_bands
+        for number in numbers
     }
-
-
-def made_on() -> str:
-    """Where the folder's scores were made, if not here: about.txt in it says so."""
-    about = FOLDER / "about.txt"
-    return about.read_text().strip() if about.exists() else "as below"
-
-
-def one_by_one(count: int) -> list[tuple[int, ...]]:
-    return [(number,) for number in range(count)]
+    side_by_side(Run.recording, *zip(*of_recordings.values(), strict=True))
+    side_by_side(Run.result, *zip(*of_bands, strict=True))
+    return lambda *name: RUNS[name if len(name) > 1 else name[0]].results(params)
 
 
 def mean_size(found: dict) -> float:
@@ -65,16 +141,12 @@ def bootstrap(found: dict, count: int = 2000) -> list[float]:
     return np.quantile(drawn, [0.05, 0.95]).tolist()
 
 
-def test_the_default_is_chosen_by_the_rule(params, progress, record) -> None:
-    both = {}
-    for method in (OURS, PAPER):
-        rig = results(params, DEVELOP, BANDS, one_by_one(FIVE), method)
-        develop = results(params, DEVELOP, rubbers(DEVELOP), one_by_one(RECORDINGS), method)
-        both[method] = rig | develop
-        progress(f"  {method}: mean of |bias| {100 * mean_size(both[method]):.2f} %")
+def test_the_default_is_chosen_by_the_rule(results, progress, record) -> None:
+    both = {method: results("rig", method) | results("develop", method) for method in (OURS, PAPER)}
     ours = both[OURS]
     sizes = {method: mean_size(one) for method, one in both.items()}
-    three = results(params, DEVELOP, (*BANDS, *rubbers(DEVELOP)), [(0, 1, 2)])
+    for method, size in sizes.items():
+        progress(f"  {method}: mean of |bias| {100 * size:.2f} %")
     record(
         "density-develop",
         asked="By the rule of validation/rubbers.py least_squares is the default: the mean over"
@@ -82,26 +154,20 @@ def test_the_default_is_chosen_by_the_rule(params, progress, record) -> None:
         " 1.5 % in the mean of five recordings. All of this took part in choosing.",
         met=sizes[OURS] < sizes[PAPER]
         and all(abs(ours[band]["mean_bias"]) <= 0.015 for band in BANDS),
-        settings={"recordings": FIVE, "of_rubbers": RECORDINGS, "made_on": made_on()},
+        settings={"recordings": FIVE, "of_rubbers": RECORDINGS},
         figures={
             "mean_size_of_bias": sizes,
             "bands": both,
             "coverage_by_bands": bootstrap(ours),
-            "three_recordings": three,
-            "launches_as_evidence": {
-                known: results(params, DEVELOP, BANDS, one_by_one(RECORDINGS), known=known)
-                for known in (1, 3)
-            },
+            "three_recordings": results("three"),
+            "launches_as_evidence": {known: results("launches", known) for known in (1, 3)},
         },
     )
     assert sizes[OURS] < sizes[PAPER]
 
 
-def test_rubbers_that_were_sealed(params, progress, record) -> None:
-    bands = tuple(rubbers(SEALED))
-    one = results(params, SEALED, bands, one_by_one(RECORDINGS))
-    three = results(params, SEALED, bands, [(0, 1, 2)])
-    told = results(params, SEALED, bands, [(0,)], known=1)
+def test_rubbers_that_were_sealed(results, progress, record) -> None:
+    one = results("sealed")
     worst = max(abs(about["mean_bias"]) for about in one.values())
     progress(f"  sealed: mean of |bias| {100 * mean_size(one):.2f} %, worst {100 * worst:.2f} %")
     record(
@@ -109,15 +175,15 @@ def test_rubbers_that_were_sealed(params, progress, record) -> None:
         asked="Rubbers that took no part in choosing, run once: |bias| at most 2 % in the mean over"
         " bands and 4 % on the worst.",
         met=mean_size(one) <= 0.02 and worst <= 0.04,
-        settings={"recordings": RECORDINGS, "seed": SEALED, "made_on": made_on()},
+        settings={"recordings": RECORDINGS, "seed": SEALED},
         figures={
             "kinds": {name: about for name, (_, about) in rubbers(SEALED).items()},
             "mean_size_of_bias": mean_size(one),
             "worst": worst,
             "coverage_by_bands": bootstrap(one),
             "one_recording": one,
-            "three_recordings": three,
-            "one_launch_as_evidence": told,
+            "three_recordings": results("sealed, three"),
+            "one_launch_as_evidence": results("sealed, a launch"),
         },
     )
     assert mean_size(one) <= 0.02
@@ -173,9 +239,8 @@ def test_episodes_of_its_own_law(progress, record) -> None:
     params = load(ROOT / "params.yaml")
     kept = FOLDER / "own-law.json"
     if not kept.exists():
-        with ProcessPoolExecutor() as pool:
-            one = partial(density.own_law, params, OURS)
-            write_json(kept, list(pool.map(one, range(EPISODES))))
+        one = partial(density.own_law, params, OURS)
+        write_json(kept, side_by_side(one, range(EPISODES)))
     found = json.loads(kept.read_text())
     young, loss = (np.abs([each[name] for each in found]) for name in ("E", "loss_factor"))
     inside = [each["low"] <= each["landing"] <= each["high"] for each in found]
@@ -188,7 +253,7 @@ def test_episodes_of_its_own_law(progress, record) -> None:
         met=bool(
             0.85 <= np.mean(inside) <= 0.95 and np.median(young) <= 5e-4 and np.median(loss) <= 0.01
         ),
-        settings={"episodes": EPISODES, "flaws": density.FLAWS, "made_on": made_on()},
+        settings={"episodes": EPISODES, "flaws": density.FLAWS},
         figures={
             "coverage": np.mean(inside),
             "median_width": np.median(width),

@@ -10,7 +10,7 @@ WIDTH, IMAGE = 128, 112
 def save_tiny_sam3(folder: Path) -> None:
     """A model that finds something by any prompt."""
     import torch
-    from transformers import CLIPTokenizer, Sam3VideoConfig, Sam3VideoModel
+    from transformers import Sam3VideoConfig, Sam3VideoModel
 
     heads = {"num_attention_heads": 2, "intermediate_size": 64}
     vision = {
@@ -65,6 +65,13 @@ def save_tiny_sam3(folder: Path) -> None:
         new_det_thresh=0.0,
     )
     Sam3VideoModel(config).save_pretrained(folder)
+    save_tokenizer(folder)
+
+
+def save_tokenizer(folder: Path) -> None:
+    """One that knows two words."""
+    from transformers import CLIPTokenizer
+
     words = ("<|startoftext|>", "<|endoftext|>", "rubber</w>", "band</w>")
     vocabulary = {word: number for number, word in enumerate(words)}
     CLIPTokenizer(vocab=vocabulary, merges=[]).save_pretrained(folder)

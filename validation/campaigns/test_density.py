@@ -7,7 +7,6 @@ choosing the method, and by which rule.
 
 import json
 import os
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,7 +37,7 @@ pytestmark = pytest.mark.validation
 OURS, PAPER = "least_squares", "sling2sim2real"
 BANDS, FIVE = ("band1", "band2", "band3"), 5
 FOLDER = Path(os.environ.get("SLING_DENSITY", ROOT / ".checkpoints/density"))
-EPISODES = 240
+PARAMS, EPISODES = ROOT / "params.yaml", 240
 CORES = cores()
 RECORDINGS_OF_ORANGE = ROOT.parent / "shared/recordings"
 
@@ -57,26 +56,25 @@ class Run(NamedTuple):
     method: str = OURS
     known: int = 0
 
-    def params(self, params):
-        """params.yaml of a recording, by its number."""
-        return partial(with_rubbers, params, self.seed)
+    def params(self, recording: int):
+        """params.yaml with the rubbers, of a recording."""
+        return with_rubbers(load(PARAMS), self.seed, recording)
 
     @property
     def folder(self) -> Path:
         return FOLDER / str(self.seed)
 
-    def results(self, params) -> dict:
+    def results(self) -> dict:
         """Of each band; what is not there yet is made."""
         return {
-            band: summary([self.result(params, band, one) for one in self.numbers])
-            for band in self.bands
+            band: summary([self.result(band, one) for one in self.numbers]) for band in self.bands
         }
 
-    def result(self, params, band: str, numbers: tuple[int, ...]) -> dict:
-        return result(self.params(params), band, numbers, self.method, self.folder, self.known)
+    def result(self, band: str, numbers: tuple[int, ...]) -> dict:
+        return result(self.params, band, numbers, self.method, self.folder, self.known)
 
-    def recording(self, params, band: str, number: int) -> None:
-        recorded(self.params(params)(number), band, self.folder / f"{band}_{number}")
+    def recording(self, band: str, number: int) -> None:
+        recorded(self.params(number), band, self.folder / f"{band}_{number}")
 
 
 def one_by_one(count: int) -> tuple[tuple[int, ...], ...]:
@@ -111,22 +109,22 @@ def side_by_side(work, *lists) -> list:
 
 
 @pytest.fixture(scope="module")
-def results(params):
+def results():
     """Results by the names in RUNS: all are made first, then read."""
     of_bands = [
-        (run, params, band, numbers)
+        (run, band, numbers)
         for run in RUNS.values()
         for band in run.bands
         for numbers in run.numbers
     ]
     of_recordings = {
-        (run.seed, band, number): (run, params, band, number)
-        for run, _, band, numbers in of_bands
+        (run.seed, band, number): (run, band, number)
+        for run, band, numbers in of_bands
         for number in numbers
     }
     side_by_side(Run.recording, *zip(*of_recordings.values(), strict=True))
     side_by_side(Run.result, *zip(*of_bands, strict=True))
-    return lambda *name: RUNS[name if len(name) > 1 else name[0]].results(params)
+    return lambda *name: RUNS[name if len(name) > 1 else name[0]].results()
 
 
 def mean_size(found: dict) -> float:
@@ -235,12 +233,14 @@ def orange_episode(params, name: str):
     return Episode.load(folder / "episode")
 
 
+def own_law(number: int) -> dict:
+    return density.own_law(load(PARAMS), OURS, number)
+
+
 def test_episodes_of_its_own_law(progress, record) -> None:
-    params = load(ROOT / "params.yaml")
     kept = FOLDER / "own-law.json"
     if not kept.exists():
-        one = partial(density.own_law, params, OURS)
-        write_json(kept, side_by_side(one, range(EPISODES)))
+        write_json(kept, side_by_side(own_law, range(EPISODES)))
     found = json.loads(kept.read_text())
     young, loss = (np.abs([each[name] for each in found]) for name in ("E", "loss_factor"))
     inside = [each["low"] <= each["landing"] <= each["high"] for each in found]

@@ -59,12 +59,15 @@ class Simulated:
         frames = 100 * loss.frames(rollouts)
         self.count = {name: int(one.sum()) for name, one in chosen.items()}
         self.mean = {name: frames[:, one].mean(axis=1) for name, one in chosen.items()}
+        middle = rollouts.center_line[:, chosen["swing"], rollouts.center_line.shape[2] // 2]
+        self.reach = middle[..., 1].max(axis=1)  # beyond the fork [m]
 
 
 def by_mesh(params, band: str, episode: Episode) -> dict:
     """By mesh: the damping that each part's pictures would have, and landings.
 
-    `sensitivity_cm` is the part's share in how far the geometric term moves over DAMPINGS.
+    `sensitivity_cm` is the part's share in how far the geometric term moves over DAMPINGS;
+    `reach_m` is how far beyond the fork a picture sees the middle of the band with theta as it is.
     """
     theta = point(load_theta(Layout().theta(band, PAPER), band))
     found, slings, best = {}, {}, {}
@@ -72,17 +75,19 @@ def by_mesh(params, band: str, episode: Episode) -> dict:
         section = params.sling.model_copy(update={"mesh": mesh})
         changed = params.model_copy(update={"sling": section})
         slings[mesh] = sling_of_method(changed, band, PAPER)
-        done = Simulated(params, episode, slings[mesh], _damped(theta, DAMPINGS))
+        dampings = np.append(DAMPINGS, theta[D] * theta[S])
+        done = Simulated(params, episode, slings[mesh], _damped(theta, dampings))
         whole = sum(done.count.values())
-        best[mesh] = DAMPINGS[np.argmin(done.total)]
+        best[mesh] = dampings[np.argmin(done.total)]
         found[mesh] = {"loss": {"best_damping_s": best[mesh], "lowest": done.total.min()}} | {
             part: {
                 "pictures": done.count[part],
-                "best_damping_s": DAMPINGS[np.argmin(mean)],
+                "best_damping_s": dampings[np.argmin(mean)],
                 "sensitivity_cm": np.ptp(mean) * done.count[part] / whole,
             }
             for part, mean in done.mean.items()
         }
+        found[mesh]["reach_m"] = done.reach[-1]
     landings = {
         f"{mesh}, best damping of {whose}": landed(slings[mesh], _damped(theta, [best[whose]]))
         for mesh in MESHES

@@ -9,7 +9,7 @@ from pipeline.episode.signal import cutoff_hz
 from pipeline.params import load
 from pipeline.sling.model import Sling
 from tests.objective.own_law import own_law_episode
-from validation.campaigns.swing import PARTS, D, S, Simulated, _damped, landed
+from validation.campaigns.swing import PARTS, D, S, SplitPictures, _damped, landed
 from validation.synthetic import pull_and_release
 
 THETA = np.array([2.2e5, 0.45, 3e-3, 0.9, 0.8])
@@ -40,7 +40,7 @@ def test_the_pictures_of_every_part_after_the_release_show_the_true_damping(
 ) -> None:
     true = THETA[D] * THETA[S]
     dampings = true * np.array([0.25, 0.5, 1.0, 2.0, 4.0])
-    done = Simulated(params, episode, sling, _damped(THETA, dampings))
+    done = SplitPictures(params, episode, sling, _damped(THETA, dampings))
     assert done.count == {"pull": 5, "taut": 2, "swing": 13, "later": 10}
     assert np.argmin(done.total) == 2
     assert {part: np.argmin(done.mean[part]) for part in [*PARTS][1:]} == {

@@ -43,7 +43,7 @@ D, S = 2, 4  # places of damping and its scale in theta
 TINY, TIMES = 1e-7, 64  # relative change of a parameter; how often
 
 
-class Simulated:
+class SplitPictures:
     """A band's first pull as simulated at points of a sling, beside the recorded one."""
 
     def __init__(self, params, episode: Episode, sling: Sling, points: np.ndarray) -> None:
@@ -76,7 +76,7 @@ def by_mesh(params, band: str, episode: Episode) -> dict:
         changed = params.model_copy(update={"sling": section})
         slings[mesh] = sling_of_method(changed, band, PAPER)
         dampings = np.append(DAMPINGS, theta[D] * theta[S])
-        done = Simulated(params, episode, slings[mesh], _damped(theta, dampings))
+        done = SplitPictures(params, episode, slings[mesh], _damped(theta, dampings))
         whole = sum(done.count.values())
         best[mesh] = dampings[np.argmin(done.total)]
         found[mesh] = {"loss": {"best_damping_s": best[mesh], "lowest": done.total.min()}} | {
@@ -87,7 +87,7 @@ def by_mesh(params, band: str, episode: Episode) -> dict:
             }
             for part, mean in done.mean.items()
         }
-        found[mesh]["reach_m"] = done.reach[-1]
+        found[mesh]["reach_m"] = float(done.reach[-1])
     landings = {
         f"{mesh}, best damping of {whose}": landed(slings[mesh], _damped(theta, [best[whose]]))
         for mesh in MESHES
@@ -114,7 +114,7 @@ def by_rounding(params, band: str, method: str, episode: Episode) -> dict:
     content = load_theta(Layout().theta(band, method), band)
     sling, best = calibrated(params, band, content), point(content)
     points = best * (1 + TINY * np.random.default_rng(0).standard_normal((TIMES, len(best))))
-    done, landing = Simulated(params, episode, sling, points), landed(sling, points)
+    done, landing = SplitPictures(params, episode, sling, points), landed(sling, points)
     return {
         "loss_range": np.ptp(done.total) / done.total.mean(),
         "range_cm": {part: np.ptp(mean) for part, mean in done.mean.items()},

@@ -24,7 +24,6 @@ from tests.project import ROOT
 from validation import density
 from validation.campaigns.rig_scores import (
     calibrated_clamps,
-    recorded,
     result,
     sling_of,
     summary,
@@ -34,7 +33,7 @@ from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubber
 
 pytestmark = pytest.mark.validation
 
-OURS, PAPER = "least_squares", "sling2sim2real"
+METHODS = OURS, PAPER = "least_squares", "sling2sim2real"
 BANDS, FIVE = ("band1", "band2", "band3"), 5
 FOLDER = Path(os.environ.get("SLING_DENSITY", ROOT / ".checkpoints/density"))
 PARAMS, EPISODES = ROOT / "params.yaml", 240
@@ -42,8 +41,8 @@ CORES = cores()
 RECORDINGS_OF_ORANGE = ROOT.parent / "shared/recordings"
 
 
-class Run(NamedTuple):
-    """Bands, each by each of its tuples of recordings.
+class Identifications(NamedTuple):
+    """Of bands, each by each of its tuples of recordings.
 
     Attributes:
         seed: Of the rubbers.
@@ -60,43 +59,34 @@ class Run(NamedTuple):
         """params.yaml with the rubbers, of a recording."""
         return with_rubbers(load(PARAMS), self.seed, recording)
 
-    @property
-    def folder(self) -> Path:
-        return FOLDER / str(self.seed)
-
-    def results(self) -> dict:
-        """Of each band; what is not there yet is made."""
-        return {
-            band: summary([self.result(band, one) for one in self.numbers]) for band in self.bands
-        }
-
-    def result(self, band: str, numbers: tuple[int, ...]) -> dict:
-        return result(self.params, band, numbers, self.method, self.folder, self.known)
-
-    def recording(self, band: str, number: int) -> None:
-        recorded(self.params(number), band, self.folder / f"{band}_{number}")
+    def results(self, band: str) -> list[dict]:
+        """What is not there yet is made."""
+        folder = FOLDER / str(self.seed)
+        return [
+            result(self.params, band, one, self.method, folder, self.known) for one in self.numbers
+        ]
 
 
 def one_by_one(count: int) -> tuple[tuple[int, ...], ...]:
     return tuple((number,) for number in range(count))
 
 
-TOGETHER = (tuple(range(RECORDINGS)),)
+TOGETHER, KNOWN = (tuple(range(RECORDINGS)),), (1, 3)
 DEVELOPED, UNSEEN = tuple(rubbers(DEVELOP)), tuple(rubbers(SEALED))
-RUNS = {
-    **{("rig", how): Run(DEVELOP, BANDS, one_by_one(FIVE), how) for how in (OURS, PAPER)},
+ALL = {
+    **{f"rig, {how}": Identifications(DEVELOP, BANDS, one_by_one(FIVE), how) for how in METHODS},
     **{
-        ("develop", how): Run(DEVELOP, DEVELOPED, one_by_one(RECORDINGS), how)
-        for how in (OURS, PAPER)
+        f"develop, {how}": Identifications(DEVELOP, DEVELOPED, one_by_one(RECORDINGS), how)
+        for how in METHODS
     },
-    "three": Run(DEVELOP, (*BANDS, *DEVELOPED), TOGETHER),
+    "three": Identifications(DEVELOP, (*BANDS, *DEVELOPED), TOGETHER),
     **{
-        ("launches", known): Run(DEVELOP, BANDS, one_by_one(RECORDINGS), known=known)
-        for known in (1, 3)
+        f"{known} launches": Identifications(DEVELOP, BANDS, one_by_one(RECORDINGS), known=known)
+        for known in KNOWN
     },
-    "sealed": Run(SEALED, UNSEEN, one_by_one(RECORDINGS)),
-    "sealed, three": Run(SEALED, UNSEEN, TOGETHER),
-    "sealed, a launch": Run(SEALED, UNSEEN, ((0,),), known=1),
+    "sealed": Identifications(SEALED, UNSEEN, one_by_one(RECORDINGS)),
+    "sealed, three": Identifications(SEALED, UNSEEN, TOGETHER),
+    "sealed, a launch": Identifications(SEALED, UNSEEN, ((0,),), known=1),
 }
 
 
@@ -108,23 +98,26 @@ def side_by_side(work, *lists) -> list:
         return list(pool.map(work, *lists))
 
 
+def make(seed: int, band: str) -> None:
+    """Everything of one band, whose identifications share recordings."""
+    for one in ALL.values():
+        if one.seed == seed and band in one.bands:
+            one.results(band)
+
+
 @pytest.fixture(scope="module")
 def results():
-    """Results by the names in RUNS: all are made first, then read."""
-    of_bands = [
-        (run, band, numbers)
-        for run in RUNS.values()
-        for band in run.bands
-        for numbers in run.numbers
-    ]
-    of_recordings = {
-        (run.seed, band, number): (run, band, number)
-        for run, band, numbers in of_bands
-        for number in numbers
-    }
-    side_by_side(Run.recording, *zip(*of_recordings.values(), strict=True))
-    side_by_side(Run.result, *zip(*of_bands, strict=True))
-    return lambda *name: RUNS[name if len(name) > 1 else name[0]].results()
+    """Scores by the names in ALL, of each band."""
+    bands = dict.fromkeys((one.seed, band) for one in ALL.values() for band in one.bands)
+    side_by_side(make, *zip(*bands, strict=True))
+
+    return lambda name: {band: summary(ALL[name].results(band)) for band in ALL[name].bands}
+
+
+def made_on() -> str:
+    """Where the folder's scores were made, if not here: about.txt in it says so."""
+    about = FOLDER / "about.txt"
+    return about.read_text().strip() if about.exists() else "as below"
 
 
 def mean_size(found: dict) -> float:
@@ -140,7 +133,7 @@ def bootstrap(found: dict, count: int = 2000) -> list[float]:
 
 
 def test_the_default_is_chosen_by_the_rule(results, progress, record) -> None:
-    both = {method: results("rig", method) | results("develop", method) for method in (OURS, PAPER)}
+    both = {how: results(f"rig, {how}") | results(f"develop, {how}") for how in METHODS}
     ours = both[OURS]
     sizes = {method: mean_size(one) for method, one in both.items()}
     for method, size in sizes.items():
@@ -152,13 +145,13 @@ def test_the_default_is_chosen_by_the_rule(results, progress, record) -> None:
         " 1.5 % in the mean of five recordings. All of this took part in choosing.",
         met=sizes[OURS] < sizes[PAPER]
         and all(abs(ours[band]["mean_bias"]) <= 0.015 for band in BANDS),
-        settings={"recordings": FIVE, "of_rubbers": RECORDINGS},
+        settings={"recordings": FIVE, "of_rubbers": RECORDINGS, "made_on": made_on()},
         figures={
             "mean_size_of_bias": sizes,
             "bands": both,
             "coverage_by_bands": bootstrap(ours),
             "three_recordings": results("three"),
-            "launches_as_evidence": {known: results("launches", known) for known in (1, 3)},
+            "launches_as_evidence": {known: results(f"{known} launches") for known in KNOWN},
         },
     )
     assert sizes[OURS] < sizes[PAPER]
@@ -173,7 +166,7 @@ def test_rubbers_that_were_sealed(results, progress, record) -> None:
         asked="Rubbers that took no part in choosing, run once: |bias| at most 2 % in the mean over"
         " bands and 4 % on the worst.",
         met=mean_size(one) <= 0.02 and worst <= 0.04,
-        settings={"recordings": RECORDINGS, "seed": SEALED},
+        settings={"recordings": RECORDINGS, "seed": SEALED, "made_on": made_on()},
         figures={
             "kinds": {name: about for name, (_, about) in rubbers(SEALED).items()},
             "mean_size_of_bias": mean_size(one),
@@ -253,7 +246,7 @@ def test_episodes_of_its_own_law(progress, record) -> None:
         met=bool(
             0.85 <= np.mean(inside) <= 0.95 and np.median(young) <= 5e-4 and np.median(loss) <= 0.01
         ),
-        settings={"episodes": EPISODES, "flaws": density.FLAWS},
+        settings={"episodes": EPISODES, "flaws": density.FLAWS, "made_on": made_on()},
         figures={
             "coverage": np.mean(inside),
             "median_width": np.median(width),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -27,7 +28,7 @@ STEPS = {  # that make a folder of another name
 
 OF_DVC = "DVC_STAGE"  # in the environment of what DVC runs
 GRACE = 5.0  # s from the interrupt to the end
-HALF = f".{22 * '?'}.tmp"  # what DVC calls a file until it has copied it to the end
+HALF = re.compile(r"\.[\w-]{22}\.tmp")  # what DVC calls a file until it has copied it to the end
 COPIES = (".dvc/cache", "data", "reports")  # where it copies to
 
 
@@ -54,24 +55,26 @@ def run(main: Callable[[], int | None]) -> None:
     """Run a stage or a command: a mistake is one line, which says what makes a missing file."""
 
     def explained() -> int | None:
+        if OF_DVC in os.environ:
+            _clear_up()
         try:
             return main()
         except NotMade as error:
             raise UserError("; ".join(filter(None, (str(error), remedy(error))))) from error
 
     if OF_DVC in os.environ:
-        _clear_up()
         Thread(target=_end_with_dvc, daemon=True).start()
     errors.run(explained)
 
 
 def _clear_up() -> None:
-    """What a killed `dvc repro` has copied in part, the next one leaves there for ever.
+    """Remove what a killed `dvc repro` has copied in part; DVC never does.
 
-    By a process of its own: no stage depends on how the flow does it.
+    In a process of its own, so that no stage imports app/.
     """
-    if any(half for top in COPIES for half in Path(top).rglob(HALF)):
-        subprocess.run([sys.executable, "-m", "app.flow.locks"], check=False)
+    if any(HALF.fullmatch(name) for top in COPIES for *_, names in os.walk(top) for name in names):
+        command = [sys.executable, "-m", "app.flow.locks"]
+        subprocess.run(command, capture_output=True, check=False)
 
 
 def _end_with_dvc() -> None:

@@ -2,8 +2,8 @@
 
 A seed draws their laws, spectra, sizes and masses. DEVELOP is what a method may be developed on.
 SEALED is run once, with the default method as it then stands, and all of it is reported; a method
-that is changed after it was seen wants another seed. So the first, 20261102, stands no longer
-here: the method has changed since it was run.
+that is changed after it was seen wants another seed. So the first, 20261102, is gone: the method
+has changed since it was run.
 
 The rule by which the default is chosen, written before any sealed rubber was run: least_squares, if
 over the develop rubbers (three recordings each) and the rig's bands (five each) the mean over bands

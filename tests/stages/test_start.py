@@ -182,7 +182,7 @@ def test_a_stage_clears_what_a_killed_dvc_has_copied_in_part(tmp_path: Path) -> 
     locks = tmp_path / ".dvc/tmp"
     half = ".s07oC0gt_BFYHCELvV-BVg.tmp"  # as DVC has named one
     halves = [tmp_path / top / half for top in (".dvc/cache/files/md5/49", "data/history/band1")]
-    others = [tmp_path / "data/history/.band1.parquet.17.tmp", tmp_path / "data/half.tmp"]
+    others = [tmp_path / "data/theta/.least_squares.json.123.tmp", tmp_path / "data/half.tmp"]
     for file in (locks / "lock", tmp_path / ".dvc/config", *halves, *others):
         file.parent.mkdir(parents=True, exist_ok=True)
         file.touch()

@@ -27,7 +27,7 @@ def sling(params) -> Sling:
 
 @pytest.fixture(scope="module")
 def episode(params, sling):
-    """Whose band has THETA; its pictures are 0, 1/30, ... s after the release."""
+    """Whose band has THETA; five of its pictures, 1/30 s apart, are before the release."""
     plan = pull_and_release("band1", params.episode, sling)
     stamps = plan.release_time + np.arange(-5, 25) / 30 + 0.01
     plan = replace(plan, cloud_time=stamps, clouds=[np.zeros((0, 3), np.float32)] * len(stamps))

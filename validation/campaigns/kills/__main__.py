@@ -157,8 +157,8 @@ def disturb(
         if one["ended"]:
             same = ended(copy, expected)
             left = {
-                "temporaries": [file for one in copy.copies for file in compare.temporaries(one)],
-                "left_in_tmp": sorted(one.name for one in (copy.place / "tmp").iterdir()),
+                "temporaries": [file for here in copy.copies for file in compare.temporaries(here)],
+                "left_in_tmp": sorted(file.name for file in (copy.place / "tmp").iterdir()),
             }
             lines.add("round", name, by, {"after": count, **same, **left})
             say(f"{name}, {by}: whole after {count}: {same}")

@@ -12,6 +12,7 @@ from pathlib import Path
 from threading import Event, Thread
 
 from app.flow import guard, locks
+from app.flow.disk import with_disk
 from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 
@@ -84,7 +85,7 @@ def run_stage(
     )
     if status == 0:
         return any(line == f"Running stage '{name}':" for line in said)
-    raise StageFailed(f"{name}: {reason(name, said, status)}")
+    raise StageFailed(with_disk(f"{name}: {reason(name, said, status)}", root))
 
 
 def repro(
@@ -118,7 +119,7 @@ def repro(
     finally:
         locks.mend(root)
     if status:
-        raise StageFailed(f"{running[-1]}: {reason(running[-1], said, status)}")
+        raise StageFailed(with_disk(f"{running[-1]}: {reason(running[-1], said, status)}", root))
 
 
 def dvc(

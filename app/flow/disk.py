@@ -16,3 +16,12 @@ def expect_room(folder: Path) -> None:
     """Raises UserError where the disk of `folder` is full."""
     if shutil.disk_usage(folder).free < ROOM:
         raise UserError(f"{folder}: cannot be written ({os.strerror(ENOSPC)})")
+
+
+def with_disk(reason: str, folder: Path) -> str:
+    """Why something failed, and that the disk of `folder` is full where it is and goes unsaid."""
+    try:
+        expect_room(folder)
+    except UserError as full:
+        return reason if os.strerror(ENOSPC) in reason else f"{reason}; {full}"
+    return reason

@@ -1,5 +1,6 @@
 """A stage as a child: its lines, why it failed, and that all its processes end."""
 
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from threading import Event
 import pytest
 
 from app.flow import child, guard
+from app.flow.disk import with_disk
 from tests.app.flow.toy import Toy, stage
 from tests.project import until
 
@@ -53,6 +55,18 @@ def test_a_failure_says_why_in_one_line(toy: Toy) -> None:
     """Of its own: test_run.py."""
     with pytest.raises(child.StageFailed, match="^nothing: output 'nothing.out' does not exist$"):
         run(toy, "nothing")
+
+
+def test_a_full_disk_is_named_where_dvc_speaks_of_something_else(toy: Toy, monkeypatch) -> None:
+    """It said "No possible cache link types" of one; a reason that names it is left as it is."""
+    full = shutil.disk_usage(toy.folder)._replace(free=10_000)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
+    why = f"{toy.folder}: cannot be written (No space left on device)"
+    for act in (lambda: run(toy, "nothing"), lambda: child.repro(toy.folder, "nothing", print)):
+        with pytest.raises(child.StageFailed) as failure:
+            act()
+        assert str(failure.value) == f"nothing: output 'nothing.out' does not exist; {why}"
+    assert with_disk(why, toy.folder) == why
 
 
 def failed(*own: str, why: str) -> list[str]:

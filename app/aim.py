@@ -10,11 +10,11 @@ import numpy as np
 from app import safety
 from app.safety import Hazard
 from pipeline.base.layout import Layout
-from pipeline.landing.simulator import simulator
-from pipeline.landing.stored import Stored
-from pipeline.launches.spread import landing_intervals
+from pipeline.identify.results.theta import launch_history, load_samples, load_theta
+from pipeline.launching.surface.simulator import simulator
+from pipeline.launching.surface.stored import Stored
+from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params import expect_known
-from pipeline.sling.theta import launch_history, load_samples, load_theta
 
 
 class Answer(TypedDict):

@@ -11,7 +11,7 @@ from pipeline.base import launch_table as table
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
 from pipeline.base.layout import Layout
-from pipeline.posterior.evidence import COLUMNS, read_launches
+from pipeline.identify.posterior.evidence import COLUMNS, read_launches
 
 Launch = tuple[float, float, float | None, float]  # draw (y, z), its error or None, landing [m]
 

@@ -29,7 +29,7 @@ PATTERNS = (
     "*/*.json",
     "validation/*/*.json",
 )
-SIMULATOR = "pipeline/sling"
+SIMULATOR = "pipeline/simulator"
 PARTS = ("pipeline", "validation")  # whose changes since a commit count
 SCRIPT = re.compile(r"\bvalidation[./][\w./]+")  # in a command, as a module or as a file
 

@@ -8,9 +8,9 @@ from app import safety
 from app.aim import pull_and_pause
 from app.arguments import finite
 from pipeline.base.errors import UserError
+from pipeline.identify.results.theta import calibrated, load_theta, vector
 from pipeline.params import expect_known
-from pipeline.sling.launch import launch
-from pipeline.sling.theta import calibrated, load_theta, vector
+from pipeline.simulator.launch import launch
 
 
 def expect_above_floor(params, draw: tuple[float, float]) -> None:

@@ -15,11 +15,11 @@ from app.launch import expect_above_floor
 from app.safety import Hazard
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
-from pipeline.landing.simulator import simulator
-from pipeline.launches.spread import LEVEL, landing_intervals
+from pipeline.identify.results.theta import load_samples, load_theta
+from pipeline.launching.surface.simulator import simulator
+from pipeline.launching.trials.spread import LEVEL, landing_intervals
 from pipeline.params import expect_known
 from pipeline.params.identification import LEAST_SQUARES
-from pipeline.sling.theta import load_samples, load_theta
 from stages.start import stage_of
 
 FAR = 3.0  # standard deviations of a predicted landing, from which a measured one is doubted

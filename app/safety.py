@@ -14,8 +14,8 @@ from app import arguments
 from app.trained_with import Change, since_card, since_run
 from pipeline.base.layout import Layout, NotMade, owner
 from pipeline.episode.episode import Episode
-from pipeline.landing.stored import Stored
-from pipeline.launches.stretch import recorded_stretch, stretch_of
+from pipeline.launching.surface.stored import Stored
+from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
 from stages.start import stage_of, unmounted
 
 MISS = 0.05  # m from the target, in simulation, from which no pose is given

@@ -16,9 +16,9 @@ is a `UserError` of one line.
 
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
-from pipeline.posterior.launches import Observed
-from pipeline.sling.load import Mounting
-from pipeline.sling.model import LaunchHistory
+from pipeline.identify.posterior.launches import Observed
+from pipeline.identify.results.mounting import Mounting
+from pipeline.simulator.model import LaunchHistory
 from sling2sim2real.episodes import episode_from_arrays, read_mcap
 from sling2sim2real.exporting import Exported, export
 from sling2sim2real.identification import Identification, Interval, identify

@@ -16,21 +16,21 @@ from pipeline.base.machine import cores, devices, workers
 from pipeline.base.schema import explained, read_json
 from pipeline.episode.episode import Episode
 from pipeline.episode.pull import launch_history
-from pipeline.launches.stretch import recorded_stretch
-from pipeline.objective.clamps import calibrate_clamps
-from pipeline.objective.evaluate import Evaluator
-from pipeline.objective.loss import EpisodeLoss
-from pipeline.objective.space import Space
+from pipeline.identify.clamps import calibrate_clamps
+from pipeline.identify.objective.evaluate import Evaluator
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.objective.space import Space
+from pipeline.identify.posterior import identify as posterior
+from pipeline.identify.posterior.launches import Observed
+from pipeline.identify.results.mounting import Mounting
+from pipeline.identify.results.theta import ThetaFile, load_samples, load_theta
+from pipeline.identify.search.build import explorer
+from pipeline.identify.search.history import History
+from pipeline.identify.search.loop import Free, budget, search
+from pipeline.launching.trials.stretch import recorded_stretch
 from pipeline.params.identification import LAWS, LEAST_SQUARES
-from pipeline.posterior import identify as posterior
-from pipeline.posterior.launches import Observed
-from pipeline.search.history import History
-from pipeline.search.loop import Free, budget, search
-from pipeline.search.optimizers import explorer
-from pipeline.sling.load import Mounting
-from pipeline.sling.material import THETA
-from pipeline.sling.model import LaunchHistory, Sling
-from pipeline.sling.theta import ThetaFile, load_samples, load_theta
+from pipeline.simulator.material import THETA
+from pipeline.simulator.model import LaunchHistory, Sling
 from sling2sim2real.model import Band, Model, Theta, known
 from sling2sim2real.settings import Settings
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.base.errors import UserError
-from pipeline.launches.spread import landing_intervals
-from pipeline.launches.stretch import stretch_of
-from pipeline.launches.trials import limited
+from pipeline.launching.trials.spread import landing_intervals
+from pipeline.launching.trials.stretch import stretch_of
+from pipeline.launching.trials.trials import limited
 from sling2sim2real.model import Model
 
 FINE = 201  # nodes along y and z, between which a target is sought on the map

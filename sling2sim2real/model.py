@@ -13,15 +13,15 @@ from pydantic import ValidationError
 from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 from pipeline.base.schema import explained, read_json
-from pipeline.landing.landing_map import LandingMap
+from pipeline.identify.results.mounting import Mounting
+from pipeline.identify.results.theta import EXTRA, ThetaFile, at_points
+from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.params.identification import LAWS
-from pipeline.sling.launch import Launches
-from pipeline.sling.launch import launch as launch_many
-from pipeline.sling.load import Mounting
-from pipeline.sling.material import THETA
-from pipeline.sling.model import LaunchHistory, Sling
-from pipeline.sling.rubber import NEO_HOOKEAN, RUBBER
-from pipeline.sling.theta import EXTRA, ThetaFile, at_points
+from pipeline.simulator.launch import Launches
+from pipeline.simulator.launch import launch as launch_many
+from pipeline.simulator.material import THETA
+from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 from sling2sim2real.settings import Settings
 
 ADDED = tuple(LAWS[RUBBER])  # parameters that the law rubber has beside the five

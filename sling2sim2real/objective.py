@@ -10,10 +10,10 @@ import numpy as np
 from pipeline.base.errors import UserError
 from pipeline.base.machine import devices, workers
 from pipeline.episode.episode import Episode
-from pipeline.objective.evaluate import Evaluator
-from pipeline.objective.loss import EpisodeLoss
-from pipeline.objective.space import Space
-from pipeline.search.loop import Free
+from pipeline.identify.objective.evaluate import Evaluator
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.objective.space import Space
+from pipeline.identify.search.loop import Free
 from sling2sim2real.model import Model, Theta
 from sling2sim2real.simulation import Simulation, simulate_batch
 

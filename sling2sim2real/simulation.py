@@ -12,8 +12,8 @@ from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import as_recorded, cutoff_hz
-from pipeline.sling.initial import hanging_guess
-from pipeline.sling.interaction import interact
+from pipeline.simulator.initial import hanging_guess
+from pipeline.simulator.interaction import interact
 from sling2sim2real.model import Model, Theta
 
 LANES = 16  # rollouts that cost as much as one

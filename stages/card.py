@@ -9,7 +9,7 @@ reports/bands/<band>/.
 from __future__ import annotations
 
 from pipeline.base.layout import Layout
-from pipeline.card.write import write
+from pipeline.report.card.write import write
 from stages.start import run, started
 
 

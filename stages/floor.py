@@ -14,9 +14,9 @@ import sys
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
-from pipeline.oracle.aim import least_sensitive_draw
-from pipeline.oracle.floor import errors_of, trial_numbers
-from pipeline.oracle.world import World
+from rig.oracle.aim import least_sensitive_draw
+from rig.oracle.floor import errors_of, trial_numbers
+from rig.oracle.world import World
 from stages.start import run, started
 
 

@@ -11,11 +11,11 @@ SLING_WORKERS say where it runs.
 from __future__ import annotations
 
 from pipeline.base.layout import Layout
-from pipeline.objective.session import service
-from pipeline.objective.space import Space
-from pipeline.search.history import History
-from pipeline.search.loop import Free, budget, search
-from pipeline.search.optimizers import explorer
+from pipeline.identify.objective.session import service
+from pipeline.identify.objective.space import Space
+from pipeline.identify.search.build import explorer
+from pipeline.identify.search.history import History
+from pipeline.identify.search.loop import Free, budget, search
 from stages.start import run, started
 
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
 from pipeline.base.machine import cores
-from pipeline.objective.clamps import calibrate_clamps
-from pipeline.objective.loss import EpisodeLoss
-from pipeline.objective.session import load_episode
-from pipeline.sling.model import Sling
+from pipeline.identify.clamps import calibrate_clamps
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.objective.session import load_episode
+from pipeline.simulator.model import Sling
 from stages.start import run, started
 
 

@@ -17,15 +17,15 @@ import numpy as np
 from pipeline.base.layout import Layout
 from pipeline.base.machine import devices, kind
 from pipeline.base.progress import Progress
-from pipeline.landing.landing_map import LandingMap, validation
-from pipeline.landing.simulated import SimulatedLandings
-from pipeline.landing.simulator import asked_of_the_hand, simulator
-from pipeline.landing.stored import Stored
+from pipeline.identify.results.theta import load_theta
+from pipeline.launching.surface.landing_map import LandingMap, validation
+from pipeline.launching.surface.simulated import SimulatedLandings
+from pipeline.launching.surface.simulator import asked_of_the_hand, simulator
+from pipeline.launching.surface.stored import Stored
 from pipeline.policy.check import check, figures, verdict
 from pipeline.policy.environment import projectile_start
 from pipeline.policy.export import export
 from pipeline.policy.train import train
-from pipeline.sling.theta import load_theta
 from stages.start import run, started
 
 EVERY = 1.0  # s, between two lines of a training

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
-from pipeline.rig.recorder.record import record
+from rig.recorder.record import record
 from stages.start import run, started
 
 

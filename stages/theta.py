@@ -24,21 +24,21 @@ from pipeline.base.launch_table import expect_apart
 from pipeline.base.layout import Layout, made
 from pipeline.base.machine import workers
 from pipeline.episode.pull import launch_history
-from pipeline.objective.evaluate import Evaluator
-from pipeline.objective.loss import EpisodeLoss
-from pipeline.objective.session import load_episode, load_episodes, service
-from pipeline.objective.space import Space
+from pipeline.identify.objective.evaluate import Evaluator
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.objective.session import load_episode, load_episodes, service
+from pipeline.identify.objective.space import Space
+from pipeline.identify.optimizers.cma.multistart import Multistart
+from pipeline.identify.posterior import identify
+from pipeline.identify.posterior.evidence import read_evidence
+from pipeline.identify.results.mounting import sling_of_method
+from pipeline.identify.results.theta import calibrated
+from pipeline.identify.search.history import History, theta_content
+from pipeline.identify.search.loop import Free, search
+from pipeline.identify.search.regions import Region, regions_of, save_regions
 from pipeline.params.identification import LAWS, LEAST_SQUARES
-from pipeline.posterior import identify
-from pipeline.posterior.evidence import read_evidence
-from pipeline.search.history import History, theta_content
-from pipeline.search.loop import Free, search
-from pipeline.search.optimizers.multistart import Multistart
-from pipeline.search.regions import Region, regions_of, save_regions
-from pipeline.sling.load import sling_of_method
-from pipeline.sling.material import THETA
-from pipeline.sling.rubber import RUBBER
-from pipeline.sling.theta import calibrated
+from pipeline.simulator.material import THETA
+from pipeline.simulator.rubber import RUBBER
 from stages.start import run, started
 
 

@@ -17,13 +17,13 @@ import numpy as np
 from pipeline.base.launch_table import expect_apart
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
-from pipeline.landing.simulator import simulator
-from pipeline.landing.stored import Stored
-from pipeline.launches import trials
-from pipeline.launches.stretch import recorded_stretch, stretch_of
+from pipeline.identify.results.theta import load_samples, load_theta
+from pipeline.launching.surface.simulator import simulator
+from pipeline.launching.surface.stored import Stored
+from pipeline.launching.trials import trials
+from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
 from pipeline.params import load
-from pipeline.rig.physics.launch import Trial, launch
-from pipeline.sling.theta import load_samples, load_theta
+from rig.physics.launch import Trial, launch
 from stages.start import run, started
 
 

@@ -183,7 +183,7 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
         "--force",
         "--no-run-cache",
         "--downstream",
-        METHODS[0],  # the ablation's search of one phase: tests/objective/test_cache.py
+        METHODS[0],  # the ablation's search of one phase: tests/identify/objective/test_cache.py
     )
     assert ran == {*METHODS, "report"}
     assert (project.folder / "dvc.lock").read_text() == before

@@ -28,7 +28,7 @@ def folders(script: Path, root: Path = ROOT) -> list[str]:
     """The concerns that `script` runs, as dvc.yaml lists them: folders, and the script itself."""
     found = {script.relative_to(root).as_posix()}
     for file in closure(script, root):
-        if concern(file) != file and not file.startswith(UNTRACKED):
+        if not file.startswith(UNTRACKED) and not file.endswith("/__init__.py"):
             found.add(concern(file))
     return sorted(found)
 

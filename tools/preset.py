@@ -27,7 +27,7 @@ from pipeline.base import errors  # noqa: E402
 from pipeline.base.errors import UserError  # noqa: E402
 from pipeline.base.files import write_json, write_text  # noqa: E402
 from pipeline.params import parse  # noqa: E402
-from pipeline.report.run import write_run  # noqa: E402
+from pipeline.report.run.run import write_run  # noqa: E402
 
 PRESETS = ROOT / "presets"
 KEPT = Path(".checkpoints", "preset.json")  # "runs" and the "stretches" [s] of a run without an end

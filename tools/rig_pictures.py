@@ -16,11 +16,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from pipeline.base.errors import run
-from pipeline.drawing.styles import COLORS, INK, THEME
 from pipeline.params import load
 from pipeline.recording.build import process
 from pipeline.recording.input import images
-from pipeline.rig.physics.elasticity import TRELOAR as LAW
+from pipeline.report.drawing.styles import COLORS, INK, THEME
+from rig.physics.elasticity import TRELOAR as LAW
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "docs" / "rig"

@@ -13,11 +13,17 @@ from pathlib import Path
 from pipeline.base.fingerprint import fingerprint
 
 ROOT = Path(__file__).parents[1]
-CODE = ("pipeline/", "stages/", "app/", "sling2sim2real/", "validation/")
+CODE = ("pipeline/", "rig/", "stages/", "app/", "sling2sim2real/", "validation/")
 UNTRACKED = ("pipeline/params/", "stages/start.py")  # nobody's dependency: see tools/closure.py
 UNCOUNTED = {"pipeline/params", "stages/start.py", "validation/code.py"}  # among digests
-NESTED = ("pipeline/rig/",)  # folders whose own folders are concerns of their own
-SINGLE = ("validation/",)  # whose scripts know little of each other: each file is a concern
+NESTED = (  # folders of folders: what lies in them is a concern by itself, be it folder or file
+    "pipeline/",
+    "pipeline/identify/",
+    "pipeline/identify/optimizers/",
+    "pipeline/launching/",
+    "pipeline/report/",
+    "rig/",
+)
 NATIVE = (".h", ".cpp", ".html", ".css", ".js")
 
 
@@ -72,11 +78,14 @@ def closure(script: Path, root: Path = ROOT) -> list[str]:
 
 
 def concern(file: str) -> str:
-    """What a file counts to, relative to the root: its folder, or the file by itself."""
-    if file.startswith(SINGLE):
+    """What a file counts to, relative to the root: the outermost folder that is not NESTED.
+
+    A script of validation/ knows little of the others and is a concern by itself.
+    """
+    if file.startswith("validation/"):
         return file
-    depth = 3 if file.startswith(NESTED) else 2
-    return "/".join(file.split("/")[:depth])
+    top = max((name for name in NESTED if file.startswith(name)), key=len, default="")
+    return "/".join(file.split("/")[: top.count("/") + 1 if top else 2])
 
 
 def digests(*scripts: Path, root: Path = ROOT) -> dict[str, str]:

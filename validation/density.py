@@ -13,18 +13,18 @@ import numpy as np
 from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import cutoff_hz
-from pipeline.launches.spread import landing_intervals
-from pipeline.objective.evaluate import Evaluator
-from pipeline.objective.loss import TERMS, EpisodeLoss
-from pipeline.objective.space import Space
+from pipeline.identify.objective.evaluate import Evaluator
+from pipeline.identify.objective.loss import TERMS, EpisodeLoss
+from pipeline.identify.objective.space import Space
+from pipeline.identify.posterior import identify
+from pipeline.identify.posterior.launches import Observed
+from pipeline.identify.results.theta import EXTRA, at_points
+from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params.identification import LAWS, LEAST_SQUARES
-from pipeline.posterior import identify
-from pipeline.posterior.launches import Observed
-from pipeline.sling.launch import launch
-from pipeline.sling.material import THETA
-from pipeline.sling.model import Sling
-from pipeline.sling.theta import EXTRA, at_points
-from tests.objective.own_law import disturbed, own_law_episode
+from pipeline.simulator.launch import launch
+from pipeline.simulator.material import THETA
+from pipeline.simulator.model import Sling
+from tests.identify.objective.own_law import disturbed, own_law_episode
 from validation.benchmarks.methods import complete
 from validation.synthetic import pull_and_release
 

@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.episode.episode import Episode
-from pipeline.objective.loss import EpisodeLoss
-from pipeline.sling.interaction import interact
-from pipeline.sling.model import Sling
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.simulator.interaction import interact
+from pipeline.simulator.model import Sling
 
 DRAW = 0.35  # m
 THETA = (2e5, 0.45, 2e-3, 0.5, 0.5)  # of the band that is recorded

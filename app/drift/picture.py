@@ -12,8 +12,8 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from app.drift.change import ChangeOfBand
 from app.drift.recordings import IdentifiedRecording
 from app.labels import as_label
-from pipeline.drawing.canvas import key, mark, picture
-from pipeline.drawing.styles import INK, KNOWN
+from pipeline.report.drawing.canvas import key, mark, picture
+from pipeline.report.drawing.styles import INK, KNOWN
 
 AXES = {
     "youngs_modulus": ("Young's modulus E [kPa]", 1e-3),

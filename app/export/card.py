@@ -9,7 +9,7 @@ from app.export import values as about
 from app.export.chain import MATCHED, SpringChain
 from app.export.match import HOLD, LANDING, DrawCompared
 from app.export.pull import PullCompared
-from pipeline.card.values import LABELS, rounded
+from pipeline.report.card.values import LABELS, rounded
 from sling2sim2real.model import Model
 
 UNITS = {"hold_force": "n", "speed": "m_s", "landing": "m"}  # in names of keys

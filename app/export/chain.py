@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.base.errors import UserError
-from pipeline.sling.model import GRAVITY
-from pipeline.sling.rubber import uniaxial
+from pipeline.simulator.model import GRAVITY
+from pipeline.simulator.rubber import uniaxial
 from sling2sim2real.model import Model
 
 EDGES = 20

@@ -11,7 +11,7 @@ from app.export import mjcf
 from app.export.chain import MATCHED, SpringChain
 from app.export.mujoco_replay import MujocoBand, Shot
 from pipeline.base.errors import UserError
-from pipeline.sling.launch import Launches
+from pipeline.simulator.launch import Launches
 from sling2sim2real.model import Model
 
 GRID = 5  # draws along y and z over the box

@@ -8,7 +8,7 @@ from xml.etree import ElementTree as xml
 import numpy as np
 
 from app.export.chain import SpringChain
-from pipeline.sling.model import GRAVITY
+from pipeline.simulator.model import GRAVITY
 
 VERSION = "3.7"  # of MuJoCo: the first whose springs may be cubic
 HAND_MASS = 1.0  # kg

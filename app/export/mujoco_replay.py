@@ -10,7 +10,7 @@ import numpy as np
 from app.export.chain import SpringChain
 from app.export.mjcf import HAND_MASS, STIFF
 from pipeline.base.errors import UserError
-from pipeline.sling.launch import ballistic_landing
+from pipeline.simulator.launch import ballistic_landing
 
 SETTLE, BRAKE = 0.25, 250.0  # s and 1/s: how long and how a drawn band is brought to rest
 LONGEST = 0.5  # s from a release until nothing has left the pouch

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.card.values import LABELS, rounded
-from pipeline.sling.rubber import RUBBER
+from pipeline.report.card.values import LABELS, rounded
+from pipeline.simulator.rubber import RUBBER
 from sling2sim2real.model import Model
 
 FRAMES = (

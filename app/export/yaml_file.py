@@ -11,9 +11,9 @@ from ruamel.yaml import YAML
 from app.export import values as about
 from app.export.match import draws_of
 from pipeline.base.files import write_text
-from pipeline.card.values import rounded
 from pipeline.episode.episode import Episode
-from pipeline.sling.rubber import TIMES, uniaxial
+from pipeline.report.card.values import rounded
+from pipeline.simulator.rubber import TIMES, uniaxial
 from sling2sim2real.model import Model
 
 STRETCHES = np.arange(1.0, 2.21, 0.1)

@@ -17,8 +17,8 @@ from app.preflight.recordings import add_recording, digests, renew_masks
 from pipeline.base.errors import UserError, printable
 from pipeline.base.launch_table import expect_apart, file_of
 from pipeline.base.layout import Layout
+from pipeline.identify.posterior.evidence import read_evidence
 from pipeline.params import Params, load
-from pipeline.posterior.evidence import read_evidence
 from pipeline.recording.input.container import expect_file
 
 

@@ -39,7 +39,7 @@ def _drawn(name: str, draw: Callable[[Path], None]) -> str:
 
 def _episode(root: Path, band: str, method: str) -> Iterator[str]:
     from pipeline.episode.episode import Episode
-    from pipeline.report.figures.pull import pull
+    from pipeline.report.run.figures.pull import pull
 
     recorded = Episode.load(Layout(root).episode(band))
     yield _drawn("pull", lambda path: pull(path, {band: recorded}, {}, {}))
@@ -48,13 +48,13 @@ def _episode(root: Path, band: str, method: str) -> Iterator[str]:
 def _theta(root: Path, band: str, method: str) -> Iterator[str]:
     import pandas as pd
 
-    from pipeline.drawing.styles import styles
+    from pipeline.identify.results.theta import load_theta
     from pipeline.params import load
-    from pipeline.report.figures import search
-    from pipeline.report.tables import parameters
-    from pipeline.report.tables.benchmark import PAPER
-    from pipeline.report.tables.cells import markdown
-    from pipeline.sling.theta import load_theta
+    from pipeline.report.drawing.styles import styles
+    from pipeline.report.run.figures import search
+    from pipeline.report.run.tables import parameters
+    from pipeline.report.run.tables.benchmark import PAPER
+    from pipeline.report.run.tables.cells import markdown
 
     layout, params, named = Layout(root), load(root / "params.yaml"), styles([method])
     theta = load_theta(layout.theta(band, method), band)
@@ -77,11 +77,11 @@ def _theta(root: Path, band: str, method: str) -> Iterator[str]:
 def _policy(root: Path, band: str, method: str) -> Iterator[str]:
     import pandas as pd
 
-    from pipeline.drawing.styles import styles
-    from pipeline.landing.stored import Stored
-    from pipeline.report.figures import policy
-    from pipeline.report.tables.cells import markdown
-    from pipeline.report.tables.policies import policies
+    from pipeline.launching.surface.stored import Stored
+    from pipeline.report.drawing.styles import styles
+    from pipeline.report.run.figures import policy
+    from pipeline.report.run.tables.cells import markdown
+    from pipeline.report.run.tables.policies import policies
 
     stored = Stored(band, method, root)
     named = styles([method])
@@ -94,11 +94,11 @@ def _policy(root: Path, band: str, method: str) -> Iterator[str]:
 def _trials(root: Path, band: str, method: str) -> Iterator[str]:
     import pandas as pd
 
-    from pipeline.drawing.styles import styles
-    from pipeline.report.figures import landings
-    from pipeline.report.tables.cells import markdown
-    from pipeline.report.tables.landings import predictions
-    from pipeline.sling.theta import load_theta
+    from pipeline.identify.results.theta import load_theta
+    from pipeline.report.drawing.styles import styles
+    from pipeline.report.run.figures import landings
+    from pipeline.report.run.tables.cells import markdown
+    from pipeline.report.run.tables.landings import predictions
 
     layout, named = Layout(root), styles([method])
     trials = pd.read_parquet(layout.trials(band, method))
@@ -113,8 +113,8 @@ def _trials(root: Path, band: str, method: str) -> Iterator[str]:
 
 def _errors(trials) -> tuple[list[str], list[list[str]]]:
     """Landing errors of launches by target, as in the report."""
-    from pipeline.report.tables.cells import centimetres
-    from pipeline.report.tables.landings import landing_errors
+    from pipeline.report.run.tables.cells import centimetres
+    from pipeline.report.run.tables.landings import landing_errors
 
     heads = ["target [m]", "launches", "failed", "mean miss [cm]", "±", "bias [cm]"]
     rows = []

@@ -151,8 +151,8 @@ def predict(
 
 
 def _simulated(params, band: str, drawn: np.ndarray, path: Path) -> float:
-    from pipeline.sling.launch import launch
-    from pipeline.sling.theta import calibrated, load_theta, vector
+    from pipeline.identify.results.theta import calibrated, load_theta, vector
+    from pipeline.simulator.launch import launch
 
     content = load_theta(path, band)
     tell(of_mounting(band, Path()))

@@ -97,7 +97,7 @@ def draw_picture(trajectory: Trajectory, path: Path) -> None:
     from matplotlib.figure import Figure
     from matplotlib.style import context
 
-    from pipeline.drawing.styles import COLORS, INK, THEME
+    from pipeline.report.drawing.styles import COLORS, INK, THEME
 
     time = np.linspace(0, trajectory.duration, 1000)
     with context(THEME):

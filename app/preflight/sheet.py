@@ -13,12 +13,12 @@ from app.labels import as_label
 from app.preflight.check import Look
 from app.preflight.output import expect_writable
 from pipeline.base.files import replacing
-from pipeline.drawing.styles import COLORS, INK, THEME
 from pipeline.recording.build import Processed
 from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.masks import masker
 from pipeline.recording.view import Frame, Scene
+from pipeline.report.drawing.styles import COLORS, INK, THEME
 
 MOMENTS = ("hanging", "grasp", "lift", "mid pull", "held", "recoil")
 SIZE, DPI = (16.0, 12.0), 100  # inches, dots an inch

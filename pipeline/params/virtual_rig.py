@@ -25,7 +25,7 @@ Time = Annotated[float, Range(1e-4, 1e4)]
 Relaxation = Annotated[tuple[Annotated[float, Range(0, 10)], Time], LIST]  # weight and time
 
 
-LAWS = {  # ranges of each law's constants; pipeline/rig/physics/elasticity.py says what they are
+LAWS = {  # ranges of each law's constants; rig/physics/elasticity.py says what they are
     "gent": ((15, 1e4),),
     "arruda_boyce": ((6, 1e4),),
     "extended_tube": ((1e-3, 0.25), (0.01, 1), (0, 100)),

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.landing.landing_map import Launcher
-from pipeline.landing.response_surface import TOO_MUCH_FORCE
+from pipeline.launching.surface.landing_map import Launcher
+from pipeline.launching.surface.response_surface import TOO_MUCH_FORCE
 from pipeline.policy.train import CHECKED_TARGETS, Policy, Trained
 
 CONVERGED = 0.01  # mean |y_p - g| [m] over the checked targets that counts as converged

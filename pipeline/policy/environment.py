@@ -19,8 +19,8 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from pipeline.landing.response_surface import Landings
-from pipeline.landing.simulated import Source
+from pipeline.launching.surface.response_surface import Landings
+from pipeline.launching.surface.simulated import Source
 
 
 class SlingshotEnv(VecEnv):

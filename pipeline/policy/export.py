@@ -21,7 +21,7 @@ from torch import nn
 
 from pipeline.base.files import replacing, write_json
 from pipeline.policy.train import Policy, ProjectilePolicy, Trained
-from pipeline.sling.rubber import NEO_HOOKEAN
+from pipeline.simulator.rubber import NEO_HOOKEAN
 
 OPSET, IR_VERSION = 18, 10  # any onnxruntime from 1.18 (2024) on reads these
 INPUT, OUTPUT = "target", "draw"

@@ -21,8 +21,8 @@ from torch import nn
 
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.progress import Progress
-from pipeline.landing import response_surface, simulated
-from pipeline.landing.simulated import Source
+from pipeline.launching.surface import response_surface, simulated
+from pipeline.launching.surface.simulated import Source
 from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.environment import SlingshotEnv, draw_box, rewarded
 from pipeline.policy.ppo import settings

@@ -1,1 +1,1 @@
-"""The report: chapters, tables, figures, the page."""
+"""What people read: cards of bands, the report of a run, and how both are drawn."""

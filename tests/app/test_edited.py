@@ -12,8 +12,8 @@ from app.observe import known
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.params import load
-from tests.card.conftest import POINT, THETA, confidence, samples
 from tests.edited import edits
+from tests.report.card.conftest import POINT, THETA, confidence, samples
 
 BAND, METHOD, DRAW = "band1", "least_squares", (-0.3, -0.15)
 

@@ -22,7 +22,11 @@ def git(folder: Path, *words: str) -> str:
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
     """A small project under Git, with the sources of a simulator and of a benchmark."""
-    for file in ("pipeline/sling/solver.py", "pipeline/sling/deep/er.py", "validation/bench.py"):
+    for file in (
+        "pipeline/simulator/solver.py",
+        "pipeline/simulator/deep/er.py",
+        "validation/bench.py",
+    ):
         (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / file).write_text("a = 1\n")
     git(tmp_path, "init", "-q")
@@ -43,26 +47,26 @@ def only(project: Path) -> figures.CommittedFigures:
 
 
 def test_digests_of_folders_decide_where_a_file_has_them(project: Path) -> None:
-    parts = ("pipeline/sling", "validation/bench.py")
+    parts = ("pipeline/simulator", "validation/bench.py")
     code = {part: digest(project / part) for part in parts}
     write(project, "validation/x.json", code=code, met=False, commit="0" * 7)
     found = only(project)
     assert (found.file, found.state) == ("reports/validation/x.json", TODAY)
     assert (found.changed, found.met, len(found.digest)) == ([], False, 12)
-    (project / "pipeline/sling/deep/er.py").write_text("a = 2\n")
-    assert (only(project).state, only(project).changed) == (OLDER, ["pipeline/sling"])
+    (project / "pipeline/simulator/deep/er.py").write_text("a = 2\n")
+    assert (only(project).state, only(project).changed) == (OLDER, ["pipeline/simulator"])
     (project / "validation/bench.py").unlink()
     assert only(project).changed == [*parts]
 
 
 def test_a_campaign_may_have_a_folder(project: Path) -> None:
-    code = {"pipeline/sling": digest(project / "pipeline/sling")}
+    code = {"pipeline/simulator": digest(project / "pipeline/simulator")}
     write(project, "validation/machines/one.json", code=code)
     assert only(project).file == "reports/validation/machines/one.json"
 
 
 def test_without_digests_the_simulator_and_the_commit_decide(project: Path) -> None:
-    commit, sling = git(project, "rev-parse", "--short", "HEAD"), project / "pipeline/sling"
+    commit, sling = git(project, "rev-parse", "--short", "HEAD"), project / "pipeline/simulator"
     for about, state in (
         ({}, UNKNOWN),
         ({"commit": None, "simulator": digest(sling)}, UNKNOWN),
@@ -83,7 +87,7 @@ def test_without_digests_the_simulator_and_the_commit_decide(project: Path) -> N
 
 def test_since_the_commit_only_what_the_command_names_counts(project: Path) -> None:
     commit = git(project, "rev-parse", "--short", "HEAD")
-    (project / "pipeline/sling/solver.py").write_text("a = 5\n")
+    (project / "pipeline/simulator/solver.py").write_text("a = 5\n")
     for command, state in (
         ("python -m validation.bench band1", TODAY),
         ("python -m pytest -n 0 validation/bench.py", TODAY),
@@ -92,7 +96,7 @@ def test_since_the_commit_only_what_the_command_names_counts(project: Path) -> N
     ):
         write(project, "validation/x.json", commit=commit, command=command)
         assert only(project).state == state, command
-    (project / "validation/bench.py").write_text("import pipeline.sling.solver\n")
+    (project / "validation/bench.py").write_text("import pipeline.simulator.solver\n")
     write(project, "validation/x.json", commit=commit, command="python -m validation.bench")
     assert only(project).state == OLDER
 
@@ -108,7 +112,7 @@ def test_dvc_decides_of_what_stages_write(project: Path, monkeypatch) -> None:
     monkeypatch.chdir(project)
     write(project, "summary.json", band1_cm=2.0)
     assert only(project).state == NOT_TOLD  # no DVC here
-    stage = "{cmd: echo 1 > out, deps: [pipeline/sling, in], outs: [out]}"
+    stage = "{cmd: echo 1 > out, deps: [pipeline/simulator, in], outs: [out]}"
     (project / "dvc.yaml").write_text(f"stages:\n  report: {stage}\n")
     (project / "in").write_text("data\n")
     for words in (("init", "-q"), ("repro", "-q")):
@@ -116,12 +120,12 @@ def test_dvc_decides_of_what_stages_write(project: Path, monkeypatch) -> None:
     assert only(project).state == TODAY
     (project / "in").unlink()  # as in a fresh clone
     assert only(project).state == TODAY
-    (project / "pipeline/sling/solver.py").write_text("a = 4\n")
+    (project / "pipeline/simulator/solver.py").write_text("a = 4\n")
     assert only(project).state == OLDER
 
 
 def test_table_and_json_say_the_same(project: Path) -> None:
-    write(project, "validation/a.json", code={"pipeline/sling": "0123456789ab"}, met=True)
+    write(project, "validation/a.json", code={"pipeline/simulator": "0123456789ab"}, met=True)
     write(project, "validation/b.json", met=False)
     found = listed(project, project)
     lines = shown(found).splitlines()
@@ -129,7 +133,7 @@ def test_table_and_json_say_the_same(project: Path) -> None:
     assert lines[2].endswith(f"{UNKNOWN}  not met")
     assert lines[-1] == "0 of 2 are of today's code, 1 of older code; 1 do not meet what they ask"
     first, second = json.loads(as_json(found))["figures"]
-    assert first["state"] == OLDER and first["changed"] == ["pipeline/sling"] and first["met"]
+    assert first["state"] == OLDER and first["changed"] == ["pipeline/simulator"] and first["met"]
     assert (second["digest"], second["met"]) == (None, False)
 
 

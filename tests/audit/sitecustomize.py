@@ -14,7 +14,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 SHORT = {  # by stage and module
-    "report": {"pipeline.drawing.styles": {"THEME": {}}},  # a layout that is solved draws all twice
+    "report": {
+        "pipeline.report.drawing.styles": {"THEME": {}}
+    },  # a layout that is solved draws all twice
 }
 read: set[str] = set()
 gc.set_threshold(100_000, 50, 50)  # it is looked for garbage while torch is imported

@@ -6,7 +6,7 @@ STARTED_TWICE = """
 import time
 from concurrent.futures import ThreadPoolExecutor
 import warp._src.context as context
-from pipeline.objective.kernel import chamfer_kernel
+from pipeline.identify.objective.kernel import chamfer_kernel
 
 starts, runtime = [], context.Runtime
 
@@ -32,10 +32,10 @@ SIMULATED = """
 import hashlib, sys
 import numpy as np
 from pipeline.base.native import wp
-from pipeline.objective.loss import EpisodeLoss
+from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.params import load
-from pipeline.sling.interaction import interact
-from pipeline.sling.launch import launch
+from pipeline.simulator.interaction import interact
+from pipeline.simulator.launch import launch
 from validation.synthetic import THETA, recorded_yardstick
 
 wp.config.cpu_compiler_flags = wp.config.cpu_compiler_flags.replace("-march=native", sys.argv[1])

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pipeline.base.errors import UserError
 from pipeline.episode.phases import held_out_blocks, phases, reach, taut_frames, within
 from pipeline.episode.signal import average, lowpass
-from tests.search import toy
+from tests.identify.search import toy
 
 RELEASE = 2.4
 

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipeline.landing.landing_map import LandingMap
+from pipeline.launching.surface.landing_map import LandingMap
 from tests import once
 from tests.policy import toy
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
-from pipeline.landing.landing_map import LandingMap
+from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.policy import train as module
 from tests.policy import toy
 from tests.policy.conftest import SETTINGS

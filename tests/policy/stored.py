@@ -6,7 +6,7 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from pipeline.landing.landing_map import LandingMap, validation
+from pipeline.launching.surface.landing_map import LandingMap, validation
 from pipeline.policy.export import write_onnx
 from pipeline.policy.train import Policy
 from tests.policy import toy

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.landing.response_surface import TOO_MUCH_FORCE
+from pipeline.launching.surface.response_surface import TOO_MUCH_FORCE
 from pipeline.policy.check import CONVERGED, Check, check, figures, verdict
 from tests.policy import toy
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from pipeline.landing.response_surface import TOO_MUCH_FORCE, ResponseSurface
+from pipeline.launching.surface.response_surface import TOO_MUCH_FORCE, ResponseSurface
 from pipeline.policy.environment import SlingshotEnv, projectile_start
 from tests.policy import toy
 

@@ -12,11 +12,11 @@ import pytest
 import torch
 
 from pipeline.base.files import write_json
-from pipeline.landing.stored import Stored
+from pipeline.launching.surface.stored import Stored
 from pipeline.params import load
 from pipeline.policy.check import Check, figures
 from pipeline.policy.export import card, write_onnx, write_torchscript
-from pipeline.sling.material import THETA
+from pipeline.simulator.material import THETA
 from tests.policy import toy
 from tests.policy.card_schema import SCHEMA
 from tests.project import ROOT, python

@@ -10,8 +10,8 @@ import pytest
 from ruamel.yaml import YAML
 
 from pipeline.base.files import write_json
-from pipeline.landing.stored import Stored
-from pipeline.sling.material import THETA
+from pipeline.launching.surface.stored import Stored
+from pipeline.simulator.material import THETA
 from stages import policy
 from tests.policy import toy
 from tests.project import ROOT

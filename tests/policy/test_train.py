@@ -8,9 +8,9 @@ import pytest
 import torch
 
 from pipeline.base.progress import Progress, parse
-from pipeline.landing.landing_map import LandingMap
-from pipeline.landing.response_surface import TOO_MUCH_FORCE
-from pipeline.landing.simulated import SimulatedLandings
+from pipeline.launching.surface.landing_map import LandingMap
+from pipeline.launching.surface.response_surface import TOO_MUCH_FORCE
+from pipeline.launching.surface.simulated import SimulatedLandings
 from pipeline.policy import train as module
 from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.train import Trained, train

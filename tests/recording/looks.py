@@ -1,7 +1,7 @@
 """Pictures with known truth of a band before a fork, an arm, a floor and a wall, in many looks.
 
 Triangles and rays (Open3D), a light that casts shadows, the noise, flying pixels and drop-outs of a
-time-of-flight camera, JPEG. Nothing of pipeline/rig: what is tested here did not learn from it.
+time-of-flight camera, JPEG. Nothing of rig: what is tested here did not learn from it.
 """
 
 from __future__ import annotations

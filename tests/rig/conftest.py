@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.params import Params
-from pipeline.rig.recorder.interaction import Interaction
-from pipeline.rig.recorder.record import record
+from rig.recorder.interaction import Interaction
+from rig.recorder.record import record
 from tests import once
 from tests.project import ROOT, with_
 

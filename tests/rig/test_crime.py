@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from pipeline.episode.signal import cutoff_hz
-from pipeline.objective.evaluate import Evaluator
-from pipeline.objective.loss import EpisodeLoss
-from pipeline.objective.space import Space
+from pipeline.identify.objective.evaluate import Evaluator
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.objective.space import Space
 from pipeline.recording.build import build_episodes
-from pipeline.rig.physics.world import string_of
-from pipeline.rig.recorder.record import EPOCH
-from pipeline.sling.model import Sling
-from tests.objective.own_law import own_law_episode, visible
+from pipeline.simulator.model import Sling
+from rig.physics.world import string_of
+from rig.recorder.record import EPOCH
+from tests.identify.objective.own_law import own_law_episode, visible
 from tests.project import ROUGH, with_
 from validation.benchmarks.methods import complete
 

@@ -6,10 +6,10 @@ import pytest
 from mcap.reader import make_reader
 from ruamel.yaml import YAML
 
-from pipeline.objective.loss import EpisodeLoss
+from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.recording.build import build_episodes
-from pipeline.rig.recorder.interaction import Interaction
-from pipeline.sling.model import Sling
+from pipeline.simulator.model import Sling
+from rig.recorder.interaction import Interaction
 from tests.project import ROOT
 
 STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]

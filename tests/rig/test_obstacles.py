@@ -8,11 +8,11 @@ import torch
 
 from app.aim import aim, why_refused
 from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK
-from pipeline.landing.landing_map import LandingMap
+from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.policy.environment import SlingshotEnv
-from pipeline.rig.physics.launch import launch as on_the_rig
-from pipeline.sling import Sling, launch
-from pipeline.sling.material import THETA
+from pipeline.simulator import Sling, launch
+from pipeline.simulator.material import THETA
+from rig.physics.launch import launch as on_the_rig
 from tests.policy.linear import write_policy
 from tests.project import with_
 

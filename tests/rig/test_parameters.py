@@ -11,9 +11,9 @@ from mcap.reader import make_reader
 
 from pipeline.params import Params, Section
 from pipeline.params.virtual_rig import RigFlow, RigSoftening, RigSpectrum
-from pipeline.rig.physics import motion
-from pipeline.rig.physics.launch import launch
-from pipeline.rig.recorder import camera, interaction, record
+from rig.physics import motion
+from rig.physics.launch import launch
+from rig.recorder import camera, interaction, record
 
 TF, GRIPPER = "/tf_static", "/franka_gripper/joint_states"
 POSE, WRENCH = "/franka_robot_state_broadcaster/current_pose", "/ft_sensor/wrench"

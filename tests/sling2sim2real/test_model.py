@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.landing.simulator import simulator
-from pipeline.sling.theta import load_theta
+from pipeline.identify.results.theta import load_theta
+from pipeline.launching.surface.simulator import simulator
 from sling2sim2real import Band, LaunchHistory, Model, Mounting, Settings, Theta
 from sling2sim2real.model import known
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.objective.evaluate import Evaluator
-from pipeline.objective.loss import EpisodeLoss
-from pipeline.objective.space import Space
-from pipeline.sling.model import Sling
+from pipeline.identify.objective.evaluate import Evaluator
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.objective.space import Space
+from pipeline.simulator.model import Sling
 from sling2sim2real import Objective, Theta, simulate_batch
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.episode.signal import as_recorded, cutoff_hz
-from pipeline.sling.interaction import interact
+from pipeline.simulator.interaction import interact
 from sling2sim2real import Theta, pull, simulate, simulate_batch
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, NotMade
-from pipeline.objective.session import load_episodes
+from pipeline.identify.objective.session import load_episodes
 from stages import episode
 from tests.recording.conftest import blind, params, seen
 from tests.recording.joined import joined

@@ -13,11 +13,11 @@ import pytest
 from dvc.lock import Lock
 
 from pipeline.base.layout import NotMade
-from pipeline.objective.evaluate import Evaluation
-from pipeline.objective.loss import TERMS
-from pipeline.objective.space import Space
+from pipeline.identify.objective.evaluate import Evaluation
+from pipeline.identify.objective.loss import TERMS
+from pipeline.identify.objective.space import Space
+from pipeline.identify.search.history import History
 from pipeline.params import load
-from pipeline.search.history import History
 from stages.start import remedy
 from tests.project import ROOT, alive, environment, python, until
 

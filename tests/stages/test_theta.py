@@ -11,10 +11,10 @@ from ruamel.yaml import YAML
 
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
+from pipeline.identify.results.theta import calibrated, load_theta
 from pipeline.params import load
-from pipeline.sling.theta import calibrated, load_theta
 from sling2sim2real.identification import Identification
-from tests.objective.own_law import own_law_episode
+from tests.identify.objective.own_law import own_law_episode
 from tests.project import ROOT
 from validation.synthetic import recorded_yardstick
 

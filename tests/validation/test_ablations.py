@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.search.loop import latin_hypercube
-from pipeline.search.optimizers import build
+from pipeline.identify.search.build import build
+from pipeline.identify.search.loop import latin_hypercube
 from validation.campaigns.ablations import FIRST, LAST, PAPER, Job, ResultLines, jobs_of, summary
 from validation.paired import compared, holm, mean_interval
 

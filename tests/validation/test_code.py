@@ -7,14 +7,14 @@ from validation.benchmarks import timing
 from validation.code import digest, digests
 
 FILES = {
-    "validation/bench/a.py": "from pipeline.sling import solver\n",
+    "validation/bench/a.py": "from pipeline.simulator import solver\n",
     "validation/bench/b.py": "",
     "pipeline/__init__.py": "",
-    "pipeline/sling/__init__.py": "",
-    "pipeline/sling/solver.py": "def f():\n    from pipeline.rig.arm import a\n",
-    "pipeline/sling/step.h": "1",
-    "pipeline/rig/arm/__init__.py": "",
-    "pipeline/rig/arm/a.py": "",
+    "pipeline/simulator/__init__.py": "",
+    "pipeline/simulator/solver.py": "def f():\n    from rig.arm import a\n",
+    "pipeline/simulator/step.h": "1",
+    "rig/arm/__init__.py": "",
+    "rig/arm/a.py": "",
     "pipeline/other/__init__.py": "",
 }
 
@@ -25,11 +25,11 @@ def test_digests_are_of_what_is_imported_and_follow_its_changes(tmp_path: Path) 
         (tmp_path / name).write_text(text)
     script = tmp_path / "validation/bench/a.py"
     before = digests(script, root=tmp_path)
-    assert [*before] == ["pipeline/rig/arm", "pipeline/sling", "validation/bench/a.py"]
+    assert [*before] == ["rig/arm", "pipeline/simulator", "validation/bench/a.py"]
     for name, part in (
-        ("pipeline/sling/step.h", "pipeline/sling"),
-        ("pipeline/sling/new/file.py", "pipeline/sling"),
-        ("pipeline/rig/arm/a.py", "pipeline/rig/arm"),
+        ("pipeline/simulator/step.h", "pipeline/simulator"),
+        ("pipeline/simulator/new/file.py", "pipeline/simulator"),
+        ("rig/arm/a.py", "rig/arm"),
         ("validation/bench/a.py", "validation/bench/a.py"),
     ):
         (tmp_path / name).parent.mkdir(exist_ok=True)
@@ -45,7 +45,7 @@ def test_digests_are_of_what_is_imported_and_follow_its_changes(tmp_path: Path) 
 
 def test_every_figure_names_its_code() -> None:
     code = timing.environment("cpu")["code"]  # of this file
-    assert {"pipeline/sling", "validation/benchmarks/timing.py"} <= {*code}
-    assert code["pipeline/sling"] == timing.SIMULATOR == digest(ROOT / "pipeline/sling")
+    assert {"pipeline/simulator", "validation/benchmarks/timing.py"} <= {*code}
+    assert code["pipeline/simulator"] == timing.SIMULATOR == digest(ROOT / "pipeline/simulator")
     script = ROOT / "validation/benchmarks/clouds.py"
     assert "pipeline/recording" in timing.environment("cpu", "", script)["code"]

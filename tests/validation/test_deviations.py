@@ -53,7 +53,7 @@ def test_every_case_has_a_file_of_its_own(tmp_path: Path) -> None:
 
 def test_the_rest_of_a_prepared_campaign_needs_no_recorder(tmp_path: Path, monkeypatch) -> None:
     """Nor Open3D, which a machine that only identifies may lack."""
-    for module in ("open3d", "pipeline.recording.build", "pipeline.rig.recorder.record"):
+    for module in ("open3d", "pipeline.recording.build", "rig.recorder.record"):
         monkeypatch.setitem(sys.modules, module, None)
     for switch in SWITCHES:
         write_json(deviations.place(tmp_path, "band1", 0, switch) / "mounting.json", {})

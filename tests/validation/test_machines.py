@@ -12,10 +12,10 @@ from pipeline.base.files import write_json
 from pipeline.base.layout import Layout, NotMade
 from pipeline.base.schema import read_json
 from pipeline.episode.signal import cutoff_hz
+from pipeline.identify.results.mounting import load_sling
 from pipeline.params import load
-from pipeline.sling.launch import launch
-from pipeline.sling.load import load_sling
-from tests.objective.own_law import own_law_episode
+from pipeline.simulator.launch import launch
+from tests.identify.objective.own_law import own_law_episode
 from tests.project import ROOT, ROUGH
 from validation.campaigns import machines
 from validation.campaigns.machines import DRAWS, FOLDER, LIMIT, OURS, PAPER, MachineReport
@@ -96,7 +96,7 @@ ABOUT = {
     "device": "cpu",
     "device_name": "one",
     "inputs": {BAND: "a"},
-    "code": {"pipeline/sling": "a", "validation/campaigns": "a"},
+    "code": {"pipeline/simulator": "a", "validation/campaigns": "a"},
     "draws": [[-0.36, -0.2], [-0.30, -0.2]],
 }
 
@@ -141,7 +141,7 @@ def test_a_launch_that_fails_on_one_machine_alone_is_a_difference(tmp_path, monk
 
 @pytest.mark.parametrize(
     ("what", "value"),
-    [("inputs", {BAND: "b"}), ("draws", [[-0.3, -0.2]]), ("code", {"pipeline/sling": "b"})],
+    [("inputs", {BAND: "b"}), ("draws", [[-0.3, -0.2]]), ("code", {"pipeline/simulator": "b"})],
 )
 def test_what_is_not_of_the_same_is_not_compared(tmp_path, monkeypatch, what, value) -> None:
     with pytest.raises(UserError, match=f"0 and 1: of different {what}"):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.params import load
-from pipeline.sling.rubber import NEO_HOOKEAN, RUBBER
+from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 from validation.campaigns import random_parameters
 from validation.simulator import robustness
 from validation.simulator.finding import Bench

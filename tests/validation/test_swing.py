@@ -7,8 +7,8 @@ import pytest
 
 from pipeline.episode.signal import cutoff_hz
 from pipeline.params import load
-from pipeline.sling.model import Sling
-from tests.objective.own_law import own_law_episode
+from pipeline.simulator.model import Sling
+from tests.identify.objective.own_law import own_law_episode
 from validation.campaigns.swing import PARTS, D, S, SplitPictures, _damped, landed
 from validation.synthetic import pull_and_release
 

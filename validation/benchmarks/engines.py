@@ -8,9 +8,9 @@ import numpy as np
 from scipy.stats import qmc
 
 from pipeline.base.errors import UserError
-from pipeline.objective.space import Space
-from pipeline.sling.interaction import interact
-from pipeline.sling.model import Sling
+from pipeline.identify.objective.space import Space
+from pipeline.simulator.interaction import interact
+from pipeline.simulator.model import Sling
 from validation.benchmarks.timing import available, timed
 from validation.engines import mujoco_flex
 from validation.engines.mesh import Tube, hand_path

@@ -18,20 +18,20 @@ import numpy as np
 
 from pipeline.base.machine import named
 from pipeline.episode.episode import Episode
-from pipeline.objective.cache import EvaluationCache
-from pipeline.objective.evaluate import Evaluator, simulated
-from pipeline.objective.loss import EpisodeLoss
-from pipeline.objective.space import Space
+from pipeline.identify.objective.cache import EvaluationCache
+from pipeline.identify.objective.evaluate import Evaluator, simulated
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.objective.space import Space
+from pipeline.identify.optimizers.cma.multistart import Multistart
+from pipeline.identify.posterior.identify import identify
+from pipeline.identify.search.build import explorer
+from pipeline.identify.search.history import History
+from pipeline.identify.search.loop import Free, budget, latin_hypercube, search
+from pipeline.identify.search.regions import regions_asked, regions_of
 from pipeline.params import expect_known
 from pipeline.params.identification import LEAST_SQUARES
-from pipeline.posterior.identify import identify
-from pipeline.search.history import History
-from pipeline.search.loop import Free, budget, latin_hypercube, search
-from pipeline.search.optimizers import explorer
-from pipeline.search.optimizers.multistart import Multistart
-from pipeline.search.regions import regions_asked, regions_of
-from pipeline.sling.material import THETA
-from pipeline.sling.model import Sling
+from pipeline.simulator.material import THETA
+from pipeline.simulator.model import Sling
 from validation.benchmarks.timing import seconds, shared, timed
 from validation.synthetic import recorded_yardstick
 

@@ -13,15 +13,15 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.base.machine import named
-from pipeline.objective.evaluate import Evaluation
-from pipeline.objective.loss import TERMS
-from pipeline.objective.session import load_episode
+from pipeline.identify.objective.evaluate import Evaluation
+from pipeline.identify.objective.loss import TERMS
+from pipeline.identify.objective.session import load_episode
+from pipeline.identify.results.mounting import sling_of_method
+from pipeline.identify.results.theta import at_points
+from pipeline.identify.search.history import History
+from pipeline.identify.search.loop import latin_hypercube
 from pipeline.params import expect_known
-from pipeline.search.history import History
-from pipeline.search.loop import latin_hypercube
-from pipeline.sling.launch import Launches, launch
-from pipeline.sling.load import sling_of_method
-from pipeline.sling.theta import at_points
+from pipeline.simulator.launch import Launches, launch
 from validation.benchmarks.methods import BUDGETS, evaluator, time_search
 from validation.benchmarks.timing import REPEATS, seconds, timed
 from validation.synthetic import DRAW, recorded_yardstick

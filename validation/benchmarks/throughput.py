@@ -13,16 +13,16 @@ import numpy as np
 from scipy.stats import qmc
 
 from pipeline.base.machine import named
-from pipeline.objective.evaluate import Evaluator
-from pipeline.objective.loss import EpisodeLoss
-from pipeline.objective.space import Space
-from pipeline.sling.interaction import interact, schedule_of
-from pipeline.sling.launch import launch
-from pipeline.sling.records import Grip
-from pipeline.sling.rubber import NEO_HOOKEAN, RUBBER
-from pipeline.sling.schedule import RELAX_STEPS
-from pipeline.sling.solver import Options, memory
-from pipeline.sling.theta import at_points
+from pipeline.identify.objective.evaluate import Evaluator
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.objective.space import Space
+from pipeline.identify.results.theta import at_points
+from pipeline.simulator.interaction import interact, schedule_of
+from pipeline.simulator.launch import launch
+from pipeline.simulator.records import Grip
+from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
+from pipeline.simulator.schedule import RELAX_STEPS
+from pipeline.simulator.solver import Options, memory
 from validation.benchmarks.timing import seconds, shared
 from validation.synthetic import DRAW, recorded_yardstick
 
@@ -118,7 +118,8 @@ def steps_of(schedule) -> dict[str, int]:
 def first_start(device: str) -> dict[str, float]:
     """Seconds that a new process needs for one launch: with an empty kernel cache, and again."""
     code = (
-        "from pipeline.params import load; from pipeline.sling import Sling, launch; p = load();"
+        "from pipeline.params import load; p = load();"
+        "from pipeline.simulator import Sling, launch;"
         "b = next(iter(p.bands.values())); launch(Sling.of(b, p.setup, p.sling),"
         f" [3e5, 0.45, 2e-3, 0.5, 1.0], [-0.38, -0.2], device={device!r})"
     )

@@ -222,7 +222,7 @@ def times(
         " the cores that other programs took meanwhile. `sling check` and `sling fit` are of one"
         " recording that was not made here.",
         "commit": json.loads((folder / "clone.json").read_text(encoding="utf-8"))["commit"],
-        "simulator": fingerprint(clone / "pipeline/sling")[:12],
+        "simulator": fingerprint(clone / "pipeline/simulator")[:12],
         "code": digests(*(one for one in scripts if one.is_file()), root=clone),
         "steps": done,
         "order": [step.name for step in todo],

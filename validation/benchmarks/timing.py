@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-import pipeline.sling
+import pipeline.simulator
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import commit, gpus, named, processor
 from validation.code import digests
 
 REPEATS = 3  # the best of them counts: others may use the machine too
-SIMULATOR = fingerprint(Path(pipeline.sling.__file__).parent)[:12]  # as it is imported
+SIMULATOR = fingerprint(Path(pipeline.simulator.__file__).parent)[:12]  # as it is imported
 
 
 def timed(work: Callable[[], object]) -> tuple:
@@ -54,7 +54,7 @@ def environment(device: str, command: str = "", *scripts: Path) -> dict:
     """What a figure belongs to: device, its name, command, versions, commit and code.
 
     `code` has a digest of each folder that `scripts` import, by default the file that calls this;
-    it tells also where there is no git. `simulator` is that of pipeline/sling.
+    it tells also where there is no git. `simulator` is that of pipeline/simulator.
     """
     import warp as wp
 

@@ -30,9 +30,9 @@ from pipeline.base.files import write_json
 from pipeline.base.machine import cores, processor
 from pipeline.base.pool import Pool
 from pipeline.episode.episode import Episode
-from pipeline.objective.space import Space
+from pipeline.identify.objective.space import Space
 from pipeline.params import expect_known, load
-from pipeline.rig.physics.launch import launch
+from rig.physics.launch import launch
 from validation.benchmarks.timing import environment
 from validation.campaigns.rig_scores import aimed, plain, recorded, sling_of
 from validation.density import found

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.episode.episode import Episode
-from pipeline.launches.stretch import recorded_stretch, stretch_of
-from pipeline.objective.loss import EpisodeLoss
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.results.theta import at_points
+from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
 from pipeline.params import load
-from pipeline.rig.physics.launch import launch
-from pipeline.sling.interaction import interact
-from pipeline.sling.theta import at_points
+from pipeline.simulator.interaction import interact
+from rig.physics.launch import launch
 from validation import orange
 from validation.campaigns.rig_scores import aimed
 from validation.density import Calibrated

@@ -29,7 +29,7 @@ from pipeline.base.layout import made
 from pipeline.base.machine import cores
 from pipeline.base.pool import Pool
 from pipeline.episode.episode import Episode
-from pipeline.objective.space import Space
+from pipeline.identify.objective.space import Space
 from pipeline.params import load
 from validation import orange
 from validation.benchmarks.timing import environment
@@ -101,7 +101,7 @@ def prepare(where: tuple[str, int], work: Path, recordings: Path | None) -> None
     if all((folder / "mounting.json").exists() for folder in folders.values()):
         return
     from pipeline.recording.build import build_episodes  # both need Open3D, the rest does not
-    from pipeline.rig.recorder.record import record
+    from rig.recorder.record import record
 
     if band == orange.NAME:
         raw = recordings / (f"{band}_{number + 1}.mcap" if number else f"{band}.mcap")

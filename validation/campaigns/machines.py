@@ -34,14 +34,14 @@ from pipeline.base.machine import named, processor
 from pipeline.base.pool import Pool
 from pipeline.base.schema import JsonRecord, read_json
 from pipeline.episode.episode import Episode
-from pipeline.objective.loss import EpisodeLoss
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.results.mounting import sling_of_method
+from pipeline.identify.results.theta import EXTRA, at_points
 from pipeline.params import expect_known, load
 from pipeline.params.identification import LAWS
-from pipeline.sling.interaction import interact
-from pipeline.sling.launch import launch
-from pipeline.sling.load import sling_of_method
-from pipeline.sling.material import THETA
-from pipeline.sling.theta import EXTRA, at_points
+from pipeline.simulator.interaction import interact
+from pipeline.simulator.launch import launch
+from pipeline.simulator.material import THETA
 from validation.benchmarks.timing import environment
 from validation.density import found
 

@@ -22,14 +22,14 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.progress import Progress
-from pipeline.landing.landing_map import LandingMap
-from pipeline.landing.simulated import SimulatedLandings
-from pipeline.landing.simulator import simulator
+from pipeline.identify.results.theta import load_theta
+from pipeline.launching.surface.landing_map import LandingMap
+from pipeline.launching.surface.simulated import SimulatedLandings
+from pipeline.launching.surface.simulator import simulator
 from pipeline.params import expect_known, load
 from pipeline.policy.check import check
 from pipeline.policy.environment import projectile_start
 from pipeline.policy.train import train
-from pipeline.sling.theta import load_theta
 from validation.benchmarks.timing import environment, timed
 from validation.code import ROOT, digest
 from validation.paired import mean_interval
@@ -40,7 +40,11 @@ METHOD = "sling2sim2real"  # whose θ: the paper's
 USUAL = {"landings": "map", "exploration": "scheduled", "state": "target"}
 PRINTED = {"landings": "simulated", "exploration": "learned", "state": "projectile_target"}
 SWITCHES = {"usual": {}, **{name: {name: PRINTED[name]} for name in PRINTED}, "all": PRINTED}
-TRAINING = "pipeline/landing", "pipeline/policy", "pipeline/sling"  # code that a result hangs on
+TRAINING = (
+    "pipeline/launching/surface",
+    "pipeline/policy",
+    "pipeline/simulator",
+)  # code that a result hangs on
 SEEDS = 11, 12, 13  # that took part in no choice
 
 

@@ -20,7 +20,7 @@ from pipeline.base.files import write_json
 from pipeline.base.machine import cores
 from pipeline.params import load
 from pipeline.params.identification import LAWS
-from pipeline.sling.rubber import NEO_HOOKEAN, RUBBER
+from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 from validation.benchmarks.timing import environment, timed
 from validation.simulator.agreement import random_thetas
 from validation.simulator.experiment import band_of

@@ -16,14 +16,14 @@ from ruamel.yaml import YAML
 
 from pipeline.base.files import replacing, write_json
 from pipeline.episode.episode import Episode
-from pipeline.landing.landing_map import LandingMap
-from pipeline.launches.spread import landing_intervals
-from pipeline.objective.clamps import calibrate_clamps
-from pipeline.objective.loss import EpisodeLoss
-from pipeline.oracle.aim import hit, least_sensitive_draw
-from pipeline.oracle.world import World
-from pipeline.posterior.launches import Observed
-from pipeline.sling.model import Sling
+from pipeline.identify.clamps import calibrate_clamps
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.posterior.launches import Observed
+from pipeline.launching.surface.landing_map import LandingMap
+from pipeline.launching.trials.spread import landing_intervals
+from pipeline.simulator.model import Sling
+from rig.oracle.aim import hit, least_sensitive_draw
+from rig.oracle.world import World
 from validation.density import Calibrated, found
 
 TARGETS = np.linspace(1.525, 2.325, 9)  # m
@@ -33,7 +33,7 @@ MAP = 17, 13  # simulated launches that tell where to seek
 def recorded(params, band: str, folder: Path) -> Episode:
     """The episode of a recording that the rig makes, clamps beside it; kept in `folder`."""
     from pipeline.recording.build import build_episodes  # both need Open3D, scores do not
-    from pipeline.rig.recorder.record import record
+    from rig.recorder.record import record
 
     mounting = folder / "mounting.json"
     if not mounting.exists():

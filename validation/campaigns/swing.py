@@ -23,13 +23,13 @@ from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.layout import Layout, made
 from pipeline.episode.episode import Episode
-from pipeline.objective.loss import EpisodeLoss
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.results.mounting import sling_of_method
+from pipeline.identify.results.theta import at_points, calibrated, load_theta, point
 from pipeline.params import load
-from pipeline.sling.interaction import interact
-from pipeline.sling.launch import launch
-from pipeline.sling.load import sling_of_method
-from pipeline.sling.model import Sling
-from pipeline.sling.theta import at_points, calibrated, load_theta, point
+from pipeline.simulator.interaction import interact
+from pipeline.simulator.launch import launch
+from pipeline.simulator.model import Sling
 from validation.benchmarks.timing import environment
 
 REPORT = Path("reports/validation/swing.json")

@@ -19,7 +19,7 @@ from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import cores
 from pipeline.base.pool import Pool
 from pipeline.episode.episode import Episode
-from pipeline.launches.spread import landing_intervals
+from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params import load
 from pipeline.recording.build import build_episodes
 from tests.project import ROOT

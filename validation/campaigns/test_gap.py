@@ -13,15 +13,15 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from pipeline.base.files import write_json
-from pipeline.drawing.styles import COLORS, INK, THEME
-from pipeline.landing.simulator import simulator
-from pipeline.landing.stored import Stored
-from pipeline.objective.space import Space
-from pipeline.oracle.aim import hit, least_sensitive_draw
-from pipeline.oracle.floor import errors_of, trial_numbers
-from pipeline.oracle.world import World
+from pipeline.identify.objective.space import Space
+from pipeline.identify.results.theta import load_theta
+from pipeline.launching.surface.simulator import simulator
+from pipeline.launching.surface.stored import Stored
 from pipeline.params import load
-from pipeline.sling.theta import load_theta
+from pipeline.report.drawing.styles import COLORS, INK, THEME
+from rig.oracle.aim import hit, least_sensitive_draw
+from rig.oracle.floor import errors_of, trial_numbers
+from rig.oracle.world import World
 from tests.project import ROOT
 from validation.campaigns.test_orange import copy_of_the_project, run
 

@@ -16,7 +16,7 @@ import pytest
 
 from app.preflight.add_band import add_band
 from pipeline.params import load
-from pipeline.report.tables.landings import prediction_error
+from pipeline.report.run.tables.landings import prediction_error
 from tests.project import ROOT, copy_project
 
 pytestmark = pytest.mark.validation

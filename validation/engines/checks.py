@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.episode.episode import Episode
-from pipeline.sling.interaction import interact
-from pipeline.sling.launch import launch
-from pipeline.sling.model import ROD, TETRAHEDRA, Sling
+from pipeline.simulator.interaction import interact
+from pipeline.simulator.launch import launch
+from pipeline.simulator.model import ROD, TETRAHEDRA, Sling
 from validation.engines import mujoco_flex
 from validation.simulator.finding import Bench, Finding, Theme
 from validation.synthetic import ease, unseen

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pipeline.sling.cylinder import cylinder, volumes
-from pipeline.sling.initial import fixed_frames
-from pipeline.sling.interaction import GRASP_BLEND
-from pipeline.sling.model import ROD, Sling
+from pipeline.simulator.cylinder import cylinder, volumes
+from pipeline.simulator.initial import fixed_frames
+from pipeline.simulator.interaction import GRASP_BLEND
+from pipeline.simulator.model import ROD, Sling
 
 CLAMPED = 0.015  # m of band in each clamp
 EDGES, GRADING = 48, 6.0  # 50 intervals with those in the clamps: 900 tetrahedra

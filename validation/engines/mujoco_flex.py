@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.base.errors import UserError
-from pipeline.sling.launch import ballistic_landing
-from pipeline.sling.model import GRAVITY, Sling
+from pipeline.simulator.launch import ballistic_landing
+from pipeline.simulator.model import GRAVITY, Sling
 from validation.engines.mesh import Tube, hand_path
 
 LED = 1e3  # kg: the inertia of what leads a vertex; a step moves it by less than a nanometre

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from pipeline.base.errors import UserError
-from pipeline.sling.model import GRAVITY
+from pipeline.simulator.model import GRAVITY
 from validation.engines.mesh import Tube
 
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.objective.space import Space
-from pipeline.sling.initial import drawn_guess, hanging_guess
-from pipeline.sling.model import Sling
-from pipeline.sling.records import Grip
-from pipeline.sling.schedule import relaxation, steps
+from pipeline.identify.objective.space import Space
+from pipeline.simulator.initial import drawn_guess, hanging_guess
+from pipeline.simulator.model import Sling
+from pipeline.simulator.records import Grip
+from pipeline.simulator.schedule import relaxation, steps
 from validation.simulator.experiment import (
     TIGHT,
     band_of,

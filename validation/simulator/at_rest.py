@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.sling import launch
-from pipeline.sling.model import GRAVITY
-from pipeline.sling.records import Grip
+from pipeline.simulator import launch
+from pipeline.simulator.model import GRAVITY
+from pipeline.simulator.records import Grip
 from validation.simulator import figures
 from validation.simulator.closed import String, cantilever, clamped_beam
 from validation.simulator.experiment import (

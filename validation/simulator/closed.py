@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.sling.material import material
-from pipeline.sling.model import Sling
+from pipeline.simulator.material import material
+from pipeline.simulator.model import Sling
 
 
 @dataclass(frozen=True)

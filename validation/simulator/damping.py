@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from pipeline.sling.model import Sling
-from pipeline.sling.records import Grip
+from pipeline.simulator.model import Sling
+from pipeline.simulator.records import Grip
 from validation.simulator import figures
 from validation.simulator.agreement import random_thetas
 from validation.simulator.at_rest import STRING

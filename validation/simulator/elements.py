@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.sling import Launches, Rollouts, Sling, interact, launch
-from pipeline.sling.initial import sections_of
-from pipeline.sling.interaction import schedule_of
-from pipeline.sling.model import GRAVITY, ROD, TETRAHEDRA
-from pipeline.sling.records import Grip
-from pipeline.sling.schedule import Schedule, statics
-from pipeline.sling.solver import Options, Slings, memory, run
+from pipeline.simulator import Launches, Rollouts, Sling, interact, launch
+from pipeline.simulator.initial import sections_of
+from pipeline.simulator.interaction import schedule_of
+from pipeline.simulator.model import GRAVITY, ROD, TETRAHEDRA
+from pipeline.simulator.records import Grip
+from pipeline.simulator.schedule import Schedule, statics
+from pipeline.simulator.solver import Options, Slings, memory, run
 from validation.benchmarks.timing import timed
 from validation.simulator.closed import String, clamped_beam
 from validation.simulator.finding import Bench, Theme

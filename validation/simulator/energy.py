@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.sling.initial import hanging_guess
-from pipeline.sling.interaction import schedule_of
-from pipeline.sling.model import Sling
-from pipeline.sling.records import Grip, Mode
-from pipeline.sling.schedule import RELAX_STEPS
+from pipeline.simulator.initial import hanging_guess
+from pipeline.simulator.interaction import schedule_of
+from pipeline.simulator.model import Sling
+from pipeline.simulator.records import Grip, Mode
+from pipeline.simulator.schedule import RELAX_STEPS
 from validation.simulator import figures
 from validation.simulator.experiment import band_of, move
 from validation.simulator.finding import Bench, Finding, Theme

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.sling.initial import fixed_frames, sections_of
-from pipeline.sling.model import Sling
-from pipeline.sling.records import Grip, Mode
-from pipeline.sling.schedule import Schedule, statics, steps
-from pipeline.sling.solver import Frames, Options, Slings, run
+from pipeline.simulator.initial import fixed_frames, sections_of
+from pipeline.simulator.model import Sling
+from pipeline.simulator.records import Grip, Mode
+from pipeline.simulator.schedule import Schedule, statics, steps
+from pipeline.simulator.solver import Frames, Options, Slings, run
 from validation.simulator.finding import Bench
 
 TIGHT = {"double": True, "tolerance": 1e-12}  # the kernel as exact as it gets

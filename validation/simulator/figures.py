@@ -7,7 +7,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pipeline.drawing.styles import COLORS, INK, THEME
+from pipeline.report.drawing.styles import COLORS, INK, THEME
 
 
 def _save(figure, path: Path) -> None:

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.sling import Sling, interact
-from pipeline.sling.records import Grip
+from pipeline.simulator import Sling, interact
+from pipeline.simulator.records import Grip
 from validation.simulator.at_rest import STRING
 from validation.simulator.closed import String
 from validation.simulator.damping import oscillate

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.sling.initial import sections_of
-from pipeline.sling.model import GRAVITY, Sling
-from pipeline.sling.records import Grip
-from pipeline.sling.schedule import steps
+from pipeline.simulator.initial import sections_of
+from pipeline.simulator.model import GRAVITY, Sling
+from pipeline.simulator.records import Grip
+from pipeline.simulator.schedule import steps
 from validation.simulator.experiment import TIGHT, band_of, launched, move, straight, straight_guess
 from validation.simulator.finding import Bench, Finding, Theme
 from validation.simulator.reference import ReferenceRod

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pipeline.sling import Launches, Sling, launch
-from pipeline.sling.initial import drawn_guess
-from pipeline.sling.launch import schedule_of
-from pipeline.sling.model import GRAVITY
-from pipeline.sling.records import Grip
-from pipeline.sling.schedule import relaxation
+from pipeline.simulator import Launches, Sling, launch
+from pipeline.simulator.initial import drawn_guess
+from pipeline.simulator.launch import schedule_of
+from pipeline.simulator.model import GRAVITY
+from pipeline.simulator.records import Grip
+from pipeline.simulator.schedule import relaxation
 from validation.simulator.experiment import band_of, rest
 from validation.simulator.finding import Bench, Finding, Theme, off
 from validation.simulator.reference import ReferenceRod

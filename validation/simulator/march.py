@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.sling.records import Grip, Mode
-from pipeline.sling.rubber import TIMES
+from pipeline.simulator.records import Grip, Mode
+from pipeline.simulator.rubber import TIMES
 from validation.simulator.reference import ReferenceRod
 
 SMALL = 1e-30  # imaginary step: derivatives without cancellation

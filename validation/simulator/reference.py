@@ -1,4 +1,4 @@
-"""The rod of pipeline/sling/rod.h in plain NumPy, float64, written a second time.
+"""The rod of pipeline/simulator/rod.h in plain NumPy, float64, written a second time.
 
 A state x has shape (..., L, 9): per section the node and the directors a, b of the edge behind it.
 The columns of the deformation gradients, F = [g a b], and the differences of neighbouring frames
@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.sling.initial import fixed_frames
-from pipeline.sling.material import material
-from pipeline.sling.model import GRAVITY, Sling
-from pipeline.sling.rubber import RUBBER, TIMES
+from pipeline.simulator.initial import fixed_frames
+from pipeline.simulator.material import material
+from pipeline.simulator.model import GRAVITY, Sling
+from pipeline.simulator.rubber import RUBBER, TIMES
 
 TURNS = 1e-2  # of the modulus: keeps the spin of an unstressed edge regular
 HOLDS, TAUT = (

@@ -8,10 +8,10 @@ from itertools import product
 
 import numpy as np
 
-from pipeline.objective.space import Space
+from pipeline.identify.objective.space import Space
+from pipeline.identify.results.theta import at_points
 from pipeline.params.identification import LAWS
-from pipeline.sling import THETA, Sling, interact, launch
-from pipeline.sling.theta import at_points
+from pipeline.simulator import THETA, Sling, interact, launch
 from validation.simulator.agreement import random_thetas
 from validation.simulator.experiment import band_of
 from validation.simulator.finding import Bench, Finding, Theme

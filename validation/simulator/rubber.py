@@ -9,14 +9,14 @@ from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.optimize import least_squares
 
-from pipeline.objective.space import Space
+from pipeline.identify.objective.space import Space
 from pipeline.params.identification import LAWS
-from pipeline.sling.initial import drawn_guess
-from pipeline.sling.material import THETA
-from pipeline.sling.model import LaunchHistory, Sling
-from pipeline.sling.records import Grip
-from pipeline.sling.rubber import RUBBER, TIMES
-from pipeline.sling.schedule import steps
+from pipeline.simulator.initial import drawn_guess
+from pipeline.simulator.material import THETA
+from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.simulator.records import Grip
+from pipeline.simulator.rubber import RUBBER, TIMES
+from pipeline.simulator.schedule import steps
 from validation.simulator import agreement, energy, launching, robustness
 from validation.simulator.at_rest import STRING
 from validation.simulator.closed import oscillation
@@ -328,7 +328,7 @@ def section(bench: Bench, count: int = 10_000, progress=print) -> Theme:
             *surveyed,
         ],
         "Mooney's share m and eight relaxing branches of one weight beside the neo-Hookean material"
-        " (`pipeline/sling/rubber.h`). E is the relaxed modulus. Each branch has a free energy,"
+        " (`pipeline/simulator/rubber.h`). E is the relaxed modulus. Each branch has a free energy,"
         " whose sum with what the branches lose takes part in the balance.",
         details={"survey": found},
     )

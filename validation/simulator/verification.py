@@ -45,7 +45,7 @@ edges bend with E I and twist with G J of the round section. Viscous stress is d
 the elastic stress, its shape part times s. Each step, of second order (BDF2), is solved \
 by Newton's method on the whole band.
 
-Device {device}; simulator {simulator}, a digest of pipeline/sling.
+Device {device}; simulator {simulator}, a digest of pipeline/simulator.
 """
 SECTIONS: dict[str, Callable[..., Theme]] = {
     "at rest": at_rest.section,

@@ -12,8 +12,8 @@ from app.export.card import HOLD, LANDING, Matched
 from app.export.chain import SpringChain
 from app.export.match import compared, draws_of, proof_draws
 from app.export.newton_replay import NewtonReplay, loader, numbers
-from pipeline.sling.launch import ballistic_landing
-from pipeline.sling.model import GRAVITY
+from pipeline.simulator.launch import ballistic_landing
+from pipeline.simulator.model import GRAVITY
 from sling2sim2real import UserError, export
 
 pytest.importorskip("newton", reason="newton: pip install -e '.[validation]'")

@@ -10,7 +10,7 @@ from PIL import Image
 from app.flow.artifacts import artifact
 from app.flow.graph import Stage
 from pipeline.base.files import write_text
-from tests.report.conftest import BAND, METHOD, root, template
+from tests.report.run.conftest import BAND, METHOD, root, template
 
 __all__ = ["root", "template"]  # fixtures
 

@@ -220,9 +220,9 @@ def test_a_held_string_pulls_as_its_formula() -> None:
 
 
 def test_the_force_by_theta(params, tmp_path) -> None:
-    from pipeline.sling.launch import launch
-    from pipeline.sling.load import load_sling
-    from pipeline.sling.material import THETA
+    from pipeline.identify.results.mounting import load_sling
+    from pipeline.simulator.launch import launch
+    from pipeline.simulator.material import THETA
 
     values = 3e5, 0.45, 5e-3, 0.5, 1.0
     path = tmp_path / "theta.json"

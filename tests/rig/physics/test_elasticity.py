@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq, least_squares
 
-from pipeline.rig.physics.elasticity import (
+from rig.physics.elasticity import (
     LAWS,
     TRELOAR,
     EightChain,

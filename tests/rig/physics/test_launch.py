@@ -6,9 +6,9 @@ from scipy.integrate import simpson
 
 from pipeline.params import Params
 from pipeline.params.virtual_rig import RigFlow, RigSoftening, RigSpectrum
-from pipeline.rig.physics.launch import POINTS, flight, fly, launch, launch_from
-from pipeline.rig.physics.scene import ROD
-from pipeline.rig.physics.world import bent_at, pulled, string_of
+from rig.physics.launch import POINTS, flight, fly, launch, launch_from
+from rig.physics.scene import ROD
+from rig.physics.world import bent_at, pulled, string_of
 from tests.project import with_
 
 DRAW = (-0.30, -0.15)

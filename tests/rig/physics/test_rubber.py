@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import cumulative_trapezoid, quad, solve_ivp
 from scipy.special import exp1, gamma, gammaincc
 
-from pipeline.rig.physics.elasticity import TRELOAR, Gent
-from pipeline.rig.physics.rubber import Flow, Rubber, Softening, spectrum
+from rig.physics.elasticity import TRELOAR, Gent
+from rig.physics.rubber import Flow, Rubber, Softening, spectrum
 
 NONE = np.empty((0, 2))
 FLOW = Flow(share=0.4, rate=100.0, power=4.0, chain=-0.7, offset=0.05)

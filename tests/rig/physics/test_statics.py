@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pipeline.params import Params
-from pipeline.rig.physics import string as dynamics
-from pipeline.rig.physics.world import bent_at, string_of
+from rig.physics import string as dynamics
+from rig.physics.world import bent_at, string_of
 
 DRAW = np.array([0.0, -0.30, -0.15])
 

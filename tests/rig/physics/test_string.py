@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 
-from pipeline.rig.physics import string as string_module
-from pipeline.rig.physics.elasticity import TRELOAR, ExtendedTube
-from pipeline.rig.physics.rubber import Flow, Rubber, Softening
-from pipeline.rig.physics.string import ElasticString
-from pipeline.rig.physics.world import bent_at
-from pipeline.rig.recorder.interaction import hang
+from rig.physics import string as string_module
+from rig.physics.elasticity import TRELOAR, ExtendedTube
+from rig.physics.rubber import Flow, Rubber, Softening
+from rig.physics.string import ElasticString
+from rig.physics.world import bent_at
+from rig.recorder.interaction import hang
 
 ELASTIC = Rubber(2e5, np.zeros((0, 2)), 2e-3)
 DRAWN = np.array([0.0, -0.4, 0.0])

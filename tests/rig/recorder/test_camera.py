@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.params import Params
-from pipeline.rig.physics.scene import Mesh, tube
-from pipeline.rig.recorder.camera import (
+from rig.physics.scene import Mesh, tube
+from rig.recorder.camera import (
     AMBIENT,
     LIGHT,
     Exposure,
@@ -15,7 +15,7 @@ from pipeline.rig.recorder.camera import (
     measured_depth,
     nearer,
 )
-from pipeline.rig.recorder.record import INSTANTS, MOST_INSTANTS, instants_of
+from rig.recorder.record import INSTANTS, MOST_INSTANTS, instants_of
 
 LINE = np.stack([np.linspace(-0.1, 0.1, 30), np.zeros(30), np.zeros(30)], axis=1)
 RADIUS = np.full(30, 0.005)

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
 from pipeline.params import Params
-from pipeline.rig.recorder import camera
-from pipeline.rig.recorder.interaction import Interaction
-from pipeline.rig.recorder.record import INSTANTS, record
+from rig.recorder import camera
+from rig.recorder.interaction import Interaction
+from rig.recorder.record import INSTANTS, record
 from tests.project import with_
 from tests.rig.conftest import SCALE
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from pipeline.params import Params
-from pipeline.rig.physics import launch as launches
-from pipeline.rig.physics.motion import OPEN, HandMotion
-from pipeline.rig.physics.robot import SENSOR_LEVER, Robot
-from pipeline.rig.physics.world import bent_at, string_of
-from pipeline.rig.recorder.camera import Exposure, VirtualCamera, measured_depth
-from pipeline.rig.recorder.interaction import Interaction
-from pipeline.rig.recorder.record import radius
-from pipeline.rig.recorder.sensors import TOOL_CENTER, wrench
+from rig.physics import launch as launches
+from rig.physics.motion import OPEN, HandMotion
+from rig.physics.robot import SENSOR_LEVER, Robot
+from rig.physics.world import bent_at, string_of
+from rig.recorder.camera import Exposure, VirtualCamera, measured_depth
+from rig.recorder.interaction import Interaction
+from rig.recorder.record import radius
+from rig.recorder.sensors import TOOL_CENTER, wrench
 
 COUNT = 20_000
 FORCE, ACCELERATION = np.array([1.0, 12.0, -3.0]), np.array([0.5, -2.0, 0.7])

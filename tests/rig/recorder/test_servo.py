@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pipeline.params import Params
-from pipeline.rig.physics.motion import END, HandMotion
-from pipeline.rig.recorder.servo import Servo
+from rig.physics.motion import END, HandMotion
+from rig.recorder.servo import Servo
 
 MASS, STIFFNESS, DAMPING = 5.0, 12000.0, 200.0
 

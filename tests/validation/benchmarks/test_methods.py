@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.objective.evaluate import Evaluator
-from pipeline.objective.loss import EpisodeLoss
-from pipeline.objective.space import Space
+from pipeline.identify.objective.evaluate import Evaluator
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.objective.space import Space
 from pipeline.params import load
 from tests.project import ROOT
 from validation.benchmarks import methods as bench

@@ -8,8 +8,8 @@ import pytest
 
 from pipeline.base.native import start, wp
 from pipeline.params import load
-from pipeline.sling.interaction import interact
-from pipeline.sling.model import Sling
+from pipeline.simulator.interaction import interact
+from pipeline.simulator.model import Sling
 from tests.project import ROOT
 from validation import synthetic
 from validation.benchmarks import throughput as bench

@@ -39,8 +39,8 @@ def project(tmp_path: Path) -> Path:
     root = tmp_path / "project"
     files = {
         "docs/times.md": f"# Times\n\n{BEGIN}old\n{END}\nMore.\n",
-        "pipeline/sling/solver.py": "",
-        "stages/record.py": "import pipeline.sling.solver\n",
+        "pipeline/simulator/solver.py": "",
+        "stages/record.py": "import pipeline.simulator.solver\n",
         "app/cli.py": "",
     }
     for name, text in files.items():
@@ -107,7 +107,7 @@ def test_steps_are_measured_once_and_failures_again(project: Path, tmp_path: Pat
     assert bench.table(written) == bench.table(report)
     assert (project / "docs/times.md").read_text().count(bench.table(written)) == 1
     assert written["steps"]["setup"]["disk_bytes"]["venv"] >= 10000
-    assert set(written["code"]) == {"app/cli.py", "pipeline/sling", "stages/record.py"}
+    assert set(written["code"]) == {"app/cli.py", "pipeline/simulator", "stages/record.py"}
     head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=project, capture_output=True, text=True)
     assert head.stdout.startswith(written["commit"])
 

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.params import load
-from pipeline.sling.model import Sling
+from pipeline.simulator.model import Sling
 from validation.engines import checks
 from validation.engines.mesh import CLAMPED, Tube
 from validation.simulator.closed import String

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.sling.initial import hanging_guess
+from pipeline.simulator.initial import hanging_guess
 from validation.simulator.closed import String
 from validation.simulator.experiment import band_of
 from validation.simulator.march import jacobian

@@ -292,7 +292,7 @@ def main() -> int:
     ran = [project / "app/cli.py", *sorted((project / "stages").glob("[a-z]*.py"))]
     about = environment("cpu", command) | {
         "commit": json.loads((work / "source.json").read_text())["commit"],
-        "simulator": fingerprint(project / "pipeline/sling")[:12],
+        "simulator": fingerprint(project / "pipeline/simulator")[:12],
         "code": digests(project / Path(__file__).relative_to(ROOT), *ran, root=project),
     }
     write_json(arguments.report, content | about)

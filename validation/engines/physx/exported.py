@@ -23,8 +23,8 @@ from pipeline.base import errors
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.params import load
-from pipeline.sling.cylinder import volumes
-from pipeline.sling.model import GRAVITY
+from pipeline.simulator.cylinder import volumes
+from pipeline.simulator.model import GRAVITY
 from validation.benchmarks.timing import environment
 from validation.engines.mesh import Tube
 from validation.engines.physx.bands import Engine, release

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.sling.launch import Launches, _outcomes
-from pipeline.sling.model import GRAVITY, Sling
-from pipeline.sling.records import LANE, Outcome
+from pipeline.simulator.launch import Launches, _outcomes
+from pipeline.simulator.model import GRAVITY, Sling
+from pipeline.simulator.records import LANE, Outcome
 from validation.engines.mesh import Tube
 from validation.engines.physx.law import energy, force_on
 from validation.engines.physx.rollouts import BURST, SPACE

@@ -20,11 +20,11 @@ import numpy as np
 from app.arguments import count
 from pipeline.base import errors
 from pipeline.base.errors import UserError
+from pipeline.identify.results.mounting import load_sling
 from pipeline.params import load
-from pipeline.sling.launch import launch
-from pipeline.sling.load import load_sling
-from pipeline.sling.model import Sling
-from pipeline.sling.rubber import NEO_HOOKEAN
+from pipeline.simulator.launch import launch
+from pipeline.simulator.model import Sling
+from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.engines.checks import SAME_MESH
 from validation.engines.mesh import Tube
 from validation.engines.physx.bands import Drive, Engine

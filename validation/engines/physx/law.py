@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.export import usd
-from pipeline.sling.model import Sling
+from pipeline.simulator.model import Sling
 from validation.engines.mesh import Tube
 from validation.simulator.closed import String
 

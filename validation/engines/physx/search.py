@@ -23,15 +23,15 @@ from pipeline.base import errors
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.machine import devices
-from pipeline.objective.loss import TERMS
-from pipeline.objective.session import service
-from pipeline.objective.space import Space
+from pipeline.identify.objective.loss import TERMS
+from pipeline.identify.objective.session import service
+from pipeline.identify.objective.space import Space
+from pipeline.identify.results.mounting import sling_of_method
+from pipeline.identify.search.history import History
+from pipeline.identify.search.loop import budget
 from pipeline.params import load
 from pipeline.params.identification import OUR_ENGINE
-from pipeline.search.history import History
-from pipeline.search.loop import budget
-from pipeline.sling.launch import launch
-from pipeline.sling.load import sling_of_method
+from pipeline.simulator.launch import launch
 from validation.benchmarks.methods import complete
 from validation.benchmarks.timing import environment
 from validation.engines.physx.bands import Engine, release

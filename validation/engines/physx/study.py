@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pipeline.sling.interaction import GRASP_BLEND, interact
-from pipeline.sling.model import GRAVITY, Sling
+from pipeline.simulator.interaction import GRASP_BLEND, interact
+from pipeline.simulator.model import GRAVITY, Sling
 from validation.benchmarks.timing import timed
 from validation.engines import checks
 from validation.engines.mesh import Tube

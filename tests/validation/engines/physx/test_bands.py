@@ -11,7 +11,7 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.base.machine import gpus
 from pipeline.params import load
-from pipeline.sling.cylinder import volumes
+from pipeline.simulator.cylinder import volumes
 from validation.engines import checks
 from validation.engines.mesh import Tube
 from validation.engines.physx import bands, scene, study

@@ -6,8 +6,8 @@ import pytest
 from app.export import usd
 from pipeline.base.errors import UserError
 from pipeline.params import load
-from pipeline.sling.cylinder import volumes
-from pipeline.sling.model import GRAVITY
+from pipeline.simulator.cylinder import volumes
+from pipeline.simulator.model import GRAVITY
 from validation.engines import checks
 from validation.engines.mesh import Tube
 from validation.engines.physx import law

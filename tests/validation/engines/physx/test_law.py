@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.params import load
-from pipeline.sling.model import Sling
+from pipeline.simulator.model import Sling
 from tests.project import ROOT
 from validation.engines.mesh import Tube
 from validation.engines.physx import law

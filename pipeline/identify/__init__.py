@@ -1,0 +1,1 @@
+"""From episodes to parameters: clamps, objective, search, optimisers, posterior, and θ files."""

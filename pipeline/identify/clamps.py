@@ -1,0 +1,137 @@
+"""How a band hangs: what its slack shape and force show before it is stretched.
+
+The five elastic parameters leave open how the band leaves its clamps and how stiff it is in
+bending (a hose, a braid or a strip is no solid round cylinder). Both matter for the recoil, and the
+recording shows them while the band is slack: hanging, lifted, and on its way until it is taut. Two
+numbers are fitted to that part alone, before any search: the flexural rigidity E I and the angle at
+the clamps.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pipeline.base.errors import UserError
+from pipeline.episode.episode import Episode
+from pipeline.episode.phases import taut_time
+from pipeline.simulator.interaction import interact
+from pipeline.simulator.model import Sling
+
+ANGLE = (-30.0, 60.0)  # of the clamps, towards the middle of the fork [deg]
+RIGIDITY = (0.1, 20.0)  # relative to a solid round band
+UNITS = {"geom": 0.1, "force": 0.1}  # 1 mm of shape weighs as much as 0.1 N
+POISSON = 0.45  # while the band is slack, any will do
+
+
+def slack_part(episode: Episode) -> Episode:
+    """The episode until the band is taut. Raises UserError where it never hangs slack."""
+    end = taut_time(episode)
+    count, frames = int(np.sum(episode.time < end)), int(np.sum(episode.cloud_time < end))
+    if end - episode.grasp_time < 0.3 or frames < 10:
+        raise UserError(
+            f"episode of {episode.band}: the band is taut within {end - episode.grasp_time:.2f} s"
+            " of the grasp; record it from hanging slack"
+        )
+    return replace(
+        episode,
+        time=episode.time[:count],
+        position=episode.position[:count],
+        velocity=episode.velocity[:count],
+        force=episode.force[:count],
+        opening=episode.opening[:count],
+        cloud_time=episode.cloud_time[:frames],
+        clouds=episode.clouds[:frames],
+        release_time=float(episode.time[count - 1]),
+    )
+
+
+def nominal_young(sling: Sling, episode: Episode) -> float:
+    """Young's modulus of the neo-Hookean string that holds the recorded force [Pa].
+
+    Median over the last half second before the release; nearly incompressible, so that the tension
+    is E A / 3 (l - 1 / l^2).
+    """
+    last = (episode.time < episode.release_time - 0.05) & (
+        episode.time > episode.release_time - 0.55
+    )
+    position, force = np.median(episode.position[last], 0), np.median(episode.force[last], 0)
+    legs = sling.tips - position
+    lengths = np.linalg.norm(legs, axis=1)
+    stretch = lengths.sum() / sling.rest_length
+    pull = np.linalg.norm((legs / lengths[:, None]).sum(axis=0))
+    if stretch < 1.05:
+        raise UserError(
+            f"episode of {episode.band}: the hand holds the band at {stretch:.2f} of its rest"
+            f" length ({sling.rest_length} m); check bands.{episode.band}.rest_length and the"
+            " extrinsics"
+        )
+    tension = np.linalg.norm(force) / pull
+    return float(3 * tension / (sling.area * (stretch - stretch**-2)))
+
+
+def calibrate_clamps(sling: Sling, episode: Episode, make_loss, *, workers: int) -> dict:
+    """Fit the clamps' angle and the flexural rigidity to the slack part of an episode.
+
+    Args:
+        sling: With the setup's clamp direction, as where the angle is 0.
+        make_loss: Called with the slack episode; gives the object whose `terms(rollouts)` are used.
+
+    Returns:
+        `clamp_direction`, `flexural_rigidity` [N m^2], and what was found on the way.
+    """
+    young = nominal_young(sling, episode)
+    solid = young * np.pi * sling.radius**4 / 4
+    part = slack_part(episode)
+    loss = make_loss(part)
+    theta = np.array([young, POISSON, 5e-3, 1.0, 1.0])
+    held_fast = replace(sling, grip_force=1e6)
+
+    def direction(angle: float) -> np.ndarray:
+        turn = Rotation.from_euler("y", -angle, degrees=True)
+        return turn.apply(sling.clamp_direction)
+
+    def losses(angle: float, rigidity: np.ndarray) -> np.ndarray:
+        """One angle with several rigidities, which share a batch, shape (len(rigidity),)."""
+        trial = replace(
+            held_fast, clamp_direction=direction(angle), flexural_rigidity=solid * rigidity
+        )
+        rollouts = interact(trial, part, np.tile(theta, (len(rigidity), 1)))
+        terms = loss.terms(rollouts)
+        total = sum(terms[name] / unit for name, unit in UNITS.items())
+        return np.where([reason is None for reason in rollouts.failure], total, np.inf)
+
+    def best(angles: np.ndarray, rigidity: np.ndarray) -> tuple[float, float, float]:
+        with ThreadPoolExecutor(workers) as pool:
+            table = np.array(list(pool.map(lambda angle: losses(angle, rigidity), angles)))
+        i, j = np.unravel_index(np.argmin(table), table.shape)
+        return float(table[i, j]), float(angles[i]), float(rigidity[j])
+
+    start = float(losses(0.0, np.array([1.0]))[0])
+    found = best(np.linspace(*ANGLE, 10), np.geomspace(*RIGIDITY, 16))
+    for width in (1.0, 0.3):  # around the best, ten degrees and half a decade on each side
+        found = min(
+            found,
+            best(
+                found[1] + width * np.linspace(-9, 9, 7),
+                found[2] * np.geomspace(3**-width, 3**width, 16),
+            ),
+        )
+    value, angle, rigidity = min(found, (start, 0.0, 1.0))
+    if not np.isfinite(value):
+        raise UserError(
+            f"episode of {episode.band}: no simulation of its slack part converges; check"
+            f" bands.{episode.band} (mass, diameter, rest_length) and the extrinsics"
+        )
+    return {
+        "clamp_direction": direction(angle).tolist(),
+        "flexural_rigidity": solid * rigidity,
+        "clamp_angle_deg": angle,
+        "relative_rigidity": rigidity,
+        "nominal_youngs_modulus": young,
+        "slack_until": float(part.time[-1]),
+        "loss": {"solid_and_vertical": start if np.isfinite(start) else None, "fitted": value},
+    }

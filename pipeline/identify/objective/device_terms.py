@@ -1,0 +1,87 @@
+"""The terms of a loss, computed where the rollouts are: a few numbers each come back from a GPU."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from pipeline.identify.objective.chamfer import Chamfer
+
+
+class DeviceTerms:
+    """The loss of one episode for rollouts that are Warp arrays."""
+
+    def __init__(
+        self,
+        chamfer: Chamfer,
+        *,
+        force: np.ndarray,
+        velocity: np.ndarray,
+        window: int,
+        sample_weights: np.ndarray,
+        frame_weights: np.ndarray,
+    ) -> None:
+        """Keep what all rollouts share, and from its first use on a device a copy there.
+
+        Args:
+            force, velocity: The measured ones, smoothed [N], [m/s], shape (T, 3).
+            window: Samples of the median filter, odd.
+            sample_weights: What a sample adds to `force` for a newton, and to the signed `work` for
+                a watt, shape (2, T).
+            frame_weights: What a frame adds to `geom` for a metre, shape (K,).
+        """
+        self._chamfer, self._window = chamfer, window
+        self._shared = {
+            "measured": force,
+            "velocity": velocity,
+            "sample_weights": sample_weights,
+            "frame_weights": frame_weights,
+        }
+        self._copies, self._lock = {}, threading.Lock()
+
+    def __call__(self, rollouts, matrix: csr_array) -> np.ndarray:
+        """Terms (N, 3) in the order of TERMS; 0 where no sample or frame has weight.
+
+        Args:
+            matrix: The recorded force's way, (T, S) from the rollouts' times.
+        """
+        import warp as wp
+
+        from pipeline.base.native import launch
+        from pipeline.identify.objective.kernel import terms_kernel
+
+        line, force = rollouts.center_line, rollouts.force
+        count, device = len(force), str(force.device)
+        kernel, kind = terms_kernel(self._window)
+        arrays = kind()
+        for name, values in self._on(device, matrix).items():
+            setattr(arrays, name, values)
+        arrays.force, arrays.errors = force, self._chamfer.errors(line, device)
+        arrays.samples, arrays.frames = matrix.shape[0], self._chamfer.frames
+        arrays.both = int(self._chamfer.symmetric)
+        filtered = count * 3 * arrays.samples
+        arrays.filtered = wp.empty(filtered, dtype=wp.float64, device=device)
+        arrays.terms = terms = wp.empty(count * 3, dtype=wp.float64, device=device)
+        launch(kernel, count, [arrays], device)
+        return terms.numpy().reshape(count, 3)
+
+    def _on(self, device: str, matrix: csr_array) -> dict:
+        """What all rollouts share, there; another filter replaces the last one."""
+        import warp as wp
+
+        with self._lock:
+            known, copies = self._copies.get(device, (None, {}))
+            if known is not matrix:
+                rows = {"first": matrix.indptr, "columns": matrix.indices}
+                values = {name: np.ravel(one) for name, one in self._shared.items()}
+                values["values"] = matrix.data
+                copies = {
+                    name: wp.array(one.astype(np.int32), device=device)
+                    for name, one in rows.items()
+                } | {
+                    name: wp.array(one.astype(float), device=device) for name, one in values.items()
+                }
+                self._copies[device] = matrix, copies
+            return copies

@@ -1,0 +1,238 @@
+"""How far a simulated interaction is from the recorded one.
+
+    geom   mean over camera frames of the Chamfer distance                              [cm]
+    force  mean over samples of |f_real - f_sim|                                        [N]
+    work   | sum of trapezoids of (f_real - f_sim) . v over the whole episode |         [J]
+
+They are the paper's, with its constants read as 1/(T 1 cm), 1/(T 1 N) and 1/(1 J). docs/method.md
+says more. Blocks of the recording can be held out: they count in no term, but in `residuals`.
+"""
+
+from __future__ import annotations
+
+import threading
+from functools import lru_cache
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.sparse import csr_array
+
+from pipeline.base.errors import UserError
+from pipeline.episode.episode import Episode
+from pipeline.episode.phases import held_out_blocks, reach, within
+from pipeline.episode.signal import as_recorded, cutoff_hz
+from pipeline.identify.objective.chamfer import Chamfer, CloudDistance
+from pipeline.identify.objective.device_terms import DeviceTerms
+
+TERMS = ("geom", "force", "work")
+LOCK = threading.Lock()  # while a filter is made, which takes a second
+
+
+class EpisodeLoss:
+    """The loss of one episode, for batches of rollouts.
+
+    Attributes:
+        fitted_samples, held_samples: Which samples count in the terms and which do not, (T,) bool;
+            those of neither are guards.
+        fitted_frames, held_frames: The same of the camera frames, shape (K,).
+    """
+
+    def __init__(
+        self,
+        episode: Episode,
+        *,
+        radius: float,
+        rest_length: float | np.ndarray,
+        weights: dict[str, float],
+        cutoff: float,
+        median_window: int = 7,
+        chamfer: str = "symmetric",
+        held_out: np.ndarray | None = None,
+    ) -> None:
+        """Prepare the recorded side.
+
+        Args:
+            radius, rest_length: Of the unstretched band [m]; the length whole or by edges.
+            weights: Of each of TERMS; a term that weighs nothing is still computed.
+            cutoff: Of the low-pass that the recorded force went through [Hz].
+            median_window: Samples of the median filter on forces and velocity, odd.
+            chamfer: "symmetric": between the cloud and the tube both ways; "measured": measured to
+                simulated alone; "clouds": between two clouds, as the paper prints it.
+            held_out: Begin and end [s] of blocks that are not fitted, shape (B, 2). Samples nearer
+                to them than the force's filters reach count nowhere; clouds pass no filter.
+
+        Raises:
+            UserError: No cloud has points.
+        """
+        self.weights = {name: float(weights[name]) for name in TERMS}
+        self.median_window = median_window
+        self.cutoff = cutoff
+        self.time, self.period = episode.time, episode.sample_period
+        self.velocity = self.smooth(episode.velocity)
+        self.force = self.smooth(episode.force)
+        distance = CloudDistance if chamfer == "clouds" else Chamfer
+        self.chamfer = distance(
+            episode.clouds,
+            episode.camera,
+            radius=radius,
+            rest_length=rest_length,
+            symmetric=chamfer != "measured",
+        )
+        blocks = np.zeros((0, 2)) if held_out is None else np.asarray(held_out, float)
+        guard = reach(self.period, cutoff, median_window)
+        seen = np.array([len(cloud) > 0 for cloud in episode.clouds])
+        self.fitted_samples = ~within(self.time, blocks, guard)
+        self.held_samples = within(self.time, blocks)
+        self.fitted_frames = ~within(episode.cloud_time, blocks) & seen
+        self.held_frames = within(episode.cloud_time, blocks) & seen
+        pull = np.array([[episode.grasp_time, episode.release_time - guard]])
+        self._pull = within(self.time, pull), within(episode.cloud_time, pull)
+        self._on_device = DeviceTerms(
+            self.chamfer,
+            force=self.force,
+            velocity=self.velocity,
+            window=median_window,
+            sample_weights=np.stack([_mean(self.fitted_samples), self._trapezoids()]),
+            frame_weights=100 * _mean(self.fitted_frames),
+        )
+        if not self.fitted_frames.any():
+            raise UserError(f"episode of {episode.band}: no camera frame shows the band")
+
+    @classmethod
+    def of(cls, params, method: str, episode: Episode, sling) -> EpisodeLoss:
+        """Make it from params.yaml's `loss`, `force` and `methods.<method>`."""
+        cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
+        held = params.loss.held_out
+        guard = reach(episode.sample_period, cutoff, params.loss.median_window)
+        return cls(
+            episode,
+            radius=sling.radius,
+            rest_length=sling.edge_lengths,
+            weights=dict(params.methods[method].weights),
+            cutoff=cutoff,
+            median_window=params.loss.median_window,
+            chamfer=params.loss.chamfer,
+            held_out=held_out_blocks(episode, held.blocks, held.length, guard),
+        )
+
+    @classmethod
+    def plain(cls, params, episode: Episode, sling) -> EpisodeLoss:
+        """Geometry and force alone, for a part of an episode."""
+        return cls(
+            episode,
+            radius=sling.radius,
+            rest_length=sling.edge_lengths,
+            weights={"geom": 1.0, "force": 1.0, "work": 0.0},
+            cutoff=cutoff_hz(params.force.cutoff, params.force.cutoff_unit),
+            median_window=params.loss.median_window,
+            chamfer=params.loss.chamfer,
+        )
+
+    def terms(self, rollouts) -> dict[str, np.ndarray]:
+        """Each term of N rollouts, shape (N,); NaN or infinite where a rollout is.
+
+        They are computed on the device that holds the rollouts. A rollout's terms are the same to
+        the bit in any batch.
+        """
+        if not isinstance(rollouts.force, np.ndarray):
+            found = self._on_device(rollouts, self._filter(rollouts.times))
+            return dict(zip(TERMS, found.T, strict=True))
+        gap, frames = self._gap(rollouts), self.frames(rollouts)
+        power = np.einsum("ntc,tc->nt", gap, self.velocity)
+        both = self.fitted_samples[:-1] & self.fitted_samples[1:]  # ends of a trapezoid
+        work = (power[:, :-1] + power[:, 1:]).compress(both, axis=1).sum(axis=1)
+        return {
+            "geom": self._centimetres(frames, self.fitted_frames),
+            "force": self._newtons(gap, self.fitted_samples),
+            "work": np.abs(work) / 2 * self.period,
+        }
+
+    def residuals(self, rollouts) -> dict[str, dict[str, np.ndarray]]:
+        """Fitted against held-out between grasp and release: `force` [N] and `cloud` [cm], (N,).
+
+        NaN where nothing is held out.
+        """
+        gap, frames = self._gap(rollouts), self.frames(rollouts)
+        samples, pictures = self._pull
+        return {
+            "force": {
+                "fitted": self._newtons(gap, samples & self.fitted_samples),
+                "held_out": self._newtons(gap, self.held_samples),
+            },
+            "cloud": {
+                "fitted": self._centimetres(frames, pictures & self.fitted_frames),
+                "held_out": self._centimetres(frames, self.held_frames),
+            },
+        }
+
+    def total(self, terms: dict[str, np.ndarray]) -> np.ndarray:
+        """Weighted sum of the terms, shape (N,); one without weight may be NaN."""
+        return sum(weight * terms[name] for name, weight in self.weights.items() if weight)
+
+    def filtered(self, rollouts) -> np.ndarray:
+        """The simulated force as the record would have it [N], shape (N, T, 3), before `smooth`."""
+        force = rollouts.force
+        force = force if isinstance(force, np.ndarray) else force.numpy()
+        count, steps, _ = force.shape
+        flat = force.transpose(1, 0, 2).reshape(steps, -1)
+        return (self._filter(rollouts.times) @ flat).reshape(-1, count, 3).transpose(1, 0, 2)
+
+    def frames(self, rollouts) -> np.ndarray:
+        """Chamfer distance of each camera frame [m], shape (N, K); NaN where it shows nothing."""
+        line = rollouts.center_line
+        return self.chamfer(line, "cpu" if isinstance(line, np.ndarray) else str(line.device))
+
+    def smooth(self, signal: np.ndarray) -> np.ndarray:
+        """Median filter along the samples of (..., T, 3)."""
+        window = (1,) * (signal.ndim - 2) + (self.median_window, 1)
+        return median_filter(signal, size=window, mode="nearest")
+
+    def _gap(self, rollouts) -> np.ndarray:
+        """Measured less simulated force [N], shape (N, T, 3)."""
+        return self.force - self.smooth(self.filtered(rollouts))
+
+    def _trapezoids(self) -> np.ndarray:
+        """What each sample's power adds to the work [s], shape (T,)."""
+        both = self.fitted_samples[:-1] & self.fitted_samples[1:]
+        return self.period / 2 * (np.append(both, False) + np.append(False, both).astype(float))
+
+    def _newtons(self, gap: np.ndarray, samples: np.ndarray) -> np.ndarray:
+        size = np.linalg.norm(gap, axis=2).compress(samples, axis=1)
+        return size.mean(axis=1) if samples.any() else np.full(len(gap), np.nan)
+
+    def _centimetres(self, frames: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        nothing = np.full(len(frames), np.nan)
+        if not chosen.any():
+            return nothing
+        # not frames[:, chosen]: its order in memory, and so the sum's, would hang on N
+        return 100 * frames.compress(chosen, axis=1).mean(axis=1)
+
+    def _filter(self, times: np.ndarray) -> csr_array:
+        """Of forces at simulated times (S,)."""
+        start = float(self.time[0] - self.period / 2)
+        with LOCK:
+            return _recording_filter(
+                times.tobytes(), self.cutoff, start, self.period, len(self.time)
+            )
+
+
+def _mean(chosen: np.ndarray) -> np.ndarray:
+    """Weights of a mean over what is chosen, shape (T,); all 0 where nothing is."""
+    return chosen / max(chosen.sum(), 1)
+
+
+@lru_cache(maxsize=128)  # shared by all losses of an episode, such as the report's replays
+def _recording_filter(
+    times: bytes, cutoff: float, start: float, period: float, samples: int
+) -> csr_array:
+    """Matrix (T, S) from forces at simulated times (S,) to the episode's T filtered samples.
+
+    It is the recorded force's way (interpolation, low-pass, averages), which is linear, and
+    forgets: weights that no rounding would show are left out.
+    """
+    times, parts = np.frombuffer(times), []
+    for first in range(0, len(times), 32):
+        pulses = np.eye(len(times), min(32, len(times) - first), -first)
+        parts.append(as_recorded(times, pulses, cutoff, start, period, samples))
+    weights = np.hstack(parts)
+    return csr_array(np.where(np.abs(weights) > 1e-18, weights, 0))

@@ -1,0 +1,1 @@
+"""Adam with finite differences."""

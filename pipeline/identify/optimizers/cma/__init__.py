@@ -1,0 +1,1 @@
+"""CMA-ES in several regions."""

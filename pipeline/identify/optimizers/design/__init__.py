@@ -1,0 +1,1 @@
+"""One design over the whole box."""

@@ -1,0 +1,58 @@
+"""Launches that are evidence: data/evidence/<band>.csv, which `sling observe` writes.
+
+Columns draw_y_m, draw_z_m, draw_error_m, landing_y_m. A launch is evidence or a score
+(data/trials/measured/), never both.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.base import launch_table as table
+from pipeline.base.errors import UserError
+from pipeline.identify.posterior.launches import Observed
+
+COLUMNS = (*table.DRAW, "draw_error_m", table.LANDING)  # as they are written
+MOST_ERROR = 0.1  # of a draw [m]
+
+
+def read_evidence(folder: Path, band: str, params) -> list[Observed]:
+    """Of a band, oldest first; none where it has no file.
+
+    A draw without an error of its own has that of a commanded one, `trials.actuation_error`.
+
+    Raises:
+        UserError: A file is no band's, cannot be read, or says what no launch can have done.
+    """
+    path = table.file_of(folder, band, params.bands)
+    return read_launches(path, params.trials.actuation_error) if path else []
+
+
+def read_launches(path: Path, error: float | None) -> list[Observed]:
+    """Of a CSV with `COLUMNS`, of which the error may be missing.
+
+    Args:
+        error: Of a draw without one of its own [m].
+
+    Raises:
+        UserError: It cannot be read, or says what no launch can have done.
+    """
+    launches = []
+    for line, row in table.rows(path, *table.EVIDENCE):
+        where = f"{path}, line {line}"
+        landing = table.metres(where, table.LANDING, row[table.LANDING])
+        if landing is None:
+            raise UserError(f"{where}: a launch that did not land is no evidence, leave it out")
+        own = row["draw_error_m"]
+        own = expect_error(where, table.number(where, "draw_error_m", own)) if own else error
+        launches.append(Observed(table.drawn(where, row), own, landing))
+    return launches
+
+
+def expect_error(where: str, error: float) -> float:
+    """A draw's standard deviation [m], if it can be one. Raises UserError."""
+    if not 0 <= error < MOST_ERROR:
+        raise UserError(
+            f"{where}: draw_error_m must be at least 0 and below {MOST_ERROR:g} m, got {error:g}"
+        )
+    return error

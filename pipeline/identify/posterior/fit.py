@@ -1,0 +1,152 @@
+"""The mode of the density by Levenberg-Marquardt within bounds, and the Gaussian around it.
+
+    -2 log p(phi | evidence) = sum of the recordings' misfits + that of the launches + priors
+
+Each recording's nuisances are its own and eliminated in it, so that what is left is a few
+coordinates, whatever the number of recordings; and leaving one out is a subtraction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from pipeline.base.errors import UserError
+from pipeline.identify.posterior.coordinates import Coordinates
+from pipeline.identify.posterior.launches import LaunchLikelihood
+from pipeline.identify.posterior.likelihood import Expansion, Failed, Likelihood
+
+ITERATIONS = 14  # at most
+BINNED = 4  # of them sort the points into bins anew; then the density keeps its form
+LONGEST = 20.0  # of a step, in those of the finite differences
+STILL = 0.2  # of a last step, in standard deviations: no interval is 2 % wider by as much
+LEAST = 1e-12  # of a precision
+DAMP, HARDER, EASIER, HARDEST = 1e-3, 10.0, 0.2, 1e4  # Levenberg's, relative to the diagonal
+
+
+class NoFit(UserError):
+    """Simulations fail wherever the fit goes."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The density around its mode.
+
+    Attributes:
+        phi: The mode, shape (D,).
+        hessian, gradient: Of -log p there, and of log p: 0 but at bounds; (D, D), (D,).
+        nuisances: Of each recording, shape (N, 3).
+        expansions: Of each recording there.
+        misfit: -2 log p there, priors included.
+        steps: How many expansions it took.
+        settled: Whether the next step would be small, hardly damped.
+    """
+
+    phi: np.ndarray
+    hessian: np.ndarray
+    gradient: np.ndarray
+    nuisances: np.ndarray
+    expansions: list[Expansion]
+    misfit: float
+    steps: int
+    settled: bool
+
+
+def fit(
+    recordings: Sequence[Likelihood],
+    coordinates: Coordinates,
+    start: np.ndarray,
+    *,
+    launches: LaunchLikelihood | None = None,
+    workers: int | None = None,
+    progress: Callable[[Fit], None] = lambda fit: None,
+) -> Fit:
+    """Fit coordinates from `start` (D,). Raises NoFit.
+
+    Args:
+        launches: That are evidence too.
+        workers: Threads; they change no result.
+        progress: Is told of each expansion that is nearer.
+    """
+    phi, nuisances = np.array(start, float), np.zeros((len(recordings), 3))
+    best, damp, new = None, DAMP, [None] * len(recordings)
+    with ThreadPoolExecutor(workers) as pool:
+        for steps in range(1, ITERATIONS + 1):
+            bins = [one.residuals for one in best.expansions] if steps > BINNED else new
+            around = coordinates.points, phi, _steps(coordinates, phi)
+            try:
+                expansions = [
+                    one.expand(*around, own, pool, kept)
+                    for one, own, kept in zip(recordings, nuisances, bins, strict=True)
+                ]
+            except Failed as why:
+                if best is None:
+                    raise NoFit(
+                        f"{recordings[0].episode.band}: the simulation at the start of the fit"
+                        f" fails: {why}"
+                    ) from None
+                trial = None
+            else:
+                seen = launches and launches.expand(*around)
+                trial = _density(coordinates, phi, nuisances, expansions, seen, steps)
+            if trial and (best is None or trial.misfit < best.misfit or steps <= BINNED):
+                best, damp = trial, damp * EASIER
+                progress(best)
+            else:
+                damp *= HARDER
+            step = _step(best, coordinates, damp)
+            if _size(best, step) < STILL or damp > HARDEST:
+                # Damping makes any step short, also where the fit is stuck.
+                free = _step(best, coordinates, min(damp, DAMP))
+                return replace(best, settled=_size(best, free) < STILL, steps=steps)
+            phi = best.phi + step
+            nuisances = np.array(
+                [
+                    own + one.nuisances[0] + one.nuisances[1] @ step
+                    for own, one in zip(best.nuisances, best.expansions, strict=True)
+                ]
+            )
+    return replace(best, steps=steps)
+
+
+def _size(fit: Fit, step: np.ndarray) -> float:
+    """Of a step (D,), in standard deviations along it: Mahalanobis's distance."""
+    return float(np.sqrt(step @ fit.hessian @ step))
+
+
+def _steps(coordinates: Coordinates, phi: np.ndarray) -> np.ndarray:
+    """Of finite differences, away from the upper bounds, shape (D,)."""
+    steps = coordinates.steps
+    return np.where(phi + steps > coordinates.high, -steps, steps)
+
+
+def _density(coordinates, phi, nuisances, expansions, launches, steps) -> Fit:
+    prior, gap = coordinates.precision, phi - coordinates.expected
+    misfit, hessian, gradient = launches or (0.0, 0.0, 0.0)
+    return Fit(
+        phi=phi,
+        hessian=sum(one.hessian for one in expansions) + np.diag(prior) + hessian,
+        gradient=sum(one.gradient for one in expansions) - prior * gap + gradient,
+        nuisances=nuisances,
+        expansions=expansions,
+        misfit=sum(one.misfit for one in expansions) + float(prior @ gap**2) + misfit,
+        steps=steps,
+        settled=False,
+    )
+
+
+def _step(fit: Fit, coordinates: Coordinates, damp: float) -> np.ndarray:
+    """Least of the damped quadratic within the bounds and LONGEST, shape (D,)."""
+    longest = LONGEST * coordinates.steps
+    low = np.maximum(coordinates.low - fit.phi, -longest)
+    high = np.minimum(coordinates.high - fit.phi, longest)
+    scale = np.sqrt(np.maximum(np.diag(fit.hessian), LEAST))  # of what nothing tells, too
+    hessian = fit.hessian / np.outer(scale, scale) + damp * np.eye(len(scale))
+    root = np.linalg.cholesky(hessian).T
+    aim = np.linalg.solve(root.T, fit.gradient / scale)
+    ends = low * scale - 1e-12, high * scale + 1e-12
+    return np.clip(lsq_linear(root, aim, ends, method="bvls").x / scale, low, high)

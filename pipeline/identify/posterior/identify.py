@@ -1,0 +1,269 @@
+"""A band's parameters from its recordings and launches, as the theta stage writes them.
+
+One density: its mode is θ*, its samples the intervals. With several recordings the Gaussian is as
+wide as they differ (Birge's ratio, Phys. Rev. 40, 1932): their disagreement beyond what each leaves
+open is the model's discrepancy, and no other is assumed but the returned share's prior.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.episode.episode import Episode
+from pipeline.episode.pull import launch_history
+from pipeline.episode.signal import cutoff_hz
+from pipeline.identify.posterior.coordinates import Coordinates
+from pipeline.identify.posterior.draws import truncated_gaussian
+from pipeline.identify.posterior.fit import Fit, fit
+from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
+from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
+from pipeline.identify.results.theta import EXTRA
+from pipeline.params.identification import LAWS, UNSEEN
+from pipeline.simulator.material import THETA
+from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.simulator.rubber import RUBBER
+
+LEVEL = 0.9
+SAMPLES = 200
+FILLS = 2 / 3  # of the box: an interval as wide tells nothing
+UNITS = {
+    "damping_product": "s",
+    "air_drag": "1/s",
+    "turn_damping": "",
+    "returned_share": "",
+    "release_time": "s",
+    "camera_delay": "s",
+}
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What is known of a band.
+
+    Attributes:
+        coordinates, fit: The density, and its mode.
+        birge: By what the recordings' disagreement widens each standard deviation; 1 for one.
+        samples: Of the coordinates, within bounds, shape (SAMPLES, D).
+        recordings, launches: The evidence.
+    """
+
+    coordinates: Coordinates
+    fit: Fit
+    birge: float
+    samples: np.ndarray
+    recordings: list[Likelihood]
+    launches: LaunchLikelihood | None
+
+    @property
+    def points(self) -> np.ndarray:
+        """Samples as `sling.theta.at_points` takes them, shape (SAMPLES, P)."""
+        return self.coordinates.points(self.samples)
+
+    @property
+    def rollouts(self) -> int:
+        """Simulated interactions of the fit."""
+        each = len(self.coordinates.names) + 1 + len(SIMULATED)
+        return self.fit.steps * len(self.recordings) * each
+
+    @property
+    def names(self) -> list[str]:
+        """Of the columns of `points`."""
+        law = self.recordings[0].sling.law
+        return [*THETA, *LAWS[law], *EXTRA]
+
+
+def identify(
+    params,
+    method: str,
+    sling: Sling,
+    episodes: Sequence[Episode],
+    start: np.ndarray,
+    *,
+    observed: Sequence[Observed] = (),
+    workers: int | None = None,
+    progress: Callable[[Fit], None] = lambda fit: None,
+) -> Identified:
+    """Identify a band.
+
+    Args:
+        method: Of params.yaml, one that searches by least squares.
+        episodes: Of the band's recordings, at least one.
+        start: θ and what its law adds, (P,): the nearest that an exploration found.
+        observed: Launches that are evidence.
+
+    Raises:
+        NoFit: Simulations fail at the start.
+    """
+    cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
+    friction = params.methods[method].fixed["dynamic_friction"]
+    recordings = [Likelihood(one, sling, cutoff, friction) for one in episodes]
+    coordinates = Coordinates.of_method(params, method, sling)
+    launches = LaunchLikelihood(observed, launched(sling, episodes[0])) if observed else None
+    known = {"launches": launches, "workers": workers, "progress": progress}
+    found = fit(recordings, coordinates, coordinates.of(start), **known)
+    birge = disagreement(found)
+    precision = found.hessian / birge**2
+    centre = found.phi + np.linalg.solve(found.hessian, found.gradient)
+    box = coordinates.low, coordinates.high
+    rng = np.random.default_rng(params.optimizer.seed)
+    samples = truncated_gaussian(centre, precision, *box, SAMPLES, rng)
+    return Identified(coordinates, found, birge, samples, recordings, launches)
+
+
+def launched(sling: Sling, episode: Episode) -> Sling:
+    """The sling as it is launched: a law that remembers takes the recording's pull and pause."""
+    if sling.law != RUBBER:
+        return sling
+    return replace(sling, history=LaunchHistory(**launch_history(episode)))
+
+
+def disagreement(found: Fit) -> float:
+    """Birge's ratio of N recordings, at least 1: how far each alone would go from the mode.
+
+    Of each, the drop of its misfit to its own least is chi squared of D' D (N - 1)/N coordinates
+    that it tells, D' those which it knows better than the rest together.
+    """
+    if len(found.expansions) < 2:
+        return 1.0
+    total = freedom = 0.0
+    for one in found.expansions:
+        inverse = np.linalg.inv(one.hessian + found.hessian)  # regular where it alone tells nothing
+        told = np.linalg.solve(found.hessian, one.hessian)
+        total += one.gradient @ inverse @ one.gradient
+        freedom += np.trace(inverse @ one.hessian @ (np.eye(len(told)) - told))
+    return float(np.sqrt(max(total / max(freedom, 1e-9), 1.0)))
+
+
+def theta_content(found: Identified, band: str, method: str) -> dict:
+    """What a θ file holds, but its loss, its rollouts and where it was found."""
+    point = found.coordinates.points(found.fit.phi[None])[0]
+    values = dict(zip(found.names, point.tolist(), strict=True))
+    law, episode = found.recordings[0].sling.law, found.recordings[0].episode
+    known = {"law": RUBBER, "history": launch_history(episode)} if law == RUBBER else {}
+    return {
+        "band": band,
+        "method": method,
+        **known,
+        "theta": {name: values[name] for name in (*THETA, *LAWS[law])},
+        "nuisances": {"air_drag": values["air_drag"]},
+        "turn_damping": values["turn_damping"],
+        "returned_share": values["returned_share"],
+    }
+
+
+def confidence(found: Identified, boxes) -> dict:
+    """What a θ file says under `confidence`, ready for JSON.
+
+    Args:
+        boxes: params.yaml's `parameters`.
+    """
+    points, names = found.points, found.names
+    columns = dict(zip(names, points.T, strict=True))
+    mode = found.coordinates.points(found.fit.phi[None])[0].tolist()
+    mode = dict(zip(names, mode, strict=True))
+    parameters = {}
+    for name in names[: -len(EXTRA)]:
+        low, high = interval(columns[name], mode[name])
+        entry = {"low": low, "high": high, "identifiable": name not in UNSEEN}
+        if name in UNSEEN:
+            entry["fixed"] = True
+        elif box := getattr(boxes, name, None):
+            ends = np.array([low, high, box.low, box.high])
+            ends = np.log(ends) if box.scale == "log" else ends
+            entry["identifiable"] = bool(ends[1] - ends[0] < FILLS * LEVEL * (ends[3] - ends[2]))
+        parameters[name] = entry
+    shown = {name: columns[name] for name in EXTRA}
+    for one, kept in ((columns, shown), (mode, mode)):
+        kept["damping_product"] = one["elasticity_damping"] * one["damping_scale"]
+    derived = {name: _told(samples, mode[name], UNITS[name]) for name, samples in shown.items()}
+    derived |= _clocks(found)
+    matrix = np.corrcoef(found.samples.T + 1e-12 * np.arange(SAMPLES))
+    return {
+        "level": LEVEL,
+        "parameters": parameters,
+        "derived": derived,
+        "correlation": {"names": list(found.coordinates.names), "matrix": matrix.tolist()},
+        "recordings": [_left(found, number) for number in range(len(found.recordings))],
+        "disagreement": found.birge,
+        "launches": _launched(found.launches),
+        "steps": found.fit.steps,
+        "settled": found.fit.settled,
+    }
+
+
+def interval(samples: np.ndarray, mode: float) -> tuple[float, float]:
+    """The central LEVEL of samples (M,), or at a bound that from the mode on."""
+    if mode <= samples.min():
+        return mode, float(np.quantile(samples, LEVEL))
+    if mode >= samples.max():
+        return float(np.quantile(samples, 1 - LEVEL)), mode
+    low, high = np.quantile(samples, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return float(low), float(high)
+
+
+def _told(samples: np.ndarray, mode: float, unit: str) -> dict:
+    low, high = interval(samples, mode)
+    return {"value": mode, "low": low, "high": high, "unit": unit}
+
+
+def _clocks(found: Identified) -> dict:
+    """Release and camera's delay of the first recording, with what its expansion leaves open."""
+    one, own = found.fit.expansions[0], found.fit.nuisances[0]
+    change = one.nuisances[1]
+    covariance = np.linalg.inv(found.fit.hessian)
+    spread = np.sqrt(one.spread**2 + np.einsum("id,de,ie->i", change, covariance, change))
+    release, camera = (SIMULATED.index(name) for name in ("release", "camera"))
+    time = found.recordings[0].episode.release_time + own[release]
+    wide = 1.645 * spread * found.birge
+    return {
+        name: {"value": value, "low": value - wide[i], "high": value + wide[i], "unit": "s"}
+        for name, value, i in (
+            ("release_time", time, release),
+            ("camera_delay", -own[camera], camera),
+        )
+    }
+
+
+def _left(found: Identified, number: int) -> dict:
+    """What a recording shows that the simulation does not, and what the others alone say of it."""
+    one, recording = found.fit.expansions[number], found.recordings[number]
+    about = {"force_rms": one.rms("force"), "held_rms": one.rms("held")}
+    about |= {"recoil_rms": one.rms("recoil"), "pictures": one.pictures}
+    about["source"] = recording.episode.metadata.get("input", {})
+    if len(found.recordings) > 1:
+        about["without_it"] = without(found, number)
+    return about
+
+
+def without(found: Identified, number: int) -> dict:
+    """How the mode of all other evidence predicts a recording, by their quadratics."""
+    one = found.fit.expansions[number]
+    hessian, gradient = found.fit.hessian - one.hessian, found.fit.gradient - one.gradient
+    phi = np.clip(
+        found.fit.phi + np.linalg.solve(hessian, gradient),
+        found.coordinates.low,
+        found.coordinates.high,
+    )
+    moved = phi - found.fit.phi
+    worse = moved @ one.hessian @ moved - 2 * one.gradient @ moved
+    spread = np.sqrt(np.diag(np.linalg.inv(hessian)))
+    return {
+        "misfit": float(worse),
+        "moved": dict(zip(found.coordinates.names, (moved / spread).tolist(), strict=True)),
+    }
+
+
+def _launched(launches: LaunchLikelihood | None) -> list[dict]:
+    if launches is None:
+        return []
+    return [
+        {
+            "draw": draw.tolist(),
+            "landing": float(landing),
+            "left": None if gap != gap else float(gap),
+        }
+        for draw, landing, gap in zip(launches.draws, launches.landings, launches.left, strict=True)
+    ]

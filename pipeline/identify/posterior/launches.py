@@ -1,0 +1,77 @@
+"""The evidence of launches that a user measured: where the projectile landed from a draw.
+
+    -2 log p = sum over launches of ((log y - log f(phi, draw)) / sigma)^2
+
+f is the simulated landing. sigma is each launch's own: what the error of its draw moves the
+landing by, and the tape measure's. What the law gets wrong is common to a band's launches: that is
+the returned share, a coordinate of the density.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.identify.results.theta import at_points
+from pipeline.simulator.launch import launch
+
+TAPE = 0.01  # of a measured landing, standard deviation [m]
+NUDGE = 1e-3  # of a draw [m]
+CROSS = NUDGE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
+
+
+@dataclass(frozen=True)
+class Observed:
+    """A launch: draw (y, z) and its standard deviation along each axis, landing [m]."""
+
+    draw: tuple[float, float]
+    error: float
+    landing: float
+
+
+class LaunchLikelihood:
+    """Launches of one band.
+
+    Attributes:
+        sling: With the history that the launches had.
+        left: Of each, log of measured over simulated landing at the last expansion; NaN where the
+            simulated launch fails, which then counts for nothing.
+    """
+
+    def __init__(self, observed: Sequence[Observed], sling) -> None:
+        self.sling = sling
+        self.draws = np.array([one.draw for one in observed], float).reshape(-1, 2)
+        self.errors = np.array([one.error for one in observed], float)
+        self.landings = np.array([one.landing for one in observed], float)
+        self.left = np.full(len(self.draws), np.nan)
+
+    def expand(
+        self, points: Callable, phi: np.ndarray, steps: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        """Misfit, Hessian (D, D) and gradient (D,) at coordinates (D,), as of an `Expansion`."""
+        around = points(phi + np.vstack([0 * steps, np.diag(steps)]))
+        cross = (self.draws[:, None] + CROSS).reshape(-1, 2)
+        near = self._simulated(np.repeat(around[:1], len(cross), axis=0), cross)
+        near = near.reshape(len(self.draws), len(CROSS))
+        slope = np.linalg.norm((near[:, 1::2] - near[:, 2::2]) / (2 * NUDGE), axis=1)
+        count = len(steps)
+        moved = self._simulated(
+            np.repeat(around[1:], len(self.draws), axis=0), np.tile(self.draws, (count, 1))
+        ).reshape(count, -1)
+        here = near[:, 0]
+        self.left = np.log(self.landings / here)
+        changes = (np.log(moved) - np.log(here)) / steps[:, None]  # (D, N)
+        spread = np.hypot(slope * self.errors / here, TAPE / self.landings)
+        good = np.isfinite(self.left + spread + changes.sum(axis=0))
+        design = changes[:, good] / spread[good]
+        gap = self.left[good] / spread[good]
+        return float(gap @ gap), design @ design.T, design @ gap
+
+    def _simulated(self, points: np.ndarray, draws: np.ndarray) -> np.ndarray:
+        """Landings [m] of points (N, P) from draws (N, 2), NaN where a launch fails."""
+        sling, theta = at_points(self.sling, points)
+        done = launch(sling, theta, draws, workers=2)
+        failed = np.array([why is not None for why in done.failure])
+        return np.where(failed, np.nan, done.landing_y)

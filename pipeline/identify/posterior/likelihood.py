@@ -1,0 +1,231 @@
+"""The evidence of one recording: residuals over their spread, and its own nuisances, eliminated.
+
+    -2 log p(recording | phi) = min over n of |r(phi, n) / sigma|^2 + |n / tolerance|^2
+
+Nuisances n are what a recording leaves open of its instruments, Gaussian, each recording's own.
+Release, camera's clock and the hand's offset along the pull must be simulated; bias and drift of
+the force, the extrinsics and the stamp of each picture act linearly on the measured side. For
+Gaussians the minimum over n is, up to a constant, the integral over n.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.episode.episode import Episode
+from pipeline.identify.posterior.residuals import Residuals, Rule
+from pipeline.identify.results.theta import at_points
+from pipeline.simulator.interaction import Rollouts, interact
+
+SIMULATED = "release", "camera", "hand"
+NUDGE = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Standard deviations of the residuals and of what the recording leaves open.
+
+    Attributes:
+        force: Of a sample of the force [N]. Its low-pass repeats a sample's error in some 14, and
+            so does what the law gets wrong of the pull: 30 mN each are worth 30 sqrt(14) alone.
+        cloud, way: Of a bin of a picture [m], and of the recoil as a share of the way gone.
+        release, camera: Of the release and of the camera's clock against the force's [s].
+        hand: Of the hand's place along the pull [m].
+        jitter: Of one picture's stamp [s].
+        shift, turn: Of the camera's extrinsics [m], [rad].
+        bias, drift: Of the tared force, and over the pull [N].
+    """
+
+    force: float = 0.11
+    cloud: float = 1.0e-3
+    way: float = 0.02
+    release: float = 3e-4
+    camera: float = 1e-3
+    hand: float = 1e-5
+    jitter: float = 1e-4
+    shift: float = 1e-3
+    turn: float = 1.7e-3
+    bias: float = 0.02
+    drift: float = 0.02
+
+    @classmethod
+    def of(cls, episode: Episode) -> Tolerances:
+        """From an episode's metadata, or as usual where it says nothing."""
+        about = episode.metadata.get("preprocessing", {})
+        delays = about.get("delays") or {}
+        camera, pose = ((delays.get(name) or {}).get("error") for name in ("camera", "pose"))
+        camera = None if camera is None else np.hypot(camera, pose or 0.0)
+        given = {"release": about.get("release_error"), "camera": camera}
+        return cls(**{name: float(value) for name, value in given.items() if value})
+
+    @property
+    def simulated(self) -> np.ndarray:
+        return np.array([self.release, self.camera, self.hand])
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """-2 log p of a recording around (phi, n), its nuisances eliminated.
+
+    Attributes:
+        misfit: There, with the linear nuisances at their best.
+        hessian, gradient: misfit + const - 2 gradient d + d' hessian d for d in phi, (D, D), (D,).
+        nuisances: Best change of the simulated ones, and its change with d, (3,), (3, D).
+        spread: Standard deviations of the simulated ones, given phi, (3,).
+        residuals, left: What was compared, and what of it is left at d = 0, shape (R,).
+    """
+
+    misfit: float
+    hessian: np.ndarray
+    gradient: np.ndarray
+    nuisances: tuple[np.ndarray, np.ndarray]
+    spread: np.ndarray
+    residuals: Residuals
+    left: np.ndarray
+
+    def rms(self, part: str) -> float:
+        """Root mean square of what is left of force [N], held or recoil [m]; 0 of nothing."""
+        count = len(self.left) - 2 * len(self.residuals.frame)
+        bins, recoils = self.left[count:].reshape(2, -1), self.residuals.recoils
+        parts = {"force": self.left[:count], "held": bins[:, ~recoils], "recoil": bins[:, recoils]}
+        return float(np.sqrt(np.mean(parts[part] ** 2))) if parts[part].size else 0.0
+
+    @property
+    def pictures(self) -> list[float]:
+        """When the recoil is seen, from the release [s]."""
+        seen, episode = self.residuals.frame[self.residuals.recoils], self.residuals.episode
+        return (episode.cloud_time[np.unique(seen)] - episode.release_time).tolist()
+
+
+def opening_time(episode: Episode, sling, friction: float) -> float:
+    """In which the simulated pads must open for the force to fall as fast as recorded [s].
+
+    From the slip on friction falls with the pads' force, which is gone after the opening time: the
+    held force is gone sooner, by its share of the friction of closed pads. An episode that does
+    not say how fast its force fell has the lab's own.
+    """
+    fall = episode.metadata.get("preprocessing", {}).get("release_fall")
+    if not fall:
+        return sling.finger_opening_time
+    late = np.flatnonzero(episode.time < episode.release_time)[-20:]
+    held = np.linalg.norm(episode.force[late], axis=1).max()
+    return float(np.clip(fall * 2 * friction * sling.grip_force / held, 5e-4, 0.05))
+
+
+class Failed(Exception):
+    """A simulation did not reach its end."""
+
+
+class Likelihood:
+    """Of the parameters of a band, by one recording.
+
+    Attributes:
+        episode, sling, cutoff, tolerances: As given; the sling is that of this episode.
+    """
+
+    def __init__(
+        self,
+        episode: Episode,
+        sling,
+        cutoff: float,
+        friction: float,
+        tolerances: Tolerances | None = None,
+        rule: Rule | None = None,
+    ) -> None:
+        """`friction` is what the method fixes, of the pads."""
+        self.episode, self.cutoff = episode, cutoff
+        self.sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
+        self.tolerances = tolerances or Tolerances.of(episode)
+        self.rule = rule or Rule()
+        end = np.searchsorted(episode.time, episode.release_time)
+        place = episode.position[max(end - 5, 0) : end].mean(axis=0)
+        self._away = place / np.linalg.norm(place)
+
+    def shifted(self, nuisances: np.ndarray) -> Episode:
+        """The episode with another release, camera's clock and place of the hand, (3,)."""
+        release, camera, hand = nuisances
+        return replace(
+            self.episode,
+            release_time=self.episode.release_time + release,
+            cloud_time=self.episode.cloud_time + camera,
+            position=self.episode.position + hand * self._away,
+        )
+
+    def simulate(self, points: np.ndarray, nuisances: np.ndarray) -> Rollouts:
+        """Rollouts of points (N, P). Raises Failed."""
+        sling, theta = at_points(self.sling, points)
+        rollouts = interact(sling, self.shifted(nuisances), theta)
+        if why := next((one for one in rollouts.failure if one), None):
+            raise Failed(why)
+        return rollouts
+
+    def expand(
+        self,
+        points: Callable,
+        phi: np.ndarray,
+        steps: np.ndarray,
+        nuisances: np.ndarray,
+        pool,
+        residuals: Residuals | None = None,
+    ) -> Expansion:
+        """Expand around coordinates (D,) with finite differences `steps` (D,). Raises Failed.
+
+        Args:
+            points: Of coordinates (N, D), as `Coordinates.points`.
+            pool: Maps over batches of rollouts.
+            residuals: Whose bins are taken; None: bins of the rollout there.
+        """
+        around = points(phi + np.vstack([0 * steps, np.diag(steps)]))
+        jobs = [(around, nuisances)]
+        jobs += [(around[:1], nuisances + nudge) for nudge in np.diag(NUDGE)]
+        first, *others = pool.map(lambda job: self.simulate(*job), jobs)
+        residuals = residuals or Residuals(
+            self.episode, self.sling, self.cutoff, first.center_line[0], self.rule
+        )
+        vectors = residuals(first)
+        moved = np.concatenate([residuals(one) for one in others])
+        gap = vectors[0]
+        slopes = ((vectors[1:] - gap) / steps[:, None], (moved - gap) / NUDGE[:, None])
+        return self._eliminated(residuals, gap, *slopes, nuisances)
+
+    def _eliminated(self, residuals, gap, slopes, own, nuisances) -> Expansion:
+        has = self.tolerances
+        linear = self._linear(residuals, own[SIMULATED.index("camera")])
+        weight = 1 / residuals.spread(has.force, has.cloud, has.way)
+        count, inner = len(slopes), len(SIMULATED)
+        design = np.concatenate([slopes, own, linear]) * weight  # (D + 3 + M, R)
+        left = -gap * weight
+        gram, slope = design @ design.T, design @ left
+        n = slice(count, count + inner)
+        gram[n, n] += np.diag(has.simulated**-2)
+        slope[n] -= nuisances / has.simulated**2
+        rest = np.arange(count + inner, len(gram))
+        gram[rest, rest] += 1.0
+        cost = left @ left + np.sum((nuisances / has.simulated) ** 2)
+        solved = np.linalg.solve(gram[np.ix_(rest, rest)], slope[rest])
+        misfit = cost - slope[rest] @ solved
+        outer = slice(count, None)
+        inverse = np.linalg.inv(gram[outer, outer])
+        best, change = inverse @ slope[outer], -inverse @ gram[outer, :count]
+        return Expansion(
+            misfit=float(misfit),
+            hessian=gram[:count, :count] + gram[:count, outer] @ change,
+            gradient=slope[:count] - gram[:count, outer] @ best,
+            nuisances=(best[:inner], change[:inner]),
+            spread=np.sqrt(np.diag(inverse)[:inner]),
+            residuals=residuals,
+            left=(left - solved @ design[rest]) / weight,
+        )
+
+    def _linear(self, residuals: Residuals, camera: np.ndarray) -> np.ndarray:
+        """Columns of the linear nuisances, each in units of its tolerance, shape (M, R)."""
+        has, known = self.tolerances, residuals.columns()
+        sizes = {"force_bias": has.bias, "force_drift": has.drift}
+        sizes |= {"cloud_shift": has.shift, "cloud_turn": has.turn}
+        columns = [sizes[name[:-2]] * column for name, column in known.items()]
+        for frame in np.unique(residuals.frame[residuals.recoils]):
+            columns.append(has.jitter * np.where(residuals.of_frame(frame), camera, 0.0))
+        return np.array(columns)

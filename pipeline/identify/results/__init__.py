@@ -1,0 +1,1 @@
+"""Files of results: θ, its confidence, and how a band hangs."""

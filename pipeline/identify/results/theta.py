@@ -1,0 +1,162 @@
+"""θ files: the identified parameters of a band as JSON, or the same written by hand.
+
+{"band": "...", "theta": {"youngs_modulus": ..., ... all five}}  is of the neo-Hookean law; with
+"law": "rubber", θ has its parameters too and "history" {"pull_time", "pause"} says in how many
+seconds the recording's hand drew the band and how long it waited. Where a stage wrote it, also
+"method", "nuisances": {"air_drag": ...}, "turn_damping", "returned_share", "loss":
+{"geom", "force", "work", "total"}, "rollouts", "confidence"; "mounted": false where the method
+leaves out the calibration of the clamps. What is read of "confidence": confidence.py.
+
+What its confidence rests on, samples of θ, lies beside in data/confidence/.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import create_model, model_validator
+
+from pipeline.base.errors import UserError, printable
+from pipeline.base.layout import NotMade, owner
+from pipeline.base.schema import JsonRecord, Name, Range, Section, read_json, refusal
+from pipeline.identify.results.confidence import Confidence, Count
+from pipeline.identify.results.mounting import load_sling
+from pipeline.params import Parameters
+from pipeline.params.identification import LAWS
+from pipeline.simulator.material import THETA
+from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
+
+EXTRA = "air_drag", "turn_damping", "returned_share"  # of a point, after θ and what its law adds
+
+
+def _limits(name: str) -> Range:
+    """How far params.yaml lets the box of the search reach."""
+    box = Parameters.model_fields[name].annotation
+    return next(one for one in box.model_fields["low"].metadata if isinstance(one, Range))
+
+
+Theta = create_model(
+    "Theta",
+    __base__=Section,
+    **{name: (Annotated[float, _limits(name)], ...) for name in THETA},
+    **{name: (Annotated[float, Range(*ends)], None) for name, ends in LAWS[RUBBER].items()},
+)
+
+
+class Nuisances(Section):
+    air_drag: Annotated[float, Range(0, 50)] | None = None  # force for mass and speed [1/s]
+
+
+class RecordedPull(Section):
+    pull_time: Annotated[float, Range(0.01, 1000)]
+    pause: Annotated[float, Range(0, 1e5)]
+
+
+class ThetaFile(JsonRecord):
+    band: str
+    law: Literal[NEO_HOOKEAN, RUBBER] = NEO_HOOKEAN
+    theta: Theta
+    history: RecordedPull | None = None
+    nuisances: Nuisances = Nuisances()
+    turn_damping: Annotated[float, Range(0, 1)] = 0.0
+    returned_share: Annotated[float, Range(0.1, 10)] = 1.0
+    mounted: bool = True
+    loss: dict[Name, float] = {}
+    rollouts: Count = 0
+    confidence: Confidence | None = None
+
+    @model_validator(mode="after")
+    def _keys_of_its_law(self) -> ThetaFile:
+        wanted, given = set(LAWS[self.law]), self.theta.model_fields_set - {*THETA}
+        if wanted != given:
+            names = ", ".join((*THETA, *LAWS[self.law]))
+            raise refusal(f"theta: of the law {self.law} it must have exactly {names}")
+        if self.law == RUBBER and self.history is None:
+            raise refusal("history: {pull_time, pause} is missing, which the law rubber needs")
+        return self
+
+
+class PosteriorFile(JsonRecord):
+    """What a θ file's confidence rests on; no samples where it has none."""
+
+    names: list[str] = []
+    samples: list[list[float]]
+
+    @model_validator(mode="after")
+    def _a_column_each(self) -> PosteriorFile:
+        known = self.names in [
+            [*THETA, *law, *EXTRA[:count]]
+            for law in LAWS.values()
+            for count in range(len(EXTRA) + 1)
+        ]
+        if self.samples and not (known and {*map(len, self.samples)} == {len(self.names)}):
+            raise refusal("samples: must have a column for each of `names`, which are those of θ")
+        return self
+
+
+def load_theta(path: Path, band: str) -> dict:
+    """Read and check a θ file. Raises UserError."""
+    path = Path(path)
+    if not (path.exists() or owner(path)):
+        raise UserError(f"{path}: no such file; `dvc repro` writes those of data/theta/{band}/")
+    content = read_json(path, ThetaFile)
+    if content.band != band:
+        raise NotMade(path, f'band: must be "{band}", got "{printable(content.band[:60])}"')
+    return content.model_dump(exclude_unset=True)
+
+
+def load_samples(path: Path) -> np.ndarray | None:
+    """Samples of θ, what its law adds, and EXTRA, (M, P); None without any.
+
+    Raises NotMade where the file is damaged.
+    """
+    samples = read_json(path, PosteriorFile).samples if path.is_file() else []
+    return np.array(samples, float) if samples else None
+
+
+def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Sling:
+    """The sling of a band with all that a θ file's content says beside the five of θ.
+
+    Its launches have the history of params.yaml's `launch`, or else the recording's.
+    """
+    law = content.get("law", NEO_HOOKEAN)
+    extra = {name: content["theta"][name] for name in LAWS[law]}
+    extra["air_drag"] = content.get("nuisances", {}).get("air_drag", 0.0)
+    extra["turn_damping"] = content.get("turn_damping", 0.0)
+    extra["returned_share"] = content.get("returned_share", 1.0)
+    extra["history"] = launch_history(params, content)
+    sling = load_sling(params, band, root, law, mounted=content.get("mounted", True))
+    return replace(sling, **extra)
+
+
+def launch_history(params, content: dict) -> LaunchHistory | None:
+    """How a hand must draw the band of a θ file to launch it; None for a law without memory."""
+    asked = {"pull_time": params.launch.pull_time, "pause": params.launch.pause}
+    if content.get("law", NEO_HOOKEAN) != RUBBER:
+        return None
+    told = {name: value for name, value in asked.items() if value is not None}
+    return LaunchHistory(**content["history"] | told)
+
+
+def at_points(sling: Sling, points: np.ndarray) -> tuple[Sling, np.ndarray]:
+    """A sling and θ (N, 5) of points (N, P): θ, what the sling's law adds, perhaps EXTRA."""
+    if points.shape[-1] == len(THETA):
+        return sling, points
+    names = (*LAWS[sling.law], *EXTRA)
+    extra = dict(zip(names, points[:, len(THETA) :].T, strict=False))
+    return replace(sling, **extra), points[:, : len(THETA)]
+
+
+def point(content: dict) -> np.ndarray:
+    """θ and what its law adds, in the order of `at_points`, shape (5,) or (7,)."""
+    names = (*THETA, *LAWS[content.get("law", NEO_HOOKEAN)])
+    return np.array([content["theta"][name] for name in names], float)
+
+
+def vector(content: dict) -> np.ndarray:
+    """θ in the simulator's order, physical units, shape (5,)."""
+    return np.array([content["theta"][name] for name in THETA], float)

@@ -1,0 +1,110 @@
+"""Everything that a search evaluated, one row a parameter vector, and the best of it.
+
+Columns: method, phase (de, cma, bo, ...), generation, solver (null unless several run side by
+side), unit_<name> and <name> (physical) of each axis, geom, force, work, total, failure. A failed
+row has total = +inf, NaN terms and the reason.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from pipeline.base.errors import UserError
+from pipeline.base.files import replacing
+from pipeline.identify.objective.evaluate import Evaluation
+from pipeline.identify.objective.loss import TERMS
+
+
+@dataclass
+class History:
+    """Rows in the order in which they were evaluated."""
+
+    method: str
+    names: tuple[str, ...]
+    _parts: list[pa.Table] = field(default_factory=list)
+
+    def add(
+        self,
+        evaluation: Evaluation,
+        *,
+        phase: str,
+        generation: int,
+        solver: np.ndarray | None = None,
+    ) -> None:
+        """Append a batch; `solver` says who asked for each point, shape (N,)."""
+        count = len(evaluation.total)
+        columns = {
+            "method": pa.array([self.method] * count, pa.string()),
+            "phase": pa.array([phase] * count, pa.string()),
+            "generation": pa.array([generation] * count, pa.int32()),
+            "solver": pa.array([None] * count if solver is None else solver, pa.int32()),
+        }
+        for prefix, values in (("unit_", evaluation.unit), ("", evaluation.theta)):
+            for name, column in zip(self.names, values.T, strict=True):
+                columns[prefix + name] = pa.array(column, pa.float64())
+        for name in TERMS:
+            columns[name] = pa.array(evaluation.terms[name], pa.float64())
+        columns["total"] = pa.array(evaluation.total, pa.float64())
+        columns["failure"] = pa.array(evaluation.failure, pa.string())
+        self._parts.append(pa.table(columns))
+
+    @property
+    def table(self) -> pa.Table:
+        if not self._parts:  # the columns of no rows
+            points, values = np.zeros((0, len(self.names))), np.zeros(0)
+            nothing = Evaluation(points, points, dict.fromkeys(TERMS, values), values, [])
+            self.add(nothing, phase="", generation=0)
+        return pa.concat_tables(self._parts).combine_chunks()
+
+    @property
+    def unit(self) -> np.ndarray:
+        """Shape (N, D)."""
+        return np.stack([self.table[f"unit_{name}"].to_numpy() for name in self.names], axis=1)
+
+    @property
+    def total(self) -> np.ndarray:
+        """Shape (N,); +inf where failed."""
+        return self.table["total"].to_numpy()
+
+    def save(self, path: Path) -> None:
+        with replacing(path) as temporary:
+            pq.write_table(self.table, temporary)
+
+    @classmethod
+    def load(cls, method: str, names: tuple[str, ...], *paths: Path) -> History:
+        """Read files that `save` wrote, one after the other."""
+        return cls(method, names, [pq.read_table(path) for path in paths])
+
+    def best(self) -> dict:
+        """The row with the least total; among equals the first. Raises UserError if all failed."""
+        total = self.total
+        if not np.isfinite(total).any():
+            reasons = sorted(set(self.table["failure"].to_pylist()))
+            raise UserError(
+                f"{self.method}: each of {len(total)} simulations failed ({'; '.join(reasons)});"
+                " check the recording, and the box under `parameters` in params.yaml"
+            )
+        return self.table.slice(int(np.argmin(total)), 1).to_pylist()[0]
+
+
+def theta_content(history: History, band: str, about: dict | None = None) -> dict:
+    """What a theta file holds: the best of everything that was evaluated, and `about`."""
+    best = history.best()
+    terms = {name: best[name] for name in (*TERMS, "total") if np.isfinite(best[name])}
+    return {
+        "band": band,
+        "method": history.method,
+        "theta": {name: best[name] for name in history.names},
+        "nuisances": {},
+        "loss": terms,
+        "rollouts": len(history.total),
+        "failed": int(np.isinf(history.total).sum()),
+        "found": {name: best[name] for name in ("phase", "generation", "solver")},
+        "confidence": None,
+        **(about or {}),
+    }

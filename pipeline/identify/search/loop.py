@@ -1,0 +1,168 @@
+"""The loop around every optimiser: it asks, its points are evaluated, it is told their losses.
+
+An optimiser knows only the unit cube of the axes that are free. It is a class that is called as
+`Class(dimension, *, rollouts, seed, population, **settings)`; `pipeline.identify.search.build`
+builds it by its name in params.yaml.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.stats import qmc
+
+from pipeline.base.errors import UserError
+from pipeline.identify.objective.evaluate import Evaluation, Penalty
+from pipeline.identify.objective.space import Space
+from pipeline.identify.search.history import History
+from pipeline.params.identification import LEAST_SQUARES
+
+
+class Optimizer(Protocol):
+    """Proposes points of the unit cube and learns their losses; deterministic given its seed.
+
+    Attributes:
+        phase: How its rows are called in the history: de, cma, bo, adam, ...
+        owner: May be left out; which of several solvers asked for each point, shape (N,).
+    """
+
+    phase: str
+
+    def ask(self) -> np.ndarray:
+        """The next points to evaluate, shape (N, D); N may differ from batch to batch."""
+        ...
+
+    def tell(self, losses: np.ndarray) -> None:
+        """Their losses, finite, shape (N,), in the order of `ask`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Free:
+    """The axes of a space that are searched; the others keep their place.
+
+    Attributes:
+        names: Of the free axes, length F.
+        axes: Their numbers in the space, shape (F,).
+        rest: A point of the whole unit cube that holds the fixed coordinates, shape (D,).
+    """
+
+    names: tuple[str, ...]
+    axes: np.ndarray
+    rest: np.ndarray
+
+    @classmethod
+    def of(cls, space: Space, fixed: Mapping[str, float]) -> Free:
+        """All axes of `space` but the `fixed` ones, which have physical values."""
+        axes = [axis for axis, name in enumerate(space.names) if name not in fixed]
+        middle = space.to_physical(np.full(len(space.names), 0.5))
+        values = [fixed.get(name, value) for name, value in zip(space.names, middle, strict=True)]
+        names = tuple(space.names[axis] for axis in axes)
+        return cls(names, np.array(axes), space.to_unit(np.array(values, float)))
+
+    def fill(self, unit: np.ndarray) -> np.ndarray:
+        """Points of the whole cube, shape (N, D), for points of the free one, shape (N, F)."""
+        whole = np.tile(self.rest, (len(unit), 1))
+        whole[:, self.axes] = unit
+        return whole
+
+
+def latin_hypercube(dimension: int, count: int, seed: int) -> np.ndarray:
+    """Points of the unit cube, one in each of `count` strata of each axis, (count, dimension).
+
+    SciPy's differential evolution shifts what it is given by a half and back; these points stand
+    that to the last bit, so that all searches start with the very same ones.
+    """
+    points = qmc.LatinHypercube(dimension, rng=np.random.default_rng(seed)).random(count)
+    return (points - 0.5) + 0.5
+
+
+def budget(optimizer, search: str) -> tuple[int, int]:
+    """Rollouts to explore with and to refine with, of params.yaml's `optimizer`.
+
+    A search of one phase explores with both together: all methods spend the same.
+    """
+    explore = optimizer.population * (optimizer.generations + 1)
+    refine = optimizer.cma_rollouts
+    two_phases = search in ("multistart", LEAST_SQUARES)
+    return (explore, refine) if two_phases else (explore + refine, 0)
+
+
+def search(
+    optimizer: Optimizer,
+    evaluate: Callable[[np.ndarray], Evaluation],
+    history: History,
+    *,
+    rollouts: int,
+    free: Free | None = None,
+) -> None:
+    """Run `optimizer` until exactly `rollouts` points are evaluated; all rows go to `history`.
+
+    The last batch is cut to what is left, and a cut batch is not told. A failed point is told as
+    twice the worst finite loss so far.
+
+    Args:
+        evaluate: Losses of points of the whole unit cube, shape (N, D).
+        free: The axes that the optimiser knows; None: all of them.
+
+    Raises:
+        UserError: The optimiser asked for something else than points of the unit cube.
+    """
+    dimension = len(history.names if free is None else free.names)
+    penalty = Penalty()
+    generation = 0
+    while rollouts > 0:
+        asked = _checked(optimizer, dimension)
+        owner = _owner(optimizer, len(asked))
+        unit = asked[:rollouts]
+        rollouts -= len(unit)
+        evaluation = evaluate(unit if free is None else free.fill(unit))
+        history.add(
+            evaluation,
+            phase=optimizer.phase,
+            generation=generation,
+            solver=None if owner is None else owner[: len(unit)],
+        )
+        generation += 1
+        if len(unit) == len(asked):
+            optimizer.tell(penalty(evaluation.total))
+
+
+def _owner(optimizer: Optimizer, count: int) -> np.ndarray | None:
+    """Which of its solvers asked for each point, shape (count,), where it says so."""
+    said = getattr(optimizer, "owner", None)
+    if said is None:
+        return None
+    try:
+        owner = np.asarray(said)
+        fine = owner.shape == (count,) and (owner == owner.astype(np.int32)).all()
+    except (TypeError, ValueError):
+        fine = False
+    if not fine:
+        raise UserError(
+            f"{type(optimizer).__name__}: owner must say by a number for each of {count} points who"
+            f" asked, and is {said!r:.40}"
+        )
+    return owner.astype(np.int32)
+
+
+def _checked(optimizer: Optimizer, dimension: int) -> np.ndarray:
+    asked, what = optimizer.ask(), ""
+    try:
+        unit = np.array(asked, float)
+    except (TypeError, ValueError):
+        what = "no array of numbers"
+    else:
+        if unit.ndim != 2 or len(unit) == 0 or unit.shape[1] != dimension:
+            what = f"shape {unit.shape}"
+        elif not ((unit >= 0) & (unit <= 1)).all():
+            what = "coordinates outside 0 to 1"
+    if what:
+        raise UserError(
+            f"{type(optimizer).__name__}: ask() must give points of the unit cube, shape"
+            f" (N, {dimension}), and gave {what}"
+        )
+    return unit

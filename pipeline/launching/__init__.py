@@ -1,0 +1,1 @@
+"""Where launches land, and how to aim them."""

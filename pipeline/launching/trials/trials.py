@@ -1,0 +1,221 @@
+"""Trials: what the policies' draws, or a user's own, lead to beside what the simulator predicts.
+
+One row a launch. `kind` says where the landing comes from: "virtual" (the rig, whose rubber is not
+the simulator's), "measured" (a user's CSV) or "predicted" (nothing but the calibrated simulator).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from pipeline.base.failures import too_strong
+from pipeline.base.files import replacing
+from pipeline.base.launch_table import file_of
+from pipeline.base.pool import Pool
+from pipeline.launching.surface.stored import Stored
+from pipeline.launching.trials.measured import read_measured
+from pipeline.launching.trials.spread import landing_intervals
+
+SCHEMA = pa.schema(
+    [
+        ("band", pa.string()),
+        ("method", pa.string()),
+        ("kind", pa.string()),  # virtual, measured or predicted
+        ("target", pa.float64()),  # m; null where the launch had none
+        ("trial", pa.int64()),  # counts launches at a target; virtual ones of equal number are
+        # off by the same errors, whatever the method
+        ("draw_y", pa.float64()),  # m, as commanded
+        ("draw_z", pa.float64()),
+        ("predicted_y", pa.float64()),  # m, by the calibrated simulator; null where it fails
+        ("predicted_low", pa.float64()),  # m, central 90 % by what is known of theta, law and draw
+        ("predicted_high", pa.float64()),
+        ("predicted_failure", pa.string()),
+        ("predicted_leave_y", pa.float64()),  # m, where the simulated projectile leaves the pouch
+        ("predicted_leave_z", pa.float64()),
+        ("predicted_speed", pa.float64()),  # m/s, there
+        ("predicted_angle", pa.float64()),  # rad above the horizon, there
+        ("landing_y", pa.float64()),  # m, also outside the area; null where it did not land, and
+        # for predictions
+        ("flight_y", pa.list_(pa.float64())),  # m, from the pouch to the floor; null where none,
+        ("flight_z", pa.list_(pa.float64())),  # and where not virtual
+        ("hold_force", pa.float64()),  # N, of the rig where kind is virtual, else as predicted
+        ("failure", pa.string()),
+        ("stretch", pa.float64()),  # length of the drawn band over its rest length
+        ("recorded_stretch", pa.float64()),  # largest of the recording
+    ]
+)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """N launches of one kind and policy; a cell, or all, is None where there is nothing to tell.
+
+    Attributes:
+        draws: As commanded (y, z) [m], shape (N, 2).
+        targets: Aimed at [m].
+        landing: Where they landed [m], also where that counts as a failure.
+        failure: Why they count for nothing.
+        hold_force: Of the drawn band on the hand [N]; None: as predicted.
+        flight: Way of the projectile (y, z) [m], shape (K, 2) each.
+    """
+
+    kind: str
+    draws: np.ndarray
+    targets: list[float | None]
+    landing: list[float | None] | None = None
+    failure: list[str | None] | None = None
+    hold_force: list[float | None] | None = None
+    flight: list[np.ndarray | None] | None = None
+
+    def every(self, name: str) -> list:
+        """What an attribute tells of each launch."""
+        told = getattr(self, name)
+        return [None] * len(self.draws) if told is None else list(told)
+
+
+def measured(params, band: str, method: str, folder: Path) -> list[Batch]:
+    """The user's launches of the band that say something about the method, if there are any.
+
+    Args:
+        params: The whole of params.yaml.
+        folder: Of the users' files, one a band.
+
+    Raises:
+        UserError: A file is no band's, or the band's own cannot be used.
+    """
+    path = file_of(folder, band, params.bands)
+    launches = read_measured(path, method, params.methods) if path else []
+    if not launches:
+        return []
+    landing = [one.landing for one in launches]
+    failure = [None if y is not None else "did not land" for y in landing]
+    draws, targets = np.array([o.draw for o in launches]), [o.target for o in launches]
+    return [Batch("measured", draws, targets, landing, failure)]
+
+
+def aimed(stored: Stored, targets: list[float]) -> Batch:
+    """What the policy would launch at the targets [m]. Raises UserError."""
+    return Batch("predicted", stored.draws(np.array(targets)), list(targets))
+
+
+def launched(batch: Batch, launch: Callable) -> Batch:
+    """The same in a virtual world; launches of equal number have equal errors.
+
+    Args:
+        launch: `launch(draw, number)` gives landing_y [m], NaN where there is none, failure,
+            hold_force [N] and flight. It goes to processes of its own: it keeps one core busy.
+    """
+    with Pool() as pool:
+        tried = list(pool.map(launch, batch.draws, range(len(batch.draws))))
+    landing = [one.landing_y if np.isfinite(one.landing_y) else None for one in tried]
+    names = ("failure", "hold_force", "flight")
+    told = {name: [getattr(one, name) for one in tried] for name in names}
+    return replace(batch, kind="virtual", landing=landing, **told)
+
+
+def predict(batches: list[Batch], launcher: Callable, samples: np.ndarray | None, params):
+    """What the calibrated simulator makes of the draws of all batches, N in all.
+
+    Args:
+        launcher, samples: As `landing_intervals` has them.
+        params: The whole of params.yaml.
+
+    Returns:
+        Its launches, limited by the arm, and where 90 % of them would land [m], shape (N, 2); NaN
+        where that is not known.
+    """
+    draws = np.concatenate([batch.draws for batch in batches])
+    launches = limited(launcher(draws), params.setup.max_force)
+    once, again = np.unique(draws, axis=0, return_inverse=True)
+    error = params.trials.actuation_error
+    intervals = landing_intervals(launcher, once, samples, error)[again]
+    intervals[np.isnan(launches.landing_y)] = np.nan
+    return launches, intervals
+
+
+def limited(launches, max_force: float):
+    """Launches of a simulator without a limit, by an arm that can hold no more than `max_force`."""
+    force = launches.hold_force
+    over = force > max_force
+    failure = [
+        too_strong(force[i], max_force) if over[i] else reason
+        for i, reason in enumerate(launches.failure)
+    ]
+    unknown = {
+        field.name: np.where(over, np.nan, getattr(launches, field.name))
+        for field in fields(launches)
+        if field.name not in ("hold_force", "failure")
+    }
+    return replace(launches, **unknown, failure=failure)
+
+
+def table(
+    band: str,
+    method: str,
+    batches: list[Batch],
+    *,
+    predicted,
+    intervals: np.ndarray,
+    stretch: np.ndarray,
+    recorded: float | None,
+) -> pa.Table:
+    """Trials as a table of `SCHEMA`, batch after batch; N launches in all.
+
+    Args:
+        predicted: The calibrated simulator's launches of their draws.
+        intervals: Where 90 % of them would land [m], shape (N, 2); NaN where that is not known.
+        stretch: Of the drawn band, shape (N,).
+        recorded: Largest stretch of the recording.
+    """
+
+    def every(name: str) -> list:
+        return [value for batch in batches for value in batch.every(name)]
+
+    def each(name: str) -> list:
+        return [getattr(batch, name) for batch in batches for _ in batch.draws]
+
+    def known(values) -> pa.Array:
+        return pa.array(values, pa.float64(), from_pandas=True)
+
+    force = zip(every("hold_force"), predicted.hold_force, strict=True)
+    columns = {
+        "band": [band] * len(stretch),
+        "method": [method] * len(stretch),
+        "kind": each("kind"),
+        "target": every("targets"),
+        "trial": [number for batch in batches for number in _counted(batch.targets)],
+        "draw_y": [y for y, _ in every("draws")],
+        "draw_z": [z for _, z in every("draws")],
+        "predicted_y": known(predicted.landing_y),
+        "predicted_low": known(intervals[:, 0]),
+        "predicted_high": known(intervals[:, 1]),
+        "predicted_failure": predicted.failure,
+        "predicted_leave_y": known(predicted.separation_y),
+        "predicted_leave_z": known(predicted.separation_z),
+        "predicted_speed": known(predicted.speed),
+        "predicted_angle": known(predicted.angle),
+        "landing_y": every("landing"),
+        "flight_y": [None if way is None else way[:, 0] for way in every("flight")],
+        "flight_z": [None if way is None else way[:, 1] for way in every("flight")],
+        "hold_force": known([theirs if own is None else own for own, theirs in force]),
+        "failure": every("failure"),
+        "stretch": stretch,
+        "recorded_stretch": [recorded] * len(stretch),
+    }
+    return pa.table(columns, schema=SCHEMA)
+
+
+def _counted(targets: list[float | None]) -> list[int]:
+    """How many launches a target has had with each, from 1."""
+    return [targets[: i + 1].count(target) for i, target in enumerate(targets)]
+
+
+def save(trials: pa.Table, path: Path) -> None:
+    with replacing(path) as temporary:
+        pq.write_table(trials, temporary)

@@ -1,0 +1,177 @@
+"""The card's still pictures. Black is what was measured, magenta what is simulated."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from pipeline.episode.episode import Episode
+from pipeline.report.card.camera import Pictures
+from pipeline.report.card.camera_view import SIMULATED, CameraView
+from pipeline.report.card.known import Aims, Known
+from pipeline.report.card.simulated import Simulated
+from pipeline.report.card.values import LABELS, ShownValue, rounded
+from pipeline.report.drawing.canvas import key, mark, picture
+from pipeline.report.drawing.styles import INK
+
+CUT = (520, 470)  # pixels of each camera picture
+MOVED = 0.005  # s after the release: in a picture from then on the band has left the hand
+MOST_SPAN = 1.5  # m of landings on which targets find room for their names
+AROUND = (-0.3, 0.4)  # of the release, magnified [s]
+BARS = "#0072b2"  # beside black and magenta, told apart by any eye
+TITLE = {"fontsize": 11, "fontweight": "bold"}
+KINDS = {"measured": ("o", "measured"), "virtual": ("D", "virtual rig")}
+
+
+def moments(episode: Episode, simulated: Simulated, pictures: Pictures) -> dict[str, int]:
+    """Pictures to look at: hanging, drawn just before the release, in the recoil."""
+    taken, release = pictures.time + simulated.camera, simulated.release
+    hanging = pictures.latest(max(episode.grasp_time - 0.1, 0.0))
+    drawn = pictures.latest(release - simulated.camera - 1e-3)
+    recoil = min(int(np.searchsorted(taken, release + MOVED)), len(taken) - 1)
+    before, after = 1000 * (release - taken[drawn]), 1000 * (taken[recoil] - release)
+    return {
+        "hanging": hanging,
+        f"drawn, {before:.0f} ms before the release": drawn,
+        f"recoil, {after:.0f} ms after the release": recoil,
+    }
+
+
+@picture(dpi=110)
+def camera(episode: Episode, simulated: Simulated, pictures: Pictures) -> plt.Figure:
+    """Three camera pictures with the simulated band drawn in."""
+    view = CameraView.of(pictures, simulated, CUT, begin=0.0)
+    chosen = moments(episode, simulated, pictures)
+    figure, axes = plt.subplots(1, len(chosen), figsize=(11, 3.95))
+    for ax, (name, number) in zip(axes, chosen.items(), strict=True):
+        image = view.picture(number)
+        ax.imshow(image[..., ::-1], interpolation="antialiased")
+        line = simulated.line(pictures.time[number] + simulated.camera)
+        ax.plot(*view.places(line).T, color=SIMULATED, lw=1.1)
+        ax.set_axis_off()
+        ax.set_title(name, fontsize=10)
+        ax.set(xlim=(-0.5, CUT[0] - 0.5), ylim=(CUT[1] - 0.5, -0.5))
+    figure.suptitle("Does the simulated band (magenta) lie on the recorded one?", **TITLE)
+    return figure
+
+
+@picture(dpi=110)
+def force(episode: Episode, simulated: Simulated) -> plt.Figure:
+    """Force on the gripper and what is left of it, over time, the release magnified."""
+    figure, axes = plt.subplots(
+        2, 2, figsize=(9.6, 4.6), width_ratios=(1.9, 1), height_ratios=(2, 1), sharex="col",
+        sharey="row",
+    )  # fmt: skip
+    for top, bottom in axes.T:
+        for one, style in (
+            (episode.force, {"color": INK, "lw": 2.4}),
+            (simulated.force, {"color": SIMULATED, "lw": 1.2}),
+        ):
+            top.plot(episode.time, np.linalg.norm(one, axis=1), **style)
+        for axis, dashes in ((1, "-"), (2, ":")):
+            gap = episode.force[:, axis] - simulated.force[:, axis]
+            bottom.plot(episode.time, gap, color=INK, lw=1.1, ls=dashes)
+        for ax in (top, bottom):
+            ax.axvline(simulated.release, color="0.6", lw=0.8, zorder=0)
+    axes[0, 0].set_ylabel("force on the hand [N]")
+    axes[1, 0].set_ylabel("measured −\nsimulated [N]")
+    axes[1, 0].set(xlabel="time [s] (grey line: release)", xlim=episode.time[[0, -1]])
+    around = np.add(simulated.release, AROUND)
+    axes[1, 1].set(xlabel="around the release [s]", xlim=around)
+    figure.align_ylabels(axes[:, 0])
+    figure.suptitle("Does the simulated force (magenta) follow the measured one (black)?", **TITLE)
+    entries = {
+        "measured": mark(color=INK, lw=2.4),
+        "simulated": mark(color=SIMULATED),
+        "left along y": mark(color=INK, lw=1.1),
+        "left along z": mark(color=INK, lw=1.1, ls=":"),
+    }
+    key(figure, entries.items())
+    return figure
+
+
+@picture(dpi=110)
+def values(shown: list[ShownValue], boxes: dict[str, tuple[float, float, str]]) -> plt.Figure:
+    """Each searched value's interval as a bar within its box.
+
+    Args:
+        boxes: Low and high end in SI, and scale (linear or log), by name.
+    """
+    rows = [one for one in shown if one.name in boxes and one.low is not None]
+    figure, ax = plt.subplots(figsize=(9.6, 0.5 * max(len(rows), 1) + 1.1))
+    for row, one in enumerate(rows):
+        low, high, scale = boxes[one.name]
+        ends = LABELS[one.name].factor * np.array([low, high])
+
+        def place(value: float, ends=ends, scale=scale) -> float:
+            if scale == "log":
+                value, ends = np.log(value), np.log(ends)
+            return float((value - ends[0]) / (ends[1] - ends[0]))
+
+        begin, end = place(one.low), place(one.high)
+        ax.barh(row, 1, height=0.52, color="0.93", zorder=1)
+        ax.barh(row, end - begin, left=begin, height=0.52, color=BARS, alpha=0.55, zorder=2)
+        ax.plot([place(one.value)] * 2, [row - 0.26, row + 0.26], color=INK, lw=2, zorder=3)
+        words = {"va": "center", "fontsize": 8, "color": "0.45"}
+        ax.text(-0.01, row, f"{rounded(ends[0]):.6g}", ha="right", **words)
+        ax.text(1.01, row, f"{rounded(ends[1]):.6g}", ha="left", **words)
+        told = f"{one.value:g}  ({one.low:g} to {one.high:g}) {one.unit}"
+        ax.text(1.12, row, told, va="center", fontsize=9)
+    ax.set_yticks(range(len(rows)), [one.label for one in rows])
+    ax.tick_params(axis="y", length=0, pad=32)
+    ax.set(xlim=(0, 1.55), xticks=[], ylim=(len(rows) - 0.4, -0.6))
+    ax.grid(False)
+    for side in ax.spines.values():
+        side.set_visible(False)
+    title = "How well are the values known? Bars: 90 % intervals, within what was thought possible"
+    figure.suptitle(title, **TITLE)
+    return figure
+
+
+@picture(dpi=110)
+def landings(known: Known) -> plt.Figure:
+    """Predicted landings with their intervals, and where launches landed."""
+    aims, launched = known.aims, known.launched
+    figure, ax = plt.subplots(figsize=(9.6, 3.6))
+    entries = {}
+    for kind, (marker, name) in KINDS.items():
+        rows = launched[launched.kind == kind]
+        if not len(rows):
+            continue
+        x, off = rows.predicted_y.to_numpy(), (rows.landing_y - rows.predicted_y).to_numpy()
+        bars = (rows[["predicted_low", "predicted_high"]].to_numpy().T - x) * 100
+        unaimed = ~np.isclose(x[:, None], aims.landing, atol=1e-6).any(axis=1)
+        _bars(ax, x[unaimed], bars[:, unaimed], color="0.75", lw=3)
+        style = {"marker": marker, "ms": 5, "mfc": "none", "mec": INK, "ls": ""}
+        ax.plot(x, 100 * off, **style, zorder=4)
+        entries[f"landed ({name})"] = mark(**style)
+    _aimed(ax, aims)
+    entries["predicted, with its 90 % interval"] = mark(color=SIMULATED, lw=3, marker="o", ms=5)
+    ax.axhline(0, color="0.6", lw=0.8, zorder=0)
+    ax.set(xlabel="predicted landing [m]", ylabel="landing − predicted [cm]")
+    question = "Do launches land inside the predicted intervals?"
+    alone = "Where launches should land: predictions of the simulator; nothing was measured"
+    figure.suptitle(question if len(launched) else alone, **TITLE)
+    key(figure, entries.items())
+    return figure
+
+
+def _aimed(ax: plt.Axes, aims: Aims) -> None:
+    bars = (aims.interval.T - aims.landing) * 100
+    _bars(ax, aims.landing, bars, color=SIMULATED, lw=6, alpha=0.35)
+    ax.plot(aims.landing, 0 * aims.landing, "o", color=SIMULATED, ms=5, zorder=3)
+    ax.margins(x=0.12, y=0.15)
+    crowded = np.ptp(ax.get_xlim()) > MOST_SPAN
+    for x, target, high in zip(aims.landing, aims.target, bars[1], strict=True):
+        if np.isfinite(x + high) and not crowded:
+            place, offset = (x, high), (0, 4)
+            ax.annotate(
+                f"target {target:g} m", place, offset, textcoords="offset points", ha="center",
+                fontsize=8, color=SIMULATED,
+            )  # fmt: skip
+
+
+def _bars(ax: plt.Axes, x: np.ndarray, ends: np.ndarray, **style) -> None:
+    """Vertical bars at x (N,) from and to ends (2, N)."""
+    good = np.isfinite(ends).all(axis=0)
+    ax.vlines(x[good], *ends[:, good], zorder=2, **style)

@@ -1,0 +1,87 @@
+"""What is known of a band, in the plain numbers that the verdict asks for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.report.card.known import Known
+from pipeline.report.card.values import LABELS, boxes, rounded
+from pipeline.report.card.verdict import FURTHER, Findings
+from pipeline.report.drawing.markdown import as_code
+
+SIDE = 0.01  # of a box's width: as near is at its side
+
+
+def findings(known: Known) -> Findings:
+    """Of a band, from files and launches."""
+    told, aims = known.confidence, known.aims
+    recordings = told.get("recordings", [])
+
+    def worst(name: str) -> float:
+        return max((one[name] for one in recordings), default=0.0)
+
+    launched = known.launched
+    scored = launched[launched.stretch <= FURTHER * known.recorded_stretch]
+    scored = scored[scored.predicted_low.notna()]
+    landing, low, high = (scored[n] for n in ("landing_y", "predicted_low", "predicted_high"))
+    left = [abs(one["left"]) for one in told.get("launches", []) if one["left"] is not None]
+    miss = np.abs(aims.landing - aims.target)
+    return Findings(
+        settled=told.get("settled"),
+        force=worst("force_rms"),
+        held=worst("held_rms"),
+        recoil=worst("recoil_rms"),
+        recoil_seen=any(one["pictures"] for one in recordings) or not recordings,
+        disagreement=told.get("disagreement", 1.0),
+        odd=_odd(recordings),
+        at_sides=_at_sides(known),
+        stretch=float(aims.stretch.max()),
+        recorded_stretch=known.recorded_stretch,
+        hold_force=float(np.nanmax(aims.hold_force, initial=0.0)),
+        max_force=known.params.setup.max_force,
+        failures=[
+            f"The launch at {target:g} m fails in simulation: {failure}."
+            for target, failure in zip(aims.target, aims.failure, strict=True)
+            if failure
+        ],
+        converged=known.policy["training"]["converged"],
+        miss=float(np.nanmax(miss, initial=0.0)),
+        half_width=float(aims.half_width.max()),
+        outside=int(((landing < low) | (landing > high)).sum()),
+        scores=len(scored),
+        off=float((landing - scored.predicted_y).abs().mean()) if len(scored) else 0.0,
+        kind=" and ".join(dict.fromkeys(scored.kind)),
+        left=max(left, default=0.0),
+        observed=len(left),
+    )
+
+
+def _odd(recordings: list[dict]) -> str:
+    """File and pull that all others predict worst; "" of fewer than two."""
+    told = [one for one in recordings if "without_it" in one]
+    if not told:
+        return ""
+    source = max(told, key=lambda one: one["without_it"]["misfit"])["source"]
+    return f"pull {source.get('pull', 1)} of {as_code(source.get('file', '?'))}"
+
+
+def _at_sides(known: Known) -> list[tuple[str, str]]:
+    """Searched parameters at a side of their box that nature does not set: label and side."""
+    found, searched = [], boxes(known.params, known.method)
+    for name, value in known.theta["theta"].items():
+        if name not in searched:
+            continue
+        low, high, scale = searched[name]
+        ends = np.array([value, low, high], float)
+        if scale == "log":
+            ends = np.log(ends)
+        place = (ends[0] - ends[1]) / (ends[2] - ends[1])
+        sides = {"lower": place < SIDE and low != 0, "upper": place > 1 - SIDE}
+        about = LABELS[name]
+        box = " to ".join(f"{rounded(about.factor * end):.6g}" for end in (low, high))
+        found += [
+            (about.text, f"{side} side of its box, {f'{box} {about.unit}'.strip()}")
+            for side, there in sides.items()
+            if there
+        ]
+    return found

@@ -1,0 +1,119 @@
+"""By how much the interval of a landing would narrow if something more were known.
+
+Near the mode a landing is linear in what is not known, which is Gaussian: both as the samples of
+the posterior have them. A launch, another pull, or knowing some parameters exactly then changes
+the covariance by plain algebra.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.identify.posterior.coordinates import PRIORS
+
+LOGS = "youngs_modulus", "elasticity_damping", "returned_share"  # whose logarithms are Gaussian
+HALF_NORMAL = 1 - 2 / np.pi  # its variance, of a normal's
+LEAST = 1e-9  # of a column that the samples vary
+
+
+@dataclass(frozen=True)
+class LandingModel:
+    """T landings of D unknowns.
+
+    Attributes:
+        names: Of the unknowns, length D.
+        covariance: Of the unknowns, shape (D, D).
+        gradient: Of the landings in the unknowns [m], shape (T, D).
+        draw: Standard deviation of the landings by the draw's error [m], shape (T,).
+        half_width: Of the landings' intervals [m], shape (T,).
+    """
+
+    names: list[str]
+    covariance: np.ndarray
+    gradient: np.ndarray
+    draw: np.ndarray
+    half_width: np.ndarray
+
+    @classmethod
+    def of(cls, names: list[str], samples: np.ndarray, aims) -> LandingModel | None:
+        """From samples (M, P) of θ and the landings of some of them; None where either lacks.
+
+        Args:
+            aims: pipeline.report.card.known.Aims.
+        """
+        landings = aims.samples
+        good = np.isfinite(landings).all(axis=0)
+        known = np.isfinite(aims.half_width).all()
+        unknown = unknowns(names, samples)
+        if not unknown or not known or good.sum() < 2 * len(unknown):
+            return None
+        columns = np.stack(list(unknown.values()), axis=1)
+        some = np.linspace(0, len(samples) - 1, landings.shape[1]).astype(int)[good]
+        design = np.column_stack([np.ones(len(some)), columns[some] - columns.mean(axis=0)])
+        gradient = np.linalg.lstsq(design, landings[:, good].T, rcond=None)[0][1:].T
+        covariance = np.atleast_2d(np.cov(columns.T))
+        return cls(list(unknown), covariance, gradient, aims.slope, aims.half_width)
+
+    def after(self, covariance: np.ndarray | None = None, draw: float = 1.0) -> np.ndarray:
+        """Half widths [m], shape (T,), with another covariance and a share of the draw's error."""
+        now, then = (
+            np.einsum("td,de,te->t", self.gradient, one, self.gradient) + (share * self.draw) ** 2
+            for one, share in (
+                (self.covariance, 1.0),
+                (self.covariance if covariance is None else covariance, draw),
+            )
+        )
+        return self.half_width * np.sqrt(then / now)
+
+    def launched(self, aim: int, tape: float, count: int = 1) -> np.ndarray:
+        """Covariance after `count` launches at one of the targets were measured to `tape` [m]."""
+        slope = self.gradient[aim]
+        noise = (self.draw[aim] ** 2 + tape**2) / count
+        told = self.covariance @ slope
+        return self.covariance - np.outer(told, told) / (slope @ told + noise)
+
+    def exact(self, names: Collection[str]) -> np.ndarray:
+        """Covariance if these unknowns were known exactly."""
+        which = [self.names.index(name) for name in names if name in self.names]
+        told = self.covariance[:, which]
+        return self.covariance - told @ np.linalg.solve(told[which], told.T)
+
+    def pulled(self, pulls: int = 1) -> np.ndarray:
+        """Covariance after another pull that tells as much as each of the `pulls` did."""
+        prior = self._prior()
+        values, vectors = np.linalg.eigh(np.linalg.inv(self.covariance) - prior)
+        told = (vectors * np.maximum(values, 0)) @ vectors.T
+        return np.linalg.inv(np.linalg.inv(self.covariance) + told / pulls)
+
+    def _prior(self) -> np.ndarray:
+        """Precision (D, D) of what is known without any pull; a bound tells as its own spread."""
+        precision, place = np.zeros_like(self.covariance), self.names.index
+        directions = {  # of the coordinates' priors in the unknowns
+            "log_loss_factor": {"elasticity_damping": 1.0, "youngs_modulus": 0.5},
+            "log_returned_share": {"returned_share": 1.0},
+            "air_drag": {"air_drag": 1.0},
+        }
+        for name, parts in directions.items():
+            if not set(parts) <= set(self.names):
+                continue
+            direction = np.zeros(len(self.names))
+            for part, weight in parts.items():
+                direction[place(part)] = weight
+            variance = PRIORS[name][1] ** 2 * (HALF_NORMAL if name == "air_drag" else 1.0)
+            precision += np.outer(direction, direction) / variance
+        if "turn_damping" in self.names:  # even between 0 and 1
+            precision[place("turn_damping"), place("turn_damping")] += 12.0
+        return precision
+
+
+def unknowns(names: list[str], samples: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns (M,) of samples (M, P) that vary, as they are Gaussian."""
+    columns = {}
+    for name, column in zip(names, samples.T, strict=True):
+        column = np.log(column) if name in LOGS else column
+        if len(column) and np.ptp(column) > LEAST:
+            columns[name] = column
+    return columns

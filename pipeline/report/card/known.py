@@ -1,0 +1,156 @@
+"""All that is known of a band when its card is written, read and launched once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from pipeline.base.layout import Layout, made
+from pipeline.base.schema import read_json
+from pipeline.episode.episode import Episode
+from pipeline.identify.results.theta import PosteriorFile, load_theta
+from pipeline.launching.surface.simulator import simulator
+from pipeline.launching.surface.stored import Stored
+from pipeline.launching.trials.spread import CROSS, MOST, STEP, landing_intervals
+from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
+from pipeline.launching.trials.trials import limited
+
+
+@dataclass(frozen=True)
+class Aims:
+    """T targets, and the draws for them, launched in the calibrated simulator.
+
+    Attributes:
+        target, landing, hold_force: [m], [m], [N], shape (T,); a landing is NaN where it fails.
+        draw: (y, z) [m], shape (T, 2).
+        interval: Central 90 % of the landings [m], shape (T, 2); NaN where not known.
+        failure: None, or why a launch fails, length T.
+        stretch: Of the drawn band, shape (T,).
+        slope: Standard deviation of a landing by the error of the draw [m], shape (T,).
+        samples: Landings with samples of θ [m], shape (T, M); none without samples.
+    """
+
+    target: np.ndarray
+    draw: np.ndarray
+    landing: np.ndarray
+    interval: np.ndarray
+    hold_force: np.ndarray
+    failure: list[str | None]
+    stretch: np.ndarray
+    slope: np.ndarray
+    samples: np.ndarray
+
+    @property
+    def half_width(self) -> np.ndarray:
+        """Of the intervals [m], shape (T,)."""
+        return np.diff(self.interval, axis=1)[:, 0] / 2
+
+
+@dataclass(frozen=True)
+class Known:
+    """Of one band by one method.
+
+    Attributes:
+        episodes: Of all its pulls; pictures show the first.
+        recordings: Names of the files that they are of.
+        theta: The θ file; `confidence` of it is empty where the method tells none.
+        names, samples: Of θ, shape (M, P), M = 0 where the method tells none.
+        policy: Its card, as far as it is read.
+        trials: One row a launch (pipeline/launching/trials/trials.py).
+        recorded_stretch: The largest of all pulls.
+    """
+
+    params: object
+    band: str
+    method: str
+    root: Path
+    episodes: list[Episode]
+    theta: dict
+    names: list[str]
+    samples: np.ndarray
+    policy: dict
+    trials: pd.DataFrame
+    aims: Aims
+    recorded_stretch: float
+
+    @property
+    def episode(self) -> Episode:
+        return self.episodes[0]
+
+    @property
+    def confidence(self) -> dict:
+        return self.theta.get("confidence") or {}
+
+    @property
+    def recordings(self) -> list[str]:
+        return list(dict.fromkeys(one.metadata["input"]["file"] for one in self.episodes))
+
+    @property
+    def launched(self) -> pd.DataFrame:
+        """Launches that landed somewhere, measured or virtual, beside what was predicted."""
+        return self.trials[self.trials.landing_y.notna() & self.trials.predicted_y.notna()]
+
+
+def known(params, band: str, method: str, root: str | Path = ".") -> Known:
+    """Read and launch. Raises UserError where an input is missing."""
+    layout, about = Layout(Path(root)), params.bands[band]
+    theta = load_theta(layout.theta(band, method), band)
+    path = layout.confidence(band, method)
+    posterior = read_json(path, PosteriorFile) if path.is_file() else PosteriorFile(samples=[])
+    samples = np.array(posterior.samples, float)
+    samples = samples.reshape(len(samples), len(posterior.names))
+    stored = Stored(band, method, layout.root)
+    episodes = Episode.load_all(layout.episodes(band))
+    stretch = partial(stretch_of, fork_width=params.setup.fork_width, rest_length=about.rest_length)
+    launcher = simulator(params, band, theta, root=root)
+    target = np.array(params.trials.targets, float)
+    return Known(
+        params=params,
+        band=band,
+        method=method,
+        root=layout.root,
+        episodes=episodes,
+        theta=theta,
+        names=posterior.names,
+        samples=samples,
+        policy=stored.card(),
+        trials=pd.read_parquet(made(layout.trials(band, method))),
+        aims=aims(launcher, target, stored.draws(target), samples, stretch, params),
+        recorded_stretch=recorded_stretch(episodes, params.setup.fork_width, about.rest_length),
+    )
+
+
+def aims(launcher, target, draw, samples, stretch, params) -> Aims:
+    """Launch draws (T, 2) at targets (T,), with the best θ and with samples (M, P) of it.
+
+    Args:
+        launcher: As `landing_intervals` takes it.
+        stretch: Of the band held at points (N, 3).
+        params: The whole of params.yaml.
+    """
+    error, count = params.trials.actuation_error, len(draw)
+    launches = limited(launcher(draw), params.setup.max_force)
+    interval = landing_intervals(launcher, draw, samples if len(samples) else None, error)
+    interval[np.isnan(launches.landing_y)] = np.nan
+    around = launcher((draw[:, None] + CROSS).reshape(-1, 2)).landing_y.reshape(count, -1)
+    slope = error * np.linalg.norm((around[:, 1::2] - around[:, 2::2]) / (2 * STEP), axis=1)
+    some = samples[np.linspace(0, len(samples) - 1, min(MOST, len(samples))).astype(int)]
+    landings = np.zeros((count, 0))
+    if len(some):
+        launched = launcher(np.repeat(draw, len(some), axis=0), np.tile(some, (count, 1)))
+        landings = launched.landing_y.reshape(count, -1)
+    return Aims(
+        target=target,
+        draw=draw,
+        landing=launches.landing_y,
+        interval=interval,
+        hold_force=launches.hold_force,
+        failure=launches.failure,
+        stretch=stretch(np.insert(draw, 0, 0, axis=1)),
+        slope=slope,
+        samples=landings,
+    )

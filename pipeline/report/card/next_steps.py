@@ -1,0 +1,100 @@
+"""What would help most next: cures of what speaks against, then what narrows the interval.
+
+That of the middle target's landing, computed from the posterior (gain.py), the largest gain first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.episode.episode import Episode
+from pipeline.identify.posterior.launches import TAPE
+from pipeline.report.card.gain import LandingModel
+from pipeline.report.card.verdict import Reason
+
+LEAST = 0.05  # share of an interval: less is no help
+MOST = 5  # sentences
+LAUNCHES = 5
+EARLY, LATE = (0.75, 0.5), (0.4, 0.15)  # s before the release, between which the force must be
+STILL = 0.01  # still to this share of it
+RECOIL = "elasticity_damping", "air_drag", "turn_damping"  # what only pictures of the recoil show
+PULL = "youngs_modulus", "mooney_share", "relaxation"  # what the force shows
+
+
+class Gain(NamedTuple):
+    """What to do, and the half width of the interval then [m]."""
+
+    text: str
+    width: float
+
+
+def next_steps(
+    band: str,
+    reasons: Sequence[Reason],
+    model: LandingModel | None,
+    targets,
+    episodes: Sequence[Episode],
+    launches: int = 0,
+) -> list[str]:
+    """Sentences, the most helpful first; one that says so where nothing helps.
+
+    Args:
+        targets: Of the landings [m], shape (T,).
+        episodes, launches: Pulls, and the number of launches, that are evidence already.
+    """
+    found = list(dict.fromkeys(reason.cure for reason in reasons if reason.cure))
+    mended_first = any(reason.against and reason.cure for reason in reasons)
+    if model is not None and not mended_first:
+        aim = len(targets) // 2
+        before = model.half_width[aim]
+        words = {"band": band, "a": "another" if launches else "a"}
+        words |= {"at": f"at {targets[aim]:g} m", "before": f"±{_cm(before)} cm"}
+        for gain in sorted(_gains(model, aim, episodes), key=lambda gain: gain.width):
+            if gain.width < (1 - LEAST) * before:
+                found.append(gain.text.format(**words, after=f"±{_cm(gain.width)} cm"))
+    if not found:
+        found.append("Nothing more would narrow the landings by much: launch.")
+    return found[:MOST]
+
+
+def _gains(model: LandingModel, aim: int, episodes: Sequence[Episode]) -> Iterator[Gain]:
+    one, more = (model.after(model.launched(aim, TAPE, count))[aim] for count in (1, LAUNCHES))
+    yield Gain(
+        "Measure {a} launch and tell it with `sling observe --band {band}`: {before} {at} become"
+        f" {{after}}, with {LAUNCHES} launches ±{_cm(more)} cm.",
+        one,
+    )
+    yield Gain(
+        "Record another pull like those that you have: {before} {at} become about {after}.",
+        model.after(model.pulled(len(episodes)))[aim],
+    )
+    yield Gain(
+        "Take more pictures of the recoil, by a faster camera or by pulls that are seen at other"
+        " moments: with damping and drag known exactly, {before} {at} become {after}.",
+        model.after(model.exact(RECOIL))[aim],
+    )
+    if any(map(relaxing, episodes)):
+        yield Gain(
+            "Pause longer before the release, for the force was still falling: with stiffness and"
+            " relaxation known exactly, {before} {at} become {after}.",
+            model.after(model.exact(PULL))[aim],
+        )
+    yield Gain(
+        "Draw more exactly: by an arm without error, {before} {at} become {after}.",
+        model.after(draw=0.0)[aim],
+    )
+
+
+def relaxing(episode: Episode) -> bool:
+    """Whether the force of the drawn band still fell shortly before the release."""
+    before = episode.release_time - episode.time
+    size = np.linalg.norm(episode.force, axis=1)
+    early, late = (size[(before < begin) & (before > end)].mean() for begin, end in (EARLY, LATE))
+    return bool(early - late > STILL * late)
+
+
+def _cm(width: float) -> str:
+    return f"{100 * width:.1f}" if width < 0.095 else f"{100 * width:.0f}"

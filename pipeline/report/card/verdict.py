@@ -1,0 +1,218 @@
+"""Can a band's simulator and policy be trusted? Judged by what is known, and by nothing else.
+
+Every limit is a constant here, with its why. What is beyond one is a reason for care, or against
+any use; each says what would mend it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from scipy.stats import binom
+
+from pipeline.base.target import TARGET_AREA
+from pipeline.identify.posterior.likelihood import Tolerances
+from pipeline.launching.trials.spread import LEVEL
+
+TRUSTED, CARE, NO = "can be trusted", "with care", "no"
+
+# What the density expects of the residuals, and how often it as a root mean square is no fit at
+# all: the pictures' expected millimetre stands beside a camera that is known to one or two.
+FORCE, HELD, RECOIL = Tolerances().force, 2 * Tolerances().cloud, 5 * Tolerances().cloud
+NO_FIT = 5.0
+# Recordings of one band differ beyond what each leaves open: intervals are then as much wider.
+DISAGREE = 2.0
+# Of a launch's stretch over the recorded one: within it the law was seen, and shortly beyond.
+FURTHER, MUCH_FURTHER = 1.03, 1.3
+NEAR_LIMIT = 0.9  # of the arm's force: its own control needs some
+MISSES = 0.05  # m that a policy may miss by in its own simulator; `sling aim` refuses beyond
+HALF_AREA = (TARGET_AREA[1] - TARGET_AREA[0]) / 2  # m: an interval as wide is the whole target
+WIDE = 0.3 * HALF_AREA
+# As many launches outside their intervals are bad luck once in twenty. They share what is wrong of
+# the law, so that counts alone speak against no use: they must be off by as much as WIDE too.
+UNLUCKY = 0.05
+ODD_LAUNCH = 0.05  # of an evidence launch that the density leaves: a draw's error is some 2 %
+FAR_LAUNCH = 0.25  # of one: then the density has not taken it up
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What is known of a band, in plain numbers; SI units.
+
+    Attributes:
+        settled: Whether the density's last step was small; None where the method has no density.
+        force, held, recoil: Worst root mean squares of all recordings [N], [m], [m].
+        recoil_seen: Whether any picture shows the recoil.
+        disagreement: Birge's ratio; `odd` names the recording that the others predict worst.
+        at_sides: Parameters at a side of their box: label, and which side.
+        stretch, recorded_stretch: Of the launches' draws, and of the pulls.
+        hold_force, max_force: Of the draws, and of the arm [N].
+        failures: Of the launches, in words.
+        converged: Whether the policy's training did; `miss` of its landings [m].
+        half_width: Widest of the landings' intervals [m]; NaN where none is known.
+        outside, scores: Launches outside their intervals, of so many within the recorded stretch.
+        off: How far those landed from where they were predicted, in the mean [m].
+        kind: Of those launches: measured or virtual.
+        left: Largest share by which an evidence launch is off the density's landing.
+        observed: Launches that are evidence.
+    """
+
+    settled: bool | None
+    force: float
+    held: float
+    recoil: float
+    recoil_seen: bool
+    disagreement: float
+    odd: str
+    at_sides: Sequence[tuple[str, str]]
+    stretch: float
+    recorded_stretch: float
+    hold_force: float
+    max_force: float
+    failures: Sequence[str]
+    converged: bool
+    miss: float
+    half_width: float
+    outside: int
+    scores: int
+    off: float
+    kind: str
+    left: float
+    observed: int
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why not to trust; `cure` says what would mend it."""
+
+    against: bool  # any use, rather than use without care
+    text: str
+    cure: str = ""
+
+
+def judge(found: Findings) -> tuple[str, list[Reason]]:
+    """The verdict and what speaks against, the worst first."""
+    reasons = [*_identified(found), *_launches(found), *_tried(found)]
+    reasons.sort(key=lambda reason: not reason.against)
+    if not reasons:
+        return TRUSTED, []
+    return (NO if reasons[0].against else CARE), reasons
+
+
+def _identified(found: Findings):
+    if found.settled is None:
+        yield Reason(
+            False,
+            "This method does not tell how sure its values are.",
+            "Put `least_squares` first under `run.methods` in params.yaml: it tells.",
+        )
+    elif not found.settled:
+        yield Reason(
+            False,
+            "The fit had not settled when it ended, so values and intervals may still move.",
+            "Record a further pull: more evidence makes a fit settle.",
+        )
+    misfits = (
+        ("force of the pull", found.force, FORCE, "N", 1, "Check the force sensor, its frame"
+         " and the band's mass and size under `bands` in params.yaml."),
+        ("band in the hand", found.held, HELD, "mm", 1000, "Check the camera's calibration"
+         " and where it stands (`/tf_static`, or `setup.camera_to_fork`)."),
+        ("recoil", found.recoil, RECOIL, "mm", 1000, "Check the camera's clock with `sling check`,"
+         " and record another pull."),
+    )  # fmt: skip
+    for what, size, limit, unit, factor, cure in misfits:
+        if size > limit:
+            how = "does not meet" if size > NO_FIT * limit else "meets only roughly"
+            text = (
+                f"The simulation {how} the {what}: {factor * size:.2g} {unit} off, where at most"
+                f" {factor * limit:.2g} {unit} are expected."
+            )
+            yield Reason(size > NO_FIT * limit, text, cure)
+    if not found.recoil_seen:
+        yield Reason(
+            False,
+            "No picture shows the recoil: its damping is only what other rubbers have.",
+            "Record another pull with the camera on until a second after the release.",
+        )
+    if found.disagreement > DISAGREE:
+        odd = f"; {found.odd} is the one that the others predict worst" if found.odd else ""
+        yield Reason(
+            False,
+            f"The recordings disagree {found.disagreement:.1f} times as much as each leaves"
+            f" open{odd}.",
+            "Find out what was different in the odd recording (another band, draw, clock or"
+            " calibration), and leave it out if it is wrong.",
+        )
+    for label, side in found.at_sides:
+        yield Reason(
+            False,
+            f"The value of {label} is at the {side}; the true one may lie beyond.",
+            f"Widen the box of {label} in params.yaml, or check mass and size of the band.",
+        )
+
+
+def _launches(found: Findings):
+    for failure in found.failures:
+        yield Reason(
+            True, failure, "Aim at other targets, or change the box of draws under `setup`."
+        )
+    share = found.stretch / found.recorded_stretch
+    if share > FURTHER:
+        yield Reason(
+            share > MUCH_FURTHER,
+            f"Launches stretch the band to {found.stretch:.2f} times its length, the recording only"
+            f" to {found.recorded_stretch:.2f}: beyond it the simulator guesses.",
+            f"Record a pull that stretches the band to {found.stretch:.2f} times its length.",
+        )
+    if NEAR_LIMIT < found.hold_force / found.max_force <= 1:  # beyond, the launch fails
+        yield Reason(
+            False,
+            f"Holding a draw takes {found.hold_force:.1f} N, and the arm may hold"
+            f" {found.max_force:g} N.",
+            "Aim at nearer targets, or raise `setup.max_force` if the arm can hold more.",
+        )
+    if found.miss > MISSES:
+        yield Reason(
+            True,
+            f"The policy misses a target by {100 * found.miss:.0f} cm in its own simulator.",
+            "Widen the box of draws (`setup.draw_y`, `setup.draw_z`), or aim at other targets.",
+        )
+    elif not found.converged:
+        yield Reason(
+            False,
+            "The policy's training did not converge.",
+            "Train it longer (`policy.iterations`), or widen the box of draws.",
+        )
+    if found.half_width != found.half_width and not found.failures:
+        yield Reason(False, "How wide the landings scatter is not known.")
+    elif found.half_width > WIDE:
+        yield Reason(
+            found.half_width > HALF_AREA,
+            f"Landings are known to ±{100 * found.half_width:.0f} cm only.",
+        )
+
+
+def _tried(found: Findings):
+    if not (found.scores or found.observed):
+        yield Reason(
+            False,
+            "No launch was measured. A band that softens when it is drawn returns less than the"
+            " pull shows: of the virtual rubbers that we tried, those landed a quarter short.",
+        )
+    if found.scores:
+        unlucky = binom.sf(found.outside - 1, found.scores, 1 - LEVEL) < UNLUCKY
+        if unlucky or (found.outside and found.off > WIDE):  # few launches are soon luck
+            yield Reason(
+                found.off > (WIDE if unlucky else HALF_AREA),
+                f"{found.outside} of {found.scores} {found.kind} launches landed outside their"
+                f" {100 * LEVEL:.0f} % intervals, {100 * found.off:.0f} cm off in the mean.",
+                "Tell the simulator of a launch with `sling observe`.",
+            )
+    if found.left > ODD_LAUNCH:
+        yield Reason(
+            found.left > FAR_LAUNCH,
+            f"A launch that is evidence is {100 * found.left:.0f} % off what all evidence together"
+            " says.",
+            "Measure that launch again: its draw or its landing may be wrong.",
+        )

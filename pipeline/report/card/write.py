@@ -1,0 +1,94 @@
+"""Write reports/bands/<band>/: what is known of one band, for a person and for a program."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.base.files import replacing_folder, write_json, write_text
+from pipeline.base.layout import Layout
+from pipeline.report.card import figures
+from pipeline.report.card.animation import animate
+from pipeline.report.card.camera import Pictures
+from pipeline.report.card.findings import findings
+from pipeline.report.card.gain import LandingModel
+from pipeline.report.card.known import Known, known
+from pipeline.report.card.next_steps import next_steps
+from pipeline.report.card.page import write_page
+from pipeline.report.card.simulated import simulate
+from pipeline.report.card.text import card_text, reasons_of
+from pipeline.report.card.values import boxes, values
+from pipeline.report.card.verdict import judge
+
+
+def write(params, band: str, method: str, root: str | Path = ".") -> dict:
+    """Write a band's card; return what card.json says. Raises UserError: an input is missing."""
+    told = known(params, band, method, root)
+    episode, setup, about = told.episode, params.setup, params.methods[method]
+    layout = Layout(Path(root))
+    recording = layout.raw(band) / episode.metadata["input"]["file"]
+    pictures = Pictures.of(recording, episode, setup)
+    simulated = simulate(params, band, method, episode, told.theta)
+
+    found = findings(told)
+    verdict, against = judge(found)
+    reasons, shown = reasons_of(found, against), values(told.theta, about.fixed)
+    model = LandingModel.of(told.names, told.samples, told.aims)
+    launches = len(told.confidence.get("launches", []))
+    steps = next_steps(band, against, model, told.aims.target, told.episodes, launches)
+    card = content(told, verdict, reasons, shown, steps)
+    text = told, found, verdict, reasons, shown, steps
+
+    with replacing_folder(layout.card(band)) as folder:
+        figures.camera(folder / "camera.webp", episode, simulated, pictures)
+        figures.force(folder / "force.png", episode, simulated)
+        figures.values(folder / "values.png", shown, boxes(params, method))
+        figures.landings(folder / "landings.png", told)
+        animate(folder / "animation.webp", episode, simulated, pictures, setup.fork_width)
+        write_text(folder / "README.md", card_text(*text))
+        write_json(folder / "card.json", card)
+        page = card_text(*text, animated=False)
+        write_page(folder, page, f"{band}: {verdict}", episode, simulated, setup)
+    return card
+
+
+def content(told: Known, verdict: str, reasons: list, shown: list, steps: list) -> dict:
+    """What card.json says; numbers are rounded, so that kinds of CPU agree."""
+    aims = told.aims
+    draws = [
+        {
+            "target_m": target,
+            "draw_y_m": _rounded(draw[0], 4),
+            "draw_z_m": _rounded(draw[1], 4),
+            "predicted_landing_m": _rounded(landing, 3),
+            "interval_90_m": _ends(ends),
+            "hold_force_n": _rounded(force, 2),
+        }
+        for target, draw, landing, ends, force in zip(
+            aims.target.tolist(), aims.draw, aims.landing, aims.interval, aims.hold_force,
+            strict=True,
+        )
+    ]  # fmt: skip
+    return {
+        "band": told.band,
+        "method": told.method,
+        "verdict": verdict,
+        "reasons": reasons,
+        "values": [asdict(one) for one in shown],
+        "draws": draws,
+        "next": steps,
+        "theta_file": Layout().theta(told.band, told.method).as_posix(),
+        "recordings": len(told.recordings),
+        "pulls": len(told.episodes),
+        "launches": len(told.confidence.get("launches", [])),
+    }
+
+
+def _ends(interval: np.ndarray) -> list[float] | None:
+    return [_rounded(end, 3) for end in interval] if np.isfinite(interval).all() else None
+
+
+def _rounded(value: float, digits: int) -> float | None:
+    return round(float(value), digits) if np.isfinite(value) else None

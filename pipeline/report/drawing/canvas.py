@@ -1,0 +1,95 @@
+"""What all pictures share. Equal data give equal bytes.
+
+Black is what was measured; a method has one colour everywhere (pipeline/report/drawing/styles.py).
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterable
+from functools import wraps
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+from matplotlib.artist import Artist
+from matplotlib.ticker import LogFormatter
+from PIL import Image
+
+from pipeline.base.files import replacing
+from pipeline.report.drawing.styles import THEME
+
+WEBP_QUALITY = 88
+PARAMETERS = {  # name and unit on an axis, and the factor from SI to that unit
+    "youngs_modulus": ("E [MPa]", 1e-6),
+    "poissons_ratio": ("ν", 1.0),
+    "elasticity_damping": ("d [ms]", 1e3),
+    "dynamic_friction": ("friction", 1.0),
+    "damping_scale": ("s", 1.0),
+}
+
+
+def mark(**style) -> plt.Line2D:
+    """A line or a dot for a key."""
+    return plt.Line2D([], [], **style)
+
+
+def patch(color: str, **style) -> plt.Rectangle:
+    """A filled square for a key."""
+    return plt.Rectangle((0, 0), 1, 1, color=color, **style)
+
+
+def key(figure: plt.Figure, entries: Iterable[tuple[str, Artist]], columns: int = 0, **more):
+    """What is what, below the picture or where `more` says, in one line or in so many columns."""
+    names, marks = zip(*entries, strict=True)
+    more = {"loc": "outside lower center", "ncols": columns or len(names)} | more
+    figure.legend(marks, names, **more)
+
+
+def log_y(ax: plt.Axes) -> None:
+    """Logarithmic y axis with plain numbers."""
+    ax.set_yscale("log")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.5, 0.5)))
+
+
+def few_ticks(axis) -> None:
+    """Round numbers on a logarithmic axis, though it may be shorter than a decade."""
+    low, high = sorted(axis.get_view_interval())
+    axis.set_major_formatter("{x:g}")
+    if high < 10 * low:
+        axis.set_major_locator(plt.MaxNLocator(4))
+        axis.set_minor_locator(plt.NullLocator())
+    else:
+        axis.set_minor_formatter(plt.NullFormatter())
+
+
+def picture(theme: dict | None = None, dpi: int = 130) -> Callable:
+    """Have a function that makes a figure draw it in the theme and save it at a path, given first.
+
+    Args:
+        theme: Settings of matplotlib's besides THEME.
+    """
+
+    def saving(draw: Callable[..., plt.Figure]) -> Callable[..., None]:
+        @wraps(draw)
+        def drawn(path: Path, *arguments) -> None:
+            with plt.rc_context({**THEME, **(theme or {})}):
+                save(draw(*arguments), path, dpi)
+
+        return drawn
+
+    return saving
+
+
+def save(figure: plt.Figure, path: Path, dpi: int) -> None:
+    """Write the picture and forget it: as PNG of 256 colours, a third of the size, or as WebP."""
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=dpi)
+    plt.close(figure)
+    image, how = Image.open(drawn).convert("RGB"), {"format": path.suffix[1:]}
+    if path.suffix == ".png":
+        image = image.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    else:  # a camera's picture has more colours
+        how |= {"quality": WEBP_QUALITY}
+    with replacing(path) as temporary:
+        image.save(temporary, **how)

@@ -1,0 +1,1 @@
+"""The report: chapters, tables, figures, the page."""

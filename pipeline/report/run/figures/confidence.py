@@ -1,0 +1,47 @@
+"""Which coordinates of the density hang on each other."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from pipeline.report.drawing.canvas import picture
+from pipeline.report.drawing.styles import INK
+from pipeline.report.run.figures.panels import panels
+
+SYMBOL = {"youngs modulus": "E", "mooney": "Mooney"}
+
+
+@picture({"axes.grid": False})
+def correlation(confidences: dict[str, dict]) -> plt.Figure:
+    """Correlations of the density's coordinates, a panel a band.
+
+    Args:
+        confidences: What the θ file of each band says of its confidence.
+    """
+    title = "Red or blue: the recording tells the two together better than each alone"
+    figure, found = panels(confidences, title, 4.0, 3.3)
+    for band, ax in found.items():
+        about = confidences[band]["correlation"]
+        matrix = np.array(about["matrix"], float)
+        names = [coordinate(name) for name in about["names"]]
+        image = ax.imshow(matrix, cmap="RdBu_r", vmin=-1, vmax=1)
+        for (row, column), value in np.ndenumerate(matrix):
+            if column < row and abs(value) >= 0.05:
+                ink = {"color": "w" if abs(value) > 0.6 else INK, "fontsize": 7}
+                text = f"{value:+.1f}".replace("-", "−")
+                ax.text(column, row, text, ha="center", va="center", **ink)
+        ax.set_xticks(range(len(names)), names, rotation=40, ha="right", rotation_mode="anchor")
+        ax.set_yticks(range(len(names)), names)
+        ax.tick_params(length=0, labelsize=7)
+        ax.spines[:].set_visible(False)
+    figure.colorbar(image, ax=list(found.values()), label="correlation", shrink=0.8)
+    return figure
+
+
+def coordinate(name: str) -> str:
+    """A coordinate of the density in words."""
+    words = name.replace("_", " ")
+    for long, short in SYMBOL.items():
+        words = words.replace(long, short)
+    return words

@@ -1,0 +1,73 @@
+"""reports/summary.json: the run in a dozen numbers, for `dvc metrics` and `dvc exp show`.
+
+Names are short, so that a terminal of 120 columns has room for three bands. A key stands where
+there is such a number.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from pipeline.report.run.results import Result, Results
+from pipeline.report.run.tables.landings import (
+    LAUNCHED,
+    intervals,
+    landing_errors,
+    prediction_error,
+)
+
+DIGITS = 3  # another kind of CPU differs beyond them
+
+
+def summary(results: Results, main: str, theirs: str | None) -> dict[str, float]:
+    """How well the run came out.
+
+    Returns:
+        `<band>_cm`, the mean landing error of the main method, or where none is known `<band>_kPa`,
+        its Young's modulus; over bands: `floors`, the error in actuation floors, and `paper_cm`,
+        the error of the paper's method; over launches of the main method: `failed`, `bias_%` of
+        its predictions, `in_90_%` of its intervals, and their median `width_%` of the distance.
+    """
+    found: dict[str, float | None] = {}
+    ratios, beside = [], []
+    for band, methods in results.methods.items():
+        error = _error(methods[main])
+        if error is None:
+            modulus = methods[main].theta["theta"]["youngs_modulus"]
+            found[f"{band}_kPa"] = 1e-3 * modulus
+            continue
+        found[f"{band}_cm"] = 100 * error
+        if band in results.least:
+            ratios.append(error / results.least[band])
+        if theirs is not None:
+            beside.append(_error(methods[theirs]))
+    some = [methods[main].trials for methods in results.methods.values()]
+    trials = pd.concat(some, ignore_index=True)
+    trials = trials[trials.kind.isin(LAUNCHED)]
+    found["floors"] = _mean(ratios)
+    found["paper_cm"] = _mean([100 * one for one in beside if one is not None])
+    if len(trials):
+        aimed = trials[trials.target.notna()]
+        found["failed"] = landing_errors(aimed)["all"]["failed"] if len(aimed) else None
+        found["bias_%"] = 100 * prediction_error(trials)["all"]["bias"]
+        covered = (intervals(trials) or {}).get("all", {"launches": 0})
+        if covered["launches"]:
+            found["in_90_%"] = 100 * covered["covered"] / covered["launches"]
+            found["width_%"] = 100 * covered["width"]
+    return {
+        name: value if isinstance(value, int) else float(f"{value:.{DIGITS}g}")
+        for name, value in found.items()
+        if value is not None and np.isfinite(value)
+    }
+
+
+def _error(result: Result) -> float | None:
+    """Mean error of the launches that had a target [m]; None without one that counts."""
+    aimed = result.trials[result.trials.kind.isin(LAUNCHED) & result.trials.target.notna()]
+    mean = landing_errors(aimed)["all"]["mean"] if len(aimed) else np.nan
+    return mean if np.isfinite(mean) else None
+
+
+def _mean(values: list[float]) -> float | None:
+    return float(np.mean(values)) if values else None

@@ -1,0 +1,89 @@
+"""What every chapter, picture and page of the report is made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.launching.surface.stored import Stored
+from pipeline.params import Params
+from pipeline.report.drawing.styles import Styles, drawn, styles
+from pipeline.report.run.paper import METHOD
+from pipeline.report.run.repeated import Repeated
+from pipeline.report.run.replay import Replay, replay
+from pipeline.report.run.results import Result, Results, gather
+
+
+@dataclass(frozen=True)
+class Report:
+    """All that ran, as it is shown.
+
+    Attributes:
+        replays: By band and method; of the methods that are drawn, of all where data are held out.
+        styles: By method.
+        repeated: The campaign on more recordings of the rig, where its bands ran.
+        root: Of the project, with data/ and reports/.
+    """
+
+    params: Params
+    results: Results
+    replays: dict[str, dict[str, Replay]]
+    styles: Styles
+    repeated: Repeated | None
+    root: Path
+
+    @classmethod
+    def of(cls, params: Params, root: Path) -> Report:
+        """Of everything in params.run. Raises UserError where an input is missing."""
+        results = gather(params, root)
+        named = styles(dict.fromkeys(result.method for result in results))
+        replays = {band: _replays(params, results, band) for band in params.run.bands}
+        repeated = Repeated.load(root) if results.floors else None
+        return cls(params, results, replays, named, repeated, root)
+
+    @property
+    def folder(self) -> Path:
+        return self.root / "reports"
+
+    @property
+    def main(self) -> str:
+        """The method that the report is about first: that of the cards."""
+        return self.params.run.methods[0]
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """The main method, and the paper's where that ran beside it."""
+        return references(self.params)
+
+    def shown(self, methods) -> Styles:
+        """The styles of methods, in the order of the run."""
+        return {method: style for method, style in self.styles.items() if method in methods}
+
+    def picture(self, name: str, alt: str, draw: Callable[..., None], *arguments) -> str:
+        """Have `draw` write reports/figures/<name>.png; return the line that shows it."""
+        draw(self.folder / "figures" / f"{name}.png", *arguments)
+        return f"![{alt}](figures/{name}.png)\n"
+
+    def draws(self, result: Result, targets: np.ndarray) -> np.ndarray:
+        """The policy's draws (N, 2) [m] for targets (N,) [m]."""
+        return Stored(result.band, result.method, self.root).draws(targets)
+
+
+def references(params: Params) -> tuple[str, ...]:
+    """What others are compared with: the first method of the run, and the paper's if it runs."""
+    methods = params.run.methods
+    return tuple(dict.fromkeys([methods[0], *(m for m in methods if m == METHOD)]))
+
+
+def _replays(params: Params, results: Results, band: str) -> dict[str, Replay]:
+    """Of the methods that are drawn; of all where held-out data are to be compared."""
+    recorded, methods = results.episodes[band], results.methods[band]
+    some = drawn(params.run.methods)
+    return {
+        method: replay(params, band, method, recorded, methods[method].theta)
+        for method in methods
+        if method in some or params.loss.held_out.blocks
+    }

@@ -1,0 +1,174 @@
+"""Landing errors in the layout of the paper's tables 1, 3 and 4, its own numbers below ours."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from pipeline.report.drawing.styles import Styles
+from pipeline.report.run import paper
+from pipeline.report.run.results import Results
+from pipeline.report.run.tables.cells import NONE, Table, number
+from pipeline.report.run.tables.landings import LAUNCHED, landing_errors, pooled_std
+
+PAPER = "paper, real robot"
+FLOOR, ORACLE = "actuation floor", "virtual, oracle"
+APART = {*paper.OPTIMISERS, *paper.ABLATIONS} - set(paper.BENCHMARK)  # tables 3 and 4 hold these
+
+
+@dataclass(frozen=True)
+class Row:
+    """Landing errors of one method on one band, by whom they were found.
+
+    Attributes:
+        band: As in params.yaml.
+        method: As in params.yaml, or FLOOR.
+        source: "virtual", "measured", PAPER or ORACLE.
+        errors: As `landing_errors` gives them.
+    """
+
+    band: str
+    method: str
+    source: str
+    errors: dict
+
+
+def ordered(methods: Iterable[str]) -> list[str]:
+    """Methods of tables 1 and 2 that ran: the paper's, then others, those of APART last."""
+    theirs = [method for method in paper.BENCHMARK if method in methods]
+    return list(dict.fromkeys([*theirs, *sorted(methods, key=APART.__contains__)]))
+
+
+def benchmark(results: Results) -> list[Row]:
+    """Table 1: every method that stands in no other table, on every band that it launched on."""
+    rows = []
+    for band, ran in results.methods.items():
+        rows += _rows(results, band, (method for method in ordered(ran) if method not in APART))
+        if band in results.floors:
+            rows.append(Row(band, FLOOR, ORACLE, _floor(results.floors[band])))
+    return rows
+
+
+def ablation(results: Results, methods: tuple[str, ...]) -> list[Row]:
+    """Tables 3 and 4: the paper's rows that ran, on bands where one of the ablations did."""
+    bands = [band for band, ran in results.methods.items() if APART & {*methods} & {*ran}]
+    return [row for band in bands for row in _rows(results, band, methods)]
+
+
+def _rows(results: Results, band: str, methods: Iterable[str]) -> list[Row]:
+    """Rows of the methods that launched on a band, each with the paper's own below it."""
+    rows = []
+    for method in methods:
+        result = results.methods[band].get(method)
+        found = [] if result is None else _launched(result.trials)
+        rows += [Row(band, method, kind, errors) for kind, errors in found]
+        if found and (cells := paper.LANDING.get((band, method))):
+            rows.append(Row(band, method, PAPER, _papers(cells)))
+    return rows
+
+
+def _launched(trials: pd.DataFrame) -> list[tuple[str, dict]]:
+    aimed = trials[trials.target.notna()]
+    by_kind = {kind: aimed[aimed.kind == kind] for kind in LAUNCHED}
+    return [(kind, landing_errors(some)) for kind, some in by_kind.items() if len(some)]
+
+
+def _papers(cells: tuple) -> dict:
+    """The paper's cells, as `landing_errors` would give them; its total's ± is what it prints."""
+    result = {}
+    for key, cell in zip((*paper.TARGETS, "all"), cells, strict=True):
+        mean, std = (math.nan, math.nan) if cell is None else (c / 100 for c in cell)
+        result[key] = {"launches": paper.REPEATS, "failed": None, "mean": mean, "std": std}
+    launches, total = paper.REPEATS * len(paper.TARGETS), result["all"]
+    result["all"] = total | {"launches": launches, "pooled_std": total["std"], "std": math.nan}
+    return result
+
+
+def _floor(floor: dict) -> dict:
+    """The oracle's launches (rig/oracle/floor.py), as `landing_errors` would give them."""
+
+    def errors(one: dict) -> dict:
+        known = {"mean": one["mean_error_m"], "std": one.get("std_m"), "bias": one.get("bias_m")}
+        known = {name: math.nan if value is None else value for name, value in known.items()}
+        return known | {"launches": one["launches"], "failed": one.get("failed", 0)}
+
+    result = {float(g): errors(one) for g, one in floor["targets"].items()}
+    return result | {"all": errors(floor) | {"pooled_std": pooled_std(result.values())}}
+
+
+def as_table(rows: list[Row], targets: Iterable[float], styles: Styles) -> Table:
+    """Mean ± deviation in cm; bold: the lowest of a band where no launch failed."""
+    tried = {key for row in rows for key in row.errors if key != "all"}
+    papers = paper.TARGETS if any(row.source == PAPER for row in rows) else ()
+    keys = [*sorted({*targets, *papers, *tried}), "all"]
+    lowest = {key: _lowest(rows, key) for key in keys}
+    lines = []
+    for row in rows:
+        cells = []
+        for key in keys:
+            one = row.errors.get(key)
+            least = lowest[key].get((row.band, row.source))
+            bold = "**" if one and not one["failed"] and one["mean"] == least else ""
+            cells.append(bold + spread(one) + bold)
+        total = row.errors["all"]
+        failed = NONE if total["failed"] is None else f"{total['failed']} of {total['launches']}"
+        names = band_name(row.band), method_name(row.method, styles), row.source
+        lines.append([*names, *cells, number(100 * total["std"], ".2f"), failed])
+    heads = [f"g = {100 * key:.1f}" for key in keys[:-1]]
+    return ["band", "method", "source", *heads, "all targets", "± over all", "failed"], lines
+
+
+def _lowest(rows: list[Row], key: float | str) -> dict[tuple[str, str], float]:
+    """The lowest mean of each band and kind of which two methods or more have no failures."""
+    means: dict[tuple[str, str], list[float]] = {}
+    for row in rows:
+        one = row.errors.get(key)
+        if one and not one["failed"] and np.isfinite(one["mean"]):
+            means.setdefault((row.band, row.source), []).append(one["mean"])
+    return {group: min(some) for group, some in means.items() if len(some) > 1}
+
+
+def spread(one: dict | None) -> str:
+    """Mean ± deviation [cm]; N/A where no launch counts; partial failures are counted."""
+    if one is None:
+        return NONE
+    if not np.isfinite(one["mean"]):
+        return "N/A"
+    around = number(100 * one.get("pooled_std", one["std"]), ".2f", "")
+    failed = f", {one['failed']} failed" if one["failed"] else ""
+    return f"{100 * one['mean']:.2f}{' ± ' * bool(around)}{around}{failed}"
+
+
+def band_name(band: str) -> str:
+    """As the paper calls the band that ours imitates, or its own name."""
+    return paper.BANDS.get(band, band)
+
+
+def method_name(method: str, styles: Styles) -> str:
+    """For readers."""
+    return method if method == FLOOR else styles[method].name
+
+
+def records(rows: list[Row]) -> pd.DataFrame:
+    """The same for machines: a line a cell, for every target that was tried; empty: not known."""
+    lines = (
+        {
+            "band": row.band,
+            "method": row.method,
+            "source": row.source,
+            "target_m": key,
+            "launches": one["launches"],
+            "failed": one["failed"],
+            "mean_error_cm": number(100 * one["mean"], ".4g", "N/A"),
+            "std_cm": 100 * one["std"],
+            "std_within_targets_cm": 100 * one.get("pooled_std", one["std"]),
+            "bias_cm": 100 * one.get("bias", math.nan),
+        }
+        for row in rows
+        for key, one in row.errors.items()
+    )
+    return pd.DataFrame(lines).astype({"failed": "Int64"})

@@ -1,0 +1,91 @@
+"""Which landing errors differ by more than noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from pipeline.report.drawing.styles import Styles
+from pipeline.report.run.noise import Difference, difference
+from pipeline.report.run.results import Results
+from pipeline.report.run.tables.benchmark import band_name
+from pipeline.report.run.tables.cells import NONE, Table
+from pipeline.report.run.tables.landings import LAUNCHED
+
+
+class Compared(NamedTuple):
+    """By how much a method's launches of a kind miss more than those of each reference."""
+
+    band: str
+    method: str
+    kind: str
+    found: dict[str, Difference | None]
+
+
+def compared(results: Results, references: Iterable[str], seed: int) -> list[Compared]:
+    """Every method beside those of the references that ran on the same band."""
+    rows = []
+    for band, of_band in results.methods.items():
+        for kind in LAUNCHED:
+            aimed = {method: _aimed(one.trials, kind) for method, one in of_band.items()}
+            for method, trials in aimed.items():
+                others = [m for m in references if m != method and len(aimed.get(m, ()))]
+                found = {other: difference(aimed[other], trials, seed) for other in others}
+                if found and len(trials):
+                    rows.append(Compared(band, method, kind, found))
+    return rows
+
+
+def _aimed(trials: pd.DataFrame, kind: str) -> pd.DataFrame:
+    return trials[(trials.kind == kind) & trials.target.notna()]
+
+
+def as_table(rows: list[Compared], styles: Styles) -> Table:
+    """Differences in cm with their intervals; bold where the interval leaves out zero."""
+    beside = [m for m in styles if any(m in row.found for row in rows)]
+    lines = []
+    for band, method, kind, found in rows:
+        cells = (shown(found[one]) if one in found else NONE for one in beside)
+        lines.append([band_name(band), styles[method].name, kind, *cells])
+    return ["band", "method", "launches", *(f"beside {styles[m].name}" for m in beside)], lines
+
+
+def shown(one: Difference | None) -> str:
+    """As in "+3.20 (+2.10 to +4.40)"."""
+    if one is None:
+        return "N/A"
+    text = _signed(one.mean)
+    if np.isfinite(one.low):
+        text += f" ({_signed(one.low)} to {_signed(one.high)})"
+    text = f"**{text}**" if one.real else text
+    return text + (f", {one.left_out} left out" if one.left_out else "")
+
+
+def _signed(metres: float) -> str:
+    return f"{100 * metres:+.2f}".replace("-", "−")
+
+
+def records(rows: list[Compared]) -> pd.DataFrame:
+    """Differences for machines."""
+    return pd.DataFrame(
+        {
+            "band": band,
+            "method": method,
+            "source": kind,
+            "beside": reference,
+            "difference_cm": 100 * one.mean,
+            "low_95_cm": 100 * one.low,
+            "high_95_cm": 100 * one.high,
+            "launches": one.launches[1],
+            "launches_beside": one.launches[0],
+            "failed_share": one.failed[1],
+            "failed_share_beside": one.failed[0],
+            "left_out": one.left_out,
+        }
+        for band, method, kind, found in rows
+        for reference, one in found.items()
+        if one is not None
+    )

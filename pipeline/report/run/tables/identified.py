@@ -1,0 +1,183 @@
+"""What the searches found beside the parameters: derived quantities, losses, residuals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pipeline.params.identification import LEAST_SQUARES
+from pipeline.report.drawing.markdown import as_code, cell
+from pipeline.report.drawing.styles import Styles
+from pipeline.report.run.replay import Replay
+from pipeline.report.run.results import Results
+from pipeline.report.run.tables.cells import NONE, Table, number, percent
+from pipeline.report.run.tables.parameters import HEADS, exactly, printed_loss
+
+DERIVED = {  # heading and factor from SI; others keep their name and unit
+    "damping_product": ("s·d [ms]", 1e3),
+    "air_drag": ("drag beside the air's [1/s]", 1.0),
+    "turn_damping": ("turn damping", 1.0),
+    "returned_share": ("returned share", 1.0),
+    "release_time": ("release [s]", 1.0),
+    "camera_delay": ("camera delay [ms]", 1e3),
+}
+PARTS = ("fitted", "held out", "ratio")
+SEARCHES = {
+    LEAST_SQUARES: "a design, then Levenberg-Marquardt",
+    "de": "differential evolution",
+    "bo": "Bayesian optimisation",
+    "adam": "Adam on finite differences",
+}
+TERMS = {"geom": "geom [cm]", "force": "force [N]", "work": "work [J]"}
+
+
+def methods(results: Results, params, styles: Styles) -> Table:
+    """What each method searched, what it minimises, and what it holds fixed."""
+    rows = []
+    for method, style in styles.items():
+        about = params.methods[method]
+        terms = [
+            term if weight == 1 else f"{weight:g} {term}"
+            for term, weight in dict(about.weights).items()
+            if weight
+        ]
+        search = SEARCHES.get(about.search, f"`{about.search}`")
+        if about.search == "multistart":
+            found = {len(one.regions) for one in results if one.method == method}
+            regions = " to ".join(str(count) for count in sorted({min(found), max(found)}))
+            search = f"DE, then CMA-ES in {regions} region{'s' if max(found) > 1 else ''}"
+            search += "" if about.covariance else ", isotropic starts"
+        fixed = [_held(name, value) for name, value in about.fixed.items()]
+        held = ", ".join(fixed) or NONE
+        if about.search == LEAST_SQUARES:
+            terms = ["−2 log p of all recordings and launches"]
+        rows.append([style.name, f"`{method}`", search, " + ".join(terms), held])
+    return ["method", "in params.yaml", "search", "minimises", "held fixed"], rows
+
+
+def _held(name: str, value: float) -> str:
+    """As in "d 5.00E-3 s"."""
+    symbol, _, unit = HEADS.get(name, name).partition(" [")
+    return f"{symbol} {exactly(name, value)} {unit.rstrip(']')}".rstrip()
+
+
+def derived(results: Results, styles: Styles) -> Table | None:
+    """Quantities that data can see, with intervals; None where no θ has a confidence."""
+    shown = [result for result in results if result.confidence]
+    if not shown:
+        return None
+    found = {name: one for r in shown for name, one in r.confidence["derived"].items()}
+    titles = {name: title for name, title in DERIVED.items() if name in found}
+    for name in sorted(found.keys() - titles):
+        titles[name] = f"{name.replace('_', ' ')} [{found[name]['unit']}]", 1.0
+    rows = []
+    for result in shown:
+        own = result.confidence["derived"]
+        cells = [ranged(own.get(name), factor) for name, (_, factor) in titles.items()]
+        rows.append([result.band, styles[result.method].name, *cells])
+    return ["band", "method", *(title for title, _ in titles.values())], rows
+
+
+def ranged(about: dict | None, factor: float) -> str:
+    """A value and its interval, with as many digits as the interval's width deserves."""
+    if about is None:
+        return NONE
+    if "low" not in about:
+        return f"{factor * about['value']:.3g}"
+    value, low, high = (factor * about[key] for key in ("value", "low", "high"))
+    width = high - low
+    if width <= 0:
+        return f"{value:.3g}, fixed"
+    digits = max(1 - math.floor(math.log10(width)), 0)
+    return f"{value:.{digits}f} ({low:.{digits}f} – {high:.{digits}f})"
+
+
+def recordings(results: Results, styles: Styles) -> Table | None:
+    """What of each recording the simulation leaves, and how the others alone would have it.
+
+    None without a density. The last two columns are for bands with several recordings.
+    """
+    rows = []
+    for result in results:
+        for count, about in enumerate(result.confidence.get("recordings", []), 1):
+            file, without = about.get("source", {}).get("file"), about.get("without_it")
+            moved = without and max(without["moved"].items(), key=lambda one: abs(one[1]))
+            rows.append(
+                [
+                    result.band,
+                    styles[result.method].name,
+                    cell(as_code(file)) if file else str(count),
+                    _scaled(about["force_rms"], 1e3, ".0f"),
+                    _scaled(about["held_rms"], 1e3, ".1f"),
+                    _scaled(about["recoil_rms"], 1e3, ".1f"),
+                    ", ".join(f"{1e3 * time:.0f}" for time in about["pictures"]) or NONE,
+                    f"{without['misfit']:.1f}" if without else NONE,
+                    f"{_word(moved[0])} {moved[1]:+.1f} sd" if moved else NONE,
+                ]
+            )
+    heads = ["band", "method", "recording", "force [mN]", "held band [mm]", "recoil [mm]"]
+    heads += ["recoil seen after [ms]", "misfit without it", "which moves"]
+    return (heads, rows) if rows else None
+
+
+def _scaled(value: float, factor: float, form: str) -> str:
+    return f"{factor * value:{form}}"
+
+
+def _word(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def observed(results: Results, styles: Styles) -> Table | None:
+    """Launches that were evidence: none of them is a score; None where there are none."""
+    rows = [
+        [
+            result.band,
+            styles[result.method].name,
+            f"{one['draw'][0]:.3f}, {one['draw'][1]:.3f}",
+            number(one["landing"], ".3f"),
+            NONE if one["left"] is None else f"{100 * one['left']:+.1f} %",
+        ]
+        for result in results
+        for one in result.confidence.get("launches", [])
+    ]
+    heads = ["band", "method", "draw (y, z) [m]", "landing [m]", "farther than simulated"]
+    return (heads, rows) if rows else None
+
+
+def losses(results: Results, params, styles: Styles) -> Table:
+    """Terms of the loss at θ, the share that each weighs, the printed total, and the budget."""
+    found = {term for one in results for term in one.theta.get("loss", {}) if term != "total"}
+    terms = TERMS | {term: term for term in sorted(found - TERMS.keys())}
+    heads = ["band", "method", *terms.values(), "total of its own loss", "printed loss", "rollouts"]
+    rows = []
+    for result in results:
+        loss, weights = result.theta.get("loss", {}), dict(params.methods[result.method].weights)
+        another = params.methods[result.method].search == LEAST_SQUARES  # minimises no such sum
+        total = math.nan if another else loss.get("total", math.nan)
+        cells = []
+        for term in terms:
+            weight, value = weights.get(term, 0.0), loss.get(term, math.nan)
+            share = f" ({percent(weight * value / total)})" if weight else " (unused)"
+            share = share if np.isfinite(value) and not another else ""
+            cells.append(number(value, ".3g") + share)
+        common = printed_loss(result)
+        spent = result.theta.get("rollouts", len(result.history))
+        cells += [number(total, ".4g"), number(common, ".4g"), str(spent)]
+        rows.append([result.band, styles[result.method].name, *cells])
+    return heads, rows
+
+
+def held_out(replays: dict[str, dict[str, Replay]], styles: Styles) -> Table:
+    """Residuals of fitted and of held-out data of each band's pull, by band and method."""
+    rows = []
+    for band, of_band in replays.items():
+        for method, replay in of_band.items():
+            cells = []
+            for kind, form in (("force", ".3f"), ("cloud", ".2f")):
+                fitted, held = (replay.residuals[kind][part] for part in ("fitted", "held_out"))
+                cells += [number(fitted, form), number(held, form), number(held / fitted, ".2f")]
+            rows.append([band, styles[method].name, *cells])
+    heads = [f"{what}, {part}" for what in ("force [N]", "cloud [cm]") for part in PARTS]
+    return ["band", "method", *heads], rows

@@ -1,0 +1,167 @@
+"""Where launches landed: beside their targets, and beside their predictions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+
+from pipeline.report.drawing.styles import Styles
+from pipeline.report.run.noise import landed
+from pipeline.report.run.results import Results
+from pipeline.report.run.tables.cells import NONE, Table, number, percent
+
+LAUNCHED = ("virtual", "measured")  # kinds of launches that landed, or failed to
+
+
+def landing_errors(trials: pd.DataFrame) -> dict:
+    """Statistics of launches that had targets: by target, and under "all" over every target.
+
+    A launch fails that has a failure or lands outside the fixed target area. Returns for each key
+    launches, failed, and over the rest mean and std of |y - g|, and bias, the mean of y - g [m].
+    "all" has two deviations, because the paper's mixes them: `pooled_std` (within targets) and
+    `std` (over all launches). Deviations are those of a sample, NaN for fewer than two.
+    """
+    trials = trials[trials.target.notna()]
+    good = landed(trials)
+
+    def statistics(chosen: pd.Series) -> dict:
+        rows = trials[chosen & good]
+        miss = rows.landing_y - rows.target
+        return {
+            "launches": int(chosen.sum()),
+            "failed": int((chosen & ~good).sum()),
+            "mean": float(miss.abs().mean()),
+            "std": float(miss.abs().std(ddof=1)),
+            "bias": float(miss.mean()),
+        }
+
+    result = {target: statistics(trials.target == target) for target in sorted(set(trials.target))}
+    everything = statistics(pd.Series(True, index=trials.index))
+    everything["pooled_std"] = pooled_std(result.values())
+    return {**result, "all": everything}
+
+
+def pooled_std(parts: Iterable[dict]) -> float:
+    """Deviation within targets, each weighed by its launches less one [m]; NaN of none."""
+    known = [(n["launches"] - n["failed"] - 1, n["std"]) for n in parts if np.isfinite(n["std"])]
+    freedom = sum(count for count, _ in known)
+    return math.sqrt(sum(n * std**2 for n, std in known) / freedom) if freedom else math.nan
+
+
+def predictions(trials: pd.DataFrame) -> Table:
+    """Predicted beside measured landing, launch by launch, with the error in % of distance."""
+    measured = bool(trials.landing_y.notna().any() or trials.failure.notna().any())
+    ranged = trials.predicted_low.notna().any()
+    heads = ["draw y, z [m]", "stretch", "hold force, predicted [N]", "predicted [m]"]
+    heads += ["90 % interval"] if ranged else []
+    heads += ["measured [m]", "error"] if measured else ["target [m]"]
+    rows = []
+    for trial in trials.itertuples():
+        beyond = "" if trial.stretch <= trial.recorded_stretch else " (beyond)"
+        row = [f"{trial.draw_y:.3f}, {trial.draw_z:.3f}", f"{trial.stretch:.2f}{beyond}"]
+        row.append(number(trial.hold_force, ".1f"))
+        row.append(number(trial.predicted_y, ".3f", trial.predicted_failure))
+        if ranged:
+            low, high = number(trial.predicted_low, ".3f"), number(trial.predicted_high, ".3f")
+            row.append(f"{low} – {high}")
+        if measured:
+            error = trial.predicted_y / trial.landing_y - 1
+            row += [number(trial.landing_y, ".3f", trial.failure), number(error, "+.1%")]
+        else:
+            row.append(number(trial.target, ".3f", ""))
+        rows.append(row)
+    return heads, rows
+
+
+def _parts(trials: pd.DataFrame) -> dict[str, pd.Series]:
+    """Which launches stretch the band no further than the recording did, which do, and all."""
+    inside = trials.stretch <= trials.recorded_stretch
+    return {"inside": inside, "beyond": ~inside, "all": inside | ~inside}
+
+
+def prediction_error(trials: pd.DataFrame) -> dict[str, dict]:
+    """Errors predicted / measured - 1 inside and beyond the recorded stretch.
+
+    Keys "inside", "beyond", "all", each with `launches` (those compared), `unpredicted` (their
+    simulation failed) of `tried`, and over those compared the mean and max of the error's size and
+    its signed mean, `bias` (fractions, NaN if none).
+    """
+    signed = trials.predicted_y / trials.landing_y - 1
+    error = signed.abs()
+    return {
+        name: {
+            "launches": int((chosen & error.notna()).sum()),
+            "mean": float(error[chosen].mean()),
+            "max": float(error[chosen].max()),
+            "bias": float(signed[chosen].mean()),
+            "tried": int(chosen.sum()),
+            "unpredicted": int((chosen & trials.predicted_y.isna()).sum()),
+        }
+        for name, chosen in _parts(trials).items()
+    }
+
+
+def intervals(trials: pd.DataFrame) -> dict[str, dict] | None:
+    """How often landings lie in their predicted 90 % intervals, inside and beyond the recording.
+
+    Keys as above, each with `launches` (those that have both), how many are `covered`,
+    and the median `width` of the intervals as a share of the landing. None where no launch has an
+    interval.
+    """
+    if trials.predicted_low.isna().all():
+        return None
+    both = trials.predicted_low.notna() & trials.landing_y.notna()
+    covered = trials.landing_y.between(trials.predicted_low, trials.predicted_high)
+    width = (trials.predicted_high - trials.predicted_low) / trials.landing_y
+    return {
+        name: {
+            "launches": int((chosen & both).sum()),
+            "covered": int((chosen & both & covered).sum()),
+            "width": float(width[chosen & both].median()),
+        }
+        for name, chosen in _parts(trials).items()
+    }
+
+
+def prediction_summary(results: Results, styles: Styles) -> Table | None:
+    """Prediction error of each method on launches of each kind, and what its intervals cover."""
+    rows, beyond = [], False
+    for result in results:
+        for kind in LAUNCHED:
+            trials = result.trials[result.trials.kind == kind]
+            if trials.empty:
+                continue
+            parts, ranges = prediction_error(trials), intervals(trials) or {}
+            beyond |= parts["beyond"]["tried"] > 0
+            bias = number(100 * parts["all"]["bias"], "+.1f")
+            unpredicted = f"{parts['all']['unpredicted']} of {parts['all']['tried']}"
+            mark = "" if result.confidence else " †"
+            covered = [coverage(ranges.get(name)) for name in ("inside", "beyond")]
+            covered = [text + mark * (text != NONE) for text in covered]
+            shares = (_share(parts[name]) for name in ("inside", "beyond"))
+            names = result.band, styles[result.method].name, kind
+            rows.append([*names, *shares, bias, unpredicted, *covered])
+    heads = ["band", "method", "launches", "error inside the recorded stretch", "beyond it"]
+    heads += ["bias [%]", "not predicted", "in the 90 % interval, inside", "beyond"]
+    if not beyond:
+        kept = [n for n, head in enumerate(heads) if not head.startswith("beyond")]
+        heads, *rows = ([row[n] for n in kept] for row in (heads, *rows))
+    return (heads, rows) if rows else None
+
+
+def _share(part: dict) -> str:
+    if not part["launches"]:
+        return NONE
+    mean, most = percent(part["mean"], ".1f"), percent(part["max"], ".1f")
+    return f"{mean} (max {most}, {part['launches']} launches)"
+
+
+def coverage(part: dict | None) -> str:
+    """How many landings lie in their intervals, and how wide these are."""
+    if not part or not part["launches"]:
+        return NONE
+    width = percent(part["width"], ".2g")
+    return f"{part['covered']} of {part['launches']}, median width {width}"

@@ -1,0 +1,79 @@
+"""The run in one table, a row a band; and what recorded bands are, in another."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from pipeline.report.drawing.styles import Styles
+from pipeline.report.run.results import Result, Results
+from pipeline.report.run.tables.cells import NONE, Table, number, without_empty
+from pipeline.report.run.tables.identified import ranged
+from pipeline.report.run.tables.landings import (
+    LAUNCHED,
+    coverage,
+    intervals,
+    landing_errors,
+    prediction_error,
+)
+
+VALUES = {  # heading, and factor from SI
+    "youngs_modulus": ("E [kPa]", 1e-3),
+    "mooney_share": ("Mooney share", 1.0),
+    "relaxation": ("relaxation [%]", 1e2),
+    "damping_product": ("damping s·d [ms]", 1e3),
+}
+
+
+def outcome(results: Results, references: tuple[str, ...], styles: Styles) -> Table | None:
+    """Landing errors of the main method and the paper's, and how the main method predicts.
+
+    Args:
+        references: The main method, and the paper's where both ran.
+
+    Returns:
+        None where nothing was launched.
+    """
+    rows = []
+    for band, methods in results.methods.items():
+        for kind in LAUNCHED:
+            floor = results.least.get(band) if kind == "virtual" else None
+            trials = [_of(methods[method], kind) for method in references]
+            if trials[0].empty:
+                continue
+            found = [_errors(some) for some in trials]
+            parts, ranges = prediction_error(trials[0])["all"], intervals(trials[0]) or {}
+            cells = [number(100 * one["mean"], ".1f", "N/A") if one else NONE for one in found]
+            own = found[0]["mean"] if found[0] else None
+            cells += [number(floor and 100 * floor, ".1f")]
+            cells += [number(own and floor and own / floor, ".1f")]
+            failed = [str(one["failed"]) for one in found if one]
+            cells += [" · ".join(failed) or NONE]
+            cells += [number(100 * parts["mean"], ".1f"), number(100 * parts["bias"], "+.1f")]
+            rows.append([band, f"{len(trials[0])} {kind}", *cells, coverage(ranges.get("all"))])
+    names = [styles[method].name for method in references]
+    heads = ["band", "launches", *(f"{name} [cm]" for name in names)]
+    heads += ["actuation floor [cm]", f"{names[0]}, in floors", f"failed: {' · '.join(names)}"]
+    heads += ["prediction off by [%]", "bias [%]", "in the 90 % interval"]
+    return without_empty((heads, rows)) if rows else None
+
+
+def _of(result: Result, kind: str) -> pd.DataFrame:
+    return result.trials[result.trials.kind == kind]
+
+
+def _errors(trials: pd.DataFrame) -> dict | None:
+    """Over all targets; None without one."""
+    return landing_errors(trials)["all"] if trials.target.notna().any() else None
+
+
+def values(results: Results, bands: list[str], method: str) -> Table:
+    """What a method identified of some bands, with 90 % intervals where they are known."""
+    rows = []
+    for band in bands:
+        result = results.methods[band][method]
+        known = {name: {"value": one} for name, one in result.theta["theta"].items()}
+        for group in ("parameters", "derived"):
+            for name, about in result.confidence.get(group, {}).items():
+                known[name] = known.get(name, {}) | about
+        rows.append([band, *(ranged(known.get(n), factor) for n, (_, factor) in VALUES.items())])
+    return without_empty((["band", *(title for title, _ in VALUES.values())], rows))

@@ -1,0 +1,170 @@
+"""What was identified, in the layout of the paper's table 2, its own numbers below ours."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from pipeline.identify.objective.space import Space
+from pipeline.params.identification import LAWS
+from pipeline.report.drawing.styles import Styles
+from pipeline.report.run import paper
+from pipeline.report.run.results import PRINTED, Result, Results
+from pipeline.report.run.tables.benchmark import PAPER, band_name, method_name, ordered
+from pipeline.report.run.tables.cells import NONE, Table, number
+from pipeline.simulator.material import THETA
+from pipeline.simulator.rubber import RUBBER
+
+HEADS = {  # as the paper has them, with units
+    "youngs_modulus": "E [Pa]",
+    "poissons_ratio": "ν",
+    "elasticity_damping": "d [s]",
+    "dynamic_friction": "friction",
+    "damping_scale": "s",
+    **{name: name.replace("_", " ").replace("mooney", "Mooney") for name in LAWS[RUBBER]},
+}
+UNITS = {"youngs_modulus": "_pa", "elasticity_damping": "_s"}
+RECORDED = {"rig": "virtual", "recording": "measured"}
+
+
+@dataclass(frozen=True)
+class Value:
+    """A parameter: what the search found, and what the posterior says [SI].
+
+    Attributes:
+        state: "identified", "not identifiable", "fixed" (the method does not search it) or
+            "" where no confidence is known.
+        low, high: Of the 90 % interval; NaN where there is none.
+        at_edge: The search ended at a side of its box.
+    """
+
+    value: float
+    state: str = ""
+    low: float = math.nan
+    high: float = math.nan
+    at_edge: bool = False
+
+
+@dataclass(frozen=True)
+class IdentifiedRow:
+    """Parameters of one method on one band, by name, and the printed loss there."""
+
+    band: str
+    method: str
+    source: str
+    values: dict[str, Value]
+    loss: float
+
+
+def identified(results: Results, params) -> list[IdentifiedRow]:
+    """Table 2: every method that ran, the paper's own numbers below those of its methods."""
+    rows = []
+    for band, ran in results.methods.items():
+        for method in ordered(ran):
+            result, source = ran[method], RECORDED[params.bands[band].source]
+            names = (name for name in HEADS if name in result.theta["theta"])
+            values = {name: _value(params, result, name) for name in names}
+            rows.append(IdentifiedRow(band, method, source, values, printed_loss(result)))
+            if cells := paper.THETA.get((band, method)):
+                *numbers, loss = cells
+                values = dict(zip(THETA, map(Value, numbers), strict=True))
+                rows.append(IdentifiedRow(band, method, PAPER, values, loss))
+    return rows
+
+
+def printed_loss(result: Result) -> float:
+    """The paper's loss of the calibrated simulator, whatever the method minimised."""
+    loss = result.theta.get("loss", {})
+    return float(sum(loss.get(term, math.nan) for term in PRINTED))
+
+
+def _value(params, result: Result, name: str) -> Value:
+    value = result.theta["theta"][name]
+    if name in params.methods[result.method].fixed:
+        return Value(value, "fixed")
+    box = Space.of_method(params, result.method)
+    edge = name in box.names and at_edge(value, name, box)
+    about = result.confidence.get("parameters", {}).get(name)
+    if about is None:
+        return Value(value, at_edge=edge)
+    state = "identified" if about["identifiable"] else "not identifiable"
+    return Value(value, state, about["low"], about["high"], edge)
+
+
+def at_edge(value: float, name: str, box: Space) -> bool:
+    """Whether the search ended within 1 % of a side of its box: the optimum may lie outside."""
+    axis = box.names.index(name)
+    low, high = box.low[axis], box.high[axis]
+    if box.log[axis]:
+        value, low, high = math.log(value), math.log(low), math.log(high)
+    return not 0.01 <= (value - low) / (high - low) <= 0.99
+
+
+def as_table(rows: list[IdentifiedRow], styles: Styles) -> Table:
+    """Parameters with their intervals; bold: the least loss of a band."""
+    losses: dict[tuple[str, str], list[float]] = {}
+    for row in rows:
+        losses.setdefault((row.band, row.source), []).append(row.loss)
+    least = {group: np.nanmin([math.inf, *some]) for group, some in losses.items() if len(some) > 1}
+    names, lines = _shown(rows), []
+    for row in rows:
+        cells = [_cell(name, row.values[name]) if name in row.values else NONE for name in names]
+        loss = number(row.loss, ".4f")
+        loss = f"**{loss}**" if row.loss == least.get((row.band, row.source)) else loss
+        whose = band_name(row.band), method_name(row.method, styles), row.source
+        lines.append([*whose, *cells, loss])
+    return ["band", "method", "source", *(HEADS[name] for name in names), "loss"], lines
+
+
+def _shown(rows: list[IdentifiedRow]) -> list[str]:
+    """The five, and what a law that any method runs with has beside them."""
+    return [name for name in HEADS if name in THETA or any(name in row.values for row in rows)]
+
+
+def _cell(name: str, one: Value) -> str:
+    shown = _physical(name, one.value) + (" ⚠" if one.at_edge else "")
+    if one.state != "identified":
+        return f"{shown}, {one.state}" if one.state else shown
+    outside = "" if one.low <= one.value <= one.high else " †"
+    return f"{shown}{outside} ({_between(name, one.low, one.high)})"
+
+
+def _between(name: str, low: float, high: float) -> str:
+    """An interval with as few digits as a value, or as many more as tell its ends apart."""
+    for digits in (2, 3, 4, 5):
+        ends = _physical(name, low, digits), _physical(name, high, digits)
+        if ends[0] != ends[1]:
+            break
+    return " – ".join(ends)
+
+
+def exactly(name: str, value: float) -> str:
+    """A setting as the tables print parameters, with more digits where it has more."""
+    shown = (_physical(name, value, digits) for digits in (2, 3, 4, 5))
+    return next((text for text in shown if float(text) == value), f"{value:g}")
+
+
+def _physical(name: str, value: float, digits: int = 2) -> str:
+    """As the paper prints it: 9.29E+5, 0.46."""
+    if name in UNITS:
+        mantissa, exponent = f"{value:.{digits}E}".split("E")
+        return f"{mantissa}E{int(exponent):+d}"
+    return f"{value:.{digits}f}"
+
+
+def records(rows: list[IdentifiedRow]) -> pd.DataFrame:
+    """The same for machines: a line a row; empty: not known."""
+    lines = []
+    for row in rows:
+        line = {"band": row.band, "method": row.method, "source": row.source}
+        for name in _shown(rows):
+            one = row.values.get(name, Value(math.nan))
+            unit = UNITS.get(name, "")
+            for part, value in (("", one.value), ("_low", one.low), ("_high", one.high)):
+                line[f"{name}{part}{unit}"] = value
+            line[f"{name}_state"] = one.state or None
+        lines.append(line | {"loss": row.loss})
+    return pd.DataFrame(lines)

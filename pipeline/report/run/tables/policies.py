@@ -1,0 +1,30 @@
+"""How the policies converged."""
+
+from __future__ import annotations
+
+from pipeline.report.drawing.styles import Styles
+from pipeline.report.run.results import Results
+from pipeline.report.run.tables.cells import NONE, Table, centimetres
+
+
+def policies(results: Results, styles: Styles) -> Table:
+    """How each policy converged in its own simulator, and how well its map interpolates."""
+    heads = ["band", "method", "converged", "mean error [cm]", "largest", "failed targets"]
+    rows = []
+    for one in results:
+        training, near = one.card["training"], one.card["landing_map"]["target_range"]
+        rows.append(
+            [
+                one.band,
+                styles[one.method].name,
+                "yes" if training["converged"] else "**no**",
+                *_errors(training),
+                str(training.get("failed_targets", NONE)),
+                *_errors(near),
+            ]
+        )
+    return [*heads, "map error [cm]", "largest"], rows
+
+
+def _errors(about: dict) -> list[str]:
+    return [centimetres(about[name]) for name in ("mean_error_m", "max_error_m")]

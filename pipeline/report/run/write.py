@@ -1,0 +1,29 @@
+"""Write reports/: README.md with pictures and tables, index.html, summary.json and run.js."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.base.files import write_json, write_text
+from pipeline.report.run.chapters.appendix import appendix
+from pipeline.report.run.chapters.outcome import outcome
+from pipeline.report.run.chapters.paper_tables import paper_tables
+from pipeline.report.run.metrics import summary
+from pipeline.report.run.page import write_page
+from pipeline.report.run.paper import METHOD
+from pipeline.report.run.report import Report
+from pipeline.report.run.run import write_run
+
+# Each makes its text of a Report, and writes the pictures and tables that the text names.
+CHAPTERS = (outcome, paper_tables, appendix)
+
+
+def write(params, root: str | Path = ".") -> None:
+    """Write the report of everything in params.run. Raises UserError where an input is missing."""
+    report = Report.of(params, Path(root))
+    markdown = "\n".join(chapter(report) for chapter in CHAPTERS)
+    theirs = METHOD if METHOD in report.references[1:] else None
+    write_json(report.folder / "summary.json", summary(report.results, report.main, theirs))
+    write_text(report.folder / "README.md", markdown)
+    write_run(report.folder)
+    write_page(report.folder, markdown)

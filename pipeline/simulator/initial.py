@@ -1,0 +1,105 @@
+"""Where a simulation starts: the clamps' frames, a band through given nodes, guesses of statics."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.simulator import tetrahedra
+from pipeline.simulator.model import ROD, Sling
+
+
+def clamp_tangents(sling: Sling) -> np.ndarray:
+    """Unit tangents of the band in the first and the last clamp, shape (2, 3)."""
+    first = sling.clamp_direction
+    return np.array([first, [first[0], -first[1], -first[2]]])
+
+
+def fixed_frames(sling: Sling) -> np.ndarray:
+    """Directors a, b in the first clamp, the last and the fingers, shape (3, 2, 3).
+
+    a x b points along the band; the fingers hold it along the fork.
+    """
+    normal = np.array([0.0, 1.0, 0.0])
+    frames = []
+    for tangent in [*clamp_tangents(sling), np.array([1.0, 0.0, 0.0])]:
+        a = normal - (normal @ tangent) * tangent
+        if np.linalg.norm(a) < 1e-6:
+            a = np.array([0.0, 0.0, 1.0])
+        a /= np.linalg.norm(a)
+        frames.append([a, np.cross(tangent, a)])
+    a, b = frames[1]
+    cosine, sine = np.cos(sling.clamp_twist), np.sin(sling.clamp_twist)
+    frames[1] = [cosine * a + sine * b, cosine * b - sine * a]
+    return np.array(frames)
+
+
+def _transport(normal: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Carry `normal` (3,) along the smallest rotations from unit `start` (3,) to `end` (..., 3)."""
+    axis = np.cross(start, end)
+    cosine = (end @ start)[..., None]
+    turned = np.cross(axis, normal)
+    return normal + turned + np.cross(axis, turned) / np.maximum(1 + cosine, 1e-6)
+
+
+def _directors(sling: Sling, end: int, direction: np.ndarray, stretch: np.ndarray) -> np.ndarray:
+    """Directors (..., 6) of edges along unit `direction` (..., 3), turned from a clamp's frame.
+
+    A stretched edge thins, its volume the same.
+    """
+    turned = _transport(fixed_frames(sling)[end, 0], clamp_tangents(sling)[end], direction)
+    both = np.concatenate([turned, np.cross(direction, turned)], axis=-1)
+    return both * stretch[..., None] ** -0.5
+
+
+def sections_of(sling: Sling, nodes: np.ndarray) -> np.ndarray:
+    """Cross-sections (..., L, dofs) of bands through `nodes` (..., L, 3)."""
+    state = np.zeros((*nodes.shape[:-1], 9))
+    state[..., :3] = nodes
+    edges = np.diff(nodes, axis=-2)
+    length = np.linalg.norm(edges, axis=-1)
+    direction, stretch = edges / length[..., None], length / sling.edge_lengths
+    for end, half in enumerate((slice(0, sling.middle), slice(sling.middle, sling.edges))):
+        state[..., half, 3:] = _directors(sling, end, direction[..., half, :], stretch[..., half])
+    state[..., -1, 3:] = fixed_frames(sling)[1].ravel()
+    return _meshed(sling, state)
+
+
+def _meshed(sling: Sling, rod: np.ndarray) -> np.ndarray:
+    """Cross-sections of the sling's mesh for a rod's (..., L, 9), whose directors are edges'."""
+    if sling.mesh == ROD:
+        return rod
+    frames = fixed_frames(sling)[:2].reshape(2, 6)
+    after = rod[..., 3:]
+    directors = (after + np.roll(after, 1, axis=-2)) / 2
+    directors[..., [0, -1], :] = frames
+    return tetrahedra.sections(rod[..., :3], directors, sling.radius)
+
+
+def hanging_guess(sling: Sling) -> np.ndarray:
+    """A U below the tips: two legs and a half circle, shape (sections, dofs)."""
+    half, length = sling.half_width, sling.rest_length
+    leg = max((length - np.pi * half) / 2, 0.0)
+    arc = sling.arc
+    nodes = np.zeros((sling.sections, 3))
+    angle = np.clip((arc - leg) / (length - 2 * leg), 0, 1) * np.pi
+    nodes[:, 0] = -half * np.cos(angle)
+    nodes[:, 2] = -np.minimum(np.minimum(arc, length - arc), leg)
+    nodes[:, 2] -= half * np.sin(angle)
+    return sections_of(sling, nodes)
+
+
+def drawn_guess(sling: Sling, draws: np.ndarray) -> np.ndarray:
+    """Two straight halves from the tips to each draw (N, 2), shape (N, sections, dofs)."""
+    middle = np.column_stack([np.zeros(len(draws)), draws])
+    part = (sling.arc / sling.arc[sling.middle])[: sling.middle + 1, None]
+    state = np.zeros((len(draws), sling.sections, 9), np.float32)
+    halves = slice(0, sling.middle + 1), slice(sling.middle, None)
+    for end, (half, tip) in enumerate(zip(halves, sling.tips, strict=True)):
+        span = middle - tip
+        state[:, half, :3] = tip + (part if end == 0 else part[::-1]) * span[:, None]
+        length = np.linalg.norm(span, axis=1)
+        direction = span / (length if end == 0 else -length)[:, None]
+        stretch = length / (sling.rest_length / 2)
+        state[:, half, 3:] = _directors(sling, end, direction, stretch)[:, None]
+    state[:, -1, 3:] = fixed_frames(sling)[1].ravel()
+    return _meshed(sling, state)

@@ -1,0 +1,167 @@
+"""The recorded interaction in simulation: hang, grasp, follow the hand, let go, swing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import maximum_filter1d
+
+from pipeline.base.errors import UserError
+from pipeline.simulator.initial import hanging_guess
+from pipeline.simulator.model import Sling
+from pipeline.simulator.records import Grip, Outcome
+from pipeline.simulator.schedule import RELAX_STEPS, Schedule, relaxation, steps
+from pipeline.simulator.solver import Frames, Options, Slings, run
+
+if TYPE_CHECKING:
+    from pipeline.episode.episode import Episode
+
+FAILURES = {
+    Outcome.GOING_ON: None,
+    Outcome.NOT_CONVERGED: "the simulation did not converge",
+    Outcome.SLIPPED: "the band slipped out of the fingers",
+}
+BOW, GRID, AROUND = 5e-6, 1e-3, 0.03  # m, s, s: of the steps while the hand holds
+GRASP_BLEND = 0.5  # s in which the held node moves from where the band hung to the hand's path
+
+
+@dataclass(frozen=True)
+class Rollouts:
+    """N simulated interactions on the episode's clock, frame O.
+
+    Attributes:
+        times: Ends of the steps [s], shape (S,); irregular.
+        force: Of the band on the gripper [N], shape (N, S, 3).
+        cloud_time: The camera's stamps [s], shape (K,).
+        center_line: Nodes of the band at those stamps [m], shape (N, K, sections, 3), float32.
+        failure: None, or why this rollout counts for nothing, length N.
+        iterations: Newton steps it took, shape (N,); those of a SIMD vector or a warp together.
+    """
+
+    times: np.ndarray
+    force: np.ndarray
+    cloud_time: np.ndarray
+    center_line: np.ndarray
+    failure: list[str | None]
+    iterations: np.ndarray | None = None
+
+
+def schedule_of(sling: Sling, episode: Episode, refine: int = 1) -> Schedule:
+    """Steps of one episode; the same for every theta.
+
+    At the episode's release time the band begins to slip between the opening fingers: the force
+    shows that moment, whatever the friction. From then on the friction that is left falls as the
+    pads' normal force does, which is gone after `finger_opening_time`.
+    """
+    size, release = sling.steps, episode.release_time
+    if release <= episode.grasp_time:
+        raise UserError(
+            f"episode of {episode.band}: released at {release:g} s, grasped at"
+            f" {episode.grasp_time:g} s; a recording needs a pull between them"
+        )
+    clear = release + sling.finger_opening_time
+    end = max(episode.time[-1], *episode.cloud_time[-1:]) + 1e-3
+    recoil_end = max(min(clear + size.recoil_time, end), clear + size.recoil_step)
+    phases = (  # until when, in steps of what size
+        (clear, size.recoil_step, Grip.OPENING),
+        (recoil_end, size.recoil_step, Grip.FREE),
+        (end, size.swing_step, Grip.FREE),
+    )
+    hand = CubicSpline(episode.time, episode.position, axis=0)
+    held = _held_times(hand, episode, size, refine)
+    rows = relaxation(Grip.FREE)
+    rows["time"] = episode.grasp_time
+    rows = np.concatenate([rows, steps(held, 1.0, grip=Grip.HELD, order=2)])
+    begin = release
+    for until, step, grip in phases:
+        if until > begin:
+            count = max(int(np.ceil((until - begin) / step * refine - 1e-9)), 1)
+            times = np.linspace(begin, until, count + 1)
+            rows = np.concatenate([rows, steps(times, rows["h"][-1], grip=grip, order=2)])
+            begin = until
+    _lead(rows, hand, sling, episode)
+    return Schedule(rows, first_free=RELAX_STEPS + np.count_nonzero(rows["grip"]))
+
+
+def _held_times(hand: CubicSpline, episode: Episode, size, refine: int) -> np.ndarray:
+    """Ends of the steps from grasp to release [s]: as long as the hand goes nearly straight.
+
+    A step of h bows from its chord by h^2 |a| / 8, which is at most BOW, and a band that the hand
+    holds follows it. Between `grip_step` and `hold_step`.
+    """
+    time = np.arange(episode.grasp_time, episode.release_time, GRID)
+    bend = np.linalg.norm(hand(_within(time, episode), 2), axis=1)
+    bend = maximum_filter1d(bend, 2 * round(AROUND / GRID) + 1)
+    longest = np.sqrt(8 * BOW / np.maximum(bend, 1e-9)).clip(size.grip_step, size.hold_step)
+    longest[time < episode.grasp_time + GRASP_BLEND] = size.grip_step
+    done = np.append(0.0, np.cumsum(np.diff(time, append=episode.release_time) / longest))
+    count = max(int(np.ceil(done[-1] * refine - 1e-9)), 1)
+    return np.interp(
+        np.linspace(0, done[-1], count + 1), done, np.append(time, episode.release_time)
+    )
+
+
+def _within(time: np.ndarray, episode: Episode) -> np.ndarray:
+    return np.clip(time, episode.time[0], episode.time[-1])
+
+
+def _lead(rows: np.ndarray, hand: CubicSpline, sling: Sling, episode: Episode) -> None:
+    """Say of steps where the hand is, and with what force its pads hold the band."""
+    time, opening = rows["time"], rows["grip"] == Grip.OPENING
+    rows["grip_force"][rows["grip"] == Grip.HELD] = sling.grip_force
+    since = time[opening] - episode.release_time
+    rows["grip_force"][opening] = sling.grip_force * since / sling.finger_opening_time
+    rows["target"] = hand(_within(time, episode))
+    part = np.clip((time - episode.grasp_time) / GRASP_BLEND, 0, 1)
+    rows["blend"] = 1 - part**3 * (10 - 15 * part + 6 * part**2)
+
+
+def interact(
+    sling: Sling,
+    episode: Episode,
+    thetas: np.ndarray,
+    *,
+    device: str = "cpu",
+    workers: int = 1,
+    fetch: bool = True,
+    refine: int = 1,
+    double: bool = False,
+) -> Rollouts:
+    """Simulate the episode's interaction with physical thetas (N, 5).
+
+    Args:
+        workers: Threads, on the CPU; results do not depend on their number.
+        fetch: Copy forces and centre lines from a GPU; else they stay there as Warp arrays.
+        refine: How many times finer the steps are than `sling` says.
+    """
+    thetas = np.atleast_2d(thetas)
+    schedule = schedule_of(sling, episode, refine)
+    times = schedule.steps["time"]
+    done = run(
+        sling,
+        schedule,
+        Slings.of(sling, thetas, hanging_guess(sling)),
+        _frames(schedule, episode.cloud_time),
+        Options(device, workers, fetch=fetch, double=double),
+    )
+    return Rollouts(
+        times=times[RELAX_STEPS - 1 :],
+        force=done.output[:, RELAX_STEPS - 1 :, :3],
+        cloud_time=episode.cloud_time,
+        center_line=done.frames,
+        failure=[FAILURES[int(round(code))] for code in done.lanes["outcome"]],
+        iterations=done.lanes["iterations"].astype(int),
+    )
+
+
+def _frames(schedule: Schedule, stamps: np.ndarray) -> Frames:
+    """The camera's, at stamps (K,); those before the grasp show the band at rest."""
+    ends, lengths = schedule.steps["time"], schedule.steps["h"]
+    within = np.searchsorted(ends, stamps).clip(RELAX_STEPS - 1, len(ends) - 1)
+    before = ends[within] - lengths[within]
+    weights = np.clip((stamps - before) / lengths[within], 0, 1)
+    weights[within < RELAX_STEPS] = 1.0
+    return Frames(within, weights)

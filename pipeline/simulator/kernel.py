@@ -1,0 +1,85 @@
+"""The native text of the simulator as a Warp kernel, one for each element and mesh.
+
+(Warp reads annotations: no postponed ones here.)
+"""
+
+from pathlib import Path
+
+import warp as wp
+
+from pipeline.base.native import built_once, text_of
+from pipeline.simulator.records import macros
+from pipeline.simulator.rubber import RUBBER, memories
+from pipeline.simulator.tetrahedra import CORNERS
+
+
+@built_once
+def sling_kernel(
+    element: str,
+    law: str,
+    dofs: int,
+    sections: int,
+    middle: int,
+    double: bool,
+    lanes: int,
+    on_gpu: bool,
+) -> tuple[wp.Kernel, type]:
+    """Compile the native text for a mesh; Warp keeps the binary in its cache.
+
+    Returns:
+        The kernel, and the structure of arrays that it takes.
+    """
+    scalar = wp.float64 if double else wp.float32
+    array, indices = wp.array(dtype=scalar), wp.array(dtype=wp.int32)
+
+    @wp.struct
+    class Arrays:
+        setting: array
+        mesh: array
+        clamp: array
+        schedule: array
+        coefficients: array
+        state: array
+        scratch: array
+        work: array
+        lanes: array
+        output: array
+        frames: array
+        frame_first: indices
+        frame_weight: array
+        n_frames: int
+        frame_width: int
+        steps: int
+        first_free: int
+        launching: int
+
+    parts = ("lanes.h", "state.h", "material.h", "rubber.h", f"{element}.h", "solve.h", "step.h")
+    tetrahedra = {} if element == "rod" else {"TETS": len(CORNERS), "CORNERS": _braced(CORNERS)}
+    text = text_of(
+        *(Path(__file__).with_name(part) for part in parts),
+        arrays=Arrays,
+        SC="double" if double else "float",
+        W=lanes,
+        N=dofs,
+        L=sections,
+        MID=middle,
+        RUBBER=int(law == RUBBER),
+        MEMORIES=memories(law),
+        **tetrahedra,
+        **macros(),
+    )
+
+    @wp.func_native(text)
+    def march(tid: int, arrays: Arrays): ...
+
+    # approximate reciprocals do for Newton's method; on the CPU it would drop the checks for NaN
+    @wp.kernel(module="unique", module_options={"fast_math": on_gpu})
+    def run(arrays: Arrays):
+        march(wp.tid(), arrays)
+
+    return run, Arrays
+
+
+def _braced(table) -> str:
+    """A table of integers as C writes it."""
+    return str(table.tolist()).translate(str.maketrans("[]", "{}"))

@@ -1,0 +1,142 @@
+"""Launches: the projectile in the pouch, from a static draw to the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK, too_strong
+from pipeline.simulator.initial import drawn_guess
+from pipeline.simulator.model import GRAVITY, Sling
+from pipeline.simulator.records import Grip, Outcome
+from pipeline.simulator.rubber import unrelaxed
+from pipeline.simulator.schedule import RELAX_STEPS, Schedule, relaxation, steps
+from pipeline.simulator.solver import Options, Slings, run
+
+SHARE = 1024  # launches: a device more for fewer would only cost its start
+
+
+@dataclass(frozen=True)
+class Launches:
+    """Outcome of N launches, frame O, SI units; NaN where `failure` names why there is none.
+
+    Attributes:
+        landing_y: Where the projectile meets the floor, shape (N,).
+        speed, angle: Of the projectile as it leaves the pouch [m/s, rad above the horizon].
+        hold_force: Of the drawn band on the hand, shape (N,); known for failed launches too,
+            but for those that did not converge.
+        separation_time: After the release [s].
+        separation_y, separation_z: Where it leaves.
+        failure: None, or the reason, length N.
+    """
+
+    landing_y: np.ndarray
+    speed: np.ndarray
+    angle: np.ndarray
+    hold_force: np.ndarray
+    separation_time: np.ndarray
+    separation_y: np.ndarray
+    separation_z: np.ndarray
+    failure: list[str | None]
+
+
+def ballistic_landing(y, z, vy, vz, floor: float):
+    """Where a free projectile from (y, z) with (vy, vz) meets z = floor, without drag."""
+    flight = (vz + np.sqrt(vz**2 + 2 * GRAVITY * np.maximum(z - floor, 0))) / GRAVITY
+    return y + vy * flight
+
+
+def schedule_of(sling: Sling, refine: int = 1) -> Schedule:
+    """Relax at the draw, where the arm gives way; then recoil in second-order steps."""
+    relax = relaxation(Grip.POUCH)
+    relax["blend"] = 1.0
+    if sling.arm_stiffness is not None:
+        relax["compliance"][relax["bending"] == 1] = 1 / sling.arm_stiffness
+    h = sling.steps.launch_step / refine
+    count = int(round(sling.steps.launch_time / h))
+    first = steps([0.0, h], h, grip=Grip.FREE)
+    rest = steps(h * np.arange(1, count + 1), h, grip=Grip.FREE, order=2)
+    return Schedule(np.concatenate([relax, first, rest]), first_free=RELAX_STEPS)
+
+
+def launch(
+    sling: Sling,
+    thetas: np.ndarray,
+    draws: np.ndarray,
+    *,
+    max_force: float = np.inf,
+    device: str | Sequence[str] = "cpu",
+    workers: int = 1,
+    refine: int = 1,
+    double: bool = False,
+) -> Launches:
+    """Launch the projectile from draws (N, 2) with physical thetas (N, 5); one of each fits all.
+
+    Args:
+        max_force: A draw that takes more is a failed launch [N].
+        device: Or several of one kind, which share a large batch evenly.
+        workers: Threads, on the CPU; results depend on them as little as on the devices' number.
+        refine: How many times finer the steps are than `sling.launch_step`.
+    """
+    thetas, draws = np.atleast_2d(thetas).astype(float), np.atleast_2d(draws).astype(float)
+    count = max(len(thetas), len(draws))
+    thetas, draws = np.broadcast_to(thetas, (count, 5)), np.broadcast_to(draws, (count, 2))
+    distance = np.linalg.norm(draws, axis=1, keepdims=True)
+    direction = np.column_stack([np.zeros(count), -draws / np.maximum(distance, 1e-9)])
+    slings = Slings.of(
+        sling, thetas, drawn_guess(sling, draws),
+        direction=direction, payload=sling.projectile_mass, unrelaxed=unrelaxed(sling, draws),
+    )  # fmt: skip
+    schedule = schedule_of(sling, refine)
+
+    def launched(place: str, share: np.ndarray) -> np.ndarray:
+        options = Options(place, workers, launching=True, double=double)
+        return run(sling, schedule, slings[share], options=options).lanes
+
+    devices = [device] if isinstance(device, str) else device[: max(count // SHARE, 1)]
+    shares = np.array_split(np.arange(count), len(devices))
+    with ThreadPoolExecutor(len(devices)) as pool:
+        lanes = np.concatenate(list(pool.map(launched, devices, shares)))
+    return _outcomes(sling, lanes, draws, max_force)
+
+
+def _outcomes(sling: Sling, lanes: np.ndarray, draws: np.ndarray, max_force: float) -> Launches:
+    """Of launches from draws (N, 2), by the slings' records (N,) of records.LANE."""
+    outcome = np.round(lanes["outcome"])
+    hold_force = np.linalg.norm(lanes["hold_force"], axis=1)
+    hold_force[outcome > 0] = np.nan
+    time, y, z, vy, vz = lanes["separation"].T
+    vy, vz = np.sqrt(sling.returned_share) * np.stack([vy, vz])
+    floor = -sling.fork_height
+    landing = ballistic_landing(y, z, vy, vz, floor)
+
+    failure = np.full(len(lanes), None, object)
+    failure[~(landing > 0)] = SHORT
+    plane = floor + sling.foot_height
+    foot = np.where(z <= plane, y, ballistic_landing(y, z, vy, vz, plane))
+    failure[(landing > 0) & (foot < 0)] = FOOT
+    failure[outcome != Outcome.SEPARATED] = NEVER_LEFT
+    failure[(lanes["lowest"] <= floor) | ((outcome == Outcome.SEPARATED) & (z <= floor))] = DRAGGED
+    half = np.hypot(sling.half_width, np.linalg.norm(draws, axis=1))
+    failure[half <= sling.rest_length / 2] = SLACK
+    for i in np.flatnonzero(hold_force > max_force):
+        failure[i] = too_strong(hold_force[i], max_force)
+    failure[~np.isfinite(hold_force)] = "the simulation did not converge"
+    good = np.array([reason is None for reason in failure])
+
+    def known(values: np.ndarray) -> np.ndarray:
+        return np.where(good, values, np.nan)
+
+    return Launches(
+        landing_y=known(landing),
+        speed=known(np.hypot(vy, vz)),
+        angle=known(np.arctan2(vz, vy)),
+        hold_force=hold_force,
+        separation_time=known(time),
+        separation_y=known(y),
+        separation_z=known(z),
+        failure=failure.tolist(),
+    )

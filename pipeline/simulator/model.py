@@ -1,0 +1,171 @@
+"""What is simulated: the geometry of a band clamped at the fork's tips, and its resolution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.simulator import tetrahedra
+from pipeline.simulator.rubber import NEO_HOOKEAN
+
+GRAVITY = 9.81
+CYLINDER_DRAG = 1.1  # across the wind, at Reynolds numbers of 1e3 to 1e4 (Wieselsberger 1921)
+ROD, TETRAHEDRA = "rod", "tetrahedra"  # meshes: rod.h, tetrahedra.h
+
+
+@dataclass(frozen=True)
+class LaunchHistory:
+    """How a hand draws the band for a launch: straight from the fork, at rest at both ends.
+
+    Attributes:
+        pull_time: That the way takes, a cubic in time [s].
+        pause: From there to the release [s].
+    """
+
+    pull_time: float
+    pause: float
+
+
+@dataclass(frozen=True)
+class Sling:
+    """Geometry and mass of a clamped band, and the resolution it is simulated with.
+
+    Attributes:
+        edges: Even number of edges along the band; the hand holds the cross-section in the middle.
+        rest_length, radius, mass: Of the band between the clamps [m, m, kg].
+        half_width: Half the distance of the fork's tips [m].
+        fork_height: Of the tips above the floor [m].
+        foot_height: Of what joins the fork's rods on the floor, which a projectile may hit [m].
+        clamp_direction: Unit vector along which the band leaves the tip at -x, shape (3,); it
+            leaves the other tip along the mirror image.
+        flexural_rigidity: E I of the band where it was measured [N m^2], one or one a theta; None
+            takes a solid round band's, which follows Young's modulus. Tetrahedra are solid and
+            round: they bend as their mesh does, whatever was measured.
+        projectile_mass, grip_force, finger_opening_time: As in params.yaml `setup` [kg, N, s].
+        arm_stiffness: Of the arm that holds a band to launch it [N/m], which is sent to the draw
+            and rests where its spring holds the band; None: it does not give way.
+        steps: The step sizes and the mesh's grading, as in params.yaml `sling`.
+        clamped: Whether the first and the last end are held; experiments on a free band let go.
+        clamp_twist: Of the last clamp about the band, against the first [rad].
+        air_drag: Of the moving band: force for its mass and speed [1/s], one or one a theta;
+            whatever brakes it besides the cylinder's drag.
+        turn_damping: Share of the damping that brakes a turn of a stressed band besides, one or one
+            a theta: 0 in a material, whose stress turns with it; 1 in engines that damp the rate of
+            the nominal stress.
+        returned_share: Of the energy that the law gives a launch, what it truly gets, one or one a
+            theta.
+        air_density: For the drag of a cylinder across the wind [kg/m^3], which tetrahedra do not
+            feel.
+        law: NEO_HOOKEAN, or RUBBER (rubber.h), which the rod alone knows.
+        mooney_share: Of `rubber`: Mooney's second constant over the sum of both, one or one a
+            theta. The shear modulus is that sum.
+        relaxation: Of `rubber`: weight of each branch (rubber.py), one or one a theta.
+        history: Of `rubber`: what a band remembers that is launched; None: it has forgotten all.
+        mesh: ROD, or TETRAHEDRA: a solid cylinder, whose edges are equally long. What of the band
+            is inside the clamps does not deform there, so that the mesh ends at them.
+    """
+
+    edges: int
+    rest_length: float
+    radius: float
+    mass: float
+    half_width: float
+    fork_height: float
+    foot_height: float
+    clamp_direction: np.ndarray
+    flexural_rigidity: float | None
+    projectile_mass: float
+    grip_force: float
+    finger_opening_time: float
+    steps: object
+    arm_stiffness: float | None = None
+    clamped: tuple[bool, bool] = (True, True)
+    clamp_twist: float = 0.0
+    mesh: str = ROD
+    air_drag: float | np.ndarray = 0.0
+    turn_damping: float | np.ndarray = 0.0
+    returned_share: float | np.ndarray = 1.0
+    air_density: float = 0.0
+    law: str = NEO_HOOKEAN
+    mooney_share: float | np.ndarray = 0.0
+    relaxation: float | np.ndarray = 0.0
+    history: LaunchHistory | None = None
+
+    @classmethod
+    def of(
+        cls, band, setup, resolution, mounting: dict | None = None, *, as_rod: bool = False
+    ) -> Sling:
+        """Make it from params.yaml's `bands.<band>`, `setup` and `sling`.
+
+        Args:
+            mounting: What the slack band shows of itself (pipeline/identify/clamps.py):
+                `clamp_direction` and `flexural_rigidity`; without it, the setup's clamp direction
+                and a solid round band.
+            as_rod: Whatever mesh the resolution asks for.
+        """
+        mounting = mounting or {}
+        mesh, edges = ROD, resolution.edges
+        if not as_rod:
+            mesh = resolution.mesh
+            edges = {ROD: edges, TETRAHEDRA: resolution.tet_edges}[mesh]
+        direction = np.asarray(mounting.get("clamp_direction", setup.clamp_direction), float)
+        return cls(
+            edges=edges,
+            rest_length=band.rest_length,
+            radius=band.diameter / 2,
+            mass=band.mass,
+            half_width=setup.fork_width / 2,
+            fork_height=setup.fork_height,
+            foot_height=setup.foot_height,
+            clamp_direction=direction / np.linalg.norm(direction),
+            flexural_rigidity=mounting.get("flexural_rigidity"),
+            projectile_mass=setup.projectile_mass,
+            grip_force=setup.grip_force,
+            finger_opening_time=setup.finger_opening_time,
+            arm_stiffness=setup.arm_stiffness,
+            air_density=setup.air_density,
+            steps=resolution,
+            mesh=mesh,
+        )
+
+    @property
+    def sections(self) -> int:
+        return self.edges + 1
+
+    @property
+    def middle(self) -> int:
+        return self.edges // 2
+
+    @property
+    def dofs(self) -> int:
+        """Degrees of freedom of a cross-section: a node and two directors, or its vertices."""
+        return 9 if self.mesh == ROD else tetrahedra.DOFS
+
+    @property
+    def edge_lengths(self) -> np.ndarray:
+        """Rest length of each edge [m], shape (edges,).
+
+        A taut band turns within sqrt(E I / tension), a few millimetres, at the clamps and in the
+        hand: there the rod's edges are `grading` times shorter than midway between them.
+        """
+        if self.mesh == TETRAHEDRA:
+            return np.full(self.edges, self.rest_length / self.edges)
+        place = (np.arange(self.middle) + 0.5) / self.middle
+        half = 1 + (self.steps.grading - 1) * np.sin(np.pi * place) ** 2
+        sizes = np.concatenate([half, half])
+        return self.rest_length * sizes / sizes.sum()
+
+    @property
+    def arc(self) -> np.ndarray:
+        """Rest length from the first clamp to each node [m], shape (sections,)."""
+        return np.concatenate([[0.0], np.cumsum(self.edge_lengths)])
+
+    @property
+    def area(self) -> float:
+        return np.pi * self.radius**2
+
+    @property
+    def tips(self) -> np.ndarray:
+        """Both ends of the band, shape (2, 3)."""
+        return np.array([[-self.half_width, 0.0, 0.0], [self.half_width, 0.0, 0.0]])

@@ -1,0 +1,65 @@
+"""Draws whose launch without errors lands on a target, found by root search in the world itself.
+
+A target is met by a whole curve of draws. The oracle takes the one whose landing depends least on
+where exactly the band is drawn: whatever a policy knows, it has no less error from a draw that is
+off. The draw for a target that is out of reach is NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pipeline.launching.surface.landing_map import LandingMap
+
+Land = Callable[[np.ndarray], float]
+"""Landing [m] of a launch from the draw (2,) without errors; NaN where there is none."""
+
+FINE = 401  # nodes along y and z between which the map is searched
+INSET = 2e-3  # m from the edge of the box, which leaves room for the root search
+NEAR = 2e-4  # m of landing that count as a hit
+FIRST_STEP, LAUNCHES = 2e-3, 12  # of the root search: share of the draw's length, and how many
+
+
+def sensitivity(landing_map: LandingMap, draws: np.ndarray, step: float = 1e-3) -> np.ndarray:
+    """Change of the landing with the draw, |dL/d(y, z)|, at draws (N, 2) [m], shape (N,)."""
+    around = step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+    landing = landing_map((draws[:, None] + around).reshape(-1, 2)).landing_y.reshape(-1, 4)
+    return np.hypot(landing[:, 0] - landing[:, 1], landing[:, 2] - landing[:, 3]) / (2 * step)
+
+
+def least_sensitive_draw(landing_map: LandingMap, target: float) -> np.ndarray:
+    """Of the draws that the map lands on `target` [m], the least sensitive one, shape (2,).
+
+    NaN where the box, within the force limit, has none.
+    """
+    axes = [
+        np.linspace(edges[0] + INSET, edges[-1] - INSET, FINE)
+        for edges in (landing_map.draw_y, landing_map.draw_z)
+    ]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+    off = landing_map(grid.reshape(-1, 2)).landing_y.reshape(FINE, FINE) - target
+    here = off[:-1, :-1]
+    hits = grid[:-1, :-1][(here * off[1:, :-1] <= 0) | (here * off[:-1, 1:] <= 0)]
+    found = sensitivity(landing_map, hits)
+    return hits[np.nanargmin(found)] if np.isfinite(found).any() else np.full(2, np.nan)
+
+
+def hit(land: Land, target: float, start: np.ndarray) -> np.ndarray:
+    """The draw (2,) on the line from the fork through `start` (2,) that lands on `target` [m].
+
+    Within NEAR, by secants. NaN where they do not come there.
+    """
+    start = np.asarray(start, float)
+    length, off = 1.0, land(start) - target
+    slope = abs(off) / FIRST_STEP
+    for _ in range(LAUNCHES):
+        if abs(off) <= NEAR:
+            return length * start
+        if not slope > 0:  # a longer draw lands further; NaN where one does not land
+            break
+        before, length = (length, off), length - off / slope
+        off = land(length * start) - target
+        slope = (off - before[1]) / (length - before[0])
+    return np.full(2, np.nan)

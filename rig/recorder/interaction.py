@@ -1,0 +1,120 @@
+"""The recorded interaction in the rig's physics: hang, grasp, lift, pull, pause, slip, swing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline.base.errors import UserError
+from rig.physics.motion import END, GRASP, OPEN, HandMotion
+from rig.physics.string import ElasticString
+from rig.physics.world import bent_at
+from rig.recorder.servo import Servo
+
+if TYPE_CHECKING:
+    from pipeline.params import Params
+
+CHUNK = 500  # states at a time, for memory
+
+
+@dataclass(frozen=True)
+class Interaction:
+    """What happened, frame O.
+
+    Attributes:
+        force: Of the band on the gripper at the sensor's times [N], shape (T, 3).
+        hand: Of the tool centre point at the sensor's times [m], shape (T, 3).
+        acceleration: Of the hand at the sensor's times [m/s2], shape (T, 3).
+        seen: The camera's times [s], shape (K,).
+        lines: Nodes of the band at those times [m], shape (K, nodes, 3).
+        slip_time: When the band leaves the fingers [s].
+    """
+
+    force: np.ndarray
+    hand: np.ndarray
+    acceleration: np.ndarray
+    seen: np.ndarray
+    lines: np.ndarray
+    slip_time: float
+
+
+def hang(string: ElasticString, tolerance: float) -> np.ndarray:
+    """Nodes of the band that hangs from its clamps, shape (nodes, 3)."""
+    reach = np.linalg.norm(string.clamps[1] - string.clamps[0]) / 2
+    depth = np.sqrt(max((string.length / 2) ** 2 - reach**2, 0.0))
+    return string.at_rest(bent_at(string, np.array([0.0, 0.0, -depth])), tolerance)[:, :3]
+
+
+def pull_and_release(
+    string: ElasticString,
+    hanging: np.ndarray,
+    motion: HandMotion,
+    sensor_times: np.ndarray,
+    camera_times: np.ndarray,
+    params: Params,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Interaction:
+    """Follow the band from rest through the motion.
+
+    Args:
+        hanging: Where the band hangs, shape (nodes, 3).
+        sensor_times, camera_times: To report at [s], ascending, between 0 and END.
+
+    Raises:
+        UserError: The pads cannot hold the band.
+    """
+    rig = params.rig
+    holding = 2 * rig.pads.friction * rig.pads.force  # two pads
+    follow = Servo.of(rig.arm, motion)
+
+    def margin(time: float, y: np.ndarray) -> float:
+        grip = holding * float(motion.grip(time))
+        return grip - float(np.linalg.norm(string.at_middle(y)))
+
+    y = string.state(hanging)
+    y[string.middle, :6] = np.concatenate([motion.position(GRASP), motion.position(GRASP, 1)])
+    last = OPEN + motion.opening[0]
+    wanted = np.union1d(sensor_times, camera_times)
+    during = wanted[(wanted > GRASP) & (wanted < last)]
+    held_times, held = string.integrate(
+        y, np.concatenate([[GRASP], during, [last]]), rig.tolerance, hand=follow, event=margin
+    )
+    held_times, held = held_times[1:], held[1:]  # the first shows the jolt of the grasp alone
+    slip = float(held_times[-1])
+    if slip < OPEN:
+        raise UserError(
+            f"rig.pads.friction: {rig.pads.friction:g} lets the band slip out at {slip:.2f} s,"
+            f" before the fingers open; raise it or rig.pads.force"
+        )
+    progress(f"held from {GRASP:.2f} s, slipped free at {slip:.4f} s")
+
+    after = wanted[wanted > slip]
+    free = string.integrate(held[-1], np.concatenate([[slip], after, [END]]), rig.tolerance)[1]
+    hand = follow.alone(held[-1, string.middle, :6], np.concatenate([[slip], after]), rig.tolerance)
+    hand = hand[1:]  # (x, v) after the slip
+
+    force, place = np.zeros((len(sensor_times), 3)), motion.position(sensor_times)
+    speed = motion.position(sensor_times, 1)
+    while_held, sensed = np.isin(sensor_times, held_times), np.isin(held_times, sensor_times)
+    force[while_held] = np.concatenate(
+        [string.at_middle(held[i : i + CHUNK]) for i in range(0, len(held), CHUNK)]
+    )[sensed]
+    place[while_held] = held[sensed, string.middle, :3]
+    speed[while_held] = held[sensed, string.middle, 3:6]
+    then = np.isin(after, sensor_times)
+    place[sensor_times > slip], speed[sensor_times > slip] = hand[then, :3], hand[then, 3:]
+
+    lines = np.repeat(hanging[None], len(camera_times), axis=0)
+    lines[np.isin(camera_times, held_times)] = held[np.isin(held_times, camera_times), :, :3]
+    lines[camera_times > slip] = free[1:-1][np.isin(after, camera_times), :, :3]
+    return Interaction(
+        force=force,
+        hand=place,
+        acceleration=follow(sensor_times, place.T, speed.T, force.T).T,
+        seen=camera_times,
+        lines=lines,
+        slip_time=slip,
+    )

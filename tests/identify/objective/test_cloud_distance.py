@@ -1,0 +1,161 @@
+"""The Chamfer distance of two clouds, against other libraries and shapes with known answers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import warp as wp
+from scipy.spatial.distance import cdist
+
+from pipeline.identify.objective.chamfer import AROUND, LANES, RINGS, Chamfer, CloudDistance
+from pipeline.identify.objective.kernel import clouds_kernel
+from pipeline.identify.objective.loss import TERMS, EpisodeLoss
+from tests.identify.search.toy import CUTOFF, LENGTH, RADIUS, episode, facing, rollouts, straight
+
+CAMERA = np.array([0.0, 0.0, 1e4])
+ASIDE = np.array([1.0, -0.8, 0.6])
+TUBE = {"radius": RADIUS, "rest_length": LENGTH}
+
+
+def vertices(line: np.ndarray, rest: np.ndarray, camera: np.ndarray) -> np.ndarray:
+    """The simulated cloud of a centre line (L, 3) in float64, (RINGS * AROUND, 3)."""
+    edge, arc = np.diff(line.astype(float), axis=0), np.concatenate([[0.0], np.cumsum(rest)])
+    length = np.linalg.norm(edge, axis=1)
+    at = (np.arange(RINGS) + 0.5) / RINGS * arc[-1]
+    on = np.searchsorted(arc, at, side="right") - 1
+    centre = np.column_stack([np.interp(at, arc, line[:, c]) for c in range(3)])
+    along = edge[on] / length[on][:, None]
+    first = np.cross(np.cross(along, camera - centre), along)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    angle = 2 * np.pi * np.arange(AROUND) / AROUND
+    around = np.multiply.outer(np.cos(angle), first)
+    around += np.multiply.outer(np.sin(angle), np.cross(along, first))
+    thick = RADIUS * np.sqrt(rest / np.maximum(length, rest / 4))[on]
+    return (centre + thick[:, None] * around).reshape(-1, 3)
+
+
+def graded() -> np.ndarray:
+    """Rest lengths of 24 edges, the first eight times shorter than those midway."""
+    sizes = np.geomspace(1, 8, 12)
+    return LENGTH * np.concatenate([sizes, sizes[::-1]]) / sizes.sum() / 2
+
+
+def test_equals_all_pairs_of_scipy_and_open3d() -> None:
+    open3d = pytest.importorskip("open3d")
+    rng = np.random.default_rng(3)
+    sizes = [1, 2, 17, 300, 1000]
+    lines = straight(len(sizes))[None] + rng.normal(0, 0.02, (2, len(sizes), 25, 3))
+    lines = lines.astype(np.float32)
+    clouds = [rng.normal(0, 0.1, (size, 3)).astype(np.float32) for size in sizes]
+    rest = graded()
+    found = CloudDistance(clouds, ASIDE, radius=RADIUS, rest_length=rest)(lines)
+    for line, row in zip(lines, found, strict=True):
+        for k, cloud in enumerate(clouds):
+            simulated = vertices(line[k], rest, ASIDE)
+            assert simulated.shape == (RINGS * AROUND, 3)
+            pairs = cdist(cloud, simulated)
+            expected = (pairs.min(0).mean() + pairs.min(1).mean()) / 2
+            assert row[k] == pytest.approx(expected, rel=2e-5)
+            one, other = (
+                open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points.astype(float)))
+                for points in (cloud, simulated)
+            )
+            both = one.compute_point_cloud_distance(other), other.compute_point_cloud_distance(one)
+            assert row[k] == pytest.approx((np.mean(both[0]) + np.mean(both[1])) / 2, rel=2e-5)
+
+
+@pytest.mark.parametrize("lanes", LANES.values())
+def test_what_is_skipped_changes_no_bit(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines near and far, crumpled, at a point and huge; clouds of all sizes."""
+    monkeypatch.setitem(LANES, "cpu", lanes)  # a vector as wide as a warp, too
+    rng = np.random.default_rng(2)
+    sizes = [1, 15, 17, 33, 500, 1000, 1025, 2500, 0, 40]
+    lines = np.tile(straight(len(sizes)), (9, 1, 1, 1)) + rng.normal(0, 0.003, (9, 1, 25, 3))
+    clouds = [
+        (lines[0, k][rng.integers(0, 25, size)] + rng.normal(0, 0.01, (size, 3))).astype(np.float32)
+        for k, size in enumerate(sizes)
+    ]
+    clouds[-1][:] = clouds[-1][0]
+    for line, spread in zip(lines[1:7], (0.003, 0.03, 0.3, 3.0, 1e4, 1e12), strict=True):
+        line += rng.normal(0, spread, (1, 25, 3))
+    lines[7] *= 1e-3
+    lines[8, :, ::2] = lines[8, :, 1::2].mean(axis=1, keepdims=True)
+    found, whole = (
+        CloudDistance(clouds, ASIDE, culled=one, **TUBE)(lines) for one in (True, False)
+    )
+    np.testing.assert_array_equal(found, whole)
+    assert np.isfinite(np.delete(found, 8, axis=1)).all()
+
+
+def test_the_side_that_no_camera_sees_counts() -> None:
+    """A cloud on the ridge: a vertex at the angle a is 2 R sin(a / 2) away."""
+    found = CloudDistance([facing(20_000)], CAMERA, **TUBE)(straight(1)[None])[0, 0]
+    angle = 2 * np.pi * np.arange(AROUND) / AROUND
+    back, there = (2 * RADIUS * np.abs(np.sin(angle / 2))).mean(), LENGTH / RINGS / 4
+    assert found == pytest.approx((back + there) / 2, rel=0.01)
+    seen = Chamfer([facing(20_000)], CAMERA, **TUBE)(straight(1)[None])[0, 0]
+    assert seen < 0.1 * found
+
+
+def test_a_stretched_band_is_thinner() -> None:
+    """From far along the band's side: the mean over a ring is of its radius, R / sqrt(2)."""
+    away, far = np.array([0.0, 0.0, 10.0]), 2 * straight(1)
+    cloud = (np.array([[0.0, 0.0, 0.0]]) + away).astype(np.float32)
+    thin = CloudDistance([cloud], CAMERA, **TUBE)(far[None])[0, 0]
+    pairs = cdist(cloud, vertices(far[0], np.full(24, LENGTH / 24), CAMERA))
+    assert thin == pytest.approx((pairs.min() + pairs.mean()) / 2, rel=1e-5)
+    nearest = 10 - RADIUS / np.sqrt(2)
+    assert pairs.min() == pytest.approx(nearest, abs=1e-6)
+
+
+def test_the_text_compiles_for_a_gpu(tmp_path) -> None:
+    """For Hopper, by the compiler that comes with Warp: no GPU is asked for."""
+    kernel, _ = clouds_kernel(24, RINGS, AROUND, LANES["cuda"])
+    wp.compile_aot_module(kernel.module, arch=90, module_dir=tmp_path, use_ptx=True)
+    (file,) = tmp_path.glob("*.ptx")
+    text = file.read_text()
+    assert ".target sm_90" in text and "shfl.sync" in text  # threads share a frame
+
+
+def test_empty_clouds_and_broken_rollouts_are_no_number_and_the_others_stay() -> None:
+    lines = np.tile(straight(3), (3, 1, 1, 1))
+    lines[1, 2, 7] = np.nan
+    found = CloudDistance([facing(), np.zeros((0, 3)), facing()], CAMERA, **TUBE)(lines)
+    assert np.isnan(found[:, 1]).all() and np.isnan(found[1, 2])
+    np.testing.assert_array_equal(found[0, [0, 2]], found[2, [0, 2]])
+    assert found[1, 0] == found[0, 0] == found[0, 2]
+
+
+def test_a_loss_takes_it_wherever_the_rollouts_are() -> None:
+    """Geometry alone changes; a copy of the rollouts as on a device costs the same."""
+    recorded = episode()
+    seen, clouds = (
+        EpisodeLoss(
+            recorded, weights=dict.fromkeys(TERMS, 1.0), cutoff=CUTOFF, chamfer=kind, **TUBE
+        )
+        for kind in ("symmetric", "clouds")
+    )
+    simulated = rollouts(recorded, count=2, shift=(0, 0.003, 0), force=(0, 1, 0))
+    there = type(simulated)(**vars(simulated))
+    there.force = wp.array(simulated.force.astype(np.float32), device="cpu")
+    there.center_line = wp.array(simulated.center_line, device="cpu")
+    expected, found = seen.terms(simulated), clouds.terms(simulated)
+    for name in ("force", "work"):
+        np.testing.assert_array_equal(found[name], expected[name])
+    assert (found["geom"] > 1.2 * expected["geom"]).all()
+    for name, values in clouds.terms(there).items():
+        np.testing.assert_allclose(values, found[name], rtol=1e-6)
+
+
+def test_a_perfect_place_costs_least() -> None:
+    recorded = episode(frames=3)
+    loss = EpisodeLoss(
+        replace(recorded, clouds=[facing(500)] * 3),
+        weights=dict.fromkeys(TERMS, 1.0),
+        cutoff=CUTOFF,
+        chamfer="clouds",
+        **TUBE,
+    )
+    shifts = (-0.01, -0.003, 0.0, 0.003, 0.01)
+    geom = [loss.terms(rollouts(recorded, shift=(0, s, 0)))["geom"][0] for s in shifts]
+    assert np.argmin(geom) == 2

@@ -1,0 +1,115 @@
+"""Batches of parameters: slicing, workers, failures."""
+
+from dataclasses import replace
+from threading import Barrier
+
+import numpy as np
+import pytest
+
+from pipeline.base.errors import UserError
+from pipeline.identify.objective.evaluate import Evaluator
+from pipeline.identify.objective.loss import TERMS, EpisodeLoss
+from pipeline.identify.objective.space import Space
+from pipeline.params import load
+from tests.identify.search import toy
+from validation.synthetic import recorded_yardstick
+
+PARAMS = load("params.yaml")
+EPISODE = toy.episode()
+SPACE = Space(
+    ("offset", "pull"), np.array([0.0, 0.1]), np.array([0.01, 10]), np.array([0, 1], bool)
+)
+
+
+def simulate(sling, episode, thetas, device):
+    """A band `offset` away and a force `pull`; beyond 8 mm it fails, beyond 9 N it is NaN."""
+    assert (sling, episode, device) == (toy.SLING, EPISODE, "cpu")
+    offset, pull = thetas.T
+    result = toy.rollouts(episode, count=len(thetas))
+    result.center_line[..., 2] -= offset[:, None, None].astype(np.float32)
+    result.force[..., 0] = np.where(pull > 9, np.nan, pull)[:, None]
+    result.failure = ["too far" if far else None for far in offset > 0.008]
+    return result
+
+
+def evaluator(workers: int = 1, **options) -> Evaluator:
+    weights = {"geom": 1.0, "force": 0.5, "work": 1.0}
+    sizes = {"radius": toy.RADIUS, "rest_length": toy.LENGTH}
+    loss = EpisodeLoss(EPISODE, weights=weights, cutoff=toy.CUTOFF, **sizes)
+    options = {"workers": workers, "simulate": simulate, **options}
+    return Evaluator(EPISODE, toy.SLING, loss, SPACE, **options)
+
+
+def test_losses_of_a_batch() -> None:
+    """Physical values in, weighted sum out; the unit cube is what was asked."""
+    unit = np.array([[0.5, 0.5], [0.0, 0.0]])
+    found = evaluator(1)(unit)
+    np.testing.assert_array_equal(found.unit, unit)
+    np.testing.assert_allclose(found.theta, [[0.005, 1.0], [0.0, 0.1]])
+    np.testing.assert_allclose(found.terms["geom"], [0.5, 0.0], atol=0.01)
+    np.testing.assert_allclose(found.terms["force"], [1.0, 0.1])
+    np.testing.assert_allclose(found.total, found.terms["geom"] + 0.5 * found.terms["force"])
+    assert found.failure == [None, None]
+
+
+def test_the_number_of_workers_and_devices_changes_nothing() -> None:
+    """Rows in their order, failures too; some devices may find nothing to do."""
+    for count, workers, devices in ((67, 3, 1), (67, 1, 2), (17, 1, 2), (2, 1, 3), (1, 1, 3)):
+        unit = np.random.default_rng(1).random((count, 2))
+        one, several = evaluator()(unit), evaluator(workers, devices=["cpu"] * devices)(unit)
+        np.testing.assert_array_equal(one.theta, several.theta)
+        np.testing.assert_array_equal(one.total, several.total)
+        assert one.failure == several.failure
+        for name in TERMS:
+            np.testing.assert_array_equal(one.terms[name], several.terms[name])
+        assert count < 67 or 0 < sum(reason is not None for reason in one.failure) < count
+
+
+def test_devices_share_a_batch_evenly_and_at_once() -> None:
+    """Each of two waits for the other, and would do so forever if they took turns."""
+    both, asked = Barrier(2, timeout=60), {}
+
+    def simulate_on(sling, episode, thetas, device):
+        asked[device] = len(thetas)
+        both.wait()
+        return simulate(sling, episode, thetas, "cpu")
+
+    found = evaluator(devices=("cpu", "cpu:1"), simulate=simulate_on)(np.full((11, 2), 0.5))
+    assert asked == {"cpu": 6, "cpu:1": 5} and np.isfinite(found.total).all()
+
+
+def test_what_a_device_raises_is_raised() -> None:
+    def broken(sling, episode, thetas, device):
+        raise UserError(f"{device}: out of memory")
+
+    with pytest.raises(UserError, match="out of memory"):
+        evaluator(devices=["cpu", "cpu"], simulate=broken)(np.full((3, 2), 0.5))
+
+
+def test_nor_does_either_where_a_law_adds_its_own_axes() -> None:
+    """Those of the law rubber, each of which changes the loss."""
+    sling, recorded = recorded_yardstick(PARAMS)
+    sling = replace(sling, law="rubber")
+    space = Space.of_method(PARAMS, "least_squares")
+    unit = np.random.default_rng(1).random((20, space.dimension))  # more than a slice
+    unit[1:3] = unit[0]
+    unit[1, space.names.index("mooney_share")] += 0.1
+    unit[2, space.names.index("relaxation")] += 0.1
+    unit[:3] %= 1
+    found = []
+    loss = EpisodeLoss.of(PARAMS, "least_squares", recorded, sling)
+    for workers, devices in ((1, ["cpu"]), (2, ["cpu"]), (1, ["cpu", "cpu"])):
+        evaluate = Evaluator(recorded, sling, loss, space, workers=workers, devices=devices)
+        found.append(evaluate(unit))
+    assert found[0].failure == found[1].failure == found[2].failure
+    assert np.isfinite(found[0].total[:3]).all() and len(set(found[0].total[:3])) == 3
+    for name in TERMS:
+        for other in found[1:]:
+            np.testing.assert_array_equal(found[0].terms[name], other.terms[name])
+
+
+def test_failures_are_infinite_and_have_a_reason() -> None:
+    found = evaluator(2)(np.array([[0.9, 0.5], [0.5, 0.999], [0.5, 0.5]]))
+    assert found.failure == ["too far", "the loss is not finite", None]
+    np.testing.assert_array_equal(np.isinf(found.total), [True, True, False])
+    assert np.isnan(found.terms["geom"][:2]).all()

@@ -1,0 +1,104 @@
+"""Adam by forward differences: closed gradients, torch's own steps, walls of failures."""
+
+import numpy as np
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipeline.identify.optimizers.adam.adam import Adam
+from tests.identify.search.functions import CENTRE, Evaluate, alone, changed, correlated, quadratic
+
+D = 5
+MATRIX = correlated()
+
+
+value = quadratic(CENTRE, MATRIX).function
+
+
+def begun(population: int = 6, **settings) -> Adam:
+    """An optimiser that was told of its first batch."""
+    optimizer = Adam(D, rollouts=600, seed=1, population=population, **settings)
+    optimizer.tell(value(optimizer.ask()))
+    return optimizer
+
+
+@settings(deadline=None, max_examples=30)
+@given(place=st.lists(st.floats(0, 1), min_size=D, max_size=D), step=st.floats(1e-4, 0.02))
+def test_its_gradient_is_the_functions(place: list[float], step: float) -> None:
+    """To the error of a forward difference, step times half the curvature, at the faces too."""
+    optimizer = begun(step=step)
+    optimizer._x[0].data.copy_(torch.tensor(place, dtype=torch.float64))
+    asked = optimizer.ask()
+    assert asked.min() >= 0
+    assert asked.max() <= 1
+    np.testing.assert_array_equal(asked[0], place)
+    np.testing.assert_allclose(np.abs(asked[1:] - asked[0]), step * np.eye(D), atol=1e-12)
+    optimizer._steepest = optimizer._worst = np.inf
+    optimizer.tell(value(asked))
+    exact = 2 * MATRIX @ (np.array(place) - CENTRE)
+    found = optimizer._x[0].grad
+    bound = step * np.diag(MATRIX) * (1 + 1e-6) + 1e-9
+    assert (np.abs(found.numpy() - exact) <= bound).all()
+
+
+def test_its_steps_are_torchs() -> None:
+    """On a linear loss, whose differences are exact, with the rate that falls along a cosine."""
+    slope = np.array([3.0, -1.0, 0.5, 2.0, -0.1])
+    optimizer = Adam(D, rollouts=6 + 6 * 20, seed=1, population=6, rate=0.02)
+    first = optimizer.ask()
+    optimizer.tell(first @ slope)
+    x = torch.tensor(first[np.argmin(first @ slope)], requires_grad=True)
+    adam = torch.optim.Adam([x], lr=0.02)
+    for number in range(20):
+        asked = optimizer.ask()
+        np.testing.assert_allclose(asked[0], x.detach().numpy(), atol=1e-9)
+        optimizer.tell(asked @ slope)
+        adam.param_groups[0]["lr"] = 0.02 * (1 + np.cos(np.pi * (number + 1) / 20)) / 2
+        x.grad = torch.from_numpy(slope)
+        adam.step()
+        x.data.clamp_(0, 1)
+
+
+def test_it_starts_from_the_best_of_the_latin_hypercube() -> None:
+    optimizer = Adam(D, rollouts=600, seed=1, population=20)
+    first = optimizer.ask()
+    optimizer.tell(value(first))
+    assert optimizer.ask().shape == (3 * (D + 1), D)  # as many starts as a batch has room for
+    best = first[np.argsort(value(first))[:3]]
+    np.testing.assert_array_equal(optimizer.ask()[:: D + 1], best)
+    np.testing.assert_array_equal(optimizer.owner, np.repeat(range(3), D + 1))
+
+
+def test_it_finds_a_minimum_beside_a_wall_of_failures() -> None:
+    """The minimum lies 0.002 from the wall: less than a difference."""
+    evaluate = quadratic(CENTRE, MATRIX, fails=lambda unit: unit[:, 3] > CENTRE[3] + 0.002)
+    for seed in (1, 2, 3):
+        history = alone("adam", evaluate, 600, changed(seed=seed, population=20))
+        assert np.isinf(history.total[20:]).any() and np.isfinite(history.unit).all()
+        assert history.total.min() - 1 < 0.1
+        assert history.total[:20].min() - 1 > 0.3
+
+
+def test_a_start_that_fails_goes_back() -> None:
+    """To its best point; the next step is shorter."""
+    optimizer = begun()
+    good = optimizer.ask()[0].copy()
+    optimizer.tell(value(optimizer.ask()))
+    first = np.abs(optimizer.ask()[0] - good).max()
+    optimizer.tell(np.full(D + 1, 1e6))
+    np.testing.assert_array_equal(optimizer.ask()[0], good)
+    optimizer.tell(value(optimizer.ask()))
+    assert 0 < np.abs(optimizer.ask()[0] - good).max() < 0.6 * first
+
+
+def test_a_corner_is_reached() -> None:
+    """The minimum outside the cube: clamped at its faces, no difference leaves it."""
+    history = alone("adam", quadratic(np.full(D, 1.2), np.eye(D)), 600, changed(population=6))
+    np.testing.assert_allclose(history.unit[np.argmin(history.total)], 1, atol=0.01)
+    assert history.unit.max() <= 1
+
+
+def test_the_budget_is_spent_and_losses_alike_move_nothing() -> None:
+    history = alone("adam", Evaluate(lambda unit: np.ones(len(unit))), 100, changed(population=20))
+    assert len(history.total) == 100
+    assert len(np.unique(history.unit[20:], axis=0)) == 3 * (D + 1)

@@ -1,0 +1,114 @@
+"""Differential evolution behind ask and tell is SciPy's, and leaves no thread behind."""
+
+import gc
+import threading
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import differential_evolution
+
+from pipeline.identify.optimizers.de.evolution import Evolution
+from pipeline.identify.search.history import History
+from pipeline.identify.search.loop import latin_hypercube, search
+from tests.identify.search.functions import NAMES, rosenbrock
+
+
+def threads() -> list[threading.Thread]:
+    return [one for one in threading.enumerate() if one.name == "differential evolution"]
+
+
+def left() -> list[threading.Thread]:
+    """Threads that do not end by themselves within a second."""
+    gc.collect()
+    end = time.monotonic() + 1
+    while threads() and time.monotonic() < end:
+        time.sleep(0.01)
+    return threads()
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    dimension=st.integers(1, 6),
+    population=st.integers(5, 30),
+    generations=st.integers(0, 12),
+    seed=st.integers(0, 1000),
+    recombination=st.floats(0, 1),
+)
+def test_its_points_are_those_of_scipy(
+    dimension: int, population: int, generations: int, seed: int, recombination: float
+) -> None:
+    """To the last bit, from the same first population and generator."""
+    expected = []
+
+    def objective(unit: np.ndarray) -> np.ndarray:
+        expected.append(unit.T.copy())
+        return ((unit.T - 0.3) ** 2).sum(axis=1)
+
+    shared = {"mutation": (0.4, 0.9), "recombination": recombination}
+    differential_evolution(
+        objective,
+        [(0, 1)] * dimension,
+        strategy="best1bin",
+        init=latin_hypercube(dimension, population, seed),
+        rng=np.random.default_rng([seed, 1]),
+        maxiter=generations,
+        vectorized=True,
+        updating="deferred",
+        polish=False,
+        tol=0,
+        atol=-1,
+        **shared,
+    )
+    rollouts = population * (generations + 1)
+    one = Evolution(dimension, rollouts=rollouts, seed=seed, population=population, **shared)
+    for unit in expected:
+        asked = one.ask()
+        np.testing.assert_array_equal(asked, unit)
+        one.tell(((asked - 0.3) ** 2).sum(axis=1))
+
+
+def test_its_first_generation_has_one_agent_in_each_stratum() -> None:
+    asked = Evolution(5, rollouts=48, seed=4, population=24).ask()
+    strata = np.sort(np.floor(asked * 24).astype(int), axis=0)
+    np.testing.assert_array_equal(strata, np.tile(np.arange(24)[:, None], 5))
+
+
+def small(population: int = 5, **more) -> Evolution:
+    return Evolution(2, rollouts=15, seed=1, population=population, **more)
+
+
+def test_no_thread_is_left() -> None:
+    """Dropped before it was asked, in the middle, and after its budget."""
+    for told in (0, 1, 3):
+        one = small()
+        for _ in range(told):
+            one.tell(rosenbrock(one.ask()))
+        assert threads()
+        del one
+        assert not left()
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
+def test_a_failing_evaluation_surfaces_and_leaves_no_thread(error: type[BaseException]) -> None:
+    def broken(unit: np.ndarray):
+        raise error
+
+    with pytest.raises(error):
+        search(small(), broken, History("toy", NAMES[:2]), rollouts=15)
+    assert not left()
+
+
+def test_what_scipy_raises_surfaces() -> None:
+    with pytest.raises(ValueError, match="mutation"):
+        small(mutation=(0.5, 7.0))
+    with pytest.raises(ValueError, match="population supplied"):
+        small(population=3).ask()
+    one = small()
+    for _ in range(4):
+        one.tell(rosenbrock(one.ask()))
+    with pytest.raises(RuntimeError, match="beyond its budget"):
+        one.ask()
+    assert not left()

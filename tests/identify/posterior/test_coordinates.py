@@ -1,0 +1,91 @@
+"""Coordinates: there and back, the loss factor's formula, bounds, steps and priors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.identify.posterior.coordinates import MOST_DRAG, MOST_LOST, Coordinates
+from pipeline.identify.results.theta import EXTRA, at_points
+from pipeline.params.identification import LAWS, UNSEEN
+from pipeline.simulator.material import THETA
+from tests.identify.objective.pulls import PARAMS, sling_of
+
+METHOD = "least_squares"
+SLING = replace(sling_of(0.03), law="rubber")
+OURS = Coordinates.of_method(PARAMS, METHOD, SLING)
+NAMES = (*THETA, *LAWS["rubber"], *EXTRA)
+
+
+def within(part: np.ndarray) -> np.ndarray:
+    return OURS.low + part * (OURS.high - OURS.low)
+
+
+UNIT = st.lists(st.floats(0.0, 1.0), min_size=len(OURS.names), max_size=len(OURS.names))
+
+
+@given(UNIT)
+def test_there_and_back(part):
+    """What a θ file's θ holds comes back; the rest is as expected."""
+    phi = within(np.array(part))
+    point = OURS.points(phi[None])[0]
+    back = OURS.of(point[: -len(EXTRA)])
+    own = len(OURS.names) - len(EXTRA)
+    np.testing.assert_allclose(back[:own], phi[:own], atol=1e-9)
+    np.testing.assert_array_equal(back[own:], OURS.expected[own:])
+
+
+def test_the_loss_factor_is_what_a_wave_loses_along_the_band():
+    """s d c/L with c^2 = E A L/m, and each column is what at_points takes it for."""
+    phi = within(np.linspace(0.2, 0.8, len(OURS.names)))
+    values = dict(zip(NAMES, OURS.points(phi[None])[0], strict=True))
+    named = dict(zip(OURS.names, phi, strict=True))
+    young = values["youngs_modulus"]
+    speed = np.sqrt(young * SLING.area * SLING.rest_length / SLING.mass)
+    product = values["elasticity_damping"] * values["damping_scale"]
+    assert np.log(young) == pytest.approx(named["log_youngs_modulus"])
+    assert np.log(product * speed / SLING.rest_length) == pytest.approx(named["log_loss_factor"])
+    assert np.log(values["returned_share"]) == pytest.approx(named["log_returned_share"])
+    same = "mooney_share", "relaxation", "air_drag", "turn_damping"
+    assert [values[name] for name in same] == [named[name] for name in same]
+    assert {name: values[name] for name in UNSEEN} == PARAMS.methods[METHOD].fixed
+    moved, theta = at_points(SLING, OURS.points(phi[None]))
+    assert theta[0].tolist() == [values[name] for name in THETA]
+    assert moved.air_drag == named["air_drag"] and moved.turn_damping == named["turn_damping"]
+
+
+def test_bounds_are_the_boxs_the_methods_and_what_is_possible():
+    """The loss factor's are those of damping's box at E's two ends."""
+    ends = dict(zip(OURS.names, zip(OURS.low, OURS.high, strict=True), strict=True))
+    bounds = PARAMS.methods[METHOD].bounds
+    assert ends["mooney_share"] == bounds["mooney_share"]
+    assert ends["relaxation"] == bounds["relaxation"]
+    assert ends["air_drag"] == (0.0, MOST_DRAG) and ends["turn_damping"] == (0.0, 1.0)
+    assert ends["log_returned_share"] == (-MOST_LOST, MOST_LOST)
+    box = PARAMS.parameters
+    for corner, side in ((OURS.low, "low"), (OURS.high, "high")):
+        values = dict(zip(NAMES, OURS.points(corner[None])[0], strict=True))
+        for name in ("youngs_modulus", "elasticity_damping"):
+            assert values[name] == pytest.approx(getattr(getattr(box, name), side))
+
+
+def test_a_start_outside_comes_to_the_bounds():
+    theta = np.array([1e9, 0.47, 1.0, 0.7, 0.6, -5.0, 1.0])
+    phi = OURS.of(theta)
+    assert np.all(phi >= OURS.low) and np.all(phi <= OURS.high)
+    assert phi[0] == OURS.high[0] and phi[2] == OURS.low[2]
+
+
+def test_narrower_bounds_and_other_fixed_values_of_the_method_count():
+    about = PARAMS.methods[METHOD]
+    fixed = about.fixed | {"damping_scale": 0.3}
+    bounds = about.bounds | {"youngs_modulus": (2e5, 4e5)}
+    mine = about.model_copy(update={"fixed": fixed, "bounds": bounds})
+    params = PARAMS.model_copy(update={"methods": PARAMS.methods | {METHOD: mine}})
+    other = Coordinates.of_method(params, METHOD, SLING)
+    assert (other.low[0], other.high[0]) == pytest.approx(tuple(np.log([2e5, 4e5])))
+    phi = other.expected.copy()
+    twice = other.points(phi[None])[0, 2] / OURS.points(phi[None])[0, 2]
+    assert twice == pytest.approx(2.0)  # of the same product

@@ -1,0 +1,157 @@
+"""What a recording leaves open, eliminated: NumPy's least squares over all unknowns at once."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.identify.posterior.likelihood import Likelihood, Tolerances, opening_time
+
+PHI, INNER, FORCES, BINS = 4, 3, 15, 12
+FRAME = np.repeat([7, 8, 9], 4)
+NAMES = [f"{name}_{axis}" for axis in "xyz" for name in ("force_bias", "force_drift")]
+NAMES += [f"{name}_{axis}" for axis in "xyz" for name in ("cloud_shift", "cloud_turn")]
+
+
+class Case:
+    """Random residuals, their slopes and columns; two of the three pictures are of the recoil."""
+
+    def __init__(self, **tolerances) -> None:
+        rng = np.random.default_rng(3)
+        size = 3 * FORCES + 2 * BINS
+        self.tolerances = Tolerances(**tolerances)
+        self.columns = {name: rng.normal(0, 1, size) for name in NAMES}
+        self.residuals = SimpleNamespace(
+            frame=FRAME,
+            recoils=FRAME > 7,
+            columns=lambda: self.columns,
+            of_frame=lambda number: np.concatenate(
+                [np.zeros(3 * FORCES, bool), FRAME == number, FRAME == number]
+            ),
+            spread=self.spread,
+        )
+        self.gap = rng.normal(0, 0.1, size)
+        self.slopes = rng.normal(0, 1, (PHI, size))
+        self.own = rng.normal(0, 50, (INNER, size))
+        self.nuisances = np.array([1e-4, -3e-4, 4e-6])
+
+    def spread(self, force, cloud, way) -> np.ndarray:
+        return np.concatenate([np.full(3 * FORCES, force), np.full(2 * BINS, np.hypot(cloud, way))])
+
+    def expanded(self):
+        recording = object.__new__(Likelihood)
+        recording.tolerances = self.tolerances
+        return recording._eliminated(
+            self.residuals, self.gap, self.slopes, self.own, self.nuisances
+        )
+
+    def full(self) -> tuple[np.ndarray, np.ndarray]:
+        """Design (rows, D + 3 + M) and aim (rows,) of all unknowns, priors as rows."""
+        has = self.tolerances
+        sizes = {
+            "force_bias": has.bias,
+            "force_drift": has.drift,
+            "cloud_shift": has.shift,
+            "cloud_turn": has.turn,
+        }
+        linear = [sizes[name[:-2]] * column for name, column in self.columns.items()]
+        linear += [
+            has.jitter * np.where(self.residuals.of_frame(frame), self.own[1], 0)
+            for frame in (8, 9)
+        ]
+        sigma = self.spread(has.force, has.cloud, has.way)
+        rows = np.concatenate([self.slopes, self.own, linear]).T / sigma[:, None]
+        count = len(linear)
+        inner = np.zeros((INNER, rows.shape[1]))
+        inner[:, PHI : PHI + INNER] = np.diag(1 / has.simulated)
+        priors = np.vstack([inner, np.eye(rows.shape[1])[-count:]])
+        aim = [-self.gap / sigma, -self.nuisances / has.simulated, np.zeros(count)]
+        return np.vstack([rows, priors]), np.concatenate(aim)
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return Case()
+
+
+def test_the_quadratic_is_the_minimum_over_the_nuisances(case):
+    found, (rows, aim) = case.expanded(), case.full()
+
+    def least(d: np.ndarray) -> float:
+        left = aim - rows[:, :PHI] @ d
+        inner = np.linalg.lstsq(rows[:, PHI:], left, rcond=None)[0]
+        return float(np.sum((left - rows[:, PHI:] @ inner) ** 2))
+
+    base = least(np.zeros(PHI))
+    for d in np.random.default_rng(1).normal(0, 0.3, (5, PHI)):
+        quadratic = -2 * found.gradient @ d + d @ found.hessian @ d
+        assert quadratic == pytest.approx(least(d) - base, rel=1e-6)
+
+
+def test_the_covariance_is_the_block_of_the_full_inverse(case):
+    found, (rows, _) = case.expanded(), case.full()
+    block = np.linalg.inv(rows.T @ rows)[:PHI, :PHI]
+    np.testing.assert_allclose(np.linalg.inv(found.hessian), block, rtol=1e-6)
+    given = np.linalg.inv(rows[:, PHI:].T @ rows[:, PHI:])
+    np.testing.assert_allclose(found.spread, np.sqrt(np.diag(given)[:INNER]), rtol=1e-6)
+
+
+def test_the_best_nuisances_follow_the_coordinates(case):
+    found, (rows, aim) = case.expanded(), case.full()
+    d = np.array([0.1, -0.2, 0.3, 0.05])
+    best = np.linalg.lstsq(rows[:, PHI:], aim - rows[:, :PHI] @ d, rcond=None)[0][:INNER]
+    np.testing.assert_allclose(found.nuisances[0] + found.nuisances[1] @ d, best, rtol=1e-6)
+
+
+def test_the_misfit_has_the_linear_ones_at_their_best_and_the_simulated_as_they_are(case):
+    found, (rows, aim) = case.expanded(), case.full()
+    linear = rows[:, PHI + INNER :]
+    left = aim - linear @ np.linalg.lstsq(linear, aim, rcond=None)[0]
+    assert found.misfit == pytest.approx(left @ left, rel=1e-9)
+    has, size = case.tolerances, len(case.gap)
+    sigma = case.spread(has.force, has.cloud, has.way)
+    np.testing.assert_allclose(found.left, left[:size] * sigma, rtol=1e-6, atol=1e-12)
+
+
+NAMED = "force cloud way release camera hand jitter shift turn bias drift".split()
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_each_tolerance_widens_what_is_known(case, name):
+    wide = Case(**{name: 3 * getattr(case.tolerances, name)}).expanded()
+    known = np.linalg.eigvalsh(case.expanded().hessian - wide.hessian)
+    size = np.abs(case.expanded().hessian).max()
+    assert known.max() > 1e-9 * size and known.min() > -1e-9 * size
+
+
+def test_tolerances_are_the_episodes_own_or_as_usual():
+    usual = Tolerances()
+    delays = {"camera": {"error": 3e-4}, "pose": {"error": 4e-4}}
+    about = {"preprocessing": {"release_error": 5e-4, "delays": delays}}
+    told = Tolerances.of(SimpleNamespace(metadata=about))
+    assert told.release == 5e-4 and told.camera == pytest.approx(5e-4)
+    assert told.simulated == pytest.approx([5e-4, 5e-4, usual.hand])
+    for empty in ({}, {"preprocessing": {"delays": None}}, {"preprocessing": {"delays": {}}}):
+        assert Tolerances.of(SimpleNamespace(metadata=empty)) == usual
+
+
+def held(fall: float | None, force: float = 20.0) -> SimpleNamespace:
+    """A hand that holds a force until 1 s, when it falls within `fall`."""
+    time = np.arange(0, 1.3, 0.03)
+    pull = np.where(time < 1, force, 0.0)
+    about = {} if fall is None else {"preprocessing": {"release_fall": fall}}
+    course = np.stack([0 * pull, 0.6 * pull, 0.8 * pull], axis=1)
+    return SimpleNamespace(time=time, force=course, release_time=1.0, metadata=about)
+
+
+def test_pads_that_open_linearly_let_the_force_fall_as_recorded():
+    """Slip begins when 2 mu N (1 - t/T) is the held force; what then falls takes until T."""
+    sling, friction = SimpleNamespace(grip_force=50.0, finger_opening_time=0.004), 0.7
+    opening, step = 0.006, 1e-7
+    time = np.arange(0, opening, step)
+    most = 2 * friction * sling.grip_force * (1 - time / opening)
+    fall = step * np.count_nonzero(most < 20.0)
+    assert opening_time(held(fall), sling, friction) == pytest.approx(opening, rel=1e-3)
+    assert opening_time(held(None), sling, friction) == 0.004
+    assert opening_time(held(1e-6), sling, friction) == 5e-4
+    assert opening_time(held(1.0), sling, friction) == 0.05

@@ -1,0 +1,166 @@
+"""The fit finds SciPy's bounded minimum on curves that need no simulator."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.identify.posterior import fit as module
+from pipeline.identify.posterior.fit import BINNED, NoFit, fit
+from pipeline.identify.posterior.identify import disagreement, without
+from tests.identify.posterior.toy import SIZE, Curve, curve, least, space
+
+TRUE = np.array([8.0, 9.0, 3.0]) * SIZE
+START = np.array([7.0, 7.0, 4.0]) * SIZE
+
+
+def curves(count: int, noise: float = 0.1, seed: int = 0, **about) -> list[Curve]:
+    rng = np.random.default_rng(seed)
+    return [Curve(curve(TRUE) + rng.normal(0, noise, 40), **about) for _ in range(count)]
+
+
+def away(found, phi: np.ndarray) -> float:
+    """In standard deviations given the other coordinates."""
+    return np.abs((found.phi - phi) * np.sqrt(np.diag(found.hessian))).max()
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_it_finds_scipys_minimum(count):
+    seen, box = curves(count), space()
+    found = fit(seen, box, START)
+    best = least(seen, box, START)
+    assert found.settled and away(found, best) < 0.05
+    assert len(found.expansions) == count and found.nuisances.shape == (count, 3)
+    np.testing.assert_allclose(found.hessian, sum(one.hessian for one in found.expansions))
+
+
+def test_a_bound_holds_the_mode_and_the_others_give_way(monkeypatch):
+    """A minimum beyond zero: at zero, and the rest where SciPy's bounded minimum has it."""
+    monkeypatch.setattr(module, "STILL", 0.05)
+    seen = [Curve(curve(np.array([8.0, 9.0, -0.5]) * SIZE))]
+    box = space()
+    found = fit(seen, box, START)
+    assert found.settled and found.phi[2] == 0.0 and found.gradient[2] < 0
+    assert away(found, least(seen, box, START)) < 0.05
+    assert all(np.all(phi >= 0) for phi in seen[0].asked)
+
+
+def test_a_prior_pulls_as_far_as_scipy_says():
+    seen, box = curves(1, sigma=1.0), space(expected=np.array([8.0, 15.0, 3.0]), spread=0.5)
+    found, free = fit(seen, box, START), fit(seen, space(), START)
+    assert away(found, least(seen, box, START)) < 0.05
+    assert found.phi[1] > free.phi[1] + 2 * SIZE[1]
+    gap = found.phi - box.expected
+    assert found.misfit == pytest.approx(
+        found.expansions[0].misfit + np.sum(gap**2 * box.precision)
+    )
+
+
+def test_launches_count_as_a_recording_does():
+    first, second = curves(2)
+    about = SimpleNamespace(
+        expand=lambda points, phi, steps: (
+            (one := second.expand(points, phi, steps, None, None)).misfit,
+            one.hessian,
+            one.gradient,
+        )
+    )
+    found = fit([first], space(), START, launches=about)
+    assert away(found, least([first, second], space(), START)) < 0.05
+
+
+def test_a_step_into_failure_is_taken_shorter():
+    """From START the first step goes where the simulation fails; the minimum does not."""
+    free = curves(1)
+    fit(free, space(), START)
+    first = free[0].asked[1]
+    seen = curves(1, fails=lambda phi: np.allclose(phi, first, atol=0.2 * SIZE))
+    found = fit(seen, space(), START)
+    assert away(found, least(seen, space(), START)) < 0.05
+    assert np.allclose(seen[0].asked[1], first) and len(seen[0].asked) > len(free[0].asked) - 1
+
+
+def test_a_start_that_fails_says_so():
+    with pytest.raises(NoFit, match="toy: the simulation at the start of the fit fails: it broke"):
+        fit(curves(1, fails=lambda phi: True), space(), START)
+
+
+def test_it_settles_only_where_the_steps_end(monkeypatch):
+    assert fit(curves(1), space(), START).settled
+    monkeypatch.setattr(module, "ITERATIONS", 2)
+    cut = fit(curves(1), space(), START)
+    assert not cut.settled and cut.steps == 2
+
+
+def test_it_is_not_settled_where_it_is_stuck():
+    """Everything but its start fails: its damped steps get short, and the minimum stays away."""
+    stuck = fit(curves(1, fails=lambda phi: not np.allclose(phi, START)), space(), START)
+    assert not stuck.settled and stuck.steps < module.ITERATIONS
+    np.testing.assert_array_equal(stuck.phi, START)
+
+
+def test_bins_are_kept_after_the_first_iterations(monkeypatch):
+    """Or the density would change its form with each step."""
+    monkeypatch.setattr(module, "STILL", 0.0)
+    seen = curves(1)
+    fit(seen, space(), START)
+    assert seen[0].kept[:BINNED] == [None] * BINNED and BINNED in seen[0].kept[BINNED:]
+    assert None not in seen[0].kept[BINNED:]
+
+
+def test_no_step_is_longer_than_said(monkeypatch):
+    monkeypatch.setattr(module, "LONGEST", 1.0)
+    seen = curves(1)
+    fit(seen, space(), START)
+    moved = np.abs(np.diff(seen[0].asked[: BINNED + 1], axis=0)) / SIZE
+    assert moved.max() == pytest.approx(1.0)
+
+
+def test_progress_tells_of_each_nearer_expansion():
+    told = []
+    found = fit(curves(1), space(), START, progress=told.append)
+    assert told[-1].misfit == found.misfit and told[0].misfit > 10 * found.misfit
+
+
+def test_finite_differences_stay_within_the_upper_bounds():
+    box = space(high=(8.0, 50.0, 50.0))
+    steps = module._steps(box, box.high)
+    assert np.all(steps == -SIZE) and np.all(module._steps(box, box.low) == SIZE)
+
+
+def test_without_a_recording_is_a_fit_without_it():
+    """To first order: recordings that differ by as much as their noise."""
+    seen, box = curves(3), space()
+    found, refit = fit(seen, box, START), fit(seen[1:], box, START)
+    spread = np.sqrt(np.diag(np.linalg.inv(refit.hessian)))
+    told = without(SimpleNamespace(fit=found, coordinates=box), 0)
+    moved = np.array(list(told["moved"].values()))
+    np.testing.assert_allclose(moved, (refit.phi - found.phi) / spread, atol=0.1)
+    there = seen[0].expand(None, refit.phi, None, None, None).misfit
+    assert told["misfit"] == pytest.approx(there - found.expansions[0].misfit, abs=0.3)
+
+
+def test_disagreement_is_one_of_alike_recordings_and_grows_with_a_shift():
+    alike = [Curve(curve(TRUE)) for _ in range(3)]
+    assert disagreement(fit(alike, space(), START)) == 1.0
+    assert disagreement(fit(alike[:1], space(), START)) == 1.0
+    ratios = []
+    for shift in (0.2, 0.4):
+        other = [*alike[:2], Curve(curve(TRUE + shift * SIZE))]
+        ratios.append(disagreement(fit(other, space(), START)))
+    assert ratios[0] > 1.5 and ratios[1] == pytest.approx(2 * ratios[0], rel=0.1)
+
+
+def test_disagreement_of_mere_noise_is_one_on_average():
+    """Chi squared over its degrees of freedom, whatever the noise's seed."""
+    squares = []
+    for seed in range(200):
+        first = fit(curves(3, seed=seed), space(), TRUE)
+        total = freedom = 0.0
+        for one in first.expansions:
+            inverse = np.linalg.inv(one.hessian)
+            total += one.gradient @ inverse @ one.gradient
+            freedom += 3 * (1 - 1 / 3)
+        squares.append(total / freedom)
+        assert disagreement(first) == pytest.approx(max(np.sqrt(squares[-1]), 1.0), rel=0.25)
+    assert np.mean(squares) == pytest.approx(1.0, abs=0.15)

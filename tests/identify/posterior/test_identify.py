@@ -1,0 +1,161 @@
+"""Episodes of the simulator's own law: what is found, how sure that is, what is written."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.episode.signal import cutoff_hz
+from pipeline.identify.posterior import coordinates, identify
+from pipeline.identify.posterior.coordinates import Coordinates
+from pipeline.identify.posterior.likelihood import Likelihood
+from pipeline.identify.posterior.residuals import Residuals, Rule
+from pipeline.identify.results.theta import at_points, load_theta
+from pipeline.simulator.interaction import interact
+from tests import once
+from tests.identify.objective.own_law import own_law_episode
+from tests.identify.objective.pulls import PARAMS, pulled, sling_of
+
+METHOD, WORKERS, LOSS = "least_squares", 2, "log_loss_factor"
+SLING = replace(sling_of(0.03), law="rubber")
+SPACE = Coordinates.of_method(PARAMS, METHOD, SLING)
+CUTOFF = cutoff_hz(PARAMS.force.cutoff, PARAMS.force.cutoff_unit)
+TRUE = np.array([np.log(3e5), np.log(0.07), 0.3, 0.01, 0.0, 0.4, 0.0])
+START = TRUE + [0.1, -0.3, -0.1, 0.005, 0.0, 0.0, 0.0]
+POINT, FROM = SPACE.points(np.stack([TRUE, START]))
+NOISE = 0.05, 0.0006  # N, m
+
+
+def recorded(phase: float, seed: int, noise=(0.0, 0.0)):
+    """Hang, grasp at 0.6 s, lift by 1.2 s, pull to 0.4 m by 3 s, release at 3.8 s."""
+    empty = pulled(160, 130, 0.6, (0.6, 1.2), (1.2, 3.0), 3.8, first_frame=phase)
+    world, theta = at_points(SLING, POINT[None])
+    force, depth = noise
+    about = {"force_noise": force, "depth_noise": depth, "seed": seed}
+    return own_law_episode(world, empty, theta[0], cutoff=CUTOFF, **about)
+
+
+def found_of(*episodes, workers: int = WORKERS):
+    return identify.identify(PARAMS, METHOD, SLING, episodes, FROM[:7], workers=workers)
+
+
+@pytest.fixture(scope="module")
+def exact(tmp_path_factory):
+    return once.value(tmp_path_factory, "exact", lambda _: [recorded(0.0, 1), recorded(0.012, 2)])
+
+
+@pytest.fixture(scope="module")
+def first(exact):
+    return found_of(exact[0])
+
+
+@pytest.fixture(scope="module")
+def both(exact):
+    return found_of(*exact)
+
+
+def told_of(found) -> dict:
+    return identify.confidence(found, PARAMS.parameters)
+
+
+def test_the_truth_is_found_where_no_prior_pulls(exact, monkeypatch):
+    """The drag's and the share's priors expect the truth; the loss factor's does not."""
+    priors = {name: one for name, one in coordinates.PRIORS.items() if name != LOSS}
+    monkeypatch.setattr(coordinates, "PRIORS", priors)
+    found = found_of(*exact)
+    assert found.fit.settled
+    assert found.fit.phi[0] == pytest.approx(TRUE[0], abs=1e-3)
+    assert found.fit.phi[1] == pytest.approx(TRUE[1], abs=0.05)
+
+
+def test_the_loss_factors_prior_pulls_towards_it_and_no_farther(first):
+    mean = coordinates.PRIORS[LOSS][0]
+    assert mean < first.fit.phi[1] < TRUE[1]
+    assert first.fit.phi[0] == pytest.approx(TRUE[0], abs=5e-3)
+
+
+def test_intervals_hold_the_truth_and_two_recordings_narrow_them(first, both):
+    one, two = (told_of(found)["parameters"] for found in (first, both))
+    for name, value in zip(first.names[:7], POINT, strict=False):
+        for about in (one[name], two[name]):
+            assert about["low"] <= value * (1 + 1e-9) and value * (1 - 1e-9) <= about["high"]
+    widths = [about["youngs_modulus"] for about in (one, two)]
+    widths = [about["high"] - about["low"] for about in widths]
+    assert widths[1] < 0.85 * widths[0]
+
+
+def test_alike_recordings_agree(both):
+    told = told_of(both)
+    assert told["disagreement"] == both.birge == 1.0
+    assert len(told["recordings"]) == 2 and "without_it" in told["recordings"][0]
+
+
+def test_what_is_written_is_a_theta_file(first, tmp_path):
+    path = tmp_path / "least_squares.json"
+    content = identify.theta_content(first, "known", METHOD)
+    content["confidence"] = told_of(first)
+    content |= {"loss": dict.fromkeys(("geom", "force", "work", "total"), 1.0), "rollouts": 1}
+    path.write_text(json.dumps(content, allow_nan=False))
+    read = load_theta(path, "known")
+    assert read["theta"] == content["theta"] and read["history"] == content["history"]
+    assert first.names == [*content["theta"], "air_drag", "turn_damping", "returned_share"]
+    assert first.points.shape == (identify.SAMPLES, len(first.names))
+
+
+def test_workers_change_no_byte(exact, first):
+    again = found_of(exact[0], workers=1)
+    np.testing.assert_array_equal(again.points, first.points)
+    assert json.dumps(told_of(again)) == json.dumps(told_of(first))
+
+
+def test_residuals_at_the_truth_are_of_the_size_of_the_noise():
+    """Of the force what its low-pass leaves of white noise, and of a bin far below a point's."""
+    episode = recorded(0.012, 5, NOISE)
+    recording = Likelihood(episode, SLING, CUTOFF, 0.7)
+    rollouts = recording.simulate(POINT[None], np.zeros(3))
+    residuals = Residuals(episode, SLING, CUTOFF, rollouts.center_line[0])
+    gap, count = residuals(rollouts)[0], 3 * len(residuals.samples)
+    assert 0.1 * NOISE[0] < gap[:count].std() < 0.5 * NOISE[0]
+    assert 1e-5 < gap[count:].std() < NOISE[1]
+
+
+def test_bias_and_shift_move_the_residuals_by_their_columns(exact):
+    episode = exact[0]
+    world, theta = at_points(SLING, POINT[None])
+    rollouts = interact(world, episode, theta)
+    base = Residuals(episode, SLING, CUTOFF, rollouts.center_line[0])
+    columns, bias, shift = base.columns(), np.array([0.02, -0.05, 0.1]), [3e-4, -2e-4, 4e-4]
+    moved = replace(
+        episode,
+        force=episode.force + bias,
+        clouds=[(cloud + np.array(shift)).astype(np.float32) for cloud in episode.clouds],
+    )
+    count = 3 * len(base.samples)
+    force = Residuals(moved, SLING, CUTOFF, rollouts.center_line[0])(rollouts)[0]
+    expected = np.tensordot(bias, [columns[f"force_bias_{axis}"] for axis in "xyz"], 1)
+    np.testing.assert_allclose((force - base(rollouts)[0])[:count], expected[:count], atol=1e-9)
+    # the same bins seen from their new place: the mean points move, the line does not
+    cloud = base(rollouts)[0][count:]
+    base.point = base.point + shift
+    expected = np.tensordot(shift, [columns[f"cloud_shift_{axis}"] for axis in "xyz"], 1)
+    change = base(rollouts)[0][count:] - cloud
+    np.testing.assert_allclose(change, expected[count:], atol=3e-5)
+
+
+def test_pictures_count_by_time_and_by_the_measured_cloud(exact):
+    """Held in the last half second, of the recoil to 50 ms; where none is, the first one after."""
+    episode = exact[0]
+    since = episode.cloud_time - episode.release_time
+    count = since[Rule().frames(episode)]
+    held = count[count < 0]
+    assert len(held) == np.count_nonzero((since > -0.5) & (since < -0.02))
+    assert 1 <= np.count_nonzero(count > 0) and count.max() <= 0.05
+    later = Rule(recoil=1e-6).frames(episode)
+    assert np.count_nonzero(since[later] > 0) == 1 and since[later].max() == since[since > 0].min()
+    home = [np.where(t > 0, 0 * c, c) for t, c in zip(since, episode.clouds, strict=True)]
+    came_back = since[Rule().frames(replace(episode, clouds=home))]
+    assert np.count_nonzero(came_back > 0) == 1
+    short = Rule(held=(-0.2, -0.02), force_until=-0.3)
+    assert len(short.frames(episode)) < len(count)
+    assert len(short.samples(episode)) < len(Rule().samples(episode))

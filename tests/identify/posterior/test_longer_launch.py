@@ -1,0 +1,56 @@
+"""A launch that flew further than simulated, in the simulator itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.identify.posterior.coordinates import Coordinates
+from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
+from pipeline.identify.results.mounting import load_sling
+from pipeline.identify.results.theta import at_points
+from pipeline.simulator.launch import launch
+from pipeline.simulator.model import LaunchHistory
+from tests.project import ROUGH, with_
+
+THETA = np.array([5e5, 0.47, 5e-3, 0.7, 0.6, 0.0, 0.02])  # and Mooney's share, relaxation
+DRAW, FURTHER = (-0.30, -0.17), 1.04
+
+
+@pytest.fixture(scope="module")
+def told(params):
+    """Coordinates, where they stand, and what was known and is with launches from DRAW."""
+    rough = with_(params, "sling", **ROUGH)
+    sling = replace(
+        load_sling(rough, "band1", "nowhere", "rubber"), history=LaunchHistory(1.0, 0.5)
+    )
+    coordinates = Coordinates.of_method(rough, "least_squares", sling)
+    phi = coordinates.of(THETA)
+    own, theta = at_points(sling, coordinates.points(phi[None]))
+    once = launch(own, theta, np.array([DRAW]))
+    assert once.failure[0] is None
+
+    def by(count: int):
+        observed = [Observed(DRAW, 0.001, FURTHER * float(once.landing_y[0]))] * count
+        _, hessian, gradient = LaunchLikelihood(observed, sling).expand(
+            coordinates.points, phi, coordinates.steps
+        )
+        return known + hessian, gradient
+
+    known = np.diag(coordinates.precision + 1e2)  # as if recordings told each within 0.1
+    return coordinates.names, known, by
+
+
+def test_a_longer_launch_gives_back_more_or_loses_less(told) -> None:
+    names, _, by = told
+    moved = dict(zip(names, np.linalg.solve(*by(1)), strict=True))
+    assert moved["log_returned_share"] > 0
+    assert moved[names[1]] < 0  # the loss factor
+
+
+def test_two_launches_narrow_what_one_leaves_open(told) -> None:
+    names, known, by = told
+    one, two = (np.linalg.inv(by(count)[0]) for count in (1, 2))
+    place = names.index("log_returned_share")
+    assert two[place, place] < one[place, place] < 1 / known[place, place]
+    assert (np.linalg.eigvalsh(one - two) > -1e-9).all()

@@ -1,0 +1,50 @@
+"""Launches in the place of a map: what the simulator says, no more and no less."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from pipeline.launching.surface.landing_map import LandingMap
+from pipeline.launching.surface.response_surface import TOO_MUCH_FORCE
+from pipeline.launching.surface.simulated import SimulatedLandings
+from tests.policy import toy
+
+BOX = {"draw_y": toy.DRAW_Y, "draw_z": toy.DRAW_Z, "size": (9, 7)}
+DRAWS = np.random.default_rng(0).uniform((-0.45, -0.3), (-0.25, -0.1), (200, 2))
+
+
+def source(launch=toy.launch, max_force: float = 15.0) -> SimulatedLandings:
+    return SimulatedLandings(
+        launch, LandingMap.simulate(toy.launch, **BOX, max_force=max_force).surface
+    )
+
+
+def test_it_says_what_the_simulator_does() -> None:
+    truth, found = toy.launch(DRAWS), source()(DRAWS)
+    heavy = truth.hold_force > 15.0
+    assert 20 < heavy.sum() < 180
+    np.testing.assert_array_equal(found.landing_y[~heavy], truth.landing_y[~heavy])
+    np.testing.assert_array_equal(found.hold_force, truth.hold_force)
+    assert np.isnan(found.landing_y[heavy]).all() and (found.failure == heavy).all()
+
+
+def test_failures_keep_their_reasons() -> None:
+    """Those that the map never met, too, and before the force that they would have taken."""
+
+    def falling(draws: np.ndarray) -> SimpleNamespace:
+        launched = toy.launch(draws)
+        launched.failure[:2], launched.failure[-1] = ["it fell"] * 2, "it broke"
+        return launched
+
+    some = source(falling, max_force=1e-3)
+    failure = some(DRAWS).failure
+    names = [some.reasons[code] for code in failure]
+    assert names == ["it fell"] * 2 + [TOO_MUCH_FORCE] * 197 + ["it broke"]
+    assert (some(DRAWS).failure == failure).all()
+
+
+def test_its_fingerprint_is_that_of_the_simulator_and_no_maps() -> None:
+    one = source()
+    assert one.fingerprint() == source().fingerprint() != source(max_force=14.0).fingerprint()
+    chart = LandingMap.simulate(toy.launch, **BOX, max_force=15.0)
+    assert one.fingerprint() != chart.surface.fingerprint()

@@ -1,0 +1,71 @@
+"""Landing intervals of a slingshot in closed form, with a stiffness that is not known exactly."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from pipeline.launching.trials.spread import CROSS, MOST, landing_intervals
+from tests.policy import toy
+
+DRAWS = np.array([[-0.35, -0.2], [-0.3, -0.15]])
+STIFFNESS = 0.02  # relative deviation: landing goes with it
+
+
+def launcher(draws: np.ndarray, thetas: np.ndarray | None = None) -> SimpleNamespace:
+    """The toy, whose landing is scaled by the first parameter."""
+    launched = toy.launch(draws)
+    if thetas is not None:
+        launched.landing_y = launched.landing_y * thetas[:, 0]
+    return launched
+
+
+def samples(count: int = 200) -> np.ndarray:
+    theta = np.full((count, 5), 0.5)
+    theta[:, 0] = 1 + STIFFNESS * np.random.default_rng(1).normal(size=count)
+    return theta
+
+
+def test_nine_landings_of_ten_lie_inside() -> None:
+    """Of launches whose stiffness and draw vary as they are said to."""
+    for error, known in ((1e-3, 0), (0.0, 1), (1e-3, 1)):
+        intervals = landing_intervals(launcher, DRAWS, samples() if known else None, error)
+        rng = np.random.default_rng(2)
+        for draw, (low, high) in zip(DRAWS, intervals, strict=True):
+            landing = toy.launch(draw + rng.normal(0, error, (4000, 2))).landing_y
+            landing = landing * (1 + known * STIFFNESS * rng.normal(size=4000))
+            assert 0.85 < ((landing > low) & (landing < high)).mean() < 0.94
+
+
+def test_an_exact_draw_of_a_known_band_has_no_width() -> None:
+    landing = toy.launch(DRAWS).landing_y
+    none = landing_intervals(launcher, DRAWS, None, 0.0)
+    np.testing.assert_allclose(none, np.stack([landing, landing], axis=1))
+
+
+def test_failures_of_the_few_are_left_out_and_of_the_many_are_none() -> None:
+    def fragile(share: float):
+        def launch(draws, thetas=None):
+            launched = launcher(draws, thetas)
+            if thetas is not None:
+                broken = np.arange(len(draws)) % 20 < 20 * share
+                launched.failure = ["it broke" if one else None for one in broken]
+            return launched
+
+        return launch
+
+    assert np.isfinite(landing_intervals(fragile(0.05), DRAWS, samples(), 0.001)).all()
+    assert np.isnan(landing_intervals(fragile(0.25), DRAWS, samples(), 0.001)).all()
+
+
+def test_an_answer_takes_few_launches() -> None:
+    """However many samples there are: `sling aim` answers in seconds."""
+    launched = []
+
+    def counted(draws, thetas=None):
+        launched.append(len(draws))
+        return launcher(draws, thetas)
+
+    few = landing_intervals(counted, DRAWS[:1], samples(2000), 0.001)
+    assert sum(launched) == len(CROSS) + MOST
+    many = np.quantile(toy.launch(DRAWS[:1]).landing_y * samples(2000)[:, 0], [0.05, 0.95])
+    np.testing.assert_allclose(few[0], many, rtol=0.02)

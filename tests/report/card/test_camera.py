@@ -1,0 +1,109 @@
+"""Where points of frame O are seen: against the truth of a recording, and OpenCV with a lens."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pipeline.base.layout import Layout, NotMade
+from pipeline.recording.input.camera import Camera
+from pipeline.recording.input.frames import Transform
+from pipeline.recording.input.reader import read_recording
+from pipeline.report.card import camera
+from pipeline.report.card.camera import Pictures
+from pipeline.report.card.camera_view import CameraView
+from pipeline.report.card.simulated import Simulated, simulate
+from tests.report.card.conftest import BAND, METHOD, TRUTH
+
+
+@pytest.fixture(scope="module")
+def pictures(told, project) -> Pictures:
+    return Pictures.of(Layout(project).raw(BAND) / "seen.mcap", told.episode, told.params.setup)
+
+
+def band_coloured(image: np.ndarray, places: np.ndarray) -> float:
+    """Share of places (N, 2) at which an image has the band's orange."""
+    whole = np.round(places).astype(int)
+    seen = image[whole[:, 1], whole[:, 0]].astype(int)
+    return float(np.mean(seen[:, 2] - seen[:, 0] > 60))
+
+
+def test_the_recorded_band_is_seen_where_it_is_projected(pictures, told) -> None:
+    drawn = np.flatnonzero((pictures.time > TRUTH.drawn) & (pictures.time < TRUTH.release - 0.02))
+    assert len(drawn) > 3
+    for number in drawn:
+        line = TRUTH.center_line(float(pictures.time[number]))
+        line = line[np.linalg.norm(line - TRUTH.hand(TRUTH.drawn), axis=1) > 0.08]  # of the fingers
+        line = line[np.abs(line[:, 1]) > 0.02]  # of the posts
+        places = pictures.project(line)
+        assert band_coloured(pictures[number], places) > 0.97
+        assert band_coloured(pictures[number], places + [0, 4]) < 0.1
+
+
+def test_a_cut_shows_the_same_larger(pictures, told) -> None:
+    line = TRUTH.center_line(2.9)
+    simulated = Simulated(
+        TRUTH.release, 0.0, np.array([0.0, 4.0]), np.array([line, line]), np.arange(180.0),
+        np.zeros((120, 3)),
+    )  # fmt: skip
+    view = CameraView.of(pictures, simulated, (480, 440))
+    number = pictures.latest(2.9)
+    image = view.picture(number)
+    assert image.shape == (440, 480, 3) and view.scale > 1.2
+    far = line[(np.linalg.norm(line - TRUTH.hand(2.9), axis=1) > 0.08) & (line[:, 1] < -0.02)]
+    assert band_coloured(image, view.places(far)) > 0.97
+    assert band_coloured(image, view.places(far) + [0, 9]) < 0.1
+
+
+def test_a_lens_and_a_pose_are_those_of_opencv() -> None:
+    matrix = np.array([[500.0, 0, 320], [0, 510, 240], [0, 0, 1]])
+    lens = np.array([-0.25, 0.08, 1e-3, -2e-3, 0.01])
+    turn, place = Rotation.from_rotvec([0.3, -0.5, 0.2]), np.array([0.1, -0.2, 1.5])
+    pictures = Pictures(
+        np.arange(3.0), Camera(640, 480, matrix, lens, ""), Transform(turn, place), []
+    )
+    points = np.random.default_rng(1).uniform(-0.4, 0.4, (50, 3))
+    expected, _ = cv2.projectPoints(points, turn.as_rotvec(), place, matrix, lens)
+    np.testing.assert_allclose(pictures.project(points), expected[:, 0], atol=1e-6)
+    behind = turn.inv().apply([[0.0, 0.0, -1.0]] - place)
+    assert np.isnan(pictures.project(behind)).all()
+
+
+def test_the_latest_picture(pictures) -> None:
+    assert pictures.latest(-5.0) == 0
+    for number in (0, 7, len(pictures.time) - 1):
+        assert pictures.latest(pictures.time[number] + 1e-6) == number
+
+
+def test_a_missing_recording_is_named(told, tmp_path) -> None:
+    with pytest.raises(NotMade, match="none.mcap"):
+        Pictures.of(tmp_path / "none.mcap", told.episode, told.params.setup)
+
+
+def test_a_simulated_pull_holds_the_hand_and_its_states_are_smooth(told, card_params) -> None:
+    simulated = simulate(card_params, BAND, METHOD, told.episode, told.theta)
+    assert simulated.release == TRUTH.release
+    middle = simulated.line(TRUTH.release - 0.05)[60]
+    np.testing.assert_allclose(middle, TRUTH.hand(TRUTH.release - 0.05), atol=5e-3)
+    fine = np.abs(simulated.time - TRUTH.release - 0.05) < 0.04
+    assert np.diff(simulated.time[fine]).max() < 1.1e-3
+    between = simulated.line(float(simulated.time[fine][:2].mean()))
+    ends = [simulated.line(float(time)) for time in simulated.time[fine][:2]]
+    np.testing.assert_allclose(between, np.mean(ends, axis=0), atol=3e-4)
+    assert simulated.force.shape == told.episode.force.shape
+    assert simulated.force[(told.episode.time > 2.5) & (told.episode.time < 2.9), 1].min() > 3
+
+
+def test_a_colour_camera_beside_the_depth_camera(told, project, monkeypatch) -> None:
+    """What lies before the depth camera is seen where the colour camera's own frame has it."""
+    path = Layout(project).raw(BAND) / "seen.mcap"
+    real = camera.geometry_of
+    beside = Transform(Rotation.from_rotvec([0.02, -0.05, 0.01]), np.array([0.06, 0.01, -0.02]))
+    monkeypatch.setattr(camera, "geometry_of", lambda *given: replace(real(*given), color=beside))
+    pictures = Pictures.of(path, told.episode, told.params.setup)
+    before = np.array([[0.1, -0.05, 0.9], [-0.2, 0.1, 1.3]])  # the depth camera
+    fork = real(read_recording(path, told.params.setup), told.params.setup).camera.apply(before)
+    expected = pictures.camera.project(beside.apply(before))
+    np.testing.assert_allclose(pictures.project(fork), expected, atol=1e-6)

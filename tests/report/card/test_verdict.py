@@ -1,0 +1,90 @@
+"""The verdict: one thing that is wrong turns it, and is named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.report.card.findings import findings
+from pipeline.report.card.verdict import CARE, NO, TRUSTED, Findings, judge
+from tests.report.card.conftest import trials
+
+GOOD = Findings(
+    settled=True, force=0.05, held=8e-4, recoil=2e-3, recoil_seen=True, disagreement=1.1, odd="",
+    at_sides=(),
+    stretch=1.5, recorded_stretch=1.6, hold_force=9.0, max_force=30.0, failures=(), converged=True,
+    miss=0.004, half_width=0.1, outside=1, scores=15, off=0.03, kind="virtual", left=0.01,
+    observed=0,
+)  # fmt: skip
+CASES = [
+    ({"settled": None}, CARE, "does not tell how sure"),
+    ({"settled": False}, CARE, "not settled"),
+    ({"force": 0.2}, CARE, "force of the pull: 0.2 N off"),
+    ({"force": 0.9}, NO, "does not meet the force"),
+    ({"held": 3e-3}, CARE, "band in the hand: 3 mm off"),
+    ({"recoil": 8e-3}, CARE, "recoil: 8 mm off"),
+    ({"recoil": 0.03}, NO, "does not meet the recoil"),
+    ({"disagreement": 2.6, "odd": "pull 2 of b.mcap"}, CARE, "pull 2 of b.mcap"),
+    ({"at_sides": (("relaxation", "upper side of its box, 0 to 5 %"),)}, CARE, "relaxation"),
+    ({"stretch": 1.7}, CARE, "1.70 times its length, the recording only to 1.60"),
+    ({"stretch": 2.2}, NO, "2.20 times"),
+    ({"hold_force": 28.0}, CARE, "28.0 N"),
+    ({"failures": ("The launch at 1.7 m fails in simulation: short.",)}, NO, "short"),
+    ({"converged": False}, CARE, "did not converge"),
+    ({"miss": 0.2}, NO, "misses a target by 20 cm"),
+    ({"half_width": 0.2}, CARE, "±20 cm only"),
+    ({"half_width": 0.6}, NO, "±60 cm only"),
+    ({"half_width": np.nan}, CARE, "not known"),
+    ({"outside": 6}, CARE, "6 of 15 virtual launches"),
+    ({"outside": 6, "off": 0.3}, NO, "30 cm off in the mean"),
+    ({"left": 0.09}, CARE, "9 % off"),
+    ({"left": 0.4}, NO, "40 % off"),
+    ({"scores": 1, "outside": 1, "off": 0.3}, CARE, "30 cm off"),
+    ({"scores": 1, "outside": 1, "off": 1.2}, NO, "120 cm off"),
+    ({"recoil": 0.0, "recoil_seen": False}, CARE, "No picture shows the recoil"),
+    ({"outside": 0, "scores": 0}, CARE, "No launch was measured"),
+]
+
+
+def test_nothing_speaks_against_a_good_band() -> None:
+    assert judge(GOOD) == (TRUSTED, [])
+
+
+@pytest.mark.parametrize(("change", "verdict", "words"), CASES)
+def test_one_thing_turns_the_verdict(change, verdict, words) -> None:
+    found, reasons = judge(replace(GOOD, **change))
+    assert found == verdict
+    assert len(reasons) == 1 and words in reasons[0].text
+    assert reasons[0].against == (verdict == NO)
+
+
+def test_the_worst_comes_first() -> None:
+    verdict, reasons = judge(replace(GOOD, settled=False, miss=0.2, left=0.09))
+    assert verdict == NO and [reason.against for reason in reasons] == [True, False, False]
+
+
+def test_findings_are_those_of_the_files(told) -> None:
+    found = findings(told)
+    assert found.settled and found.force == 0.05 and found.recoil == 2e-3
+    assert (found.outside, found.scores, found.kind) == (0, 2, "measured")
+    assert found.off == pytest.approx(0.02)
+    assert found.at_sides == []
+    half = np.hypot(0.1375, np.linalg.norm(told.aims.draw, axis=1))
+    assert found.stretch == pytest.approx(2 * half.max() / 0.52, rel=1e-6)
+    assert found.recorded_stretch == pytest.approx(2 * np.hypot(0.1375, 0.38) / 0.52, rel=1e-3)
+
+
+def test_findings_see_a_bad_score_a_side_and_odd_evidence(told) -> None:
+    rows = trials().assign(landing_y=[1.5, 2.1])
+    theta = dict(told.theta, theta=told.theta["theta"] | {"relaxation": 0.0499})
+    launches = [{"left": None}, {"left": -0.07}]
+    recordings = [
+        {"force_rms": force, "held_rms": 0, "recoil_rms": 0, "pictures": []}
+        | {"source": {"file": f"{force}.mcap", "pull": 3}, "without_it": {"misfit": force}}
+        for force in (0.1, 0.3)
+    ]
+    theta["confidence"] = theta["confidence"] | {"launches": launches, "recordings": recordings}
+    found = findings(replace(told, trials=rows, theta=theta))
+    assert (found.outside, found.left, found.force) == (1, 0.07, 0.3)
+    assert found.odd == "pull 3 of `0.3.mcap`"
+    assert found.at_sides == [("relaxation a half decade", "upper side of its box, 0 to 5 %")]

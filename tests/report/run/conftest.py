@@ -1,0 +1,173 @@
+"""A finished run of a band that was never there: every input of the report, small and synthetic."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from ruamel.yaml import YAML
+
+from pipeline.episode.episode import Episode
+from pipeline.identify.search.regions import Region, save_regions
+from pipeline.params import load
+from pipeline.report.run.results import Result, Results, gather
+from pipeline.simulator.material import THETA as NAMES
+from tests.policy.stored import write_stored
+
+BAND, METHOD = "toy", "sling2sim2real"
+THETA = {
+    "youngs_modulus": 3e5,
+    "poissons_ratio": 0.45,
+    "elasticity_damping": 3e-3,
+    "dynamic_friction": 0.5,
+    "damping_scale": 0.7,
+}
+
+
+def episode() -> Episode:
+    time = np.linspace(0.015, 8.985, 300)
+    stamps = np.arange(90) / 10
+    line = np.stack([np.linspace(-0.14, 0.14, 25), np.full(25, -0.2), np.zeros(25)], 1)
+    nothing = np.zeros((300, 3))
+    force = np.stack([0 * time, np.where(time < 8, time, 0), np.sin(time)], 1)
+    return Episode(
+        BAND, time, nothing + [0, -0.4, 0], nothing, force, 0 * time, stamps,
+        [line.astype(np.float32)] * 90, 1.0, 8.0, np.array([1.0, 0, 0]),
+    )  # fmt: skip
+
+
+def history(phase: str, totals: list[float], solver: int | None = None) -> pd.DataFrame:
+    """Rows on the diagonal of the unit cube, one generation each; its box is params.yaml's."""
+    boxes = load(Path("params.yaml")).parameters
+    place = (np.arange(len(totals)) + 0.5) / len(totals)
+    rows = pd.DataFrame({"method": METHOD, "phase": phase, "total": totals})
+    rows["generation"], rows["solver"] = np.arange(len(totals)), solver
+    rows["solver"] = rows.solver.astype("Int32")
+    for name in NAMES:
+        box = getattr(boxes, name)
+        low, high = np.log([box.low, box.high]) if box.scale == "log" else (box.low, box.high)
+        value = low + place * (high - low)
+        rows[f"unit_{name}"], rows[name] = place, np.exp(value) if box.scale == "log" else value
+    finite = np.where(np.isfinite(totals), totals, np.nan)
+    for name, share in (("geom", 0.5), ("force", 0.25), ("work", 0.25)):
+        rows[name] = share * finite
+    rows["failure"] = np.where(np.isfinite(totals), None, "slipped")
+    return rows
+
+
+def launches() -> pd.DataFrame:
+    rows = pd.DataFrame(
+        [(1.725, 1.745), (1.725, 1.695), (1.925, 1.965), (2.125, None)],
+        columns=["target", "landing_y"],
+    )
+    failure = [None, None, None, "did not land"]
+    return rows.assign(
+        band=BAND, method=METHOD, kind="measured", policy=None, trial=[1, 2, 1, 1],
+        draw_y=-0.3, draw_z=-0.2, hold_force=9.0, failure=failure, flight_y=None, flight_z=None,
+        stretch=[1.4, 1.4, 1.7, 1.8], recorded_stretch=1.63, predicted_y=rows.target,
+        predicted_failure=None, predicted_speed=4.5, predicted_angle=0.5,
+        predicted_leave_y=-0.05, predicted_leave_z=-0.03,
+        predicted_low=rows.target - 0.025, predicted_high=rows.target + 0.025,
+    )  # fmt: skip
+
+
+def confidence(fixed: str | None = None) -> dict:
+    """What a θ file says of its confidence; friction cannot be identified."""
+    parameters = {
+        name: {"low": 0.9 * value, "high": 1.1 * value, "identifiable": name != "dynamic_friction"}
+        for name, value in THETA.items()
+    }
+    if fixed:
+        parameters[fixed] = {"low": THETA[fixed], "high": THETA[fixed], "identifiable": False}
+        parameters[fixed]["fixed"] = True
+    matrix = np.eye(5)
+    matrix[0, 1] = matrix[1, 0] = -0.9
+    return {
+        "level": 0.9,
+        "parameters": parameters,
+        "derived": {
+            "damping_product": {"value": 2.1e-3, "low": 1.9e-3, "high": 2.3e-3, "unit": "s"},
+            "turn_damping": {"value": 0.0, "low": 0.0, "high": 0.2, "unit": ""},
+            "returned_share": {"value": 1.0, "low": 0.97, "high": 1.03, "unit": ""},
+            "air_drag": {"value": 0.5, "low": 0.1, "high": 1.5, "unit": "1/s"},
+        },
+        "correlation": {"names": list(NAMES), "matrix": matrix.tolist()},
+        "recordings": [
+            {"force_rms": 0.041, "held_rms": 5e-4, "recoil_rms": 2.1e-3, "pictures": [0.0123]}
+            | {"source": {"file": "one.mcap"}}
+        ],
+        "disagreement": 1.0,
+        "launches": [],
+        "steps": 5,
+        "settled": True,
+    }
+
+
+def posterior() -> dict:
+    """Samples within ± 10 % of θ."""
+    spread = np.linspace(0.9, 1.1, 41)
+    theta = np.array(list(THETA.values()))
+    return {
+        "names": list(NAMES),
+        "samples": (theta * spread[:, None]).tolist(),
+    }
+
+
+@pytest.fixture(scope="session")
+def template(tmp_path_factory) -> Path:
+    """A project folder with params.yaml and everything that the report reads."""
+    root, yaml = tmp_path_factory.mktemp("report"), YAML()
+    content = yaml.load(Path("params.yaml"))
+    content["run"].update(bands=[BAND], rig=[], methods=[METHOD])
+    content["run"]["ablations"].update(bands=[], methods=[])
+    band = {"source": "recording", "mass": 0.04, "diameter": 0.01, "rest_length": 0.52}
+    content["bands"][BAND] = band
+    yaml.dump(content, root / "params.yaml")
+    data = root / "data"
+    for name in ("history", "clusters", "refined", "theta", "confidence", "trials"):
+        (data / name / BAND).mkdir(parents=True)
+    episode().save(data / "episodes" / BAND / "1")
+    for step, rows in (
+        ("history", history("de", [3.0, np.inf, 2.0])),
+        ("refined", history("cma", [2.5, 1.25], solver=0)),
+    ):
+        rows.to_parquet(data / step / BAND / f"{METHOD}.parquet")
+    region = Region(np.full(5, 0.4), 0.01 * np.eye(5), 2.0, [2, 0])
+    save_regions(data / "clusters" / BAND / f"{METHOD}.json", NAMES, [region], 5)
+    loss = {"geom": 0.5, "force": 0.25, "work": 0.5, "total": 1.25}
+    theta = {"band": BAND, "method": METHOD, "theta": THETA, "loss": loss, "rollouts": 5}
+    theta["confidence"] = confidence()
+    (data / "theta" / BAND / f"{METHOD}.json").write_text(json.dumps(theta))
+    (data / "confidence" / BAND / f"{METHOD}.json").write_text(json.dumps(posterior()))
+
+    folder = data / "policies" / BAND / METHOD
+    chart = write_stored(folder)
+    chart.save(folder / "map.parquet")
+    pd.DataFrame({"iteration": [1, 2], "mean_error": [0.3, 0.004]}).to_parquet(
+        folder / "training.parquet"
+    )
+    launches().to_parquet(data / "trials" / BAND / f"{METHOD}.parquet")
+    return root
+
+
+@pytest.fixture
+def root(template: Path, tmp_path: Path) -> Path:
+    """A copy of the template, to change."""
+    return shutil.copytree(template, tmp_path, dirs_exist_ok=True)
+
+
+@pytest.fixture
+def params(root: Path):
+    return load(root / "params.yaml")
+
+
+@pytest.fixture
+def results(root: Path, params) -> Results:
+    return gather(params, root)
+
+
+@pytest.fixture
+def result(results: Results) -> Result:
+    return results.methods[BAND][METHOD]

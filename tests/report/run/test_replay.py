@@ -1,0 +1,86 @@
+"""The replay against the rollout that it filters and samples."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import PchipInterpolator
+
+from pipeline.episode.episode import Episode
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.params import load
+from pipeline.report.run.replay import replay
+from pipeline.simulator.interaction import interact
+from pipeline.simulator.material import THETA as NAMES
+from pipeline.simulator.model import Sling
+from tests.project import ROOT
+
+pytestmark = pytest.mark.usefixtures("nowhere")
+
+METHOD = "sling2sim2real"
+THETA = dict(zip(NAMES, (3e5, 0.46, 4e-3, 0.5, 0.6), strict=True))
+SHIFT = np.array([0, 0.05, 0])  # of the clouds from where the band is
+
+
+@pytest.fixture(scope="module")
+def params():
+    return load(ROOT / "params.yaml")
+
+
+@pytest.fixture(scope="module")
+def sling(params):
+    return Sling.of(params.bands["band1"], params.setup, params.sling)
+
+
+@pytest.fixture(scope="module")
+def recorded(sling):
+    """A hand that takes the hanging band at 1 s, draws it 0.3 m by 3 s and lets go at 4 s."""
+    time = (np.arange(160) + 0.5) * 0.03
+    knots = np.array([[0, 0, -0.2], [0, 0, -0.2], [0, 0, 0], [0, -0.3, 0], [0, -0.3, 0]])
+    path = PchipInterpolator([0, 1, 2, 3, 5], knots)
+    nothing, stamps = np.zeros((160, 3)), np.arange(20) * 0.24
+    episode = Episode(
+        "band1", time, path(time), path(time, 1), nothing + [0, 2, 0], 0 * time, stamps, [],
+        1.0, 4.0, np.array([1.5, 0, 0]),
+    )  # fmt: skip
+    rollouts = interact(sling, episode, np.array([list(THETA.values())]))
+    clouds = [(line + SHIFT).astype(np.float32) for line in rollouts.center_line[0]]
+    return replace(episode, clouds=clouds), rollouts
+
+
+@pytest.fixture(scope="module")
+def played(params, recorded):
+    episode, rollouts = recorded
+    theta = {"theta": THETA}
+    return episode, rollouts, replay(params, "band1", METHOD, episode, theta)
+
+
+def test_the_pause_keeps_the_force_and_nothing_pulls_before_or_after(played) -> None:
+    episode, rollouts, played = played
+    held = rollouts.force[0, np.searchsorted(rollouts.times, 3.7), 1]
+    pause = (episode.time > 3.5) & (episode.time < 3.9)
+    assert held > 3 and played.force.shape == (160, 3)
+    np.testing.assert_allclose(played.force[pause, 1], held, rtol=0.01)
+    free = (episode.time < 0.9) | (episode.time > 4.1)
+    assert np.abs(played.force[free]).max() < 0.02 * held
+
+
+def test_the_filter_does_not_delay_the_release(played) -> None:
+    episode, _, played = played
+    force = played.force[:, 1]
+    half = force[episode.time < 3.9].max() / 2
+    after = np.flatnonzero((force < half) & (episode.time > 3.5))[0]
+    assert abs(episode.time[after] - 4.0) <= 0.03
+
+
+def test_the_bands_ends_stay_at_the_tips(played) -> None:
+    _, rollouts, played = played
+    assert played.center_line.shape == rollouts.center_line.shape[1:]
+    ends = played.center_line[:, [0, -1]]
+    np.testing.assert_allclose(np.abs(ends), np.broadcast_to([0.1375, 0, 0], ends.shape), atol=2e-3)
+
+
+def test_it_is_as_far_off_as_the_loss_says(params, sling, played) -> None:
+    episode, rollouts, played = played
+    terms = EpisodeLoss.of(params, METHOD, episode, sling).terms(rollouts)
+    assert 100 * played.distance.mean() == pytest.approx(terms["geom"][0], rel=1e-6)

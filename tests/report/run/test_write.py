@@ -1,0 +1,203 @@
+"""The whole report of a synthetic run: complete, reproducible, and refused where inputs lack."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+
+import pandas as pd
+import pytest
+
+from pipeline.base.layout import NotMade
+from pipeline.report.run import report as reporting
+from pipeline.report.run import write as writing
+from tests.report.run.conftest import BAND, METHOD
+from tests.report.run.toy_replay import toy_replay
+
+THETA_FILE = f"data/theta/{BAND}/{METHOD}.json"
+
+
+@pytest.fixture(autouse=True)
+def no_simulation(monkeypatch) -> None:
+    monkeypatch.setattr(reporting, "replay", toy_replay)
+
+
+@pytest.fixture
+def text_alone(monkeypatch) -> None:
+    """Pictures and the page take seconds, and tell a test of the text nothing."""
+    monkeypatch.setattr(reporting.Report, "picture", lambda _, name, *__: f"{name}.png")
+    monkeypatch.setattr(writing, "write_page", lambda *_: None)
+
+
+def written(root, params) -> str:
+    writing.write(params, root)
+    return (root / "reports" / "README.md").read_text()
+
+
+ELSEWHERE = """\
+from pathlib import Path
+from pipeline.params import load
+from pipeline.report.run import report, write
+from tests.report.run.toy_replay import toy_replay
+report.replay = toy_replay
+root = Path({root!r})
+write.write(load(root / "params.yaml"), root)
+"""
+
+
+def committed(root) -> dict:
+    """Bytes of what Git and DVC know of a report."""
+    files = (root / "reports").rglob("*")
+    return {f: f.read_bytes() for f in files if f.is_file() and f.name != "run.js"}
+
+
+def rig(root, params, bands: tuple[str, ...]):
+    """Parameters of a run in which the rig records and launches `bands`, all alike but by name."""
+    data, yaml = root / "data", {"source": "rig"}
+    for band in bands:
+        for file in data.glob(f"*/{BAND}"):
+            shutil.copytree(file, file.with_name(band))
+        trials = data / "trials" / band / f"{METHOD}.parquet"
+        pd.read_parquet(trials).assign(band=band, kind="virtual").to_parquet(trials)
+        content = json.loads((data / "theta" / band / f"{METHOD}.json").read_text())
+        for method in METHODS:
+            for file in data.glob(f"*/{band}/{METHOD}*"):
+                copy = file.with_name(file.name.replace(METHOD, method))
+                if method != METHOD:
+                    (shutil.copytree if file.is_dir() else shutil.copy)(file, copy)
+            text = json.dumps(content | {"band": band, "method": method})
+            (data / "theta" / band / f"{method}.json").write_text(text)
+            launched = pd.read_parquet(trials).assign(method=method)
+            launched.to_parquet(data / "trials" / band / f"{method}.parquet")
+        (data / "floor").mkdir(exist_ok=True)
+        floor = {"mean_error_m": 0.02, "launches": 5, "actuation_error_m": 1e-3}
+        floor |= {"release_jitter": 0.02, "targets": {}}
+        (data / "floor" / f"{band}.json").write_text(json.dumps(floor))
+    more = params.run.ablations.model_copy(
+        update={"bands": bands[:1], "methods": ("de", "no_work")}
+    )
+    run = params.run.model_copy(
+        update={"bands": bands, "rig": bands, "methods": METHODS[:4], "ablations": more}
+    )
+    about = params.bands[BAND].model_copy(update=yaml)
+    return params.model_copy(update={"run": run, "bands": dict.fromkeys(bands, about)})
+
+
+METHODS = (
+    "least_squares", "sling2sim2real", "real2sim2real", "package_si", "de", "no_work",
+)  # fmt: skip
+
+
+def test_the_report_is_complete_and_equal_in_another_process(root, params) -> None:
+    text, first = written(root, params), committed(root)
+    pictures = re.findall(r"\]\((figures/[^)]+)\)", text)
+    assert len(pictures) == len(set(pictures)) <= 15
+    assert {root / "reports" / name for name in pictures} == {
+        file for file in first if file.suffix == ".png"
+    }
+    page = (root / "reports" / "index.html").read_text("utf-8")
+    assert page.count('src="data:image/png;base64,') == len(pictures)
+    for title in re.findall("^## (.*)$", text, re.MULTILINE):
+        assert f">{title}</h2>" in page
+    tables = {f"table{number}.{kind}" for number in (1, 2) for kind in ("csv", "tex")}
+    assert tables == {file.name for file in first if file.parent.name == "tables"}
+    assert "3.00 ± 0.71" in text  # |miss| 2 and 3 cm, then 4 cm; one target has a deviation
+    assert "1 of 4" in text
+    found = json.loads((root / "reports" / "summary.json").read_text())
+    assert found[f"{BAND}_cm"] == 3.0 and found["failed"] == 1
+    about = json.loads((root / "reports" / "run.js").read_text().removeprefix("run = "))
+    assert {"written", "commit", "machine", "python", "numpy"} <= {*about}
+    shutil.rmtree(root / "reports")
+    other = os.environ | {"PYTHONHASHSEED": "7", "TZ": "Asia/Seoul", "OMP_NUM_THREADS": "1"}
+    code = ELSEWHERE.format(root=str(root))
+    subprocess.run([sys.executable, "-c", code], env=other, check=True)
+    assert committed(root) == first
+
+
+def test_a_run_of_three_bands_is_told_in_few_words_and_pictures(root, params, text_alone) -> None:
+    text = written(root, rig(root, params, ("band1", "band2", "band3")))
+    told, appendix = text.split("\n## Appendix\n")
+    words = [word for word in told.split() if re.search(r"\w", word)]
+    assert len(words) <= 2500
+    chapters = ["What came out", "The bands", "The paper's tables"]
+    assert re.findall("^## (.*)$", told, re.MULTILINE) == chapters
+    assert [f"### Table {n}\n" in told for n in (1, 2, 3, 4)] == [True] * 4
+    assert "not run" not in text and text.count(".png") <= 15
+    sentences = [line for line in told.splitlines() if line.startswith("- ") and "⚠" not in line]
+    assert len([line for line in sentences if "](bands/" not in line]) <= 8
+    assert "[band2](bands/band2/README.md)" in told and "| band3 | 4 virtual | 3.0 |" in told
+
+
+def test_a_band_that_nobody_launched_is_told_without_emptiness(root, params, text_alone) -> None:
+    file = root / "data" / "trials" / BAND / f"{METHOD}.parquet"
+    nothing = {"kind": "predicted", "landing_y": None, "failure": None}
+    pd.read_parquet(file).assign(**nothing).to_parquet(file)
+    text = written(root, params)
+    assert "Nothing was launched in this run" in text and "a robot; no launch yet\n" in text
+    assert f"| {BAND} | 300 (270 – 330) |" in text  # θ stands in the first chapter
+    assert re.findall("^### (Table .)$", text, re.MULTILINE) == ["Table 2"]
+    for absent in ("landings.png", "predictions.png", "more than noise", "virtual", "floor", "N/A"):
+        assert absent not in text
+    assert json.loads((root / "reports" / "summary.json").read_text()) == {f"{BAND}_kPa": 300.0}
+
+
+def test_a_theta_by_hand_needs_no_confidence(root, params, text_alone) -> None:
+    theta = json.loads((root / THETA_FILE).read_text())
+    (root / THETA_FILE).write_text(json.dumps({"band": BAND, "theta": theta["theta"]}))
+    text = written(root, params)
+    assert "| 3.00E+5 | 0.45 |" in text and "correlation" not in text
+    assert "† The interval holds the draw's error alone" in text
+
+
+def test_a_failed_prediction_is_named(root, params, text_alone) -> None:
+    file = root / "data" / "trials" / BAND / f"{METHOD}.parquet"
+    good = pd.read_parquet(file)
+    text = written(root, params)
+    assert "could not be predicted" not in text
+    # 1.745 lies in 1.70 - 1.75, 1.695 does not; the third lies beyond the recorded stretch
+    assert "| 1 of 2, median width 2.9 % | 0 of 1, median width 2.5 % |" in text
+    bad = good.assign(
+        predicted_y=[1.725, None, 1.925, 2.125],
+        predicted_failure=[None, "the simulation did not converge", None, None],
+        hold_force=[9.0, None, 9.0, 9.0],
+    )
+    bad.to_parquet(file)
+    text = written(root, params)
+    assert "⚠ toy, Sling2Sim2Real: 1 of 4 launches could not be predicted." in text
+    assert "| 1 of 4 |" in text and "hold force, predicted [N]" in text
+    assert "| 1.40 | – | the simulation did not converge |" in text
+
+
+def test_held_out_data_have_a_table_where_params_hold_some_out(root, params, text_alone) -> None:
+    """Though nothing is known of them: the toy's replay has none."""
+    assert "held out" not in written(root, params)
+    held_out = params.loss.held_out.model_copy(update={"blocks": 2})
+    loss = params.loss.model_copy(update={"held_out": held_out})
+    text = written(root, params.model_copy(update={"loss": loss}))
+    assert "| toy | Sling2Sim2Real | 0.200 | – | – |" in text
+
+
+def test_says_of_a_policy_what_it_was_trained_on(root, params, text_alone) -> None:
+    maps, samples = "reads landings off maps", "512 × 4 samples each"
+    text = written(root, params)
+    assert maps in text and samples in text
+    policy = params.policy.model_copy(update={"landings": "simulated"})
+    text = written(root, params.model_copy(update={"policy": policy}))
+    assert maps not in text and samples not in text
+    assert "Training simulates every launch" in text and "512 × 4 simulated launches each" in text
+
+
+def test_names_the_input_that_is_missing(root, params) -> None:
+    for name in (
+        f"episodes/{BAND}/1/signals.parquet",
+        *(f"{step}/{BAND}/{METHOD}.parquet" for step in ("history", "refined", "trials")),
+        *(f"{step}/{BAND}/{METHOD}.json" for step in ("clusters", "theta")),
+        *(f"policies/{BAND}/{METHOD}/{file}" for file in ("card.json", "map.parquet")),
+    ):
+        away = (root / "data" / name).rename(root / "away")
+        with pytest.raises(NotMade, match=f"{re.escape(name)}: missing"):
+            writing.write(params, root)
+        assert not (root / "reports").exists()
+        away.rename(root / "data" / name)

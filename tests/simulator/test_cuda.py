@@ -1,0 +1,96 @@
+"""One source for both: on a GPU the simulator does what it does on the CPU."""
+
+from dataclasses import replace
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+from pipeline.base.machine import gpus
+from pipeline.identify.objective.evaluate import Evaluator
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.objective.space import Space
+from pipeline.params import load
+from pipeline.simulator import interact, launch
+from pipeline.simulator.model import LaunchHistory
+from tests.simulator.bands import random_draws, random_thetas
+
+pytestmark = pytest.mark.skipif(not gpus(), reason="no CUDA device on this machine")
+
+
+RUBBER = {"mooney_share": 0.3, "relaxation": 0.02, "history": LaunchHistory(4.0, 2.0)}
+LAWS = {"neo_hookean": {}, "rubber": RUBBER}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_interaction_agrees_with_the_cpu(strong_grip, episode, law):
+    """Held force within 0.1 %; the middle of the taut band within 1 mm in the first recoil."""
+    strong_grip = replace(strong_grip, law=law, **LAWS[law])
+    thetas = random_thetas(64, seed=2)
+    cpu = interact(strong_grip, episode, thetas, workers=2)
+    gpu = interact(strong_grip, episode, thetas, device="cuda:0")
+    good = np.array(
+        [a is None and b is None for a, b in zip(cpu.failure, gpu.failure, strict=True)]
+    )
+    assert good.sum() >= 62
+    held = np.argmin(np.abs(cpu.times - 2.3))
+    assert np.allclose(cpu.force[good, held], gpu.force[good, held], rtol=1e-3, atol=5e-3)
+    frame = np.searchsorted(cpu.cloud_time, 2.43)
+    gap = np.abs(cpu.center_line - gpu.center_line)[good, frame, strong_grip.middle]
+    assert np.median(gap) < 1e-4 and np.percentile(gap, 95) < 1e-3
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_launches_agree_with_the_cpu(sling, law):
+    """Landing within 0.1 %, by an arm that gives way."""
+    sling = replace(sling, law=law, arm_stiffness=12000.0, **LAWS[law])
+    draws = random_draws(64, np.random.default_rng(4))
+    theta = [2.5e5, 0.45, 2e-3, 0.5, 1.0]
+    cpu, gpu = launch(sling, theta, draws), launch(sling, theta, draws, device="cuda:0")
+    assert cpu.failure == gpu.failure
+    assert gpu.landing_y == pytest.approx(cpu.landing_y, rel=1e-3)
+
+
+def test_what_stays_on_the_gpu_is_what_is_fetched(strong_grip, episode):
+    """Forces and centre lines of 65 slings, which fill no warp."""
+    thetas = random_thetas(65, seed=5)
+    stays = interact(strong_grip, episode, thetas, device="cuda:0", fetch=False)
+    fetched = interact(strong_grip, episode, thetas, device="cuda:0")
+    assert not isinstance(stays.center_line, np.ndarray)
+    assert np.array_equal(stays.center_line.numpy(), fetched.center_line)
+    assert np.array_equal(stays.force.numpy(), fetched.force)
+
+
+@pytest.mark.skipif(len(gpus()) < 2, reason="fewer than two GPUs on this machine")
+def test_gpus_share_a_batch_and_change_nothing(strong_grip, sling, episode, monkeypatch):
+    """Rollouts with their loss in shares of 34 and 33, and launches."""
+    time = episode.cloud_time
+    clouds = [np.random.default_rng(frame).normal(0, 0.1, (200, 3)) for frame in range(len(time))]
+    seen = replace(episode, clouds=[cloud.astype(np.float32) for cloud in clouds])
+    weights = {"geom": 1.0, "force": 1.0, "work": 1.0}
+    shape = {"radius": sling.radius, "rest_length": sling.edge_lengths}
+    loss = EpisodeLoss(seen, **shape, weights=weights, cutoff=30.0)
+    space = Space.of(load("params.yaml").parameters)
+    unit = np.random.default_rng(8).random((67, space.dimension))
+    teams = ("cuda:0",), ("cuda:1",), ("cuda:0", "cuda:1")
+    one, *others = (Evaluator(seen, strong_grip, loss, space, devices=team)(unit) for team in teams)
+    for other in others:
+        assert other.failure == one.failure
+        np.testing.assert_array_equal(other.total, one.total)
+        for name, values in one.terms.items():
+            np.testing.assert_array_equal(other.terms[name], values)
+
+    monkeypatch.setattr(import_module("pipeline.simulator.launch"), "SHARE", 1)
+    thetas = space.to_physical(unit)
+    one, *others = (launch(sling, thetas, [-0.4, -0.2], device=team) for team in teams)
+    for other in others:
+        assert other.failure == one.failure
+        np.testing.assert_array_equal(other.landing_y, one.landing_y)
+
+
+def test_result_depends_on_no_neighbour_on_the_gpu(strong_grip, episode):
+    thetas = random_thetas(20, seed=3)
+    together = interact(strong_grip, episode, thetas, device="cuda:0")
+    alone = interact(strong_grip, episode, thetas[7], device="cuda:0")
+    assert np.array_equal(together.force[7], alone.force[0])
+    assert np.array_equal(together.center_line[7], alone.center_line[0])

@@ -1,0 +1,101 @@
+"""The air's drag on the band: a force for mass and speed, which the projectile does not feel."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.simulator.interaction import interact
+from pipeline.simulator.launch import launch
+from pipeline.simulator.model import GRAVITY, ROD, TETRAHEDRA, Sling
+from pipeline.simulator.records import Grip
+from pipeline.simulator.schedule import steps
+from tests.simulator.bands import along_x, stepped, vertex_masses
+
+THETA = [3e5, 0.45, 2e-3, 0.5, 1.0]
+H, COUNT = 1e-3, 60
+
+
+def fallen(sling: Sling, drags: np.ndarray, payload=0.0, stretch=1.0) -> np.ndarray:
+    """How far the middle (of a mesh, the centre) of loose bands falls with each drag [1/s], (N,).
+
+    Args:
+        payload: At the middle [kg].
+    """
+    loose = replace(sling, clamped=(False, False), air_drag=drags, air_density=0.0)
+    table, start = steps(H * np.arange(COUNT + 1), H, grip=Grip.FREE), along_x(loose, stretch)
+    done = stepped(loose, table, [THETA] * len(drags), start, payload=payload)
+    if sling.mesh == ROD:
+        return start[sling.middle, 2] - done.state[:, sling.middle, 2]
+    drop = start[:, 2::3] - done.state[:, :, 2::3]
+    mass = np.broadcast_to(vertex_masses(sling), drop.shape)
+    return np.average(drop, axis=(1, 2), weights=mass)
+
+
+def fall(rate: float) -> float:
+    """Of one mass: backward Euler of v' = -g - rate v, which is exact for these steps."""
+    speed = place = 0.0
+    for _ in range(COUNT):
+        speed = (speed + H * GRAVITY) / (1 + H * rate)
+        place += H * speed
+    return place
+
+
+def test_a_loose_band_falls_as_one_mass_in_the_wind(params):
+    drags = np.array([0.0, 3.0, 40.0])
+    for mesh in (ROD, TETRAHEDRA):  # contracting as it falls
+        shape = params.sling.model_copy(update={"mesh": mesh})
+        found = fallen(Sling.of(params.bands["band1"], params.setup, shape), drags, stretch=1.3)
+        assert found == pytest.approx([fall(drag) for drag in drags], rel=1e-5)
+
+
+def test_the_projectile_feels_no_wind(sling):
+    """A stiff band with a load at its middle falls as both masses with the drag of one."""
+    stiff = replace(sling, rest_length=0.02, mass=0.02)
+    (found,) = fallen(stiff, np.array([30.0]), payload=0.04)
+    assert found == pytest.approx(fall(30.0 * 0.02 / 0.06), rel=0.02)
+
+
+def test_drag_differs_by_rollout_and_slows_the_recoil(strong_grip, episode):
+    """Three drags in one batch, each as if alone; the swing loses speed."""
+    drags = np.array([0.0, 2.0, 6.0])
+    both = interact(replace(strong_grip, air_drag=drags), episode, np.array([THETA] * 3))
+    for drag, line in zip(drags, both.center_line, strict=True):
+        alone = interact(replace(strong_grip, air_drag=drag), episode, np.array([THETA]))
+        np.testing.assert_array_equal(alone.center_line[0], line)
+    swing = both.cloud_time > episode.release_time + 0.2
+    moved = np.abs(np.diff(both.center_line[:, swing, strong_grip.middle], axis=1)).sum((1, 2))
+    assert moved[0] > 1.05 * moved[1] > 1.05**2 * moved[2]
+
+
+def test_drag_shortens_a_launch(sling):
+    blown = replace(sling, air_drag=np.array([0.0, 3.0]))
+    still, slowed = launch(blown, [THETA, THETA], [-0.33, -0.17]).landing_y
+    assert 0.93 < slowed / still < 0.995
+
+
+def test_air_brakes_a_band_as_a_cylinder_across_the_wind_and_not_along_it(sling):
+    """Speed v_t tanh(g t / v_t), v_t² = 2 m g / (rho C d L); end first it falls free."""
+    light = replace(sling, clamped=(False, False), mass=2e-3, air_density=1.2)
+    terminal = np.sqrt(
+        2 * light.mass * GRAVITY / (1.2 * 1.1 * 2 * light.radius * light.rest_length)
+    )
+    table = steps(H * np.arange(301), H, grip=Grip.FREE, order=2)
+    table[0] = steps([0.0, H], H, grip=Grip.FREE)[0]
+    start, time = along_x(light, 1.0), 0.3
+    done = stepped(light, table, [THETA], start)
+    told = terminal**2 / GRAVITY * np.log(np.cosh(GRAVITY * time / terminal))
+    assert told < 0.9 * GRAVITY * time**2 / 2  # it counts
+    fallen = start[:, 2] - done.state[0, :, 2]
+    assert fallen == pytest.approx(np.full(len(fallen), told), rel=5e-3)
+    upright = start[:, [1, 2, 0, 4, 5, 3, 7, 8, 6]]
+    done = stepped(light, table, [THETA], upright)
+    drop = (upright[:, 2] - done.state[0, :, 2]).mean()
+    assert drop == pytest.approx(GRAVITY * time**2 / 2, rel=5e-3)
+
+
+def test_air_takes_energy_from_a_recoil(sling):
+    """Little: the projectile is heavier and slower than a band alone."""
+    far = [launch(replace(sling, air_density=rho), THETA, [-0.35, -0.15]).landing_y[0]
+           for rho in (0.0, 1.2, 2.4)]  # fmt: skip
+    assert 0.99 * far[0] < far[2] < far[1] < 0.9999 * far[0]

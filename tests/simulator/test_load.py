@@ -1,0 +1,52 @@
+"""The sling of a band: with the clamps that its recording showed, or without."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.base.files import write_json
+from pipeline.base.layout import Layout
+from pipeline.identify.results.mounting import load_sling, sling_of_method
+from pipeline.identify.results.theta import calibrated, load_theta
+from pipeline.params import load
+from pipeline.simulator.launch import launch
+from pipeline.simulator.material import THETA
+from tests.project import ROOT
+
+PARAMS = load(ROOT / "params.yaml")
+SHOWN = {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}
+VALUES = dict(zip(THETA, (2.5e5, 0.45, 3e-3, 0.7, 0.6), strict=True))
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    write_json(Layout(tmp_path).mounting("band1"), SHOWN)
+    return tmp_path
+
+
+def mounting_of(sling) -> tuple:
+    return sling.clamp_direction.tolist(), sling.flexural_rigidity
+
+
+def test_a_method_takes_what_the_recording_showed_or_leaves_it_out(root: Path) -> None:
+    method = PARAMS.methods["sling2sim2real"]
+    methods = {"with": method, "without": method.model_copy(update={"mounting": False})}
+    params = PARAMS.model_copy(update={"methods": methods})
+    assert mounting_of(sling_of_method(params, "band1", "with", root)) == tuple(SHOWN.values())
+    as_setup = (list(PARAMS.setup.clamp_direction), None)
+    assert mounting_of(sling_of_method(params, "band1", "without", root)) == as_setup
+    assert mounting_of(load_sling(PARAMS, "band1", "nowhere")) == as_setup
+
+
+def test_a_theta_file_says_so_and_its_launches_land_elsewhere(root: Path) -> None:
+    content = {"band": "band1", "theta": VALUES}
+    landings = []
+    for mounted in ({}, {"mounted": True}, {"mounted": False}):
+        path = root / "theta.json"
+        write_json(path, content | mounted)
+        sling = calibrated(PARAMS, "band1", load_theta(path, "band1"), root)
+        assert (sling.flexural_rigidity is None) == (mounted == {"mounted": False})
+        landings.append(launch(sling, np.array([*VALUES.values()]), (-0.35, -0.2)).landing_y[0])
+    assert landings[0] == landings[1]
+    assert 1e-3 < abs(landings[2] - landings[0]) < 0.5

@@ -1,0 +1,124 @@
+"""The law `rubber`: what it adds, what it refuses, and that its memory turns with the band."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.base.errors import UserError
+from pipeline.episode.pull import launch_history
+from pipeline.simulator import interact, launch
+from pipeline.simulator.model import LaunchHistory
+from pipeline.simulator.rubber import RUBBER, TIMES, overstress, unrelaxed, update
+from rig.physics.motion import pull_history
+
+THETA = np.array([3e5, 0.45, 2e-3, 0.5, 0.7])
+DRAW = np.array([-0.35, -0.15])
+
+
+@pytest.fixture(scope="module")
+def rubber(sling):
+    return replace(sling, law=RUBBER)
+
+
+def test_without_its_parameters_it_is_the_neo_hookean_law_to_the_bit(sling, rubber, episode):
+    for one, other in zip(
+        (interact(sling, episode, THETA), launch(sling, THETA, DRAW)),
+        (interact(rubber, episode, THETA), launch(rubber, THETA, DRAW)),
+        strict=True,
+    ):
+        same = "force", "center_line", "landing_y", "hold_force"
+        for name in (name for name in same if hasattr(one, name)):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def test_each_parameter_has_its_effect(rubber):
+    """A negative share stiffens a drawn band; what relaxes holds more at once, and later less."""
+    history = LaunchHistory(1.0, 0.1)
+    plain = launch(rubber, THETA, DRAW)
+    soft, stiff = (launch(replace(rubber, mooney_share=m), THETA, DRAW) for m in (0.5, -0.3))
+    assert soft.hold_force < 0.9 * plain.hold_force < 0.9 * stiff.hold_force
+    memory = replace(rubber, relaxation=0.02, history=history)
+    fresh = launch(memory, THETA, DRAW)
+    long = replace(memory, history=LaunchHistory(1.0, 600.0))
+    old = launch(long, THETA, DRAW)
+    assert fresh.hold_force > 1.03 * plain.hold_force
+    assert old.hold_force == pytest.approx(plain.hold_force, rel=1e-4)
+    assert old.speed < 0.99 * fresh.speed and old.speed < 0.99 * plain.speed
+
+
+def test_every_theta_may_have_its_own_parameters(rubber):
+    shares, weights = np.array([0.0, 0.5, -0.2]), np.array([0.0, 0.01, 0.03])
+    history = LaunchHistory(2.0, 1.0)
+    many = replace(rubber, mooney_share=shares, relaxation=weights, history=history)
+    together = launch(many, np.tile(THETA, (3, 1)), DRAW).landing_y
+    alone = [
+        launch(replace(many, mooney_share=m, relaxation=w), THETA, DRAW).landing_y[0]
+        for m, w in zip(shares, weights, strict=True)
+    ]
+    np.testing.assert_array_equal(together, alone)
+
+
+def test_memory_of_a_pull_is_that_of_short_steps_and_fades(rubber):
+    drawn = np.array([[-0.40, 0.0]])
+    carried = unrelaxed(replace(rubber, history=LaunchHistory(4.0, 2.0)), drawn)[0]
+    step = 1e-3  # Euler's method on o' = p' - o/t
+    part = np.clip(np.arange(0, 6, step) / 4, 0, 1)
+    depth = 0.4 * part**2 * (3 - 2 * part)
+    stretch = np.maximum(2 * np.hypot(rubber.half_width, depth) / rubber.rest_length, 1)
+    stress = stretch - stretch**-2
+    told = np.zeros(len(TIMES))
+    for change in np.diff(stress):
+        told += change - step * told / TIMES
+    np.testing.assert_allclose(carried, told / stress[-1], atol=2e-3)
+    assert np.all(np.diff(carried) >= -1e-12)  # slow branches keep more
+    assert unrelaxed(replace(rubber, history=LaunchHistory(4.0, 1e4)), drawn).max() < 1e-6
+    slack = np.array([[-0.01, 0.0]])
+    assert unrelaxed(replace(rubber, history=LaunchHistory(4.0, 0.0)), slack).max() == 0
+
+
+def test_updates_are_exact_for_straight_histories():
+    """Ramp of slope 1: o = t (1 - exp(-time / t)), whatever the steps."""
+    for count in (1, 7):
+        carried = overstress(np.linspace(0, 2.0, count + 1), 2.0 / count)
+        np.testing.assert_allclose(carried, TIMES * -np.expm1(-2.0 / TIMES), rtol=1e-12)
+    forget, follow = update(np.array([1e-6, 1e3]))
+    np.testing.assert_allclose(follow[0], 1, rtol=1e-3)
+    assert forget[1].max() < 1e-40
+
+
+def test_tetrahedra_refuse_it_by_name(solid):
+    with pytest.raises(UserError, match="tetrahedra do not know the law `rubber`"):
+        launch(replace(solid, law=RUBBER), THETA, DRAW)
+
+
+def test_history_of_a_recording():
+    """A cubic pull of 4 s and a pause of 2 s, with an approach before and a retreat after."""
+    time = np.arange(0, 10, 0.03)
+    way = np.interp(time - 2, np.arange(0, 6.001, 0.01), pull_history(0.01))
+    position = np.outer(way, [0.0, -0.4, -0.1])
+    position[time < 1.5] = [0.0, -0.1, -0.3]
+    position[time > 8] = [0.0, -0.5, -0.1]
+    episode = SimpleNamespace(time=time, position=position, release_time=8.0)
+    episode.band = "test"
+    found = launch_history(episode)
+    assert found["pull_time"] == pytest.approx(4.0, abs=0.1)
+    assert found["pause"] == pytest.approx(2.0, abs=0.1)
+    assert launch_history(SimpleNamespace(**vars(episode) | {"release_time": 1e6}))["pause"] <= 1e5
+    for release in (-1.0, 8.0):
+        still = vars(episode) | {"release_time": release, "position": 0 * position}
+        with pytest.raises(UserError, match="the hand lets go at the fork"):
+            launch_history(SimpleNamespace(**still))
+
+
+def test_a_pause_fades_the_memory_by_its_own_length(rubber):
+    """Whatever the pull's: exp(-pause / t) of what it left."""
+    for pull_time in (0.05, 4.0, 100.0):
+        none, some = (
+            unrelaxed(replace(rubber, history=LaunchHistory(pull_time, pause)), DRAW[None])[0]
+            for pause in (0.0, 0.7)
+        )
+        np.testing.assert_allclose(some, none * np.exp(-0.7 / TIMES), rtol=1e-12)

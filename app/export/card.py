@@ -9,7 +9,7 @@ from app.export import values as about
 from app.export.chain import MATCHED, SpringChain
 from app.export.match import HOLD, LANDING, DrawCompared
 from app.export.pull import PullCompared
-from pipeline.report.card.values import LABELS, rounded
+from pipeline.report.quantities import QUANTITIES, rounded
 from sling2sim2real.model import Model
 
 UNITS = {"hold_force": "n", "speed": "m_s", "landing": "m"}  # in names of keys
@@ -164,11 +164,11 @@ def _table(head: str, rows) -> str:
 
 
 def _value(row: dict) -> str:
-    label = LABELS[row["name"]]
-    shown = [label.factor * row[key] if row[key] is not None else None for key in _ENDS]
+    quantity = QUANTITIES[row["name"]]
+    shown = [quantity.factor * row[key] if row[key] is not None else None for key in _ENDS]
     value, low, high = (one if one is None else f"{one:.3g}" for one in shown)
     between = "fixed" if low is None else f"{low} – {high}"
-    return f"| {label.text} (`{row['name']}`) | {value} {label.unit} | {between} |"
+    return f"| {quantity.label} (`{row['name']}`) | {value} {quantity.unit} | {between} |"
 
 
 _ENDS = "value", "low", "high"

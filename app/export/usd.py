@@ -22,7 +22,7 @@ from app.export.match import draws_of
 from app.export.usd_card import readme
 from pipeline.base.files import write_text
 from pipeline.episode.episode import Episode
-from pipeline.report.card.values import rounded
+from pipeline.report.quantities import rounded
 from pipeline.simulator.model import GRAVITY
 from sling2sim2real.model import Model
 from validation.engines.mesh import Tube

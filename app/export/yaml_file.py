@@ -12,7 +12,7 @@ from app.export import values as about
 from app.export.match import draws_of
 from pipeline.base.files import write_text
 from pipeline.episode.episode import Episode
-from pipeline.report.card.values import rounded
+from pipeline.report.quantities import rounded
 from pipeline.simulator.rubber import TIMES, uniaxial
 from sling2sim2real.model import Model
 

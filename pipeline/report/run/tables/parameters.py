@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
 from pipeline.identify.objective.space import Space
+from pipeline.identify.results.units import SI_UNITS
 from pipeline.params.identification import LAWS
 from pipeline.report.drawing.styles import Styles
+from pipeline.report.quantities import QUANTITIES
 from pipeline.report.run import paper
 from pipeline.report.run.results import PRINTED, Result, Results
 from pipeline.report.run.tables.benchmark import PAPER, band_name, method_name, ordered
@@ -18,15 +20,10 @@ from pipeline.report.run.tables.cells import NONE, Table, number
 from pipeline.simulator.material import THETA
 from pipeline.simulator.rubber import RUBBER
 
-HEADS = {  # as the paper has them, with units
-    "youngs_modulus": "E [Pa]",
-    "poissons_ratio": "ν",
-    "elasticity_damping": "d [s]",
-    "dynamic_friction": "friction",
-    "damping_scale": "s",
-    **{name: name.replace("_", " ").replace("mooney", "Mooney") for name in LAWS[RUBBER]},
+HEADS = {  # as the paper has them, in SI units
+    name: replace(QUANTITIES[name], unit=SI_UNITS.get(name, "")).heading
+    for name in (*THETA, *LAWS[RUBBER])
 }
-UNITS = {"youngs_modulus": "_pa", "elasticity_damping": "_s"}
 RECORDED = {"rig": "virtual", "recording": "measured"}
 
 
@@ -149,7 +146,7 @@ def exactly(name: str, value: float) -> str:
 
 def _physical(name: str, value: float, digits: int = 2) -> str:
     """As the paper prints it: 9.29E+5, 0.46."""
-    if name in UNITS:
+    if name in SI_UNITS:
         mantissa, exponent = f"{value:.{digits}E}".split("E")
         return f"{mantissa}E{int(exponent):+d}"
     return f"{value:.{digits}f}"
@@ -162,7 +159,7 @@ def records(rows: list[IdentifiedRow]) -> pd.DataFrame:
         line = {"band": row.band, "method": row.method, "source": row.source}
         for name in _shown(rows):
             one = row.values.get(name, Value(math.nan))
-            unit = UNITS.get(name, "")
+            unit = f"_{SI_UNITS[name].lower()}" if name in SI_UNITS else ""
             for part, value in (("", one.value), ("_low", one.low), ("_high", one.high)):
                 line[f"{name}{part}{unit}"] = value
             line[f"{name}_state"] = one.state or None

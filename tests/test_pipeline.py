@@ -7,15 +7,24 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+from pipeline.params.lab import StepParams
 from tests import project
 from tests.project import ROOT, ROUGH, copy_project
 
 pytestmark = pytest.mark.slow
+METHODS = ["least_squares", "sling2sim2real"]
+STEPS = {step: [] for step in StepParams.model_fields}
 TINY = {
     "run.bands": ["band1"],
     "run.rig": ["band1"],
-    "run.methods": ["least_squares", "sling2sim2real"],
-    "run.ablations": {"bands": ["band1"], "methods": ["de"]},
+    "run.methods": METHODS,
+    "run.steps": STEPS | {"history": METHODS, "clusters": METHODS[1:], "density": METHODS[:1]},
+    "run.ablations": {
+        "bands": ["band1"],
+        "rig": ["band1"],
+        "methods": ["de"],
+        "steps": STEPS | {"de": ["de"]},
+    },
     "cloud.points": 100,
     **{f"sling.{name}": value for name, value in ROUGH.items()},
     "optimizer.population": 6,
@@ -35,12 +44,12 @@ TINY = {
     "rig.tolerance": 1e-3,
     "rig.camera.drop_rate": 0.8,
 }
-SEARCHED = ("history", "theta", "policy", "trials")
-METHODS = [f"{step}@band1-sling2sim2real" for step in SEARCHED]
-FITTED = [f"{step}@band1-least_squares" for step in SEARCHED]
-ABLATIONS = [f"ablation_{step}@band1-de" for step in SEARCHED]
-OF_THE_BAND = {f"{step}@band1" for step in ("record", "episode", "mounting", "floor")}
-EVERYTHING = {*OF_THE_BAND, *METHODS, *FITTED, *ABLATIONS, "card@band1", "report"}
+JUDGED = ("theta", "policy", "launches", "trials")
+SEARCHED = [f"{step}@band1-sling2sim2real" for step in ("history", "clusters", "cma", *JUDGED)]
+FITTED = [f"{step}@band1-least_squares" for step in ("history", "density", *JUDGED)]
+ABLATIONS = [f"ablation_{step}@band1-de" for step in ("de", *JUDGED)]
+OF_THE_BAND = {f"{step}@band1" for step in ("record", "episode", "clamps", "evidence", "floor")}
+EVERYTHING = {*OF_THE_BAND, *SEARCHED, *FITTED, *ABLATIONS, "card@band1", "report"}
 
 
 class Copy(project.Copy):
@@ -105,12 +114,12 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
         script = name.removeprefix("ablation_")
         step, *item = name.split("@")
         if step == "card":  # of the first method
-            script = f"{name}-{TINY['run.methods'][0]}"
+            script = f"{name}-{METHODS[0]}"
         band, _, method = item[0].partition("-") if item else ("", "", "")
         listed = [
             key.replace("${item.band}", band)
             .replace("${item.method}", method)
-            .replace("${run.methods[0]}", TINY["run.methods"][0])
+            .replace("${run.methods[0]}", METHODS[0])
             for key in stages[step].get("params", [])
         ]
         notes = list((project.folder.parent / "audit").glob(f"{script}.*.json"))
@@ -183,9 +192,9 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
         "--force",
         "--no-run-cache",
         "--downstream",
-        METHODS[0],  # the ablation's search of one phase: tests/identify/objective/test_cache.py
+        SEARCHED[0],  # the ablation's search of one phase: tests/identify/objective/test_cache.py
     )
-    assert ran == {*METHODS, "report"}
+    assert ran == {*SEARCHED, "report"}
     assert (project.folder / "dvc.lock").read_text() == before
     for file, content in reports.items():
         assert file.read_bytes() == content, file
@@ -193,7 +202,8 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
 
 def test_a_variation_of_k_top_keeps_the_history(project: Copy) -> None:
     project.commit()
-    theta = METHODS[1]
-    assert project.dvc("exp", "run", "-S", "optimizer.k_top=1", theta) == {theta}
+    theta = "theta@band1-sling2sim2real"
+    ran = project.dvc("exp", "run", "-S", "optimizer.k_top=1", theta)
+    assert ran == {"clusters@band1-sling2sim2real", "cma@band1-sling2sim2real", theta}
     content = YAML(typ="safe").load(project.folder / "params.yaml")
     assert content["optimizer"]["k_top"] == 1

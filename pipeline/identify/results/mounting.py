@@ -29,7 +29,7 @@ def load_sling(
 
     Raises NotMade where the file of the mounting is damaged.
     """
-    path, mounting = Layout(Path(root)).mounting(band), None
+    path, mounting = Layout(Path(root)).clamps(band), None
     if mounted and path.exists():
         mounting = read_json(path, Mounting).model_dump()
     sling = Sling.of(params.bands[band], params.setup, params.sling, mounting)

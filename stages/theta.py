@@ -36,7 +36,8 @@ from pipeline.identify.results.theta import calibrated
 from pipeline.identify.search.history import History, theta_content
 from pipeline.identify.search.loop import Free, search
 from pipeline.identify.search.regions import Region, regions_of, save_regions
-from pipeline.params.identification import LAWS, LEAST_SQUARES
+from pipeline.params import Params
+from pipeline.params.identification import LAWS, LEAST_SQUARES, MethodParams, OptimizerParams
 from pipeline.simulator.material import THETA
 from pipeline.simulator.rubber import RUBBER
 from stages.start import run, started
@@ -61,7 +62,7 @@ def main() -> None:
         print(f"  {name} {value:.4g}{_trust(told['parameters'][name]) if told else ''}")
 
 
-def searched(params, band: str, method: str, free: Free, regions: list[Region]) -> dict:
+def searched(params: Params, band: str, method: str, free: Free, regions: list[Region]) -> dict:
     """The best of all that a search and a CMA-ES in each region evaluated."""
     layout, law = Layout(), params.methods[method].law
     if regions:
@@ -75,7 +76,7 @@ def searched(params, band: str, method: str, free: Free, regions: list[Region]) 
     return theta_content(history, band, known | unmounted(params, method))
 
 
-def fitted(params, band: str, method: str) -> tuple[dict, dict]:
+def fitted(params: Params, band: str, method: str) -> tuple[dict, dict]:
     """The mode of the density over all evidence, from the best that was explored."""
     layout, names = Layout(), (*THETA, *LAWS[params.methods[method].law])
     explored = History.load(method, names, layout.history(band, method))
@@ -109,7 +110,7 @@ def fitted(params, band: str, method: str) -> tuple[dict, dict]:
     return theta_content(history, band, content), samples
 
 
-def refine(params, band: str, method: str, free: Free, regions: list[Region]) -> History:
+def refine(params: Params, band: str, method: str, free: Free, regions: list[Region]) -> History:
     """What a CMA-ES in each region evaluates; no row where there is no region."""
     optimizer, history = params.optimizer, History(method, Space.of_method(params, method).names)
     if regions:
@@ -123,7 +124,9 @@ def refine(params, band: str, method: str, free: Free, regions: list[Region]) ->
     return history
 
 
-def promising(about, optimizer, explored: History) -> tuple[list[Region], int]:
+def promising(
+    about: MethodParams, optimizer: OptimizerParams, explored: History
+) -> tuple[list[Region], int]:
     """Regions of a history and how many were asked for; none where the search has one phase."""
     if about.search != "multistart":
         return [], 0
@@ -131,7 +134,7 @@ def promising(about, optimizer, explored: History) -> tuple[list[Region], int]:
     return regions_of(about, optimizer, explored)
 
 
-def unmounted(params, method: str) -> dict:
+def unmounted(params: Params, method: str) -> dict:
     """What a θ file says where the method leaves out the calibration of the clamps."""
     return {} if params.methods[method].mounting else {"mounted": False}
 

@@ -11,12 +11,13 @@ from pathlib import Path
 from pipeline.base import launch_table as table
 from pipeline.base.errors import UserError
 from pipeline.identify.posterior.launches import Observed
+from pipeline.params import Params
 
 COLUMNS = (*table.DRAW, "draw_error_m", table.LANDING)  # as they are written
 MOST_ERROR = 0.1  # of a draw [m]
 
 
-def read_evidence(folder: Path, band: str, params) -> list[Observed]:
+def read_evidence(folder: Path, band: str, params: Params) -> list[Observed]:
     """Of a band, oldest first; none where it has no file.
 
     A draw without an error of its own has that of a commanded one, `trials.actuation_error`.

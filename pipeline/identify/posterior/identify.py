@@ -21,6 +21,7 @@ from pipeline.identify.posterior.fit import Fit, fit
 from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
 from pipeline.identify.results.theta import EXTRA
+from pipeline.params import Params
 from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.simulator.material import THETA
 from pipeline.simulator.model import LaunchHistory, Sling
@@ -76,7 +77,7 @@ class Identified:
 
 
 def identify(
-    params,
+    params: Params,
     method: str,
     sling: Sling,
     episodes: Sequence[Episode],

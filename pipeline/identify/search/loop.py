@@ -18,7 +18,7 @@ from pipeline.base.errors import UserError
 from pipeline.identify.objective.evaluate import Evaluation, Penalty
 from pipeline.identify.objective.space import Space
 from pipeline.identify.search.history import History
-from pipeline.params.identification import LEAST_SQUARES
+from pipeline.params.identification import LEAST_SQUARES, OptimizerParams
 
 
 class Optimizer(Protocol):
@@ -80,7 +80,7 @@ def latin_hypercube(dimension: int, count: int, seed: int) -> np.ndarray:
     return (points - 0.5) + 0.5
 
 
-def budget(optimizer, search: str) -> tuple[int, int]:
+def budget(optimizer: OptimizerParams, search: str) -> tuple[int, int]:
     """Rollouts to explore with and to refine with, of params.yaml's `optimizer`.
 
     A search of one phase explores with both together: all methods spend the same.

@@ -21,6 +21,7 @@ from pipeline.base.pool import Pool
 from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.measured import read_measured
 from pipeline.launching.trials.spread import landing_intervals
+from pipeline.params import Params
 
 SCHEMA = pa.schema(
     [
@@ -79,7 +80,7 @@ class Batch:
         return [None] * len(self.draws) if told is None else list(told)
 
 
-def measured(params, band: str, method: str, folder: Path) -> list[Batch]:
+def measured(params: Params, band: str, method: str, folder: Path) -> list[Batch]:
     """The user's launches of the band that say something about the method, if there are any.
 
     Args:
@@ -119,7 +120,7 @@ def launched(batch: Batch, launch: Callable) -> Batch:
     return replace(batch, kind="virtual", landing=landing, **told)
 
 
-def predict(batches: list[Batch], launcher: Callable, samples: np.ndarray | None, params):
+def predict(batches: list[Batch], launcher: Callable, samples: np.ndarray | None, params: Params):
     """What the calibrated simulator makes of the draws of all batches, N in all.
 
     Args:

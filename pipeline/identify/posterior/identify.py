@@ -22,6 +22,7 @@ from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
 from pipeline.identify.results.estimate import pull_of
 from pipeline.identify.results.theta import EXTRA
+from pipeline.params import Params
 from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.simulator.material import THETA
 from pipeline.simulator.model import LaunchHistory, Sling
@@ -77,7 +78,7 @@ class Identified:
 
 
 def fit_posterior(
-    params,
+    params: Params,
     method: str,
     sling: Sling,
     episodes: Sequence[Episode],

@@ -21,6 +21,7 @@ from pipeline.base.pool import Pool
 from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.measured import Measured
 from pipeline.launching.trials.spread import landing_intervals
+from pipeline.params import Params
 
 SCHEMA = pa.schema(
     [
@@ -144,7 +145,7 @@ def launched(batch: Batch, launch: Callable) -> Batch:
     return replace(batch, kind="virtual", landing=landing, **told)
 
 
-def predict(batches: list[Batch], launcher: Callable, samples: np.ndarray | None, params):
+def predict(batches: list[Batch], launcher: Callable, samples: np.ndarray | None, params: Params):
     """What the calibrated simulator makes of the draws of all batches, N in all.
 
     Args:

@@ -20,10 +20,10 @@ from pipeline.report.run.tables.cells import NONE, Table, number
 from pipeline.simulator.material import THETA
 from pipeline.simulator.rubber import RUBBER
 
-HEADS = {  # as the paper has them, in SI units
+HEADS = {  # as the paper has them, in SI units but for Young's modulus
     name: replace(QUANTITIES[name], unit=SI_UNITS.get(name, "")).heading
     for name in (*THETA, *LAWS[RUBBER])
-}
+} | {"youngs_modulus": QUANTITIES["youngs_modulus"].heading}
 RECORDED = {"rig": "virtual", "recording": "measured"}
 
 
@@ -145,7 +145,10 @@ def exactly(name: str, value: float) -> str:
 
 
 def _physical(name: str, value: float, digits: int = 2) -> str:
-    """As the paper prints it: 9.29E+5, 0.46."""
+    """As in 929, 1.11E-2, 0.46."""
+    if name == "youngs_modulus":
+        value *= QUANTITIES[name].factor
+        return f"{value:.{max(digits - math.floor(math.log10(value)), 0)}f}"
     if name in SI_UNITS:
         mantissa, exponent = f"{value:.{digits}E}".split("E")
         return f"{mantissa}E{int(exponent):+d}"

@@ -35,13 +35,20 @@ QUANTITIES = {  # in the order of the cards
     "damping_scale": Quantity("damping scale", "s"),
     "poissons_ratio": Quantity("Poisson's ratio", "ν"),
     "dynamic_friction": Quantity("friction of the pads", "friction"),
+    "damping_product": Quantity("product of scale and damping time", "damping s·d", "ms", 1e3),
     "air_drag": Quantity("drag beyond a cylinder's", "air drag", "1/s"),
     "turn_damping": Quantity("damping of turns", "turn damping"),
     "returned_share": Quantity("energy that a launch returns", "returned share", "%", 100.0),
-    "damping_product": Quantity("product of scale and damping time", "damping s·d", "ms", 1e3),
     "release_time": Quantity("release", "release", "s"),
     "camera_delay": Quantity("delay of the camera", "camera delay", "ms", 1e3),
 }
+
+
+def coordinate(name: str) -> str:
+    """A coordinate of the density (pipeline/identify/posterior/coordinates.py) in words."""
+    plain = name.removeprefix("log_")
+    words = QUANTITIES[plain].symbol if plain in QUANTITIES else plain.replace("_", " ")
+    return words if plain == name else f"log {words}"
 
 
 def rounded(value: float, digits: int = 3) -> float:

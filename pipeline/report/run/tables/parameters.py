@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -20,10 +20,7 @@ from pipeline.report.run.tables.cells import NONE, Table, number
 from pipeline.simulator.material import THETA
 from pipeline.simulator.rubber import RUBBER
 
-HEADS = {  # as the paper has them, in SI units but for Young's modulus
-    name: replace(QUANTITIES[name], unit=SI_UNITS.get(name, "")).heading
-    for name in (*THETA, *LAWS[RUBBER])
-} | {"youngs_modulus": QUANTITIES["youngs_modulus"].heading}
+NAMES = (*THETA, *LAWS[RUBBER])
 RECORDED = {"rig": "virtual", "recording": "measured"}
 
 
@@ -62,7 +59,7 @@ def identified(results: Results, params) -> list[IdentifiedRow]:
     for band, ran in results.methods.items():
         for method in ordered(ran):
             result, source = ran[method], RECORDED[params.bands[band].source]
-            names = (name for name in HEADS if name in result.theta["theta"])
+            names = (name for name in NAMES if name in result.theta["theta"])
             values = {name: _value(params, result, name) for name in names}
             rows.append(IdentifiedRow(band, method, source, values, printed_loss(result)))
             if cells := paper.THETA.get((band, method)):
@@ -113,12 +110,13 @@ def as_table(rows: list[IdentifiedRow], styles: Styles) -> Table:
         loss = f"**{loss}**" if row.loss == least.get((row.band, row.source)) else loss
         whose = band_name(row.band), method_name(row.method, styles), row.source
         lines.append([*whose, *cells, loss])
-    return ["band", "method", "source", *(HEADS[name] for name in names), "loss"], lines
+    heads = [QUANTITIES[name].heading for name in names]
+    return ["band", "method", "source", *heads, "loss"], lines
 
 
 def _shown(rows: list[IdentifiedRow]) -> list[str]:
     """The five, and what a law that any method runs with has beside them."""
-    return [name for name in HEADS if name in THETA or any(name in row.values for row in rows)]
+    return [name for name in NAMES if name in THETA or any(name in row.values for row in rows)]
 
 
 def _cell(name: str, one: Value) -> str:
@@ -140,18 +138,17 @@ def _between(name: str, low: float, high: float) -> str:
 
 def exactly(name: str, value: float) -> str:
     """A setting as the tables print parameters, with more digits where it has more."""
-    shown = (_physical(name, value, digits) for digits in (2, 3, 4, 5))
-    return next((text for text in shown if float(text) == value), f"{value:g}")
+    texts = [_physical(name, value, digits) for digits in (2, 3, 4, 5)]
+    value *= QUANTITIES[name].factor
+    return next((text for text in texts if math.isclose(float(text), value)), f"{value:g}")
 
 
 def _physical(name: str, value: float, digits: int = 2) -> str:
-    """As in 929, 1.11E-2, 0.46."""
-    if name == "youngs_modulus":
-        value *= QUANTITIES[name].factor
-        return f"{value:.{max(digits - math.floor(math.log10(value)), 0)}f}"
-    if name in SI_UNITS:
-        mantissa, exponent = f"{value:.{digits}E}".split("E")
-        return f"{mantissa}E{int(exponent):+d}"
+    """As in 929, 11.1, 0.46: one digit more where there is a unit, or so many after the point."""
+    quantity = QUANTITIES[name]
+    value *= quantity.factor
+    if quantity.unit and value:
+        digits = max(digits - math.floor(math.log10(abs(value))), 0)
     return f"{value:.{digits}f}"
 
 

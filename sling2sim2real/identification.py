@@ -209,7 +209,7 @@ def identify(
         start=point,
         observed=launches,
         workers=workers() or cores(),
-        progress=lambda fit: progress(f"expansion {fit.steps}: misfit {fit.misfit:.2f}"),
+        progress=progress,
     ).density
     content = {"band": band.name, **posterior.theta_entries(density)}
     told = posterior.confidence(density, settings.parameters)

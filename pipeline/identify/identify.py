@@ -13,7 +13,6 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.optimizers.cma.refine import refine
-from pipeline.identify.posterior.fit import Fit
 from pipeline.identify.posterior.identify import Identified, fit_posterior
 from pipeline.identify.posterior.launches import Observed
 from pipeline.identify.search.explore import explore
@@ -72,7 +71,7 @@ def identify(
     start: np.ndarray | None = None,
     observed: Sequence[Observed] = (),
     workers: int | None = None,
-    progress: Callable[[Fit], None] = lambda fit: None,
+    progress: Callable[[str], None] = lambda line: None,
 ) -> IdentifiedBand:
     """Identify a band by a method: least squares takes all episodes, other searches the first.
 
@@ -82,16 +81,25 @@ def identify(
         start: A point (P,) to fit the density from, without any search.
         observed: Launches that are evidence.
         workers: Threads of the fit; they change no result.
-        progress: Called with each step of the fit.
+        progress: Called with a line after the exploration and at each step of the fit.
 
     Raises:
         UserError: All simulations fail.
     """
-    evaluations = None if start is not None else evaluations_of(params, method, evaluate)
+    evaluations = None
+    if start is None:
+        evaluations = evaluations_of(params, method, evaluate)
+        progress(f"explored {len(evaluations.total)} points")
     if params.methods[method].search != LEAST_SQUARES:
         return IdentifiedBand(evaluations, None)
-    start = evaluations.best_point() if start is None else start
-    given = {"observed": observed, "workers": workers, "progress": progress}
-    return IdentifiedBand(
-        evaluations, fit_posterior(params, method, sling, episodes, start, **given)
+    density = fit_posterior(
+        params,
+        method,
+        sling,
+        episodes,
+        evaluations.best_point() if start is None else start,
+        observed=observed,
+        workers=workers,
+        progress=lambda fit: progress(f"expansion {fit.steps}: misfit {fit.misfit:.2f}"),
     )
+    return IdentifiedBand(evaluations, density)

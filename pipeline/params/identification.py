@@ -225,15 +225,15 @@ def methods_by_step(methods: Iterable[str], known: Mapping[str, MethodParams]) -
     """What `run.steps` must hold for `methods`, each of which is in `known`."""
     found: dict[str, list] = {step: [] for step in StepParams.model_fields}
     for name in methods:
-        for step in STEPS.get(known[name].search, ("search",)):
+        for step in steps_of(known[name].search):
             if step in found:  # `cma` has the list of `clusters`
                 found[step].append(name)
     return found
 
 
-def last_step(search: str) -> str:
-    """The stage that ends a search and writes its evaluations."""
-    return STEPS.get(search, ("search",))[-1]
+def steps_of(search: str) -> tuple[str, ...]:
+    """The stages of a search, the last of which writes its evaluations."""
+    return STEPS.get(search, ("search",))
 
 
 def check_method(

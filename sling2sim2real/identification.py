@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +30,7 @@ from pipeline.identify.search.loop import Free, budget, search
 from pipeline.launching.trials.stretch import recorded_stretch
 from pipeline.params.identification import LAWS, LEAST_SQUARES
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.simulator.model import ClampedBand, LaunchHistory
 from sling2sim2real.model import Band, Model, Theta, known
 from sling2sim2real.settings import Settings
 
@@ -229,13 +229,13 @@ def identify(
     )
 
 
-def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> Sling:
-    sling = Sling.of(band, settings.setup, settings.sling, mounting and mounting.model_dump())
-    return replace(sling, law=settings.methods[METHOD].law)
+def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> ClampedBand:
+    law = settings.methods[METHOD].law
+    return ClampedBand.of(band, settings.setup, settings.sling, mounting, law=law)
 
 
 def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
-    sling = Sling.of(band, settings.setup, settings.sling, as_rod=True)
+    sling = ClampedBand.of(band, settings.setup, settings.sling, as_rod=True)
     found = calibrate_clamps(
         sling,
         episode,
@@ -245,7 +245,7 @@ def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
     return Mounting.model_validate(found)
 
 
-def _explored(episode: Episode, sling: Sling, settings: Settings) -> tuple[np.ndarray, int]:
+def _explored(episode: Episode, sling: ClampedBand, settings: Settings) -> tuple[np.ndarray, int]:
     """The best point (P,) of a design over the box, and of how many."""
     about, space = settings.methods[METHOD], Space.of_method(settings, METHOD)
     loss = EpisodeLoss.of(settings, METHOD, episode, sling)

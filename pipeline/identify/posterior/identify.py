@@ -8,7 +8,7 @@ open is the model's discrepancy, and no other is assumed but the returned share'
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
 from pipeline.identify.results.theta import EXTRA
 from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from pipeline.simulator.rubber import RUBBER
 
 LEVEL = 0.9
@@ -78,7 +78,7 @@ class Identified:
 def identify(
     params,
     method: str,
-    sling: Sling,
+    sling: ClampedBand,
     episodes: Sequence[Episode],
     start: np.ndarray,
     *,
@@ -101,7 +101,10 @@ def identify(
     friction = params.methods[method].fixed["dynamic_friction"]
     recordings = [Likelihood(one, sling, cutoff, friction) for one in episodes]
     coordinates = Coordinates.of_method(params, method, sling)
-    launches = LaunchLikelihood(observed, launched(sling, episodes[0])) if observed else None
+    launches = None
+    if observed:
+        setup = LaunchSetup.of(params.setup, params.sling, recorded_history(sling, episodes[0]))
+        launches = LaunchLikelihood(observed, sling, setup)
     known = {"launches": launches, "workers": workers, "progress": progress}
     found = fit(recordings, coordinates, coordinates.of(start), **known)
     birge = disagreement(found)
@@ -113,11 +116,9 @@ def identify(
     return Identified(coordinates, found, birge, samples, recordings, launches)
 
 
-def launched(sling: Sling, episode: Episode) -> Sling:
-    """The sling as it is launched: a law that remembers takes the recording's pull and pause."""
-    if sling.law != RUBBER:
-        return sling
-    return replace(sling, history=LaunchHistory(**launch_history(episode)))
+def recorded_history(sling: ClampedBand, episode: Episode) -> LaunchHistory | None:
+    """What a band remembers that is launched as it was recorded; None for a law without memory."""
+    return LaunchHistory(**launch_history(episode)) if sling.law == RUBBER else None
 
 
 def disagreement(found: Fit) -> float:

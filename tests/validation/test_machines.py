@@ -15,6 +15,7 @@ from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.results.mounting import load_sling
 from pipeline.params import load
 from pipeline.simulator.launch import launch
+from pipeline.simulator.model import LaunchSetup
 from tests.identify.objective.own_law import own_law_episode
 from tests.project import ROOT, ROUGH
 from validation.campaigns import machines
@@ -61,7 +62,8 @@ def test_the_same_inputs_give_the_same_theta_with_other_threads(
     ours, paper = (measured["bands"][BAND][method] for method in (OURS, PAPER))
     assert len(paper["theta"]) == 5 and len(ours["theta"]) == 10
     params = load(project / "params.yaml")
-    true = launch(load_sling(params, BAND, project), np.array(TRUE), np.array(DRAWS)).landing_y
+    world = load_sling(params, BAND, project), LaunchSetup.of(params.setup, params.sling)
+    true = launch(*world, np.array(TRUE), np.array(DRAWS)).landing_y
     assert np.isfinite(true).sum() >= 8
     np.testing.assert_allclose(np.array(ours["landing"], float), true, rtol=0.05)
 

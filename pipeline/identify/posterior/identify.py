@@ -21,7 +21,7 @@ from pipeline.identify.posterior.fit import Fit, fit
 from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
 from pipeline.identify.results.theta import EXTRA
-from pipeline.params import Params
+from pipeline.params import Parameters, Params
 from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.simulator.material import THETA
 from pipeline.simulator.model import LaunchHistory, Sling
@@ -155,7 +155,7 @@ def theta_content(found: Identified, band: str, method: str) -> dict:
     }
 
 
-def confidence(found: Identified, boxes) -> dict:
+def confidence(found: Identified, boxes: Parameters) -> dict:
     """What a θ file says under `confidence`, ready for JSON.
 
     Args:
@@ -231,7 +231,7 @@ def _clocks(found: Identified) -> dict:
 def _left(found: Identified, number: int) -> dict:
     """What a recording shows that the simulation does not, and what the others alone say of it."""
     one, recording = found.fit.expansions[number], found.recordings[number]
-    about = {"force_rms": one.rms("force"), "held_rms": one.rms("held")}
+    about: dict = {"force_rms": one.rms("force"), "held_rms": one.rms("held")}
     about |= {"recoil_rms": one.rms("recoil"), "pictures": one.pictures}
     about["source"] = recording.episode.metadata.get("input", {})
     if len(found.recordings) > 1:

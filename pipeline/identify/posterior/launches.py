@@ -16,6 +16,7 @@ import numpy as np
 
 from pipeline.identify.results.theta import at_points
 from pipeline.simulator.launch import launch
+from pipeline.simulator.model import Sling
 
 TAPE = 0.01  # of a measured landing, standard deviation [m]
 NUDGE = 1e-3  # of a draw [m]
@@ -24,10 +25,13 @@ CROSS = NUDGE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
 
 @dataclass(frozen=True)
 class Observed:
-    """A launch: draw (y, z) and its standard deviation along each axis, landing [m]."""
+    """A launch: draw (y, z) and its standard deviation along each axis, landing [m].
+
+    The deviation is None where a table leaves it out.
+    """
 
     draw: tuple[float, float]
-    error: float
+    error: float | None
     landing: float
 
 
@@ -40,7 +44,7 @@ class LaunchLikelihood:
             simulated launch fails, which then counts for nothing.
     """
 
-    def __init__(self, observed: Sequence[Observed], sling) -> None:
+    def __init__(self, observed: Sequence[Observed], sling: Sling) -> None:
         self.sling = sling
         self.draws = np.array([one.draw for one in observed], float).reshape(-1, 2)
         self.errors = np.array([one.error for one in observed], float)

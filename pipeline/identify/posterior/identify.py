@@ -8,7 +8,7 @@ open is the model's discrepancy, and no other is assumed but the returned share'
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from pipeline.identify.posterior.launches import Evidence, LaunchLikelihood
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
 from pipeline.identify.results.estimate import pull_of
 from pipeline.identify.results.theta import EXTRA
-from pipeline.params import Params
+from pipeline.params import Parameters, Params
 from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.simulator.material import THETA
 from pipeline.simulator.model import ClampedBand, LaunchHistory
@@ -154,7 +154,7 @@ def theta_entries(found: Identified) -> dict:
     }
 
 
-def confidence(found: Identified, boxes) -> dict:
+def confidence(found: Identified, boxes: Parameters) -> dict:
     """What a θ file says under `confidence`, ready for JSON.
 
     Args:
@@ -230,7 +230,7 @@ def _clocks(found: Identified) -> dict:
 def _left(found: Identified, number: int) -> dict:
     """What a recording shows that the simulation does not, and what the others alone say of it."""
     one, recording = found.fit.expansions[number], found.recordings[number]
-    about = {"force_rms": one.rms("force"), "held_rms": one.rms("held")}
+    about: dict = {"force_rms": one.rms("force"), "held_rms": one.rms("held")}
     about |= {"recoil_rms": one.rms("recoil"), "pictures": one.pictures}
     about["source"] = recording.episode.metadata.get("input", {})
     if len(found.recordings) > 1:

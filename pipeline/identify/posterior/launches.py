@@ -25,10 +25,13 @@ CROSS = NUDGE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
 
 @dataclass(frozen=True)
 class Observed:
-    """A launch: draw (y, z) and its standard deviation along each axis, landing [m]."""
+    """A launch: draw (y, z) and its standard deviation along each axis, landing [m].
+
+    The deviation is None where a table leaves it out.
+    """
 
     draw: tuple[float, float]
-    error: float
+    error: float | None
     landing: float
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,12 +11,12 @@ import numpy as np
 from pipeline.base.machine import cores
 from pipeline.identify.results.theta import at_points, calibrated, launch_setup, vector
 from pipeline.params import Params
-from pipeline.simulator.launch import launch
+from pipeline.simulator.launch import Launches, launch
 
 
 def asked_of_the_hand(
     params: Params, band: str, content: dict, draw: np.ndarray, root: str | Path = "."
-) -> dict[str, float] | None:
+) -> dict[str, float | None] | None:
     """How the hand must draw a band whose law remembers it, and what it costs not to.
 
     Returns:
@@ -44,7 +44,7 @@ def simulator(
     max_force: float = np.inf,
     root: str | Path = ".",
     device: str | Sequence[str] = "cpu",
-):
+) -> Callable[..., Launches]:
     """Function that launches draws, shape (N, 2) [m], in the simulator calibrated by a θ file.
 
     A second argument gives each launch a point of its own, shape (N, P), as `at_points` has them.
@@ -52,7 +52,7 @@ def simulator(
     sling, best = calibrated(params, band, content, root), vector(content)[None]
     setup, threads = launch_setup(params, content), cores()
 
-    def launcher(draws: np.ndarray, thetas: np.ndarray | None = None):
+    def launcher(draws: np.ndarray, thetas: np.ndarray | None = None) -> Launches:
         own, theta = (sling, best) if thetas is None else at_points(sling, thetas)
         return launch(own, setup, theta, draws, max_force=max_force, device=device, workers=threads)
 

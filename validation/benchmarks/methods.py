@@ -30,7 +30,7 @@ from pipeline.identify.search.regions import regions_asked
 from pipeline.params import expect_known
 from pipeline.params.identification import LEAST_SQUARES
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from validation.benchmarks.timing import seconds, shared, timed
 from validation.synthetic import recorded_yardstick
 
@@ -87,7 +87,7 @@ def bench_methods(
 
 
 def time_search(
-    params, method: str, optimizer, sling: Sling, episode: Episode, devices: Sequence[str]
+    params, method: str, optimizer, sling: ClampedBand, episode: Episode, devices: Sequence[str]
 ) -> tuple[dict, History]:
     """One search from nothing, all its rollouts counted; and what it evaluated."""
     params = params.model_copy(update={"optimizer": optimizer})
@@ -122,7 +122,7 @@ def time_search(
     return row, history
 
 
-def _generation(params, sling: Sling, episode: Episode, method: str, devices, count: int):
+def _generation(params, sling: ClampedBand, episode: Episode, method: str, devices, count: int):
     """Seconds of one generation: simulated, and with the loss, on all cores or GPUs."""
     evaluate = evaluator(params, method, sling, episode, devices)
     unit = latin_hypercube(evaluate.space.dimension, count, params.optimizer.seed)
@@ -134,7 +134,7 @@ def _generation(params, sling: Sling, episode: Episode, method: str, devices, co
 
 
 def evaluator(
-    params, method: str, sling: Sling, episode: Episode, devices: Sequence[str]
+    params, method: str, sling: ClampedBand, episode: Episode, devices: Sequence[str]
 ) -> Evaluator:
     """A method's, with nothing remembered."""
     loss = EpisodeLoss.of(params, method, episode, sling)
@@ -142,7 +142,7 @@ def evaluator(
 
 
 def _import_and_compile(
-    params, sling: Sling, episode: Episode, method: str, devices: Sequence[str]
+    params, sling: ClampedBand, episode: Episode, method: str, devices: Sequence[str]
 ) -> None:
     """What a machine does once, and a method should not pay for."""
     import torch  # noqa: F401

@@ -7,34 +7,10 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from tests import project
-from tests.project import ROOT, ROUGH, copy_project
+from tests.project import ROOT
+from validation.projects import TINY, ProjectCopy, copy_project, set_params
 
 pytestmark = pytest.mark.slow
-TINY = {
-    "run.bands": ["band1"],
-    "run.rig": ["band1"],
-    "run.methods": ["least_squares", "sling2sim2real"],
-    "run.ablations": {"bands": ["band1"], "methods": ["de"]},
-    "cloud.points": 100,
-    **{f"sling.{name}": value for name, value in ROUGH.items()},
-    "optimizer.population": 6,
-    "optimizer.generations": 2,
-    "optimizer.k_nn": 6,
-    "optimizer.k_top": 2,
-    "optimizer.cma_population": 4,
-    "optimizer.cma_rollouts": 8,
-    "policy.map_size": [7, 7],
-    "policy.envs": 32,
-    "policy.iterations": 3,
-    "trials.targets": [1.925],
-    "trials.repeats": 1,
-    "floor.map_size": [4, 4],
-    "floor.launches": 1,
-    "rig.edges": 16,
-    "rig.tolerance": 1e-3,
-    "rig.camera.drop_rate": 0.8,
-}
 SEARCHED = ("history", "theta", "policy", "trials")
 METHODS = [f"{step}@band1-sling2sim2real" for step in SEARCHED]
 FITTED = [f"{step}@band1-least_squares" for step in SEARCHED]
@@ -43,7 +19,7 @@ OF_THE_BAND = {f"{step}@band1" for step in ("record", "episode", "mounting", "fl
 EVERYTHING = {*OF_THE_BAND, *METHODS, *FITTED, *ABLATIONS, "card@band1", "report"}
 
 
-class Copy(project.Copy):
+class Copy(ProjectCopy):
     """A copy of the project's files in a Git repository of its own."""
 
     def __init__(self, folder: Path) -> None:
@@ -55,28 +31,10 @@ class Copy(project.Copy):
         )
         (folder.parent / "audit").mkdir()
         copy_project(folder)
-        self.set(TINY)
+        set_params(folder, TINY)
         evidence = folder / "data" / "evidence" / "band1.csv"
         evidence.write_text("draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.17,2.0\n")
-        self("git", "init", "-q")
-        self("git", "config", "user.name", "Test")
-        self("git", "config", "user.email", "test@example.org")
         self.commit()
-
-    def set(self, values: dict) -> None:
-        yaml, path = YAML(), self.folder / "params.yaml"
-        content = yaml.load(path)
-        for key, value in values.items():
-            *sections, name = key.split(".")
-            node = content
-            for section in sections:
-                node = node[section]
-            node[name] = value
-        yaml.dump(content, path)
-
-    def commit(self) -> None:
-        self("git", "add", "--all")
-        self("git", "commit", "-q", "-m", "state")
 
 
 @pytest.fixture(scope="module")

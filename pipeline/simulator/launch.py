@@ -100,10 +100,10 @@ def launch(
     shares = np.array_split(np.arange(count), len(devices))
     with ThreadPoolExecutor(len(devices)) as pool:
         lanes = np.concatenate(list(pool.map(launched, devices, shares)))
-    return _outcomes(sling, lanes, draws, max_force)
+    return outcomes(sling, lanes, draws, max_force)
 
 
-def _outcomes(sling: Sling, lanes: np.ndarray, draws: np.ndarray, max_force: float) -> Launches:
+def outcomes(sling: Sling, lanes: np.ndarray, draws: np.ndarray, max_force: float) -> Launches:
     """Of launches from draws (N, 2), by the slings' records (N,) of records.LANE."""
     outcome = np.round(lanes["outcome"])
     hold_force = np.linalg.norm(lanes["hold_force"], axis=1)

@@ -22,8 +22,8 @@ from pipeline.report.drawing.styles import COLORS, INK, THEME
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.world import World
-from tests.project import ROOT
 from validation.campaigns.test_orange import copy_of_the_project, run
+from validation.code import ROOT
 
 pytestmark = pytest.mark.validation
 

@@ -17,7 +17,8 @@ import pytest
 from app.preflight.add_band import add_band
 from pipeline.params import load
 from pipeline.report.run.tables.landings import prediction_error
-from tests.project import ROOT, copy_project
+from validation.code import ROOT
+from validation.projects import copy_project
 
 pytestmark = pytest.mark.validation
 

@@ -21,8 +21,8 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from pipeline.params import Params, load
-from tests.recording.bag import Lens, Truth, write_bag
-from tests.recording.foxglove_bag import translate
+from validation.recordings.bag import Lens, Truth, write_bag
+from validation.recordings.foxglove_bag import translate
 
 CONTAINERS = {
     "zstd": {"compression": CompressionType.ZSTD},

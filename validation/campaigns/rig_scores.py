@@ -84,7 +84,9 @@ class RigIdentification:
     seconds: float
 
 
-def identified(params: Params, band: str, method: str, seed: int, folder: Path) -> RigIdentification:
+def identified(
+    params: Params, band: str, method: str, seed: int, folder: Path
+) -> RigIdentification:
     """Identify the episode in `folder` with a seed of the search. Raises UserError."""
     optimizer = params.optimizer.model_copy(update={"seed": seed})
     params = params.model_copy(update={"optimizer": optimizer})

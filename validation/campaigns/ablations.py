@@ -32,13 +32,12 @@ from pipeline.params.identification import MethodParams
 from validation.benchmarks.timing import environment
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import aimed, errors_on_the_rig, identified, recorded
-from validation.campaigns.runner import ResultLines, plain, result_of
+from validation.campaigns.runner import PAPER, ResultLines, plain, result_of
 from validation.paired import LEVEL, compared, mean_interval
 
 WORK = Path("data/ablations")
 REPORT = Path("reports/validation/ablations.json")
 FIRST, SEEDS = 1001, 5  # rig seed of the first recording; search seeds on it
-PAPER = "sling2sim2real"
 LAST = "plain_bo"  # takes as long as all others
 
 

@@ -14,10 +14,10 @@ from pipeline.params import Params, load
 from pipeline.simulator.interaction import interact
 from validation import orange
 from validation.campaigns.rig_scores import aimed, errors_on_the_rig
+from validation.campaigns.runner import PAPER
 from validation.density import Calibrated
 from validation.effects import AS_IS
 
-PAPER, OURS = "sling2sim2real", "least_squares"
 SWITCHES = {  # section and values, as the paper has them
     AS_IS: ("method_defaults", {}),
     "mounting: false": ("method_defaults", {"mounting": False}),

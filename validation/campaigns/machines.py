@@ -45,11 +45,11 @@ from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
 from pipeline.simulator.material import THETA
 from validation.benchmarks.timing import environment
+from validation.campaigns.runner import OURS, PAPER
 from validation.density import found
 
 FOLDER, TWICE = Path("reports/validation/machines"), Path("reports/validation/twice.json")
 COMMITTED, TABLE = Path(), Path("reports/tables/table1.csv")
-OURS, PAPER = "least_squares", "sling2sim2real"
 DRAWS = [*product((-0.36, -0.31, -0.27), (-0.20, -0.15, -0.11))]  # (y, z) [m], all in the box
 LIMIT = 2e-3  # of a landing of ours, relative
 ALONE = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"  # one each, as stages have

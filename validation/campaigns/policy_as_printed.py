@@ -33,13 +33,12 @@ from pipeline.policy.environment import projectile_start
 from pipeline.policy.train import train
 from validation.benchmarks.timing import environment, timed
 from validation.campaigns import runner
-from validation.campaigns.runner import ResultLines, plain
+from validation.campaigns.runner import PAPER, ResultLines, plain
 from validation.code import ROOT, digest
 from validation.paired import mean_interval
 
 WORK = Path("data/policy_as_printed")
 REPORT = Path("reports/validation/policy-as-printed.json")
-METHOD = "sling2sim2real"  # whose θ: the paper's
 USUAL = {"landings": "map", "exploration": "scheduled", "state": "target"}
 PRINTED = {"landings": "simulated", "exploration": "learned", "state": "projectile_target"}
 SWITCHES = {"usual": {}, **{name: {name: PRINTED[name]} for name in PRINTED}, "all": PRINTED}
@@ -146,7 +145,7 @@ def main() -> None:
     params = load()
     parser = runner.parser(__doc__, REPORT)
     parser.add_argument("--bands", nargs="+", default=list(params.run.bands))
-    parser.add_argument("--method", default=METHOD, help=f"whose θ (default: {METHOD})")
+    parser.add_argument("--method", default=PAPER, help=f"whose θ (default: {PAPER})")
     parser.add_argument("--seeds", nargs="+", type=int, default=SEEDS)
     parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
     args = parser.parse_args()

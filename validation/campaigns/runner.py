@@ -25,6 +25,7 @@ from pipeline.base.machine import cores
 from pipeline.base.pool import Pool
 
 THREADS = ("SLING_WORKERS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+OURS, PAPER = "least_squares", "sling2sim2real"  # methods of params.yaml
 Job = TypeVar("Job")
 Result = dict[str, object]
 

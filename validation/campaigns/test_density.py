@@ -23,14 +23,14 @@ from pipeline.recording.build import build_episodes
 from validation import density
 from validation.campaigns import rig_scores
 from validation.campaigns.rig_scores import calibrated_clamps, result, sling_of, summary
-from validation.campaigns.runner import each, made_once
+from validation.campaigns.runner import OURS, PAPER, each, made_once
 from validation.code import ROOT, digests
 from validation.orange import landings, with_orange
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
 pytestmark = pytest.mark.validation
 
-METHODS = OURS, PAPER = "least_squares", "sling2sim2real"
+METHODS = OURS, PAPER
 BANDS, FIVE = ("band1", "band2", "band3"), 5
 FOLDER = Path(os.environ.get("SLING_DENSITY", ROOT / ".checkpoints/density"))
 CODE = fingerprint(json.dumps(digests(Path(rig_scores.__file__))))[:12]  # of what scores hang on

@@ -22,12 +22,13 @@ from pipeline.report.drawing.styles import COLORS, INK, THEME
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.world import World
+from validation.campaigns.runner import OURS, PAPER
 from validation.campaigns.test_orange import copy_of_the_project, run
 from validation.code import ROOT
 
 pytestmark = pytest.mark.validation
 
-PAPER, OURS = METHODS = ("sling2sim2real", "least_squares")
+METHODS = PAPER, OURS
 FACTOR = 1.5  # times the floor, asked of ours
 SHOTS, REACH = 40, 0.05  # launches that the oracle's θ is fitted to; m beyond the trained range
 STARTS, STEP, LOST = 48, 2e-3, 0.5  # of the fit: points, of the unit cube, m for a failed launch

@@ -22,9 +22,9 @@ from pipeline.recording.input.reader import Recording, Stream
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.view import Scene, View
 from validation.recordings import strand
+from validation.recordings.bag import FLOOR
 from validation.recordings.strand import GRASP, RELEASE, REST, TIPS
 
-FLOOR = -0.52
 SIZE, FOCAL = (640, 480), 495.0
 RANGE, BLUR = 2.2, 0.0006  # m beyond which there is no depth; noise at 1 m [m]
 LIGHT = np.array([0.35, 0.30, 0.89])

@@ -31,7 +31,7 @@ from validation.projects import (  # noqa: E402
     TINY,
     ProjectCopy,
     copy_project,
-    set_params,
+    run_of,
 )
 
 BUDGET = {  # long enough to be looked at, and to converge
@@ -160,7 +160,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place, browsing() as page:
         copy = ProjectCopy(Path(place, "copy"), SLING_WORKERS="1")
         copy_project(copy.folder)
-        set_params(copy.folder, TINY | BUDGET)
+        copy.set(TINY | run_of(["band1"], ["least_squares", "sling2sim2real"], ["de"]) | BUDGET)
         copy.commit()
         with serving(copy) as server:
             shoot(copy, server, page, folder)

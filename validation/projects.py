@@ -10,13 +10,15 @@ import subprocess
 import sys
 import time
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
 import psutil
 from ruamel.yaml import YAML
 
+from pipeline.params import load
+from pipeline.params.identification import methods_by_step
 from validation.code import ROOT
 
 CLI = ("-c", "from app.cli import main; main()")  # after `python`: this project's `sling`
@@ -30,11 +32,7 @@ ROUGH = {  # keys of `sling` for a fast simulation
     "recoil_step": 5e-4,
     "swing_step": 2e-3,
 }
-TINY = {  # the whole DAG of one band in minutes
-    "run.bands": ["band1"],
-    "run.rig": ["band1"],
-    "run.methods": ["least_squares", "sling2sim2real"],
-    "run.ablations": {"bands": ["band1"], "methods": ["de"]},
+TINY = {  # keys of params.yaml for a whole run of a band in minutes
     "cloud.points": 100,
     **{f"sling.{name}": value for name, value in ROUGH.items()},
     "optimizer.population": 6,
@@ -85,6 +83,22 @@ def set_params(folder: Path, values: Mapping[str, object]) -> None:
     yaml.dump(content, path)
 
 
+def run_of(
+    bands: Sequence[str], methods: Sequence[str], ablations: Sequence[str] = ()
+) -> dict[str, object]:
+    """Keys of `run`: bands of the rig, methods, and further methods on the first band."""
+    known = load(ROOT / "params.yaml").methods
+    first = [*bands[:1]] if ablations else []
+    further = {"bands": first, "rig": first, "methods": [*ablations]}
+    return {
+        "run.bands": [*bands],
+        "run.rig": [*bands],
+        "run.methods": [*methods],
+        "run.steps": methods_by_step(methods, known),
+        "run.ablations": further | {"steps": methods_by_step(ablations, known)},
+    }
+
+
 def environment(**more: str) -> dict[str, str]:
     """Ours, with this Python and this project first, one thread a process, and `more`."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
@@ -111,6 +125,10 @@ class ProjectCopy:
     def dvc(self, *arguments: str) -> set[str]:
         """Run DVC; the stages that really ran."""
         return set(re.findall(r"^Running stage '(.+)':$", self("dvc", *arguments), re.MULTILINE))
+
+    def set(self, values: Mapping[str, object]) -> None:
+        """Set values in params.yaml, by keys with dots."""
+        set_params(self.folder, values)
 
     def commit(self) -> None:
         """Commit all files, in a Git repository of the folder's own."""

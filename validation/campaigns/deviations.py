@@ -30,8 +30,6 @@ from validation.benchmarks.timing import environment
 from validation.campaigns import runner
 from validation.campaigns.deviation_scores import (
     MESH,
-    OURS,
-    PAPER,
     SWITCHES,
     WORDS,
     forces,
@@ -39,7 +37,7 @@ from validation.campaigns.deviation_scores import (
     params_of,
 )
 from validation.campaigns.rig_scores import calibrated_clamps, identified
-from validation.campaigns.runner import ResultLines, plain, result_of
+from validation.campaigns.runner import OURS, PAPER, ResultLines, plain, result_of
 from validation.effects import AS_IS, effects, runs, table
 from validation.marked import marks, with_block
 from validation.paired import LEVEL

@@ -25,15 +25,13 @@ from validation.projects import (
     ProjectCopy,
     copy_project,
     marked,
+    run_of,
     send,
     set_params,
     wait,
 )
 
-BUDGET = TINY | {
-    "run.methods": ["sling2sim2real"],  # the fit's: least_squares
-    "run.ablations": {"bands": [], "methods": []},
-}
+BUDGET = TINY | run_of(["band1"], ["sling2sim2real"])  # the fit's: least_squares
 SOURCE = "project"
 RECORDING, NAME = "mine.mcap", "mine"  # of the fit
 MASS = 0.023  # kg, of band1, whose recording it is
@@ -161,7 +159,7 @@ class FitCopy(StruckCopy):
     """`sling fit` of a recording that the project does not know yet."""
 
     name = "sling fit"
-    values = {"run.methods": ["least_squares"]}
+    values = run_of(["band1"], ["least_squares"])
     stages = (f"card@{NAME}",)
     words = (*SLING, "fit", RECORDING, "--mass", str(MASS), "--name", NAME)
 

@@ -91,6 +91,13 @@ def test_modules_import_each_other_in_no_circle() -> None:
     TopologicalSorter(graph).prepare()  # raises CycleError
 
 
+def test_nothing_imports_the_tests() -> None:
+    """What tests and campaigns share lies in validation/, which is packaged; tests/ is not."""
+    for file in [*code(), *(ROOT / "tools").glob("*.py"), *(ROOT / "examples").glob("*.py")]:
+        names = imported(file)
+        assert not any(name.split(".")[0] == "tests" for name in names), relative(file)
+
+
 def imported(file: Path) -> set[str]:
     """Dotted names that `file` imports."""
     names: set[str] = set()

@@ -12,7 +12,17 @@ from packaging.requirements import Requirement
 
 from tests.project import ROOT
 
-OURS = {"app", "examples", "pipeline", "sling2sim2real", "stages", "tests", "tools", "validation"}
+OURS = {
+    "app",
+    "examples",
+    "pipeline",
+    "rig",
+    "sling2sim2real",
+    "stages",
+    "tests",
+    "tools",
+    "validation",
+}
 # By path, extras that come beside what everybody has.
 EXTRAS = {
     "app/cluster/": "cluster",
@@ -31,6 +41,7 @@ EXTRAS = {
     "tools/browser.py": "validation",
     "validation/": "validation",
     "validation/campaigns/": "dev",
+    "validation/recordings/": "dev",
     "validation/engines/physx/": "physx",
 }
 INSTALLED_AS = {

@@ -36,7 +36,7 @@ validate: setup       # slow campaigns, and tests by other engines and readers; 
 	.venv/bin/pip install --disable-pip-version-check -q -e '.[dev,validation]' -c constraints.txt
 	.venv/bin/sling verify
 	SLING_BROWSER=required .venv/bin/python -m pytest tests/report/run/test_browser.py tests/report/card/test_write.py
-	.venv/bin/python -m pytest tests/validation/engines tests/validation/benchmarks tests/app/export tests/recording/masks \
+	.venv/bin/python -m pytest tests/validation/engines tests/validation/benchmarks tests/export tests/recording/masks \
 		tests/recording/input/test_kinematics.py tests/app/preflight/test_pictures.py \
 		tests/rig/recorder/test_record.py
 	.venv/bin/python -m validation.campaigns.mutations

@@ -12,19 +12,29 @@ from packaging.requirements import Requirement
 
 from tests.project import ROOT
 
-OURS = {"app", "examples", "pipeline", "sling2sim2real", "stages", "tests", "tools", "validation"}
+OURS = {
+    "app",
+    "examples",
+    "pipeline",
+    "rig",
+    "sling2sim2real",
+    "stages",
+    "tests",
+    "tools",
+    "validation",
+}
 # By path, extras that come beside what everybody has.
 EXTRAS = {
     "app/cluster/": "cluster",
-    "app/export/mujoco_replay.py": "validation",
-    "app/export/newton_band.py": "validation",
+    "pipeline/export/mujoco_replay.py": "validation",
+    "pipeline/export/newton_band.py": "validation",
     "app/preflight/timeline.py": "rerun",
     "pipeline/recording/masks/sam3.py": "sam3",
     "tests/": "dev",
     "tests/recording/input/test_kinematics.py": "validation",  # skipped where that is missing
     "tests/recording/masks/": "validation",
     "tests/validation/": "validation",
-    "tests/app/export/": "validation",
+    "tests/export/": "validation",
     "tests/app/preflight/": "validation",
     "tests/rig/recorder/test_record.py": "validation",
     "tools/": "dev",

@@ -2,9 +2,9 @@
 
 DVC re-runs a stage when something listed changes; it cannot see Python's imports. This follows what
 a stage's script imports, at any depth and inside functions too, and lists the folder of each such
-file: one folder a concern. Two things are nobody's dependency, for no result hangs on them but by
+file: one folder a concern. Three things are nobody's dependency, for no result hangs on them but by
 the values in params.yaml, which DVC tracks by themselves: pipeline/params/, which holds no default,
-and stages/start.py, which reads the arguments.
+stages/start.py, which reads the arguments, and stages/dvc_files.py, which clears up.
 
     python tools/closure.py          # says what differs; exit status 1 if anything does
     python tools/closure.py --fix    # rewrite the code dependencies, comments kept
@@ -21,7 +21,7 @@ from ruamel.yaml import YAML
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from validation.code import CODE, UNTRACKED, closure, concern  # noqa: E402
+from pipeline.base.code import CODE, UNTRACKED, closure, concern  # noqa: E402
 
 
 def folders(script: Path, root: Path = ROOT) -> list[str]:

@@ -27,6 +27,7 @@ from pathlib import Path
 from threading import Lock
 
 from pipeline.base import errors
+from pipeline.base.code import digests
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_json
 from pipeline.base.fingerprint import fingerprint
@@ -35,7 +36,6 @@ from validation.benchmarks.timing import environment
 from validation.campaigns import outcomes
 from validation.campaigns.outcomes import FAULT, HANGS, MOST, name_of
 from validation.campaigns.small_recordings import CHECKED, CONTAINERS, FAMILIES, write_small
-from validation.code import digests
 
 ROOT = Path(__file__).parents[2]
 WORK, REPORT = Path("build/mutations"), Path("reports/validation/mutations.json")

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from pipeline.base.code import digests
 from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import cores
@@ -26,7 +27,6 @@ from tests.project import ROOT
 from validation import density
 from validation.campaigns import rig_scores
 from validation.campaigns.rig_scores import calibrated_clamps, result, sling_of, summary
-from validation.code import digests
 from validation.orange import landings, with_orange
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 

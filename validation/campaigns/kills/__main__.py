@@ -23,6 +23,7 @@ from pathlib import Path
 from threading import Lock
 
 from pipeline.base import errors
+from pipeline.base.code import digests
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
@@ -40,7 +41,6 @@ from validation.campaigns.kills.commands import (
     orphans,
     source,
 )
-from validation.code import digests
 
 WORK = Path("data/kills")
 REPORT = ROOT / "reports/validation/kills.json"

@@ -14,9 +14,9 @@ from pathlib import Path
 import psutil
 from ruamel.yaml import YAML, YAMLError
 
-from app.flow import locks
 from pipeline.base.files import write_json
 from pipeline.base.machine import commit
+from stages import dvc_files
 from tests import project
 from tests.app.flow.killing import SLING, Run, send
 from tests.project import ROOT, copy_project, wait
@@ -155,7 +155,7 @@ class ReproCopy(StruckCopy):
             except (ValueError, YAMLError):
                 half = True
         if half:
-            locks.mend(self.folder)
+            dvc_files.mend(self.folder)
         return half
 
 

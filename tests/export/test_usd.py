@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.export.usd import nominal
+from pipeline.export.usd import nominal
 from sling2sim2real import export
 
 

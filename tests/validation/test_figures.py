@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from app import figures
-from app.figures import NOT_TOLD, OLDER, TODAY, UNKNOWN, as_json, listed, shown
+from app.flow.graph import outdated
+from pipeline.base.code import digest
 from pipeline.base.errors import UserError
 from tests.project import ROOT, python
-from validation.code import digest
+from validation import figures
+from validation.figures import NOT_TOLD, OLDER, TODAY, UNKNOWN, as_json, listed, shown
 
 
 def git(folder: Path, *words: str) -> str:
@@ -42,7 +43,7 @@ def write(project: Path, name: str, **content) -> None:
 
 
 def only(project: Path) -> figures.CommittedFigures:
-    (found,) = listed(project, project)
+    (found,) = listed(project, outdated, project)
     return found
 
 
@@ -127,7 +128,7 @@ def test_dvc_decides_of_what_stages_write(project: Path, monkeypatch) -> None:
 def test_table_and_json_say_the_same(project: Path) -> None:
     write(project, "validation/a.json", code={"pipeline/simulator": "0123456789ab"}, met=True)
     write(project, "validation/b.json", met=False)
-    found = listed(project, project)
+    found = listed(project, outdated, project)
     lines = shown(found).splitlines()
     assert lines[1].split() == ["reports/validation/a.json", "0123456789ab", *OLDER.split(), "met"]
     assert lines[2].endswith(f"{UNKNOWN}  not met")
@@ -139,12 +140,12 @@ def test_table_and_json_say_the_same(project: Path) -> None:
 
 def test_a_users_mistake(project: Path) -> None:
     with pytest.raises(UserError, match="no figures; run this in the project's folder"):
-        listed(project)
+        listed(project, outdated)
     write(project, "validation/x.json")
     for text in ("[]", "{", "\xff"):
         (project / "reports/validation/x.json").write_text(text, encoding="latin-1")
         with pytest.raises(UserError, match="reports/validation/x.json: "):
-            listed(project)
+            listed(project, outdated)
 
 
 def test_the_command_lists_each_committed_file() -> None:

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.export import mjcf, mujoco_replay
-from app.export.card import HOLD, LANDING, Matched
-from app.export.chain import SpringChain
-from app.export.match import compared, draws_of, proof_draws
-from app.export.newton_replay import NewtonReplay, loader, numbers
+from pipeline.export import mjcf, mujoco_replay
+from pipeline.export.card import HOLD, LANDING, Matched
+from pipeline.export.chain import SpringChain
+from pipeline.export.match import compared, draws_of, proof_draws
+from pipeline.export.newton_replay import NewtonReplay, loader, numbers
 from pipeline.simulator.launch import ballistic_landing
 from pipeline.simulator.model import GRAVITY
 from sling2sim2real import UserError, export
@@ -122,8 +122,8 @@ def test_the_pull_is_near_ours(done) -> None:
 
 def test_without_newton_it_is_refused(model, tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "newton", None)
-    monkeypatch.delitem(sys.modules, "app.export.newton_band", raising=False)
-    monkeypatch.delattr("app.export.newton_band", raising=False)
+    monkeypatch.delitem(sys.modules, "pipeline.export.newton_band", raising=False)
+    monkeypatch.delattr("pipeline.export.newton_band", raising=False)
     with pytest.raises(UserError, match=r"newton is not installed: pip install -e '.\[valid"):
         export(model, "newton", tmp_path / "toy")
     assert list(tmp_path.iterdir()) == []

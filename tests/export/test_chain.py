@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.export.chain import STEPS, SpringChain
 from pipeline.base.errors import UserError
+from pipeline.export.chain import STEPS, SpringChain
 from sling2sim2real import Band, Model, Theta
 
 

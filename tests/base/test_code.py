@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from pipeline.base.code import digest, digests
+from pipeline.base.environment import SIMULATOR, environment
 from tests.project import ROOT
-from validation.benchmarks import timing
-from validation.code import digest, digests
 
 FILES = {
     "validation/bench/a.py": "from pipeline.simulator import solver\n",
@@ -25,7 +25,7 @@ def test_digests_are_of_what_is_imported_and_follow_its_changes(tmp_path: Path) 
         (tmp_path / name).write_text(text)
     script = tmp_path / "validation/bench/a.py"
     before = digests(script, root=tmp_path)
-    assert [*before] == ["rig/arm", "pipeline/simulator", "validation/bench/a.py"]
+    assert [*before] == ["pipeline/simulator", "rig/arm", "validation/bench/a.py"]
     for name, part in (
         ("pipeline/simulator/step.h", "pipeline/simulator"),
         ("pipeline/simulator/new/file.py", "pipeline/simulator"),
@@ -44,8 +44,9 @@ def test_digests_are_of_what_is_imported_and_follow_its_changes(tmp_path: Path) 
 
 
 def test_every_figure_names_its_code() -> None:
-    code = timing.environment("cpu")["code"]  # of this file
+    script = ROOT / "validation/benchmarks/throughput.py"
+    code = environment("cpu", "", script)["code"]
     assert {"pipeline/simulator", "validation/benchmarks/timing.py"} <= {*code}
-    assert code["pipeline/simulator"] == timing.SIMULATOR == digest(ROOT / "pipeline/simulator")
+    assert code["pipeline/simulator"] == SIMULATOR == digest(ROOT / "pipeline/simulator")
     script = ROOT / "validation/benchmarks/clouds.py"
-    assert "pipeline/recording" in timing.environment("cpu", "", script)["code"]
+    assert "pipeline/recording" in environment("cpu", "", script)["code"]

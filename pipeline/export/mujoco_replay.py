@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from app.export.chain import SpringChain
-from app.export.mjcf import HAND_MASS, STIFF
 from pipeline.base.errors import UserError
+from pipeline.export.chain import SpringChain
+from pipeline.export.mjcf import HAND_MASS, STIFF
 from pipeline.simulator.launch import ballistic_landing
 
 SETTLE, BRAKE = 0.25, 250.0  # s and 1/s: how long and how a drawn band is brought to rest

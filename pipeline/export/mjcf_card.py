@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.export.mjcf import VERSION
+from pipeline.export.mjcf import VERSION
 
 
 def how(name: str, step: float, finer: float, springs: float) -> str:

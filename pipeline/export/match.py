@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from app.export import mjcf
-from app.export.chain import MATCHED, SpringChain
-from app.export.mujoco_replay import MujocoBand, Shot
 from pipeline.base.errors import UserError
+from pipeline.export import mjcf
+from pipeline.export.band import CalibratedBand
+from pipeline.export.chain import MATCHED, SpringChain
+from pipeline.export.mujoco_replay import MujocoBand, Shot
 from pipeline.simulator.launch import Launches
-from sling2sim2real.model import Model
 
 GRID = 5  # draws along y and z over the box
 AROUND = 1.6  # times nearer and farther than policy.targets: where launches are matched
@@ -41,7 +41,7 @@ class DrawCompared:
         return {name: theirs / ours - 1 for name, (ours, theirs) in pairs.items()}
 
 
-def draws_of(model: Model) -> np.ndarray:
+def draws_of(model: CalibratedBand) -> np.ndarray:
     """The draws (N, 2) of a grid over the box that land around the targets.
 
     And that the arm may hold. Raises UserError where there are too few.
@@ -61,7 +61,7 @@ def draws_of(model: Model) -> np.ndarray:
     return draws[good]
 
 
-def compared(model: Model, draws: np.ndarray, shots: list[Shot]) -> list[DrawCompared]:
+def compared(model: CalibratedBand, draws: np.ndarray, shots: list[Shot]) -> list[DrawCompared]:
     """Shots of draws (N, 2) beside what the calibrated simulation does there."""
     done = model.launches(draws)
     return [
@@ -75,7 +75,7 @@ def compared(model: Model, draws: np.ndarray, shots: list[Shot]) -> list[DrawCom
     ]
 
 
-def matched(model: Model) -> SpringChain:
+def matched(model: CalibratedBand) -> SpringChain:
     """The chain whose held forces and landings around the targets are nearest to ours.
 
     Raises:
@@ -120,7 +120,7 @@ def _fitted(start: SpringChain, draws: np.ndarray, ours: Launches) -> SpringChai
     return chain_at(found.x)
 
 
-def proof_draws(model: Model) -> np.ndarray:
+def proof_draws(model: CalibratedBand) -> np.ndarray:
     """A draw for each of three targets that no match has seen, shape (3, 2).
 
     The farther the target, the farther from the fork along y; along z what lands nearest.

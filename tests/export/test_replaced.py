@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from app.export.export import replaceable
+from pipeline.export.export import replaceable
 
 CARD = {"target": "yaml", "files": {"band.yaml": "values", "README.md": "how to use it"}}
 

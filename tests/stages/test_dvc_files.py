@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 from dvc.lock import Lock, make_lock
 
-from app.flow import child, locks
+from app.flow import child
 from app.flow.graph import Graph
 from pipeline.base.errors import UserError
+from stages import dvc_files
 from tests.app.flow.toy import Toy, stage
 
 
@@ -32,12 +33,12 @@ def test_hardlink_locks_as_in_a_shared_folder(toy: Toy, monkeypatch: pytest.Monk
     for name in ("lock", "rwlock.lock"):
         with Lock(str(tmp / name)):
             pass
-    locks.mend(toy.folder)
+    dvc_files.mend(toy.folder)
     assert [*Graph(toy.folder).stages] == ["one", "two"]
     assert not (tmp / "lock").exists()
     monkeypatch.setattr("dvc.lock.DEFAULT_TIMEOUT", 0.1)
     with make_lock(str(tmp / "lock"), tmp_dir=str(tmp), hardlink_lock=True):
-        locks.mend(toy.folder)
+        dvc_files.mend(toy.folder)
         with pytest.raises(UserError, match="another DVC command is at work.* rm .dvc/tmp/lock"):
             Graph(toy.folder)
 
@@ -52,7 +53,7 @@ def test_who_is_in_a_stages_way_is_named_in_one_line(toy: Toy) -> None:
 
 def test_paths_of_the_dead_are_released_and_those_of_the_living_kept(toy: Toy) -> None:
     path = toy.folder / ".dvc/tmp/rwlock"
-    locks.mend(toy.folder)
+    dvc_files.mend(toy.folder)
     assert not path.exists()
     code = "import time; time.sleep(60)"
     living = subprocess.Popen([sys.executable, "-c", code, "repro", "-s", "count@a"])
@@ -61,14 +62,14 @@ def test_paths_of_the_dead_are_released_and_those_of_the_living_kept(toy: Toy) -
         other = {"pid": os.getpid(), "cmd": "dvc repro -s count@b"}  # a number that lives again
         held = {"write": {"/a": alive, "/b": other}, "read": {"/c": [alive, other], "/d": [other]}}
         path.write_text(json.dumps(held))
-        locks.mend(toy.folder)
+        dvc_files.mend(toy.folder)
         assert json.loads(path.read_text()) == {"write": {"/a": alive}, "read": {"/c": [alive]}}
     finally:
         living.kill()
         living.wait()
     for damaged in ("", '{"write": {', "[]", '{"write": {"/a": 1}}'):
         path.write_text(damaged)
-        locks.mend(toy.folder)
+        dvc_files.mend(toy.folder)
         assert not path.exists()
 
 
@@ -80,21 +81,21 @@ def test_a_dvc_lock_that_is_cut_off_anywhere_costs_its_last_entry(toy: Toy) -> N
     second = whole.index("  two:\n")
     for end in range(0, len(whole), 7):
         path.write_text(whole[:end])
-        locks.mend(toy.folder)
+        dvc_files.mend(toy.folder)
         if path.is_file():
             left = path.read_text()
             assert left in (whole[:end], whole[:second])
-            assert locks._is_valid(left)
+            assert dvc_files._is_valid(left)
             assert end < second or left.startswith(whole[:second])
         else:
             assert end < second
     path.write_text(whole[: second + 30])
-    locks.mend(toy.folder)
+    dvc_files.mend(toy.folder)
     assert toy.dvc("repro") == set()
     assert path.read_text() == whole
     conflict = whole.replace("  one:\n", "<<<<<<< HEAD\n  one:\n")  # not ours to mend
     path.write_text(conflict)
-    locks.mend(toy.folder)
+    dvc_files.mend(toy.folder)
     assert path.read_text() == conflict
     with pytest.raises(UserError, match="^DVC: [^\n]*dvc.lock[^\n]*$"):
         Graph(toy.folder)

@@ -16,22 +16,22 @@ from pathlib import Path
 
 import numpy as np
 
-from app.export import values as about
-from app.export.chain import SpringChain
-from app.export.match import draws_of
-from app.export.usd_card import readme
 from pipeline.base.files import write_text
 from pipeline.episode.episode import Episode
+from pipeline.export import values as about
+from pipeline.export.band import CalibratedBand
+from pipeline.export.chain import SpringChain
+from pipeline.export.match import draws_of
+from pipeline.export.mesh import Tube
+from pipeline.export.usd_card import readme
 from pipeline.report.card.values import rounded
 from pipeline.simulator.model import GRAVITY
-from sling2sim2real.model import Model
-from validation.engines.mesh import Tube
 
 RATE, ITERATIONS = 200, 64  # steps a second, of the solver: the paper's
 EDGES, GRADING = 52, 1.0  # between the clamps: 18 tetrahedra each
 
 
-def to_usd(model: Model, folder: Path, episode: Episode | None) -> dict:
+def to_usd(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
     """<band>.usda, and README.md: what it is, and what it is not."""
     draws = draws_of(model)
     tension, stretch = SpringChain.tension(model, draws, model.launches(draws).hold_force)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
-from app.export import values as about
-from app.export.chain import MATCHED, SpringChain
-from app.export.match import HOLD, LANDING, DrawCompared
-from app.export.pull import PullCompared
+from pipeline.export import values as about
+from pipeline.export.band import CalibratedBand
+from pipeline.export.chain import MATCHED, SpringChain
+from pipeline.export.match import HOLD, LANDING, DrawCompared
+from pipeline.export.pull import PullCompared
 from pipeline.report.card.values import LABELS, rounded
-from sling2sim2real.model import Model
 
 UNITS = {"hold_force": "n", "speed": "m_s", "landing": "m"}  # in names of keys
 ASKED = (
@@ -47,7 +47,7 @@ class Matched:
         )
 
 
-def content(model: Model, done: Matched, target: str, files: dict[str, str]) -> dict:
+def content(model: CalibratedBand, done: Matched, target: str, files: dict[str, str]) -> dict:
     """What card.json holds."""
     chain = done.chain
     return {

@@ -5,17 +5,16 @@ from __future__ import annotations
 from importlib.metadata import version
 from pathlib import Path
 
-from app.export import card, newton_card
-from app.export.match import compared, draws_of, matched, proof_draws
-from app.export.newton_replay import NewtonReplay, loader, numbers
-from app.export.pull import compare_pull
 from pipeline.base.files import write_json, write_text
 from pipeline.episode.episode import Episode
-from sling2sim2real.model import Model
-from sling2sim2real.simulation import pull
+from pipeline.export import card, newton_card
+from pipeline.export.band import CalibratedBand, pull_to
+from pipeline.export.match import compared, draws_of, matched, proof_draws
+from pipeline.export.newton_replay import NewtonReplay, loader, numbers
+from pipeline.export.pull import compare_pull
 
 
-def to_newton(model: Model, folder: Path, episode: Episode | None) -> dict:
+def to_newton(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
     """<band>.json and newton_band.py, proven by a replay on the CPU.
 
     The chain is matched in MuJoCo, which steps the same springs the same way. All that is said
@@ -37,7 +36,7 @@ def to_newton(model: Model, folder: Path, episode: Episode | None) -> dict:
         chain=chain,
         match=compared(model, draws, replay.launches(draws)),
         proof=compared(model, proof, shots),
-        pull=compare_pull(model, episode or pull(model, tuple(proof[-1])), replay),
+        pull=compare_pull(model, episode or pull_to(model, tuple(proof[-1])), replay),
         finer=max(map(abs, moved)),
         engine=f"Newton {version('newton')}, Warp {version('warp-lang')}, CPU",
     )

@@ -1,19 +1,28 @@
 """What killed DVC commands leave behind and DVC itself does not clear: locks, half files.
 
-`python -m app.flow.locks` clears up in the working directory.
+Both the flow and a stage that DVC runs clear up by it.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from pipeline.base.files import write_json, write_text
 
 COPIES = (".dvc/cache", "data", "reports")  # where DVC copies to
-HALF = re.compile(r"\.[\w-]{22}\.tmp")  # its names of what it has not copied to the end
+HALF = re.compile(r"\.[\w-]{22}\.tmp")  # what it calls a file until it has copied it to the end
 ENTRY = re.compile(r"^  [^ ]", re.MULTILINE)  # where a stage's entry of dvc.lock begins
+
+
+def half_files(root: Path) -> Iterator[Path]:
+    """What DVC has not copied to the end."""
+    for top in COPIES:
+        for folder, _, names in os.walk(root / top):
+            yield from (Path(folder, name) for name in names if HALF.fullmatch(name))
 
 
 def mend(root: Path) -> None:
@@ -39,9 +48,8 @@ def mend(root: Path) -> None:
         hardlink = Config(str(folder.parent))["core"].get("hardlink_lock", False)
         with lock("lock"):  # whoever copies, or writes dvc.lock, holds it
             _cut_back(Path(root, "dvc.lock"))
-            for file in (file for top in COPIES for file in Path(root, top).rglob(".*.tmp")):
-                if HALF.fullmatch(file.name):
-                    file.unlink(missing_ok=True)
+            for file in [*half_files(root)]:
+                file.unlink(missing_ok=True)
         with lock("rwlock.lock"):
             _release(folder / "rwlock")
     except DvcException:  # such as that a DVC is at work: it is for the graph to say so
@@ -111,7 +119,3 @@ def _lives(holder: dict) -> bool:
     except psutil.AccessDenied:
         return True
     return holder["cmd"].partition(" ")[2] in " ".join(words)  # `python -m` renames the first
-
-
-if __name__ == "__main__":
-    mend(Path())

@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 from ruamel.yaml import YAML
 
-from app.export import values as about
-from app.export.match import draws_of
 from pipeline.base.files import write_text
 from pipeline.episode.episode import Episode
+from pipeline.export import values as about
+from pipeline.export.band import CalibratedBand
+from pipeline.export.match import draws_of
 from pipeline.report.card.values import rounded
 from pipeline.simulator.rubber import TIMES, uniaxial
-from sling2sim2real.model import Model
 
 STRETCHES = np.arange(1.0, 2.21, 0.1)
 
 
-def to_yaml(model: Model, folder: Path, episode: Episode | None) -> dict:
+def to_yaml(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
     """<band>.yaml, and README.md: how to read it."""
     name = f"{model.band.name}.yaml"
     content = content_of(model)
@@ -39,7 +39,7 @@ READ_ME = (
 )
 
 
-def content_of(model: Model) -> dict:
+def content_of(model: CalibratedBand) -> dict:
     """What the file holds."""
     theta, draws = model.theta, draws_of(model)
     share = theta.mooney_share or 0.0
@@ -73,7 +73,7 @@ def content_of(model: Model) -> dict:
     }
 
 
-def _readme(model: Model, name: str, content: dict) -> str:
+def _readme(model: CalibratedBand, name: str, content: dict) -> str:
     kilo = f"{1e-3 * model.theta.youngs_modulus:.3g} kPa"
     history, after = content["history"], ""
     if history:

@@ -11,13 +11,13 @@ from __future__ import annotations
 import json
 import re
 import subprocess
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from pipeline.base.code import CODE, ROOT, digest, digests
 from pipeline.base.errors import UserError
 from pipeline.base.fingerprint import fingerprint
-from validation.code import CODE, ROOT, digest, digests
 
 TODAY, OLDER = "today", "older code"
 UNKNOWN = "unknown: written before digests"
@@ -53,10 +53,15 @@ class CommittedFigures:
     met: bool | None
 
 
-def listed(root: Path, code: Path = ROOT) -> list[CommittedFigures]:
+def listed(
+    root: Path,
+    outdated: Callable[[Path, Iterable[str], tuple[str, ...]], Mapping[str, bool | None]],
+    code: Path = ROOT,
+) -> list[CommittedFigures]:
     """Every JSON file under root/reports, held against the sources in `code`.
 
-    DVC wants `root` to be the working directory.
+    Args:
+        outdated: DVC's answer of stages, by name (app/flow/graph.py).
 
     Raises:
         UserError: There are none, or one of them is no JSON object.
@@ -65,7 +70,11 @@ def listed(root: Path, code: Path = ROOT) -> list[CommittedFigures]:
     files = list(dict.fromkeys(one for kind in PATTERNS for one in sorted(reports.glob(kind))))
     if not files:
         raise UserError(f"{reports}: no figures; run this in the project's folder")
-    stages = _by_dvc(root, {stage for file in files if (stage := _stage(file, root))})
+    names = {stage for file in files if (stage := _stage(file, root))}
+    states = {None: NOT_TOLD, True: OLDER, False: TODAY}
+    stages = (
+        {name: states[old] for name, old in outdated(root, names, CODE).items()} if names else {}
+    )
     return [_figures(file, root, code, stages.get(_stage(file, root))) for file in files]
 
 
@@ -157,25 +166,3 @@ def _stage(file: Path, root: Path) -> str | None:
     if parts == ("summary.json",):
         return "report"
     return f"card@{parts[1]}" if parts[0] == "bands" else None
-
-
-def _by_dvc(root: Path, stages: set[str]) -> dict[str, str]:
-    """Whether code or parameters of stages, or of any before them, are others than in dvc.lock."""
-    from dvc.exceptions import DvcException
-    from dvc.repo import Repo
-
-    if not stages:
-        return {}
-    found = dict.fromkeys(stages, NOT_TOLD)
-    with suppress(DvcException), Repo(str(root)) as repo:
-        for one in stages:
-            with suppress(DvcException):  # such as a band that params.yaml has not
-                found[one] = _stale(repo.status(targets=[one], with_deps=True))
-    return found
-
-
-def _stale(status: dict) -> str:
-    """OLDER if what `dvc status` prints names code or parameters; data may lack in a clone."""
-    entries = [entry for told in status.values() for entry in told if isinstance(entry, dict)]
-    parts = [part for entry in entries for part in entry.get("changed deps", {})]
-    return OLDER if any(part.startswith((*CODE, "params.yaml")) for part in parts) else TODAY

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.export.mujoco_replay import MujocoBand
-from app.export.newton_replay import NewtonReplay
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
-from sling2sim2real.model import Model
-from sling2sim2real.simulation import simulate
-from validation.engines.mesh import hand_path
+from pipeline.export.band import CalibratedBand
+from pipeline.export.mesh import hand_path
+from pipeline.export.mujoco_replay import MujocoBand
+from pipeline.export.newton_replay import NewtonReplay
+from pipeline.simulator.interaction import interact
 
 
 @dataclass(frozen=True)
@@ -36,25 +36,28 @@ class PullCompared:
     taut_rms: float | None
 
 
-def compare_pull(model: Model, episode: Episode, replay: MujocoBand | NewtonReplay) -> PullCompared:
+def compare_pull(
+    model: CalibratedBand, episode: Episode, replay: MujocoBand | NewtonReplay
+) -> PullCompared:
     """Pull as in `episode`, in both. Raises UserError where our simulation fails."""
-    ours, chain = simulate(model, episode), replay.chain
-    if ours.failure:
-        raise UserError(f"the pull of {episode.band}: {ours.failure}")
+    sling, five = model.at(model.theta.point[None])
+    ours, chain = interact(sling, episode, five), replay.chain
+    if ours.failure[0]:
+        raise UserError(f"the pull of {episode.band}: {ours.failure[0]}")
     count = int((episode.release_time - episode.grasp_time) / chain.step)
     times = episode.grasp_time + chain.step * np.arange(1, count + 1)
     stamps = episode.cloud_time
     seen = (stamps > times[0]) & (stamps < times[-1])
     theirs = replay.pull(lambda start: hand_path(episode, times, start), times, stamps[seen])
 
-    held = (ours.step_time > times[0]) & (ours.step_time < times[-1])
-    force = ours.step_force[held]
-    other = _read(ours.step_time[held], theirs.time, theirs.force)
+    held = (ours.times > times[0]) & (ours.times < times[-1])
+    force = ours.force[0, held]
+    other = _read(ours.times[held], theirs.time, theirs.force)
     off = np.linalg.norm(other - force, axis=1)
-    length = np.diff(ours.step_time[held], prepend=times[0])  # steps are irregular
+    length = np.diff(ours.times[held], prepend=times[0])  # steps are irregular
 
     arc = np.linspace(0, chain.rest_length, chain.edges + 1)
-    lines = np.array([_read(arc, model.sling.arc, one) for one in ours.center_line[seen]])
+    lines = np.array([_read(arc, model.sling.arc, one) for one in ours.center_line[0, seen]])
     apart = np.sqrt((np.linalg.norm(theirs.line - lines, axis=2) ** 2).mean(axis=1))
     middle = lines[:, chain.edges // 2, None] - chain.tips
     taut = np.linalg.norm(middle, axis=2).min(axis=1) > chain.rest_length / 2

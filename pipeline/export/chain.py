@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.export.band import CalibratedBand
 from pipeline.simulator.model import GRAVITY
 from pipeline.simulator.rubber import uniaxial
-from sling2sim2real.model import Model
 
 EDGES = 20
 STEPS = (5e-4, 2.5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)  # s, of time
@@ -56,7 +56,7 @@ class SpringChain:
     step: float
 
     @classmethod
-    def of(cls, model: Model, draws: np.ndarray, hold_force: np.ndarray) -> SpringChain:
+    def of(cls, model: CalibratedBand, draws: np.ndarray, hold_force: np.ndarray) -> SpringChain:
         """A first guess: straight halves that pull with `hold_force` (N,) at draws (N, 2).
 
         Its damping time is θ's, its time step the largest that is stable with that.
@@ -81,7 +81,7 @@ class SpringChain:
         return replace(chain, step=chain.stable_step)
 
     @staticmethod
-    def tension(model: Model, draws: np.ndarray, hold_force: np.ndarray) -> np.ndarray:
+    def tension(model: CalibratedBand, draws: np.ndarray, hold_force: np.ndarray) -> np.ndarray:
         """Pull [N] and stretch, shape (2, N), of straight halves that the hand holds at draws."""
         setup, band = model.settings.setup, model.band
         distance = np.linalg.norm(draws, axis=1)

@@ -7,9 +7,9 @@ from types import ModuleType
 
 import numpy as np
 
-from app.export.chain import SpringChain
-from app.export.mujoco_replay import HANG, Pulled, Shot
 from pipeline.base.errors import UserError
+from pipeline.export.chain import SpringChain
+from pipeline.export.mujoco_replay import HANG, Pulled, Shot
 
 
 def numbers(name: str, chain: SpringChain, draws: np.ndarray) -> dict:
@@ -75,9 +75,9 @@ class NewtonReplay:
 
 
 def loader() -> ModuleType:
-    """app.export.newton_band. Raises UserError where Newton is not installed."""
+    """pipeline.export.newton_band. Raises UserError where Newton is not installed."""
     try:
-        from app.export import newton_band
+        from pipeline.export import newton_band
     except ImportError as error:
         raise UserError("newton is not installed: pip install -e '.[validation]'") from error
     return newton_band

@@ -7,7 +7,7 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
-from app.export.chain import SpringChain
+from pipeline.export.chain import SpringChain
 from pipeline.simulator.model import GRAVITY
 
 VERSION = "3.7"  # of MuJoCo: the first whose springs may be cubic

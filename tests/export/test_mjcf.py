@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.export import mjcf
-from app.export.card import HOLD, LANDING, Matched
-from app.export.chain import SpringChain
-from app.export.match import compared, draws_of, proof_draws
-from app.export.mujoco_replay import MujocoBand
+from pipeline.export import mjcf
+from pipeline.export.card import HOLD, LANDING, Matched
+from pipeline.export.chain import SpringChain
+from pipeline.export.match import compared, draws_of, proof_draws
+from pipeline.export.mujoco_replay import MujocoBand
 from sling2sim2real import UserError, export
 
 mujoco = pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[validation]'")

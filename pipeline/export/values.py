@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.export.band import CalibratedBand
 from pipeline.report.card.values import LABELS, rounded
 from pipeline.simulator.rubber import RUBBER
-from sling2sim2real.model import Model
 
 FRAMES = (
     "SI units throughout. Frame O: origin midway between the fork's tips, x along the fork, y"
@@ -16,7 +16,7 @@ FRAMES = (
 UNITS = {"youngs_modulus": "Pa", "elasticity_damping": "s", "air_drag": "1/s"}
 
 
-def values(model: Model) -> list[dict]:
+def values(model: CalibratedBand) -> list[dict]:
     """Each parameter with its 90 % interval where one is known: name, value, unit, low, high."""
     intervals, found = getattr(model, "intervals", {}), []
     for name in LABELS:
@@ -37,7 +37,7 @@ def values(model: Model) -> list[dict]:
     return found
 
 
-def sizes(model: Model) -> dict[str, float | list[float] | None]:
+def sizes(model: CalibratedBand) -> dict[str, float | list[float] | None]:
     """What was weighed and measured, and how the band is mounted; SI units are in the names."""
     band, setup, mounting = model.band, model.settings.setup, model.mounting
     return {
@@ -53,13 +53,13 @@ def sizes(model: Model) -> dict[str, float | list[float] | None]:
     }
 
 
-def history(model: Model) -> dict[str, float] | None:
+def history(model: CalibratedBand) -> dict[str, float] | None:
     """In how long the hand must draw, and how long it must wait; None: it does not matter."""
     told = model.sling.history
     return told and {"pull_time_s": rounded(told.pull_time, 6), "pause_s": rounded(told.pause, 6)}
 
 
-def without_slot(model: Model) -> list[dict]:
+def without_slot(model: CalibratedBand) -> list[dict]:
     """What springs cannot express, its value, and what stands in for it."""
     theta, setup, sling = model.theta, model.settings.setup, model.sling
     direction, rigidity = sling.clamp_direction, sling.flexural_rigidity
@@ -104,7 +104,7 @@ def without_slot(model: Model) -> list[dict]:
     return [dict(zip(("name", "value", "instead"), row, strict=True)) for row in rows]
 
 
-def _of_rubber(model: Model) -> list[tuple[str, str, str]]:
+def _of_rubber(model: CalibratedBand) -> list[tuple[str, str, str]]:
     theta, told = model.theta, history(model)
     after = "it has forgotten every pull"
     if told:

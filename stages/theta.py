@@ -37,6 +37,7 @@ from pipeline.identify.search.history import History, theta_content
 from pipeline.identify.search.loop import Free, search
 from pipeline.identify.search.regions import Region, regions_of, save_regions
 from pipeline.params.identification import LAWS, LEAST_SQUARES
+from pipeline.params.provenance import settings_of
 from pipeline.simulator.material import THETA
 from pipeline.simulator.rubber import RUBBER
 from stages.start import run, started
@@ -53,6 +54,8 @@ def main() -> None:
         content, samples = fitted(params, band, method)
     else:
         content, samples = searched(params, band, method, free, regions), {"samples": []}
+    launches = bool((content["confidence"] or {}).get("launches"))
+    content["made_with"] = settings_of(params, band, method, launches=launches)
     write_json(layout.confidence(band, method), samples | {"band": band})
     write_json(layout.theta(band, method), content)
     print(f"{band} {method}: loss {content['loss']['total']:.5g}")

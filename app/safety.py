@@ -16,7 +16,7 @@ from pipeline.episode.episode import Episode
 from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
 from pipeline.params import Params
-from pipeline.params.provenance import Change, changes, policy_settings_of, settings_of
+from pipeline.params.provenance import Change, changed_since, changes, policy_settings_of
 from stages.start import stage_of, unmounted
 
 MISS = 0.05  # m from the target, in simulation, from which no pose is given
@@ -117,7 +117,7 @@ def of_identification(params: Params, content: dict, path: Path) -> Iterator[Haz
         if "made_with" not in content or method not in params.methods:
             what = f"nothing tells with which params.yaml θ was identified: {mended}"
             yield Hazard("params", what)
-        yield from _of_changes(_since_theta(params, content, method), "θ was identified", mended)
+        yield from _of_changes(changed_since(params, content, method), "θ was identified", mended)
 
 
 def of_policy(
@@ -133,7 +133,7 @@ def of_policy(
     else:
         if card["made_with"] is None:
             yield Hazard("params", f"nothing tells what the policy was trained with: {mended}")
-    found = {change.key: change for change in _since_theta(params, content, method)}
+    found = {change.key: change for change in changed_since(params, content, method)}
     if then := card["made_with"]:
         now = policy_settings_of(params, band)
         found |= {change.key: change for change in changes(then, now)}
@@ -141,15 +141,6 @@ def of_policy(
     if card.get("theta") != content["theta"]:
         what = f"the policy was trained with another θ than there is now: {mended}"
         yield Hazard("params", what)
-
-
-def _since_theta(params: Params, content: dict, method: str) -> list[Change]:
-    """What has changed since the θ of a file was identified, as far as the file tells."""
-    then = content.get("made_with")
-    if not then or method not in params.methods:
-        return []
-    launches = bool((content.get("confidence") or {}).get("launches"))
-    return changes(then, settings_of(params, content["band"], method, launches=launches))
 
 
 def of_mounting(band: str, root: Path) -> list[Hazard]:

@@ -81,6 +81,15 @@ def changes(then: Mapping[str, Any], now: Mapping[str, Any]) -> list[Change]:
     return sorted((one for one in found if one.old != one.new), key=lambda one: one.key)
 
 
+def changed_since(params: Params, content: Mapping[str, Any], method: str) -> list[Change]:
+    """What has changed since the θ of a file's content was identified, as far as it tells."""
+    then = content.get("made_with")
+    if not then or method not in params.methods:
+        return []
+    launches = bool((content.get("confidence") or {}).get("launches"))
+    return changes(then, settings_of(params, content["band"], method, launches=launches))
+
+
 def _launch_settings(params: Params) -> dict[str, Any]:
     found = _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
     return found | dict(_leaves("launch", params.launch))

@@ -56,7 +56,9 @@ INDIRECT = {
     "ruff": "make lint",
     "uv": "tools/setup.sh",
     "threadpoolctl": "by the script of a test",
+    "codespell": "the same",
     "pre-commit": "the same at each commit",
+    "pre-commit-hooks": "large files, at each commit",
 }
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from app.safety import of_mounting, tell
 from pipeline.base.errors import UserError
+from pipeline.params import Params
 from pipeline.recording.input.frames import Transform
 
 ALIKE = 0.02  # relative: stretches that are as good as equal
@@ -40,33 +41,31 @@ class Earlier:
     problem: str | None
 
 
-def read_earlier(path: Path, params) -> Earlier:
+def read_earlier(path: Path, params: Params) -> Earlier:
     """Read a recording as far as a plan needs it: no pictures. Raises UserError.
 
     Of several pulls, the first that can be used.
     """
-    from pipeline.recording.geometry import geometry_of
     from pipeline.recording.input.reader import read_recording
-    from pipeline.recording.pulls import pulls_of
+    from pipeline.recording.pulls import Pull, pulls_of
     from pipeline.recording.signals import signals_of
 
-    recording = read_recording(Path(path), params.setup)
-    geometry = geometry_of(recording, params.setup)
-    source, frame = geometry.sources["base_to_fork"], recording.pose.frame
-    problem = None
+    whole = Pull.of(read_recording(Path(path), params.setup), params.setup)
+    base, source = whole.geometry.base, whole.geometry.sources["base_to_fork"]
+    frame, problem = whole.recording.pose.frame, None
     try:
-        for pull in pulls_of(recording, params.setup):
+        for pull in pulls_of(whole):
             try:
-                signals = signals_of(pull, geometry, params)
+                signals = signals_of(pull, params)
             except UserError as error:
                 problem = problem or f"{path}: {str(error).removeprefix(f'{path}: ')}"
                 continue
             force = float(np.linalg.norm(signals.facts["hold_force"]))
             drawn = signals.hand(signals.release_time)
-            return Earlier(path, geometry.base, source, frame, force, drawn, None)
+            return Earlier(path, base, source, frame, force, drawn, None)
     except UserError as error:
         problem = f"{path}: {error}"
-    return Earlier(path, geometry.base, source, frame, None, None, problem)
+    return Earlier(path, base, source, frame, None, None, problem)
 
 
 @dataclass(frozen=True)

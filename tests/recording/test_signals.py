@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
+from pipeline.recording.pulls import Pull
 from pipeline.recording.signals import signals_of
 from pipeline.recording.tool_inertia import estimate_tool_inertia
 from tests.recording.bag import HAND, SENSOR, START, Truth
@@ -27,7 +28,7 @@ def signals(played: Played, params, tool=None, recording=None, inertia=None):
     recording = recording or played.recording()
     setup = params.setup.model_copy(update={"tool": tool})
     params = params.model_copy(update={"setup": setup})
-    return signals_of(recording, played.geometry(), params, inertia)
+    return signals_of(Pull(recording, played.geometry()), params, inertia)
 
 
 def off(played: Played, found) -> np.ndarray:
@@ -82,7 +83,7 @@ def test_the_inertia_of_a_hand_that_does_not_turn(params) -> None:
 def test_a_tool_that_nobody_told_of_is_felt(params) -> None:
     """Its inertia in free motion shows its mass, with which it is gone from the pull, too."""
     played = Played(mass=MASS, truth=Truth(noise=0.005))
-    inertia = estimate_tool_inertia(played.recording(), played.geometry(), None)
+    inertia = estimate_tool_inertia(Pull(played.recording(), played.geometry()), None)
     assert inertia.mass == pytest.approx(MASS, rel=0.03)
     found = band_alone(played, params, inertia)
     assert found.facts["tool"]["source"] == "its inertia"
@@ -97,7 +98,7 @@ def test_a_sensor_that_takes_off_too_much_or_has_the_other_sign(params) -> None:
         Played(mass=-0.3, truth=Truth(noise=0.005)),
         Played(mass=MASS, truth=Truth(noise=0.005, sign=-1.0)),
     ):
-        inertia = estimate_tool_inertia(played.recording(), played.geometry(), None)
+        inertia = estimate_tool_inertia(Pull(played.recording(), played.geometry()), None)
         assert inertia.mass == pytest.approx(played.truth.sign * played.mass, rel=0.03)
         band_alone(played, params, inertia)
 
@@ -109,7 +110,7 @@ def test_a_sensor_that_knows_the_weight_but_not_the_inertia(params) -> None:
     t = recording.wrench.seconds(START)
     weight = (played.orientation(t) * SENSOR).inv().apply(MASS * GRAVITY)
     recording.wrench = replace(recording.wrench, values=recording.wrench.values - weight)
-    inertia = estimate_tool_inertia(recording, played.geometry(), None)
+    inertia = estimate_tool_inertia(Pull(recording, played.geometry()), None)
     assert inertia.mass == pytest.approx(MASS, rel=0.05)
     band_alone(played, params, replace(inertia, center=TOOL), recording)
 
@@ -120,7 +121,7 @@ def test_a_delay_that_is_left_does_not_displace_the_inertia(params) -> None:
     recording = played.recording()
     pose = recording.pose
     recording.pose = replace(pose, stamp=pose.stamp + 20_000_000)
-    inertia = estimate_tool_inertia(recording, played.geometry(), None)
+    inertia = estimate_tool_inertia(Pull(recording, played.geometry()), None)
     assert inertia.delay == pytest.approx(0.02, abs=0.002)
     band_alone(played, params, inertia, recording)
 

@@ -150,7 +150,7 @@ def test_a_camera_that_stops_before_the_release_is_said(looked, params) -> None:
 
 def test_a_sensor_that_tf_static_does_not_know_is_said(looked, params) -> None:
     assert "sensor" not in abouts(looked.report)
-    recording = looked.done.recording
+    recording = looked.done.pull.recording
     loose = replace(recording, wrench=replace(recording.wrench, frame="elsewhere"))
     found = cautions_of(looked.report, replace(looked.done, recording=loose), params.setup)
     assert any(c.about == "sensor" and "'elsewhere'" in c.what for c in found)

@@ -60,7 +60,7 @@ def read_earlier(path: Path, params: Params) -> Earlier:
             except UserError as error:
                 problem = problem or f"{path}: {str(error).removeprefix(f'{path}: ')}"
                 continue
-            force = float(np.linalg.norm(signals.facts["hold_force"]))
+            force = float(np.linalg.norm(signals.facts.hold_force))
             drawn = signals.hand(signals.release_time)
             return Earlier(path, base, source, frame, force, drawn, None)
     except UserError as error:

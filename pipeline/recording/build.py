@@ -140,7 +140,7 @@ def episode_of(done: Processed, band_name: str, params: Params) -> Episode:
         },
         "geometry": KeptGeometry.of(recording, geometry).content(),
         "preprocessing": {
-            **signals.facts,
+            **asdict(signals.facts),
             "delays": asdict(done.delays),
             **_named(params.force, "cutoff", "cutoff_unit"),
             **_named(params.cloud, "mask", "points", *removal),

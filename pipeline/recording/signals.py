@@ -23,6 +23,55 @@ MOST_GAP = 0.3  # s over which force and pose may be interpolated
 
 
 @dataclass(frozen=True)
+class ToolFacts:
+    """The tool whose load was taken off the force: mass [kg], centre [m], and who tells of it."""
+
+    mass: float
+    center: list[float]
+    source: str
+
+
+@dataclass(frozen=True)
+class SignalFacts:
+    """What was found on the way from streams to samples, for the metadata.
+
+    Attributes:
+        bias, drift: Taken off the force, frame O [N], [N/s].
+        noise: Standard deviation of one force sample [N].
+        hold_force: Mean just before the release, frame O [N].
+        peak_force: Largest of the filtered force while the band is held [N].
+        flipped: The sensor reports the force of the gripper on the band.
+        turn: Largest turn of the hand before the release [rad].
+        tool: None where nothing was taken off.
+        rate: Of the force [Hz].
+        longest_gap: In the window, by topic [s].
+        cutoff_hz: Of the force's filter [Hz].
+        release_error, release_fall, release_resolution: Of `events.Release` [s].
+        slips: Sudden drops of the force before the release, since the window's start [s].
+        velocity_window: Of the fits that differentiate the path [s].
+        twist_difference: Median difference of speed to a recorded twist [m/s]; None without one.
+    """
+
+    bias: list[float]
+    drift: list[float]
+    noise: float
+    hold_force: list[float]
+    peak_force: float
+    flipped: bool
+    turn: float
+    tool: ToolFacts | None
+    rate: float
+    longest_gap: dict[str, float]
+    cutoff_hz: float
+    release_error: float
+    release_fall: float
+    release_resolution: float
+    slips: list[float]
+    velocity_window: float
+    twist_difference: float | None
+
+
+@dataclass(frozen=True)
 class Signals:
     """What the robot measured and did, frame O, times in seconds since the window's start.
 
@@ -32,7 +81,6 @@ class Signals:
         position, velocity, force: Shape (T, 3).
         opening: Shape (T,), NaN where it was not recorded.
         grasp_time, release_time: Events.
-        facts: Bias, noise, drift, turn, flip and the like, for the metadata.
         path_time, path: The hand at its native rate, for what needs more than samples.
         tool_axis: Where the hand points to (z of its frame), shape (3,).
     """
@@ -45,7 +93,7 @@ class Signals:
     opening: np.ndarray
     grasp_time: float
     release_time: float
-    facts: dict
+    facts: SignalFacts
     path_time: np.ndarray
     path: np.ndarray
     tool_axis: np.ndarray
@@ -98,25 +146,25 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
     smooth = signal.lowpass(even, rate, cutoff)
     pulled = smooth[grid < release.time - MARGIN]
     pose_grid, position, velocity = motion.velocity()
-    facts = {
-        "bias": band.bias.tolist(),
-        "drift": band.drift.tolist(),
-        "noise": release.noise,
-        "hold_force": band.hold.tolist(),
-        "peak_force": float(np.linalg.norm(pulled, axis=1).max()),
-        "flipped": band.flipped,
-        "turn": turn,
-        "tool": _tool_facts(tool, "setup.tool") or _tool_facts(inertia, "its inertia"),
-        "rate": rate,
-        "longest_gap": gaps,
-        "cutoff_hz": cutoff,
-        "release_error": release.error,
-        "release_fall": release.fall,
-        "release_resolution": release.resolution,
-        "slips": [time - start for time in release.slips],
-        "velocity_window": VELOCITY_WINDOW,
-        "twist_difference": _twist_difference(pull, pose_grid, velocity),
-    }
+    facts = SignalFacts(
+        bias=band.bias.tolist(),
+        drift=band.drift.tolist(),
+        noise=release.noise,
+        hold_force=band.hold.tolist(),
+        peak_force=float(np.linalg.norm(pulled, axis=1).max()),
+        flipped=band.flipped,
+        turn=turn,
+        tool=_tool_facts(tool, "setup.tool") or _tool_facts(inertia, "its inertia"),
+        rate=rate,
+        longest_gap=gaps,
+        cutoff_hz=cutoff,
+        release_error=release.error,
+        release_fall=release.fall,
+        release_resolution=release.resolution,
+        slips=[time - start for time in release.slips],
+        velocity_window=VELOCITY_WINDOW,
+        twist_difference=_twist_difference(pull, pose_grid, velocity),
+    )
     return Signals(
         origin=recording.origin + round(start * 1e9),
         time=(np.arange(episode.samples) + 0.5) * period,
@@ -176,8 +224,8 @@ def _gaps(pull: Pull, start: float, end: float) -> dict[str, float]:
     return found
 
 
-def _tool_facts(tool: Tool | ToolInertia | None, source: str) -> dict | None:
-    return tool and {"mass": tool.mass, "center": list(tool.center), "source": source}
+def _tool_facts(tool: Tool | ToolInertia | None, source: str) -> ToolFacts | None:
+    return tool and ToolFacts(tool.mass, list(tool.center), source)
 
 
 def _twist_difference(pull: Pull, times: np.ndarray, velocity: np.ndarray) -> float | None:

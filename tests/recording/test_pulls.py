@@ -116,7 +116,7 @@ def test_a_band_that_slips_out_between_two_pulls_is_a_pull_that_cannot_be_used(
     assert "gripper stays closed" in str(refused[0])
     alone = process_pulls(seen[0], params.bands["band1"], params)[0][0].signals
     for done in found:
-        np.testing.assert_allclose(done.signals.facts["bias"], alone.facts["bias"], atol=0.02)
+        np.testing.assert_allclose(done.signals.facts.bias, alone.facts.bias, atol=0.02)
 
 
 def test_a_force_that_fails_for_a_while_does_not_end_a_pull(seen, params) -> None:

@@ -9,11 +9,11 @@ from app.aim import pull_and_pause
 from app.arguments import finite
 from pipeline.base.errors import UserError
 from pipeline.identify.results.theta import calibrated, load_theta, vector
-from pipeline.params import expect_known
+from pipeline.params import Params, expect_known
 from pipeline.simulator.launch import launch
 
 
-def expect_above_floor(params, draw: tuple[float, float]) -> None:
+def expect_above_floor(params: Params, draw: tuple[float, float]) -> None:
     """Raises UserError where a draw (y, z) [m] lies below the floor."""
     floor = -params.setup.fork_height
     if draw[1] < floor:
@@ -24,7 +24,7 @@ def expect_above_floor(params, draw: tuple[float, float]) -> None:
 
 
 def launched(
-    params, band: str, theta: Path, draw: tuple[float, float], root: str | Path = "."
+    params: Params, band: str, theta: Path, draw: tuple[float, float], root: str | Path = "."
 ) -> dict:
     """What `sling launch --json` says of a draw (y, z) [m]; `warnings` are of app.safety.
 

@@ -16,6 +16,7 @@ from pipeline.base.layout import Layout, NotMade, owner
 from pipeline.episode.episode import Episode
 from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
+from pipeline.params import Params
 from stages.start import stage_of, unmounted
 
 MISS = 0.05  # m from the target, in simulation, from which no pose is given
@@ -55,7 +56,7 @@ def shown(answer: dict, to_json: bool) -> str:
     return arguments.shown({k: v for k, v in answer.items() if k != "warnings"}, False)
 
 
-def of_draw(params, band: str, draw: tuple[float, float], root: Path) -> Iterator[Hazard]:
+def of_draw(params: Params, band: str, draw: tuple[float, float], root: Path) -> Iterator[Hazard]:
     """A draw (y, z) [m] outside the box, or further than the band was drawn in its recordings."""
     for axis, value in zip("yz", draw, strict=True):
         low, high = getattr(params.setup, f"draw_{axis}")
@@ -82,7 +83,7 @@ def of_draw(params, band: str, draw: tuple[float, float], root: Path) -> Iterato
         )
 
 
-def of_launch(params, force: float, failure: str | None) -> Iterator[Hazard]:
+def of_launch(params: Params, force: float, failure: str | None) -> Iterator[Hazard]:
     """A simulated launch that fails, or whose draw takes more force [N] than the arm may hold."""
     if failure:
         yield Hazard("failure", f"the launch fails in simulation: {failure}")
@@ -108,7 +109,7 @@ def of_confidence(content: dict, path: Path) -> Iterator[Hazard]:
         )
 
 
-def of_identification(params, content: dict, path: Path, root: Path) -> Iterator[Hazard]:
+def of_identification(params: Params, content: dict, path: Path, root: Path) -> Iterator[Hazard]:
     """A θ file of a run whose parameters have changed since; a hand-written one has no run."""
     known = owner(path)
     if known and known[2]:
@@ -120,7 +121,9 @@ def of_identification(params, content: dict, path: Path, root: Path) -> Iterator
         yield from _of_changes(changes or [], "θ was identified", _mended(stage))
 
 
-def of_policy(params, band: str, method: str, content: dict, root: Path) -> Iterator[Hazard]:
+def of_policy(
+    params: Params, band: str, method: str, content: dict, root: Path
+) -> Iterator[Hazard]:
     """A policy whose parameters, or θ, are no longer those that it was trained with."""
     stage = stage_of(params, "policy", band, method)
     changes = since_run(root, stage)

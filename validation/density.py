@@ -13,19 +13,19 @@ import numpy as np
 from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import cutoff_hz
+from pipeline.identify.identify import identify
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import TERMS, EpisodeLoss
 from pipeline.identify.objective.space import Space
-from pipeline.identify.posterior import identify
+from pipeline.identify.posterior import identify as posterior
 from pipeline.identify.posterior.launches import Observed
 from pipeline.identify.results.theta import EXTRA, at_points
 from pipeline.launching.trials.spread import landing_intervals
-from pipeline.params.identification import LAWS, LEAST_SQUARES
+from pipeline.params.identification import LAWS
 from pipeline.simulator.launch import launch
 from pipeline.simulator.material import THETA
 from pipeline.simulator.model import Sling
 from tests.identify.objective.own_law import disturbed, own_law_episode
-from validation.benchmarks.methods import complete
 from validation.synthetic import pull_and_release
 
 WORKERS = cores()
@@ -67,20 +67,18 @@ def found(
     Searches have their rollouts on `devices`, the fit of least squares on the CPU.
     Of another search than least squares it says "loss": the terms and the total of the best.
     """
-    about, space = params.methods[method], Space.of_method(params, method)
+    space = Space.of_method(params, method)
     loss = EpisodeLoss.of(params, method, episodes[0], sling)
     evaluate = Evaluator(episodes[0], sling, loss, space, workers=WORKERS, devices=devices)
-    best = complete(params, method, params.optimizer, evaluate).best()
-    start = np.array([best[name] for name in space.names])
-    if about.search != LEAST_SQUARES:
+    given = {"observed": observed, "workers": WORKERS}
+    identified = identify(params, method, sling, episodes, evaluate, **given)
+    density, launched = identified.density, posterior.launched(sling, episodes[0])
+    if density is None:
+        best = identified.evaluations.best()
         told = {"loss": {name: best[name] for name in (*TERMS, "total")}}
-        return Calibrated(identify.launched(sling, episodes[0]), start, None), told
-    one = identify.identify(
-        params, method, sling, episodes, start, observed=observed, workers=WORKERS
-    )
-    point = one.coordinates.points(one.fit.phi[None])[0]
-    told = identify.confidence(one, params.parameters)
-    return Calibrated(identify.launched(sling, episodes[0]), point, one.points), told
+        return Calibrated(launched, identified.point, None), told
+    told = posterior.confidence(density, params.parameters)
+    return Calibrated(launched, identified.point, density.points), told
 
 
 def own_law(params, method: str, number: int) -> dict:
@@ -97,7 +95,7 @@ def own_law(params, method: str, number: int) -> dict:
     band = next(iter(params.bands))
     about = params.methods[method]
     sling = replace(Sling.of(params.bands[band], params.setup, params.sling), law=about.law)
-    coordinates = identify.Coordinates.of_method(params, method, sling)
+    coordinates = posterior.Coordinates.of_method(params, method, sling)
     true = coordinates.expected.copy()
     true[0] = rng.uniform(*np.log([1.5e5, 4.5e5]))
     true[1] += rng.normal(0, coordinates.precision[1] ** -0.5)

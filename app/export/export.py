@@ -17,7 +17,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder, write_json, write_text
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
-from pipeline.params import expect_known
+from pipeline.params import Params, expect_known
 from sling2sim2real.identification import Identification
 from sling2sim2real.model import Model
 from sling2sim2real.simulation import pull
@@ -39,7 +39,7 @@ def write(model: Model, to: str, folder: Path, episode: Episode | None = None) -
 
 
 def of_run(
-    params, band: str, method: str, to: str, out: Path | None = None, root: str | Path = "."
+    params: Params, band: str, method: str, to: str, out: Path | None = None, root: str | Path = "."
 ) -> tuple[Path, dict]:
     """Export a band of a project, as `sling fit` or `dvc repro` found it: folder and card.
 

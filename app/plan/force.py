@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from app.safety import of_mounting, tell
 from pipeline.base.errors import UserError
 from pipeline.params import Params
+from pipeline.params.lab import BandParams, SetupParams
 from pipeline.recording.input.frames import Transform
 
 ALIKE = 0.02  # relative: stretches that are as good as equal
@@ -81,7 +82,7 @@ class Held:
     rest_length: float
 
     @classmethod
-    def of(cls, band, setup) -> Held:
+    def of(cls, band: BandParams, setup: SetupParams) -> Held:
         return cls(setup.fork_width / 2, band.rest_length)
 
     def legs(self, point: np.ndarray) -> tuple[float, float]:
@@ -114,7 +115,7 @@ class Prediction:
 
 
 def predict(
-    params, band: str, drawn: np.ndarray, theta: Path | None, earlier: Earlier | None
+    params: Params, band: str, drawn: np.ndarray, theta: Path | None, earlier: Earlier | None
 ) -> Prediction:
     """The force at `drawn` (3,): by the simulator, else by an earlier recording, else unknown."""
     held = Held.of(params.bands[band], params.setup)
@@ -149,7 +150,7 @@ def predict(
     return Prediction(None, f"not checked: {why}; the band is stretched to {stretch:.2f}{advice}")
 
 
-def _simulated(params, band: str, drawn: np.ndarray, path: Path) -> float:
+def _simulated(params: Params, band: str, drawn: np.ndarray, path: Path) -> float:
     from pipeline.identify.results.theta import calibrated, load_theta, vector
     from pipeline.simulator.launch import launch
 

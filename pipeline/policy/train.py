@@ -23,6 +23,7 @@ from pipeline.base.fingerprint import fingerprint
 from pipeline.base.progress import Progress
 from pipeline.launching.surface import response_surface, simulated
 from pipeline.launching.surface.simulated import Source
+from pipeline.params.launches import PolicyParams, Reward
 from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.environment import SlingshotEnv, draw_box, rewarded
 from pipeline.policy.ppo import settings
@@ -113,7 +114,7 @@ class Trained:
 
 def train(
     surface: Source,
-    params,
+    params: PolicyParams,
     kept: Path | None = None,
     progress: Progress | None = None,
     *,
@@ -166,7 +167,7 @@ def one_thread() -> Iterator[None]:
 
 
 def earned(
-    surface: Source, draws: np.ndarray, targets: np.ndarray, reward
+    surface: Source, draws: np.ndarray, targets: np.ndarray, reward: Reward
 ) -> tuple[float, float, int]:
     """Mean reward and |y_p - g| [m] (NaN if all fail) of draws for targets, and failed targets."""
     rewards, launched = rewarded(surface, draws, targets, reward)
@@ -181,7 +182,7 @@ def told(error: float) -> str:
     return "every launch fails" if np.isnan(error) else f"mean error {100 * error:.2f} cm"
 
 
-def _stamp(surface: Source, params, projectile: tuple[float, float] | None) -> str:
+def _stamp(surface: Source, params: PolicyParams, projectile: tuple[float, float] | None) -> str:
     """Of everything that a training hangs on."""
     versions = (f"{name} {version(name)}" for name in PACKAGES)
     return fingerprint(*SOURCES, surface.fingerprint(), repr((params, projectile)), *versions)
@@ -203,7 +204,7 @@ class _Training:
         self,
         runner,
         env: SlingshotEnv,
-        params,
+        params: PolicyParams,
         checkpoint: Checkpoint | None,
         progress: Progress | None,
         projectile: tuple[float, float] | None,

@@ -12,6 +12,7 @@ import numpy as np
 from pipeline.base.pool import Pool
 from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.params import load
+from pipeline.params.lab import SetupParams
 from rig.oracle.aim import hit
 from rig.physics.launch import Trial, launch
 
@@ -56,7 +57,7 @@ class World:
             failure=[None if np.isfinite(one.landing_y) else one.failure for one in every],
         )
 
-    def landing_map(self, setup, size: tuple[int, int]) -> LandingMap:
+    def landing_map(self, setup: SetupParams, size: tuple[int, int]) -> LandingMap:
         """Of launches without errors over the box of draws of `setup`."""
         box = {"draw_y": setup.draw_y, "draw_z": setup.draw_z, "max_force": setup.max_force}
         return LandingMap.simulate(self.exact, **box, size=size, checks=0)

@@ -36,7 +36,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     yaml.dump(content, root / "params.yaml")
     params, layout = load(root / "params.yaml"), Layout(root)
     clamps = {"clamp_direction": [0.0, 0.0, -1.0], "flexural_rigidity": 1e-5}
-    write_json(layout.mounting(BAND), clamps)
+    write_json(layout.clamps(BAND), clamps)
     sling = load_sling(params, BAND, root)
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
     plan = pull_and_release(BAND, params.episode, sling)
@@ -81,9 +81,7 @@ def test_another_input_has_another_digest(project, changed: str, tmp_path: Path)
         with (layout.episode(BAND) / "clouds.parquet").open("ab") as file:
             file.write(b" ")
     elif changed == "clamps":
-        layout.mounting(BAND).write_text(
-            layout.mounting(BAND).read_text().replace("1e-05", "2e-05")
-        )
+        layout.clamps(BAND).write_text(layout.clamps(BAND).read_text().replace("1e-05", "2e-05"))
     else:
         text = (root / "params.yaml").read_text()
         (root / "params.yaml").write_text(text.replace("mass: 0.023", "mass: 0.024"))

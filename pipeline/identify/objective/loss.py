@@ -23,6 +23,7 @@ from pipeline.episode.phases import held_out_blocks, reach, within
 from pipeline.episode.signal import as_recorded, cutoff_hz
 from pipeline.identify.objective.chamfer import Chamfer, CloudDistance
 from pipeline.identify.objective.device_terms import DeviceTerms
+from pipeline.params import Params
 
 TERMS = ("geom", "force", "work")
 LOCK = threading.Lock()  # while a filter is made, which takes a second
@@ -99,7 +100,7 @@ class EpisodeLoss:
             raise UserError(f"episode of {episode.band}: no camera frame shows the band")
 
     @classmethod
-    def of(cls, params, method: str, episode: Episode, sling) -> EpisodeLoss:
+    def of(cls, params: Params, method: str, episode: Episode, sling) -> EpisodeLoss:
         """Make it from params.yaml's `loss`, `force` and `methods.<method>`."""
         cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
         held = params.loss.held_out
@@ -116,7 +117,7 @@ class EpisodeLoss:
         )
 
     @classmethod
-    def plain(cls, params, episode: Episode, sling) -> EpisodeLoss:
+    def plain(cls, params: Params, episode: Episode, sling) -> EpisodeLoss:
         """Geometry and force alone, for a part of an episode."""
         return cls(
             episode,

@@ -1,22 +1,29 @@
 """Launches that are evidence: data/evidence/<band>.csv, which `sling observe` writes.
 
 Columns draw_y_m, draw_z_m, draw_error_m, landing_y_m. A launch is evidence or a score
-(data/trials/measured/), never both.
+(data/trials/measured/), never both. The stage `evidence` checks them, and the density reads what it
+writes: {"launches": [{"draw", "error", "landing"}, ...], "lab": {...}}, where "lab" is how the lab
+launches, and missing where there is no launch.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 from pipeline.base import launch_table as table
 from pipeline.base.errors import UserError
+from pipeline.base.files import write_json
+from pipeline.base.schema import LIST, JsonRecord, read_json
 from pipeline.identify.posterior.launches import Observed
+from pipeline.params import Params
 
 COLUMNS = (*table.DRAW, "draw_error_m", table.LANDING)  # as they are written
 MOST_ERROR = 0.1  # of a draw [m]
 
 
-def read_evidence(folder: Path, band: str, params) -> list[Observed]:
+def read_evidence(folder: Path, band: str, params: Params) -> list[Observed]:
     """Of a band, oldest first; none where it has no file.
 
     A draw without an error of its own has that of a commanded one, `trials.actuation_error`.
@@ -47,6 +54,39 @@ def read_launches(path: Path, error: float | None) -> list[Observed]:
         own = expect_error(where, table.number(where, "draw_error_m", own)) if own else error
         launches.append(Observed(table.drawn(where, row), own, landing))
     return launches
+
+
+LAB = {  # of the simulated launches of a density, by section of params.yaml
+    "setup": ("projectile_mass", "arm_stiffness", "foot_height"),
+    "sling": ("launch_step", "launch_time"),
+}
+
+
+class LaunchRecord(JsonRecord):
+    draw: Annotated[tuple[float, float], LIST]
+    error: float
+    landing: float
+
+
+class ObservedFile(JsonRecord):
+    launches: list[LaunchRecord]
+
+
+def save_observed(path: Path, launches: Sequence[Observed], params: Params) -> None:
+    """Write an `ObservedFile`; without launches it is the same whatever the lab is."""
+    content: dict = {"launches": [vars(one) for one in launches]}
+    if launches:
+        content["lab"] = {
+            section: {name: getattr(getattr(params, section), name) for name in names}
+            for section, names in LAB.items()
+        }
+    write_json(path, content)
+
+
+def load_observed(path: Path) -> list[Observed]:
+    """The launches of an `ObservedFile`. Raises NotMade."""
+    read = read_json(path, ObservedFile)
+    return [Observed(one.draw, one.error, one.landing) for one in read.launches]
 
 
 def expect_error(where: str, error: float) -> float:

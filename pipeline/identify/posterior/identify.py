@@ -20,7 +20,9 @@ from pipeline.identify.posterior.draws import truncated_gaussian
 from pipeline.identify.posterior.fit import Fit, fit
 from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
+from pipeline.identify.results.estimate import pull_of
 from pipeline.identify.results.theta import EXTRA
+from pipeline.params import Params
 from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.simulator.material import THETA
 from pipeline.simulator.model import LaunchHistory, Sling
@@ -75,8 +77,8 @@ class Identified:
         return [*THETA, *LAWS[law], *EXTRA]
 
 
-def identify(
-    params,
+def fit_posterior(
+    params: Params,
     method: str,
     sling: Sling,
     episodes: Sequence[Episode],
@@ -86,7 +88,7 @@ def identify(
     workers: int | None = None,
     progress: Callable[[Fit], None] = lambda fit: None,
 ) -> Identified:
-    """Identify a band.
+    """Fit the density of a band.
 
     Args:
         method: Of params.yaml, one that searches by least squares.
@@ -137,16 +139,13 @@ def disagreement(found: Fit) -> float:
     return float(np.sqrt(max(total / max(freedom, 1e-9), 1.0)))
 
 
-def theta_content(found: Identified, band: str, method: str) -> dict:
-    """What a θ file holds, but its loss, its rollouts and where it was found."""
+def theta_entries(found: Identified) -> dict:
+    """What a θ file holds of the mode."""
     point = found.coordinates.points(found.fit.phi[None])[0]
     values = dict(zip(found.names, point.tolist(), strict=True))
     law, episode = found.recordings[0].sling.law, found.recordings[0].episode
-    known = {"law": RUBBER, "history": launch_history(episode)} if law == RUBBER else {}
     return {
-        "band": band,
-        "method": method,
-        **known,
+        **pull_of(episode, law),
         "theta": {name: values[name] for name in (*THETA, *LAWS[law])},
         "nuisances": {"air_drag": values["air_drag"]},
         "turn_damping": values["turn_damping"],

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from pipeline.base.layout import Layout
 from pipeline.base.schema import Direction, JsonRecord, Range, read_json
+from pipeline.params import Params
 from pipeline.simulator.model import Sling
 from pipeline.simulator.rubber import NEO_HOOKEAN
 
@@ -20,7 +21,12 @@ class Mounting(JsonRecord):
 
 
 def load_sling(
-    params, band: str, root: str | Path = ".", law: str = NEO_HOOKEAN, *, mounted: bool = True
+    params: Params,
+    band: str,
+    root: str | Path = ".",
+    law: str = NEO_HOOKEAN,
+    *,
+    mounted: bool = True,
 ) -> Sling:
     """The sling of a band of params.yaml, mounted as its recording shows where that was fitted.
 
@@ -29,14 +35,14 @@ def load_sling(
 
     Raises NotMade where the file of the mounting is damaged.
     """
-    path, mounting = Layout(Path(root)).mounting(band), None
+    path, mounting = Layout(Path(root)).clamps(band), None
     if mounted and path.exists():
         mounting = read_json(path, Mounting).model_dump()
     sling = Sling.of(params.bands[band], params.setup, params.sling, mounting)
     return replace(sling, law=law)
 
 
-def sling_of_method(params, band: str, method: str, root: str | Path = ".") -> Sling:
+def sling_of_method(params: Params, band: str, method: str, root: str | Path = ".") -> Sling:
     """The sling of a band as a method of params.yaml takes it: with its law, mounted or not."""
     about = params.methods[method]
     return load_sling(params, band, root, about.law, mounted=about.mounting)

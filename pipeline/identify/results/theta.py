@@ -24,7 +24,7 @@ from pipeline.base.layout import NotMade, owner
 from pipeline.base.schema import JsonRecord, Name, Range, Section, read_json, refusal
 from pipeline.identify.results.confidence import Confidence, Count
 from pipeline.identify.results.mounting import load_sling
-from pipeline.params import Parameters
+from pipeline.params import Parameters, Params
 from pipeline.params.identification import LAWS
 from pipeline.simulator.material import THETA
 from pipeline.simulator.model import LaunchHistory, Sling
@@ -118,7 +118,7 @@ def load_samples(path: Path) -> np.ndarray | None:
     return np.array(samples, float) if samples else None
 
 
-def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Sling:
+def calibrated(params: Params, band: str, content: dict, root: str | Path = ".") -> Sling:
     """The sling of a band with all that a θ file's content says beside the five of θ.
 
     Its launches have the history of params.yaml's `launch`, or else the recording's.
@@ -133,7 +133,7 @@ def calibrated(params, band: str, content: dict, root: str | Path = ".") -> Slin
     return replace(sling, **extra)
 
 
-def launch_history(params, content: dict) -> LaunchHistory | None:
+def launch_history(params: Params, content: dict) -> LaunchHistory | None:
     """How a hand must draw the band of a θ file to launch it; None for a law without memory."""
     asked = {"pull_time": params.launch.pull_time, "pause": params.launch.pause}
     if content.get("law", NEO_HOOKEAN) != RUBBER:

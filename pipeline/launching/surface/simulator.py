@@ -10,11 +10,12 @@ import numpy as np
 
 from pipeline.base.machine import cores
 from pipeline.identify.results.theta import at_points, calibrated, vector
+from pipeline.params import Params
 from pipeline.simulator.launch import launch
 
 
 def asked_of_the_hand(
-    params, band: str, content: dict, draw: np.ndarray, root: str | Path = "."
+    params: Params, band: str, content: dict, draw: np.ndarray, root: str | Path = "."
 ) -> dict[str, float] | None:
     """How the hand must draw a band whose law remembers it, and what it costs not to.
 
@@ -35,7 +36,7 @@ def asked_of_the_hand(
 
 
 def simulator(
-    params,
+    params: Params,
     band: str,
     content: dict,
     max_force: float = np.inf,

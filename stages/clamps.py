@@ -1,8 +1,8 @@
 """Fit how the band leaves its clamps and how stiff it bends, to the slack part of the recording.
 
-    python -m stages.mounting band1
+    python -m stages.clamps band1
 
-Reads data/episodes/<band>/; writes data/mounting/<band>.json.
+Reads data/episodes/<band>/; writes data/clamps/<band>.json.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def main() -> None:
         lambda part: EpisodeLoss.plain(params, part, sling),
         workers=cores(),
     )
-    write_json(Layout().mounting(band), content)
+    write_json(Layout().clamps(band), content)
     print(
         f"{band}: clamps at {content['clamp_angle_deg']:.1f} deg, bending"
         f" {content['relative_rigidity']:.2f} of a solid round band's"

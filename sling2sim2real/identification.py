@@ -25,6 +25,7 @@ from pipeline.identify.posterior import identify as posterior
 from pipeline.identify.posterior.launches import Evidence, Observed
 from pipeline.identify.results.mounting import Mounting
 from pipeline.identify.results.theta import ThetaFile, load_samples, load_theta
+from pipeline.identify.results.units import SI_UNITS
 from pipeline.launching.trials.stretch import recorded_stretch
 from pipeline.params.identification import parameter_names
 from pipeline.params.provenance import changed_since
@@ -258,15 +259,12 @@ def _intervals(content: dict, told: dict) -> dict[str, Interval]:
     """Of a θ file's content and its confidence."""
     found = {}
     for name, one in told["parameters"].items():
-        value, unit = content["theta"][name], UNITS.get(name, "")
+        value, unit = content["theta"][name], SI_UNITS.get(name, "")
         found[name] = Interval(value, one["low"], one["high"], one["identifiable"], unit)
     for name, one in told["derived"].items():
         value, low, high = (float(one[key]) for key in ("value", "low", "high"))
         found[name] = Interval(value, low, high, True, one["unit"])
     return found
-
-
-UNITS = {"youngs_modulus": "Pa", "elasticity_damping": "s"}
 
 
 def _stretch(episodes: Sequence[Episode], settings: Settings, band) -> float | None:

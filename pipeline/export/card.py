@@ -10,7 +10,7 @@ from pipeline.export.band import CalibratedBand
 from pipeline.export.chain import MATCHED, SpringChain
 from pipeline.export.match import HOLD, LANDING, DrawCompared
 from pipeline.export.pull import PullCompared
-from pipeline.report.card.values import LABELS, rounded
+from pipeline.report.quantities import QUANTITIES, rounded
 
 UNITS = {"hold_force": "n", "speed": "m_s", "landing": "m"}  # in names of keys
 ASKED = (
@@ -164,11 +164,11 @@ def _table(head: str, rows) -> str:
 
 
 def _value(row: dict) -> str:
-    label = LABELS[row["name"]]
-    shown = [label.factor * row[key] if row[key] is not None else None for key in _ENDS]
+    quantity = QUANTITIES[row["name"]]
+    shown = [quantity.factor * row[key] if row[key] is not None else None for key in _ENDS]
     value, low, high = (one if one is None else f"{one:.3g}" for one in shown)
     between = "fixed" if low is None else f"{low} – {high}"
-    return f"| {label.text} (`{row['name']}`) | {value} {label.unit} | {between} |"
+    return f"| {quantity.label} (`{row['name']}`) | {value} {quantity.unit} | {between} |"
 
 
 _ENDS = "value", "low", "high"

@@ -24,7 +24,7 @@ from pipeline.export.chain import SpringChain
 from pipeline.export.match import draws_of
 from pipeline.export.mesh import Tube
 from pipeline.export.usd_card import readme
-from pipeline.report.card.values import rounded
+from pipeline.report.quantities import rounded
 from pipeline.simulator.model import GRAVITY
 
 RATE, ITERATIONS = 200, 64  # steps a second, of the solver: the paper's

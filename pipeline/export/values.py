@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.export.band import CalibratedBand
-from pipeline.report.card.values import LABELS, rounded
+from pipeline.identify.results.units import SI_UNITS
+from pipeline.report.quantities import QUANTITIES, rounded
 from pipeline.simulator.rubber import RUBBER
 
 FRAMES = (
@@ -13,14 +14,13 @@ FRAMES = (
     " towards the target, z up. A draw is the place (y, z) to which the arm is sent with the"
     " projectile; a landing is a distance along y on the floor."
 )
-UNITS = {"youngs_modulus": "Pa", "elasticity_damping": "s", "air_drag": "1/s"}
 
 
 def values(model: CalibratedBand) -> list[dict]:
     """Each parameter with its 90 % interval where one is known: name, value, unit, low, high."""
     intervals, found = getattr(model, "intervals", {}), []
-    for name in LABELS:
-        value, known = getattr(model.theta, name), intervals.get(name)
+    for name in QUANTITIES:
+        value, known = getattr(model.theta, name, None), intervals.get(name)
         if value is None:
             continue
         sure = known is not None and known.low < known.high
@@ -28,7 +28,7 @@ def values(model: CalibratedBand) -> list[dict]:
             {
                 "name": name,
                 "value": rounded(value, 6),
-                "unit": UNITS.get(name, ""),
+                "unit": SI_UNITS.get(name, ""),
                 "low": rounded(known.low, 6) if sure else None,
                 "high": rounded(known.high, 6) if sure else None,
                 "identified": bool(sure and known.identifiable),

@@ -13,7 +13,7 @@ from pipeline.episode.episode import Episode
 from pipeline.export import values as about
 from pipeline.export.band import CalibratedBand
 from pipeline.export.match import draws_of
-from pipeline.report.card.values import rounded
+from pipeline.report.quantities import rounded
 from pipeline.simulator.rubber import TIMES, uniaxial
 
 STRETCHES = np.arange(1.0, 2.21, 0.1)

@@ -22,6 +22,7 @@ from pipeline.identify.posterior.launches import Evidence, LaunchLikelihood
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
 from pipeline.identify.results.estimate import pull_of
 from pipeline.identify.results.theta import EXTRA
+from pipeline.identify.results.units import SI_UNITS
 from pipeline.params import Parameters, Params
 from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.simulator.material import THETA
@@ -31,14 +32,6 @@ from pipeline.simulator.rubber import RUBBER
 LEVEL = 0.9
 SAMPLES = 200
 FILLS = 2 / 3  # of the box: an interval as wide tells nothing
-UNITS = {
-    "damping_product": "s",
-    "air_drag": "1/s",
-    "turn_damping": "",
-    "returned_share": "",
-    "release_time": "s",
-    "camera_delay": "s",
-}
 
 
 @dataclass(frozen=True)
@@ -178,7 +171,9 @@ def confidence(found: Identified, boxes: Parameters) -> dict:
     shown = {name: columns[name] for name in EXTRA}
     for one, kept in ((columns, shown), (mode, mode)):
         kept["damping_product"] = one["elasticity_damping"] * one["damping_scale"]
-    derived = {name: _told(samples, mode[name], UNITS[name]) for name, samples in shown.items()}
+    derived = {
+        name: _told(samples, mode[name], SI_UNITS.get(name, "")) for name, samples in shown.items()
+    }
     derived |= _clocks(found)
     matrix = np.corrcoef(found.samples.T + 1e-12 * np.arange(SAMPLES))
     return {

@@ -28,9 +28,10 @@ ui: setup             # what `sling flow` does, in a browser on this machine: ht
 test: setup           # the tests
 	.venv/bin/python -m pytest
 
-lint: setup           # ruff: rules and format; codespell
+lint: setup           # ruff: rules and format; basedpyright: types; codespell
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
+	.venv/bin/basedpyright
 	.venv/bin/codespell
 
 validate: setup       # slow campaigns, and tests by other engines and readers; results are committed
@@ -41,7 +42,7 @@ validate: setup       # slow campaigns, and tests by other engines and readers; 
 		tests/recording/input/test_kinematics.py tests/app/preflight/test_pictures.py \
 		tests/rig/recorder/test_record.py
 	.venv/bin/python -m validation.campaigns.mutations
-	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation
+	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation tests/app/flow
 	.venv/bin/python -m validation.campaigns.kills
 
 clean:                # all but data, checkpoints and DVC's cache

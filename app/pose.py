@@ -18,6 +18,8 @@ from app.plan.hand import along_pull, quaternion
 from app.safety import Hazard
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
+from pipeline.params import Params
+from pipeline.params.lab import SetupParams
 from pipeline.recording.input.frames import Transform
 
 
@@ -30,7 +32,7 @@ class PosedAnswer(Answer):
     tcp_quaternion_xyzw: list[float] | None
 
 
-def posed(answer: Answer, params, band: str, root: str | Path = ".") -> PosedAnswer:
+def posed(answer: Answer, params: Params, band: str, root: str | Path = ".") -> PosedAnswer:
     """The answer of `aim` with the hand's pose for its draw, before its warnings."""
     drawn = np.array([0.0, answer["draw_y_m"], answer["draw_z_m"]])
     warnings, frame, position, turn = list(answer["warnings"]), None, None, None
@@ -51,7 +53,7 @@ def posed(answer: Answer, params, band: str, root: str | Path = ".") -> PosedAns
     }
 
 
-def fork_in_base(params, band: str, root: str | Path = ".") -> tuple[Transform, str]:
+def fork_in_base(params: Params, band: str, root: str | Path = ".") -> tuple[Transform, str]:
     """Frame O to the robot's base, and the base's name, as the band's first recording has them.
 
     There, setup.base_to_fork comes before /tf_static; without a recording that can be read it
@@ -67,7 +69,7 @@ def fork_in_base(params, band: str, root: str | Path = ".") -> tuple[Transform, 
     return fork, frame or params.plan.frame
 
 
-def _recorded(layout: Layout, band: str, setup) -> tuple[Transform, str]:
+def _recorded(layout: Layout, band: str, setup: SetupParams) -> tuple[Transform, str]:
     recordings = layout.recordings(band)
     if not recordings:
         raise UserError(

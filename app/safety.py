@@ -56,7 +56,7 @@ def shown(answer: dict, to_json: bool) -> str:
     return arguments.shown({k: v for k, v in answer.items() if k != "warnings"}, False)
 
 
-def of_draw(params, band: str, draw: tuple[float, float], root: Path) -> Iterator[Hazard]:
+def of_draw(params: Params, band: str, draw: tuple[float, float], root: Path) -> Iterator[Hazard]:
     """A draw (y, z) [m] outside the box, or further than the band was drawn in its recordings."""
     for axis, value in zip("yz", draw, strict=True):
         low, high = getattr(params.setup, f"draw_{axis}")
@@ -83,7 +83,7 @@ def of_draw(params, band: str, draw: tuple[float, float], root: Path) -> Iterato
         )
 
 
-def of_launch(params, force: float, failure: str | None) -> Iterator[Hazard]:
+def of_launch(params: Params, force: float, failure: str | None) -> Iterator[Hazard]:
     """A simulated launch that fails, or whose draw takes more force [N] than the arm may hold."""
     if failure:
         yield Hazard("failure", f"the launch fails in simulation: {failure}")

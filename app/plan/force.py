@@ -11,6 +11,8 @@ from scipy.optimize import brentq
 
 from app.safety import of_mounting, tell
 from pipeline.base.errors import UserError
+from pipeline.params import Params
+from pipeline.params.lab import BandParams, SetupParams
 from pipeline.recording.input.frames import Transform
 
 ALIKE = 0.02  # relative: stretches that are as good as equal
@@ -40,7 +42,7 @@ class Earlier:
     problem: str | None
 
 
-def read_earlier(path: Path, params) -> Earlier:
+def read_earlier(path: Path, params: Params) -> Earlier:
     """Read a recording as far as a plan needs it: no pictures. Raises UserError.
 
     Of several pulls, the first that can be used.
@@ -82,7 +84,7 @@ class Held:
     rest_length: float
 
     @classmethod
-    def of(cls, band, setup) -> Held:
+    def of(cls, band: BandParams, setup: SetupParams) -> Held:
         return cls(setup.fork_width / 2, band.rest_length)
 
     def legs(self, point: np.ndarray) -> tuple[float, float]:
@@ -115,7 +117,7 @@ class Prediction:
 
 
 def predict(
-    params, band: str, drawn: np.ndarray, theta: Path | None, earlier: Earlier | None
+    params: Params, band: str, drawn: np.ndarray, theta: Path | None, earlier: Earlier | None
 ) -> Prediction:
     """The force at `drawn` (3,): by the simulator, else by an earlier recording, else unknown."""
     held = Held.of(params.bands[band], params.setup)
@@ -150,15 +152,14 @@ def predict(
     return Prediction(None, f"not checked: {why}; the band is stretched to {stretch:.2f}{advice}")
 
 
-def _simulated(params, band: str, drawn: np.ndarray, path: Path) -> float:
-    from pipeline.identify.results.theta import calibrated, load_theta, vector
+def _simulated(params: Params, band: str, drawn: np.ndarray, path: Path) -> float:
+    from pipeline.identify.results.theta import calibrated, launch_setup, load_theta, vector
     from pipeline.simulator.launch import launch
 
     content = load_theta(path, band)
     tell(of_mounting(band, Path()))
-    force = float(
-        launch(calibrated(params, band, content), vector(content), drawn[1:]).hold_force[0]
-    )
+    sling, setup = calibrated(params, band, content), launch_setup(params, content)
+    force = float(launch(sling, setup, vector(content), drawn[1:]).hold_force[0])
     if not np.isfinite(force):
         raise UserError(
             f"{path}: the simulated hold of draw [{drawn[1]:g}, {drawn[2]:g}] does not converge:"

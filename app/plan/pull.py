@@ -11,6 +11,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from app.plan.trajectory import Phase, Trajectory, leg_time
+from pipeline.params.lab import BandParams, PlanParams, SetupParams
+from pipeline.params.recording import EpisodeParams
 from pipeline.recording.pulls import CALM
 
 TICK = 0.001  # s: phases last whole ticks
@@ -31,7 +33,7 @@ def catenary_sag(length: float, width: float) -> float:
     return width / (2 * u) * (math.cosh(u) - 1)
 
 
-def hanging_middle(plan, setup, band) -> np.ndarray:
+def hanging_middle(plan: PlanParams, setup: SetupParams, band: BandParams) -> np.ndarray:
     """Where the fingers take the band, frame O, shape (3,): plan.hanging, else a catenary's."""
     below = plan.hanging
     if below is None:
@@ -39,7 +41,14 @@ def hanging_middle(plan, setup, band) -> np.ndarray:
     return np.array([0.0, 0.0, -below])
 
 
-def trajectory_of(plan, setup, episode, band, axis: np.ndarray, pulls: int = 1) -> Trajectory:
+def trajectory_of(
+    plan: PlanParams,
+    setup: SetupParams,
+    episode: EpisodeParams,
+    band: BandParams,
+    axis: np.ndarray,
+    pulls: int = 1,
+) -> Trajectory:
     """The whole recording, frame O.
 
     Args:

@@ -14,7 +14,8 @@ from app.preflight.tips import Tips, along, measure_tips
 from app.preflight.verdict import cautions_of
 from app.sizes import DIAMETER, REST_LENGTH, band_to_come
 from pipeline.base.errors import UserError
-from pipeline.params import expect_known
+from pipeline.params import Params, expect_known
+from pipeline.params.lab import BandParams
 from pipeline.recording.build import Processed, process_recording
 from pipeline.recording.delays import Delays, delays_of
 from pipeline.recording.geometry import geometry_of
@@ -41,7 +42,7 @@ class Look:
     tips: Tips | None = None
 
 
-def check_recording(path: Path, params: object, band: object | None = None) -> CheckReport:
+def check_recording(path: Path, params: Params, band: BandParams | None = None) -> CheckReport:
     """Look at a recording as far as it can be read.
 
     Args:
@@ -57,8 +58,8 @@ def check_recording(path: Path, params: object, band: object | None = None) -> C
 
 def look_at(
     path: Path,
-    params: object,
-    band: object | None = None,
+    params: Params,
+    band: BandParams | None = None,
     source: str = "given",
     pull: int | None = None,
 ) -> Look:
@@ -102,7 +103,7 @@ def look_at(
 
 
 def band_of(
-    params: object, name: str | None, diameter: float | None, rest_length: float | None
+    params: Params, name: str | None, diameter: float | None, rest_length: float | None
 ) -> tuple[object | None, str]:
     """The band that a command line names, None where it names none, and where it is from.
 
@@ -121,7 +122,7 @@ def band_of(
     return band, f"given, but assumed: {left[0]}" if left else "given"
 
 
-def _look_at_pull(report: CheckReport, pull: Recording, band: object, params: object) -> Look:
+def _look_at_pull(report: CheckReport, pull: Recording, band: BandParams, params: Params) -> Look:
     """Fills the report of what the file is with what the pull is."""
     report.pull = pull.pull
     try:
@@ -137,7 +138,7 @@ def _without(path: Path, error: UserError) -> str:
     return str(error).removeprefix(f"{path}: ")
 
 
-def _whole_look(report: CheckReport, done: Processed, params: object) -> Look:
+def _whole_look(report: CheckReport, done: Processed, params: Params) -> Look:
     report.frames = done.geometry.sources
     report.signals = _signal_facts(done.recording, done.signals, done.scene)
     report.delays = _delays(done.delays)
@@ -181,7 +182,9 @@ def _add_roles(topics: list[Topic], recording: Recording) -> None:
         row.notes = list(stream.notes)
 
 
-def _add_signals(report: CheckReport, recording: Recording, band: object, params: object) -> None:
+def _add_signals(
+    report: CheckReport, recording: Recording, band: BandParams, params: Params
+) -> None:
     """What is known of force and motion where only the pictures cannot be used."""
     try:
         geometry = geometry_of(recording, params.setup)

@@ -6,11 +6,12 @@ from pathlib import Path
 
 from app.preflight.check import COMMON, band_of, look_at
 from app.preflight.output import expect_writable, written
+from pipeline.params import Params
 
 
 def check(
     recording: Path,
-    params: object,
+    params: Params,
     *,
     band: str | None = None,
     diameter: float | None = None,

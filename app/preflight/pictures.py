@@ -11,6 +11,8 @@ import cv2
 from app.preflight.output import expect_folder
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder
+from pipeline.params import Params
+from pipeline.params.lab import BandParams
 from pipeline.recording.build import view_of
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.masks.folder import mask_name
@@ -24,7 +26,7 @@ def expect_new(folder: Path) -> None:
         raise UserError(f"{folder}: is there already, name a folder that is not")
 
 
-def write_pictures(recording: Path, band: object, params: object, folder: Path) -> str:
+def write_pictures(recording: Path, band: BandParams, params: Params, folder: Path) -> str:
     """Write the colour pictures of each pull's window as PNG, named as their masks are to be.
 
     Args:

@@ -16,6 +16,7 @@ from app.preflight.output import expect_writable
 from app.preflight.sheet import masked_frames
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing
+from pipeline.params import Params
 from pipeline.recording.build import Processed
 from pipeline.recording.input import images
 from pipeline.recording.input.camera import Camera
@@ -32,7 +33,7 @@ JPEG_QUALITY = 85  # of pictures that come raw
 BAND = (255, 0, 255, 150)  # RGBA of the mask
 
 
-def write_timeline(look: Look, params: object, path: Path) -> str:
+def write_timeline(look: Look, params: Params, path: Path) -> str:
     """Write an .rrd of what can be shown.
 
     Returns:
@@ -184,7 +185,7 @@ def _motion(log: _Log, look: Look) -> None:
         log.at(facts[f"{name}_s"], "events", rerun.TextLog(name, level="INFO"))
 
 
-def _clouds(log: _Log, look: Look, params: object) -> None:
+def _clouds(log: _Log, look: Look, params: Params) -> None:
     import rerun
 
     done, start = look.done, look.report.signals["window_start_s"]

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from app.preflight.report import Caution, CheckReport, Topic
+from pipeline.params.lab import SetupParams
 from pipeline.recording.build import Processed
 from pipeline.recording.events import SETTLE
 from pipeline.recording.pulls import CALM
@@ -31,7 +32,7 @@ RELEASE = 0.001  # s
 SEEN_AS = {"hanging": "hangs", "drawn": "is drawn", "recoil": "recoils", "swing": "swings"}
 
 
-def cautions_of(report: CheckReport, done: Processed, setup: object) -> list[Caution]:
+def cautions_of(report: CheckReport, done: Processed, setup: SetupParams) -> list[Caution]:
     """In the order of a recording's way: file, topics, clocks, force, motion, pictures, frames.
 
     Args:
@@ -111,7 +112,7 @@ def _of_clocks(report: CheckReport) -> Iterator[Caution]:
             )
 
 
-def _of_force(report: CheckReport, setup: object) -> Iterator[Caution]:
+def _of_force(report: CheckReport, setup: SetupParams) -> Iterator[Caution]:
     facts = report.signals
     hold = float(np.linalg.norm(facts["hold_force_n"]))
     share = facts["noise_n"] / hold
@@ -140,7 +141,7 @@ def _of_force(report: CheckReport, setup: object) -> Iterator[Caution]:
         yield Caution("slip", what, "the band slipped in the pads: grip firmly and record again")
 
 
-def _of_motion(report: CheckReport, signals: Signals, setup: object) -> Iterator[Caution]:
+def _of_motion(report: CheckReport, signals: Signals, setup: SetupParams) -> Iterator[Caution]:
     facts = report.signals
     if round(facts["grasp_s"], 2) < LEAD_IN:
         what = f"only {facts['grasp_s']:.2f} s of the empty hand come before the grasp"

@@ -15,9 +15,8 @@ from pipeline.params import Params
 RECORDING = ("force", "cloud", "episode")  # whole sections
 RECORDED_SETUP = ("base_to_fork", "camera_to_fork", "start_pose", "tip_link", "tool", "topics")
 RECORDED_SETUP += ("urdf",)
-PULL_SETUP = ("air_density", "clamp_direction", "finger_opening_time", "foot_height")
-PULL_SETUP += ("fork_height", "fork_width", "grip_force")
-LAUNCH_SETUP = ("arm_stiffness", "projectile_mass")
+PULL_SETUP = ("air_density", "clamp_direction", "finger_opening_time", "fork_width", "grip_force")
+LAUNCH_SETUP = ("arm_stiffness", "foot_height", "fork_height", "projectile_mass")
 POLICY_SETUP = ("draw_y", "draw_z", "max_force")
 MESH = ("edges", "grading", "mesh", "tet_edges")
 PULL_STEPS = ("grip_step", "hold_step", "recoil_step", "recoil_time", "swing_step")
@@ -38,15 +37,11 @@ class Change:
         return f"{self.key} was {_short(self.old)}, is {_short(self.new)}"
 
 
-def settings_of(
-    params: Params, band: str, method: str, *, launches: bool = False
-) -> dict[str, Any]:
+def settings_of(params: Params, band: str, method: str) -> dict[str, Any]:
     """The settings that θ of a band and a method rests on, by their keys in params.yaml.
 
-    Args:
-        launches: Whether measured launches are among its evidence.
-
-    Values are those of JSON: numbers, texts, lists, None.
+    But for those of launches that are evidence: `evidence_settings_of`. Values are those of JSON:
+    numbers, texts, lists, None.
     """
     found = dict(_leaves(f"bands.{band}", params.bands[band]))
     for name in RECORDING:
@@ -57,10 +52,13 @@ def settings_of(
     found.update(_leaves("parameters", params.parameters))
     for name in METHOD:
         found.update(_leaves(f"methods.{method}.{name}", getattr(params.methods[method], name)))
-    if launches:
-        found.update(_launch_settings(params))
-        found["trials.actuation_error"] = params.trials.actuation_error
     return found
+
+
+def evidence_settings_of(params: Params) -> dict[str, Any]:
+    """The settings that launches as evidence rest on, as `settings_of` gives them."""
+    found = _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
+    return found | {"trials.actuation_error": params.trials.actuation_error}
 
 
 def policy_settings_of(params: Params, band: str) -> dict[str, Any]:
@@ -86,8 +84,10 @@ def changed_since(params: Params, content: Mapping[str, Any], method: str) -> li
     then = content.get("made_with")
     if not then or method not in params.methods:
         return []
-    launches = bool((content.get("confidence") or {}).get("launches"))
-    return changes(then, settings_of(params, content["band"], method, launches=launches))
+    now = settings_of(params, content["band"], method)
+    if (content.get("confidence") or {}).get("launches"):
+        now |= evidence_settings_of(params)
+    return changes(then, now)
 
 
 def _launch_settings(params: Params) -> dict[str, Any]:

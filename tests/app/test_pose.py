@@ -14,7 +14,7 @@ from app.plan.plan import plan_recording
 from app.pose import posed
 from pipeline.params import load
 from tests.project import ROOT, with_
-from tests.recording.bag import write_bag
+from validation.recordings.bag import write_bag
 
 pytestmark = pytest.mark.usefixtures("nowhere")
 

@@ -9,7 +9,8 @@ from ruamel.yaml import YAML
 
 from pipeline.simulator.material import THETA
 from sling2sim2real import UserError, export
-from tests.project import ROOT, SLING, python
+from tests.project import ROOT, python
+from validation.projects import CLI
 
 
 def test_plain_numbers_are_those_of_the_simulation(model, tmp_path) -> None:
@@ -51,7 +52,7 @@ def test_the_command(tmp_path) -> None:
     theta.parent.mkdir(parents=True)
     soft = dict(zip(THETA, (2.2e5, 0.45, 2e-3, 0.5, 1.0), strict=True))
     theta.write_text(json.dumps({"band": "band1", "theta": soft}))
-    command = (*SLING, "export", "--band", "band1", "--to", "yaml")
+    command = (*CLI, "export", "--band", "band1", "--to", "yaml")
     for _ in range(2):
         done = python(*command, folder=tmp_path)
         assert (done.returncode, done.stderr) == (0, "")

@@ -12,9 +12,9 @@ from pipeline.recording.build import build_episodes, process_pulls
 from pipeline.recording.events import releases_of
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.pulls import pulls_of
-from tests.recording.bag import START, Truth, blind_bag, edit
 from tests.recording.conftest import written
 from tests.recording.joined import joined
+from validation.recordings.bag import START, Truth, blind_bag, edit
 
 DEEP, SHALLOW = Truth(), Truth(draw=0.26, release=3.1507)
 

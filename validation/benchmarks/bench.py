@@ -6,6 +6,8 @@ import argparse
 import json
 from pathlib import Path
 
+from pipeline.params import Params
+
 METHOD = "sling2sim2real"  # of --scaling
 # What each benchmark takes beside --json and the flag that asks for it; "" is the plain form.
 TAKES = {
@@ -53,7 +55,7 @@ def asked(arguments: argparse.Namespace) -> str:
     return what
 
 
-def _simulator(arguments, params, device, budget):
+def _simulator(arguments, params: Params, device, budget):
     from validation.benchmarks import throughput
 
     if arguments.law is None:
@@ -62,13 +64,13 @@ def _simulator(arguments, params, device, budget):
     return result, throughput.table, f"--law {arguments.law} --device {device}"
 
 
-def _recording(arguments, params, device, budget):
+def _recording(arguments, params: Params, device, budget):
     from validation.benchmarks import clouds
 
     return clouds.bench_recording(arguments.recording, params), clouds.table, "--recording"
 
 
-def _scaling(arguments, params, device, budget):
+def _scaling(arguments, params: Params, device, budget):
     from validation.benchmarks import scaling
 
     band, method = arguments.scaling, (arguments.methods or [METHOD])[0]
@@ -77,7 +79,7 @@ def _scaling(arguments, params, device, budget):
     return result, scaling.table, command
 
 
-def _methods(arguments, params, device, budget):
+def _methods(arguments, params: Params, device, budget):
     from validation.benchmarks import methods
 
     result = methods.bench_methods(params, device, budget, arguments.methods)
@@ -85,7 +87,7 @@ def _methods(arguments, params, device, budget):
     return result, methods.table, " ".join(words)
 
 
-def _peers(arguments, params, device, budget):
+def _peers(arguments, params: Params, device, budget):
     from validation.benchmarks import engines
 
     entries = engines.bench_peers(params, device)

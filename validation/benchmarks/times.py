@@ -38,7 +38,8 @@ BAND = "timed"  # of the recording
 CHANGES = ("PYTHONPATH", "VIRTUAL_ENV", "UV_CACHE_DIR", "PIP_CACHE_DIR", "WARP_CACHE_PATH")
 STAGE = re.compile(r"^([a-z]+)(?:@[\w-]+)? \| done \((?:(\d+) min )?([\d.]+) s\)$", re.MULTILINE)
 ABLATION = re.compile("^ablation_", re.MULTILINE)
-STAGES = "record episode mounting history theta policy trials floor card report".split()
+STAGES = "record episode mounting clamps evidence history clusters cma density de bo adam search"
+STAGES = (STAGES + " theta policy launches trials floor card report").split()  # order of columns
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ from pipeline.identify.objective.evaluate import Evaluation, Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.space import Space
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.params.identification import OUR_ENGINE
+from pipeline.params import Params
+from pipeline.params.identification import OUR_ENGINE, MethodParams
 
 PIPELINE = Path(__file__).parents[2]
 SOURCES = (  # the code that a term of the loss hangs on
@@ -50,7 +51,7 @@ class LoggingEvaluator:
         return evaluation
 
 
-def service(stage: str, band: str, method: str, params, rollouts: int) -> LoggingEvaluator:
+def service(stage: str, band: str, method: str, params: Params, rollouts: int) -> LoggingEvaluator:
     """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
     evaluate, layout = evaluator(params, band, method), Layout()
     sections = (params.bands[band], params.setup, params.sling, params.force, params.loss)
@@ -60,7 +61,7 @@ def service(stage: str, band: str, method: str, params, rollouts: int) -> Loggin
         fingerprint(
             *SOURCES,
             *(layout.episode(band) / f"{name}.parquet" for name in ("signals", "clouds")),
-            layout.mounting(band),
+            layout.clamps(band),
             *sources_of(params.methods[method].engine),
             *(section.model_dump_json() for section in sections),
             *(f"{package} {version(package)}" for package in ("warp-lang", "numpy", "scipy")),
@@ -70,13 +71,13 @@ def service(stage: str, band: str, method: str, params, rollouts: int) -> Loggin
     return LoggingEvaluator(cache, Progress(f"{stage}-{band}-{method}", rollouts, "rollouts"))
 
 
-def _folder(band: str, method) -> list[str]:
+def _folder(band: str, method: MethodParams) -> list[str]:
     """Words that tell methods apart whose rollouts differ."""
     words = [band] if method.mounting else [band, "unmounted"]
     return words if method.engine == OUR_ENGINE else [*words, method.engine.replace(":", ".")]
 
 
-def evaluator(params, band: str, method: str) -> Evaluator:
+def evaluator(params: Params, band: str, method: str) -> Evaluator:
     """The evaluator of a recorded band, on the devices that the environment names."""
     episode, engine = load_episode(band), params.methods[method].engine
     sling = sling_of_method(params, band, method)

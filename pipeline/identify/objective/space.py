@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.params.identification import LAWS
+from pipeline.params import Params
+from pipeline.params.identification import LAWS, Parameters
 from pipeline.simulator.material import THETA
 from pipeline.simulator.rubber import NEO_HOOKEAN
 
@@ -29,7 +30,7 @@ class Space:
     @classmethod
     def of(
         cls,
-        parameters,
+        parameters: Parameters,
         bounds: dict[str, tuple[float, float]] | None = None,
         law: str = NEO_HOOKEAN,
     ) -> Space:
@@ -46,7 +47,7 @@ class Space:
         return cls(tuple(known), low, high, np.array(log))
 
     @classmethod
-    def of_method(cls, params, method: str) -> Space:
+    def of_method(cls, params: Params, method: str) -> Space:
         """The box that a method of params.yaml searches, within its bounds."""
         about = params.methods[method]
         return cls.of(params.parameters, about.bounds, about.law)

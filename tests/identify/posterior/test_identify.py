@@ -14,8 +14,8 @@ from pipeline.identify.posterior.residuals import Residuals, Rule
 from pipeline.identify.results.theta import at_points, load_theta
 from pipeline.simulator.interaction import interact
 from tests import once
-from tests.identify.objective.own_law import own_law_episode
 from tests.identify.objective.pulls import PARAMS, pulled, sling_of
+from validation.synthetic import own_law_episode
 
 METHOD, WORKERS, LOSS = "least_squares", 2, "log_loss_factor"
 SLING = replace(sling_of(0.03), law="rubber")
@@ -37,7 +37,7 @@ def recorded(phase: float, seed: int, noise=(0.0, 0.0)):
 
 
 def found_of(*episodes, workers: int = WORKERS):
-    return identify.identify(PARAMS, METHOD, SLING, episodes, FROM[:7], workers=workers)
+    return identify.fit_posterior(PARAMS, METHOD, SLING, episodes, FROM[:7], workers=workers)
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_alike_recordings_agree(both):
 
 def test_what_is_written_is_a_theta_file(first, tmp_path):
     path = tmp_path / "least_squares.json"
-    content = identify.theta_content(first, "known", METHOD)
+    content = {"band": "known", **identify.theta_entries(first)}
     content["confidence"] = told_of(first)
     content |= {"loss": dict.fromkeys(("geom", "force", "work", "total"), 1.0), "rollouts": 1}
     path.write_text(json.dumps(content, allow_nan=False))

@@ -15,9 +15,9 @@ from pipeline.base.errors import UserError
 from pipeline.recording.build import build_episodes, process_pulls, process_recording
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.masks import masker
-from tests.recording import looks
 from tests.recording.joined import joined
-from tests.recording.looks import LOOKS
+from validation.recordings import looks
+from validation.recordings.looks import LOOKS
 
 
 @pytest.fixture(scope="module")

@@ -9,15 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace as Message
+from typing import BinaryIO
 
 import cv2
 import numpy as np
 from mcap.writer import Writer
 from mcap_ros2._dynamic import serialize_dynamic
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
 TYPES = {
@@ -122,6 +123,30 @@ def scores(episode: object, truth: Truth) -> tuple[np.ndarray, float]:
     return np.concatenate(off), float(np.mean(covered))
 
 
+class RosWriter:
+    """Messages of ROS 2 in CDR; `finish` ends the file."""
+
+    def __init__(self, file: BinaryIO, **options: object) -> None:
+        self._writer, self._types = Writer(file, **options), get_typestore(Stores.ROS2_HUMBLE)
+        self._writer.start("ros2")
+        self._channels: dict[str, tuple[int, Callable[[object], bytes]]] = {}
+        self.finish = self._writer.finish
+
+    def register(self, name: str, fields: str) -> None:
+        """Add a type by the text of its .msg file."""
+        self._types.register(get_types_from_msg(fields, name))
+
+    def write(self, topic: str, name: str, time: int, message: object) -> None:
+        """Write a message of a type, received and sent at a time [ns]."""
+        if topic not in self._channels:
+            text = self._types.generate_msgdef(name, ros_version=2)[0]
+            schema = self._writer.register_schema(name, "ros2msg", text.encode())
+            number = self._writer.register_channel(topic, "cdr", schema)
+            self._channels[topic] = number, serialize_dynamic(name, text)[name]
+        number, encode = self._channels[topic]
+        self._writer.add_message(number, time, encode(message), time)
+
+
 def _ease(x: float) -> float:
     x = min(max(x, 0.0), 1.0)
     return x**3 * (10 - 15 * x + 6 * x * x)
@@ -156,17 +181,8 @@ def write_bag(
     truth, random = truth or Truth(), np.random.default_rng(1)
     to_sensor, to_base = (HAND * SENSOR).inv(), BASE[0].inv()
     turn = dict(zip("xyzw", (to_base * HAND).as_quat(), strict=True))
-    definitions = get_typestore(Stores.ROS2_HUMBLE)
     with path.open("wb") as file:
-        writer = Writer(file, **{"chunk_size": 200_000, **options})
-        writer.start("ros2")
-
-        @cache
-        def channel(topic: str, name: str) -> tuple[int, Callable[[object], bytes]]:
-            text = definitions.generate_msgdef(name, ros_version=2)[0]
-            schema = writer.register_schema(name, "ros2msg", text.encode())
-            number = writer.register_channel(topic, "cdr", schema)
-            return number, serialize_dynamic(name, text)[name]
+        writer = RosWriter(file, **{"chunk_size": 200_000, **options})
 
         def write(kind: str, topic: str, t: float, delay: float, body: dict, frame: str) -> None:
             if kind in without:
@@ -179,8 +195,7 @@ def write_bag(
             message = change(kind, stamp, message)
             if message is not None:
                 late = START + round(receive(kind, t, delay) * 1e9)
-                number, encode = channel(topic, TYPES[kind])
-                writer.add_message(number, late, encode(message), late)
+                writer.write(topic, TYPES[kind], late, message)
 
         write("tf", "/tf_static", 0.0, 0.0, {"transforms": _transforms()}, "")
         events = [(k / rate, "wrench") for k in range(int(truth.end * rate))]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.recording.view import View
-from tests.recording import strand
-from tests.recording.looks import BAND, Truth
-from tests.recording.strand import GRASP, RELEASE, REST, TIPS
+from validation.recordings import strand
+from validation.recordings.looks import BAND, FrameTruth
+from validation.recordings.strand import GRASP, RELEASE, REST, TIPS
 
 PHASES = ("hanging", "lift", "taut", "recoil", "swing")
 
@@ -21,7 +21,9 @@ def phase(time: float) -> str:
     return "recoil" if time < RELEASE + 0.1 else "swing"
 
 
-def score(view: View, frame: object, truth: Truth, points: np.ndarray) -> dict[str, np.ndarray]:
+def score(
+    view: View, frame: object, truth: FrameTruth, points: np.ndarray
+) -> dict[str, np.ndarray]:
     """How a cloud compares with the truth.
 
     Returns:
@@ -45,7 +47,7 @@ def score(view: View, frame: object, truth: Truth, points: np.ndarray) -> dict[s
     return {"off": np.abs(gaps.min(axis=1)), "covered": bins[seen]}
 
 
-def figures(view: View, truths: list[Truth], clouds: object) -> dict[str, dict[str, float]]:
+def figures(view: View, truths: list[FrameTruth], clouds: object) -> dict[str, dict[str, float]]:
     """Of all frames and of each phase: median distance from the surface, covered share, strays."""
     found: dict[str, list] = {"all": []}
     numbered = zip(view.frames(), clouds.points, strict=True)

@@ -21,10 +21,10 @@ from pipeline.recording.input.frames import Transform
 from pipeline.recording.input.reader import Recording, Stream
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.view import Scene, View
-from tests.recording import strand
-from tests.recording.strand import GRASP, RELEASE, REST, TIPS
+from validation.recordings import strand
+from validation.recordings.bag import FLOOR
+from validation.recordings.strand import GRASP, RELEASE, REST, TIPS
 
-FLOOR = -0.52
 SIZE, FOCAL = (640, 480), 495.0
 RANGE, BLUR = 2.2, 0.0006  # m beyond which there is no depth; noise at 1 m [m]
 LIGHT = np.array([0.35, 0.30, 0.89])
@@ -37,7 +37,7 @@ AXES = np.stack([[1.0, 0, 0], np.cross(APPROACH, [1.0, 0, 0]), APPROACH], axis=1
 
 
 @dataclass(frozen=True)
-class Look:
+class Appearance:
     """Colours (BGR), light and shape of what is seen.
 
     Attributes:
@@ -63,9 +63,9 @@ class Look:
 
 WHITE = {"band": (222, 226, 228), "finger": (220, 222, 222)}
 LOOKS = {
-    "orange on grey, white arm": Look(),
-    "near white beside a white arm": Look(**WHITE),
-    "dark in shadow, dark floor and arm": Look(
+    "orange on grey, white arm": Appearance(),
+    "near white beside a white arm": Appearance(**WHITE),
+    "dark in shadow, dark floor and arm": Appearance(
         band=(38, 36, 34),
         floor=(45, 47, 50),
         wall=(60, 60, 60),
@@ -74,23 +74,23 @@ LOOKS = {
         fork=(60, 58, 58),
         light=0.8,
     ),
-    "the floor's colour": Look(band=(92, 100, 107)),
-    "the wall's and the fork's colour": Look(
+    "the floor's colour": Appearance(band=(92, 100, 107)),
+    "the wall's and the fork's colour": Appearance(
         band=(150, 155, 152), fork=(150, 155, 152), wall=(150, 155, 152), arm=(160, 160, 160)
     ),
-    "4 mm thin": Look(diameter=0.004),
-    "4 mm thin, white, white arm": Look(diameter=0.004, **WHITE),
-    "blue, blue glove": Look(
+    "4 mm thin": Appearance(diameter=0.004),
+    "4 mm thin, white, white arm": Appearance(diameter=0.004, **WHITE),
+    "blue, blue glove": Appearance(
         band=(150, 80, 35), finger=(150, 82, 38), arm=(145, 85, 40), floor=(160, 165, 168)
     ),
-    "white, from the other side": Look(eye=(-0.55, 0.62, 0.30), **WHITE),
-    "orange, colour camera apart": Look(offset=(0.06, 0.01, 0.0)),
-    "white, from behind and above": Look(eye=(0.62, -0.75, 0.55), **WHITE),
+    "white, from the other side": Appearance(eye=(-0.55, 0.62, 0.30), **WHITE),
+    "orange, colour camera apart": Appearance(offset=(0.06, 0.01, 0.0)),
+    "white, from behind and above": Appearance(eye=(0.62, -0.75, 0.55), **WHITE),
 }
 
 
 @dataclass
-class Truth:
+class FrameTruth:
     """Of one picture: what each pixel shows, and the band's middle and radius."""
 
     line: np.ndarray  # (N, 3) frame O
@@ -228,7 +228,7 @@ def _seen(time: float, diameter: float, eye: tuple, from_: tuple | None = None):
     return part.astype(np.uint8), bright, depth.astype(np.float32)
 
 
-def _jpeg(look: Look, part: np.ndarray, bright: np.ndarray, random) -> Picture:
+def _jpeg(look: Appearance, part: np.ndarray, bright: np.ndarray, random) -> Picture:
     tile = tuple(0.8 * np.array(look.floor))
     base = (52, 50, 50)
     colors = (look.floor, tile, look.wall, look.fork, base, look.arm, look.finger, look.band)
@@ -255,7 +255,7 @@ def _millimetres(depth: np.ndarray, random) -> Picture:
 
 
 @dataclass
-class Signals:
+class LookSignals:
     """What the pipeline knows of the hand; the same names as pipeline.recording.signals."""
 
     time: np.ndarray
@@ -279,13 +279,13 @@ def times(count: int) -> np.ndarray:
     return np.concatenate([before, after])
 
 
-def view_of(look: Look, stamps: np.ndarray, seed: int = 0) -> tuple[View, list[Truth]]:
+def view_of(look: Appearance, stamps: np.ndarray, seed: int = 0) -> tuple[View, list[FrameTruth]]:
     """A view of a recording in this look, and what is true of each frame."""
     random = np.random.default_rng(seed)
     colors, depths, truths = [], [], []
     for time in map(float, stamps):
         part, bright, depth = _seen(time, look.diameter, look.eye)
-        truths.append(Truth(*band(time, look.diameter), part, depth))
+        truths.append(FrameTruth(*band(time, look.diameter), part, depth))
         if look.offset is not None:
             part, bright, _ = _seen(time, look.diameter, look.eye, look.offset)
         colors.append(_jpeg(look, part, bright, random))
@@ -293,7 +293,7 @@ def view_of(look: Look, stamps: np.ndarray, seed: int = 0) -> tuple[View, list[T
     return assemble(look, stamps, colors, depths), truths
 
 
-def assemble(look: Look, stamps: np.ndarray, colors: list, depths: list) -> View:
+def assemble(look: Appearance, stamps: np.ndarray, colors: list, depths: list) -> View:
     """A view of these pictures, as if they had been read of a recording."""
     nanoseconds = np.round(stamps * 1e9).astype(np.int64)
     colors = [replace(one, stamp=int(t)) for one, t in zip(colors, nanoseconds, strict=True)]
@@ -313,6 +313,6 @@ def assemble(look: Look, stamps: np.ndarray, colors: list, depths: list) -> View
     geometry = Geometry(
         Transform.identity(), Transform(turn, place), to_color, Rotation.identity(), True, {}
     )
-    signals = Signals(np.linspace(0, strand.END, 140))
+    signals = LookSignals(np.linspace(0, strand.END, 140))
     scene = Scene(TIPS, FLOOR, look.diameter, REST, signals)
     return View(recording, geometry, scene, strand.END)

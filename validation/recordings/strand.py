@@ -12,8 +12,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-TIPS = np.array([[-0.1375, 0.0, 0.0], [0.1375, 0.0, 0.0]])
-REST, NODES = 0.52, 61
+from validation.recordings.bag import REST, TIPS
+
+NODES = 61
 MIDDLE = NODES // 2
 MASS, STIFFNESS, BENDING = 0.025, 18.0, 6e-5  # kg, N (force at twice the length), N m^2
 DAMPING, DRAG = 3e-4, 1.5  # s of the springs' force, 1/s

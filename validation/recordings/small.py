@@ -16,13 +16,11 @@ import cv2
 import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
-from mcap_ros2._dynamic import serialize_dynamic
 from mcap_ros2.decoder import DecoderFactory
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from pipeline.params import Params, load
-from tests.recording.bag import Lens, Truth, write_bag
-from tests.recording.foxglove_bag import translate
+from validation.recordings.bag import Lens, RosWriter, Truth, write_bag
+from validation.recordings.foxglove_bag import translate
 
 CONTAINERS = {
     "zstd": {"compression": CompressionType.ZSTD},
@@ -88,23 +86,9 @@ def _contained(source: Path, target: Path, options: dict) -> None:
 
 def _franka(source: Path, target: Path) -> None:
     """The arm's state instead of pose and force, and raw depth, as franka_ros2 and a driver do."""
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    store.register(get_types_from_msg(STATE_FIELDS, STATE))
     with source.open("rb") as file, target.open("wb") as out:
-        writer = Writer(out)
-        writer.start("ros2")
-        channels: dict[str, tuple[int, Callable]] = {}
-
-        def write(topic: str, name: str, time: int, message: object) -> None:
-            if topic not in channels:
-                text = store.generate_msgdef(name, ros_version=2)[0]
-                schema = writer.register_schema(name, "ros2msg", text.encode())
-                number = writer.register_channel(topic, "cdr", schema)
-                channels[topic] = number, serialize_dynamic(name, text)[name]
-            number, encode = channels[topic]
-            writer.add_message(number, time, encode(message), time)
-
-        pose = None
+        writer, pose = RosWriter(out), None
+        writer.register(STATE, STATE_FIELDS)
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         for schema, channel, record, message in reader.iter_decoded_messages():
             kind = schema.name.rsplit("/", 1)[-1]
@@ -121,11 +105,11 @@ def _franka(source: Path, target: Path) -> None:
                     o_t_ee=pose,
                     robot_mode=2,
                 )
-                write("/franka/robot_state", STATE, record.log_time, state)
+                writer.write("/franka/robot_state", STATE, record.log_time, state)
             elif kind == "CompressedImage" and "compressedDepth" in message.format:
-                write("/camera/depth/image_raw", IMAGE, record.log_time, _raw(message))
+                writer.write("/camera/depth/image_raw", IMAGE, record.log_time, _raw(message))
             else:
-                write(channel.topic, schema.name, record.log_time, message)
+                writer.write(channel.topic, schema.name, record.log_time, message)
         writer.finish()
 
 

@@ -12,20 +12,13 @@ from pipeline.identify.results.mounting import Mounting
 from pipeline.params import Params
 from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.launch import Launches
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import BandSizes, ClampedBand, LaunchSetup
 
 
-class BandSizes(Protocol):
-    """Mass [kg], diameter and rest length [m]."""
+class NamedBand(BandSizes, Protocol):
+    """A band's sizes, and what it is called."""
 
-    @property
-    def name(self) -> str: ...
-    @property
-    def mass(self) -> float: ...
-    @property
-    def diameter(self) -> float: ...
-    @property
-    def rest_length(self) -> float: ...
+    name: str
 
 
 class MaterialParameters(Protocol):
@@ -59,7 +52,7 @@ class CalibratedBand(Protocol):
     """A band that can be simulated, as `sling2sim2real.Model` is one."""
 
     @property
-    def band(self) -> BandSizes: ...
+    def band(self) -> NamedBand: ...
     @property
     def theta(self) -> MaterialParameters: ...
     @property
@@ -67,13 +60,15 @@ class CalibratedBand(Protocol):
     @property
     def settings(self) -> Params: ...
     @property
-    def sling(self) -> Sling: ...
+    def sling(self) -> ClampedBand: ...
+    @property
+    def launch_setup(self) -> LaunchSetup: ...
     def launches(self, draws: np.ndarray) -> Launches:
         """Launch draws (N, 2) [m]."""
         ...
 
-    def at(self, points: np.ndarray) -> tuple[Sling, np.ndarray]:
-        """Sling and the five parameters (N, 5) of points (N, P)."""
+    def at(self, points: np.ndarray) -> tuple[ClampedBand, np.ndarray]:
+        """The clamped band and the five parameters (N, 5) of points (N, P)."""
         ...
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import reduce
@@ -29,6 +30,7 @@ class Stage:
             relative to the root.
         travels: Whether DVC keeps all that it makes, so that a remote can carry it; the report is
             Git's.
+        description: In words, `desc` of dvc.yaml up to its first pause.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Stage:
     gpu: bool
     sources: tuple[str, ...]
     travels: bool
+    description: str = ""
 
 
 def stages_of(root: Path) -> dict[str, Stage]:
@@ -46,6 +49,15 @@ def stages_of(root: Path) -> dict[str, Stage]:
 
     with _clear(), Repo(str(root)) as repo:
         return _stages(repo.index)
+
+
+def leading_to(stages: Mapping[str, Stage], name: str) -> list[Stage]:
+    """A stage and all that it reads from, in the order of `stages`."""
+    found = {name}
+    for stage in reversed([*stages.values()]):  # consumers first
+        if stage.name in found:
+            found |= {*stage.producers}
+    return [stage for stage in stages.values() if stage.name in found]
 
 
 class Graph:
@@ -203,6 +215,7 @@ def _stage(stage, producers: list) -> Stage:
         gpu=bool((stage.meta or {}).get("gpu")),
         sources=tuple(sorted(sources)),
         travels=all(out.use_cache for out in stage.outs),
+        description=re.split("[,;:]", stage.desc or "")[0],
     )
 
 

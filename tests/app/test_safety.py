@@ -10,7 +10,7 @@ from app import safety
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.params import load
-from pipeline.params.provenance import policy_settings_of, settings_of
+from pipeline.params.provenance import evidence_settings_of, policy_settings_of, settings_of
 from pipeline.simulator.material import THETA
 from tests.project import ROOT
 
@@ -182,7 +182,7 @@ def test_theta_of_a_run_and_by_hand(params, project) -> None:
 
 def test_launches_as_evidence_are_settings_too(params, project) -> None:
     seen = {"settled": True, "steps": 7, "launches": [{}]}
-    then = settings_of(params, "band1", "least_squares", launches=True)
+    then = settings_of(params, "band1", "least_squares") | evidence_settings_of(params)
     content = CONTENT | {"confidence": seen, "made_with": then | {"setup.projectile_mass": 0.05}}
     path = Layout(project).theta("band1", "least_squares")
     (found,) = safety.of_identification(params, content, path)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from app.flow.graph import Graph, Stage
+from app.flow.graph import Graph, Stage, leading_to
 from pipeline.base.errors import UserError
 from tests.app.flow.toy import Toy, stage
 
@@ -43,6 +43,8 @@ def test_stages_come_after_their_producers_the_longest_way_first(toy: Toy) -> No
         "side@left", "side", "left", ("top",), False, ("work.py",), True
     )
     assert found["bottom"].producers == ("side@left", "side@right")
+    assert [one.name for one in leading_to(found, "side@left")] == ["top", "side@left"]
+    assert len(leading_to(found, "bottom")) == 4
 
 
 def test_stale_is_what_dvc_would_run(toy: Toy) -> None:

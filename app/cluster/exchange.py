@@ -45,7 +45,7 @@ def needs(root: Path) -> dict[str, Needs]:
 
     with Repo(str(root)) as repo:
         found = [stage for stage in repo.index.stages if isinstance(stage, PipelineStage)]
-        makers = {Path(out.fs_path): {stage.name} for stage in found for out in stage.outs}
+        makers = {Path(out.fs_path): {str(stage.name)} for stage in found for out in stage.outs}
         inside = defaultdict(set)  # by folder, who makes something in it
         for out, who in makers.items():
             for folder in out.parents:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,20 +17,17 @@ from pipeline.base.schema import explained, read_json
 from pipeline.episode.episode import Episode
 from pipeline.episode.pull import launch_history
 from pipeline.identify.clamps import calibrate_clamps
+from pipeline.identify.identify import identify as run_identification
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.space import Space
 from pipeline.identify.posterior import identify as posterior
-from pipeline.identify.posterior.launches import Observed
+from pipeline.identify.posterior.launches import Evidence, Observed
 from pipeline.identify.results.mounting import Mounting
 from pipeline.identify.results.theta import ThetaFile, load_samples, load_theta
-from pipeline.identify.search.build import explorer
-from pipeline.identify.search.history import History
-from pipeline.identify.search.loop import Free, budget, search
 from pipeline.launching.trials.stretch import recorded_stretch
-from pipeline.params.identification import LAWS, LEAST_SQUARES
-from pipeline.simulator.material import THETA
-from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.params.identification import parameter_names
+from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from sling2sim2real.model import Band, Model, Theta, known
 from sling2sim2real.settings import Settings
 
@@ -126,7 +123,7 @@ class Identification(Model):
         about = settings.bands[band]
         content = load_theta(layout.theta(band, method), band)
         file = ThetaFile.model_validate(content)
-        path, told = layout.mounting(band), content.get("confidence")
+        path, told = layout.clamps(band), content.get("confidence")
         there = layout.episode(band).is_dir()
         episodes = Episode.load_all(layout.episodes(band)) if there else []
         return cls(
@@ -190,31 +187,32 @@ def identify(
             raise UserError(
                 f"launches: {launch}: draw y < 0, error >= 0 and landing > 0 are needed"
             )
+    evaluate = point = None
     if start is None:
         mounting = None
         if settings.methods[METHOD].mounting:
             mounting = _mounting(episodes[0], band, settings)
             progress(f"mounting: clamps at {mounting.clamp_angle_deg:.0f} degrees")
         sling = _sling(band, settings, mounting)
-        point, rollouts = _explored(episodes[0], sling, settings)
-        progress(f"explored {rollouts} points")
+        evaluate = _evaluator(episodes[0], sling, settings)
     else:
         mounting, theta = start.mounting, start.theta
-        names = (*THETA, *LAWS[settings.methods[METHOD].law])
+        names = parameter_names(settings.methods[METHOD].law)
         point = np.array([getattr(theta, name) or 0.0 for name in names])
         sling = _sling(band, settings, mounting)
-    found = posterior.identify(
+    density = run_identification(
         settings,
         METHOD,
         sling,
         episodes,
-        point,
-        observed=launches,
+        evaluate,
+        start=point,
+        evidence=Evidence(launches, LaunchSetup.of(settings.setup, settings.sling)),
         workers=workers() or cores(),
-        progress=lambda fit: progress(f"expansion {fit.steps}: misfit {fit.misfit:.2f}"),
-    )
-    content = posterior.theta_content(found, band.name, METHOD)
-    told = posterior.confidence(found, settings.parameters)
+        progress=progress,
+    ).density
+    content = {"band": band.name, **posterior.theta_entries(density)}
+    told = posterior.confidence(density, settings.parameters)
     file = ThetaFile.model_validate(content)
     return Identification(
         band=band,
@@ -223,19 +221,19 @@ def identify(
         history=file.history and LaunchHistory(**file.history.model_dump()),
         settings=settings,
         intervals=_intervals(content, told),
-        samples=found.points,
+        samples=density.points,
         settled=told["settled"],
         stretch=_stretch(episodes, settings, band),
     )
 
 
-def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> Sling:
-    sling = Sling.of(band, settings.setup, settings.sling, mounting and mounting.model_dump())
-    return replace(sling, law=settings.methods[METHOD].law)
+def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> ClampedBand:
+    law = settings.methods[METHOD].law
+    return ClampedBand.of(band, settings.setup, settings.sling, mounting, law=law)
 
 
 def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
-    sling = Sling.of(band, settings.setup, settings.sling, as_rod=True)
+    sling = ClampedBand.of(band, settings.setup, settings.sling, as_rod=True)
     found = calibrate_clamps(
         sling,
         episode,
@@ -245,17 +243,10 @@ def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
     return Mounting.model_validate(found)
 
 
-def _explored(episode: Episode, sling: Sling, settings: Settings) -> tuple[np.ndarray, int]:
-    """The best point (P,) of a design over the box, and of how many."""
-    about, space = settings.methods[METHOD], Space.of_method(settings, METHOD)
+def _evaluator(episode: Episode, sling: ClampedBand, settings: Settings) -> Evaluator:
+    space = Space.of_method(settings, METHOD)
     loss = EpisodeLoss.of(settings, METHOD, episode, sling)
-    evaluate = Evaluator(episode, sling, loss, space, devices=devices(), workers=workers())
-    free, history = Free.of(space, about.fixed), History(METHOD, space.names)
-    rollouts, _ = budget(settings.optimizer, LEAST_SQUARES)
-    optimizer = explorer(about, settings.optimizer, len(free.axes), rollouts)
-    search(optimizer, evaluate, history, rollouts=rollouts, free=free)
-    best = history.best()
-    return np.array([best[name] for name in space.names]), rollouts
+    return Evaluator(episode, sling, loss, space, devices=devices(), workers=workers())
 
 
 def _intervals(content: dict, told: dict) -> dict[str, Interval]:

@@ -16,15 +16,16 @@ from pipeline.base import errors
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, NotMade, owner
 from pipeline.params import Params, expect_known, load
+from pipeline.params.identification import steps_of
 
-STEPS = {  # that make a folder of another name
+MAKERS = {  # steps that make a folder of another name
     "raw": "record",
     "episodes": "episode",
-    "clusters": "theta",
-    "refined": "theta",
-    "confidence": "theta",
+    "launches": "evidence",
     "policies": "policy",
 }
+
+OF_A_SEARCH = ("history", "clusters", "evaluations", "confidence")  # its last step writes the rest
 
 OF_DVC = "DVC_STAGE"  # in the environment of what DVC runs
 GRACE = 5.0  # s from the interrupt to the end
@@ -104,7 +105,13 @@ def remedy(error: NotMade) -> str:
     folder, band, method = known
     if folder == "raw" and band not in load().run.rig:
         return f"`sling add-recording --band {band} FILE.mcap` puts a recording there"
-    step, params = STEPS.get(folder, folder), load()
+    params = load()
+    step = MAKERS.get(folder, folder)
+    if folder in OF_A_SEARCH and method in params.methods:
+        steps = steps_of(params.methods[method].search)
+        step = folder if folder in steps else steps[-1]
+    elif error.path.name == "launches.parquet":
+        step = "launches"
     stage = f"{step}@{band}" if method is None else stage_of(params, step, band, method)
     if stage is None:
         return (
@@ -128,11 +135,11 @@ def stage_of(params: Params, step: str, band: str, method: str) -> str | None:
 
 def unmounted(band: str, root: str | Path = ".") -> list[str]:
     """A warning where nothing is known of how a band hangs: simulations go on without."""
-    path = Layout(Path(root)).mounting(band)
+    path = Layout(Path(root)).clamps(band)
     if path.exists():
         return []
     return [
-        f"{path} is missing, so the band hangs as `setup` says; `dvc repro mounting@{band}` fits it"
+        f"{path} is missing, so the band hangs as `setup` says; `dvc repro clamps@{band}` fits it"
         " to a recording"
     ]
 

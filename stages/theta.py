@@ -1,149 +1,45 @@
-"""Refine what a search explored, and choose θ*.
+"""Choose θ* from everything that a search evaluated.
 
     python -m stages.theta band1 sling2sim2real
 
-Reads data/history/<band>/<method>.parquet, data/episodes/<band>/, data/mounting/<band>.json and,
-where launches are evidence, data/evidence/<band>.csv. Writes the regions with their covariances to
-data/clusters/<band>/<method>.json and what was evaluated to data/refined/<band>/<method>.parquet,
-θ* to data/theta/<band>/<method>.json, and samples of what is known of it to
-data/confidence/<band>/<method>.json.
-
-By the method's search: `multistart` refines its regions by a CMA-ES in each, and θ* is the best of
-all; `least_squares` fits one density to all recordings and launches, θ* is its mode, and it alone
-says how sure θ* is: else "confidence" is null and there are no samples. A search of one phase has
-no region and no row. Killed, it resumes from .checkpoints/. SLING_DEVICE and SLING_WORKERS say
-where it runs.
+Reads data/evaluations/ and data/confidence/ of the method; writes data/theta/<band>/<method>.json.
+θ* is the mode of the density where one was fitted, which alone says how sure θ* is; else it is the
+best of all evaluations, and "confidence" is null.
 """
 
 from __future__ import annotations
 
-import numpy as np
-
 from pipeline.base.files import write_json
-from pipeline.base.launch_table import expect_apart
 from pipeline.base.layout import Layout, made
-from pipeline.base.machine import workers
-from pipeline.episode.pull import launch_history
-from pipeline.identify.objective.evaluate import Evaluator
-from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.session import load_episode, load_episodes, service
-from pipeline.identify.objective.space import Space
-from pipeline.identify.optimizers.cma.multistart import Multistart
-from pipeline.identify.posterior import identify
-from pipeline.identify.posterior.evidence import read_evidence
-from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.results.theta import calibrated
+from pipeline.identify.results.estimate import load_estimate
 from pipeline.identify.search.history import History, theta_content
-from pipeline.identify.search.loop import Free, search
-from pipeline.identify.search.regions import Region, regions_of, save_regions
-from pipeline.params import Params
-from pipeline.params.identification import LAWS, LEAST_SQUARES, MethodParams, OptimizerParams
-from pipeline.simulator.material import THETA
-from pipeline.simulator.rubber import RUBBER
+from pipeline.params.identification import parameter_names
 from stages.start import run, started
 
 
 def main() -> None:
     params, band, method = started("band", "method")
-    about, layout = params.methods[method], Layout()
-    free = Free.of(Space.of_method(params, method), about.fixed)
-    explored = History.load(method, free.names, made(layout.history(band, method)))
-    regions, asked = promising(about, params.optimizer, explored)
-    save_regions(layout.clusters(band, method), free.names, regions, asked)
-    if about.search == LEAST_SQUARES:
-        content, samples = fitted(params, band, method)
-    else:
-        content, samples = searched(params, band, method, free, regions), {"samples": []}
-    write_json(layout.confidence(band, method), samples | {"band": band})
+    method_params, layout = params.methods[method], Layout()
+    names = parameter_names(method_params.law)
+    evaluations = History.load(method, names, made(layout.evaluations(band, method)))
+    estimate = load_estimate(layout.confidence(band, method))
+    if not method_params.mounting:  # the clamps were left as `setup` says
+        estimate["mounted"] = False
+    content = theta_content(evaluations, band, estimate)
     write_json(layout.theta(band, method), content)
     print(f"{band} {method}: loss {content['loss']['total']:.5g}")
-    told = content["confidence"]
+    intervals = (content["confidence"] or {}).get("parameters", {})
     for name, value in content["theta"].items():
-        print(f"  {name} {value:.4g}{_trust(told['parameters'][name]) if told else ''}")
+        print(f"  {name} {value:.4g}{_interval(intervals.get(name))}")
 
 
-def searched(params: Params, band: str, method: str, free: Free, regions: list[Region]) -> dict:
-    """The best of all that a search and a CMA-ES in each region evaluated."""
-    layout, law = Layout(), params.methods[method].law
-    if regions:
-        print(
-            f"{band} {method}: {len(regions)} regions, best loss {regions[0].loss:.5g}", flush=True
-        )
-    refine(params, band, method, free, regions).save(layout.refined(band, method))
-    sources = layout.history(band, method), layout.refined(band, method)
-    history = History.load(method, (*THETA, *LAWS[law]), *sources)
-    known = {"law": RUBBER, "history": launch_history(load_episode(band))} if law == RUBBER else {}
-    return theta_content(history, band, known | unmounted(params, method))
-
-
-def fitted(params: Params, band: str, method: str) -> tuple[dict, dict]:
-    """The mode of the density over all evidence, from the best that was explored."""
-    layout, names = Layout(), (*THETA, *LAWS[params.methods[method].law])
-    explored = History.load(method, names, layout.history(band, method))
-    best = explored.best()
-    expect_apart(layout, band)
-    sling = sling_of_method(params, band, method)
-    found = identify.identify(
-        params,
-        method,
-        sling,
-        load_episodes(band),
-        np.array([best[name] for name in names]),
-        observed=read_evidence(layout.evidence, band, params),
-        workers=workers(),
-        progress=lambda fit: print(
-            f"{band} {method}: expansion {fit.steps}, misfit {fit.misfit:.2f}", flush=True
-        ),
-    )
-    content = identify.theta_content(found, band, method) | unmounted(params, method)
-    content["confidence"] = identify.confidence(found, params.parameters)
-    content["rollouts"] = len(explored.total) + found.rollouts
-
-    space, episode = Space.of_method(params, method), found.recordings[0].episode
-    sling = calibrated(params, band, content)
-    mode = Evaluator(episode, sling, EpisodeLoss.of(params, method, episode, sling), space)
-    point = space.to_unit(np.array([[content["theta"][name] for name in space.names]]))
-    history = History(method, space.names)
-    history.add(mode(point), phase=LEAST_SQUARES, generation=found.fit.steps)
-    history.save(layout.refined(band, method))
-    samples = {"names": found.names, "samples": found.points.tolist()}
-    return theta_content(history, band, content), samples
-
-
-def refine(params: Params, band: str, method: str, free: Free, regions: list[Region]) -> History:
-    """What a CMA-ES in each region evaluates; no row where there is no region."""
-    optimizer, history = params.optimizer, History(method, Space.of_method(params, method).names)
-    if regions:
-        search(
-            Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed),
-            service("refined", band, method, params, optimizer.cma_rollouts),
-            history,
-            rollouts=optimizer.cma_rollouts,
-            free=free,
-        )
-    return history
-
-
-def promising(
-    about: MethodParams, optimizer: OptimizerParams, explored: History
-) -> tuple[list[Region], int]:
-    """Regions of a history and how many were asked for; none where the search has one phase."""
-    if about.search != "multistart":
-        return [], 0
-    explored.best()  # says why, where all failed
-    return regions_of(about, optimizer, explored)
-
-
-def unmounted(params: Params, method: str) -> dict:
-    """What a θ file says where the method leaves out the calibration of the clamps."""
-    return {} if params.methods[method].mounting else {"mounted": False}
-
-
-def _trust(about: dict) -> str:
-    if about.get("fixed"):
+def _interval(interval: dict | None) -> str:
+    if interval is None:
+        return ""
+    if interval.get("fixed"):
         return " (fixed)"
-    word = "" if about["identifiable"] else ", not identifiable"
-    return f" ({about['low']:.4g} to {about['high']:.4g}{word})"
+    word = "" if interval["identifiable"] else ", not identifiable"
+    return f" ({interval['low']:.4g} to {interval['high']:.4g}{word})"
 
 
 if __name__ == "__main__":

@@ -14,19 +14,19 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.simulator.interaction import interact
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 
 DRAW = 0.35  # m
 THETA = (2e5, 0.45, 2e-3, 0.5, 0.5)  # of the band that is recorded
 GRASP, LIFTED, DRAWN, RELEASE, DURATION = 1.0, 2.0, 6.0, 8.1, 9.0  # s
 
 
-def yardstick(band, params) -> Sling:
+def yardstick(band, params) -> ClampedBand:
     """A band in pads that let no theta slip, so that every rollout goes on to its end."""
-    return replace(Sling.of(band, params.setup, params.sling), grip_force=1e5)
+    return replace(ClampedBand.of(band, params.setup, params.sling), grip_force=1e5)
 
 
-def pull_and_release(band: str, shape, sling: Sling) -> Episode:
+def pull_and_release(band: str, shape, sling: ClampedBand) -> Episode:
     """The yardstick's interaction, with a camera at 30 Hz that sees nothing yet.
 
     Args:
@@ -68,7 +68,7 @@ def unseen(
     )
 
 
-def recorded_yardstick(params) -> tuple[Sling, Episode]:
+def recorded_yardstick(params) -> tuple[ClampedBand, Episode]:
     """The first band, pulled and released with THETA, as sensors without noise would record it."""
     band = next(iter(params.bands))
     sling = yardstick(params.bands[band], params)

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from pipeline.episode.signal import cutoff_hz
+from pipeline.identify.identify import evaluations_of
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.space import Space
 from pipeline.recording.build import build_episodes
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from rig.physics.world import string_of
 from rig.recorder.record import EPOCH
 from tests.identify.objective.own_law import own_law_episode, visible
 from tests.project import ROUGH, with_
-from validation.benchmarks.methods import complete
 
 METHOD = "sling2sim2real"
 TRUTH = np.array([2.5e5, 0.45, 4e-3, 0.7, 0.6])
@@ -39,7 +39,7 @@ def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorde
     So what is left is the law: Ogden's with relaxation against neo-Hookean with damping.
     """
     path, happened = recorded
-    sling = Sling.of(quick.bands["band1"], quick.setup, quick.sling)
+    sling = ClampedBand.of(quick.bands["band1"], quick.setup, quick.sling)
     string, rng = string_of(quick, "band1"), np.random.default_rng(0)
     episode = build_episodes(path, "band1", quick)[0][0]
     start = 1e-9 * (episode.metadata["input"]["start_ns"] - EPOCH)
@@ -53,5 +53,5 @@ def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorde
     own = own_law_episode(sling, rig, TRUTH, cutoff=cutoff, force_noise=noise)
     at_truth = evaluator(quick, sling, own)
     own_loss = at_truth(at_truth.space.to_unit(TRUTH[None])).total[0]  # its least is no more
-    best = complete(quick, METHOD, quick.optimizer, evaluator(quick, sling, rig)).best()
+    best = evaluations_of(quick, METHOD, evaluator(quick, sling, rig)).best()
     assert best["total"] > 3 * own_loss

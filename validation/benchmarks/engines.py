@@ -10,7 +10,7 @@ from scipy.stats import qmc
 from pipeline.base.errors import UserError
 from pipeline.identify.objective.space import Space
 from pipeline.simulator.interaction import interact
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from validation.benchmarks.timing import available, timed
 from validation.engines import mujoco_flex
 from validation.engines.mesh import Tube, hand_path
@@ -51,7 +51,7 @@ def bench_peers(params, device: str = "cpu") -> list[dict]:
     return [*entries, _newton(sling, episode, here, device)]
 
 
-def _ours(sling: Sling, episode, space: Space, device: str) -> dict:
+def _ours(sling: ClampedBand, episode, space: Space, device: str) -> dict:
     held = interact(sling, episode, THETA[None], device=device)  # compiles, too
     force = held.force[0, np.searchsorted(held.times, episode.release_time) - 1]
     kind = device.partition(":")[0]
@@ -65,7 +65,7 @@ def _ours(sling: Sling, episode, space: Space, device: str) -> dict:
     )  # fmt: skip
 
 
-def _mujoco(sling: Sling, episode, ours: dict) -> dict:
+def _mujoco(sling: ClampedBand, episode, ours: dict) -> dict:
     try:
         result, cpu, _ = timed(lambda: mujoco_flex.interact(sling, episode, THETA, PEER_STEP))
     except UserError as error:
@@ -81,7 +81,7 @@ def _mujoco(sling: Sling, episode, ours: dict) -> dict:
     )  # fmt: skip
 
 
-def _newton(sling: Sling, episode, ours: dict, device: str) -> dict:
+def _newton(sling: ClampedBand, episode, ours: dict, device: str) -> dict:
     kind = device.partition(":")[0]
     count = ENVIRONMENTS[kind][1]
     whole = int(round((episode.time[-1] - episode.grasp_time) / PEER_STEP))
@@ -148,7 +148,7 @@ def table(entries: list[dict]) -> str:
     return "\n".join(lines)
 
 
-def _force_error(sling: Sling, episode, force: np.ndarray) -> float:
+def _force_error(sling: ClampedBand, episode, force: np.ndarray) -> float:
     """Of the drawn band's force on the hand, against two straight, weightless halves."""
     hand = episode.position[np.searchsorted(episode.time, episode.release_time) - 1]
     legs = sling.tips - hand

@@ -5,7 +5,7 @@
     python -m validation.campaigns.machines --twice dvc.lock other/dvc.lock
 
 The first identifies each band, by our method and by the paper's, from what a run has left under
-data/episodes and data/mounting, and launches fixed draws in the simulator. A GPU has the rollouts
+data/episodes and data/clamps, and launches fixed draws in the simulator. A GPU has the rollouts
 of searches, and the launches; the fit of least squares is on the CPU anywhere. The second prints
 how far machines differ, and fails where our landings do by more than 0.2 %; of the paper's method,
 whose search takes another way after the first other bit, it only tells. The third compares what
@@ -81,7 +81,7 @@ def inputs(params, band: str, root: Path) -> str:
     about = (params.bands[band], params.setup, params.sling, params.force, params.loss)
     about += (params.parameters, params.optimizer, params.methods[OURS], params.methods[PAPER])
     texts = [one.model_dump_json() for one in about]
-    return fingerprint(*map(made, [*files, layout.mounting(band)]), *texts)
+    return fingerprint(*map(made, [*files, layout.clamps(band)]), *texts)
 
 
 def identified(band: str, method: str, root: Path, device: str) -> dict:
@@ -96,7 +96,7 @@ def identified(band: str, method: str, root: Path, device: str) -> dict:
     loss = EpisodeLoss.of(params, method, episode, sling)
     terms = loss.terms(interact(sling, episode, theta, device=devices[0], fetch=False))
     total = float(loss.total(terms)[0])
-    landed = launch(sling, theta, np.array(DRAWS), device=devices)
+    landed = launch(sling, outcome.setup, theta, np.array(DRAWS), device=devices)
     names = [*THETA, *LAWS[sling.law], *EXTRA]
     return {
         "theta": dict(zip(names, outcome.point.tolist(), strict=False)),

@@ -94,7 +94,7 @@ def test_landings_are_predicted_within_the_recorded_stretch(
         inside, beyond = errors[method]["inside"]["mean"], errors[method]["beyond"]["mean"]
         progress(f"  {method}: {100 * inside:.2f} % inside, {100 * beyond:.2f} % beyond")
 
-    mounting = json.loads((project / "data/mounting" / f"{BAND}.json").read_text("utf-8"))
+    mounting = json.loads((project / "data/clamps" / f"{BAND}.json").read_text("utf-8"))
     unpredicted = [one for one in figures[OURS]["launches"] if one["predicted_failure"]]
     inside = errors[OURS]["inside"]
     met = inside["launches"] > 0 and inside["mean"] <= LIMIT and not unpredicted

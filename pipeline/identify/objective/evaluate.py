@@ -18,7 +18,7 @@ from pipeline.identify.objective.space import Space
 from pipeline.params.identification import LAWS
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.rubber import RUBBER
 
 NOT_FINITE = "the loss is not finite"  # the one failure that depends on the weights
@@ -58,7 +58,7 @@ class Evaluator:
     def __init__(
         self,
         episode: Episode,
-        sling: Sling,
+        sling: ClampedBand,
         loss: EpisodeLoss,
         space: Space,
         *,

@@ -25,7 +25,7 @@ from pipeline.identify.objective.chamfer import Chamfer, CloudDistance
 from pipeline.identify.objective.device_terms import DeviceTerms
 from pipeline.params import Params
 from pipeline.simulator.interaction import Rollouts
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 
 TERMS = ("geom", "force", "work")
 LOCK = threading.Lock()  # while a filter is made, which takes a second
@@ -102,7 +102,7 @@ class EpisodeLoss:
             raise UserError(f"episode of {episode.band}: no camera frame shows the band")
 
     @classmethod
-    def of(cls, params: Params, method: str, episode: Episode, sling: Sling) -> EpisodeLoss:
+    def of(cls, params: Params, method: str, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
         """Make it from params.yaml's `loss`, `force` and `methods.<method>`."""
         cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
         held = params.loss.held_out
@@ -119,7 +119,7 @@ class EpisodeLoss:
         )
 
     @classmethod
-    def plain(cls, params: Params, episode: Episode, sling: Sling) -> EpisodeLoss:
+    def plain(cls, params: Params, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
         """Geometry and force alone, for a part of an episode."""
         return cls(
             episode,

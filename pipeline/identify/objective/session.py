@@ -61,7 +61,7 @@ def service(stage: str, band: str, method: str, params: Params, rollouts: int) -
         fingerprint(
             *SOURCES,
             *(layout.episode(band) / f"{name}.parquet" for name in ("signals", "clouds")),
-            layout.mounting(band),
+            layout.clamps(band),
             *sources_of(params.methods[method].engine),
             *(section.model_dump_json() for section in sections),
             *(f"{package} {version(package)}" for package in ("warp-lang", "numpy", "scipy")),

@@ -18,13 +18,14 @@ from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.posterior.coordinates import Coordinates
 from pipeline.identify.posterior.draws import truncated_gaussian
 from pipeline.identify.posterior.fit import Fit, fit
-from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
+from pipeline.identify.posterior.launches import Evidence, LaunchLikelihood
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
+from pipeline.identify.results.estimate import pull_of
 from pipeline.identify.results.theta import EXTRA
 from pipeline.params import Parameters, Params
 from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.simulator.model import ClampedBand, LaunchHistory
 from pipeline.simulator.rubber import RUBBER
 
 LEVEL = 0.9
@@ -76,24 +77,24 @@ class Identified:
         return [*THETA, *LAWS[law], *EXTRA]
 
 
-def identify(
+def fit_posterior(
     params: Params,
     method: str,
-    sling: Sling,
+    sling: ClampedBand,
     episodes: Sequence[Episode],
     start: np.ndarray,
     *,
-    observed: Sequence[Observed] = (),
+    evidence: Evidence | None = None,
     workers: int | None = None,
     progress: Callable[[Fit], None] = lambda fit: None,
 ) -> Identified:
-    """Identify a band.
+    """Fit the density of a band.
 
     Args:
         method: Of params.yaml, one that searches by least squares.
         episodes: Of the band's recordings, at least one.
         start: θ and what its law adds, (P,): the nearest that an exploration found.
-        observed: Launches that are evidence.
+        evidence: Launches, drawn as the first recording was.
 
     Raises:
         NoFit: Simulations fail at the start.
@@ -102,7 +103,10 @@ def identify(
     friction = params.methods[method].fixed["dynamic_friction"]
     recordings = [Likelihood(one, sling, cutoff, friction) for one in episodes]
     coordinates = Coordinates.of_method(params, method, sling)
-    launches = LaunchLikelihood(observed, launched(sling, episodes[0])) if observed else None
+    launches = None
+    if evidence and evidence.launches:
+        setup = replace(evidence.setup, history=recorded_history(sling, episodes[0]))
+        launches = LaunchLikelihood(evidence.launches, sling, setup)
     known = {"launches": launches, "workers": workers, "progress": progress}
     found = fit(recordings, coordinates, coordinates.of(start), **known)
     birge = disagreement(found)
@@ -114,11 +118,9 @@ def identify(
     return Identified(coordinates, found, birge, samples, recordings, launches)
 
 
-def launched(sling: Sling, episode: Episode) -> Sling:
-    """The sling as it is launched: a law that remembers takes the recording's pull and pause."""
-    if sling.law != RUBBER:
-        return sling
-    return replace(sling, history=LaunchHistory(**launch_history(episode)))
+def recorded_history(sling: ClampedBand, episode: Episode) -> LaunchHistory | None:
+    """What a band remembers that is launched as it was recorded; None for a law without memory."""
+    return LaunchHistory(**launch_history(episode)) if sling.law == RUBBER else None
 
 
 def disagreement(found: Fit) -> float:
@@ -138,16 +140,13 @@ def disagreement(found: Fit) -> float:
     return float(np.sqrt(max(total / max(freedom, 1e-9), 1.0)))
 
 
-def theta_content(found: Identified, band: str, method: str) -> dict:
-    """What a θ file holds, but its loss, its rollouts and where it was found."""
+def theta_entries(found: Identified) -> dict:
+    """What a θ file holds of the mode."""
     point = found.coordinates.points(found.fit.phi[None])[0]
     values = dict(zip(found.names, point.tolist(), strict=True))
     law, episode = found.recordings[0].sling.law, found.recordings[0].episode
-    known = {"law": RUBBER, "history": launch_history(episode)} if law == RUBBER else {}
     return {
-        "band": band,
-        "method": method,
-        **known,
+        **pull_of(episode, law),
         "theta": {name: values[name] for name in (*THETA, *LAWS[law])},
         "nuisances": {"air_drag": values["air_drag"]},
         "turn_damping": values["turn_damping"],

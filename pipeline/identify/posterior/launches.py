@@ -16,7 +16,7 @@ import numpy as np
 
 from pipeline.identify.results.theta import at_points
 from pipeline.simulator.launch import launch
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand, LaunchSetup
 
 TAPE = 0.01  # of a measured landing, standard deviation [m]
 NUDGE = 1e-3  # of a draw [m]
@@ -35,17 +35,27 @@ class Observed:
     landing: float
 
 
+@dataclass(frozen=True)
+class Evidence:
+    """Launches of one band, and what launches them."""
+
+    launches: Sequence[Observed]
+    setup: LaunchSetup
+
+
 class LaunchLikelihood:
     """Launches of one band.
 
     Attributes:
-        sling: With the history that the launches had.
+        setup: With the history that the launches had.
         left: Of each, log of measured over simulated landing at the last expansion; NaN where the
             simulated launch fails, which then counts for nothing.
     """
 
-    def __init__(self, observed: Sequence[Observed], sling: Sling) -> None:
-        self.sling = sling
+    def __init__(
+        self, observed: Sequence[Observed], sling: ClampedBand, setup: LaunchSetup
+    ) -> None:
+        self.sling, self.setup = sling, setup
         self.draws = np.array([one.draw for one in observed], float).reshape(-1, 2)
         self.errors = np.array([one.error for one in observed], float)
         self.landings = np.array([one.landing for one in observed], float)
@@ -76,6 +86,6 @@ class LaunchLikelihood:
     def _simulated(self, points: np.ndarray, draws: np.ndarray) -> np.ndarray:
         """Landings [m] of points (N, P) from draws (N, 2), NaN where a launch fails."""
         sling, theta = at_points(self.sling, points)
-        done = launch(sling, theta, draws, workers=2)
+        done = launch(sling, self.setup, theta, draws, workers=2)
         failed = np.array([why is not None for why in done.failure])
         return np.where(failed, np.nan, done.landing_y)

@@ -20,7 +20,7 @@ from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.residuals import Residuals, Rule
 from pipeline.identify.results.theta import at_points
 from pipeline.simulator.interaction import Rollouts, interact
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 
 SIMULATED = "release", "camera", "hand"
 NUDGE = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
@@ -102,7 +102,7 @@ class Expansion:
         return (episode.cloud_time[np.unique(seen)] - episode.release_time).tolist()
 
 
-def opening_time(episode: Episode, sling: Sling, friction: float) -> float:
+def opening_time(episode: Episode, sling: ClampedBand, friction: float) -> float:
     """In which the simulated pads must open for the force to fall as fast as recorded [s].
 
     From the slip on friction falls with the pads' force, which is gone after the opening time: the
@@ -131,7 +131,7 @@ class Likelihood:
     def __init__(
         self,
         episode: Episode,
-        sling: Sling,
+        sling: ClampedBand,
         cutoff: float,
         friction: float,
         tolerances: Tolerances | None = None,

@@ -19,7 +19,7 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import as_recorded
 from pipeline.simulator.interaction import Rollouts
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 
 BINS = 16  # along the band, equal at rest
 LEAST_POINTS = 4  # of a bin
@@ -85,7 +85,7 @@ class Residuals:
     """
 
     episode: Episode
-    sling: Sling
+    sling: ClampedBand
     cutoff: float
     reference: np.ndarray
     rule: Rule = field(default_factory=Rule)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import average, lowpass, uniform
 from pipeline.simulator.interaction import interact
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 
 RATE = 1000.0  # of the force sensor [Hz]
 ALONG, AROUND = 400, 16  # points of the band's surface before a camera sees them
@@ -16,7 +16,7 @@ POINTS = 1000  # of a cloud
 
 
 def own_law_episode(
-    sling: Sling,
+    sling: ClampedBand,
     episode: Episode,
     theta: np.ndarray,
     *,

@@ -23,16 +23,17 @@ from pipeline.base import errors
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.machine import devices
+from pipeline.identify.identify import evaluations_of
 from pipeline.identify.objective.loss import TERMS
 from pipeline.identify.objective.session import service
 from pipeline.identify.objective.space import Space
 from pipeline.identify.results.mounting import sling_of_method
+from pipeline.identify.search.explore import rollouts_of
 from pipeline.identify.search.history import History
-from pipeline.identify.search.loop import budget
 from pipeline.params import load
 from pipeline.params.identification import OUR_ENGINE
 from pipeline.simulator.launch import launch
-from validation.benchmarks.methods import complete
+from pipeline.simulator.model import LaunchSetup
 from validation.benchmarks.timing import environment
 from validation.engines.physx.bands import Engine, release
 from validation.engines.physx.launches import FINE, alike, draws_of, launch_in_physx
@@ -56,15 +57,16 @@ class Comparison:
     def __init__(self, params, band: str) -> None:
         self.params, self.band = with_engines(params), band
         self.sling = sling_of_method(self.params, band, OURS)
+        self.setup = LaunchSetup.of(params.setup, params.sling)
         self.space = Space.of_method(self.params, OURS)
 
     def search(self, engine: str) -> tuple[History, float]:
         """Everything that was evaluated, and the seconds that it took (less what was recalled)."""
         optimizer = self.params.optimizer
-        total = sum(budget(optimizer, self.params.methods[engine].search))
+        total = rollouts_of(self.params, engine) + optimizer.cma_rollouts  # a multistart
         evaluate = service("search", self.band, engine, self.params, total)
         began = time.perf_counter()
-        history = complete(self.params, engine, optimizer, evaluate)
+        history = evaluations_of(self.params, engine, evaluate)
         return history, time.perf_counter() - began
 
     def losses(self, thetas: np.ndarray) -> dict[str, list[dict]]:
@@ -82,7 +84,10 @@ class Comparison:
     def launches(self, thetas: np.ndarray, draws: np.ndarray, measured) -> list[dict]:
         """Where our simulator lands the draws (L, 2) with each theta, and where they landed [m]."""
         landings = np.array(
-            [launch(self.sling, np.tile(one, (len(draws), 1)), draws).landing_y for one in thetas]
+            [
+                launch(self.sling, self.setup, np.tile(one, (len(draws), 1)), draws).landing_y
+                for one in thetas
+            ]
         )
         rows = []
         for i, draw in enumerate(draws):
@@ -97,14 +102,14 @@ class Comparison:
 
         Raises UserError, as `Engine`.
         """
-        sling = alike(self.sling)
+        both = self.sling, alike(self.params)
         each, every = np.repeat(thetas, len(draws), axis=0), np.tile(draws, (len(thetas), 1))
         gained = [None] * len(every)
         if where == OURS:
-            done = launch(sling, each, every)
+            done = launch(*both, each, every)
         else:
             with Engine() as engine:
-                pushed = launch_in_physx(engine, sling, each, every, rate=rate)
+                pushed = launch_in_physx(engine, *both, each, every, rate=rate)
             done, gained = pushed.launches, [_plain(one) for one in pushed.gained]
         columns = {
             "landing_m": [_plain(one) for one in done.landing_y],

@@ -1,8 +1,8 @@
 """Fit how the band leaves its clamps and how stiff it bends, to the slack part of the recording.
 
-    python -m stages.mounting band1
+    python -m stages.clamps band1
 
-Reads data/episodes/<band>/; writes data/mounting/<band>.json.
+Reads data/episodes/<band>/; writes data/clamps/<band>.json.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from pipeline.base.machine import cores
 from pipeline.identify.clamps import calibrate_clamps
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.session import load_episode
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from stages.start import run, started
 
 
 def main() -> None:
     params, band = started("band")
     # with the rod, whatever simulates afterwards: a solid mesh has no rigidity to fit
-    sling = Sling.of(params.bands[band], params.setup, params.sling, as_rod=True)
+    sling = ClampedBand.of(params.bands[band], params.setup, params.sling, as_rod=True)
     content = calibrate_clamps(
         sling,
         load_episode(band),
         lambda part: EpisodeLoss.plain(params, part, sling),
         workers=cores(),
     )
-    write_json(Layout().mounting(band), content)
+    write_json(Layout().clamps(band), content)
     print(
         f"{band}: clamps at {content['clamp_angle_deg']:.1f} deg, bending"
         f" {content['relative_rigidity']:.2f} of a solid round band's"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -47,7 +47,7 @@ def as_json(hazards: Iterable[Hazard]) -> list[dict[str, str]]:
     return [asdict(hazard) for hazard in hazards]
 
 
-def shown(answer: dict, to_json: bool) -> str:
+def shown(answer: Mapping[str, Any], to_json: bool) -> str:
     """An answer with its `warnings`, which are told first: as one JSON object, or as lines."""
     hazards = answer["warnings"]
     tell(hazards)

@@ -18,6 +18,7 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from app.cluster import exchange
 from app.cluster.worker import Order, introduce, versions, work
@@ -128,7 +129,9 @@ class Cluster:
             old.unlink()
         token.touch()
 
-    def _some(self, on_line, cancelled) -> dict[str, dict]:
+    def _some(
+        self, on_line: Callable[[str], None], cancelled: Callable[[], bool]
+    ) -> dict[str, dict]:
         """The workers, once there are some. Raises UserError, Cancelled."""
         told = False
         while not (workers := self._meet(on_line)):
@@ -147,7 +150,7 @@ class Cluster:
             new = [address for address in workers if address not in self._shares]
             if not new:
                 return workers
-            answers = self.client.run(introduce, self.token, workers=new, on_error="return")
+            answers: Any = self.client.run(introduce, self.token, workers=new, on_error="return")
             ours = versions()
             for address, answer in answers.items():
                 if isinstance(answer, ImportError):
@@ -178,7 +181,13 @@ class Cluster:
             exchange.transfer(self.root, "push", new, cancelled)
             self._sent.update(new)
 
-    def _result(self, order, resources, on_line, cancelled) -> tuple[bool, dict | None]:
+    def _result(
+        self,
+        order: Order,
+        resources: dict[str, float],
+        on_line: Callable[[str], None],
+        cancelled: Callable[[], bool],
+    ) -> tuple[bool, dict | None]:
         """What `work` returns on a worker that has these resources; passes its lines on."""
         from concurrent.futures import CancelledError
 

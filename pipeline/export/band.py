@@ -12,14 +12,13 @@ from pipeline.identify.results.mounting import Mounting
 from pipeline.params import Params
 from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.launch import Launches
-from pipeline.simulator.model import BandSizes, ClampedBand
+from pipeline.simulator.model import BandSizes, ClampedBand, LaunchSetup
 
 
-class NamedSizes(BandSizes, Protocol):
-    """The same with the band's name."""
+class NamedBand(BandSizes, Protocol):
+    """A band's sizes, and what it is called."""
 
-    @property
-    def name(self) -> str: ...
+    name: str
 
 
 class MaterialParameters(Protocol):
@@ -53,7 +52,7 @@ class CalibratedBand(Protocol):
     """A band that can be simulated, as `sling2sim2real.Model` is one."""
 
     @property
-    def band(self) -> NamedSizes: ...
+    def band(self) -> NamedBand: ...
     @property
     def theta(self) -> MaterialParameters: ...
     @property
@@ -62,12 +61,14 @@ class CalibratedBand(Protocol):
     def settings(self) -> Params: ...
     @property
     def sling(self) -> ClampedBand: ...
+    @property
+    def launch_setup(self) -> LaunchSetup: ...
     def launches(self, draws: np.ndarray) -> Launches:
         """Launch draws (N, 2) [m]."""
         ...
 
     def at(self, points: np.ndarray) -> tuple[ClampedBand, np.ndarray]:
-        """ClampedBand and the five parameters (N, 5) of points (N, P)."""
+        """The clamped band and the five parameters (N, 5) of points (N, P)."""
         ...
 
 

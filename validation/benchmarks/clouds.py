@@ -14,6 +14,7 @@ from pathlib import Path
 
 import cv2
 
+from pipeline.params import Params
 from pipeline.recording.build import view_of
 from pipeline.recording.cloud import cloud_of
 from pipeline.recording.input.reader import read_recording
@@ -24,7 +25,7 @@ from validation.benchmarks.timing import timed
 STEPS = ("decode", "points", "learn", "mask", "cloud")
 
 
-def bench_recording(path: Path, params: object) -> dict:
+def bench_recording(path: Path, params: Params) -> dict:
     """Time every step from the file to the clouds, with the first band of params.yaml.
 
     Returns:

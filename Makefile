@@ -28,9 +28,10 @@ ui: setup             # what `sling flow` does, in a browser on this machine: ht
 test: setup           # the tests
 	.venv/bin/python -m pytest
 
-lint: setup           # ruff: rules and format
+lint: setup           # ruff: rules and format; basedpyright: types
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
+	.venv/bin/basedpyright
 
 validate: setup       # slow campaigns, and tests by other engines and readers; results are committed
 	.venv/bin/pip install --disable-pip-version-check -q -e '.[dev,validation]' -c constraints.txt

@@ -10,7 +10,7 @@ import numpy as np
 from app import safety
 from app.safety import Hazard
 from pipeline.base.layout import Layout
-from pipeline.identify.results.theta import launch_history, load_samples, load_theta
+from pipeline.identify.results.theta import history_of, load_samples, load_theta
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.spread import landing_intervals
@@ -37,7 +37,7 @@ class Answer(TypedDict):
 
 def pull_and_pause(params: Params, content: dict) -> dict[str, list[float]]:
     """What a launch takes for granted of the hand, for a θ file whose law remembers it [s]."""
-    history = launch_history(params, content)
+    history = history_of(params, content)
     return {} if history is None else {"pull_and_pause_s": [history.pull_time, history.pause]}
 
 

@@ -8,7 +8,7 @@ from app import safety
 from app.aim import pull_and_pause
 from app.arguments import finite
 from pipeline.base.errors import UserError
-from pipeline.identify.results.theta import calibrated, load_theta, vector
+from pipeline.identify.results.theta import calibrated, launch_setup, load_theta, vector
 from pipeline.params import Params, expect_known
 from pipeline.simulator.launch import launch
 
@@ -34,8 +34,8 @@ def launched(
     expect_known(params, "band", band)
     expect_above_floor(params, draw)
     content, root = load_theta(theta, band), Path(root)
-    sling = calibrated(params, band, content, root)
-    result = launch(sling, vector(content), draw, max_force=params.setup.max_force)
+    sling, setup = calibrated(params, band, content, root), launch_setup(params, content)
+    result = launch(sling, setup, vector(content), draw, max_force=params.setup.max_force)
     force, failure = result.hold_force[0], result.failure[0]
     return {
         "landing_y_m": finite(result.landing_y[0]),

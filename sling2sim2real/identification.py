@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -22,12 +22,12 @@ from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.space import Space
 from pipeline.identify.posterior import identify as posterior
-from pipeline.identify.posterior.launches import Observed
+from pipeline.identify.posterior.launches import Evidence, Observed
 from pipeline.identify.results.mounting import Mounting
 from pipeline.identify.results.theta import ThetaFile, load_samples, load_theta
 from pipeline.launching.trials.stretch import recorded_stretch
 from pipeline.params.identification import parameter_names
-from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from sling2sim2real.model import Band, Model, Theta, known
 from sling2sim2real.settings import Settings
 
@@ -207,9 +207,9 @@ def identify(
         episodes,
         evaluate,
         start=point,
-        observed=launches,
+        evidence=Evidence(launches, LaunchSetup.of(settings.setup, settings.sling)),
         workers=workers() or cores(),
-        progress=lambda fit: progress(f"expansion {fit.steps}: misfit {fit.misfit:.2f}"),
+        progress=progress,
     ).density
     content = {"band": band.name, **posterior.theta_entries(density)}
     told = posterior.confidence(density, settings.parameters)
@@ -227,13 +227,13 @@ def identify(
     )
 
 
-def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> Sling:
-    sling = Sling.of(band, settings.setup, settings.sling, mounting and mounting.model_dump())
-    return replace(sling, law=settings.methods[METHOD].law)
+def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> ClampedBand:
+    law = settings.methods[METHOD].law
+    return ClampedBand.of(band, settings.setup, settings.sling, mounting, law=law)
 
 
 def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
-    sling = Sling.of(band, settings.setup, settings.sling, as_rod=True)
+    sling = ClampedBand.of(band, settings.setup, settings.sling, as_rod=True)
     found = calibrate_clamps(
         sling,
         episode,
@@ -243,7 +243,7 @@ def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
     return Mounting.model_validate(found)
 
 
-def _evaluator(episode: Episode, sling: Sling, settings: Settings) -> Evaluator:
+def _evaluator(episode: Episode, sling: ClampedBand, settings: Settings) -> Evaluator:
     space = Space.of_method(settings, METHOD)
     loss = EpisodeLoss.of(settings, METHOD, episode, sling)
     return Evaluator(episode, sling, loss, space, devices=devices(), workers=workers())

@@ -34,7 +34,7 @@ def main() -> None:
         sling,
         episodes,
         explored.best_point(),
-        observed=load_observed(layout.observed(band)),
+        evidence=load_observed(layout.observed(band)),
         workers=workers(),
         progress=lambda fit: print(
             f"{band} {method}: expansion {fit.steps}, misfit {fit.misfit:.2f}", flush=True

@@ -16,7 +16,7 @@ from pipeline.base import errors
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, NotMade, owner
 from pipeline.params import Params, expect_known, load
-from pipeline.params.identification import last_step
+from pipeline.params.identification import steps_of
 
 MAKERS = {  # steps that make a folder of another name
     "raw": "record",
@@ -24,6 +24,8 @@ MAKERS = {  # steps that make a folder of another name
     "launches": "evidence",
     "policies": "policy",
 }
+
+OF_A_SEARCH = ("history", "clusters", "evaluations", "confidence")  # its last step writes the rest
 
 OF_DVC = "DVC_STAGE"  # in the environment of what DVC runs
 GRACE = 5.0  # s from the interrupt to the end
@@ -105,8 +107,9 @@ def remedy(error: NotMade) -> str:
         return f"`sling add-recording --band {band} FILE.mcap` puts a recording there"
     params = load()
     step = MAKERS.get(folder, folder)
-    if folder in ("evaluations", "confidence") and method in params.methods:
-        step = last_step(params.methods[method].search)
+    if folder in OF_A_SEARCH and method in params.methods:
+        steps = steps_of(params.methods[method].search)
+        step = folder if folder in steps else steps[-1]
     elif error.path.name == "launches.parquet":
         step = "launches"
     stage = f"{step}@{band}" if method is None else stage_of(params, step, band, method)

@@ -8,6 +8,8 @@ from pathlib import Path
 import psutil
 
 from pipeline.params import Params
+from pipeline.params.identification import steps_of
+from pipeline.params.lab import StepParams
 from validation.code import ROOT
 from validation.projects import environment, wait
 
@@ -16,6 +18,17 @@ def python(*arguments: str | Path, folder: Path = ROOT, **more: str) -> subproce
     """Run Python in `folder`, with `more` in its environment."""
     command, about = [sys.executable, *map(str, arguments)], {"capture_output": True, "text": True}
     return subprocess.run(command, cwd=folder, env=environment(**more), timeout=240, **about)
+
+
+def set_methods(content: dict, methods: list[str], ablations: list[str] | tuple = ()) -> None:
+    """Write into the content of a params.yaml which methods run, and by which steps."""
+    searches = content["methods"], content["method_defaults"]["search"]
+    for run, names in ((content["run"], methods), (content["run"]["ablations"], ablations)):
+        run["methods"], run["steps"] = list(names), {step: [] for step in StepParams.model_fields}
+        for name in names:
+            for step in steps_of(searches[0][name].get("search", searches[1])):
+                if step in run["steps"]:
+                    run["steps"][step].append(name)
 
 
 def with_(params: Params, section: str, **values: object) -> Params:

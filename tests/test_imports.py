@@ -54,6 +54,7 @@ INDIRECT = {
     "fastapi": "newer ones break Prefect's server",
     "onnxscript": "torch's ONNX exporter imports it",
     "pytest-xdist": "a plug-in of pytest's",
+    "basedpyright": "make lint",
     "ruff": "make lint",
     "uv": "tools/setup.sh",
     "threadpoolctl": "by the script of a test",

@@ -18,7 +18,7 @@ from pipeline.episode.signal import average, lowpass, uniform
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.params import Params
 from pipeline.simulator.interaction import interact
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 
 DRAW = 0.35  # m
 THETA = (2e5, 0.45, 2e-3, 0.5, 0.5)  # of the band that is recorded
@@ -28,12 +28,12 @@ ALONG, AROUND = 400, 16  # points of the band's surface before a camera sees the
 POINTS = 1000  # of a cloud
 
 
-def yardstick(band, params) -> Sling:
+def yardstick(band, params) -> ClampedBand:
     """A band in pads that let no theta slip, so that every rollout goes on to its end."""
-    return replace(Sling.of(band, params.setup, params.sling), grip_force=1e5)
+    return replace(ClampedBand.of(band, params.setup, params.sling), grip_force=1e5)
 
 
-def pull_and_release(band: str, shape, sling: Sling) -> Episode:
+def pull_and_release(band: str, shape, sling: ClampedBand) -> Episode:
     """The yardstick's interaction, with a camera at 30 Hz that sees nothing yet.
 
     Args:
@@ -75,7 +75,7 @@ def unseen(
     )
 
 
-def recorded_yardstick(params: Params) -> tuple[Sling, Episode]:
+def recorded_yardstick(params: Params) -> tuple[ClampedBand, Episode]:
     """The first band, pulled and released with THETA, as sensors without noise would record it."""
     band = next(iter(params.bands))
     sling = yardstick(params.bands[band], params)
@@ -102,7 +102,7 @@ def _ridge(line: np.ndarray, radius: float, camera: np.ndarray, count: int) -> n
 
 
 def own_law_episode(
-    sling: Sling,
+    sling: ClampedBand,
     episode: Episode,
     theta: np.ndarray,
     *,

@@ -55,7 +55,7 @@ def sizes(model: Model) -> dict[str, float | list[float] | None]:
 
 def history(model: Model) -> dict[str, float] | None:
     """In how long the hand must draw, and how long it must wait; None: it does not matter."""
-    told = model.sling.history
+    told = model.launch_setup.history
     return told and {"pull_time_s": rounded(told.pull_time, 6), "pause_s": rounded(told.pause, 6)}
 
 

@@ -13,7 +13,7 @@ from pipeline.base.files import replacing
 class Checkpoint:
     """One state of a training in a file that DVC does not know."""
 
-    def __init__(self, path: Path, fingerprint: str):
+    def __init__(self, path: Path, fingerprint: str) -> None:
         """Look at `path`.
 
         Args:

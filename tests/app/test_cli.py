@@ -211,7 +211,7 @@ def test_aim_prints_one_json_object(tmp_path: Path) -> None:
     shown = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
     assert shown["tcp_position_m"] == "0.5 -0.329 0.25"
     assert shown["max_force_n"] == "30" and "warnings" not in shown
-    for warning in ("does not tell how well", "data/mounting/band1.json is missing"):
+    for warning in ("does not tell how well", "data/clamps/band1.json is missing"):
         assert warning in done.stderr
 
 

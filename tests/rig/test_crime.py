@@ -11,7 +11,7 @@ from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.space import Space
 from pipeline.recording.build import build_episodes
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from rig.physics.world import string_of
 from rig.recorder.record import EPOCH
 from tests.project import with_
@@ -40,7 +40,7 @@ def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorde
     So what is left is the law: Ogden's with relaxation against neo-Hookean with damping.
     """
     path, happened = recorded
-    sling = Sling.of(quick.bands["band1"], quick.setup, quick.sling)
+    sling = ClampedBand.of(quick.bands["band1"], quick.setup, quick.sling)
     string, rng = string_of(quick, "band1"), np.random.default_rng(0)
     episode = build_episodes(path, "band1", quick)[0][0]
     start = 1e-9 * (episode.metadata["input"]["start_ns"] - EPOCH)

@@ -36,9 +36,9 @@ def test_what_a_method_leaves_out_is_left_out_everywhere(
     truth = np.array([2e5, 0.45, 2e-3, 0.7, 0.6])
     episode = own_law_episode(sling, episode, truth, cutoff=35.0)
     episode.save(layout.episode("band1"))
-    write_json(layout.mounting("band1"), SHOWN)
+    write_json(layout.clamps("band1"), SHOWN)
     monkeypatch.setattr(sys, "argv", ["stage", "band1", "sling2sim2real"])
-    for stage in ("history", "theta"):
+    for stage in ("history", "clusters", "cma", "theta"):
         with pytest.raises(SystemExit) as ended:
             runpy.run_module(f"stages.{stage}", run_name="__main__")
         assert not ended.value.code

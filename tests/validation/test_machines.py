@@ -16,6 +16,7 @@ from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.results.mounting import load_sling
 from pipeline.params import load
 from pipeline.simulator.launch import launch
+from pipeline.simulator.model import LaunchSetup
 from tests.project import ROOT
 from validation.campaigns import machines
 from validation.campaigns.machines import DRAWS, FOLDER, LIMIT, OURS, PAPER, MachineReport
@@ -37,7 +38,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     yaml.dump(content, root / "params.yaml")
     params, layout = load(root / "params.yaml"), Layout(root)
     clamps = {"clamp_direction": [0.0, 0.0, -1.0], "flexural_rigidity": 1e-5}
-    write_json(layout.mounting(BAND), clamps)
+    write_json(layout.clamps(BAND), clamps)
     sling = load_sling(params, BAND, root)
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
     plan = pull_and_release(BAND, params.episode, sling)
@@ -62,7 +63,8 @@ def test_the_same_inputs_give_the_same_theta_with_other_threads(
     ours, paper = (measured["bands"][BAND][method] for method in (OURS, PAPER))
     assert len(paper["theta"]) == 5 and len(ours["theta"]) == 10
     params = load(project / "params.yaml")
-    true = launch(load_sling(params, BAND, project), np.array(TRUE), np.array(DRAWS)).landing_y
+    world = load_sling(params, BAND, project), LaunchSetup.of(params.setup, params.sling)
+    true = launch(*world, np.array(TRUE), np.array(DRAWS)).landing_y
     assert np.isfinite(true).sum() >= 8
     np.testing.assert_allclose(np.array(ours["landing"], float), true, rtol=0.05)
 
@@ -82,9 +84,7 @@ def test_another_input_has_another_digest(project, changed: str, tmp_path: Path)
         with (layout.episode(BAND) / "clouds.parquet").open("ab") as file:
             file.write(b" ")
     elif changed == "clamps":
-        layout.mounting(BAND).write_text(
-            layout.mounting(BAND).read_text().replace("1e-05", "2e-05")
-        )
+        layout.clamps(BAND).write_text(layout.clamps(BAND).read_text().replace("1e-05", "2e-05"))
     else:
         text = (root / "params.yaml").read_text()
         (root / "params.yaml").write_text(text.replace("mass: 0.023", "mass: 0.024"))

@@ -30,7 +30,7 @@ from pipeline.identify.search.regions import regions_asked
 from pipeline.params import Params, expect_known
 from pipeline.params.identification import LEAST_SQUARES, OptimizerParams
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from validation.benchmarks.timing import seconds, shared, timed
 from validation.synthetic import recorded_yardstick
 
@@ -51,7 +51,7 @@ class Clocked:
 
 
 def bench_methods(
-    params, device: str = "cpu", size: str = "laptop", methods: list[str] | None = None
+    params: Params, device: str = "cpu", size: str = "laptop", methods: list[str] | None = None
 ) -> dict:
     """Time a search with each of params.yaml's methods.
 
@@ -90,7 +90,7 @@ def time_search(
     params: Params,
     method: str,
     optimizer: OptimizerParams,
-    sling: Sling,
+    sling: ClampedBand,
     episode: Episode,
     devices: Sequence[str],
 ) -> tuple[dict, History]:
@@ -128,7 +128,12 @@ def time_search(
 
 
 def _generation(
-    params: Params, sling: Sling, episode: Episode, method: str, devices: Sequence[str], count: int
+    params: Params,
+    sling: ClampedBand,
+    episode: Episode,
+    method: str,
+    devices: Sequence[str],
+    count: int,
 ) -> dict:
     """Seconds of one generation: simulated, and with the loss, on all cores or GPUs."""
     evaluate = evaluator(params, method, sling, episode, devices)
@@ -141,7 +146,7 @@ def _generation(
 
 
 def evaluator(
-    params: Params, method: str, sling: Sling, episode: Episode, devices: Sequence[str]
+    params: Params, method: str, sling: ClampedBand, episode: Episode, devices: Sequence[str]
 ) -> Evaluator:
     """A method's, with nothing remembered."""
     loss = EpisodeLoss.of(params, method, episode, sling)
@@ -149,7 +154,7 @@ def evaluator(
 
 
 def _import_and_compile(
-    params: Params, sling: Sling, episode: Episode, method: str, devices: Sequence[str]
+    params: Params, sling: ClampedBand, episode: Episode, method: str, devices: Sequence[str]
 ) -> None:
     """What a machine does once, and a method should not pay for."""
     import torch  # noqa: F401

@@ -22,6 +22,7 @@ from pipeline.identify.search.history import History
 from pipeline.identify.search.loop import latin_hypercube
 from pipeline.params import Params, expect_known
 from pipeline.simulator.launch import Launches, launch
+from pipeline.simulator.model import LaunchSetup
 from validation.benchmarks.methods import BUDGETS, evaluator, time_search
 from validation.benchmarks.timing import REPEATS, seconds, timed
 from validation.synthetic import DRAW, recorded_yardstick
@@ -84,7 +85,9 @@ def scaling(
     def launches(count: int) -> dict:
         unit = latin_hypercube(space.dimension, count, optimizer.seed)
         own, thetas = at_points(sling, space.to_physical(unit))
-        works = [partial(launch, own, thetas, [-DRAW, -0.15], device=team) for team in teams]
+        setup = LaunchSetup.of(params.setup, params.sling)
+        work = partial(launch, own, setup, thetas, [-DRAW, -0.15])
+        works = [partial(work, device=team) for team in teams]
         return {"launches": count} | _compared(works, teams, _launched)
 
     def search() -> dict:

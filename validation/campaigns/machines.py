@@ -99,7 +99,7 @@ def identified(band: str, method: str, root: Path, device: str) -> dict:
     loss = EpisodeLoss.of(params, method, episode, sling)
     terms = loss.terms(interact(sling, episode, theta, device=devices[0], fetch=False))
     total = float(loss.total(terms)[0])
-    landed = launch(sling, theta, np.array(DRAWS), device=devices)
+    landed = launch(sling, outcome.setup, theta, np.array(DRAWS), device=devices)
     names = [*THETA, *LAWS[sling.law], *EXTRA]
     return {
         "theta": dict(zip(names, outcome.point.tolist(), strict=False)),

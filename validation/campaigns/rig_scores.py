@@ -5,25 +5,26 @@ Recordings are made once and kept as episodes; the rig is launched after a metho
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from ruamel.yaml import YAML
 
 from pipeline.base.files import replacing, write_json
+from pipeline.base.schema import read_json
 from pipeline.episode.episode import Episode
 from pipeline.identify.clamps import calibrate_clamps
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.space import Space
 from pipeline.identify.posterior.launches import Observed
+from pipeline.identify.results.mounting import Mounting
 from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params import Params
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.world import World
 from rig.physics.launch import launch
@@ -53,19 +54,19 @@ def recorded(params: Params, band: str, folder: Path) -> Episode:
 def calibrated_clamps(params: Params, band: str, episode: Episode, folder: Path) -> None:
     """Keep an episode in `folder`, with its clamps beside it."""
     episode.save(folder / "episode")
-    sling = Sling.of(params.bands[band], params.setup, params.sling, as_rod=True)
+    sling = ClampedBand.of(params.bands[band], params.setup, params.sling, as_rod=True)
     clamps = calibrate_clamps(
         sling, episode, lambda part: EpisodeLoss.plain(params, part, sling), workers=1
     )
     write_json(folder / "mounting.json", clamps)
 
 
-def sling_of(params: Params, band: str, method: str, folder: Path) -> Sling:
+def sling_of(params: Params, band: str, method: str, folder: Path) -> ClampedBand:
     """The band as a method takes it, with or without the clamps of its first recording."""
     about = params.methods[method]
-    mounting = json.loads((folder / "mounting.json").read_text()) if about.mounting else None
-    sling = Sling.of(params.bands[band], params.setup, params.sling, mounting)
-    return replace(sling, law=about.law)
+    mounting = read_json(folder / "mounting.json", Mounting) if about.mounting else None
+    lab = params.setup, params.sling
+    return ClampedBand.of(params.bands[band], *lab, mounting, law=about.law)
 
 
 @dataclass(frozen=True)

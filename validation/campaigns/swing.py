@@ -25,11 +25,11 @@ from pipeline.base.layout import Layout, made
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.results.theta import at_points, calibrated, load_theta, point
+from pipeline.identify.results.theta import at_points, calibrated, launch_setup, load_theta, point
 from pipeline.params import Params, load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand, LaunchSetup
 from validation.benchmarks.timing import environment
 from validation.campaigns.runner import OURS, PAPER
 from validation.effects import AS_IS
@@ -52,7 +52,7 @@ TINY, TIMES = 1e-7, 64  # relative change of a parameter; how often
 class SplitPictures:
     """A band's first pull as simulated at points of a sling, beside the recorded one."""
 
-    def __init__(self, params, episode: Episode, sling: Sling, points: np.ndarray) -> None:
+    def __init__(self, params, episode: Episode, sling: ClampedBand, points: np.ndarray) -> None:
         self.sling, theta = at_points(sling, points)
         rollouts = interact(self.sling, episode, theta)
         loss = EpisodeLoss.of(params, PAPER, episode, sling)
@@ -98,7 +98,7 @@ def by_mesh(params: Params, band: str, episode: Episode) -> dict:
     return {"own_damping_s": own, "own_theta": theta.tolist(), **found}
 
 
-def sling_with(params: Params, band: str, mesh: str) -> Sling:
+def sling_with(params: Params, band: str, mesh: str) -> ClampedBand:
     section = params.sling.model_copy(update={"mesh": mesh})
     return sling_of_method(params.model_copy(update={"sling": section}), band, PAPER)
 
@@ -113,11 +113,11 @@ def as_found(params: Params, band: str, results: list[dict]) -> dict:
         for one in results
         if (one["band"], one["method"], one["recording"], one["seed"]) == (band, PAPER, 0, 1)
     }
-    done = {}
+    done, setup = {}, LaunchSetup.of(params.setup, params.sling)
     for mesh in MESHES:
         sling = sling_with(params, band, mesh)
         for whose, switch in zip(MESHES, (AS_IS, AS_TETRAHEDRA), strict=True):
-            outcome = launch(sling, np.tile(found[switch], (len(DRAWS), 1)), DRAWS)
+            outcome = launch(sling, setup, np.tile(found[switch], (len(DRAWS), 1)), DRAWS)
             done[f"launched with {mesh}, found with {whose}"] = outcome
     first = next(iter(done.values()))
     return {
@@ -137,10 +137,11 @@ def _damped(theta: np.ndarray, dampings) -> np.ndarray:
     return thetas
 
 
-def landed(sling: Sling, points: np.ndarray) -> np.ndarray:
+def landed(sling: ClampedBand, setup: LaunchSetup, points: np.ndarray) -> np.ndarray:
     """Where DRAWS land with points (N, P) [m], shape (N, 3)."""
     each, every = np.repeat(points, len(DRAWS), axis=0), np.tile(DRAWS, (len(points), 1))
-    return launch(*at_points(sling, each), every).landing_y.reshape(len(points), -1)
+    sling, thetas = at_points(sling, each)
+    return launch(sling, setup, thetas, every).landing_y.reshape(len(points), -1)
 
 
 def by_rounding(params: Params, band: str, method: str, episode: Episode) -> dict:
@@ -148,7 +149,10 @@ def by_rounding(params: Params, band: str, method: str, episode: Episode) -> dic
     content = load_theta(Layout().theta(band, method), band)
     sling, best = calibrated(params, band, content), point(content)
     points = best * (1 + TINY * np.random.default_rng(0).standard_normal((TIMES, len(best))))
-    done, landing = SplitPictures(params, episode, sling, points), landed(sling, points)
+    done, landing = (
+        SplitPictures(params, episode, sling, points),
+        landed(sling, launch_setup(params, content), points),
+    )
     return {
         "loss_range": np.ptp(done.total) / done.total.mean(),
         "range_cm": {part: np.ptp(mean) for part, mean in done.mean.items()},

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.simulator.cylinder import cylinder, volumes
 from pipeline.simulator.initial import fixed_frames
 from pipeline.simulator.interaction import GRASP_BLEND
-from pipeline.simulator.model import ROD, Sling
+from pipeline.simulator.model import ROD, ClampedBand
 
 CLAMPED = 0.015  # m of band in each clamp
 EDGES, GRADING = 48, 6.0  # 50 intervals with those in the clamps: 900 tetrahedra
@@ -40,7 +40,9 @@ class Tube:
     arc: np.ndarray
 
     @classmethod
-    def of(cls, sling: Sling, edges: int = EDGES, grading: float = GRADING, rings: int = 1) -> Tube:
+    def of(
+        cls, sling: ClampedBand, edges: int = EDGES, grading: float = GRADING, rings: int = 1
+    ) -> Tube:
         """Mesh a sling's band.
 
         Args:
@@ -107,7 +109,7 @@ def hand_path(episode, times: np.ndarray, grasp: np.ndarray) -> np.ndarray:
     return path + (1 - part**3 * (10 - 15 * part + 6 * part**2)) * (grasp - path[0])
 
 
-def _hanging(sling: Sling, arc: np.ndarray, rest: np.ndarray) -> np.ndarray:
+def _hanging(sling: ClampedBand, arc: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """Two legs and a half circle, as in model.hanging_guess."""
     half, length = sling.half_width, sling.rest_length
     leg = max((length - np.pi * half) / 2, 0.0)

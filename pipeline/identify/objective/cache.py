@@ -57,6 +57,7 @@ class EvaluationCache:
         with replacing(path) as temporary, temporary.open("wb") as file:
             np.savez(
                 file,
+                allow_pickle=False,
                 theta=evaluation.theta,
                 failure=np.array([reason or "" for reason in evaluation.failure]),
                 weighed=np.array(self._weighed),

@@ -8,19 +8,19 @@ the host. It runs on one device, whichever it chooses.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
+from typing import cast
 
 from pipeline.base.errors import UserError, one_line
 from pipeline.base.imported import imported, is_import
-from pipeline.identify.objective.evaluate import simulated
+from pipeline.identify.objective.evaluate import Simulate, simulated
 from pipeline.params.identification import OUR_ENGINE
 
 GROUP = "sling2sim2real.engines"  # of entry points: engines that installed packages offer
 
 
-def simulate_of(engine: str) -> Callable:
+def simulate_of(engine: str) -> Simulate:
     """The function of an engine: OUR_ENGINE, one of GROUP, or a user's `package.module:function`.
 
     Raises UserError where there is no such function.
@@ -34,7 +34,7 @@ def simulate_of(engine: str) -> Callable:
         raise UserError(f"engine {engine}: cannot be imported ({said})") from error
     if not callable(found):
         raise UserError(f"engine {engine}: must be a function; see docs/simulator.md")
-    return found
+    return cast(Simulate, found)
 
 
 def _installed(engine: str) -> str:
@@ -48,4 +48,7 @@ def sources_of(engine: str) -> list[Path]:
     """The folder of another engine's code, which its rollouts hang on; none for ours."""
     if engine == OUR_ENGINE:
         return []
-    return [Path(inspect.getsourcefile(simulate_of(engine))).parent]
+    source = inspect.getsourcefile(simulate_of(engine))
+    if source is None:
+        raise UserError(f"engine {engine}: must be a function of Python, in a file of its own")
+    return [Path(source).parent]

@@ -86,7 +86,7 @@ class Stored:
             if "projectile" in {port.name for port in session.get_inputs()}:
                 at = np.array(self._projectile(), np.float32)
                 given["projectile"] = np.tile(at, (len(given["target"]), 1))
-            return session.run(["draw"], given)[0].astype(float)
+            return np.asarray(session.run(["draw"], given)[0], float)
         except NotMade:
             raise
         except Exception as error:  # onnxruntime has an error of its own for each kind of damage

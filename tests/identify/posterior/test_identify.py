@@ -37,7 +37,7 @@ def recorded(phase: float, seed: int, noise=(0.0, 0.0)):
 
 
 def found_of(*episodes, workers: int = WORKERS):
-    return identify.identify(PARAMS, METHOD, SLING, episodes, FROM[:7], workers=workers)
+    return identify.fit_posterior(PARAMS, METHOD, SLING, episodes, FROM[:7], workers=workers)
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_alike_recordings_agree(both):
 
 def test_what_is_written_is_a_theta_file(first, tmp_path):
     path = tmp_path / "least_squares.json"
-    content = identify.theta_content(first, "known", METHOD)
+    content = {"band": "known", **identify.theta_entries(first)}
     content["confidence"] = told_of(first)
     content |= {"loss": dict.fromkeys(("geom", "force", "work", "total"), 1.0), "rollouts": 1}
     path.write_text(json.dumps(content, allow_nan=False))

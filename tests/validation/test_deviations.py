@@ -35,8 +35,7 @@ def test_a_switch_is_the_key_that_it_is_called_by(switch: str) -> None:
         for method in [*content["methods"]]:
             if content["methods"][method].get("law") == "rubber":
                 del content["methods"][method]
-                for names in (content["run"]["methods"], *content["run"]["steps"].values()):
-                    names[:] = [name for name in names if name != method]
+                content["run"]["methods"].remove(method)
                 for step in ("history", "density"):
                     content["run"]["steps"][step].remove(method)
     expected = check(content)

@@ -12,6 +12,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
+from pipeline.base.code import ROOT
 from pipeline.base.files import write_json
 from pipeline.identify.objective.space import Space
 from pipeline.identify.results.theta import load_theta
@@ -25,7 +26,6 @@ from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.world import World
 from validation.campaigns.runner import OURS, PAPER
 from validation.campaigns.test_orange import copy_of_the_project, run
-from validation.code import ROOT
 
 pytestmark = pytest.mark.validation
 

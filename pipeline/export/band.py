@@ -12,7 +12,7 @@ from pipeline.identify.results.mounting import Mounting
 from pipeline.params import Params
 from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.launch import Launches
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 
 
 class BandSizes(Protocol):
@@ -67,13 +67,13 @@ class CalibratedBand(Protocol):
     @property
     def settings(self) -> Params: ...
     @property
-    def sling(self) -> Sling: ...
+    def sling(self) -> ClampedBand: ...
     def launches(self, draws: np.ndarray) -> Launches:
         """Launch draws (N, 2) [m]."""
         ...
 
-    def at(self, points: np.ndarray) -> tuple[Sling, np.ndarray]:
-        """Sling and the five parameters (N, 5) of points (N, P)."""
+    def at(self, points: np.ndarray) -> tuple[ClampedBand, np.ndarray]:
+        """ClampedBand and the five parameters (N, 5) of points (N, P)."""
         ...
 
 

@@ -185,7 +185,7 @@ def test_rubbers_that_were_sealed(results, progress, record) -> None:
     not (RECORDINGS_OF_ORANGE / "orange_landings.csv").exists(),
     reason="the recordings of the orange band are not beside the project",
 )
-def test_recordings_that_this_project_did_not_make(params, progress, record) -> None:
+def test_recordings_that_this_project_did_not_make(params: Params, progress, record) -> None:
     params = with_orange(params)
     draws, measured = landings(RECORDINGS_OF_ORANGE)
     names = ("orange", "orange_2", "orange_3")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from app import safety
 from app.aim import pull_and_pause
 from app.arguments import finite
@@ -35,7 +37,7 @@ def launched(
     expect_above_floor(params, draw)
     content, root = load_theta(theta, band), Path(root)
     sling, setup = calibrated(params, band, content, root), launch_setup(params, content)
-    result = launch(sling, setup, vector(content), draw, max_force=params.setup.max_force)
+    result = launch(sling, setup, vector(content), np.array(draw), max_force=params.setup.max_force)
     force, failure = result.hold_force[0], result.failure[0]
     return {
         "landing_y_m": finite(result.landing_y[0]),
@@ -47,7 +49,7 @@ def launched(
             *safety.of_launch(params, force, failure),
             *safety.of_draw(params, band, draw, root),
             *safety.of_confidence(content, theta),
-            *safety.of_identification(params, content, theta, root),
+            *safety.of_identification(params, content, theta),
             *safety.of_mounting(band, root),
         ],
     }

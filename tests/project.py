@@ -7,10 +7,10 @@ from pathlib import Path
 
 import psutil
 
+from pipeline.base.code import ROOT
 from pipeline.params import Params
 from pipeline.params.identification import steps_of
 from pipeline.params.lab import StepParams
-from validation.code import ROOT
 from validation.projects import environment, wait
 
 

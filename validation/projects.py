@@ -17,9 +17,9 @@ from typing import TypeVar
 import psutil
 from ruamel.yaml import YAML
 
+from pipeline.base.code import ROOT
 from pipeline.params import load
 from pipeline.params.identification import methods_by_step
-from validation.code import ROOT
 
 CLI = ("-c", "from app.cli import main; main()")  # after `python`: this project's `sling`
 SLING = (sys.executable, *CLI)

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import average, lowpass, uniform
 from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.params import Params
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
 
@@ -74,7 +75,7 @@ def unseen(
     )
 
 
-def recorded_yardstick(params) -> tuple[ClampedBand, Episode]:
+def recorded_yardstick(params: Params) -> tuple[ClampedBand, Episode]:
     """The first band, pulled and released with THETA, as sensors without noise would record it."""
     band = next(iter(params.bands))
     sling = yardstick(params.bands[band], params)

@@ -17,6 +17,7 @@ from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.space import Space
 from pipeline.identify.results.theta import at_points
+from pipeline.params import Params
 from pipeline.simulator.interaction import interact, schedule_of
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import LaunchSetup
@@ -34,7 +35,7 @@ BOXES = {  # of what a law adds to params.yaml's parameters
 }
 
 
-def bench(params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
+def bench(params: Params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
     """Time the yardstick.
 
     Args:

@@ -24,6 +24,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from pipeline.base import errors
+from pipeline.base.code import ROOT, digests
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_json
 from pipeline.base.fingerprint import fingerprint
@@ -31,7 +32,6 @@ from validation.benchmarks.timing import environment
 from validation.campaigns import outcomes, runner
 from validation.campaigns.outcomes import FAULT, HANGS, MOST, name_of
 from validation.campaigns.runner import Result, ResultLines
-from validation.code import ROOT, digests
 from validation.recordings.small import CHECKED, CONTAINERS, FAMILIES, write_small
 
 WORK, REPORT = Path("build/mutations"), Path("reports/validation/mutations.json")

@@ -52,7 +52,7 @@ def same(a: Episode, b: Episode) -> bool:
 
 def said(done: Processed) -> list[str]:
     """Everything by which a user is told of damage."""
-    words = [*done.recording.losses, *done.recording.notes]
+    words = [*done.pull.recording.losses, *done.pull.recording.notes]
     if done.clouds.damaged or done.clouds.unpaired:
         words.append(f"{done.clouds.damaged} pictures damaged, {done.clouds.unpaired} unpaired")
     return words

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base import errors
+from pipeline.base.code import ROOT, digest
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
@@ -34,7 +35,6 @@ from pipeline.policy.train import train
 from validation.benchmarks.timing import environment, timed
 from validation.campaigns import runner
 from validation.campaigns.runner import PAPER, ResultLines, plain
-from validation.code import ROOT, digest
 from validation.paired import mean_interval
 
 WORK = Path("data/policy_as_printed")

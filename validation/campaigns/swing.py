@@ -26,7 +26,7 @@ from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import sling_of_method
 from pipeline.identify.results.theta import at_points, calibrated, launch_setup, load_theta, point
-from pipeline.params import load
+from pipeline.params import Params, load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
@@ -69,7 +69,7 @@ class SplitPictures:
         self.reach = middle[..., 1].max(axis=1)  # beyond the fork [m]
 
 
-def by_mesh(params, band: str, episode: Episode) -> dict:
+def by_mesh(params: Params, band: str, episode: Episode) -> dict:
     """By mesh: the damping that each part's pictures would have.
 
     `sensitivity_cm` is how far the part's pictures alone move the geometric term over DAMPINGS;
@@ -98,12 +98,12 @@ def by_mesh(params, band: str, episode: Episode) -> dict:
     return {"own_damping_s": own, "own_theta": theta.tolist(), **found}
 
 
-def sling_with(params, band: str, mesh: str) -> ClampedBand:
+def sling_with(params: Params, band: str, mesh: str) -> ClampedBand:
     section = params.sling.model_copy(update={"mesh": mesh})
     return sling_of_method(params.model_copy(update={"sling": section}), band, PAPER)
 
 
-def as_found(params, band: str, results: list[dict]) -> dict:
+def as_found(params: Params, band: str, results: list[dict]) -> dict:
     """Launches in both meshes of what the paper's method found in one recording with each.
 
     `landing_ratio` is the mean over DRAWS, and `hold_force_ratio` too, beside rod and rod.
@@ -144,7 +144,7 @@ def landed(sling: ClampedBand, setup: LaunchSetup, points: np.ndarray) -> np.nda
     return launch(sling, setup, thetas, every).landing_y.reshape(len(points), -1)
 
 
-def by_rounding(params, band: str, method: str, episode: Episode) -> dict:
+def by_rounding(params: Params, band: str, method: str, episode: Episode) -> dict:
     """How far TINY changes of all parameters move the loss, each part and landings."""
     content = load_theta(Layout().theta(band, method), band)
     sling, best = calibrated(params, band, content), point(content)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from pipeline.base.code import ROOT, digests
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
@@ -24,7 +25,6 @@ from validation import density
 from validation.campaigns import rig_scores
 from validation.campaigns.rig_scores import calibrated_clamps, result, sling_of, summary
 from validation.campaigns.runner import OURS, PAPER, each, made_once
-from validation.code import ROOT, digests
 from validation.orange import landings, with_orange
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
@@ -185,7 +185,7 @@ def test_rubbers_that_were_sealed(results, progress, record) -> None:
     not (RECORDINGS_OF_ORANGE / "orange_landings.csv").exists(),
     reason="the recordings of the orange band are not beside the project",
 )
-def test_recordings_that_this_project_did_not_make(params, progress, record) -> None:
+def test_recordings_that_this_project_did_not_make(params: Params, progress, record) -> None:
     params = with_orange(params)
     draws, measured = landings(RECORDINGS_OF_ORANGE)
     names = ("orange", "orange_2", "orange_3")

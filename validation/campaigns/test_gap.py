@@ -12,12 +12,13 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
+from pipeline.base.code import ROOT
 from pipeline.base.files import write_json
 from pipeline.identify.objective.space import Space
 from pipeline.identify.results.theta import load_theta
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
-from pipeline.params import load
+from pipeline.params import Params, load
 from pipeline.params.identification import STEPS
 from pipeline.report.drawing.styles import COLORS, INK, THEME
 from rig.oracle.aim import hit, least_sensitive_draw
@@ -25,7 +26,6 @@ from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.world import World
 from validation.campaigns.runner import OURS, PAPER
 from validation.campaigns.test_orange import copy_of_the_project, run
-from validation.code import ROOT
 
 pytestmark = pytest.mark.validation
 
@@ -36,7 +36,7 @@ STARTS, STEP, LOST = 48, 2e-3, 0.5  # of the fit: points, of the unit cube, m fo
 AS_IT_IS, THETA_, AIMED, HIT = "as it is", "oracle θ", "exact policy", "oracle policy"
 
 
-def shots(params, landing_map, seed: int = 1) -> np.ndarray:
+def shots(params: Params, landing_map, seed: int = 1) -> np.ndarray:
     """Draws (SHOTS, 2) spread over those of the box that land in the trained range, by the map."""
     setup, (near, far) = params.setup, params.policy.targets
     low, high = np.array([setup.draw_y, setup.draw_z]).T
@@ -82,7 +82,7 @@ def oracle_theta(launcher, space: Space, draws: np.ndarray, landing: np.ndarray,
     return dict(zip(space.names, space.to_physical(unit).tolist(), strict=True)), fit.fun
 
 
-def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
+def split(params: Params, root: Path, world: World, known: tuple, method: str) -> dict:
     """What the error of one method on one band is made of.
 
     Args:
@@ -143,7 +143,7 @@ def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
     }
 
 
-def band_figures(params, root: Path, band: str, methods, progress) -> dict:
+def band_figures(params: Params, root: Path, band: str, methods, progress) -> dict:
     """Floor and split of every method on one band."""
     targets = params.trials.targets
     with World(band, root / "params.yaml") as world:

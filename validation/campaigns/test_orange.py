@@ -14,11 +14,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from app.preflight.add_band import add_band
+from pipeline.base.code import ROOT
 from pipeline.params import load
 from pipeline.report.run.tables.landings import prediction_error
 from validation.campaigns.runner import OURS
-from validation.code import ROOT
 from validation.projects import copy_project
 
 pytestmark = pytest.mark.validation
@@ -65,7 +64,7 @@ def test_landings_are_predicted_within_the_recorded_stretch(
 ) -> None:
     project, methods = copy_of_the_project(tmp_path / "project"), params.run.methods
     table = project / "params.yaml"
-    progress("\n  " + add_band(BAND, [RECORDING], MASS, params_path=table, root=project))
+    run(project, "sling", "add-band", BAND, f"--recording={RECORDING}", f"--mass={MASS}")
     # the note says where the hand was, not where it was sent
     text = table.read_text("utf-8").replace("arm_stiffness: 12000.0", "arm_stiffness: null")
     table.write_text(text, "utf-8")

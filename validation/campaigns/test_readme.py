@@ -5,8 +5,8 @@ import shutil
 
 import pytest
 
+from pipeline.base.code import ROOT
 from pipeline.params import load
-from validation.code import ROOT
 from validation.marked import CODE_BLOCK
 from validation.projects import ProjectCopy, copy_project
 

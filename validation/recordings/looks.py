@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -263,7 +264,7 @@ class LookSignals:
     grasp_time: float = GRASP
     release_time: float = RELEASE
     tool_axis: np.ndarray = field(default_factory=lambda: APPROACH)
-    facts: dict = field(default_factory=lambda: {"turn": 0.0})
+    facts: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(turn=0.0))
 
     def hand(self, times: np.ndarray) -> np.ndarray:
         return strand.path()(times)

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from app.flow import guard, locks
+from app.flow import guard
 from app.flow.child import StageFailed, run_stage
+from stages import dvc_files
 from tests.app.flow.killing import OUTPUTS, STEPS, Toy
 from tests.app.flow.serving import serving
 from validation.projects import SLING, command_line, send, wait
@@ -151,7 +152,7 @@ def test_a_full_disk_is_one_clear_line_and_room_is_all_it_needs(disk: Path) -> N
             run_stage(toy.folder, "count@a", environment=toy.environment, on_line=lambda line: None)
         assert "\n" not in str(failure.value)
         ballast.unlink()
-        locks.mend(toy.folder)  # as the next flow does
+        dvc_files.mend(toy.folder)  # as the next flow does
         assert not temporaries(toy)
         toy.dvc("repro", "count@a")
         assert toy.outputs()["out/a.txt"] == "a" * 400_000 + "\n"

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.base.errors import UserError
 from pipeline.recording.input import kinematics
 from pipeline.recording.input.container import Channel
+from pipeline.recording.input.decode import Unreadable
 from tests.recording.input.messages import (
     COUNT,
     FORCE,
@@ -161,7 +162,7 @@ def test_arm_and_gripper_that_share_a_topic(params, gantry) -> None:
     assert len(roles["pose"].read(both[1]).value) == 6
     assert roles["gripper"].read(both[0]).value == (gantry[0, 0] + gantry[0, 1],)
     for role, payload in (("pose", both[0]), ("gripper", both[1])):
-        with pytest.raises(ValueError, match="is missing"):
+        with pytest.raises(Unreadable, match="is missing"):
             roles[role].read(payload)
 
 

@@ -21,6 +21,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from pipeline.base import errors
+from pipeline.base.code import ROOT, digests
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
@@ -37,7 +38,6 @@ from validation.campaigns.kills.commands import (
     source,
 )
 from validation.campaigns.runner import ResultLines, made_once, parser
-from validation.code import ROOT, digests
 from validation.projects import PROMPT, send
 
 WORK = Path("data/kills")

@@ -14,10 +14,10 @@ from pathlib import Path
 import psutil
 from ruamel.yaml import YAML, YAMLError
 
-from app.flow import locks
+from pipeline.base.code import ROOT
 from pipeline.base.files import write_json
 from pipeline.base.machine import commit
-from validation.code import ROOT
+from stages import dvc_files
 from validation.projects import (
     SLING,
     TINY,
@@ -144,7 +144,7 @@ class ReproCopy(StruckCopy):
             except (ValueError, YAMLError):
                 half = True
         if half:
-            locks.mend(self.folder)
+            dvc_files.mend(self.folder)
         return half
 
 

@@ -127,7 +127,7 @@ def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
         sources["wrench"] = f"fixed frame {wrench_frame}"
     else:
         tool = _tool_frame(tree, wrench_frame, setup.tip_link)
-        sensor = tree.between(tool, wrench_frame)
+        sensor = tree.between(tool, wrench_frame) or Transform.identity()
         sources["wrench"] = f"{wrench_frame} on {tool}, which the pose topic is taken to move"
     return Geometry(base, color_to_fork @ color, color, sensor, fixed is not None, sources)
 

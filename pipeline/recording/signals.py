@@ -98,7 +98,7 @@ class Signals:
     path: np.ndarray
     tool_axis: np.ndarray
 
-    def hand(self, times: np.ndarray) -> np.ndarray:
+    def hand(self, times: np.ndarray | float) -> np.ndarray:
         """Tool centre point at any times, shape (..., 3)."""
         axes = [np.interp(times, self.path_time, axis) for axis in self.path.T]
         return np.stack(axes, axis=-1)

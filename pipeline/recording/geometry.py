@@ -79,7 +79,7 @@ class KeptGeometry:
         if kept is None:
             raise UserError(
                 f"the episodes of {band} are of an older version, without the rig's geometry:"
-                f" `dvc repro --force episode@{band}` makes them anew"
+                f" `dvc repro episode@{band}` makes them anew"
             )
         camera = kept["camera"]
         arrays = {key: np.array(camera[key], float) for key in ("matrix", "distortion")}

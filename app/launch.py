@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from app import safety
 from app.aim import pull_and_pause
 from app.arguments import finite
 from pipeline.base.errors import UserError
-from pipeline.identify.results.theta import calibrated, load_theta, vector
+from pipeline.identify.results.theta import calibrated, launch_setup, load_theta, vector
 from pipeline.params import Params, expect_known
 from pipeline.simulator.launch import launch
 
@@ -34,8 +36,8 @@ def launched(
     expect_known(params, "band", band)
     expect_above_floor(params, draw)
     content, root = load_theta(theta, band), Path(root)
-    sling = calibrated(params, band, content, root)
-    result = launch(sling, vector(content), draw, max_force=params.setup.max_force)
+    sling, setup = calibrated(params, band, content, root), launch_setup(params, content)
+    result = launch(sling, setup, vector(content), np.array(draw), max_force=params.setup.max_force)
     force, failure = result.hold_force[0], result.failure[0]
     return {
         "landing_y_m": finite(result.landing_y[0]),
@@ -47,7 +49,7 @@ def launched(
             *safety.of_launch(params, force, failure),
             *safety.of_draw(params, band, draw, root),
             *safety.of_confidence(content, theta),
-            *safety.of_identification(params, content, theta, root),
+            *safety.of_identification(params, content, theta),
             *safety.of_mounting(band, root),
         ],
     }

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -44,7 +45,7 @@ def posed(answer: Answer, params: Params, band: str, root: str | Path = ".") -> 
     else:
         position = [round(float(value), 6) + 0.0 for value in fork.apply(drawn)]
         turn = quaternion(fork.rotation * along_pull(drawn)).tolist()
-    return {
+    pose = {
         **{name: value for name, value in answer.items() if name != "warnings"},
         "pitch_rad": math.atan2(-drawn[2], -drawn[1]),
         "tcp_frame": frame,
@@ -52,6 +53,7 @@ def posed(answer: Answer, params: Params, band: str, root: str | Path = ".") -> 
         "tcp_quaternion_xyzw": turn,
         "warnings": warnings,
     }
+    return cast(PosedAnswer, pose)
 
 
 def fork_in_base(params: Params, band: str, root: str | Path = ".") -> tuple[Transform, str]:

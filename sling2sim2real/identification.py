@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -22,12 +22,14 @@ from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.space import Space
 from pipeline.identify.posterior import identify as posterior
-from pipeline.identify.posterior.launches import Observed
+from pipeline.identify.posterior.launches import Evidence, Observed
 from pipeline.identify.results.mounting import Mounting
 from pipeline.identify.results.theta import ThetaFile, load_samples, load_theta
+from pipeline.identify.results.units import SI_UNITS
 from pipeline.launching.trials.stretch import recorded_stretch
 from pipeline.params.identification import parameter_names
-from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.params.provenance import changed_since
+from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from sling2sim2real.model import Band, Model, Theta, known
 from sling2sim2real.settings import Settings
 
@@ -63,12 +65,15 @@ class Identification(Model):
         settled: Whether the fit has converged; if not, do not trust the intervals.
         stretch: The largest that the recordings show: length over rest length. Beyond it a launch
             is extrapolated.
+        changed: Settings of params.yaml that have changed since a run identified the band, in
+            words.
     """
 
     intervals: dict[str, Interval] = field(default_factory=dict, repr=False)
     samples: np.ndarray | None = field(default=None, repr=False, compare=False)
     settled: bool = False
     stretch: float | None = None
+    changed: tuple[str, ...] = field(default=(), repr=False)
 
     def save(self, path: str | Path) -> None:
         """Write all of it as one JSON file, settings included."""
@@ -136,6 +141,7 @@ class Identification(Model):
             samples=load_samples(layout.confidence(band, method)),
             settled=bool(told and told["settled"]),
             stretch=_stretch(episodes, settings, about),
+            changed=tuple(map(str, changed_since(settings, content, method))),
         )
 
 
@@ -207,7 +213,7 @@ def identify(
         episodes,
         evaluate,
         start=point,
-        observed=launches,
+        evidence=Evidence(launches, LaunchSetup.of(settings.setup, settings.sling)),
         workers=workers() or cores(),
         progress=progress,
     ).density
@@ -227,13 +233,13 @@ def identify(
     )
 
 
-def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> Sling:
-    sling = Sling.of(band, settings.setup, settings.sling, mounting and mounting.model_dump())
-    return replace(sling, law=settings.methods[METHOD].law)
+def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> ClampedBand:
+    law = settings.methods[METHOD].law
+    return ClampedBand.of(band, settings.setup, settings.sling, mounting, law=law)
 
 
 def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
-    sling = Sling.of(band, settings.setup, settings.sling, as_rod=True)
+    sling = ClampedBand.of(band, settings.setup, settings.sling, as_rod=True)
     found = calibrate_clamps(
         sling,
         episode,
@@ -243,7 +249,7 @@ def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
     return Mounting.model_validate(found)
 
 
-def _evaluator(episode: Episode, sling: Sling, settings: Settings) -> Evaluator:
+def _evaluator(episode: Episode, sling: ClampedBand, settings: Settings) -> Evaluator:
     space = Space.of_method(settings, METHOD)
     loss = EpisodeLoss.of(settings, METHOD, episode, sling)
     return Evaluator(episode, sling, loss, space, devices=devices(), workers=workers())
@@ -253,15 +259,12 @@ def _intervals(content: dict, told: dict) -> dict[str, Interval]:
     """Of a θ file's content and its confidence."""
     found = {}
     for name, one in told["parameters"].items():
-        value, unit = content["theta"][name], UNITS.get(name, "")
+        value, unit = content["theta"][name], SI_UNITS.get(name, "")
         found[name] = Interval(value, one["low"], one["high"], one["identifiable"], unit)
     for name, one in told["derived"].items():
         value, low, high = (float(one[key]) for key in ("value", "low", "high"))
         found[name] = Interval(value, low, high, True, one["unit"])
     return found
-
-
-UNITS = {"youngs_modulus": "Pa", "elasticity_damping": "s"}
 
 
 def _stretch(episodes: Sequence[Episode], settings: Settings, band) -> float | None:

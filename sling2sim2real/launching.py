@@ -135,7 +135,7 @@ def aim(model: Model, target: float) -> Aim:
     samples = getattr(model, "samples", None)
     error = model.settings.trials.actuation_error
     low, high = landing_intervals(model.launches, draw, samples, error)[0].tolist()
-    interval, history = ((low, high) if low == low else None), model.sling.history
+    interval, history = ((low, high) if low == low else None), model.launch_setup.history
     return Aim(
         target=float(target),
         draw=found.draw,
@@ -209,3 +209,5 @@ def _warnings(
             f"the draw stretches the band by {100 * (asked - 1):.1f} %, its recordings by"
             f" {100 * (known - 1):.1f} % at most: force and landing are extrapolated"
         )
+    for change in getattr(model, "changed", ()):
+        yield f"params.yaml: {change}, since θ was identified"

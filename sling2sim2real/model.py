@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from pipeline.params.identification import LAWS
 from pipeline.simulator.launch import Launches
 from pipeline.simulator.launch import launch as launch_many
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 from sling2sim2real.settings import Settings
 
@@ -177,10 +177,15 @@ class Model:
         known(self.settings, self.band)
 
     @cached_property
-    def sling(self) -> Sling:
+    def sling(self) -> ClampedBand:
         """What the simulator takes, with all that θ says beside the five."""
         sling, _ = self.at(self.theta.point[None])
         return sling
+
+    @cached_property
+    def launch_setup(self) -> LaunchSetup:
+        """How it is launched."""
+        return LaunchSetup.of(self.settings.setup, self.settings.sling, self._history())
 
     @cached_property
     def landing_map(self) -> LandingMap:
@@ -203,14 +208,12 @@ class Model:
         draws = np.atleast_2d(np.asarray(draws, float))
         points = self.theta.point[None] if points is None else points
         sling, five = self.at(np.broadcast_to(points, (len(draws), points.shape[-1])))
-        return launch_many(sling, five, draws, workers=cores())
+        return launch_many(sling, self.launch_setup, five, draws, workers=cores())
 
-    def at(self, points: np.ndarray) -> tuple[Sling, np.ndarray]:
-        """Sling and the five (N, 5) of points (N, P)."""
-        mounting = self.mounting and self.mounting.model_dump()
-        sling = Sling.of(self.band, self.settings.setup, self.settings.sling, mounting)
-        sling = replace(sling, law=self.theta.law, history=self._history())
-        return at_points(sling, points)
+    def at(self, points: np.ndarray) -> tuple[ClampedBand, np.ndarray]:
+        """The band and the five (N, 5) of points (N, P)."""
+        lab = self.settings.setup, self.settings.sling
+        return at_points(ClampedBand.of(self.band, *lab, self.mounting, law=self.theta.law), points)
 
     def _history(self) -> LaunchHistory | None:
         told = dict(vars(self.history)) if self.history else {}

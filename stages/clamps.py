@@ -13,14 +13,14 @@ from pipeline.base.machine import cores
 from pipeline.identify.clamps import calibrate_clamps
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.session import load_episode
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from stages.start import run, started
 
 
 def main() -> None:
     params, band = started("band")
     # with the rod, whatever simulates afterwards: a solid mesh has no rigidity to fit
-    sling = Sling.of(params.bands[band], params.setup, params.sling, as_rod=True)
+    sling = ClampedBand.of(params.bands[band], params.setup, params.sling, as_rod=True)
     content = calibrate_clamps(
         sling,
         load_episode(band),

@@ -18,15 +18,14 @@ from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import TERMS, EpisodeLoss
 from pipeline.identify.objective.space import Space
 from pipeline.identify.posterior import identify as posterior
-from pipeline.identify.posterior.launches import Observed
+from pipeline.identify.posterior.launches import Evidence, Observed
 from pipeline.identify.results.theta import EXTRA, at_points
 from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params.identification import LAWS
 from pipeline.simulator.launch import launch
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import Sling
-from tests.identify.objective.own_law import disturbed, own_law_episode
-from validation.synthetic import pull_and_release
+from pipeline.simulator.model import ClampedBand, LaunchSetup
+from validation.synthetic import disturbed, own_law_episode, pull_and_release
 
 WORKERS = cores()
 FLAWS = {
@@ -42,22 +41,30 @@ class Calibrated:
     """A method's θ of a band, and its simulator.
 
     Attributes:
+        sling, setup: As it is launched.
         point, samples: As `at_points` has them, (P,) and (S, P) or None.
     """
 
-    def __init__(self, sling: Sling, point: np.ndarray, samples: np.ndarray | None) -> None:
-        self.sling, self.point, self.samples = sling, point, samples
+    def __init__(
+        self,
+        sling: ClampedBand,
+        setup: LaunchSetup,
+        point: np.ndarray,
+        samples: np.ndarray | None = None,
+    ) -> None:
+        self.sling, self.setup, self.point, self.samples = sling, setup, point, samples
 
     def __call__(self, draws: np.ndarray, points: np.ndarray | None = None):
         """Launches of draws (N, 2) with θ, or with points (N, P)."""
         points = self.point[None] if points is None else points
-        return launch(*at_points(self.sling, points), draws, workers=WORKERS)
+        sling, theta = at_points(self.sling, points)
+        return launch(sling, self.setup, theta, draws, workers=WORKERS)
 
 
 def found(
     params,
     method: str,
-    sling: Sling,
+    sling: ClampedBand,
     episodes: Sequence[Episode],
     observed: Sequence[Observed] = (),
     devices: Sequence[str] = ("cpu",),
@@ -70,15 +77,19 @@ def found(
     space = Space.of_method(params, method)
     loss = EpisodeLoss.of(params, method, episodes[0], sling)
     evaluate = Evaluator(episodes[0], sling, loss, space, workers=WORKERS, devices=devices)
-    given = {"observed": observed, "workers": WORKERS}
-    identified = identify(params, method, sling, episodes, evaluate, **given)
-    density, launched = identified.density, posterior.launched(sling, episodes[0])
+    history = posterior.recorded_history(sling, episodes[0])
+    setup = LaunchSetup.of(params.setup, params.sling, history)
+    evidence = Evidence(observed, setup)
+    identified = identify(
+        params, method, sling, episodes, evaluate, evidence=evidence, workers=WORKERS
+    )
+    density = identified.density
     if density is None:
         best = identified.evaluations.best()
         told = {"loss": {name: best[name] for name in (*TERMS, "total")}}
-        return Calibrated(launched, identified.point, None), told
+        return Calibrated(sling, setup, identified.point), told
     told = posterior.confidence(density, params.parameters)
-    return Calibrated(launched, identified.point, density.points), told
+    return Calibrated(sling, setup, identified.point, density.points), told
 
 
 def own_law(params, method: str, number: int) -> dict:
@@ -94,7 +105,7 @@ def own_law(params, method: str, number: int) -> dict:
     rng = np.random.default_rng([19, number])
     band = next(iter(params.bands))
     about = params.methods[method]
-    sling = replace(Sling.of(params.bands[band], params.setup, params.sling), law=about.law)
+    sling = ClampedBand.of(params.bands[band], params.setup, params.sling, law=about.law)
     coordinates = posterior.Coordinates.of_method(params, method, sling)
     true = coordinates.expected.copy()
     true[0] = rng.uniform(*np.log([1.5e5, 4.5e5]))
@@ -116,7 +127,7 @@ def own_law(params, method: str, number: int) -> dict:
     outcome, told = found(params, method, sling, [episode])
     draw = np.array([[rng.uniform(-0.36, -0.30), rng.uniform(-0.18, -0.12)]])
     off = rng.normal(0, params.trials.actuation_error, 2)
-    landed = launch(*at_points(outcome.sling, point), draw + off)
+    landed = outcome(draw + off, point)
     low, high = landing_intervals(outcome, draw, outcome.samples, params.trials.actuation_error)[0]
     found_at = coordinates.of(outcome.point[: -len(EXTRA)])
     return {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from scipy.optimize import brentq
@@ -103,7 +104,8 @@ class Held:
 
     def reach(self, value: Callable[[np.ndarray], float], limit: float, drawn: np.ndarray) -> float:
         """Share of the way to `drawn` (3,) at which a value that grows along it meets a limit."""
-        return brentq(lambda part: value(part * drawn) - limit, 1e-6, 1.0)
+        part = brentq(lambda part: value(part * drawn) - limit, 1e-6, 1.0)
+        return cast(float, part)
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ def predict(
     stretch = held.stretch(drawn)
     if theta is not None:
         return Prediction(_simulated(params, band, drawn, theta), f"simulated with {theta}")
-    if earlier is not None and earlier.force is not None:
+    if earlier and earlier.force is not None and earlier.drawn is not None:
         was = held.stretch(earlier.drawn)
         if was <= 1:
             raise UserError(
@@ -151,14 +153,13 @@ def predict(
 
 
 def _simulated(params: Params, band: str, drawn: np.ndarray, path: Path) -> float:
-    from pipeline.identify.results.theta import calibrated, load_theta, vector
+    from pipeline.identify.results.theta import calibrated, launch_setup, load_theta, vector
     from pipeline.simulator.launch import launch
 
     content = load_theta(path, band)
     tell(of_mounting(band, Path()))
-    force = float(
-        launch(calibrated(params, band, content), vector(content), drawn[1:]).hold_force[0]
-    )
+    sling, setup = calibrated(params, band, content), launch_setup(params, content)
+    force = float(launch(sling, setup, vector(content), drawn[1:]).hold_force[0])
     if not np.isfinite(force):
         raise UserError(
             f"{path}: the simulated hold of draw [{drawn[1]:g}, {drawn[2]:g}] does not converge:"

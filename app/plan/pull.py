@@ -6,6 +6,7 @@ For several pulls in one recording the hand returns to where it began and does i
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import numpy as np
 from scipy.optimize import brentq
@@ -29,7 +30,9 @@ def catenary_sag(length: float, width: float) -> float:
     if ratio <= 1:
         raise ValueError(f"a string of {length} m does not reach across {width} m")
     high = math.sqrt(6 * (ratio - 1))  # since sinh(u) / u > 1 + u^2 / 6
-    u = brentq(lambda u: math.sinh(u) / u - ratio, 1e-9 * high, high) if high > 1e-4 else high
+    u = high
+    if high > 1e-4:
+        u = cast(float, brentq(lambda u: math.sinh(u) / u - ratio, 1e-9 * high, high))
     return width / (2 * u) * (math.cosh(u) - 1)
 
 

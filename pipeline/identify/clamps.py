@@ -19,7 +19,7 @@ from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.episode.phases import taut_time
 from pipeline.simulator.interaction import interact
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 
 ANGLE = (-30.0, 60.0)  # of the clamps, towards the middle of the fork [deg]
 RIGIDITY = (0.1, 20.0)  # relative to a solid round band
@@ -49,7 +49,7 @@ def slack_part(episode: Episode) -> Episode:
     )
 
 
-def nominal_young(sling: Sling, episode: Episode) -> float:
+def nominal_young(sling: ClampedBand, episode: Episode) -> float:
     """Young's modulus of the neo-Hookean string that holds the recorded force [Pa].
 
     Median over the last half second before the release; nearly incompressible, so that the tension
@@ -73,7 +73,7 @@ def nominal_young(sling: Sling, episode: Episode) -> float:
     return float(3 * tension / (sling.area * (stretch - stretch**-2)))
 
 
-def calibrate_clamps(sling: Sling, episode: Episode, make_loss, *, workers: int) -> dict:
+def calibrate_clamps(sling: ClampedBand, episode: Episode, make_loss, *, workers: int) -> dict:
     """Fit the clamps' angle and the flexural rigidity to the slack part of an episode.
 
     Args:

@@ -14,11 +14,11 @@ from pipeline.identify.posterior.identify import Identified, confidence, theta_e
 from pipeline.identify.search.history import History
 from pipeline.params import Params
 from pipeline.params.identification import LEAST_SQUARES
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 
 
 def evaluated_mode(
-    params: Params, method: str, sling: Sling, episode: Episode, density: Identified
+    params: Params, method: str, sling: ClampedBand, episode: Episode, density: Identified
 ) -> History:
     """The mode's loss, one row of the phase `least_squares`."""
     entries, space = theta_entries(density), Space.of_method(params, method)

@@ -14,13 +14,13 @@ from pipeline.episode.episode import Episode
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.optimizers.cma.refine import refine
 from pipeline.identify.posterior.identify import Identified, fit_posterior
-from pipeline.identify.posterior.launches import Observed
+from pipeline.identify.posterior.launches import Evidence
 from pipeline.identify.search.explore import explore
 from pipeline.identify.search.history import History
 from pipeline.identify.search.regions import regions_of
 from pipeline.params import Params
 from pipeline.params.identification import LEAST_SQUARES
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 
 
 @dataclass(frozen=True)
@@ -64,12 +64,12 @@ def evaluations_of(
 def identify(
     params: Params,
     method: str,
-    sling: Sling,
+    sling: ClampedBand,
     episodes: Sequence[Episode],
     evaluate: Callable[[np.ndarray], Evaluation] | None = None,
     *,
     start: np.ndarray | None = None,
-    observed: Sequence[Observed] = (),
+    evidence: Evidence | None = None,
     workers: int | None = None,
     progress: Callable[[str], None] = lambda line: None,
 ) -> IdentifiedBand:
@@ -79,7 +79,7 @@ def identify(
         sling: Of the band, with the method's law and clamps.
         evaluate: Losses of points of the whole unit cube, shape (N, D), for the search.
         start: A point (P,) to fit the density from, without any search.
-        observed: Launches that are evidence.
+        evidence: Launches, of methods that search by least squares.
         workers: Threads of the fit; they change no result.
         progress: Called with a line after the exploration and at each step of the fit.
 
@@ -98,7 +98,7 @@ def identify(
         sling,
         episodes,
         evaluations.best_point() if start is None else start,
-        observed=observed,
+        evidence=evidence,
         workers=workers,
         progress=lambda fit: progress(f"expansion {fit.steps}: misfit {fit.misfit:.2f}"),
     )

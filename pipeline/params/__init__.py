@@ -6,6 +6,7 @@ enough for any lab. Every violation is a UserError of one line that names the ke
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -146,7 +147,7 @@ class Params(Section):
         return self
 
 
-def _expect_all(names, known, key: str) -> None:
+def _expect_all(names: Iterable[str], known: Collection[str], key: str) -> None:
     for name in names:
         if name not in known:
             raise refusal(f"{key}: {name} is not one of {', '.join(known)}")

@@ -12,9 +12,10 @@ from pipeline.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
 from pipeline.params.lab import StepParams
 
 Step = Annotated[float, Range(1e-5, 0.05)]
-Bound = TypeVar("Bound")
+Bound = TypeVar("Bound", bound=float)
 KTop = Annotated[int, Range(1, 50)]
-LAWS = {  # of the band's material: what each has beside the five, and how far its box may reach
+# Of the band's material: what each has beside the five, and how far its box may reach.
+LAWS: dict[str, dict[str, tuple[float, float]]] = {
     "neo_hookean": {},
     "rubber": {"mooney_share": (-1.0, 1.0), "relaxation": (0.0, 0.2)},
 }
@@ -161,7 +162,7 @@ Bounds = Annotated[tuple[Value, Value], LIST]
 class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
-    law: Literal[tuple(LAWS)]
+    law: Literal["neo_hookean", "rubber"]  # of LAWS
     search: Annotated[str, AfterValidator(_is_search)]
     engine: Annotated[str, AfterValidator(_is_engine)]
     settings: dict[str, Setting]

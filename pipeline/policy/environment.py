@@ -45,7 +45,7 @@ class SlingshotEnv(VecEnv):
         reward: Reward,
         seed: int,
         projectile: tuple[float, float] | None = None,
-    ):
+    ) -> None:
         """Set targets.
 
         Args:

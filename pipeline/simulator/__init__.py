@@ -3,6 +3,6 @@
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.launch import Launches, launch
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand, LaunchSetup
 
-__all__ = ["THETA", "Launches", "Rollouts", "Sling", "interact", "launch"]
+__all__ = ["THETA", "ClampedBand", "LaunchSetup", "Launches", "Rollouts", "interact", "launch"]

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.simulator import tetrahedra
-from pipeline.simulator.model import ROD, Sling
+from pipeline.simulator.model import ROD, ClampedBand
 
 
-def clamp_tangents(sling: Sling) -> np.ndarray:
+def clamp_tangents(sling: ClampedBand) -> np.ndarray:
     """Unit tangents of the band in the first and the last clamp, shape (2, 3)."""
     first = sling.clamp_direction
     return np.array([first, [first[0], -first[1], -first[2]]])
 
 
-def fixed_frames(sling: Sling) -> np.ndarray:
+def fixed_frames(sling: ClampedBand) -> np.ndarray:
     """Directors a, b in the first clamp, the last and the fingers, shape (3, 2, 3).
 
     a x b points along the band; the fingers hold it along the fork.
@@ -41,7 +41,9 @@ def _transport(normal: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.nda
     return normal + turned + np.cross(axis, turned) / np.maximum(1 + cosine, 1e-6)
 
 
-def _directors(sling: Sling, end: int, direction: np.ndarray, stretch: np.ndarray) -> np.ndarray:
+def _directors(
+    sling: ClampedBand, end: int, direction: np.ndarray, stretch: np.ndarray
+) -> np.ndarray:
     """Directors (..., 6) of edges along unit `direction` (..., 3), turned from a clamp's frame.
 
     A stretched edge thins, its volume the same.
@@ -51,7 +53,7 @@ def _directors(sling: Sling, end: int, direction: np.ndarray, stretch: np.ndarra
     return both * stretch[..., None] ** -0.5
 
 
-def sections_of(sling: Sling, nodes: np.ndarray) -> np.ndarray:
+def sections_of(sling: ClampedBand, nodes: np.ndarray) -> np.ndarray:
     """Cross-sections (..., L, dofs) of bands through `nodes` (..., L, 3)."""
     state = np.zeros((*nodes.shape[:-1], 9))
     state[..., :3] = nodes
@@ -64,7 +66,7 @@ def sections_of(sling: Sling, nodes: np.ndarray) -> np.ndarray:
     return _meshed(sling, state)
 
 
-def _meshed(sling: Sling, rod: np.ndarray) -> np.ndarray:
+def _meshed(sling: ClampedBand, rod: np.ndarray) -> np.ndarray:
     """Cross-sections of the sling's mesh for a rod's (..., L, 9), whose directors are edges'."""
     if sling.mesh == ROD:
         return rod
@@ -75,7 +77,7 @@ def _meshed(sling: Sling, rod: np.ndarray) -> np.ndarray:
     return tetrahedra.sections(rod[..., :3], directors, sling.radius)
 
 
-def hanging_guess(sling: Sling) -> np.ndarray:
+def hanging_guess(sling: ClampedBand) -> np.ndarray:
     """A U below the tips: two legs and a half circle, shape (sections, dofs)."""
     half, length = sling.half_width, sling.rest_length
     leg = max((length - np.pi * half) / 2, 0.0)
@@ -88,7 +90,7 @@ def hanging_guess(sling: Sling) -> np.ndarray:
     return sections_of(sling, nodes)
 
 
-def drawn_guess(sling: Sling, draws: np.ndarray) -> np.ndarray:
+def drawn_guess(sling: ClampedBand, draws: np.ndarray) -> np.ndarray:
     """Two straight halves from the tips to each draw (N, 2), shape (N, sections, dofs)."""
     middle = np.column_stack([np.zeros(len(draws)), draws])
     part = (sling.arc / sling.arc[sling.middle])[: sling.middle + 1, None]

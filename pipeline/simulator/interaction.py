@@ -11,7 +11,7 @@ from scipy.ndimage import maximum_filter1d
 
 from pipeline.base.errors import UserError
 from pipeline.simulator.initial import hanging_guess
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.records import Grip, Outcome
 from pipeline.simulator.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.simulator.solver import Frames, Options, Slings, run
@@ -49,7 +49,7 @@ class Rollouts:
     iterations: np.ndarray | None = None
 
 
-def schedule_of(sling: Sling, episode: Episode, refine: int = 1) -> Schedule:
+def schedule_of(sling: ClampedBand, episode: Episode, refine: int = 1) -> Schedule:
     """Steps of one episode; the same for every theta.
 
     At the episode's release time the band begins to slip between the opening fingers: the force
@@ -108,7 +108,7 @@ def _within(time: np.ndarray, episode: Episode) -> np.ndarray:
     return np.clip(time, episode.time[0], episode.time[-1])
 
 
-def _lead(rows: np.ndarray, hand: CubicSpline, sling: Sling, episode: Episode) -> None:
+def _lead(rows: np.ndarray, hand: CubicSpline, sling: ClampedBand, episode: Episode) -> None:
     """Say of steps where the hand is, and with what force its pads hold the band."""
     time, opening = rows["time"], rows["grip"] == Grip.OPENING
     rows["grip_force"][rows["grip"] == Grip.HELD] = sling.grip_force
@@ -120,7 +120,7 @@ def _lead(rows: np.ndarray, hand: CubicSpline, sling: Sling, episode: Episode) -
 
 
 def interact(
-    sling: Sling,
+    sling: ClampedBand,
     episode: Episode,
     thetas: np.ndarray,
     *,

@@ -10,13 +10,14 @@ import numpy as np
 
 from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK, too_strong
 from pipeline.simulator.initial import drawn_guess
-from pipeline.simulator.model import GRAVITY, Sling
+from pipeline.simulator.model import GRAVITY, ClampedBand, LaunchHistory, LaunchSetup
 from pipeline.simulator.records import Grip, Outcome
-from pipeline.simulator.rubber import unrelaxed
+from pipeline.simulator.rubber import RUBBER, TIMES, overstress, uniaxial
 from pipeline.simulator.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.simulator.solver import Options, Slings, run
 
 SHARE = 1024  # launches: a device more for fewer would only cost its start
+HISTORY_STEPS = 200  # of a pull
 
 
 @dataclass(frozen=True)
@@ -49,21 +50,38 @@ def ballistic_landing(y, z, vy, vz, floor: float):
     return y + vy * flight
 
 
-def schedule_of(sling: Sling, refine: int = 1) -> Schedule:
+def schedule_of(setup: LaunchSetup, refine: int = 1) -> Schedule:
     """Relax at the draw, where the arm gives way; then recoil in second-order steps."""
     relax = relaxation(Grip.POUCH)
     relax["blend"] = 1.0
-    if sling.arm_stiffness is not None:
-        relax["compliance"][relax["bending"] == 1] = 1 / sling.arm_stiffness
-    h = sling.steps.launch_step / refine
-    count = int(round(sling.steps.launch_time / h))
+    if setup.arm_stiffness is not None:
+        relax["compliance"][relax["bending"] == 1] = 1 / setup.arm_stiffness
+    h = setup.step / refine
+    count = int(round(setup.duration / h))
     first = steps([0.0, h], h, grip=Grip.FREE)
     rest = steps(h * np.arange(1, count + 1), h, grip=Grip.FREE, order=2)
     return Schedule(np.concatenate([relax, first, rest]), first_free=RELAX_STEPS)
 
 
+def unrelaxed(band: ClampedBand, history: LaunchHistory | None, draws: np.ndarray) -> np.ndarray:
+    """What share of a drawn band's stress at rest its branches carry besides, shape (N, 8).
+
+    Of draws (N, 2) by a history, the band's halves taken as straight and, while they are slack, as
+    unstretched. A band that is not stretched there carries nothing.
+    """
+    if band.law != RUBBER or history is None:
+        return np.zeros((len(draws), len(TIMES)))
+    part = np.linspace(0, 1, HISTORY_STEPS + 1)
+    drawn = np.linalg.norm(draws, axis=1)[:, None] * (part**2 * (3 - 2 * part))
+    stretch = np.maximum(2 * np.hypot(band.half_width, drawn) / band.rest_length, 1.0)
+    stress = uniaxial(stretch, np.reshape(band.mooney_share, (-1, 1)))
+    carried = overstress(stress, history.pull_time / HISTORY_STEPS)
+    return carried * np.exp(-history.pause / TIMES) / np.maximum(stress[:, -1:], 1e-9)
+
+
 def launch(
-    sling: Sling,
+    band: ClampedBand,
+    setup: LaunchSetup,
     thetas: np.ndarray,
     draws: np.ndarray,
     *,
@@ -79,7 +97,7 @@ def launch(
         max_force: A draw that takes more is a failed launch [N].
         device: Or several of one kind, which share a large batch evenly.
         workers: Threads, on the CPU; results depend on them as little as on the devices' number.
-        refine: How many times finer the steps are than `sling.launch_step`.
+        refine: How many times finer the steps are than `setup.step`.
     """
     thetas, draws = np.atleast_2d(thetas).astype(float), np.atleast_2d(draws).astype(float)
     count = max(len(thetas), len(draws))
@@ -87,41 +105,43 @@ def launch(
     distance = np.linalg.norm(draws, axis=1, keepdims=True)
     direction = np.column_stack([np.zeros(count), -draws / np.maximum(distance, 1e-9)])
     slings = Slings.of(
-        sling, thetas, drawn_guess(sling, draws),
-        direction=direction, payload=sling.projectile_mass, unrelaxed=unrelaxed(sling, draws),
+        band, thetas, drawn_guess(band, draws), direction=direction,
+        payload=setup.projectile_mass, unrelaxed=unrelaxed(band, setup.history, draws),
     )  # fmt: skip
-    schedule = schedule_of(sling, refine)
+    schedule = schedule_of(setup, refine)
 
     def launched(place: str, share: np.ndarray) -> np.ndarray:
         options = Options(place, workers, launching=True, double=double)
-        return run(sling, schedule, slings[share], options=options).lanes
+        return run(band, schedule, slings[share], options=options).lanes
 
     devices = [device] if isinstance(device, str) else device[: max(count // SHARE, 1)]
     shares = np.array_split(np.arange(count), len(devices))
     with ThreadPoolExecutor(len(devices)) as pool:
         lanes = np.concatenate(list(pool.map(launched, devices, shares)))
-    return _outcomes(sling, lanes, draws, max_force)
+    return outcomes(band, setup, lanes, draws, max_force)
 
 
-def _outcomes(sling: Sling, lanes: np.ndarray, draws: np.ndarray, max_force: float) -> Launches:
+def outcomes(
+    band: ClampedBand, setup: LaunchSetup, lanes: np.ndarray, draws: np.ndarray, max_force: float
+) -> Launches:
     """Of launches from draws (N, 2), by the slings' records (N,) of records.LANE."""
     outcome = np.round(lanes["outcome"])
     hold_force = np.linalg.norm(lanes["hold_force"], axis=1)
     hold_force[outcome > 0] = np.nan
     time, y, z, vy, vz = lanes["separation"].T
-    vy, vz = np.sqrt(sling.returned_share) * np.stack([vy, vz])
-    floor = -sling.fork_height
+    vy, vz = np.sqrt(band.returned_share) * np.stack([vy, vz])
+    floor = -setup.fork_height
     landing = ballistic_landing(y, z, vy, vz, floor)
 
     failure = np.full(len(lanes), None, object)
     failure[~(landing > 0)] = SHORT
-    plane = floor + sling.foot_height
+    plane = floor + setup.foot_height
     foot = np.where(z <= plane, y, ballistic_landing(y, z, vy, vz, plane))
     failure[(landing > 0) & (foot < 0)] = FOOT
     failure[outcome != Outcome.SEPARATED] = NEVER_LEFT
     failure[(lanes["lowest"] <= floor) | ((outcome == Outcome.SEPARATED) & (z <= floor))] = DRAGGED
-    half = np.hypot(sling.half_width, np.linalg.norm(draws, axis=1))
-    failure[half <= sling.rest_length / 2] = SLACK
+    half = np.hypot(band.half_width, np.linalg.norm(draws, axis=1))
+    failure[half <= band.rest_length / 2] = SLACK
     for i in np.flatnonzero(hold_force > max_force):
         failure[i] = too_strong(hold_force[i], max_force)
     failure[~np.isfinite(hold_force)] = "the simulation did not converge"

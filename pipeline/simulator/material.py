@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.records import MATERIAL
 
 THETA = (
@@ -22,7 +22,7 @@ THETA = (
 LEAST_SCALE = 0.0075  # without any damping of shape waves ring on for ever, and no step holds them
 
 
-def material(sling: Sling, thetas: np.ndarray) -> np.ndarray:
+def material(sling: ClampedBand, thetas: np.ndarray) -> np.ndarray:
     """Coefficients of the law, records (N,) of records.MATERIAL, for physical thetas (N, 5).
 
     mu is the shear modulus and lam the volume modulus of the stable neo-Hookean law without its

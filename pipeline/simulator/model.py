@@ -1,17 +1,35 @@
-"""What is simulated: the geometry of a band clamped at the fork's tips, and its resolution."""
+"""What is simulated: a band clamped at the fork's tips, its resolution, and how it is launched."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
+from pipeline.params.identification import SlingParams
+from pipeline.params.lab import SetupParams
 from pipeline.simulator import tetrahedra
 from pipeline.simulator.rubber import NEO_HOOKEAN
 
 GRAVITY = 9.81
 CYLINDER_DRAG = 1.1  # across the wind, at Reynolds numbers of 1e3 to 1e4 (Wieselsberger 1921)
 ROD, TETRAHEDRA = "rod", "tetrahedra"  # meshes: rod.h, tetrahedra.h
+
+
+class BandSizes(Protocol):
+    """What a scale and a ruler say of a band: mass between the clamps, diameter, length [kg, m]."""
+
+    mass: float
+    diameter: float
+    rest_length: float
+
+
+class ClampValues(Protocol):
+    """How a band leaves its clamps, a unit vector, and its flexural rigidity [N m^2]."""
+
+    clamp_direction: tuple[float, float, float]
+    flexural_rigidity: float
 
 
 @dataclass(frozen=True)
@@ -28,23 +46,58 @@ class LaunchHistory:
 
 
 @dataclass(frozen=True)
-class Sling:
+class LaunchSetup:
+    """What a launch has that a recorded pull has not: projectile, arm, floor, and its steps.
+
+    Attributes:
+        projectile_mass: In the pouch [kg].
+        fork_height: Of the tips above the floor [m].
+        foot_height: Of what joins the fork's rods on the floor, which a projectile may hit [m].
+        arm_stiffness: Of the arm that holds a band to launch it [N/m], which is sent to the draw
+            and rests where its spring holds the band; None: it does not give way.
+        step, duration: Length of a step, and of the simulation from the release on [s].
+        history: Of a law with memory: how the band was drawn; None: it has forgotten all.
+    """
+
+    projectile_mass: float
+    fork_height: float
+    foot_height: float
+    arm_stiffness: float | None
+    step: float
+    duration: float
+    history: LaunchHistory | None = None
+
+    @classmethod
+    def of(
+        cls, setup: SetupParams, resolution: SlingParams, history: LaunchHistory | None = None
+    ) -> LaunchSetup:
+        """Make it from params.yaml's `setup` and `sling`."""
+        return cls(
+            projectile_mass=setup.projectile_mass,
+            fork_height=setup.fork_height,
+            foot_height=setup.foot_height,
+            arm_stiffness=setup.arm_stiffness,
+            step=resolution.launch_step,
+            duration=resolution.launch_time,
+            history=history,
+        )
+
+
+@dataclass(frozen=True)
+class ClampedBand:
     """Geometry and mass of a clamped band, and the resolution it is simulated with.
 
     Attributes:
         edges: Even number of edges along the band; the hand holds the cross-section in the middle.
         rest_length, radius, mass: Of the band between the clamps [m, m, kg].
         half_width: Half the distance of the fork's tips [m].
-        fork_height: Of the tips above the floor [m].
-        foot_height: Of what joins the fork's rods on the floor, which a projectile may hit [m].
         clamp_direction: Unit vector along which the band leaves the tip at -x, shape (3,); it
             leaves the other tip along the mirror image.
         flexural_rigidity: E I of the band where it was measured [N m^2], one or one a theta; None
             takes a solid round band's, which follows Young's modulus. Tetrahedra are solid and
             round: they bend as their mesh does, whatever was measured.
-        projectile_mass, grip_force, finger_opening_time: As in params.yaml `setup` [kg, N, s].
-        arm_stiffness: Of the arm that holds a band to launch it [N/m], which is sent to the draw
-            and rests where its spring holds the band; None: it does not give way.
+        grip_force, finger_opening_time: Of the fingers that hold the middle of a recorded band, as
+            in params.yaml `setup` [N, s].
         steps: The step sizes and the mesh's grading, as in params.yaml `sling`.
         clamped: Whether the first and the last end are held; experiments on a free band let go.
         clamp_twist: Of the last clamp about the band, against the first [rad].
@@ -61,7 +114,6 @@ class Sling:
         mooney_share: Of `rubber`: Mooney's second constant over the sum of both, one or one a
             theta. The shear modulus is that sum.
         relaxation: Of `rubber`: weight of each branch (rubber.py), one or one a theta.
-        history: Of `rubber`: what a band remembers that is launched; None: it has forgotten all.
         mesh: ROD, or TETRAHEDRA: a solid cylinder, whose edges are equally long. What of the band
             is inside the clamps does not deform there, so that the mesh ends at them.
     """
@@ -71,15 +123,11 @@ class Sling:
     radius: float
     mass: float
     half_width: float
-    fork_height: float
-    foot_height: float
     clamp_direction: np.ndarray
     flexural_rigidity: float | None
-    projectile_mass: float
     grip_force: float
     finger_opening_time: float
-    steps: object
-    arm_stiffness: float | None = None
+    steps: SlingParams
     clamped: tuple[bool, bool] = (True, True)
     clamp_twist: float = 0.0
     mesh: str = ROD
@@ -90,43 +138,45 @@ class Sling:
     law: str = NEO_HOOKEAN
     mooney_share: float | np.ndarray = 0.0
     relaxation: float | np.ndarray = 0.0
-    history: LaunchHistory | None = None
 
     @classmethod
     def of(
-        cls, band, setup, resolution, mounting: dict | None = None, *, as_rod: bool = False
-    ) -> Sling:
+        cls,
+        band: BandSizes,
+        setup: SetupParams,
+        resolution: SlingParams,
+        mounting: ClampValues | None = None,
+        *,
+        law: str = NEO_HOOKEAN,
+        as_rod: bool = False,
+    ) -> ClampedBand:
         """Make it from params.yaml's `bands.<band>`, `setup` and `sling`.
 
         Args:
-            mounting: What the slack band shows of itself (pipeline/identify/clamps.py):
-                `clamp_direction` and `flexural_rigidity`; without it, the setup's clamp direction
-                and a solid round band.
+            mounting: What the slack band shows of itself (pipeline/identify/clamps.py); without it,
+                the setup's clamp direction and a solid round band.
+            law: Of its material.
             as_rod: Whatever mesh the resolution asks for.
         """
-        mounting = mounting or {}
         mesh, edges = ROD, resolution.edges
         if not as_rod:
             mesh = resolution.mesh
             edges = {ROD: edges, TETRAHEDRA: resolution.tet_edges}[mesh]
-        direction = np.asarray(mounting.get("clamp_direction", setup.clamp_direction), float)
+        direction = np.asarray((mounting or setup).clamp_direction, float)
         return cls(
             edges=edges,
             rest_length=band.rest_length,
             radius=band.diameter / 2,
             mass=band.mass,
             half_width=setup.fork_width / 2,
-            fork_height=setup.fork_height,
-            foot_height=setup.foot_height,
             clamp_direction=direction / np.linalg.norm(direction),
-            flexural_rigidity=mounting.get("flexural_rigidity"),
-            projectile_mass=setup.projectile_mass,
+            flexural_rigidity=mounting and mounting.flexural_rigidity,
             grip_force=setup.grip_force,
             finger_opening_time=setup.finger_opening_time,
-            arm_stiffness=setup.arm_stiffness,
             air_density=setup.air_density,
             steps=resolution,
             mesh=mesh,
+            law=law,
         )
 
     @property

@@ -13,7 +13,6 @@ import numpy as np
 from pipeline.params.identification import LAWS
 
 NEO_HOOKEAN, RUBBER = LAWS
-HISTORY_STEPS = 200  # of a pull
 TIMES = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])  # of the branches [s]
 
 
@@ -34,22 +33,6 @@ def update(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def uniaxial(stretch: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Relaxed nominal stress over the shear modulus (Mooney 1940, Rivlin 1948), stretches >= 1."""
     return (stretch - stretch**-2) * (1 - share + share / stretch)
-
-
-def unrelaxed(sling, draws: np.ndarray) -> np.ndarray:
-    """What share of a drawn band's stress at rest its branches carry besides, shape (N, 8).
-
-    Of draws (N, 2) by the sling's history, its halves taken as straight and, while they are slack,
-    as unstretched. A band that is not stretched there carries nothing.
-    """
-    if sling.law != RUBBER or sling.history is None:
-        return np.zeros((len(draws), len(TIMES)))
-    part = np.linspace(0, 1, HISTORY_STEPS + 1)
-    drawn = np.linalg.norm(draws, axis=1)[:, None] * (part**2 * (3 - 2 * part))
-    stretch = np.maximum(2 * np.hypot(sling.half_width, drawn) / sling.rest_length, 1.0)
-    stress = uniaxial(stretch, np.reshape(sling.mooney_share, (-1, 1)))
-    carried = overstress(stress, sling.history.pull_time / HISTORY_STEPS)
-    return carried * np.exp(-sling.history.pause / TIMES) / np.maximum(stress[:, -1:], 1e-9)
 
 
 def overstress(stress: np.ndarray, step: float) -> np.ndarray:

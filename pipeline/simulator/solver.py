@@ -11,7 +11,7 @@ from pipeline.base.errors import UserError
 from pipeline.simulator import tetrahedra
 from pipeline.simulator.initial import fixed_frames
 from pipeline.simulator.material import material
-from pipeline.simulator.model import CYLINDER_DRAG, GRAVITY, TETRAHEDRA, Sling
+from pipeline.simulator.model import CYLINDER_DRAG, GRAVITY, TETRAHEDRA, ClampedBand
 from pipeline.simulator.records import LANE, OUTPUT, SETTING, numbers, records, width
 from pipeline.simulator.rubber import RUBBER, memories
 from pipeline.simulator.schedule import Schedule
@@ -36,7 +36,7 @@ class Slings:
     lanes: np.ndarray
 
     @classmethod
-    def of(cls, sling: Sling, thetas: np.ndarray, state: np.ndarray, **lanes) -> Slings:
+    def of(cls, sling: ClampedBand, thetas: np.ndarray, state: np.ndarray, **lanes) -> Slings:
         """With physical thetas (N, 5), at rest; `lanes` are fields of records.LANE, else 0."""
         records = np.zeros(len(thetas), LANE)
         for name, values in lanes.items():
@@ -112,7 +112,7 @@ class Stepped:
 
 
 def run(
-    sling: Sling,
+    sling: ClampedBand,
     schedule: Schedule,
     slings: Slings,
     frames: Frames | None = None,
@@ -146,7 +146,7 @@ def run(
     )
 
 
-def memory(sling: Sling, schedule: Schedule, n_frames: int, options: Options) -> int:
+def memory(sling: ClampedBand, schedule: Schedule, n_frames: int, options: Options) -> int:
     """Bytes that one rollout takes in single precision while it is simulated."""
     frames = Frames(np.zeros(n_frames, int), np.zeros(n_frames))
     return 4 * sum(_widths(sling, schedule, frames, options).values())
@@ -156,7 +156,9 @@ RETURNED = ("state", "lanes", "output", "frames")
 LONG = ("output", "frames")
 
 
-def _widths(sling: Sling, schedule: Schedule, frames: Frames, options: Options) -> dict[str, int]:
+def _widths(
+    sling: ClampedBand, schedule: Schedule, frames: Frames, options: Options
+) -> dict[str, int]:
     """Numbers that each array which a kernel writes holds of one sling."""
     kept = (2 * sling.dofs + 2) * sling.sections * (sling.dofs + 1)
     if options.on_gpu:  # by two chains, and for spare threads
@@ -179,7 +181,12 @@ class _Work:
     """
 
     def __init__(
-        self, sling: Sling, schedule: Schedule, slings: Slings, frames: Frames, options: Options
+        self,
+        sling: ClampedBand,
+        schedule: Schedule,
+        slings: Slings,
+        frames: Frames,
+        options: Options,
     ) -> None:
         from pipeline.simulator.kernel import sling_kernel
 
@@ -198,7 +205,7 @@ class _Work:
         }
         self.rows = len(self.given["state"])
 
-    def _common(self, sling: Sling, schedule: Schedule, frames: Frames) -> dict:
+    def _common(self, sling: ClampedBand, schedule: Schedule, frames: Frames) -> dict:
         """What all slings share."""
         mesh, setting = sling.edge_lengths, _setting(sling, self.options)
         if sling.mesh == TETRAHEDRA:
@@ -262,7 +269,7 @@ class _Work:
         return values.transpose(0, 2, 1).reshape(size * self.lanes, self.widths[name])
 
 
-def _setting(sling: Sling, options: Options) -> np.ndarray:
+def _setting(sling: ClampedBand, options: Options) -> np.ndarray:
     """A record of records.SETTING, shape (1,)."""
     result = np.zeros(1, SETTING)
     shortest = sling.edge_lengths.min()

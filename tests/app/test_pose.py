@@ -19,7 +19,7 @@ from pipeline.params import load
 from pipeline.recording.geometry import KeptGeometry, geometry_of
 from pipeline.recording.input.reader import read_recording
 from tests.project import ROOT, with_
-from tests.recording.bag import write_bag
+from validation.recordings.bag import write_bag
 
 pytestmark = pytest.mark.usefixtures("nowhere")
 

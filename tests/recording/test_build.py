@@ -13,7 +13,7 @@ from pipeline.recording.build import build_episodes, episode_of, process, proces
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.pulls import Pull
 from pipeline.recording.signals import signals_of
-from tests.recording.bag import EYE, Truth, blind_bag, edit, scores
+from validation.recordings.bag import EYE, Truth, blind_bag, edit, scores
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.pulls import Pull
 from pipeline.recording.tool_inertia import estimate_tool_inertia
-from tests.recording.bag import Truth
 from tests.recording.played import Played
+from validation.recordings.bag import Truth
 
 SLOW = Truth(grasp=0.9, lifted=1.4, drawn=2.8, release=3.4, end=4.6)
 INJECTED = (-0.02, 0.0, 0.005, 0.015)  # s

@@ -15,9 +15,9 @@ from pipeline.recording.input import reader
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.motion import Motion
 from pipeline.recording.pulls import Pull, pulls_of
-from tests.recording.bag import START, Truth, blind_bag, edit
 from tests.recording.conftest import written
 from tests.recording.joined import joined
+from validation.recordings.bag import START, Truth, blind_bag, edit
 
 DEEP, SHALLOW = Truth(), Truth(draw=0.26, release=3.1507)
 

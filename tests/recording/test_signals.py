@@ -13,8 +13,8 @@ from pipeline.base.errors import UserError
 from pipeline.recording.pulls import Pull
 from pipeline.recording.signals import ToolFacts, signals_of
 from pipeline.recording.tool_inertia import estimate_tool_inertia
-from tests.recording.bag import HAND, SENSOR, START, Truth
 from tests.recording.played import GRAVITY, Played, stream
+from validation.recordings.bag import HAND, SENSOR, START, Truth
 
 MASS = 0.73
 TOOL = (0.01, -0.02, 0.05)  # its centre of mass

@@ -11,11 +11,12 @@ from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.space import Space
 from pipeline.recording.build import build_episodes
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from rig.physics.world import string_of
 from rig.recorder.record import EPOCH
-from tests.identify.objective.own_law import own_law_episode, visible
-from tests.project import ROUGH, with_
+from tests.project import with_
+from validation.projects import ROUGH
+from validation.synthetic import own_law_episode, visible
 
 METHOD = "sling2sim2real"
 TRUTH = np.array([2.5e5, 0.45, 4e-3, 0.7, 0.6])
@@ -39,7 +40,7 @@ def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorde
     So what is left is the law: Ogden's with relaxation against neo-Hookean with damping.
     """
     path, happened = recorded
-    sling = Sling.of(quick.bands["band1"], quick.setup, quick.sling)
+    sling = ClampedBand.of(quick.bands["band1"], quick.setup, quick.sling)
     string, rng = string_of(quick, "band1"), np.random.default_rng(0)
     episode = build_episodes(path, "band1", quick)[0][0]
     start = 1e-9 * (episode.metadata["input"]["start_ns"] - EPOCH)

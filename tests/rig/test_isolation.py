@@ -8,7 +8,7 @@ from ruamel.yaml import YAML
 
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.recording.build import build_episodes
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from rig.recorder.interaction import Interaction
 from tests.project import ROOT
 
@@ -29,7 +29,7 @@ def test_an_episode_and_its_loss_are_made_without_the_world(coarse, recorded) ->
         blind.rig.seed  # noqa: B018
     band = blind.bands["band1"]
     episode = build_episodes(recorded[0], "band1", blind)[0][0]
-    sling = Sling.of(band, blind.setup, blind.sling)
+    sling = ClampedBand.of(band, blind.setup, blind.sling)
     EpisodeLoss.of(blind, "sling2sim2real", episode, sling)
 
 

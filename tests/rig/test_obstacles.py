@@ -9,8 +9,9 @@ import torch
 from app.aim import aim, why_refused
 from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK
 from pipeline.launching.surface.landing_map import LandingMap
+from pipeline.params import Params
 from pipeline.policy.environment import SlingshotEnv
-from pipeline.simulator import Sling, launch
+from pipeline.simulator import ClampedBand, LaunchSetup, launch
 from pipeline.simulator.material import THETA
 from rig.physics.launch import launch as on_the_rig
 from tests.policy.linear import write_policy
@@ -35,11 +36,15 @@ CASES = [
 ]
 
 
+def simulated_of(world: Params) -> tuple[ClampedBand, LaunchSetup]:
+    lab = world.setup, world.sling
+    return ClampedBand.of(world.bands["band1"], *lab), LaunchSetup.of(*lab)
+
+
 @pytest.mark.parametrize(("setup", "draw", "expected"), CASES)
 def test_rig_and_simulator_agree_on_what_happens(coarse, setup, draw, expected) -> None:
     world = with_(coarse, "setup", **setup)
-    sling = Sling.of(world.bands["band1"], world.setup, world.sling)
-    simulated = launch(sling, BAND, draw, max_force=world.setup.max_force)
+    simulated = launch(*simulated_of(world), BAND, draw, max_force=world.setup.max_force)
     truth = on_the_rig("band1", world, draw, None)
     assert np.isfinite(truth.landing_y) == (expected is None)
     assert np.isfinite(simulated.landing_y[0]) == (expected is None)
@@ -53,8 +58,8 @@ def test_rig_and_simulator_agree_on_what_happens(coarse, setup, draw, expected) 
 def low(params):
     """A fork of 10 cm and its launches."""
     world = with_(params, "setup", **LOW)
-    sling = Sling.of(world.bands["band1"], world.setup, world.sling)
-    return world, lambda draws, thetas=None: launch(sling, BAND, draws)
+    band, setup = simulated_of(world)
+    return world, lambda draws, thetas=None: launch(band, setup, BAND, draws)
 
 
 def test_training_has_no_reward_for_them(low) -> None:

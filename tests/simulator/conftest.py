@@ -7,14 +7,20 @@ import numpy as np
 import pytest
 
 from pipeline.episode.episode import Episode
-from pipeline.simulator import Sling
+from pipeline.simulator import ClampedBand, LaunchSetup
 from pipeline.simulator.model import TETRAHEDRA
 
 
 @pytest.fixture(scope="session")
 def sling(params):
     band = SimpleNamespace(mass=0.023, diameter=0.01, rest_length=0.52)
-    return replace(Sling.of(band, params.setup, params.sling), arm_stiffness=None)
+    return ClampedBand.of(band, params.setup, params.sling)
+
+
+@pytest.fixture(scope="session")
+def launch_setup(params):
+    """By an arm that does not give way."""
+    return replace(LaunchSetup.of(params.setup, params.sling), arm_stiffness=None)
 
 
 @pytest.fixture(scope="session")

@@ -18,7 +18,7 @@ from tests.simulator.bands import random_draws, random_thetas
 pytestmark = pytest.mark.skipif(not gpus(), reason="no CUDA device on this machine")
 
 
-RUBBER = {"mooney_share": 0.3, "relaxation": 0.02, "history": LaunchHistory(4.0, 2.0)}
+RUBBER = {"mooney_share": 0.3, "relaxation": 0.02}
 LAWS = {"neo_hookean": {}, "rubber": RUBBER}
 
 
@@ -41,12 +41,16 @@ def test_interaction_agrees_with_the_cpu(strong_grip, episode, law):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_launches_agree_with_the_cpu(sling, law):
+def test_launches_agree_with_the_cpu(sling, law, launch_setup):
     """Landing within 0.1 %, by an arm that gives way."""
-    sling = replace(sling, law=law, arm_stiffness=12000.0, **LAWS[law])
+    sling = replace(sling, law=law, **LAWS[law])
+    launch_setup = replace(launch_setup, arm_stiffness=12000.0, history=LaunchHistory(4.0, 2.0))
     draws = random_draws(64, np.random.default_rng(4))
     theta = [2.5e5, 0.45, 2e-3, 0.5, 1.0]
-    cpu, gpu = launch(sling, theta, draws), launch(sling, theta, draws, device="cuda:0")
+    cpu, gpu = (
+        launch(sling, launch_setup, theta, draws),
+        launch(sling, launch_setup, theta, draws, device="cuda:0"),
+    )
     assert cpu.failure == gpu.failure
     assert gpu.landing_y == pytest.approx(cpu.landing_y, rel=1e-3)
 
@@ -62,7 +66,9 @@ def test_what_stays_on_the_gpu_is_what_is_fetched(strong_grip, episode):
 
 
 @pytest.mark.skipif(len(gpus()) < 2, reason="fewer than two GPUs on this machine")
-def test_gpus_share_a_batch_and_change_nothing(strong_grip, sling, episode, monkeypatch):
+def test_gpus_share_a_batch_and_change_nothing(
+    strong_grip, sling, episode, monkeypatch, launch_setup
+):
     """Rollouts with their loss in shares of 34 and 33, and launches."""
     time = episode.cloud_time
     clouds = [np.random.default_rng(frame).normal(0, 0.1, (200, 3)) for frame in range(len(time))]
@@ -82,7 +88,9 @@ def test_gpus_share_a_batch_and_change_nothing(strong_grip, sling, episode, monk
 
     monkeypatch.setattr(import_module("pipeline.simulator.launch"), "SHARE", 1)
     thetas = space.to_physical(unit)
-    one, *others = (launch(sling, thetas, [-0.4, -0.2], device=team) for team in teams)
+    one, *others = (
+        launch(sling, launch_setup, thetas, [-0.4, -0.2], device=team) for team in teams
+    )
     for other in others:
         assert other.failure == one.failure
         np.testing.assert_array_equal(other.landing_y, one.landing_y)

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
-from pipeline.simulator.model import GRAVITY, ROD, TETRAHEDRA, Sling
+from pipeline.simulator.model import GRAVITY, ROD, TETRAHEDRA, ClampedBand
 from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import steps
 from tests.simulator.bands import along_x, stepped, vertex_masses
@@ -16,7 +16,7 @@ THETA = [3e5, 0.45, 2e-3, 0.5, 1.0]
 H, COUNT = 1e-3, 60
 
 
-def fallen(sling: Sling, drags: np.ndarray, payload=0.0, stretch=1.0) -> np.ndarray:
+def fallen(sling: ClampedBand, drags: np.ndarray, payload=0.0, stretch=1.0) -> np.ndarray:
     """How far the middle (of a mesh, the centre) of loose bands falls with each drag [1/s], (N,).
 
     Args:
@@ -45,7 +45,9 @@ def test_a_loose_band_falls_as_one_mass_in_the_wind(params):
     drags = np.array([0.0, 3.0, 40.0])
     for mesh in (ROD, TETRAHEDRA):  # contracting as it falls
         shape = params.sling.model_copy(update={"mesh": mesh})
-        found = fallen(Sling.of(params.bands["band1"], params.setup, shape), drags, stretch=1.3)
+        found = fallen(
+            ClampedBand.of(params.bands["band1"], params.setup, shape), drags, stretch=1.3
+        )
         assert found == pytest.approx([fall(drag) for drag in drags], rel=1e-5)
 
 
@@ -68,9 +70,9 @@ def test_drag_differs_by_rollout_and_slows_the_recoil(strong_grip, episode):
     assert moved[0] > 1.05 * moved[1] > 1.05**2 * moved[2]
 
 
-def test_drag_shortens_a_launch(sling):
+def test_drag_shortens_a_launch(sling, launch_setup):
     blown = replace(sling, air_drag=np.array([0.0, 3.0]))
-    still, slowed = launch(blown, [THETA, THETA], [-0.33, -0.17]).landing_y
+    still, slowed = launch(blown, launch_setup, [THETA, THETA], [-0.33, -0.17]).landing_y
     assert 0.93 < slowed / still < 0.995
 
 
@@ -94,8 +96,8 @@ def test_air_brakes_a_band_as_a_cylinder_across_the_wind_and_not_along_it(sling)
     assert drop == pytest.approx(GRAVITY * time**2 / 2, rel=5e-3)
 
 
-def test_air_takes_energy_from_a_recoil(sling):
+def test_air_takes_energy_from_a_recoil(sling, launch_setup):
     """Little: the projectile is heavier and slower than a band alone."""
-    far = [launch(replace(sling, air_density=rho), THETA, [-0.35, -0.15]).landing_y[0]
+    far = [launch(replace(sling, air_density=rho), launch_setup, THETA, [-0.35, -0.15]).landing_y[0]
            for rho in (0.0, 1.2, 2.4)]  # fmt: skip
     assert 0.99 * far[0] < far[2] < far[1] < 0.9999 * far[0]

@@ -1,6 +1,7 @@
 """The sling of a band: with the clamps that its recording showed, or without."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,9 +9,9 @@ import pytest
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
 from pipeline.identify.results.mounting import load_sling, sling_of_method
-from pipeline.identify.results.theta import calibrated, load_theta
+from pipeline.identify.results.theta import calibrated, launch_setup, load_theta
 from pipeline.params import load
-from pipeline.simulator.launch import launch
+from pipeline.simulator import ClampedBand, interact, launch
 from pipeline.simulator.material import THETA
 from tests.project import ROOT
 
@@ -41,12 +42,25 @@ def test_a_method_takes_what_the_recording_showed_or_leaves_it_out(root: Path) -
 
 def test_a_theta_file_says_so_and_its_launches_land_elsewhere(root: Path) -> None:
     content = {"band": "band1", "theta": VALUES}
-    landings = []
+    landings, setup = [], launch_setup(PARAMS, content)
     for mounted in ({}, {"mounted": True}, {"mounted": False}):
         path = root / "theta.json"
         write_json(path, content | mounted)
         sling = calibrated(PARAMS, "band1", load_theta(path, "band1"), root)
         assert (sling.flexural_rigidity is None) == (mounted == {"mounted": False})
-        landings.append(launch(sling, np.array([*VALUES.values()]), (-0.35, -0.2)).landing_y[0])
+        landings.append(
+            launch(sling, setup, np.array([*VALUES.values()]), (-0.35, -0.2)).landing_y[0]
+        )
     assert landings[0] == landings[1]
     assert 1e-3 < abs(landings[2] - landings[0]) < 0.5
+
+
+def test_a_recorded_pull_reads_no_launch_setting(episode) -> None:
+    launching = {"projectile_mass", "arm_stiffness", "fork_height", "foot_height"}
+    launching |= {"launch_step", "launch_time"}
+    setup, resolution = (
+        SimpleNamespace(**{name: value for name, value in one if name not in launching})
+        for one in (PARAMS.setup, PARAMS.sling)
+    )
+    band = ClampedBand.of(PARAMS.bands["band1"], setup, resolution)
+    assert interact(band, episode, np.array([*VALUES.values()])).failure == [None]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from pipeline.simulator.initial import drawn_guess
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.records import Grip
 from pipeline.simulator.rubber import RUBBER
 from rig.physics.elasticity import law_of
@@ -33,7 +33,7 @@ def bench(params) -> Bench:
     return Bench(params)
 
 
-def string_like(sling: Sling, eta: float, edges: int = 96) -> ElasticString:
+def string_like(sling: ClampedBand, eta: float, edges: int = 96) -> ElasticString:
     """The rig's string of a sling's band, shear modulus YOUNG / 3."""
     law = law_of("ogden", [1 - SHARE, 2.0, -SHARE, -2.0])
     tips = sling.half_width * np.array([[-1.0, 0, 0], [1.0, 0, 0]])

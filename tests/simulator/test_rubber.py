@@ -11,8 +11,9 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.episode.pull import launch_history
 from pipeline.simulator import interact, launch
+from pipeline.simulator.launch import unrelaxed
 from pipeline.simulator.model import LaunchHistory
-from pipeline.simulator.rubber import RUBBER, TIMES, overstress, unrelaxed, update
+from pipeline.simulator.rubber import RUBBER, TIMES, overstress, update
 from rig.physics.motion import pull_history
 
 THETA = np.array([3e5, 0.45, 2e-3, 0.5, 0.7])
@@ -24,10 +25,12 @@ def rubber(sling):
     return replace(sling, law=RUBBER)
 
 
-def test_without_its_parameters_it_is_the_neo_hookean_law_to_the_bit(sling, rubber, episode):
+def test_without_its_parameters_it_is_the_neo_hookean_law_to_the_bit(
+    sling, rubber, episode, launch_setup
+):
     for one, other in zip(
-        (interact(sling, episode, THETA), launch(sling, THETA, DRAW)),
-        (interact(rubber, episode, THETA), launch(rubber, THETA, DRAW)),
+        (interact(sling, episode, THETA), launch(sling, launch_setup, THETA, DRAW)),
+        (interact(rubber, episode, THETA), launch(rubber, launch_setup, THETA, DRAW)),
         strict=True,
     ):
         same = "force", "center_line", "landing_y", "hold_force"
@@ -35,28 +38,31 @@ def test_without_its_parameters_it_is_the_neo_hookean_law_to_the_bit(sling, rubb
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
-def test_each_parameter_has_its_effect(rubber):
+def test_each_parameter_has_its_effect(rubber, launch_setup):
     """A negative share stiffens a drawn band; what relaxes holds more at once, and later less."""
-    history = LaunchHistory(1.0, 0.1)
-    plain = launch(rubber, THETA, DRAW)
-    soft, stiff = (launch(replace(rubber, mooney_share=m), THETA, DRAW) for m in (0.5, -0.3))
+    plain = launch(rubber, launch_setup, THETA, DRAW)
+    soft, stiff = (
+        launch(replace(rubber, mooney_share=m), launch_setup, THETA, DRAW) for m in (0.5, -0.3)
+    )
     assert soft.hold_force < 0.9 * plain.hold_force < 0.9 * stiff.hold_force
-    memory = replace(rubber, relaxation=0.02, history=history)
-    fresh = launch(memory, THETA, DRAW)
-    long = replace(memory, history=LaunchHistory(1.0, 600.0))
-    old = launch(long, THETA, DRAW)
+    memory = replace(rubber, relaxation=0.02)
+    histories = LaunchHistory(1.0, 0.1), LaunchHistory(1.0, 600.0)
+    fresh, old = (
+        launch(memory, replace(launch_setup, history=one), THETA, DRAW) for one in histories
+    )
     assert fresh.hold_force > 1.03 * plain.hold_force
     assert old.hold_force == pytest.approx(plain.hold_force, rel=1e-4)
     assert old.speed < 0.99 * fresh.speed and old.speed < 0.99 * plain.speed
 
 
-def test_every_theta_may_have_its_own_parameters(rubber):
+def test_every_theta_may_have_its_own_parameters(rubber, launch_setup):
     shares, weights = np.array([0.0, 0.5, -0.2]), np.array([0.0, 0.01, 0.03])
     history = LaunchHistory(2.0, 1.0)
-    many = replace(rubber, mooney_share=shares, relaxation=weights, history=history)
-    together = launch(many, np.tile(THETA, (3, 1)), DRAW).landing_y
+    many = replace(rubber, mooney_share=shares, relaxation=weights)
+    launch_setup = replace(launch_setup, history=history)
+    together = launch(many, launch_setup, np.tile(THETA, (3, 1)), DRAW).landing_y
     alone = [
-        launch(replace(many, mooney_share=m, relaxation=w), THETA, DRAW).landing_y[0]
+        launch(replace(many, mooney_share=m, relaxation=w), launch_setup, THETA, DRAW).landing_y[0]
         for m, w in zip(shares, weights, strict=True)
     ]
     np.testing.assert_array_equal(together, alone)
@@ -64,7 +70,7 @@ def test_every_theta_may_have_its_own_parameters(rubber):
 
 def test_memory_of_a_pull_is_that_of_short_steps_and_fades(rubber):
     drawn = np.array([[-0.40, 0.0]])
-    carried = unrelaxed(replace(rubber, history=LaunchHistory(4.0, 2.0)), drawn)[0]
+    carried = unrelaxed(rubber, LaunchHistory(4.0, 2.0), drawn)[0]
     step = 1e-3  # Euler's method on o' = p' - o/t
     part = np.clip(np.arange(0, 6, step) / 4, 0, 1)
     depth = 0.4 * part**2 * (3 - 2 * part)
@@ -75,9 +81,9 @@ def test_memory_of_a_pull_is_that_of_short_steps_and_fades(rubber):
         told += change - step * told / TIMES
     np.testing.assert_allclose(carried, told / stress[-1], atol=2e-3)
     assert np.all(np.diff(carried) >= -1e-12)  # slow branches keep more
-    assert unrelaxed(replace(rubber, history=LaunchHistory(4.0, 1e4)), drawn).max() < 1e-6
+    assert unrelaxed(rubber, LaunchHistory(4.0, 1e4), drawn).max() < 1e-6
     slack = np.array([[-0.01, 0.0]])
-    assert unrelaxed(replace(rubber, history=LaunchHistory(4.0, 0.0)), slack).max() == 0
+    assert unrelaxed(rubber, LaunchHistory(4.0, 0.0), slack).max() == 0
 
 
 def test_updates_are_exact_for_straight_histories():
@@ -90,9 +96,9 @@ def test_updates_are_exact_for_straight_histories():
     assert forget[1].max() < 1e-40
 
 
-def test_tetrahedra_refuse_it_by_name(solid):
+def test_tetrahedra_refuse_it_by_name(solid, launch_setup):
     with pytest.raises(UserError, match="tetrahedra do not know the law `rubber`"):
-        launch(replace(solid, law=RUBBER), THETA, DRAW)
+        launch(replace(solid, law=RUBBER), launch_setup, THETA, DRAW)
 
 
 def test_history_of_a_recording():
@@ -118,7 +124,7 @@ def test_a_pause_fades_the_memory_by_its_own_length(rubber):
     """Whatever the pull's: exp(-pause / t) of what it left."""
     for pull_time in (0.05, 4.0, 100.0):
         none, some = (
-            unrelaxed(replace(rubber, history=LaunchHistory(pull_time, pause)), DRAW[None])[0]
+            unrelaxed(rubber, LaunchHistory(pull_time, pause), DRAW[None])[0]
             for pause in (0.0, 0.7)
         )
         np.testing.assert_allclose(some, none * np.exp(-0.7 / TIMES), rtol=1e-12)

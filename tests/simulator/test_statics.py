@@ -22,7 +22,9 @@ def test_hanging_band_is_an_equilibrium_of_the_energy(sling):
     assert sections[sling.middle, 2] < -0.15
 
 
-def test_single_and_double_precision_hold_the_same_force(sling):
+def test_single_and_double_precision_hold_the_same_force(sling, launch_setup):
     thetas = np.array([THETA, [1e7, 0.49, 1e-3, 0.5, 0.5]])
-    single, double = (launch(sling, thetas, [-0.4, -0.2], double=d) for d in (False, True))
+    single, double = (
+        launch(sling, launch_setup, thetas, [-0.4, -0.2], double=d) for d in (False, True)
+    )
     assert single.hold_force == pytest.approx(double.hold_force, rel=1e-4)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.simulator import Sling, interact, launch
+from pipeline.simulator import ClampedBand, interact, launch
 from pipeline.simulator.cylinder import cylinder, volumes
 from pipeline.simulator.initial import clamp_tangents, drawn_guess, hanging_guess
 from pipeline.simulator.launch import schedule_of
@@ -52,26 +52,26 @@ def test_hanging_band_is_an_equilibrium_of_the_energy(solid):
     assert sections[solid.middle, 2] < -0.15
 
 
-def test_hand_feels_what_the_drawn_band_pulls_with(solid):
+def test_hand_feels_what_the_drawn_band_pulls_with(solid, launch_setup):
     """The force on the hand is that of the energy on the held section, and the sections' weight."""
-    table = schedule_of(solid).steps[:RELAX_STEPS]
+    table = schedule_of(launch_setup).steps[:RELAX_STEPS]
     start = drawn_guess(solid, np.array([DRAW]))
-    done = stepped(solid, table, THETA, start, payload=solid.projectile_mass)
+    done = stepped(solid, table, THETA, start, payload=launch_setup.projectile_mass)
     held = forces(solid, THETA, done.state[0])[solid.middle].sum(axis=0)
-    held[2] -= (solid.projectile_mass + solid.mass / solid.edges) * GRAVITY
+    held[2] -= (launch_setup.projectile_mass + solid.mass / solid.edges) * GRAVITY
     assert done.lanes["hold_force"][0] == pytest.approx(held, abs=1e-4 * np.abs(held).max())
     assert np.allclose(done.state[0, solid.middle], start[0, solid.middle], atol=1e-6)
 
 
-def test_thin_band_pulls_as_a_string_the_finer_its_mesh(solid):
+def test_thin_band_pulls_as_a_string_the_finer_its_mesh(solid, launch_setup):
     """The closed form of test_statics.py; a clamp keeps a slab's length from thinning."""
-    gaps = []
+    gaps, launch_setup = [], replace(launch_setup, projectile_mass=1e-6)
     for edges in (26, 52):
-        thin = replace(solid, radius=solid.radius / 4, mass=1e-4, projectile_mass=1e-6, edges=edges)
+        thin = replace(solid, radius=solid.radius / 4, mass=1e-4, edges=edges)
         half = np.hypot(0.4, thin.half_width)
         pull = String.of(thin, THETA).force(2 * half / thin.rest_length)
         expected = 2 * pull * 0.4 / half
-        gaps.append(launch(thin, THETA, [-0.4, 0.0]).hold_force[0] / expected - 1)
+        gaps.append(launch(thin, launch_setup, THETA, [-0.4, 0.0]).hold_force[0] / expected - 1)
     assert 0 < gaps[1] < 0.02
     assert gaps[1] == pytest.approx(gaps[0] / 2, rel=0.1)
 
@@ -93,14 +93,14 @@ def test_random_thetas_converge_whatever_their_neighbours(solid, episode):
     assert np.array_equal(together.force[7], alone.force[0])
 
 
-def test_mesh_is_chosen_in_params_and_not_for_a_gpu(params):
+def test_mesh_is_chosen_in_params_and_not_for_a_gpu(params, launch_setup):
     band = params.bands["band1"]
     chosen = params.sling.model_copy(update={"mesh": TETRAHEDRA})
-    solid = Sling.of(band, params.setup, chosen)
+    solid = ClampedBand.of(band, params.setup, chosen)
     assert (solid.sections, solid.dofs) == (53, 21)
-    assert Sling.of(band, params.setup, params.sling).dofs == 9
+    assert ClampedBand.of(band, params.setup, params.sling).dofs == 9
     with pytest.raises(UserError, match="CPU"):
-        launch(solid, THETA, DRAW, device="cuda:0")
+        launch(solid, launch_setup, THETA, DRAW, device="cuda:0")
 
 
 def held_steps(count=20):

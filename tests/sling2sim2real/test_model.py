@@ -36,12 +36,11 @@ def test_launches_are_those_of_a_run_with_the_same_theta_file(world, tmp_path, s
 
 def test_launch_settings_go_before_the_recordings_history(world) -> None:
     asked = Settings.coarse(launch={"pause": 5.0})
-    assert replace(world, history=HISTORY, settings=asked).sling.history == replace(
-        HISTORY, pause=5.0
-    )
-    assert world.sling.history is None
+    model = replace(world, history=HISTORY, settings=asked)
+    assert model.launch_setup.history == replace(HISTORY, pause=5.0)
+    assert world.launch_setup.history is None
     neo = Theta(2.2e5, 0.47, 2.4e-3, 0.7, 0.6)
-    assert replace(world, theta=neo, history=HISTORY).sling.history is None
+    assert replace(world, theta=neo, history=HISTORY).launch_setup.history is None
 
 
 def test_points_of_their_own(world) -> None:

@@ -7,7 +7,7 @@ from pipeline.base.errors import UserError
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.space import Space
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from sling2sim2real import Objective, Theta, simulate_batch
 
 
@@ -16,7 +16,7 @@ def test_it_is_the_loss_of_the_method(world, episode) -> None:
     assert objective.names == ("youngs_modulus", "dynamic_friction")
     unit = np.array([[0.3, 0.5], [0.6, 0.9], [0.4, 0.7]])
     settings = world.settings
-    sling = Sling.of(world.band, settings.setup, settings.sling)
+    sling = ClampedBand.of(world.band, settings.setup, settings.sling)
     loss = EpisodeLoss.of(settings, "real2sim2real", episode, sling)
     space = Space.of_method(settings, "real2sim2real")
     whole = [space.to_unit(objective.theta(one).point[:5]) for one in unit]

@@ -7,10 +7,9 @@ import pytest
 
 from pipeline.episode.signal import cutoff_hz
 from pipeline.params import load
-from pipeline.simulator.model import Sling
-from tests.identify.objective.own_law import own_law_episode
+from pipeline.simulator.model import ClampedBand, LaunchSetup
 from validation.campaigns.swing import PARTS, D, S, SplitPictures, _damped, landed
-from validation.synthetic import pull_and_release
+from validation.synthetic import own_law_episode, pull_and_release
 
 THETA = np.array([2.2e5, 0.45, 3e-3, 0.9, 0.8])
 
@@ -21,8 +20,8 @@ def params():
 
 
 @pytest.fixture(scope="module")
-def sling(params) -> Sling:
-    return Sling.of(params.bands["band1"], params.setup, params.sling)
+def sling(params) -> ClampedBand:
+    return ClampedBand.of(params.bands["band1"], params.setup, params.sling)
 
 
 @pytest.fixture(scope="module")
@@ -52,9 +51,10 @@ def test_the_pictures_of_every_part_after_the_release_show_the_true_damping(
     assert np.ptp(done.mean["pull"]) < 0.01 * np.ptp(done.mean["swing"])
 
 
-def test_launches_are_those_of_each_point(sling) -> None:
+def test_launches_are_those_of_each_point(params, sling) -> None:
+    setup = LaunchSetup.of(params.setup, params.sling)
     points = _damped(THETA, [1e-3, 4e-3])
-    together = landed(sling, points)
+    together = landed(sling, setup, points)
     assert together.shape == (2, 3)
-    np.testing.assert_array_equal(together[1:], landed(sling, points[1:]))
+    np.testing.assert_array_equal(together[1:], landed(sling, setup, points[1:]))
     assert (together[0] > together[1]).all()

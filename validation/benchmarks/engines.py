@@ -8,12 +8,13 @@ import numpy as np
 from scipy.stats import qmc
 
 from pipeline.base.errors import UserError
+from pipeline.export.mesh import Tube, hand_path
 from pipeline.identify.objective.space import Space
+from pipeline.params import Params
 from pipeline.simulator.interaction import interact
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from validation.benchmarks.timing import available, timed
 from validation.engines import mujoco_flex
-from validation.engines.mesh import Tube, hand_path
 from validation.engines.newton_vbd import Bands
 from validation.simulator.closed import String
 from validation.synthetic import DRAWN, pull_and_release, yardstick
@@ -25,7 +26,7 @@ ENVIRONMENTS = {"cpu": (64, 1), "cuda": (1024, 1024)}  # ours, Newton's
 TIMED_STEPS = 20  # of Newton, on a GPU
 
 
-def bench_peers(params, device: str = "cpu") -> list[dict]:
+def bench_peers(params: Params, device: str = "cpu") -> list[dict]:
     """One entry an engine and device: settings, cost, `ratio` to ours there, force error.
 
     On a CPU the cost is CPU seconds a rollout, on a GPU rollouts a second; a ratio above 1 is how
@@ -51,7 +52,7 @@ def bench_peers(params, device: str = "cpu") -> list[dict]:
     return [*entries, _newton(sling, episode, here, device)]
 
 
-def _ours(sling: Sling, episode, space: Space, device: str) -> dict:
+def _ours(sling: ClampedBand, episode, space: Space, device: str) -> dict:
     held = interact(sling, episode, THETA[None], device=device)  # compiles, too
     force = held.force[0, np.searchsorted(held.times, episode.release_time) - 1]
     kind = device.partition(":")[0]
@@ -65,7 +66,7 @@ def _ours(sling: Sling, episode, space: Space, device: str) -> dict:
     )  # fmt: skip
 
 
-def _mujoco(sling: Sling, episode, ours: dict) -> dict:
+def _mujoco(sling: ClampedBand, episode, ours: dict) -> dict:
     try:
         result, cpu, _ = timed(lambda: mujoco_flex.interact(sling, episode, THETA, PEER_STEP))
     except UserError as error:
@@ -81,7 +82,7 @@ def _mujoco(sling: Sling, episode, ours: dict) -> dict:
     )  # fmt: skip
 
 
-def _newton(sling: Sling, episode, ours: dict, device: str) -> dict:
+def _newton(sling: ClampedBand, episode, ours: dict, device: str) -> dict:
     kind = device.partition(":")[0]
     count = ENVIRONMENTS[kind][1]
     whole = int(round((episode.time[-1] - episode.grasp_time) / PEER_STEP))
@@ -148,7 +149,7 @@ def table(entries: list[dict]) -> str:
     return "\n".join(lines)
 
 
-def _force_error(sling: Sling, episode, force: np.ndarray) -> float:
+def _force_error(sling: ClampedBand, episode, force: np.ndarray) -> float:
     """Of the drawn band's force on the hand, against two straight, weightless halves."""
     hand = episode.position[np.searchsorted(episode.time, episode.release_time) - 1]
     legs = sling.tips - hand

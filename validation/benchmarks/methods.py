@@ -27,10 +27,10 @@ from pipeline.identify.posterior.identify import fit_posterior
 from pipeline.identify.search.history import History
 from pipeline.identify.search.loop import latin_hypercube
 from pipeline.identify.search.regions import regions_asked
-from pipeline.params import expect_known
-from pipeline.params.identification import LEAST_SQUARES
+from pipeline.params import Params, expect_known
+from pipeline.params.identification import LEAST_SQUARES, OptimizerParams
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from validation.benchmarks.timing import seconds, shared, timed
 from validation.synthetic import recorded_yardstick
 
@@ -51,7 +51,7 @@ class Clocked:
 
 
 def bench_methods(
-    params, device: str = "cpu", size: str = "laptop", methods: list[str] | None = None
+    params: Params, device: str = "cpu", size: str = "laptop", methods: list[str] | None = None
 ) -> dict:
     """Time a search with each of params.yaml's methods.
 
@@ -87,7 +87,12 @@ def bench_methods(
 
 
 def time_search(
-    params, method: str, optimizer, sling: Sling, episode: Episode, devices: Sequence[str]
+    params: Params,
+    method: str,
+    optimizer: OptimizerParams,
+    sling: ClampedBand,
+    episode: Episode,
+    devices: Sequence[str],
 ) -> tuple[dict, History]:
     """One search from nothing, all its rollouts counted; and what it evaluated."""
     params = params.model_copy(update={"optimizer": optimizer})
@@ -122,7 +127,14 @@ def time_search(
     return row, history
 
 
-def _generation(params, sling: Sling, episode: Episode, method: str, devices, count: int):
+def _generation(
+    params: Params,
+    sling: ClampedBand,
+    episode: Episode,
+    method: str,
+    devices: Sequence[str],
+    count: int,
+) -> dict:
     """Seconds of one generation: simulated, and with the loss, on all cores or GPUs."""
     evaluate = evaluator(params, method, sling, episode, devices)
     unit = latin_hypercube(evaluate.space.dimension, count, params.optimizer.seed)
@@ -134,7 +146,7 @@ def _generation(params, sling: Sling, episode: Episode, method: str, devices, co
 
 
 def evaluator(
-    params, method: str, sling: Sling, episode: Episode, devices: Sequence[str]
+    params: Params, method: str, sling: ClampedBand, episode: Episode, devices: Sequence[str]
 ) -> Evaluator:
     """A method's, with nothing remembered."""
     loss = EpisodeLoss.of(params, method, episode, sling)
@@ -142,7 +154,7 @@ def evaluator(
 
 
 def _import_and_compile(
-    params, sling: Sling, episode: Episode, method: str, devices: Sequence[str]
+    params: Params, sling: ClampedBand, episode: Episode, method: str, devices: Sequence[str]
 ) -> None:
     """What a machine does once, and a method should not pay for."""
     import torch  # noqa: F401

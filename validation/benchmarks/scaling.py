@@ -20,8 +20,9 @@ from pipeline.identify.results.mounting import sling_of_method
 from pipeline.identify.results.theta import at_points
 from pipeline.identify.search.history import History
 from pipeline.identify.search.loop import latin_hypercube
-from pipeline.params import expect_known
+from pipeline.params import Params, expect_known
 from pipeline.simulator.launch import Launches, launch
+from pipeline.simulator.model import LaunchSetup
 from validation.benchmarks.methods import BUDGETS, evaluator, time_search
 from validation.benchmarks.timing import REPEATS, seconds, timed
 from validation.synthetic import DRAW, recorded_yardstick
@@ -31,7 +32,7 @@ LAUNCHES = (1024, 16384)
 
 
 def bench_scaling(
-    params,
+    params: Params,
     device: str,
     band: str | None = None,
     method: str = "sling2sim2real",
@@ -60,7 +61,9 @@ def bench_scaling(
     return scaling(params, devices, band, method, size)
 
 
-def scaling(params, devices: Sequence[str], band: str | None, method: str, size: str) -> dict:
+def scaling(
+    params: Params, devices: Sequence[str], band: str | None, method: str, size: str
+) -> dict:
     """`bench_scaling` on devices that are there."""
     expect_known(params, "method", method)
     if band:
@@ -82,7 +85,9 @@ def scaling(params, devices: Sequence[str], band: str | None, method: str, size:
     def launches(count: int) -> dict:
         unit = latin_hypercube(space.dimension, count, optimizer.seed)
         own, thetas = at_points(sling, space.to_physical(unit))
-        works = [partial(launch, own, thetas, [-DRAW, -0.15], device=team) for team in teams]
+        setup = LaunchSetup.of(params.setup, params.sling)
+        work = partial(launch, own, setup, thetas, [-DRAW, -0.15])
+        works = [partial(work, device=team) for team in teams]
         return {"launches": count} | _compared(works, teams, _launched)
 
     def search() -> dict:

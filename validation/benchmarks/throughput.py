@@ -17,8 +17,10 @@ from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.space import Space
 from pipeline.identify.results.theta import at_points
+from pipeline.params import Params
 from pipeline.simulator.interaction import interact, schedule_of
 from pipeline.simulator.launch import launch
+from pipeline.simulator.model import LaunchSetup
 from pipeline.simulator.records import Grip
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 from pipeline.simulator.schedule import RELAX_STEPS
@@ -33,7 +35,7 @@ BOXES = {  # of what a law adds to params.yaml's parameters
 }
 
 
-def bench(params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
+def bench(params: Params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
     """Time the yardstick.
 
     Args:
@@ -51,7 +53,7 @@ def bench(params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
     devices = named(device, "--device")
     kind = devices[0].partition(":")[0]
     sling, episode = recorded_yardstick(params)
-    sling = replace(sling, law=law)
+    sling, setup = replace(sling, law=law), LaunchSetup.of(params.setup, params.sling)
     space = Space.of(params.parameters, bounds=BOXES[law], law=law)
     loss = EpisodeLoss.of(params, next(iter(params.methods)), episode, sling)
 
@@ -61,7 +63,7 @@ def bench(params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
 
     def shoot(points: np.ndarray, **options):
         own, thetas = at_points(sling, points)
-        return launch(own, thetas, np.array([[-DRAW, -0.15]]), device=devices, **options)
+        return launch(own, setup, thetas, np.array([[-DRAW, -0.15]]), device=devices, **options)
 
     simulate = partial(shared, devices, on_one)
 
@@ -119,8 +121,9 @@ def first_start(device: str) -> dict[str, float]:
     """Seconds that a new process needs for one launch: with an empty kernel cache, and again."""
     code = (
         "from pipeline.params import load; p = load();"
-        "from pipeline.simulator import Sling, launch;"
-        "b = next(iter(p.bands.values())); launch(Sling.of(b, p.setup, p.sling),"
+        "from pipeline.simulator import ClampedBand, LaunchSetup, launch;"
+        "b = next(iter(p.bands.values())); lab = p.setup, p.sling;"
+        "launch(ClampedBand.of(b, *lab), LaunchSetup.of(*lab),"
         f" [3e5, 0.45, 2e-3, 0.5, 1.0], [-0.38, -0.2], device={device!r})"
     )
     with tempfile.TemporaryDirectory() as cache:

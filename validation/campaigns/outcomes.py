@@ -24,7 +24,7 @@ from pipeline.episode.episode import Episode
 from pipeline.params import Params
 from pipeline.recording.build import Processed, episode_of, process
 from validation.campaigns.damage import mutated
-from validation.campaigns.small_recordings import CHECKED, small_params
+from validation.recordings.small import CHECKED, small_params
 
 SAME, SAID, LINE = "same episode", "episode with loss said", "one line"
 OTHER = "another episode"  # which only a recording without checksums may become

@@ -25,17 +25,18 @@ from pipeline.base.layout import Layout, made
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.results.theta import at_points, calibrated, load_theta, point
-from pipeline.params import load
+from pipeline.identify.results.theta import at_points, calibrated, launch_setup, load_theta, point
+from pipeline.params import Params, load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand, LaunchSetup
 from validation.benchmarks.timing import environment
+from validation.campaigns.runner import OURS, PAPER
+from validation.effects import AS_IS
 
 REPORT = Path("reports/validation/swing.json")
 DEVIATIONS = Path("reports/validation/deviations.json")
-AS_IS, AS_TETRAHEDRA = "as it is", "sling.mesh: tetrahedra"  # its rows
-OURS, PAPER, MESHES = "least_squares", "sling2sim2real", ("rod", "tetrahedra")
+MESHES, AS_TETRAHEDRA = ("rod", "tetrahedra"), "sling.mesh: tetrahedra"  # its switch
 DAMPINGS = np.geomspace(2e-4, 1e-2, 35)  # s d [s]
 PARTS = {  # begin and end, s after the release
     "pull": (-100.0, 0.0),
@@ -51,7 +52,7 @@ TINY, TIMES = 1e-7, 64  # relative change of a parameter; how often
 class SplitPictures:
     """A band's first pull as simulated at points of a sling, beside the recorded one."""
 
-    def __init__(self, params, episode: Episode, sling: Sling, points: np.ndarray) -> None:
+    def __init__(self, params, episode: Episode, sling: ClampedBand, points: np.ndarray) -> None:
         self.sling, theta = at_points(sling, points)
         rollouts = interact(self.sling, episode, theta)
         loss = EpisodeLoss.of(params, PAPER, episode, sling)
@@ -68,7 +69,7 @@ class SplitPictures:
         self.reach = middle[..., 1].max(axis=1)  # beyond the fork [m]
 
 
-def by_mesh(params, band: str, episode: Episode) -> dict:
+def by_mesh(params: Params, band: str, episode: Episode) -> dict:
     """By mesh: the damping that each part's pictures would have.
 
     `sensitivity_cm` is how far the part's pictures alone move the geometric term over DAMPINGS;
@@ -97,12 +98,12 @@ def by_mesh(params, band: str, episode: Episode) -> dict:
     return {"own_damping_s": own, "own_theta": theta.tolist(), **found}
 
 
-def sling_with(params, band: str, mesh: str) -> Sling:
+def sling_with(params: Params, band: str, mesh: str) -> ClampedBand:
     section = params.sling.model_copy(update={"mesh": mesh})
     return sling_of_method(params.model_copy(update={"sling": section}), band, PAPER)
 
 
-def as_found(params, band: str, results: list[dict]) -> dict:
+def as_found(params: Params, band: str, results: list[dict]) -> dict:
     """Launches in both meshes of what the paper's method found in one recording with each.
 
     `landing_ratio` is the mean over DRAWS, and `hold_force_ratio` too, beside rod and rod.
@@ -112,11 +113,11 @@ def as_found(params, band: str, results: list[dict]) -> dict:
         for one in results
         if (one["band"], one["method"], one["recording"], one["seed"]) == (band, PAPER, 0, 1)
     }
-    done = {}
+    done, setup = {}, LaunchSetup.of(params.setup, params.sling)
     for mesh in MESHES:
         sling = sling_with(params, band, mesh)
         for whose, switch in zip(MESHES, (AS_IS, AS_TETRAHEDRA), strict=True):
-            outcome = launch(sling, np.tile(found[switch], (len(DRAWS), 1)), DRAWS)
+            outcome = launch(sling, setup, np.tile(found[switch], (len(DRAWS), 1)), DRAWS)
             done[f"launched with {mesh}, found with {whose}"] = outcome
     first = next(iter(done.values()))
     return {
@@ -136,18 +137,22 @@ def _damped(theta: np.ndarray, dampings) -> np.ndarray:
     return thetas
 
 
-def landed(sling: Sling, points: np.ndarray) -> np.ndarray:
+def landed(sling: ClampedBand, setup: LaunchSetup, points: np.ndarray) -> np.ndarray:
     """Where DRAWS land with points (N, P) [m], shape (N, 3)."""
     each, every = np.repeat(points, len(DRAWS), axis=0), np.tile(DRAWS, (len(points), 1))
-    return launch(*at_points(sling, each), every).landing_y.reshape(len(points), -1)
+    sling, thetas = at_points(sling, each)
+    return launch(sling, setup, thetas, every).landing_y.reshape(len(points), -1)
 
 
-def by_rounding(params, band: str, method: str, episode: Episode) -> dict:
+def by_rounding(params: Params, band: str, method: str, episode: Episode) -> dict:
     """How far TINY changes of all parameters move the loss, each part and landings."""
     content = load_theta(Layout().theta(band, method), band)
     sling, best = calibrated(params, band, content), point(content)
     points = best * (1 + TINY * np.random.default_rng(0).standard_normal((TIMES, len(best))))
-    done, landing = SplitPictures(params, episode, sling, points), landed(sling, points)
+    done, landing = (
+        SplitPictures(params, episode, sling, points),
+        landed(sling, launch_setup(params, content), points),
+    )
     return {
         "loss_range": np.ptp(done.total) / done.total.mean(),
         "range_cm": {part: np.ptp(mean) for part, mean in done.mean.items()},

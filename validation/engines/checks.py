@@ -9,8 +9,9 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
-from pipeline.simulator.model import ROD, TETRAHEDRA, Sling
+from pipeline.simulator.model import ROD, TETRAHEDRA, ClampedBand
 from validation.engines import mujoco_flex
+from validation.simulator.experiment import setup_of
 from validation.simulator.finding import Bench, Finding, Theme
 from validation.synthetic import ease, unseen
 
@@ -81,7 +82,7 @@ class EnginePull:
         return 1e3 * np.sqrt((distance**2).mean(axis=1))
 
 
-def episode_of(sling: Sling) -> Episode:
+def episode_of(sling: ClampedBand) -> Episode:
     """Lift, pull to (-DRAW, -DROP) and hold; a camera at 30 Hz."""
     t = np.arange(0.0, RELEASE + 0.5, 0.01)
     hang = np.sqrt(sling.rest_length**2 / 4 - sling.half_width**2)
@@ -146,12 +147,12 @@ def launch_check(
     bench: Bench, cases=LAUNCHES, step: float = 2.5e-4, title: str = "", **mesh
 ) -> Finding:
     """The largest difference of the landings of `cases`, as listed in LAUNCHES."""
-    sling = sling_of(bench)
+    sling, setup = sling_of(bench), setup_of(bench)
     thetas = np.array([[young, poisson, d, 1.0, 1.0] for young, poisson, d, _ in cases])
     draws = np.array([draw for *_, draw in cases])
-    ours = launch(sling, thetas, draws, device=bench.device)
+    ours = launch(sling, setup, thetas, draws, device=bench.device)
     theirs = [
-        mujoco_flex.launch(sling, theta, draw, step, **mesh)
+        mujoco_flex.launch(sling, setup, theta, draw, step, **mesh)
         for theta, draw in zip(thetas, draws, strict=True)
     ]
     landing = 100 * (np.array([one.landing_y for one in theirs]) / ours.landing_y - 1)
@@ -236,12 +237,12 @@ def _with_mesh(bench: Bench, mesh: str, device: str) -> Bench:
     return replace(bench, params=params, device=device)
 
 
-def sling_of(bench: Bench) -> Sling:
+def sling_of(bench: Bench) -> ClampedBand:
     """The first band of params.yaml, mounted as `setup` says."""
     params = bench.params
-    sling = Sling.of(params.bands[next(iter(params.bands))], params.setup, params.sling)
-    # MuJoCo has neither air nor an arm, and damps the rate of the nominal stress
-    return replace(sling, air_density=0.0, arm_stiffness=None, turn_damping=1.0)
+    sling = ClampedBand.of(params.bands[next(iter(params.bands))], params.setup, params.sling)
+    # MuJoCo has no air, and damps the rate of the nominal stress
+    return replace(sling, air_density=0.0, turn_damping=1.0)
 
 
 def _interpolate(at: np.ndarray, places: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.export.mesh import Tube, hand_path
 from pipeline.simulator.launch import ballistic_landing
-from pipeline.simulator.model import GRAVITY, Sling
-from validation.engines.mesh import Tube, hand_path
+from pipeline.simulator.model import GRAVITY, ClampedBand, LaunchSetup
 
 LED = 1e3  # kg: the inertia of what leads a vertex; a step moves it by less than a nanometre
 SETTLE_STEP, SETTLE_STEPS = 0.02, 60
@@ -129,7 +129,7 @@ class FlexInteraction:
     arc: np.ndarray
 
 
-def interact(sling: Sling, episode, theta, step: float = 5e-4, **mesh) -> FlexInteraction:
+def interact(sling: ClampedBand, episode, theta, step: float = 5e-4, **mesh) -> FlexInteraction:
     """The episode's grasp, lift and pull with one theta (5,), as sling.interaction makes it.
 
     Args:
@@ -170,7 +170,9 @@ class FlexLaunch:
     separation_time: float
 
 
-def launch(sling: Sling, theta, draw, step: float = 2.5e-4, **mesh) -> FlexLaunch:
+def launch(
+    sling: ClampedBand, setup: LaunchSetup, theta, draw, step: float = 2.5e-4, **mesh
+) -> FlexLaunch:
     """Launch the projectile, spread over the middle section, from a draw (y, z) at rest.
 
     It leaves where its acceleration along the launch direction no longer takes a push.
@@ -184,7 +186,7 @@ def launch(sling: Sling, theta, draw, step: float = 2.5e-4, **mesh) -> FlexLaunc
     tube = Tube.of(sling, **mesh)
     band = FlexBand(tube, theta, step)
     band.hold(True)
-    band.load(sling.projectile_mass)
+    band.load(setup.projectile_mass)
     place = np.array([0.0, *draw])
     goal = band.positions
     goal[tube.middle] = place + tube.rest[tube.middle] * [0.0, 1.0, 1.0]
@@ -194,18 +196,18 @@ def launch(sling: Sling, theta, draw, step: float = 2.5e-4, **mesh) -> FlexLaunc
 
     direction = -place / np.linalg.norm(place)
     position, velocity, contact = place, np.zeros(3), hold_force
-    for i in range(int(round(sling.steps.launch_time / step))):
+    for i in range(int(round(setup.duration / step))):
         band.step()
         last, position = position, band.positions[tube.middle].mean(axis=0)
         old, velocity = velocity, band.velocities[tube.middle].mean(axis=0)
         push = (velocity - old) / step + [0.0, 0.0, GRAVITY]
-        before, contact = contact, sling.projectile_mass * push @ direction
+        before, contact = contact, setup.projectile_mass * push @ direction
         if contact <= 0:
             part = before / max(before - contact, 1e-9)
             _, y, z = last + part * (position - last)
             _, vy, vz = old + part * (velocity - old)
             return FlexLaunch(
-                landing_y=float(ballistic_landing(y, z, vy, vz, -sling.fork_height)),
+                landing_y=float(ballistic_landing(y, z, vy, vz, -setup.fork_height)),
                 speed=float(np.hypot(vy, vz)),
                 angle=float(np.arctan2(vz, vy)),
                 hold_force=hold_force,

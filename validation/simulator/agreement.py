@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.identify.objective.space import Space
 from pipeline.simulator.initial import drawn_guess, hanging_guess
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import relaxation, steps
 from validation.simulator.experiment import (
@@ -43,16 +43,16 @@ class Start:
         turned: How far the sections are turned about the band before the steps, in its middle.
     """
 
-    sling: Sling
+    sling: ClampedBand
     steps: np.ndarray
     guess: np.ndarray
-    before: Sling | None = None
+    before: ClampedBand | None = None
     grip: Grip = Grip.FREE
     payload: float = 0.0
     turned: float = 0.0
 
 
-def _turned(sling: Sling, sections: np.ndarray, most: float) -> np.ndarray:
+def _turned(sling: ClampedBand, sections: np.ndarray, most: float) -> np.ndarray:
     """Sections (L, 9) with their sections turned about the band, by `most` in its middle."""
     angle = most * np.sin(np.pi * sling.arc / sling.rest_length)[:, None]
     a, b = sections[:, 3:6], sections[:, 6:]
@@ -60,8 +60,8 @@ def _turned(sling: Sling, sections: np.ndarray, most: float) -> np.ndarray:
     return np.hstack([sections[:, :3], *turned])
 
 
-def scenes(sling: Sling) -> dict[str, Start]:
-    """Every way to hold a band, and both orders of steps."""
+def scenes(sling: ClampedBand, payload: float) -> dict[str, Start]:
+    """Every way to hold a band, and both orders of steps; the launch of a payload [kg]."""
     path = np.linspace([0.0, 0.0, -0.2], [0.01, -0.03, -0.18], 8)
     held = steps(0.002 * np.arange(9), 0.002, grip=Grip.HELD)
     held["target"], held["grip_force"], held["blend"] = path, 1e4, np.linspace(1, 0.3, 8)
@@ -83,7 +83,7 @@ def scenes(sling: Sling) -> dict[str, Start]:
             drawn_guess(sling, draw)[0],
             before=sling,
             grip=Grip.POUCH,
-            payload=sling.projectile_mass,
+            payload=payload,
         ),
         "twisted and let go": Start(taut, launched(0.0005, 12, 1), start, before=taut, turned=0.3),
         "stretched and let go at both ends": Start(loose, launched(0.0005, 12), start, before=taut),
@@ -91,11 +91,12 @@ def scenes(sling: Sling) -> dict[str, Start]:
 
 
 def compare(
-    bench: Bench, thetas: np.ndarray, sling: Sling | None = None
+    bench: Bench, thetas: np.ndarray, sling: ClampedBand | None = None
 ) -> dict[str, tuple[float, float]]:
     """Largest difference of a scene's states and forces, by what the reference says they do."""
     result = {}
-    for name, scene in scenes(sling or band_of(bench)).items():
+    mass = bench.params.setup.projectile_mass
+    for name, scene in scenes(sling or band_of(bench), mass).items():
         states, forces = [], []
         for theta in thetas:
             start = scene.guess.copy()
@@ -115,7 +116,7 @@ def compare(
     return result
 
 
-def checks(bench: Bench, count: int = 4, sling: Sling | None = None) -> list[Finding]:
+def checks(bench: Bench, count: int = 4, sling: ClampedBand | None = None) -> list[Finding]:
     against = "NumPy reference implementation, Newton's method to rounding"
     note = f"{count} random θ of the box, double precision"
     result = []

@@ -17,6 +17,7 @@ from validation.simulator.experiment import (
     move,
     rest,
     settling,
+    setup_of,
     straight,
     straight_guess,
 )
@@ -63,10 +64,10 @@ def straight_pull(
 
 def drawn_pull(bench: Bench, depth: float, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Measured and closed-form hold force (N,) of a weightless band drawn at the fork."""
-    sling = replace(band_of(bench), mass=1e-4, projectile_mass=1e-6)
+    sling, setup = replace(band_of(bench), mass=1e-4), setup_of(bench, projectile_mass=1e-6)
     half = np.hypot(depth, sling.half_width)
     stretch = 2 * half / sling.rest_length
-    done = launch(sling, theta, [-depth, 0.0], device=bench.device, workers=bench.workers)
+    done = launch(sling, setup, theta, [-depth, 0.0], device=bench.device, workers=bench.workers)
     strings = [String.of(sling, one) for one in theta]
     expected = [2 * float(one.force(stretch)) * depth / half for one in strings]
     return done.hold_force, np.array(expected)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.simulator.material import material
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,14 @@ class String:
         damping, scale: d [s] and s.
     """
 
-    sling: Sling
+    sling: ClampedBand
     mu: float
     lam: float
     damping: float
     scale: float
 
     @classmethod
-    def of(cls, sling: Sling, theta) -> String:
+    def of(cls, sling: ClampedBand, theta) -> String:
         return cls(sling, *list(material(sling, np.array([theta]))[0].tolist())[:4])
 
     def volume(self, stretch):

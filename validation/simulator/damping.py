@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.records import Grip
 from validation.simulator import figures
 from validation.simulator.agreement import random_thetas
@@ -37,7 +37,7 @@ STATES = {  # stretch along the band, across it, and how rough: share of each
 }
 
 
-def random_states(sling: Sling, kind: str, count: int, rng) -> np.ndarray:
+def random_states(sling: ClampedBand, kind: str, count: int, rng) -> np.ndarray:
     """Rough states (count, L, 9) of a straight band."""
     along, across, rough = STATES[kind]
     result = np.tile(straight_guess(straight(sling, sling.rest_length)), (count, 1, 1))
@@ -161,7 +161,7 @@ def oscillate(
     mass: float = 0.5,
     periods: float = 4.0,
     per_period: int = 800,
-    sling: Sling | None = None,
+    sling: ClampedBand | None = None,
 ) -> tuple[np.ndarray, np.ndarray, tuple[float, float], tuple[float, float]]:
     """A heavy middle of a thin, light band, let go 1 % of the rest length off its place.
 

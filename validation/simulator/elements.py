@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.simulator import Launches, Rollouts, Sling, interact, launch
+from pipeline.simulator import ClampedBand, Launches, LaunchSetup, Rollouts, interact, launch
 from pipeline.simulator.initial import sections_of
 from pipeline.simulator.interaction import schedule_of
 from pipeline.simulator.model import GRAVITY, ROD, TETRAHEDRA
@@ -15,6 +15,7 @@ from pipeline.simulator.schedule import Schedule, statics
 from pipeline.simulator.solver import Options, Slings, memory, run
 from validation.benchmarks.timing import timed
 from validation.simulator.closed import String, clamped_beam
+from validation.simulator.experiment import setup_of
 from validation.simulator.finding import Bench, Theme
 from validation.simulator.launching import random_launches
 from validation.synthetic import pull_and_release
@@ -50,7 +51,7 @@ class Figures:
         rollout_seconds, launch_seconds: CPU time of one of them.
     """
 
-    sling: Sling
+    sling: ClampedBand
     pull: np.ndarray
     bending: np.ndarray
     rollouts: Rollouts
@@ -69,18 +70,18 @@ class Figures:
         return (1 - part) * line[:, :, at - 1] + part * line[:, :, at]
 
 
-def slings(params) -> dict[str, Sling]:
+def slings(params) -> dict[str, ClampedBand]:
     """The first band of params.yaml in either mesh, and in twice as many sections."""
     band = params.bands[next(iter(params.bands))]
     shapes = (params.sling.model_copy(update={"mesh": mesh}) for mesh in (ROD, TETRAHEDRA))
-    made = (Sling.of(band, params.setup, shape) for shape in shapes)
+    made = (ClampedBand.of(band, params.setup, shape) for shape in shapes)
     # tetrahedra feel no cylinder's drag
-    rod, solid = (replace(one, air_density=0.0, arm_stiffness=None) for one in made)
+    rod, solid = (replace(one, air_density=0.0) for one in made)
     finer = replace(solid, edges=2 * solid.edges)
     return {"rod": rod, "tetrahedra": solid, "tetrahedra, twice as many": finer}
 
 
-def bending(sling: Sling, poissons=POISSON) -> np.ndarray:
+def bending(sling: ClampedBand, poissons=POISSON) -> np.ndarray:
     """Stiffness of a light beam clamped at both ends over Euler-Bernoulli's; NaN if it fails."""
     beam = replace(
         sling,
@@ -105,28 +106,30 @@ def bending(sling: Sling, poissons=POISSON) -> np.ndarray:
     return np.where(done.lanes["outcome"] == 0, ratio, np.nan)
 
 
-def pull(sling: Sling, depths=DEPTHS, poisson: float = 0.45) -> np.ndarray:
+def pull(
+    sling: ClampedBand, setup: LaunchSetup, depths=DEPTHS, poisson: float = 0.45
+) -> np.ndarray:
     """Hold force of a weightless band drawn level with the tips, over that of two strings."""
-    light = replace(sling, mass=1e-4, projectile_mass=1e-6)
+    light, setup = replace(sling, mass=1e-4), replace(setup, projectile_mass=1e-6)
     theta = np.array([5e5, poisson, 2e-3, 0.5, 1.0])
     half = np.hypot(depths, light.half_width)
     tension = String.of(light, theta).force(2 * half / light.rest_length)
     draws = np.column_stack([-np.array(depths), np.zeros(len(depths))])
-    return launch(light, theta, draws).hold_force / (2 * tension * depths / half)
+    return launch(light, setup, theta, draws).hold_force / (2 * tension * depths / half)
 
 
-def measure(bench: Bench, sling: Sling, count: int = COUNT) -> Figures:
+def measure(bench: Bench, sling: ClampedBand, count: int = COUNT) -> Figures:
     band = next(iter(bench.params.bands))
     episode = pull_and_release(band, bench.params.episode, sling)
-    thetas, draws = random_launches(count)
+    setup, (thetas, draws) = setup_of(bench), random_launches(count)
     firm = replace(sling, grip_force=1e6)  # no theta slips out of it
-    launch(sling, thetas[:1], draws[:1])  # compiles
+    launch(sling, setup, thetas[:1], draws[:1])  # compiles
     rollouts, rollout_seconds, _ = timed(lambda: interact(firm, episode, thetas))
-    launches, launch_seconds, _ = timed(lambda: launch(sling, thetas, draws))
+    launches, launch_seconds, _ = timed(lambda: launch(sling, setup, thetas, draws))
     frames = len(episode.cloud_time)
     return Figures(
         sling=sling,
-        pull=pull(sling),
+        pull=pull(sling, setup),
         bending=bending(sling),
         rollouts=rollouts,
         rollout_seconds=rollout_seconds / count,

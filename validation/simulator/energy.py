@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.interaction import schedule_of
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.records import Grip, Mode
 from pipeline.simulator.schedule import RELAX_STEPS
 from validation.simulator import figures
@@ -101,7 +101,7 @@ def remembered(
     return Remembered(carried, weight * follow.sum(-1)[:, None], free[1:], lost)
 
 
-def balance(bench: Bench, theta=THETA, sling: Sling | None = None) -> Balance:
+def balance(bench: Bench, theta=THETA, sling: ClampedBand | None = None) -> Balance:
     """The bench's pull and release in double precision, every step of it accounted for."""
     sling = sling or band_of(bench)
     episode = pull_and_release("band", bench.params.episode, sling)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.simulator.initial import fixed_frames, sections_of
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.records import Grip, Mode
 from pipeline.simulator.schedule import Schedule, statics, steps
 from pipeline.simulator.solver import Frames, Options, Slings, run
@@ -37,22 +37,28 @@ class Trajectories:
     failed: np.ndarray
 
 
-def band_of(bench: Bench) -> Sling:
-    """The first band of params.yaml as a solid rod of the default resolution, no air, stiff arm."""
+def band_of(bench: Bench) -> ClampedBand:
+    """The first band of params.yaml as a solid rod of the default resolution, without air."""
     params = bench.params
     band = params.bands[next(iter(params.bands))]
-    sling = Sling.of(band, params.setup, params.sling, as_rod=True)
-    return replace(sling, air_density=0.0, arm_stiffness=None)
+    sling = ClampedBand.of(band, params.setup, params.sling, as_rod=True)
+    return replace(sling, air_density=0.0)
 
 
-def straight(sling: Sling, length: float, **changes) -> Sling:
+def setup_of(bench: Bench, **changes) -> LaunchSetup:
+    """How it is launched: by an arm that does not give way, without a history."""
+    setup = LaunchSetup.of(bench.params.setup, bench.params.sling)
+    return replace(setup, arm_stiffness=None, **changes)
+
+
+def straight(sling: ClampedBand, length: float, **changes) -> ClampedBand:
     """A band whose clamps are `length` apart and in line."""
     return replace(
         sling, half_width=length / 2, clamp_direction=np.array([1.0, 0.0, 0.0]), **changes
     )
 
 
-def straight_guess(sling: Sling, first_half: float | None = None) -> np.ndarray:
+def straight_guess(sling: ClampedBand, first_half: float | None = None) -> np.ndarray:
     """Sections (L, 9) of a straight band, its first half stretched to `first_half` [m]."""
     middle = 0.0 if first_half is None else first_half - sling.half_width
     place = [0.0, sling.arc[sling.middle], sling.rest_length]
@@ -76,7 +82,7 @@ def settling(grip: Grip = Grip.FREE, target=(0.0, 0.0, 0.0)) -> np.ndarray:
 
 
 def move(
-    bench: Bench, sling: Sling, thetas, table: np.ndarray, start: np.ndarray, *,
+    bench: Bench, sling: ClampedBand, thetas, table: np.ndarray, start: np.ndarray, *,
     payload: float = 0.0, unrelaxed=0.0, **options,
 ) -> Trajectories:  # fmt: skip
     """Step N thetas (N, 5) from `start` (N, L, 9) or (L, 9), at rest, through steps (S,).
@@ -123,7 +129,7 @@ def rates(
     return v, at
 
 
-def rest(bench: Bench, sling: Sling, theta, start, *, table=None, **options) -> np.ndarray:
+def rest(bench: Bench, sling: ClampedBand, theta, start, *, table=None, **options) -> np.ndarray:
     """Sections (L, 9) of one band at rest."""
     table = settling() if table is None else table
     motion = move(bench, sling, theta, table, start, **options)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.simulator import Sling, interact
+from pipeline.simulator import ClampedBand, interact
 from pipeline.simulator.records import Grip
 from validation.simulator.at_rest import STRING
 from validation.simulator.closed import String
@@ -25,7 +25,7 @@ def _with(**changes: float) -> list[float]:
     return [changes.get(name, value) for name, value in zip(names, THETA, strict=True)]
 
 
-def held_force(bench: Bench, sling: Sling, thetas: list, when: float = 7.9) -> np.ndarray:
+def held_force(bench: Bench, sling: ClampedBand, thetas: list, when: float = 7.9) -> np.ndarray:
     """Force (N,) on the hand in the yardstick's pause before the release."""
     episode = pull_and_release("band", bench.params.episode, sling)
     done = interact(sling, episode, np.array(thetas), device=bench.device, workers=bench.workers)

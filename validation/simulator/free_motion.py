@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.simulator.initial import sections_of
-from pipeline.simulator.model import GRAVITY, Sling
+from pipeline.simulator.model import GRAVITY, ClampedBand
 from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import steps
 from validation.simulator.experiment import TIGHT, band_of, launched, move, straight, straight_guess
@@ -44,7 +44,7 @@ def fall_of_a_point(times: np.ndarray, order: int) -> np.ndarray:
     return np.array(z)
 
 
-def loose_band(bench: Bench) -> Sling:
+def loose_band(bench: Bench) -> ClampedBand:
     sling = band_of(bench)
     return straight(sling, sling.rest_length, clamped=(False, False))
 
@@ -83,7 +83,7 @@ def momenta(rod: ReferenceRod, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray
     return linear, sum(part.sum(-2) for part in parts)
 
 
-def bent(sling: Sling) -> np.ndarray:
+def bent(sling: ClampedBand) -> np.ndarray:
     """Sections (L, 9) of a band stretched by up to 1.3 and bent in space.
 
     Stretch and curvature fade out towards the free ends, which bear neither pull nor moment: so

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pipeline.simulator import Launches, Sling, launch
+from pipeline.simulator import ClampedBand, Launches, launch
 from pipeline.simulator.initial import drawn_guess
 from pipeline.simulator.launch import schedule_of
 from pipeline.simulator.model import GRAVITY
 from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import relaxation
-from validation.simulator.experiment import band_of, rest
+from validation.simulator.experiment import band_of, rest, setup_of
 from validation.simulator.finding import Bench, Finding, Theme, off
 from validation.simulator.reference import ReferenceRod
 
@@ -52,7 +52,7 @@ def random_launches(count: int = COUNT) -> tuple[np.ndarray, np.ndarray]:
     return theta, draws
 
 
-def with_edges(sling: Sling, times: int) -> Sling:
+def with_edges(sling: ClampedBand, times: int) -> ClampedBand:
     """The band on a mesh of `times` as many edges."""
     finer = sling.steps.model_copy(update={"edges": times * sling.edges})
     return replace(sling, edges=finer.edges, steps=finer)
@@ -67,10 +67,16 @@ def differences(default: Launches, finer: Launches) -> dict[str, float]:
 
 
 def convergence(
-    bench: Bench, count: int = COUNT, meshes=(2, 4), progress=print, sling: Sling | None = None
+    bench: Bench,
+    count: int = COUNT,
+    meshes=(2, 4),
+    progress=print,
+    sling: ClampedBand | None = None,
+    **changes,
 ) -> list[Finding]:
     sling, (thetas, draws) = sling or band_of(bench), random_launches(count)
-    default = launch(sling, thetas, draws, device=bench.device, workers=bench.workers)
+    setup = setup_of(bench, **changes)
+    default = launch(sling, setup, thetas, draws, device=bench.device, workers=bench.workers)
     finer = {f"{REFINE} times finer steps": (sling, {"refine": REFINE})}
     finer |= {f"a mesh {n} times finer": (with_edges(sling, n), {}) for n in meshes}
     finer |= {
@@ -85,7 +91,7 @@ def convergence(
     for name, (band, options) in finer.items():
         progress(f"  {count} launches with {name}, double precision")
         # on the CPU: so fine a band in double precision does not fit a GPU's shared memory
-        done = launch(band, thetas, draws, double=True, workers=bench.workers, **options)
+        done = launch(band, setup, thetas, draws, double=True, workers=bench.workers, **options)
         far = differences(default, done)
         note = f"landing {far['landing_y']:.2f} %, hold force {far['hold_force']:.2f} %"
         if name in stated:
@@ -101,11 +107,11 @@ def convergence(
 
 def order_in_time(bench: Bench, count: int = COUNT) -> list[Finding]:
     """Observed order of each launch's speed, from the default steps to the finest of REFINED."""
-    sling, (thetas, draws) = band_of(bench), random_launches(count)
+    sling, setup, (thetas, draws) = band_of(bench), setup_of(bench), random_launches(count)
 
     def speed(refine: int) -> np.ndarray:
         common = {"device": bench.device, "workers": bench.workers}
-        return launch(sling, thetas, draws, double=True, refine=refine, **common).speed
+        return launch(sling, setup, thetas, draws, double=True, refine=refine, **common).speed
 
     finest = speed(REFERENCE)
     errors = np.array([np.abs(speed(refine) / finest - 1) for refine in REFINED])
@@ -143,10 +149,10 @@ def _flight(y: float, z: float, speed: float, angle: float, floor: float) -> flo
 
 def physics(bench: Bench, count: int = COUNT) -> list[Finding]:
     """Ballistic flight, and the energy that the drawn band holds."""
-    sling, (thetas, draws) = band_of(bench), random_launches(count)
-    done = launch(sling, thetas, draws, device=bench.device, workers=bench.workers)
+    sling, setup, (thetas, draws) = band_of(bench), setup_of(bench), random_launches(count)
+    done = launch(sling, setup, thetas, draws, device=bench.device, workers=bench.workers)
     state = zip(done.separation_y, done.separation_z, done.speed, done.angle, strict=True)
-    flights = [_flight(*one, -sling.fork_height) for one in state]
+    flights = [_flight(*one, -setup.fork_height) for one in state]
     shares = []
     for k, (theta, draw) in enumerate(zip(thetas, draws, strict=True)):
         table = relaxation(Grip.POUCH)
@@ -155,8 +161,8 @@ def physics(bench: Bench, count: int = COUNT) -> list[Finding]:
             bench, sling, theta, drawn_guess(sling, draw[None])[0], table=table, double=True
         )
         rod = ReferenceRod(sling, tuple(theta))
-        lift = sling.projectile_mass * GRAVITY * (done.separation_z[k] - draw[1])
-        gained = sling.projectile_mass / 2 * done.speed[k] ** 2 + lift
+        lift = setup.projectile_mass * GRAVITY * (done.separation_z[k] - draw[1])
+        gained = setup.projectile_mass / 2 * done.speed[k] ** 2 + lift
         shares.append(gained / rod.elastic(drawn))
     named = sum(reason is not None for reason in done.failure)
     return [
@@ -180,14 +186,14 @@ def physics(bench: Bench, count: int = COUNT) -> list[Finding]:
 
 
 def section(bench: Bench, progress=print) -> Theme:
-    sling = band_of(bench)
-    size = sling.steps.launch_step
-    count = len(schedule_of(sling).steps)
+    setup, edges = setup_of(bench), band_of(bench).edges
+    size = setup.step
+    count = len(schedule_of(setup).steps)
     return Theme(
         "Launches",
         [*convergence(bench, progress=progress), *order_in_time(bench), *physics(bench)],
         f"Random θ (E 0.1–1 MPa, ν 0.30–0.49, d 0.3–16 ms, s 0–1) and draws. The default takes"
-        f" {1e3 * size:g} ms steps of second order on {sling.edges} edges, in single precision;"
+        f" {1e3 * size:g} ms steps of second order on {edges} edges, in single precision;"
         f" at most {count} steps, until the projectile leaves.",
         details={"theta": RANGES, "draw_y_m": DRAW_Y, "draw_z_m": DRAW_Z, "seed": SEED},
     )

@@ -17,7 +17,7 @@ import numpy as np
 
 from pipeline.simulator.initial import fixed_frames
 from pipeline.simulator.material import material
-from pipeline.simulator.model import GRAVITY, Sling
+from pipeline.simulator.model import GRAVITY, ClampedBand
 from pipeline.simulator.rubber import RUBBER, TIMES
 
 TURNS = 1e-2  # of the modulus: keeps the spin of an unstressed edge regular
@@ -60,7 +60,7 @@ class ReferenceRod:
             whatever the step's end is, shape (E,), and what they add of p there.
     """
 
-    sling: Sling
+    sling: ClampedBand
     theta: tuple[float, ...]
     gravity: float = GRAVITY
     payload: float = 0.0

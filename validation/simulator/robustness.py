@@ -11,9 +11,9 @@ import numpy as np
 from pipeline.identify.objective.space import Space
 from pipeline.identify.results.theta import at_points
 from pipeline.params.identification import LAWS
-from pipeline.simulator import THETA, Sling, interact, launch
+from pipeline.simulator import THETA, ClampedBand, interact, launch
 from validation.simulator.agreement import random_thetas
-from validation.simulator.experiment import band_of
+from validation.simulator.experiment import band_of, setup_of
 from validation.simulator.finding import Bench, Finding, Theme
 from validation.synthetic import pull_and_release
 
@@ -48,7 +48,7 @@ def ranges(thetas: list[dict[str, float]], names=THETA) -> str:
 
 
 def survey(
-    bench: Bench, sling: Sling, thetas: np.ndarray, progress=print, batch: int = BATCH
+    bench: Bench, sling: ClampedBand, thetas: np.ndarray, progress=print, batch: int = BATCH
 ) -> dict:
     """Roll thetas (N, 5), or points with what the law adds, out; count what comes of them."""
     episode = pull_and_release("band", bench.params.episode, sling)
@@ -78,14 +78,13 @@ def survey(
     }
 
 
-def survey_launches(bench: Bench, sling: Sling, thetas: np.ndarray) -> dict:
+def survey_launches(bench: Bench, sling: ClampedBand, thetas: np.ndarray) -> dict:
     """Launch with all thetas from random draws of the arm's box, and count what comes of them."""
-    rng, setup = np.random.default_rng(SEED), bench.params.setup
-    draws = np.column_stack(
-        [rng.uniform(*box, len(thetas)) for box in (setup.draw_y, setup.draw_z)]
-    )
+    rng, box = np.random.default_rng(SEED), bench.params.setup
+    draws = np.column_stack([rng.uniform(*ends, len(thetas)) for ends in (box.draw_y, box.draw_z)])
     own, theta = at_points(sling, thetas)
-    done = launch(own, theta, draws, device=bench.device, workers=bench.workers)
+    options = {"device": bench.device, "workers": bench.workers}
+    done = launch(own, setup_of(bench), theta, draws, **options)
     good = np.array([reason is None for reason in done.failure])
     outcome = np.column_stack([done.landing_y, done.speed, done.angle, done.hold_force])
     return {

@@ -13,7 +13,7 @@ from pipeline.identify.objective.space import Space
 from pipeline.params.identification import LAWS
 from pipeline.simulator.initial import drawn_guess
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.simulator.model import ClampedBand, LaunchHistory
 from pipeline.simulator.records import Grip
 from pipeline.simulator.rubber import RUBBER, TIMES
 from pipeline.simulator.schedule import steps
@@ -26,6 +26,7 @@ from validation.simulator.experiment import (
     launched,
     move,
     settling,
+    setup_of,
     straight,
     straight_guess,
 )
@@ -43,9 +44,9 @@ HISTORY = LaunchHistory(pull_time=4.0, pause=2.0)
 SEED = 5
 
 
-def rubber_of(bench: Bench, share: float = 0.3, weight: float = WEIGHT) -> Sling:
+def rubber_of(bench: Bench, share: float = 0.3, weight: float = WEIGHT) -> ClampedBand:
     sling = band_of(bench)
-    return replace(sling, law=RUBBER, mooney_share=share, relaxation=weight, history=HISTORY)
+    return replace(sling, law=RUBBER, mooney_share=share, relaxation=weight)
 
 
 def stress(stretch, share: float):
@@ -57,7 +58,7 @@ def slope(stretch: float, share: float) -> float:
     return (1 - share) * (1 + 2 * stretch**-3) + 3 * share * stretch**-4
 
 
-def _string(bench: Bench, share: float, weight: float, lighter: float = 1.0) -> Sling:
+def _string(bench: Bench, share: float, weight: float, lighter: float = 1.0) -> ClampedBand:
     """A straight, thin, light band at its rest length, to be drawn across at its middle."""
     sling = rubber_of(bench, share, weight)
     sling = replace(sling, radius=sling.radius / THIN, mass=sling.mass / THIN**2 / lighter)
@@ -65,7 +66,7 @@ def _string(bench: Bench, share: float, weight: float, lighter: float = 1.0) -> 
 
 
 def drawn_across(
-    bench: Bench, sling: Sling, stretch: np.ndarray, times: np.ndarray
+    bench: Bench, sling: ClampedBand, stretch: np.ndarray, times: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pull along the band [N] over A mu as its middle is drawn to stretches (T,), and the times."""
     theta = np.array([1e6, FULL, 2e-4, 0.5, 1.0])
@@ -243,8 +244,9 @@ def slack(bench: Bench) -> list[Finding]:
 def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Finding]:
     """`launch` starts with what a pull and a pause leave in the memory: the march of that pull."""
     sling, draw = rubber_of(bench), np.array([-0.35, -0.15])
-    done = launching.launch(sling, theta, draw, device=bench.device)
-    none = launching.launch(replace(sling, history=None), theta, draw, device=bench.device)
+    setup = setup_of(bench, history=HISTORY)
+    done = launching.launch(sling, setup, theta, draw, device=bench.device)
+    none = launching.launch(sling, setup_of(bench), theta, draw, device=bench.device)
     times = 0.02 * np.arange(301)  # 4 s, and 2 s drawn
     part = np.minimum(times / HISTORY.pull_time, 1)
     way = (part**2 * (3 - 2 * part))[:, None] * draw
@@ -255,7 +257,7 @@ def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Finding]:
     before = settling(Grip.POUCH, (0.0, *way[first]))
     start = drawn_guess(sling, way[[first]])[0]
     motion = move(
-        bench, sling, theta, np.concatenate([before, table]), start, payload=sling.projectile_mass
+        bench, sling, theta, np.concatenate([before, table]), start, payload=setup.projectile_mass
     )
     hold = float(np.linalg.norm(motion.force[0, -1]))
     return [
@@ -324,7 +326,7 @@ def section(bench: Bench, count: int = 10_000, progress=print) -> Theme:
             *growth(bench),
             *slack(bench),
             *histories(bench),
-            *launching.convergence(bench, progress=progress, sling=sling),
+            *launching.convergence(bench, progress=progress, sling=sling, history=HISTORY),
             *surveyed,
         ],
         "Mooney's share m and eight relaxing branches of one weight beside the neo-Hookean material"

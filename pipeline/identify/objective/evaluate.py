@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,14 +16,16 @@ from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import TERMS, EpisodeLoss
 from pipeline.identify.objective.space import Space
 from pipeline.params.identification import LAWS
-from pipeline.simulator.interaction import interact
+from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.material import THETA
+from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.rubber import RUBBER
 
 NOT_FINITE = "the loss is not finite"  # the one failure that depends on the weights
 SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
 
-simulated = partial(interact, fetch=False)  # the loss is computed where the rollouts are
+Simulate = Callable[..., Rollouts]
+simulated: Simulate = partial(interact, fetch=False)  # the loss is computed where the rollouts are
 
 
 @dataclass(frozen=True)
@@ -56,13 +58,13 @@ class Evaluator:
     def __init__(
         self,
         episode: Episode,
-        sling,
+        sling: ClampedBand,
         loss: EpisodeLoss,
         space: Space,
         *,
         devices: Sequence[str] = ("cpu",),
         workers: int | None = None,
-        simulate=simulated,
+        simulate: Simulate = simulated,
         whole: bool = False,
     ) -> None:
         """Keep what every batch needs.

@@ -24,6 +24,8 @@ from pipeline.episode.signal import as_recorded, cutoff_hz
 from pipeline.identify.objective.chamfer import Chamfer, CloudDistance
 from pipeline.identify.objective.device_terms import DeviceTerms
 from pipeline.params import Params
+from pipeline.simulator.interaction import Rollouts
+from pipeline.simulator.model import ClampedBand
 
 TERMS = ("geom", "force", "work")
 LOCK = threading.Lock()  # while a filter is made, which takes a second
@@ -100,7 +102,7 @@ class EpisodeLoss:
             raise UserError(f"episode of {episode.band}: no camera frame shows the band")
 
     @classmethod
-    def of(cls, params: Params, method: str, episode: Episode, sling) -> EpisodeLoss:
+    def of(cls, params: Params, method: str, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
         """Make it from params.yaml's `loss`, `force` and `methods.<method>`."""
         cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
         held = params.loss.held_out
@@ -117,7 +119,7 @@ class EpisodeLoss:
         )
 
     @classmethod
-    def plain(cls, params: Params, episode: Episode, sling) -> EpisodeLoss:
+    def plain(cls, params: Params, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
         """Geometry and force alone, for a part of an episode."""
         return cls(
             episode,
@@ -129,7 +131,7 @@ class EpisodeLoss:
             chamfer=params.loss.chamfer,
         )
 
-    def terms(self, rollouts) -> dict[str, np.ndarray]:
+    def terms(self, rollouts: Rollouts) -> dict[str, np.ndarray]:
         """Each term of N rollouts, shape (N,); NaN or infinite where a rollout is.
 
         They are computed on the device that holds the rollouts. A rollout's terms are the same to
@@ -148,7 +150,7 @@ class EpisodeLoss:
             "work": np.abs(work) / 2 * self.period,
         }
 
-    def residuals(self, rollouts) -> dict[str, dict[str, np.ndarray]]:
+    def residuals(self, rollouts: Rollouts) -> dict[str, dict[str, np.ndarray]]:
         """Fitted against held-out between grasp and release: `force` [N] and `cloud` [cm], (N,).
 
         NaN where nothing is held out.
@@ -168,9 +170,10 @@ class EpisodeLoss:
 
     def total(self, terms: dict[str, np.ndarray]) -> np.ndarray:
         """Weighted sum of the terms, shape (N,); one without weight may be NaN."""
-        return sum(weight * terms[name] for name, weight in self.weights.items() if weight)
+        weighed = (weight * terms[name] for name, weight in self.weights.items() if weight)
+        return sum(weighed, np.zeros(()))
 
-    def filtered(self, rollouts) -> np.ndarray:
+    def filtered(self, rollouts: Rollouts) -> np.ndarray:
         """The simulated force as the record would have it [N], shape (N, T, 3), before `smooth`."""
         force = rollouts.force
         force = force if isinstance(force, np.ndarray) else force.numpy()
@@ -178,7 +181,7 @@ class EpisodeLoss:
         flat = force.transpose(1, 0, 2).reshape(steps, -1)
         return (self._filter(rollouts.times) @ flat).reshape(-1, count, 3).transpose(1, 0, 2)
 
-    def frames(self, rollouts) -> np.ndarray:
+    def frames(self, rollouts: Rollouts) -> np.ndarray:
         """Chamfer distance of each camera frame [m], shape (N, K); NaN where it shows nothing."""
         line = rollouts.center_line
         return self.chamfer(line, "cpu" if isinstance(line, np.ndarray) else str(line.device))
@@ -188,7 +191,7 @@ class EpisodeLoss:
         window = (1,) * (signal.ndim - 2) + (self.median_window, 1)
         return median_filter(signal, size=window, mode="nearest")
 
-    def _gap(self, rollouts) -> np.ndarray:
+    def _gap(self, rollouts: Rollouts) -> np.ndarray:
         """Measured less simulated force [N], shape (N, T, 3)."""
         return self.force - self.smooth(self.filtered(rollouts))
 
@@ -224,14 +227,14 @@ def _mean(chosen: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=128)  # shared by all losses of an episode, such as the report's replays
 def _recording_filter(
-    times: bytes, cutoff: float, start: float, period: float, samples: int
+    stamps: bytes, cutoff: float, start: float, period: float, samples: int
 ) -> csr_array:
     """Matrix (T, S) from forces at simulated times (S,) to the episode's T filtered samples.
 
     It is the recorded force's way (interpolation, low-pass, averages), which is linear, and
     forgets: weights that no rounding would show are left out.
     """
-    times, parts = np.frombuffer(times), []
+    times, parts = np.frombuffer(stamps), []
     for first in range(0, len(times), 32):
         pulses = np.eye(len(times), min(32, len(times) - first), -first)
         parts.append(as_recorded(times, pulses, cutoff, start, period, samples))

@@ -20,6 +20,7 @@ from pipeline.identify.results.theta import EXTRA
 from pipeline.params import Params
 from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.simulator.material import THETA
+from pipeline.simulator.model import ClampedBand
 
 YOUNG, POISSON, DAMPING, FRICTION, SCALE = range(5)
 LOGS = "log_youngs_modulus", "log_loss_factor"  # of Pa
@@ -64,7 +65,7 @@ class Coordinates:
     precision: np.ndarray
 
     @classmethod
-    def of_method(cls, params: Params, method: str, sling) -> Coordinates:
+    def of_method(cls, params: Params, method: str, sling: ClampedBand) -> Coordinates:
         """Of a method of params.yaml that searches by least squares, and its band's sling."""
         about = params.methods[method]
         box = {name: (one.low, one.high) for name, one in params.parameters} | dict(about.bounds)

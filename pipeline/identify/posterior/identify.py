@@ -18,27 +18,20 @@ from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.posterior.coordinates import Coordinates
 from pipeline.identify.posterior.draws import truncated_gaussian
 from pipeline.identify.posterior.fit import Fit, fit
-from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
+from pipeline.identify.posterior.launches import Evidence, LaunchLikelihood
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
 from pipeline.identify.results.estimate import pull_of
 from pipeline.identify.results.theta import EXTRA
-from pipeline.params import Params
+from pipeline.identify.results.units import SI_UNITS
+from pipeline.params import Parameters, Params
 from pipeline.params.identification import LAWS, UNSEEN
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.simulator.model import ClampedBand, LaunchHistory
 from pipeline.simulator.rubber import RUBBER
 
 LEVEL = 0.9
 SAMPLES = 200
 FILLS = 2 / 3  # of the box: an interval as wide tells nothing
-UNITS = {
-    "damping_product": "s",
-    "air_drag": "1/s",
-    "turn_damping": "",
-    "returned_share": "",
-    "release_time": "s",
-    "camera_delay": "s",
-}
 
 
 @dataclass(frozen=True)
@@ -80,11 +73,11 @@ class Identified:
 def fit_posterior(
     params: Params,
     method: str,
-    sling: Sling,
+    sling: ClampedBand,
     episodes: Sequence[Episode],
     start: np.ndarray,
     *,
-    observed: Sequence[Observed] = (),
+    evidence: Evidence | None = None,
     workers: int | None = None,
     progress: Callable[[Fit], None] = lambda fit: None,
 ) -> Identified:
@@ -94,7 +87,7 @@ def fit_posterior(
         method: Of params.yaml, one that searches by least squares.
         episodes: Of the band's recordings, at least one.
         start: θ and what its law adds, (P,): the nearest that an exploration found.
-        observed: Launches that are evidence.
+        evidence: Launches, drawn as the first recording was.
 
     Raises:
         NoFit: Simulations fail at the start.
@@ -103,7 +96,10 @@ def fit_posterior(
     friction = params.methods[method].fixed["dynamic_friction"]
     recordings = [Likelihood(one, sling, cutoff, friction) for one in episodes]
     coordinates = Coordinates.of_method(params, method, sling)
-    launches = LaunchLikelihood(observed, launched(sling, episodes[0])) if observed else None
+    launches = None
+    if evidence and evidence.launches:
+        setup = replace(evidence.setup, history=recorded_history(sling, episodes[0]))
+        launches = LaunchLikelihood(evidence.launches, sling, setup)
     known = {"launches": launches, "workers": workers, "progress": progress}
     found = fit(recordings, coordinates, coordinates.of(start), **known)
     birge = disagreement(found)
@@ -115,11 +111,9 @@ def fit_posterior(
     return Identified(coordinates, found, birge, samples, recordings, launches)
 
 
-def launched(sling: Sling, episode: Episode) -> Sling:
-    """The sling as it is launched: a law that remembers takes the recording's pull and pause."""
-    if sling.law != RUBBER:
-        return sling
-    return replace(sling, history=LaunchHistory(**launch_history(episode)))
+def recorded_history(sling: ClampedBand, episode: Episode) -> LaunchHistory | None:
+    """What a band remembers that is launched as it was recorded; None for a law without memory."""
+    return LaunchHistory(**launch_history(episode)) if sling.law == RUBBER else None
 
 
 def disagreement(found: Fit) -> float:
@@ -153,7 +147,7 @@ def theta_entries(found: Identified) -> dict:
     }
 
 
-def confidence(found: Identified, boxes) -> dict:
+def confidence(found: Identified, boxes: Parameters) -> dict:
     """What a θ file says under `confidence`, ready for JSON.
 
     Args:
@@ -177,7 +171,9 @@ def confidence(found: Identified, boxes) -> dict:
     shown = {name: columns[name] for name in EXTRA}
     for one, kept in ((columns, shown), (mode, mode)):
         kept["damping_product"] = one["elasticity_damping"] * one["damping_scale"]
-    derived = {name: _told(samples, mode[name], UNITS[name]) for name, samples in shown.items()}
+    derived = {
+        name: _told(samples, mode[name], SI_UNITS.get(name, "")) for name, samples in shown.items()
+    }
     derived |= _clocks(found)
     matrix = np.corrcoef(found.samples.T + 1e-12 * np.arange(SAMPLES))
     return {
@@ -229,7 +225,7 @@ def _clocks(found: Identified) -> dict:
 def _left(found: Identified, number: int) -> dict:
     """What a recording shows that the simulation does not, and what the others alone say of it."""
     one, recording = found.fit.expansions[number], found.recordings[number]
-    about = {"force_rms": one.rms("force"), "held_rms": one.rms("held")}
+    about: dict = {"force_rms": one.rms("force"), "held_rms": one.rms("held")}
     about |= {"recoil_rms": one.rms("recoil"), "pictures": one.pictures}
     about["source"] = recording.episode.metadata.get("input", {})
     if len(found.recordings) > 1:

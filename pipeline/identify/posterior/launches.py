@@ -9,13 +9,14 @@ the returned share, a coordinate of the density.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.identify.results.theta import at_points
 from pipeline.simulator.launch import launch
+from pipeline.simulator.model import ClampedBand, LaunchSetup
 
 TAPE = 0.01  # of a measured landing, standard deviation [m]
 NUDGE = 1e-3  # of a draw [m]
@@ -24,24 +25,42 @@ CROSS = NUDGE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
 
 @dataclass(frozen=True)
 class Observed:
-    """A launch: draw (y, z) and its standard deviation along each axis, landing [m]."""
+    """A launch: draw (y, z) and its standard deviation along each axis, landing [m].
+
+    The deviation is None where a table leaves it out.
+    """
 
     draw: tuple[float, float]
-    error: float
+    error: float | None
     landing: float
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Launches of one band, and what launches them.
+
+    Attributes:
+        made_with: The settings that `setup` comes from, by their keys in params.yaml.
+    """
+
+    launches: Sequence[Observed]
+    setup: LaunchSetup
+    made_with: Mapping[str, float | None] = field(default_factory=dict)
 
 
 class LaunchLikelihood:
     """Launches of one band.
 
     Attributes:
-        sling: With the history that the launches had.
+        setup: With the history that the launches had.
         left: Of each, log of measured over simulated landing at the last expansion; NaN where the
             simulated launch fails, which then counts for nothing.
     """
 
-    def __init__(self, observed: Sequence[Observed], sling) -> None:
-        self.sling = sling
+    def __init__(
+        self, observed: Sequence[Observed], sling: ClampedBand, setup: LaunchSetup
+    ) -> None:
+        self.sling, self.setup = sling, setup
         self.draws = np.array([one.draw for one in observed], float).reshape(-1, 2)
         self.errors = np.array([one.error for one in observed], float)
         self.landings = np.array([one.landing for one in observed], float)
@@ -72,6 +91,6 @@ class LaunchLikelihood:
     def _simulated(self, points: np.ndarray, draws: np.ndarray) -> np.ndarray:
         """Landings [m] of points (N, P) from draws (N, 2), NaN where a launch fails."""
         sling, theta = at_points(self.sling, points)
-        done = launch(sling, theta, draws, workers=2)
+        done = launch(sling, self.setup, theta, draws, workers=2)
         failed = np.array([why is not None for why in done.failure])
         return np.where(failed, np.nan, done.landing_y)

@@ -11,6 +11,7 @@ Gaussians the minimum over n is, up to a constant, the integral over n.
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.residuals import Residuals, Rule
 from pipeline.identify.results.theta import at_points
 from pipeline.simulator.interaction import Rollouts, interact
+from pipeline.simulator.model import ClampedBand
 
 SIMULATED = "release", "camera", "hand"
 NUDGE = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
@@ -100,7 +102,7 @@ class Expansion:
         return (episode.cloud_time[np.unique(seen)] - episode.release_time).tolist()
 
 
-def opening_time(episode: Episode, sling, friction: float) -> float:
+def opening_time(episode: Episode, sling: ClampedBand, friction: float) -> float:
     """In which the simulated pads must open for the force to fall as fast as recorded [s].
 
     From the slip on friction falls with the pads' force, which is gone after the opening time: the
@@ -129,7 +131,7 @@ class Likelihood:
     def __init__(
         self,
         episode: Episode,
-        sling,
+        sling: ClampedBand,
         cutoff: float,
         friction: float,
         tolerances: Tolerances | None = None,
@@ -168,7 +170,7 @@ class Likelihood:
         phi: np.ndarray,
         steps: np.ndarray,
         nuisances: np.ndarray,
-        pool,
+        pool: Executor,
         residuals: Residuals | None = None,
     ) -> Expansion:
         """Expand around coordinates (D,) with finite differences `steps` (D,). Raises Failed.
@@ -191,7 +193,14 @@ class Likelihood:
         slopes = ((vectors[1:] - gap) / steps[:, None], (moved - gap) / NUDGE[:, None])
         return self._eliminated(residuals, gap, *slopes, nuisances)
 
-    def _eliminated(self, residuals, gap, slopes, own, nuisances) -> Expansion:
+    def _eliminated(
+        self,
+        residuals: Residuals,
+        gap: np.ndarray,
+        slopes: np.ndarray,
+        own: np.ndarray,
+        nuisances: np.ndarray,
+    ) -> Expansion:
         has = self.tolerances
         linear = self._linear(residuals, own[SIMULATED.index("camera")])
         weight = 1 / residuals.spread(has.force, has.cloud, has.way)

@@ -1,15 +1,14 @@
-"""The sling of a band of params.yaml, with the clamps as its recording has calibrated them."""
+"""A clamped band of params.yaml, with the clamps as its recording has calibrated them."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from pipeline.base.layout import Layout
 from pipeline.base.schema import Direction, JsonRecord, Range, read_json
 from pipeline.params import Params
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.rubber import NEO_HOOKEAN
 
 
@@ -27,22 +26,20 @@ def load_sling(
     law: str = NEO_HOOKEAN,
     *,
     mounted: bool = True,
-) -> Sling:
-    """The sling of a band of params.yaml, mounted as its recording shows where that was fitted.
+) -> ClampedBand:
+    """A band of params.yaml, mounted as its recording shows where that was fitted.
 
     Args:
         mounted: False leaves out what was fitted: the band hangs as `setup` says.
 
     Raises NotMade where the file of the mounting is damaged.
     """
-    path, mounting = Layout(Path(root)).clamps(band), None
-    if mounted and path.exists():
-        mounting = read_json(path, Mounting).model_dump()
-    sling = Sling.of(params.bands[band], params.setup, params.sling, mounting)
-    return replace(sling, law=law)
+    path = Layout(Path(root)).clamps(band)
+    mounting = read_json(path, Mounting) if mounted and path.exists() else None
+    return ClampedBand.of(params.bands[band], params.setup, params.sling, mounting, law=law)
 
 
-def sling_of_method(params: Params, band: str, method: str, root: str | Path = ".") -> Sling:
-    """The sling of a band as a method of params.yaml takes it: with its law, mounted or not."""
+def sling_of_method(params: Params, band: str, method: str, root: str | Path = ".") -> ClampedBand:
+    """A band as a method of params.yaml takes it: with its law, mounted or not."""
     about = params.methods[method]
     return load_sling(params, band, root, about.law, mounted=about.mounting)

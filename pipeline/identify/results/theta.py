@@ -5,7 +5,8 @@
 seconds the recording's hand drew the band and how long it waited. Where a stage wrote it, also
 "method", "nuisances": {"air_drag": ...}, "turn_damping", "returned_share", "loss":
 {"geom", "force", "work", "total"}, "rollouts", "confidence"; "mounted": false where the method
-leaves out the calibration of the clamps. What is read of "confidence": confidence.py.
+leaves out the calibration of the clamps; "made_with": the settings of params.yaml that it rests on
+(params/provenance.py). What is read of "confidence": confidence.py.
 
 What its confidence rests on, samples of θ, lies beside in data/confidence/.
 """
@@ -14,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import create_model, model_validator
@@ -27,7 +28,7 @@ from pipeline.identify.results.mounting import load_sling
 from pipeline.params import Parameters, Params
 from pipeline.params.identification import LAWS
 from pipeline.simulator.material import THETA
-from pipeline.simulator.model import LaunchHistory, Sling
+from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 
 EXTRA = "air_drag", "turn_damping", "returned_share"  # of a point, after θ and what its law adds
@@ -67,6 +68,7 @@ class ThetaFile(JsonRecord):
     mounted: bool = True
     loss: dict[Name, float] = {}
     rollouts: Count = 0
+    made_with: dict[str, Any] = {}
     confidence: Confidence | None = None
 
     @model_validator(mode="after")
@@ -118,23 +120,27 @@ def load_samples(path: Path) -> np.ndarray | None:
     return np.array(samples, float) if samples else None
 
 
-def calibrated(params: Params, band: str, content: dict, root: str | Path = ".") -> Sling:
-    """The sling of a band with all that a θ file's content says beside the five of θ.
-
-    Its launches have the history of params.yaml's `launch`, or else the recording's.
-    """
+def calibrated(params: Params, band: str, content: dict, root: str | Path = ".") -> ClampedBand:
+    """The band with all that a θ file's content says beside the five of θ."""
     law = content.get("law", NEO_HOOKEAN)
     extra = {name: content["theta"][name] for name in LAWS[law]}
     extra["air_drag"] = content.get("nuisances", {}).get("air_drag", 0.0)
     extra["turn_damping"] = content.get("turn_damping", 0.0)
     extra["returned_share"] = content.get("returned_share", 1.0)
-    extra["history"] = launch_history(params, content)
     sling = load_sling(params, band, root, law, mounted=content.get("mounted", True))
     return replace(sling, **extra)
 
 
-def launch_history(params: Params, content: dict) -> LaunchHistory | None:
-    """How a hand must draw the band of a θ file to launch it; None for a law without memory."""
+def launch_setup(params: Params, content: dict) -> LaunchSetup:
+    """How the band of a θ file is launched."""
+    return LaunchSetup.of(params.setup, params.sling, history_of(params, content))
+
+
+def history_of(params: Params, content: dict) -> LaunchHistory | None:
+    """How a hand must draw the band of a θ file to launch it; None for a law without memory.
+
+    As params.yaml's `launch` says, or else as the recording's hand did.
+    """
     asked = {"pull_time": params.launch.pull_time, "pause": params.launch.pause}
     if content.get("law", NEO_HOOKEAN) != RUBBER:
         return None
@@ -142,7 +148,7 @@ def launch_history(params: Params, content: dict) -> LaunchHistory | None:
     return LaunchHistory(**content["history"] | told)
 
 
-def at_points(sling: Sling, points: np.ndarray) -> tuple[Sling, np.ndarray]:
+def at_points(sling: ClampedBand, points: np.ndarray) -> tuple[ClampedBand, np.ndarray]:
     """A sling and θ (N, 5) of points (N, P): θ, what the sling's law adds, perhaps EXTRA."""
     if points.shape[-1] == len(THETA):
         return sling, points

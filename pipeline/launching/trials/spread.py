@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy.special import ndtri
+
+from pipeline.launching.surface.landing_map import Launched, Launcher
 
 LEVEL = 0.9
 MOST = 60  # samples of θ that are launched
@@ -15,7 +15,7 @@ ERRORS = ndtri((np.arange(401) + 0.5) / 401)  # equally likely; 41 end 6 % too s
 
 
 def landing_intervals(
-    launcher: Callable,
+    launcher: Launcher,
     draws: np.ndarray,
     samples: np.ndarray | None,
     error: float,
@@ -52,6 +52,6 @@ def landing_intervals(
     return result
 
 
-def _landing(launched) -> np.ndarray:
+def _landing(launched: Launched) -> np.ndarray:
     good = np.array([failure is None for failure in launched.failure])
     return np.where(good, np.asarray(launched.landing_y, float), np.nan)

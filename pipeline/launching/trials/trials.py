@@ -22,6 +22,7 @@ from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.measured import Measured
 from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params import Params
+from pipeline.simulator.launch import Launches
 
 SCHEMA = pa.schema(
     [
@@ -145,7 +146,12 @@ def launched(batch: Batch, launch: Callable) -> Batch:
     return replace(batch, kind="virtual", landing=landing, **told)
 
 
-def predict(batches: list[Batch], launcher: Callable, samples: np.ndarray | None, params: Params):
+def predict(
+    batches: list[Batch],
+    launcher: Callable[..., Launches],
+    samples: np.ndarray | None,
+    params: Params,
+) -> tuple[Launches, np.ndarray]:
     """What the calibrated simulator makes of the draws of all batches, N in all.
 
     Args:
@@ -165,7 +171,7 @@ def predict(batches: list[Batch], launcher: Callable, samples: np.ndarray | None
     return launches, intervals
 
 
-def limited(launches, max_force: float):
+def limited(launches: Launches, max_force: float) -> Launches:
     """Launches of a simulator without a limit, by an arm that can hold no more than `max_force`."""
     force = launches.hold_force
     over = force > max_force
@@ -186,7 +192,7 @@ def table(
     method: str,
     batches: list[Batch],
     *,
-    predicted,
+    predicted: Launches,
     intervals: np.ndarray,
     stretch: np.ndarray,
     recorded: float | None,
@@ -206,7 +212,7 @@ def table(
     def each(name: str) -> list:
         return [getattr(batch, name) for batch in batches for _ in batch.draws]
 
-    def known(values) -> pa.Array:
+    def known(values: np.ndarray | list) -> pa.Array:
         return pa.array(values, pa.float64(), from_pandas=True)
 
     force = zip(every("hold_force"), predicted.hold_force, strict=True)

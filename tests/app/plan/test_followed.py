@@ -13,7 +13,7 @@ from pipeline.base.errors import UserError
 from pipeline.params import load
 from pipeline.recording.input.reader import read_recording
 from tests.project import ROOT, with_
-from tests.recording.bag import BASE, HAND, REST, Truth, write_bag
+from validation.recordings.bag import BASE, HAND, REST, Truth, write_bag
 
 
 @dataclass(frozen=True)

@@ -223,12 +223,15 @@ def test_the_force_by_theta(params, tmp_path) -> None:
     from pipeline.identify.results.mounting import load_sling
     from pipeline.simulator.launch import launch
     from pipeline.simulator.material import THETA
+    from pipeline.simulator.model import LaunchSetup
 
     values = 3e5, 0.45, 5e-3, 0.5, 1.0
     path = tmp_path / "theta.json"
     theta = dict(zip(THETA, values, strict=True))
     path.write_text(json.dumps({"band": "band1", "theta": theta}))
-    held = float(launch(load_sling(params, "band1"), np.array(values), (-0.3, -0.2)).hold_force[0])
+    setup = LaunchSetup.of(params.setup, params.sling)
+    done = launch(load_sling(params, "band1"), setup, np.array(values), (-0.3, -0.2))
+    held = float(done.hold_force[0])
     planned = plan_recording(params, "band1", draw=(-0.3, -0.2), theta=path)
     assert planned.force.force == held
 

@@ -13,7 +13,7 @@ from app.preflight.verdict import cautions_of, pause
 from pipeline.base.errors import UserError, printable
 from tests.hostile import MARKUP
 from tests.project import with_
-from tests.recording.bag import RADIUS, START, Truth, blind_bag, edit, head, write_bag
+from validation.recordings.bag import RADIUS, START, Truth, blind_bag, edit, head, write_bag
 
 
 def abouts(report) -> set[str]:

@@ -6,16 +6,16 @@ import numpy as np
 
 from pipeline.episode.episode import Episode
 from pipeline.params import load
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand, ClampValues
 
 PARAMS = load("params.yaml")
 PERIOD = 0.03
 
 
-def sling_of(mass: float, clamps: dict | None = None) -> Sling:
+def sling_of(mass: float, clamps: ClampValues | None = None) -> ClampedBand:
     """A band of 10 mm and 52 cm at params.yaml's resolution."""
     band = SimpleNamespace(mass=mass, diameter=0.01, rest_length=0.52)
-    return Sling.of(band, PARAMS.setup, PARAMS.sling, clamps)
+    return ClampedBand.of(band, PARAMS.setup, PARAMS.sling, clamps)
 
 
 def smooth(time: np.ndarray, start: float, end: float) -> np.ndarray:

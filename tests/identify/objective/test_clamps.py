@@ -9,9 +9,10 @@ from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.identify.clamps import calibrate_clamps, nominal_young, slack_part
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.simulator.model import Sling
-from tests.identify.objective.own_law import own_law_episode
+from pipeline.identify.results.mounting import Mounting
+from pipeline.simulator.model import ClampedBand
 from tests.identify.objective.pulls import PARAMS, pulled, sling_of
+from validation.synthetic import own_law_episode
 
 THETA = np.array([3e5, 0.45, 4e-3, 1.0, 1.0])
 SOLID = THETA[0] * np.pi * 0.005**4 / 4
@@ -19,15 +20,16 @@ ANGLE, RIGIDITY = np.deg2rad(15.0), 3.0
 
 
 @pytest.fixture(scope="module")
-def sling() -> Sling:
+def sling() -> ClampedBand:
     return sling_of(0.03)
 
 
 @pytest.fixture(scope="module")
-def episode(sling: Sling) -> Episode:
+def episode(sling: ClampedBand) -> Episode:
     """Hang, grasp at 0.6 s, lift by 1.6 s, pull to 0.4 m by 4 s, hold, release at 4.8 s."""
-    clamps = {"clamp_direction": [np.sin(ANGLE), 0.0, -np.cos(ANGLE)]}
-    truth = sling_of(0.03, clamps | {"flexural_rigidity": RIGIDITY * SOLID})
+    direction = (np.sin(ANGLE), 0.0, -np.cos(ANGLE))
+    clamps = Mounting(clamp_direction=direction, flexural_rigidity=RIGIDITY * SOLID)
+    truth = sling_of(0.03, clamps)
     empty = pulled(190, 170, 0.6, (0.6, 1.6), (1.6, 4.0), 4.8)
     return own_law_episode(truth, empty, THETA, cutoff=35.65, force_noise=0.0, depth_noise=0.0)
 

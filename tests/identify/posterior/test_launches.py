@@ -11,7 +11,7 @@ from pipeline.identify.posterior.launches import TAPE, LaunchLikelihood, Observe
 STEPS = np.array([1e-3, 1e-3])
 
 
-def toy(sling, theta: np.ndarray, draws: np.ndarray, workers: int) -> SimpleNamespace:
+def toy(sling, setup, theta: np.ndarray, draws: np.ndarray, workers: int) -> SimpleNamespace:
     """log landing is linear in both coordinates; none from draws above z = 0."""
     y, z = np.asarray(draws).T
     landing = np.exp(theta @ [1.0, 0.5]) * y**2 * (1 - z)
@@ -26,7 +26,7 @@ def closed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def expanded(*observed: Observed, phi=(0.0, 0.0)):
-    evidence = LaunchLikelihood(observed, None)
+    evidence = LaunchLikelihood(observed, None, None)
     return evidence, *evidence.expand(lambda phi: phi, np.array(phi), STEPS)
 
 
@@ -67,7 +67,7 @@ def test_a_launch_that_fails_in_simulation_counts_for_nothing() -> None:
 
 def test_at_the_truth_nothing_pulls() -> None:
     phi = (0.2, -0.1)
-    landing = float(toy(None, np.array([phi]), np.array([[-0.5, -0.2]]), 1).landing_y[0])
+    landing = float(toy(None, None, np.array([phi]), np.array([[-0.5, -0.2]]), 1).landing_y[0])
     _, misfit, _, gradient = expanded(Observed((-0.5, -0.2), 0.001, landing), phi=phi)
     assert misfit == pytest.approx(0, abs=1e-12)
     np.testing.assert_allclose(gradient, 0, atol=1e-6)

@@ -1,7 +1,5 @@
 """A launch that flew further than simulated, in the simulator itself."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -10,8 +8,9 @@ from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
 from pipeline.identify.results.mounting import load_sling
 from pipeline.identify.results.theta import at_points
 from pipeline.simulator.launch import launch
-from pipeline.simulator.model import LaunchHistory
-from tests.project import ROUGH, with_
+from pipeline.simulator.model import LaunchHistory, LaunchSetup
+from tests.project import with_
+from validation.projects import ROUGH
 
 THETA = np.array([5e5, 0.47, 5e-3, 0.7, 0.6, 0.0, 0.02])  # and Mooney's share, relaxation
 DRAW, FURTHER = (-0.30, -0.17), 1.04
@@ -21,18 +20,17 @@ DRAW, FURTHER = (-0.30, -0.17), 1.04
 def told(params):
     """Coordinates, where they stand, and what was known and is with launches from DRAW."""
     rough = with_(params, "sling", **ROUGH)
-    sling = replace(
-        load_sling(rough, "band1", "nowhere", "rubber"), history=LaunchHistory(1.0, 0.5)
-    )
+    sling = load_sling(rough, "band1", "nowhere", "rubber")
+    setup = LaunchSetup.of(rough.setup, rough.sling, LaunchHistory(1.0, 0.5))
     coordinates = Coordinates.of_method(rough, "least_squares", sling)
     phi = coordinates.of(THETA)
     own, theta = at_points(sling, coordinates.points(phi[None]))
-    once = launch(own, theta, np.array([DRAW]))
+    once = launch(own, setup, theta, np.array([DRAW]))
     assert once.failure[0] is None
 
     def by(count: int):
         observed = [Observed(DRAW, 0.001, FURTHER * float(once.landing_y[0]))] * count
-        _, hessian, gradient = LaunchLikelihood(observed, sling).expand(
+        _, hessian, gradient = LaunchLikelihood(observed, sling, setup).expand(
             coordinates.points, phi, coordinates.steps
         )
         return known + hessian, gradient

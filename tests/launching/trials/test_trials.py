@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.launching.trials.trials import SCHEMA, Batch, launched, limited, table
 from pipeline.params import load
 from pipeline.simulator.launch import Launches, launch
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand, LaunchSetup
 
 PREDICTED = Launches(
     landing_y=np.array([1.9, np.nan, 2.0]),
@@ -86,11 +86,12 @@ def test_the_limit_is_the_simulators_own() -> None:
     assert weak == [None, "it broke", "holding takes 31.0 N, more than 30 N"]
     assert limited(PREDICTED, 31.0).failure == PREDICTED.failure
     params = load()
-    sling = Sling.of(params.bands["band1"], params.setup, params.sling)
+    lab = params.setup, params.sling
+    world = ClampedBand.of(params.bands["band1"], *lab), LaunchSetup.of(*lab)
     draws, theta = np.array([[-0.28, -0.1], [-0.44, -0.28]]), np.array([2e5, 0.45, 2e-3, 0.5, 0.5])
-    free = launch(sling, theta, draws)
+    free = launch(*world, theta, draws)
     limit = float(free.hold_force.mean())
-    expected, found = launch(sling, theta, draws, max_force=limit), limited(free, limit)
+    expected, found = launch(*world, theta, draws, max_force=limit), limited(free, limit)
     assert found.failure == expected.failure and found.failure[0] is None
     for name in ("landing_y", "speed", "angle", "separation_y", "separation_z", "hold_force"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))

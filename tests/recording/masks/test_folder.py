@@ -16,9 +16,9 @@ from pipeline.recording.build import build_episodes, process_pull, process_pulls
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.masks import masker
 from pipeline.recording.pulls import Pull
-from tests.recording import looks
 from tests.recording.joined import joined
-from tests.recording.looks import LOOKS
+from validation.recordings import looks
+from validation.recordings.looks import LOOKS
 
 
 @pytest.fixture(scope="module")

@@ -15,9 +15,9 @@ from pipeline.recording.input.frames import Transform
 from pipeline.recording.masks.hand import Colors, Shape
 from pipeline.recording.masks.ridge import RidgeMask
 from pipeline.recording.view import View
-from tests.recording import looks, strand
-from tests.recording.looks import LOOKS
-from tests.recording.scores import PHASES, figures
+from validation.recordings import looks, strand
+from validation.recordings.looks import LOOKS
+from validation.recordings.scores import PHASES, figures
 
 FRAMES = 24
 # Depth alone decides in looks that differ in colour alone: these differ in what matters.

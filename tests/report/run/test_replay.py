@@ -12,7 +12,7 @@ from pipeline.params import load
 from pipeline.report.run.replay import replay
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.material import THETA as NAMES
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from tests.project import ROOT
 
 pytestmark = pytest.mark.usefixtures("nowhere")
@@ -29,7 +29,7 @@ def params():
 
 @pytest.fixture(scope="module")
 def sling(params):
-    return Sling.of(params.bands["band1"], params.setup, params.sling)
+    return ClampedBand.of(params.bands["band1"], params.setup, params.sling)
 
 
 @pytest.fixture(scope="module")

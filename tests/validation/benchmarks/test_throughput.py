@@ -9,7 +9,7 @@ import pytest
 from pipeline.base.native import start, wp
 from pipeline.params import load
 from pipeline.simulator.interaction import interact
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from tests.project import ROOT
 from validation import synthetic
 from validation.benchmarks import throughput as bench
@@ -18,7 +18,7 @@ PARAMS = load(ROOT / "params.yaml")
 
 
 def test_the_yardstick_is_held_drawn_and_let_go() -> None:
-    sling = Sling.of(PARAMS.bands["band1"], PARAMS.setup, PARAMS.sling)
+    sling = ClampedBand.of(PARAMS.bands["band1"], PARAMS.setup, PARAMS.sling)
     episode = synthetic.pull_and_release("band1", PARAMS.episode, sling)
     rollouts = interact(sling, episode, np.array([[6e5, 0.45, 5e-3, 0.5, 1.0]]))
     assert rollouts.failure == [None]

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
+from pipeline.export.mesh import CLAMPED, Tube
 from pipeline.params import load
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand
 from validation.engines import checks
-from validation.engines.mesh import CLAMPED, Tube
 from validation.simulator.closed import String
 from validation.simulator.finding import Bench
 
@@ -19,7 +19,7 @@ THETA = np.array([2.2e5, 0.45, 3e-3, 1.0, 1.0])
 @pytest.fixture(scope="module")
 def sling():
     params = load()
-    return Sling.of(params.bands["band1"], params.setup, params.sling)
+    return ClampedBand.of(params.bands["band1"], params.setup, params.sling)
 
 
 def test_it_weighs_as_much_as_the_band_and_what_is_in_the_clamps(sling):

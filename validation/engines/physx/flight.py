@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.simulator.launch import Launches, _outcomes
-from pipeline.simulator.model import GRAVITY, Sling
+from pipeline.export.mesh import Tube
+from pipeline.simulator.launch import Launches, outcomes
+from pipeline.simulator.model import GRAVITY, ClampedBand, LaunchSetup
 from pipeline.simulator.records import LANE, Outcome
-from validation.engines.mesh import Tube
 from validation.engines.physx.law import energy, force_on
 from validation.engines.physx.rollouts import BURST, SPACE
 from validation.engines.physx.study import clamped
@@ -43,12 +43,15 @@ class Flight:
     targets (N, D, 3) for the next, or None when none is in its pouch any more.
     """
 
-    def __init__(self, sling: Sling, tube: Tube, thetas, draws, rate: int) -> None:
-        self.sling, self.tube, self.draws, self.step = sling, tube, np.asarray(draws), 1 / rate
+    def __init__(
+        self, sling: ClampedBand, setup: LaunchSetup, tube: Tube, thetas, draws, rate: int
+    ) -> None:
+        self.sling, self.setup, self.tube = sling, setup, tube
+        self.draws, self.step = np.asarray(draws), 1 / rate
         self.young, self.poisson, damping = np.asarray(thetas, float).T[:3]
         self.delay, size = damping * rate, len(draws)
         section = tube.mass.reshape(tube.rest.shape[:2])[tube.middle].sum()
-        self.mass = sling.projectile_mass + section
+        self.mass = setup.projectile_mass + section
         self.place = np.column_stack([np.zeros(size), self.draws])
         self.direction = -self.place / np.linalg.norm(self.place, axis=1, keepdims=True)
         self.speed, self.time = np.zeros((size, 3)), 0.0  # half a step behind the place
@@ -73,7 +76,7 @@ class Flight:
         going = self._going
         self._part(going & ((force * self.direction).sum(axis=1) <= 0), force)
         self.lanes["lowest"][going] = np.minimum(self.lanes["lowest"], self.place[:, 2])[going]
-        if self.time >= self.sling.steps.launch_time or not self._going.any():
+        if self.time >= self.setup.duration or not self._going.any():
             return None
         going = self._going[:, None]
         kick = self.step / 2 if first else self.step
@@ -85,7 +88,7 @@ class Flight:
 
     def outcome(self) -> Pushed:
         """What became of them."""
-        done = _outcomes(self.sling, self.lanes, self.draws, np.inf)
+        done = outcomes(self.sling, self.setup, self.lanes, self.draws, np.inf)
         failure = np.where(self.burst, BURST, np.array(done.failure, object)).tolist()
         return Pushed(replace(done, failure=failure), self.gained)
 

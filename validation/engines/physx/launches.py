@@ -17,16 +17,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.arguments import count
 from pipeline.base import errors
 from pipeline.base.errors import UserError
+from pipeline.export.mesh import Tube
 from pipeline.identify.results.mounting import load_sling
-from pipeline.params import load
+from pipeline.params import Params, load
 from pipeline.simulator.launch import launch
-from pipeline.simulator.model import Sling
+from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.engines.checks import SAME_MESH
-from validation.engines.mesh import Tube
 from validation.engines.physx.bands import Drive, Engine
 from validation.engines.physx.flight import Flight, Pushed, led_to
 from validation.engines.physx.rollouts import ITERATIONS, RATE
@@ -37,13 +36,19 @@ FINE = 1000  # steps a second, to see what the paper's 200 do to a launch
 COLUMNS = "draw_y_m", "draw_z_m", "ours_m", "physx_m", "ours_N", "physx_N", "gained"
 
 
-def alike(sling: Sling) -> Sling:
-    """The sling as both engines launch it: the arm does not give way."""
-    return replace(sling, arm_stiffness=None)
+def alike(params: Params) -> LaunchSetup:
+    """How both engines launch: the arm does not give way."""
+    return replace(LaunchSetup.of(params.setup, params.sling), arm_stiffness=None)
 
 
 def launch_in_physx(
-    engine: Engine, sling: Sling, thetas: np.ndarray, draws: np.ndarray, *, rate: int = RATE
+    engine: Engine,
+    sling: ClampedBand,
+    setup: LaunchSetup,
+    thetas: np.ndarray,
+    draws: np.ndarray,
+    *,
+    rate: int = RATE,
 ) -> Pushed:
     """Launch from draws (N, 2) with thetas (N, 5), all at once, in steps of 1 / rate.
 
@@ -52,7 +57,7 @@ def launch_in_physx(
     if sling.law != NEO_HOOKEAN:
         raise UserError(f"PhysX has no law {sling.law}; set law: {NEO_HOOKEAN}")
     tube = Tube.of(sling, **SAME_MESH)
-    flight, phases = Flight(sling, tube, thetas, draws, rate), course(tube, draws, rate)
+    flight, phases = Flight(sling, setup, tube, thetas, draws, rate), course(tube, draws, rate)
     engine.simulate(tube, thetas, phases, rate=rate, iterations=ITERATIONS, steer=flight)
     return flight.outcome()
 
@@ -88,17 +93,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("band")
     parser.add_argument("--theta", required=True, help="E,nu,d,mu,s")
-    parser.add_argument("--rate", type=count, default=RATE, help="PhysX's steps a second")
+    parser.add_argument("--rate", type=int, default=RATE, help="PhysX's steps a second")
     parser.add_argument("--params", default="params.yaml")
     asked = parser.parse_args()
+    if asked.rate < 1:
+        raise UserError(f"--rate {asked.rate}: must be a whole number above 0")
     params = load(asked.params)
     if asked.band not in params.bands:
         raise UserError(f"no band {asked.band} in {asked.params}")
-    sling, draws = alike(load_sling(params, asked.band)), draws_of(params.setup)
+    sling, setup = load_sling(params, asked.band), alike(params)
+    draws = draws_of(params.setup)
     thetas = np.tile(theta_of(asked.theta), (len(draws), 1))
-    ours = launch(sling, thetas, draws)
+    ours = launch(sling, setup, thetas, draws)
     with Engine() as engine:
-        theirs = launch_in_physx(engine, sling, thetas, draws, rate=asked.rate)
+        theirs = launch_in_physx(engine, sling, setup, thetas, draws, rate=asked.rate)
     print(*(f"{name:>9}" for name in COLUMNS), " PhysX: why not")
     done = theirs.launches
     columns = *draws.T, ours.landing_y, done.landing_y, ours.hold_force, done.hold_force

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.export import usd
-from pipeline.simulator.model import Sling
-from validation.engines.mesh import Tube
+from pipeline.export import usd
+from pipeline.export.mesh import Tube
+from pipeline.simulator.model import ClampedBand
 from validation.simulator.closed import String
 
 
@@ -117,13 +117,13 @@ def nominal(stretch, young: float, poisson: float) -> np.ndarray:
     return young * usd.nominal(stretch, poisson)
 
 
-def equal_modulus(sling: Sling, theta, stretch) -> np.ndarray:
+def equal_modulus(sling: ClampedBand, theta, stretch) -> np.ndarray:
     """Factor on Young's modulus with which PhysX's law pulls as ours does at a stretch."""
     ours = String.of(sling, theta).force(stretch) / sling.area
     return ours / nominal(stretch, *theta[:2])
 
 
-def energy_left(sling: Sling, theta, stretch: float) -> float:
+def energy_left(sling: ClampedBand, theta, stretch: float) -> float:
     """Energy to a stretch under PhysX's law that pulls there as ours does, over ours, less 1."""
     to = np.linspace(1, stretch, 1001)
     theirs = nominal(to, *theta[:2]) * sling.area * equal_modulus(sling, theta, stretch)

@@ -33,6 +33,7 @@ from pipeline.identify.search.history import History
 from pipeline.params import load
 from pipeline.params.identification import OUR_ENGINE
 from pipeline.simulator.launch import launch
+from pipeline.simulator.model import LaunchSetup
 from validation.benchmarks.timing import environment
 from validation.engines.physx.bands import Engine, release
 from validation.engines.physx.launches import FINE, alike, draws_of, launch_in_physx
@@ -56,6 +57,7 @@ class Comparison:
     def __init__(self, params, band: str) -> None:
         self.params, self.band = with_engines(params), band
         self.sling = sling_of_method(self.params, band, OURS)
+        self.setup = LaunchSetup.of(params.setup, params.sling)
         self.space = Space.of_method(self.params, OURS)
 
     def search(self, engine: str) -> tuple[History, float]:
@@ -82,7 +84,10 @@ class Comparison:
     def launches(self, thetas: np.ndarray, draws: np.ndarray, measured) -> list[dict]:
         """Where our simulator lands the draws (L, 2) with each theta, and where they landed [m]."""
         landings = np.array(
-            [launch(self.sling, np.tile(one, (len(draws), 1)), draws).landing_y for one in thetas]
+            [
+                launch(self.sling, self.setup, np.tile(one, (len(draws), 1)), draws).landing_y
+                for one in thetas
+            ]
         )
         rows = []
         for i, draw in enumerate(draws):
@@ -97,14 +102,14 @@ class Comparison:
 
         Raises UserError, as `Engine`.
         """
-        sling = alike(self.sling)
+        both = self.sling, alike(self.params)
         each, every = np.repeat(thetas, len(draws), axis=0), np.tile(draws, (len(thetas), 1))
         gained = [None] * len(every)
         if where == OURS:
-            done = launch(sling, each, every)
+            done = launch(*both, each, every)
         else:
             with Engine() as engine:
-                pushed = launch_in_physx(engine, sling, each, every, rate=rate)
+                pushed = launch_in_physx(engine, *both, each, every, rate=rate)
             done, gained = pushed.launches, [_plain(one) for one in pushed.gained]
         columns = {
             "landing_m": [_plain(one) for one in done.landing_y],

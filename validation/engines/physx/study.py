@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from pipeline.export.mesh import Tube
 from pipeline.simulator.interaction import GRASP_BLEND, interact
-from pipeline.simulator.model import GRAVITY, Sling
+from pipeline.simulator.model import GRAVITY, ClampedBand
 from validation.benchmarks.timing import timed
 from validation.engines import checks
-from validation.engines.mesh import Tube
 from validation.engines.physx.bands import Course, Drive, Engine
 from validation.engines.physx.law import energy_left, equal_modulus, force_on
 from validation.simulator.finding import Bench, Finding, off
@@ -126,7 +126,7 @@ def balance(tube: Tube, thetas: np.ndarray, courses: list[Course]) -> np.ndarray
     return 100 * np.linalg.norm(hand + ends - weight, axis=1) / np.linalg.norm(hand, axis=1)
 
 
-def ours(sling: Sling, episode, thetas: np.ndarray) -> list[BandMotion]:
+def ours(sling: ClampedBand, episode, thetas: np.ndarray) -> list[BandMotion]:
     """The same by our simulator."""
     done = interact(sling, episode, thetas)
     marks = episode.cloud_time

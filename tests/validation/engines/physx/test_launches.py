@@ -9,11 +9,11 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.base.failures import DRAGGED, NEVER_LEFT, SLACK
+from pipeline.export.mesh import Tube
 from pipeline.identify.results.mounting import load_sling
 from pipeline.params import load
 from pipeline.simulator.model import GRAVITY
 from validation.engines.checks import SAME_MESH
-from validation.engines.mesh import Tube
 from validation.engines.physx import bands, flight, launches, worker
 from validation.engines.physx.rollouts import BURST
 
@@ -49,7 +49,12 @@ worker.main()
 
 @pytest.fixture(scope="module")
 def sling():
-    return launches.alike(load_sling(load(), "band1"))
+    return load_sling(load(), "band1")
+
+
+@pytest.fixture(scope="module")
+def launch_setup():
+    return launches.alike(load())
 
 
 @pytest.fixture(scope="module")
@@ -84,21 +89,21 @@ def springs(monkeypatch):
     monkeypatch.setattr(flight, "energy", energy)
 
 
-def closed_form(sling, tube, stiffness: float, draw: np.ndarray) -> tuple[float, float, float]:
+def closed_form(setup, tube, stiffness: float, draw: np.ndarray) -> tuple[float, float, float]:
     """Landing [m], time and speed at the separation [s, m/s]."""
-    mass = sling.projectile_mass + tube.mass.reshape(tube.rest.shape[:2])[tube.middle].sum()
+    mass = setup.projectile_mass + tube.mass.reshape(tube.rest.shape[:2])[tube.middle].sum()
     pulse, ahead = np.sqrt(stiffness / mass), -draw / np.linalg.norm(draw)
     rest = np.array([0.0, -mass * GRAVITY / stiffness])
     phase = np.arccos(-(rest @ ahead) / ((draw - rest) @ ahead))
     y, z = rest + (draw - rest) * np.cos(phase)
     vy, vz = velocity = -pulse * (draw - rest) * np.sin(phase)
-    flight = (vz + np.sqrt(vz**2 + 2 * GRAVITY * (z + sling.fork_height))) / GRAVITY
+    flight = (vz + np.sqrt(vz**2 + 2 * GRAVITY * (z + setup.fork_height))) / GRAVITY
     return y + vy * flight, phase / pulse, np.linalg.norm(velocity)
 
 
-def flown(sling, tube, thetas, draws, rate=1000, spoil=lambda nodes, step: nodes):
+def flown(sling, setup, tube, thetas, draws, rate=1000, spoil=lambda nodes, step: nodes):
     """As by an engine whose nodes are at the band's rest, but for the led ones."""
-    flying = flight.Flight(sling, tube, thetas, draws, rate)
+    flying = flight.Flight(sling, setup, tube, thetas, draws, rate)
     targets, nodes = flight.led_to(tube, flying.place), np.tile(tube.rest, (len(draws), 1, 1, 1))
     for step in range(10_000):
         nodes[:, tube.middle] = targets[:, -tube.rest.shape[1] :]
@@ -109,13 +114,15 @@ def flown(sling, tube, thetas, draws, rate=1000, spoil=lambda nodes, step: nodes
 
 
 @pytest.mark.parametrize("rate", [200, 1000])
-def test_springs_throw_as_far_as_the_closed_form_says(sling, tube, engine, springs, rate):
+def test_springs_throw_as_far_as_the_closed_form_says(
+    sling, launch_setup, tube, engine, springs, rate
+):
     """Several of them, through worker.py; leapfrog's error is (pulse x step)^2 / 24, and small."""
-    done = launches.launch_in_physx(engine, sling, THETAS, DRAWS, rate=rate)
+    done = launches.launch_in_physx(engine, sling, launch_setup, THETAS, DRAWS, rate=rate)
     assert done.launches.failure == [None] * 3
     for i, (theta, draw) in enumerate(zip(THETAS, DRAWS, strict=True)):
-        landing, time, speed = closed_form(sling, tube, theta[0], draw)
-        error = theta[0] / sling.projectile_mass / rate**2 / 8
+        landing, time, speed = closed_form(launch_setup, tube, theta[0], draw)
+        error = theta[0] / launch_setup.projectile_mass / rate**2 / 8
         assert done.launches.landing_y[i] == pytest.approx(landing, rel=error)
         assert done.launches.separation_time[i] == pytest.approx(time, rel=error)
         assert done.launches.speed[i] == pytest.approx(speed, rel=error)
@@ -160,7 +167,9 @@ class Chain:
 
 
 @pytest.mark.parametrize(("rate", "error"), [(200, 0.015), (1000, 0.0025)])
-def test_beside_a_band_with_mass_it_is_as_fast_as_within(sling, tube, monkeypatch, rate, error):
+def test_beside_a_band_with_mass_it_is_as_fast_as_within(
+    sling, launch_setup, tube, monkeypatch, rate, error
+):
     """A chain that carries the projectile, and the same chain led by it, step after step."""
     one, led = (Chain(np.linalg.norm(DRAWS[0])) for _ in range(2))
     seen = [np.diff(led.x)[-1]]
@@ -179,35 +188,38 @@ def test_beside_a_band_with_mass_it_is_as_fast_as_within(sling, tube, monkeypatc
     monkeypatch.setattr(flight, "force_on", force_on)
     monkeypatch.setattr(flight, "energy", lambda *_: np.ones(1))
     monkeypatch.setattr(flight, "GRAVITY", 0.0)
-    flying = flown(sling, tube, THETAS[:1], DRAWS[:1], rate).launches
-    mass = flight.Flight(sling, tube, THETAS[:1], DRAWS[:1], rate).mass
+    flying = flown(sling, launch_setup, tube, THETAS[:1], DRAWS[:1], rate).launches
+    mass = flight.Flight(sling, launch_setup, tube, THETAS[:1], DRAWS[:1], rate).mass
     while one.tension()[-1] > 0:
         one.advance(1e-5, mass)
     assert flying.failure == [None] and flying.speed[0] == pytest.approx(-one.v[-1], rel=error)
 
 
-def test_a_launch_that_does_not_land_says_why(sling, tube, springs):
+def test_a_launch_that_does_not_land_says_why(sling, launch_setup, tube, springs):
     slack = np.array([[-0.12, -0.1]])
-    assert flown(sling, tube, THETAS[:1], slack).launches.failure == [SLACK]
+    assert flown(sling, launch_setup, tube, THETAS[:1], slack).launches.failure == [SLACK]
     weak = THETAS[:1] * [1e-3, 1, 1, 1, 1]
-    assert flown(sling, tube, weak, DRAWS[:1]).launches.failure == [DRAGGED]
-    high = replace(sling, fork_height=50.0)
-    done = flown(high, tube, weak, DRAWS[:1])
+    assert flown(sling, launch_setup, tube, weak, DRAWS[:1]).launches.failure == [DRAGGED]
+    high = replace(launch_setup, fork_height=50.0)
+    done = flown(sling, high, tube, weak, DRAWS[:1])
     assert done.launches.failure == [NEVER_LEFT] and np.isnan(done.launches.landing_y[0])
 
 
-def test_a_band_that_bursts_leaves_the_others_as_they_are(sling, tube, springs):
+def test_a_band_that_bursts_leaves_the_others_as_they_are(sling, launch_setup, tube, springs):
     def spoil(nodes, step):
         if step >= 5:
             nodes[1, 3, 2] = np.nan if step % 2 else 1e9
         return nodes
 
-    alone, done = (flown(sling, tube, THETAS, DRAWS, spoil=one) for one in (lambda n, _: n, spoil))
+    alone, done = (
+        flown(sling, launch_setup, tube, THETAS, DRAWS, spoil=one)
+        for one in (lambda n, _: n, spoil)
+    )
     assert done.launches.failure == [None, BURST, None]
     assert np.isnan(done.launches.landing_y[1]) and np.isnan(done.gained[1])
     assert (done.launches.landing_y == alone.launches.landing_y).tolist() == [True, False, True]
 
 
-def test_a_law_that_physx_lacks_is_refused(sling):
+def test_a_law_that_physx_lacks_is_refused(sling, launch_setup):
     with pytest.raises(UserError, match="no law rubber"):
-        launches.launch_in_physx(None, replace(sling, law="rubber"), THETAS, DRAWS)
+        launches.launch_in_physx(None, replace(sling, law="rubber"), launch_setup, THETAS, DRAWS)

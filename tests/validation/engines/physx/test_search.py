@@ -67,9 +67,9 @@ def test_what_physx_lands_stands_with_its_theta_and_draw(searched, monkeypatch):
         def __exit__(self, *_):
             pass
 
-    def thrown(engine, sling, thetas, draws, *, rate):
-        assert sling.arm_stiffness is None
-        done = search.launch(sling, thetas, draws)
+    def thrown(engine, sling, setup, thetas, draws, *, rate):
+        assert setup.arm_stiffness is None
+        done = search.launch(sling, setup, thetas, draws)
         where = thetas[:, 0] + draws[:, 0] + rate
         fields = {**vars(done), "landing_y": where, "failure": [None] * len(where)}
         return SimpleNamespace(

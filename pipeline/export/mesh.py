@@ -1,0 +1,120 @@
+"""The band as tetrahedra between its clamps, as both peers take it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from pipeline.simulator.cylinder import cylinder, volumes
+from pipeline.simulator.initial import fixed_frames
+from pipeline.simulator.interaction import GRASP_BLEND
+from pipeline.simulator.model import ROD, ClampedBand
+
+CLAMPED = 0.015  # m of band in each clamp
+EDGES, GRADING = 48, 6.0  # 50 intervals with those in the clamps: 900 tetrahedra
+
+
+@dataclass(frozen=True)
+class Tube:
+    """A tetrahedral band of `shape` (sections, V, 3), row-major.
+
+    The outermost two sections on each side lie in the clamps. Clamps, fingers and pouch hold whole
+    sections, which then neither turn nor deform.
+
+    Attributes:
+        rest: Vertices of the straight band at rest [m], `shape`.
+        tetrahedra: Indices into the vertices, shape (T, 4).
+        mass: Of each vertex, a quarter of what its tetrahedra weigh [kg], shape (sections V,).
+        hanging: A smooth U of unstretched band to start from, `shape`.
+        clamped: `hanging` with the clamped sections where the clamps hold them, `shape`.
+        arc: Places of the sections between the clamps [m].
+    """
+
+    rest: np.ndarray
+    tetrahedra: np.ndarray
+    mass: np.ndarray
+    hanging: np.ndarray
+    clamped: np.ndarray
+    arc: np.ndarray
+
+    @classmethod
+    def of(
+        cls, sling: ClampedBand, edges: int = EDGES, grading: float = GRADING, rings: int = 1
+    ) -> Tube:
+        """Mesh a sling's band.
+
+        Args:
+            edges: Even number of intervals between the clamps.
+            grading: How much shorter they are at the clamps and in the hand than midway.
+            rings: Of vertices in the section.
+        """
+        steps = sling.steps.model_copy(update={"grading": grading})
+        arc = replace(sling, edges=edges, mesh=ROD, steps=steps).arc
+        whole = np.concatenate([[-CLAMPED], arc, [sling.rest_length + CLAMPED]])
+        rest, tetrahedra = cylinder(whole, 2 * sling.radius, rings)
+        share = np.repeat(volumes(rest, tetrahedra) / 4, 4)
+        density = sling.mass / (sling.area * sling.rest_length)
+        hanging = _hanging(sling, whole, rest)
+        clamped, frames = hanging.copy(), fixed_frames(sling)
+        for sections, tip, (a, b), start in (
+            (slice(0, 2), sling.tips[0], frames[0], 0.0),
+            (slice(-2, None), sling.tips[1], frames[1], sling.rest_length),
+        ):
+            axes = np.array([np.cross(a, b), a, b])
+            clamped[sections] = tip + (rest[sections] - [start, 0.0, 0.0]) @ axes
+        mass = density * np.bincount(tetrahedra.ravel(), share)
+        return cls(rest, tetrahedra, mass, hanging, clamped, arc)
+
+    @property
+    def middle(self) -> int:
+        """The section in the hand."""
+        return len(self.rest) // 2
+
+    def elastic_force(self, positions: np.ndarray, theta) -> np.ndarray:
+        """Force of the stretched band on each vertex [N], like `positions` (sections, V, 3).
+
+        The law of material.h: nominal stress P = mu F + (lam (J - 1) - mu) cof F in each
+        tetrahedron.
+        """
+        young, poisson = theta[:2]
+        mu = young / (2 * (1 + poisson))
+        lam = young * poisson / ((1 + poisson) * (1 - 2 * poisson)) + mu
+        before, now = (
+            np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+            for corners in (v.reshape(-1, 3)[self.tetrahedra] for v in (self.rest, positions))
+        )
+        inverse = np.linalg.inv(before)
+        gradient = now @ inverse
+        ratio = np.linalg.det(gradient)[:, None, None]
+        cofactor = ratio * np.swapaxes(np.linalg.inv(gradient), 1, 2)
+        stress = mu * gradient + (lam * (ratio - 1) - mu) * cofactor
+        shares = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
+        pull = -np.einsum("t,tij,tkj->tki", np.linalg.det(before) / 6, stress, shares)
+        force = np.zeros((len(self.mass), 3))
+        np.add.at(force, self.tetrahedra, pull)
+        return force.reshape(self.rest.shape)
+
+
+def hand_path(episode, times: np.ndarray, grasp: np.ndarray) -> np.ndarray:
+    """Where the held section is at `times` (S,): on the hand's path, after a blend from `grasp`.
+
+    Returns:
+        Its centre [m], shape (S, 3), as sling.interaction leads it.
+    """
+    inside = np.clip(times, episode.time[0], episode.time[-1])
+    path = CubicSpline(episode.time, episode.position, axis=0)(inside)
+    part = np.clip((times - episode.grasp_time) / GRASP_BLEND, 0, 1)[:, None]
+    return path + (1 - part**3 * (10 - 15 * part + 6 * part**2)) * (grasp - path[0])
+
+
+def _hanging(sling: ClampedBand, arc: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Two legs and a half circle, as in model.hanging_guess."""
+    half, length = sling.half_width, sling.rest_length
+    leg = max((length - np.pi * half) / 2, 0.0)
+    turn = np.clip((arc - leg) / (length - 2 * leg), 0, 1) * np.pi
+    down = np.minimum(np.minimum(arc, length - arc), leg) + half * np.sin(turn)
+    center = np.stack([-half * np.cos(turn), 0 * arc, -down], axis=1)
+    inward = np.stack([np.cos(turn), 0 * arc, np.sin(turn)], axis=1)  # tangent x (0, 1, 0)
+    return center[:, None] + rest[..., 1:2] * [0.0, 1.0, 0.0] + rest[..., 2:] * inward[:, None]

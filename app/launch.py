@@ -49,7 +49,7 @@ def launched(
             *safety.of_launch(params, force, failure),
             *safety.of_draw(params, band, draw, root),
             *safety.of_confidence(content, theta),
-            *safety.of_identification(params, content, theta, root),
+            *safety.of_identification(params, content, theta),
             *safety.of_mounting(band, root),
         ],
     }

@@ -19,8 +19,9 @@ from app.plan.hand import along_pull, quaternion
 from app.safety import Hazard
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
+from pipeline.episode.episode import read_metadata
 from pipeline.params import Params
-from pipeline.params.lab import SetupParams
+from pipeline.recording.geometry import KeptGeometry
 from pipeline.recording.input.frames import Transform
 
 
@@ -56,30 +57,21 @@ def posed(answer: Answer, params: Params, band: str, root: str | Path = ".") -> 
 
 
 def fork_in_base(params: Params, band: str, root: str | Path = ".") -> tuple[Transform, str]:
-    """Frame O to the robot's base, and the base's name, as the band's first recording has them.
+    """Frame O to the robot's base, and the base's name, as the band's first episode has them.
 
-    There, setup.base_to_fork comes before /tf_static; without a recording that can be read it
-    stands alone, and plan.frame names the base. Raises UserError where neither tells.
+    setup.base_to_fork comes before the episode's; without an episode it stands alone, and
+    plan.frame names the base. Raises UserError where neither tells.
     """
-    given = params.setup.base_to_fork
+    given, folder = params.setup.base_to_fork, Layout(Path(root)).episode(band)
     try:
-        fork, frame = _recorded(Layout(Path(root)), band, params.setup)
-    except UserError:
+        kept = KeptGeometry.of_episode(read_metadata(folder), band)
+    except UserError as error:
         if given is None:
-            raise
-        fork, frame = Transform.of(given), ""
-    return fork, frame or params.plan.frame
-
-
-def _recorded(layout: Layout, band: str, setup: SetupParams) -> tuple[Transform, str]:
-    recordings = layout.recordings(band)
-    if not recordings:
-        raise UserError(
-            f"setup.base_to_fork is null and {layout.raw(band)} holds no recording: measure where"
-            " the fork stands (docs/recording.md, Calibration)"
-        )
-    from pipeline.recording.geometry import geometry_of
-    from pipeline.recording.input.reader import read_recording
-
-    recording = read_recording(recordings[0], setup)
-    return geometry_of(recording, setup).base.inverse(), recording.pose.frame
+            raise UserError(
+                f"setup.base_to_fork is null and no episode says where the fork stands ({error}):"
+                f" `dvc repro episode@{band}` makes them of a recording, or measure it"
+                " (docs/recording.md, Calibration)"
+            ) from error
+        return Transform.of(given), params.plan.frame
+    fork = kept.base_to_fork if given is None else Transform.of(given)
+    return fork, kept.base_frame or params.plan.frame

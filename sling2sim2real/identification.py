@@ -27,6 +27,7 @@ from pipeline.identify.results.mounting import Mounting
 from pipeline.identify.results.theta import ThetaFile, load_samples, load_theta
 from pipeline.launching.trials.stretch import recorded_stretch
 from pipeline.params.identification import parameter_names
+from pipeline.params.provenance import changed_since
 from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from sling2sim2real.model import Band, Model, Theta, known
 from sling2sim2real.settings import Settings
@@ -63,12 +64,15 @@ class Identification(Model):
         settled: Whether the fit has converged; if not, do not trust the intervals.
         stretch: The largest that the recordings show: length over rest length. Beyond it a launch
             is extrapolated.
+        changed: Settings of params.yaml that have changed since a run identified the band, in
+            words.
     """
 
     intervals: dict[str, Interval] = field(default_factory=dict, repr=False)
     samples: np.ndarray | None = field(default=None, repr=False, compare=False)
     settled: bool = False
     stretch: float | None = None
+    changed: tuple[str, ...] = field(default=(), repr=False)
 
     def save(self, path: str | Path) -> None:
         """Write all of it as one JSON file, settings included."""
@@ -136,6 +140,7 @@ class Identification(Model):
             samples=load_samples(layout.confidence(band, method)),
             settled=bool(told and told["settled"]),
             stretch=_stretch(episodes, settings, about),
+            changed=tuple(map(str, changed_since(settings, content, method))),
         )
 
 

@@ -28,13 +28,14 @@ def main() -> None:
     layout, names = Layout(), parameter_names(params.methods[method].law)
     explored = History.load(method, names, made(layout.history(band, method)))
     sling, episodes = sling_of_method(params, band, method), load_episodes(band)
+    evidence = load_observed(layout.observed(band))
     density = fit_posterior(
         params,
         method,
         sling,
         episodes,
         explored.best_point(),
-        evidence=load_observed(layout.observed(band)),
+        evidence=evidence,
         workers=workers(),
         progress=lambda fit: print(
             f"{band} {method}: expansion {fit.steps}, misfit {fit.misfit:.2f}", flush=True
@@ -43,6 +44,7 @@ def main() -> None:
     mode = evaluated_mode(params, method, sling, episodes[0], density)
     explored.followed_by(mode).save(layout.evaluations(band, method))
     estimate, samples = estimate_of(params, density, explored), density.points.tolist()
+    estimate["made_with"] = evidence.made_with if evidence else {}
     save_estimate(layout.confidence(band, method), band, estimate, density.names, samples)
 
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import re
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -17,6 +15,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, NotMade, owner
 from pipeline.params import Params, expect_known, load
 from pipeline.params.identification import steps_of
+from stages import dvc_files
 
 MAKERS = {  # steps that make a folder of another name
     "raw": "record",
@@ -29,8 +28,6 @@ OF_A_SEARCH = ("history", "clusters", "evaluations", "confidence")  # its last s
 
 OF_DVC = "DVC_STAGE"  # in the environment of what DVC runs
 GRACE = 5.0  # s from the interrupt to the end
-HALF = re.compile(r"\.[\w-]{22}\.tmp")  # what DVC calls a file until it has copied it to the end
-COPIES = (".dvc/cache", "data", "reports")  # where it copies to
 
 
 def arguments(*names: str) -> list[str]:
@@ -56,8 +53,8 @@ def run(main: Callable[[], int | None]) -> None:
     """Run a stage or a command: a mistake is one line, which says what makes a missing file."""
 
     def explained() -> int | None:
-        if OF_DVC in os.environ:
-            _clear_up()
+        if OF_DVC in os.environ and any(dvc_files.half_files(Path())):
+            dvc_files.mend(Path())  # what a killed `dvc repro` has copied in part; DVC never does
         try:
             return main()
         except NotMade as error:
@@ -66,16 +63,6 @@ def run(main: Callable[[], int | None]) -> None:
     if OF_DVC in os.environ:
         Thread(target=_end_with_dvc, daemon=True).start()
     errors.run(explained)
-
-
-def _clear_up() -> None:
-    """Remove what a killed `dvc repro` has copied in part; DVC never does.
-
-    In a process of its own, so that no stage imports app/.
-    """
-    if any(HALF.fullmatch(name) for top in COPIES for *_, names in os.walk(top) for name in names):
-        command = [sys.executable, "-m", "app.flow.locks"]
-        subprocess.run(command, capture_output=True, check=False)
 
 
 def _end_with_dvc() -> None:

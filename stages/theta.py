@@ -14,6 +14,7 @@ from pipeline.base.layout import Layout, made
 from pipeline.identify.results.estimate import load_estimate
 from pipeline.identify.search.history import History, theta_content
 from pipeline.params.identification import parameter_names
+from pipeline.params.provenance import settings_of
 from stages.start import run, started
 
 
@@ -26,6 +27,7 @@ def main() -> None:
     if not method_params.mounting:  # the clamps were left as `setup` says
         estimate["mounted"] = False
     content = theta_content(evaluations, band, estimate)
+    content["made_with"] = settings_of(params, band, method) | estimate.get("made_with", {})
     write_json(layout.theta(band, method), content)
     print(f"{band} {method}: loss {content['loss']['total']:.5g}")
     intervals = (content["confidence"] or {}).get("parameters", {})

@@ -8,43 +8,11 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from pipeline.params.lab import StepParams
-from tests import project
-from tests.project import ROOT, ROUGH, copy_project
+from tests.project import ROOT
+from validation.projects import TINY, ProjectCopy, copy_project, run_of
 
 pytestmark = pytest.mark.slow
 METHODS = ["least_squares", "sling2sim2real"]
-STEPS = {step: [] for step in StepParams.model_fields}
-TINY = {
-    "run.bands": ["band1", "band2"],
-    "run.rig": ["band1", "band2"],
-    "run.methods": METHODS,
-    "run.steps": STEPS | {"history": METHODS, "clusters": METHODS[1:], "density": METHODS[:1]},
-    "run.ablations": {
-        "bands": ["band1"],
-        "rig": ["band1"],
-        "methods": ["de", "bo"],
-        "steps": STEPS | {"de": ["de"], "bo": ["bo"]},
-    },
-    "cloud.points": 100,
-    **{f"sling.{name}": value for name, value in ROUGH.items()},
-    "optimizer.population": 6,
-    "optimizer.generations": 2,
-    "optimizer.k_nn": 6,
-    "optimizer.k_top": 2,
-    "optimizer.cma_population": 4,
-    "optimizer.cma_rollouts": 8,
-    "policy.map_size": [7, 7],
-    "policy.envs": 32,
-    "policy.iterations": 3,
-    "trials.targets": [1.925],
-    "trials.repeats": 1,
-    "floor.map_size": [4, 4],
-    "floor.launches": 1,
-    "rig.edges": 16,
-    "rig.tolerance": 1e-3,
-    "rig.camera.drop_rate": 0.8,
-}
 BANDS = ("band1", "band2")
 JUDGED = ("theta", "policy", "launches", "trials")
 SEARCH = {"sling2sim2real": ("history", "clusters", "cma"), "least_squares": ("history", "density")}
@@ -74,7 +42,7 @@ EVERYTHING = {
 LAUNCH = "draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.17,2.0\n"
 
 
-class Copy(project.Copy):
+class Copy(ProjectCopy):
     """A copy of the project's files in a Git repository of its own."""
 
     def __init__(self, folder: Path) -> None:
@@ -86,33 +54,15 @@ class Copy(project.Copy):
         )
         (folder.parent / "audit").mkdir()
         copy_project(folder)
-        self.set(TINY)
+        self.set(TINY | run_of(BANDS, METHODS, ("de", "bo")))
         self.write("data/evidence/band1.csv", LAUNCH)
-        self("git", "init", "-q")
-        self("git", "config", "user.name", "Test")
-        self("git", "config", "user.email", "test@example.org")
         self.commit()
-
-    def set(self, values: dict) -> None:
-        yaml, path = YAML(), self.folder / "params.yaml"
-        content = yaml.load(path)
-        for key, value in values.items():
-            *sections, name = key.split(".")
-            node = content
-            for section in sections:
-                node = node[section]
-            node[name] = value
-        yaml.dump(content, path)
 
     def write(self, name: str, text: str) -> None:
         (self.folder / name).write_text(text, encoding="utf-8")
 
     def append(self, name: str, text: str) -> None:
         self.write(name, (self.folder / name).read_text(encoding="utf-8") + text)
-
-    def commit(self) -> None:
-        self("git", "add", "--all")
-        self("git", "commit", "-q", "-m", "state")
 
 
 @pytest.fixture(scope="module")

@@ -25,8 +25,7 @@ from pipeline.params.identification import LAWS
 from pipeline.simulator.launch import launch
 from pipeline.simulator.material import THETA
 from pipeline.simulator.model import ClampedBand, LaunchSetup
-from tests.identify.objective.own_law import disturbed, own_law_episode
-from validation.synthetic import pull_and_release
+from validation.synthetic import disturbed, own_law_episode, pull_and_release
 
 WORKERS = cores()
 FLAWS = {

@@ -11,6 +11,7 @@ from app.drift.change import FALSE_ALARM, ChangeOfBand, changes, newest
 from app.drift.picture import AXES, over_time
 from app.drift.recordings import COMPARED, IdentifiedRecording, identified, in_time
 from app.sizes import DIAMETER, REST_LENGTH
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
@@ -18,7 +19,6 @@ from pipeline.params import expect_known
 from sling2sim2real.identification import METHOD
 from sling2sim2real.model import Band
 from sling2sim2real.settings import Settings
-from validation.benchmarks.timing import environment
 
 SAME = "no change beyond the intervals"
 SHORT = {"youngs_modulus": "E", "damping_product": "damping s·d"}

@@ -48,28 +48,26 @@ def read_earlier(path: Path, params: Params) -> Earlier:
 
     Of several pulls, the first that can be used.
     """
-    from pipeline.recording.geometry import geometry_of
     from pipeline.recording.input.reader import read_recording
-    from pipeline.recording.pulls import pulls_of
+    from pipeline.recording.pulls import Pull, pulls_of
     from pipeline.recording.signals import signals_of
 
-    recording = read_recording(Path(path), params.setup)
-    geometry = geometry_of(recording, params.setup)
-    source, frame = geometry.sources["base_to_fork"], recording.pose.frame
-    problem = None
+    whole = Pull.of(read_recording(Path(path), params.setup), params.setup)
+    base, source = whole.geometry.base, whole.geometry.sources["base_to_fork"]
+    frame, problem = whole.recording.pose.frame, None
     try:
-        for pull in pulls_of(recording, params.setup):
+        for pull in pulls_of(whole):
             try:
-                signals = signals_of(pull, geometry, params)
+                signals = signals_of(pull, params)
             except UserError as error:
                 problem = problem or f"{path}: {str(error).removeprefix(f'{path}: ')}"
                 continue
-            force = float(np.linalg.norm(signals.facts["hold_force"]))
+            force = float(np.linalg.norm(signals.facts.hold_force))
             drawn = signals.hand(signals.release_time)
-            return Earlier(path, geometry.base, source, frame, force, drawn, None)
+            return Earlier(path, base, source, frame, force, drawn, None)
     except UserError as error:
         problem = f"{path}: {error}"
-    return Earlier(path, geometry.base, source, frame, None, None, problem)
+    return Earlier(path, base, source, frame, None, None, problem)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from torch import nn
 
 from pipeline.base.files import replacing, write_json
 from pipeline.params import Params
+from pipeline.params.provenance import policy_settings_of
 from pipeline.policy.train import Policy, ProjectilePolicy, Trained
 from pipeline.simulator.rubber import NEO_HOOKEAN
 
@@ -173,6 +174,7 @@ def card(
             "high": high,
         },
         "max_force_n": setup.max_force,
+        "made_with": policy_settings_of(params, band),
         "setup": {
             "fork_width_m": setup.fork_width,
             "fork_height_m": setup.fork_height,

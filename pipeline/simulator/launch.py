@@ -118,10 +118,10 @@ def launch(
     shares = np.array_split(np.arange(count), len(devices))
     with ThreadPoolExecutor(len(devices)) as pool:
         lanes = np.concatenate(list(pool.map(launched, devices, shares)))
-    return _outcomes(band, setup, lanes, draws, max_force)
+    return outcomes(band, setup, lanes, draws, max_force)
 
 
-def _outcomes(
+def outcomes(
     band: ClampedBand, setup: LaunchSetup, lanes: np.ndarray, draws: np.ndarray, max_force: float
 ) -> Launches:
     """Of launches from draws (N, 2), by the slings' records (N,) of records.LANE."""

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from app import __version__, bench, cli
+from app import __version__, cli
 from app.command_line import COMMANDS, EXITS
 from pipeline.simulator.material import THETA
 from tests.policy.linear import write_policy
 from tests.project import ROOT, python
+from validation.benchmarks import bench
 
 SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 

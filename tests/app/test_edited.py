@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from app.export.export import replaceable
 from app.launch import launched
 from app.observe import known
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
+from pipeline.export.export import replaceable
 from pipeline.params import load
 from tests.edited import edits
 from tests.report.card.conftest import POINT, THETA, confidence, samples

@@ -14,8 +14,9 @@ from pipeline.recording.build import build_episodes
 from pipeline.simulator.model import ClampedBand
 from rig.physics.world import string_of
 from rig.recorder.record import EPOCH
-from tests.identify.objective.own_law import own_law_episode, visible
-from tests.project import ROUGH, with_
+from tests.project import with_
+from validation.projects import ROUGH
+from validation.synthetic import own_law_episode, visible
 
 METHOD = "sling2sim2real"
 TRUTH = np.array([2.5e5, 0.45, 4e-3, 0.7, 0.6])

@@ -19,7 +19,8 @@ from pipeline.identify.objective.space import Space
 from pipeline.identify.search.history import History
 from pipeline.params import load
 from stages.start import remedy
-from tests.project import ROOT, alive, environment, python, until
+from tests.project import ROOT, alive, python, until
+from validation.projects import environment
 
 OF_A_BAND = ("record", "episode", "mounting")
 OF_A_METHOD = ("history", "theta", "policy", "trials", "card")

@@ -14,9 +14,8 @@ from pipeline.base.layout import Layout
 from pipeline.identify.results.theta import calibrated, load_theta
 from pipeline.params import load
 from sling2sim2real.identification import Identification
-from tests.identify.objective.own_law import own_law_episode
 from tests.project import ROOT
-from validation.synthetic import recorded_yardstick
+from validation.synthetic import own_law_episode, recorded_yardstick
 
 BUDGET = {"population": 5, "generations": 2, "k_top": 1, "k_nn": 6, "cma_population": 4}
 SHOWN = {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}

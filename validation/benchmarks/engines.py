@@ -8,12 +8,12 @@ import numpy as np
 from scipy.stats import qmc
 
 from pipeline.base.errors import UserError
+from pipeline.export.mesh import Tube, hand_path
 from pipeline.identify.objective.space import Space
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
 from validation.benchmarks.timing import available, timed
 from validation.engines import mujoco_flex
-from validation.engines.mesh import Tube, hand_path
 from validation.engines.newton_vbd import Bands
 from validation.simulator.closed import String
 from validation.synthetic import DRAWN, pull_and_release, yardstick

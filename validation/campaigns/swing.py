@@ -31,11 +31,12 @@ from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
 from validation.benchmarks.timing import environment
+from validation.campaigns.runner import OURS, PAPER
+from validation.effects import AS_IS
 
 REPORT = Path("reports/validation/swing.json")
 DEVIATIONS = Path("reports/validation/deviations.json")
-AS_IS, AS_TETRAHEDRA = "as it is", "sling.mesh: tetrahedra"  # its rows
-OURS, PAPER, MESHES = "least_squares", "sling2sim2real", ("rod", "tetrahedra")
+MESHES, AS_TETRAHEDRA = ("rod", "tetrahedra"), "sling.mesh: tetrahedra"  # its switch
 DAMPINGS = np.geomspace(2e-4, 1e-2, 35)  # s d [s]
 PARTS = {  # begin and end, s after the release
     "pull": (-100.0, 0.0),

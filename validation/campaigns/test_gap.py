@@ -12,26 +12,27 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
+from pipeline.base.code import ROOT
 from pipeline.base.files import write_json
 from pipeline.identify.objective.space import Space
 from pipeline.identify.results.theta import load_theta
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
 from pipeline.params import load
+from pipeline.params.identification import STEPS
 from pipeline.report.drawing.styles import COLORS, INK, THEME
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.world import World
-from tests.project import ROOT
+from validation.campaigns.runner import OURS, PAPER
 from validation.campaigns.test_orange import copy_of_the_project, run
 
 pytestmark = pytest.mark.validation
 
-PAPER, OURS = METHODS = ("sling2sim2real", "least_squares")
+METHODS = PAPER, OURS
 FACTOR = 1.5  # times the floor, asked of ours
 SHOTS, REACH = 40, 0.05  # launches that the oracle's θ is fitted to; m beyond the trained range
 STARTS, STEP, LOST = 48, 2e-3, 0.5  # of the fit: points, of the unit cube, m for a failed launch
-STAGES = ("history", "theta", "policy")
 AS_IT_IS, THETA_, AIMED, HIT = "as it is", "oracle θ", "exact policy", "oracle policy"
 
 
@@ -200,10 +201,10 @@ def test_what_the_error_of_a_landing_is_made_of(tmp_path, progress, record) -> N
     params = load(project / "params.yaml")
     figures = {}
     for band in (name for name, about in params.bands.items() if about.source == "rig"):
-        for stage in ("record", "episode", "mounting"):
+        for stage in ("record", "episode", "clamps", "evidence"):
             run(project, "python", "-m", f"stages.{stage}", band)
         for method in METHODS:
-            for stage in STAGES:
+            for stage in (*STEPS[params.methods[method].search], "theta", "policy"):
                 run(project, "python", "-m", f"stages.{stage}", band, method)
         figures[band] = band_figures(params, project, band, METHODS, progress)
     draw_figure(figures, ROOT / "reports/validation/gap.png")

@@ -3,8 +3,8 @@
 import pytest
 
 from pipeline.recording.cloud import clouds_of
-from tests.recording import looks
-from tests.recording.scores import figures
+from validation.recordings import looks
+from validation.recordings.scores import figures
 
 pytestmark = pytest.mark.validation
 

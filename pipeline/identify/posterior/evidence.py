@@ -3,7 +3,7 @@
 Columns draw_y_m, draw_z_m, draw_error_m, landing_y_m. A launch is evidence or a score
 (data/trials/measured/), never both. The stage `evidence` checks them, and the density reads what it
 writes: {"launches": [{"draw", "error", "landing"}, ...], "setup": {...}}; "setup" is what launches
-them (a LaunchSetup) and missing where there is no launch.
+them (a LaunchSetup) and missing where there is no launch; "made_with" its keys in params.yaml.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pipeline.base.files import write_json
 from pipeline.base.schema import LIST, JsonRecord, read_json
 from pipeline.identify.posterior.launches import Evidence, Observed
 from pipeline.params import Params
+from pipeline.params.provenance import evidence_settings_of
 from pipeline.simulator.model import LaunchSetup
 
 COLUMNS = (*table.DRAW, "draw_error_m", table.LANDING)  # as they are written
@@ -75,6 +76,7 @@ class SetupRecord(JsonRecord):
 class ObservedFile(JsonRecord):
     launches: list[LaunchRecord]
     setup: SetupRecord | None = None
+    made_with: dict[str, float | None] = {}
 
 
 def save_observed(path: Path, launches: Sequence[Observed], params: Params) -> None:
@@ -83,6 +85,7 @@ def save_observed(path: Path, launches: Sequence[Observed], params: Params) -> N
     if launches:
         setup = vars(LaunchSetup.of(params.setup, params.sling))
         content["setup"] = {name: setup[name] for name in SetupRecord.model_fields}
+        content["made_with"] = evidence_settings_of(params)
     write_json(path, content)
 
 
@@ -92,9 +95,8 @@ def load_observed(path: Path) -> Evidence | None:
     if not read.launches or read.setup is None:
         return None
     launches = [Observed(one.draw, one.error, one.landing) for one in read.launches]
-    return Evidence(
-        launches, LaunchSetup(**read.setup.model_dump(include=set(SetupRecord.model_fields)))
-    )
+    setup = {name: getattr(read.setup, name) for name in SetupRecord.model_fields}
+    return Evidence(launches, LaunchSetup(**setup), read.made_with)
 
 
 def expect_error(where: str, error: float) -> float:

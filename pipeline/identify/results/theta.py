@@ -5,7 +5,8 @@
 seconds the recording's hand drew the band and how long it waited. Where a stage wrote it, also
 "method", "nuisances": {"air_drag": ...}, "turn_damping", "returned_share", "loss":
 {"geom", "force", "work", "total"}, "rollouts", "confidence"; "mounted": false where the method
-leaves out the calibration of the clamps. What is read of "confidence": confidence.py.
+leaves out the calibration of the clamps; "made_with": the settings of params.yaml that it rests on
+(params/provenance.py). What is read of "confidence": confidence.py.
 
 What its confidence rests on, samples of θ, lies beside in data/confidence/.
 """
@@ -14,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import create_model, model_validator
@@ -67,6 +68,7 @@ class ThetaFile(JsonRecord):
     mounted: bool = True
     loss: dict[Name, float] = {}
     rollouts: Count = 0
+    made_with: dict[str, Any] = {}
     confidence: Confidence | None = None
 
     @model_validator(mode="after")

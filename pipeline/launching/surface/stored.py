@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -42,6 +42,7 @@ class Card(JsonRecord):
 
     training: Training
     landing_map: LandingMapErrors
+    made_with: dict[str, Any] | None = None  # settings of params.yaml (params/provenance.py)
     projectile: Projectile | None = None  # of a policy that sees it
 
 

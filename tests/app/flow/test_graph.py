@@ -38,8 +38,10 @@ def toy(done: Toy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Toy:
 def test_stages_come_after_their_producers_the_longest_way_first(toy: Toy) -> None:
     found = Graph(toy.folder).stages
     assert list(found) == ORDER
-    assert found["top"] == Stage("top", "top", "", (), True)
-    assert found["side@left"] == Stage("side@left", "side", "left", ("top",), False)
+    assert found["top"] == Stage("top", "top", "", (), True, ("word", "work.py"), True)
+    assert found["side@left"] == Stage(
+        "side@left", "side", "left", ("top",), False, ("work.py",), True
+    )
     assert found["bottom"].producers == ("side@left", "side@right")
 
 

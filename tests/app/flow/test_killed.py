@@ -12,9 +12,9 @@ import pytest
 
 from app.flow import guard, locks
 from app.flow.child import StageFailed, run_stage
-from tests.app.flow.killing import OUTPUTS, SLING, STEPS, Toy, send, told
+from tests.app.flow.killing import OUTPUTS, STEPS, Toy
 from tests.app.flow.serving import serving
-from tests.project import wait
+from validation.projects import SLING, command_line, send, wait
 
 pytestmark = pytest.mark.slow
 READY = 90.0  # s in which a flow must have begun its stages, or ended them, on a busy machine
@@ -103,8 +103,8 @@ def test_a_killed_stage_fails_with_one_line_and_leaves_nothing(toy: Toy) -> None
             stage = one.submit(run, lines)
             assert wait(lambda: "step 3" in lines or stage.done(), READY)  # noqa: B023
             python = [one for one in toy.run.named(victim) if one.name().startswith("python")]
-            found = [one for one in python if victim != "repro" or "guard" not in told(one)]
-            assert len(found) == 1, [told(one) for one in toy.run.alive()]
+            found = [one for one in python if victim != "repro" or "guard" not in command_line(one)]
+            assert len(found) == 1, [command_line(one) for one in toy.run.alive()]
             send(found[0])
             with pytest.raises(StageFailed, match=f"^count@a: {reason}$"):
                 stage.result(20)

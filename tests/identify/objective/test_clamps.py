@@ -11,8 +11,8 @@ from pipeline.identify.clamps import calibrate_clamps, nominal_young, slack_part
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import Mounting
 from pipeline.simulator.model import ClampedBand
-from tests.identify.objective.own_law import own_law_episode
 from tests.identify.objective.pulls import PARAMS, pulled, sling_of
+from validation.synthetic import own_law_episode
 
 THETA = np.array([3e5, 0.45, 4e-3, 1.0, 1.0])
 SOLID = THETA[0] * np.pi * 0.005**4 / 4

@@ -13,8 +13,9 @@ from pipeline.identify.objective import session
 from pipeline.params import load
 from tests.identify.search import toy
 from tests.identify.search.functions import Evaluate, rosenbrock
+from tests.project import ROOT
 
-PARAMS = load(Path(__file__).parents[2] / "params.yaml")
+PARAMS = load(ROOT / "params.yaml")
 UNIT = np.random.default_rng(1).random((4, 5))
 
 

@@ -14,8 +14,8 @@ from pipeline.identify.posterior.residuals import Residuals, Rule
 from pipeline.identify.results.theta import at_points, load_theta
 from pipeline.simulator.interaction import interact
 from tests import once
-from tests.identify.objective.own_law import own_law_episode
 from tests.identify.objective.pulls import PARAMS, pulled, sling_of
+from validation.synthetic import own_law_episode
 
 METHOD, WORKERS, LOSS = "least_squares", 2, "log_loss_factor"
 SLING = replace(sling_of(0.03), law="rubber")

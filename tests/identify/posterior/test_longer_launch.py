@@ -9,7 +9,8 @@ from pipeline.identify.results.mounting import load_sling
 from pipeline.identify.results.theta import at_points
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import LaunchHistory, LaunchSetup
-from tests.project import ROUGH, with_
+from tests.project import with_
+from validation.projects import ROUGH
 
 THETA = np.array([5e5, 0.47, 5e-3, 0.7, 0.6, 0.0, 0.02])  # and Mooney's share, relaxation
 DRAW, FURTHER = (-0.30, -0.17), 1.04

@@ -16,8 +16,9 @@ from pipeline.recording.build import build_episodes
 from pipeline.report.card.known import Known, known
 from tests import once
 from tests.policy.stored import write_stored
-from tests.project import ROOT, ROUGH, set_methods
-from tests.recording.bag import Truth, write_bag
+from tests.project import ROOT, set_methods
+from validation.projects import ROUGH
+from validation.recordings.bag import Truth, write_bag
 
 BAND, METHOD = "toy", "least_squares"
 TRUTH = Truth()

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.simulator.launch import Launches, _outcomes
+from pipeline.export.mesh import Tube
+from pipeline.simulator.launch import Launches, outcomes
 from pipeline.simulator.model import GRAVITY, ClampedBand, LaunchSetup
 from pipeline.simulator.records import LANE, Outcome
-from validation.engines.mesh import Tube
 from validation.engines.physx.law import energy, force_on
 from validation.engines.physx.rollouts import BURST, SPACE
 from validation.engines.physx.study import clamped
@@ -88,7 +88,7 @@ class Flight:
 
     def outcome(self) -> Pushed:
         """What became of them."""
-        done = _outcomes(self.sling, self.setup, self.lanes, self.draws, np.inf)
+        done = outcomes(self.sling, self.setup, self.lanes, self.draws, np.inf)
         failure = np.where(self.burst, BURST, np.array(done.failure, object)).tolist()
         return Pushed(replace(done, failure=failure), self.gained)
 

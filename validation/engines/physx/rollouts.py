@@ -12,11 +12,11 @@ from functools import cache
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.export.mesh import Tube
 from pipeline.simulator.interaction import Rollouts
 from pipeline.simulator.model import GRAVITY
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.engines.checks import SAME_MESH
-from validation.engines.mesh import Tube
 from validation.engines.physx.bands import Engine
 from validation.engines.physx.study import MARK, motions, phases
 

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.report.card.inputs import CardInputs
 from pipeline.report.card.values import boxes
 from pipeline.report.card.verdict import FURTHER, Findings
-from pipeline.report.drawing.markdown import as_code
+from pipeline.report.drawing.names import as_code
 from pipeline.report.quantities import QUANTITIES, rounded
 
 SIDE = 0.01  # of a box's width: as near is at its side

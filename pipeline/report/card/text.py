@@ -8,7 +8,7 @@ from pipeline.report.card.findings import Findings
 from pipeline.report.card.inputs import CardInputs
 from pipeline.report.card.values import ShownValue
 from pipeline.report.card.verdict import CARE, NO, TRUSTED, Reason
-from pipeline.report.drawing.markdown import as_code
+from pipeline.report.drawing.names import as_code
 
 SAID = {TRUSTED: "can be trusted", CARE: "use with care", NO: "do not use it"}
 

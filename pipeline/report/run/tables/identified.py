@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.params import Params
 from pipeline.params.identification import LEAST_SQUARES
-from pipeline.report.drawing.markdown import as_code, cell
+from pipeline.report.drawing.names import as_code, cell
 from pipeline.report.drawing.styles import Styles
 from pipeline.report.quantities import QUANTITIES, Quantity, coordinate
 from pipeline.report.run.replay import MethodReplay

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 
 import pandas as pd
@@ -89,17 +90,17 @@ def test_landings_are_predicted_within_the_recorded_stretch(
             "theta": theta["theta"],
             "loss": theta["loss"],
             "rollouts": theta["rollouts"],
-            "mean_and_max_abs_error": errors[method],
+            "mean_and_max_abs_error": {part: asdict(one) for part, one in errors[method].items()},
             "launches": launches(trials),
             "recorded_stretch": trials.recorded_stretch[0],
         }
-        inside, beyond = errors[method]["inside"]["mean"], errors[method]["beyond"]["mean"]
+        inside, beyond = errors[method]["inside"].mean, errors[method]["beyond"].mean
         progress(f"  {method}: {100 * inside:.2f} % inside, {100 * beyond:.2f} % beyond")
 
     mounting = json.loads((project / "data/clamps" / f"{BAND}.json").read_text("utf-8"))
     unpredicted = [one for one in figures[OURS]["launches"] if one["predicted_failure"]]
     inside = errors[OURS]["inside"]
-    met = inside["launches"] > 0 and inside["mean"] <= LIMIT and not unpredicted
+    met = inside.launches > 0 and inside.mean <= LIMIT and not unpredicted
     record(
         "orange",
         asked="Identified from one recording by an independent engine and renderer (no robot), with"
@@ -114,6 +115,6 @@ def test_landings_are_predicted_within_the_recorded_stretch(
         },
         figures={"mounting": mounting, "methods": figures, "wall_seconds_to_theta": wall},
     )
-    assert inside["launches"] > 0
+    assert inside.launches > 0
     assert not unpredicted
-    assert inside["mean"] <= LIMIT
+    assert inside.mean <= LIMIT

@@ -50,11 +50,11 @@ def summary(results: Results, main: str, theirs: str | None) -> dict[str, float]
     if len(trials):
         aimed = trials[trials.target.notna()]
         found["failed"] = landing_errors(aimed)["all"]["failed"] if len(aimed) else None
-        found["bias_%"] = 100 * prediction_error(trials)["all"]["bias"]
-        covered = (intervals(trials) or {}).get("all", {"launches": 0})
-        if covered["launches"]:
-            found["in_90_%"] = 100 * covered["covered"] / covered["launches"]
-            found["width_%"] = 100 * covered["width"]
+        found["bias_%"] = 100 * prediction_error(trials)["all"].bias
+        coverage = (intervals(trials) or {}).get("all")
+        if coverage and coverage.launches:
+            found["in_90_%"] = 100 * coverage.covered / coverage.launches
+            found["width_%"] = 100 * coverage.width
     return {
         name: value if isinstance(value, int) else float(f"{value:.{DIGITS}g}")
         for name, value in found.items()

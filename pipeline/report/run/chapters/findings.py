@@ -90,15 +90,15 @@ def _predictions(report: Report, kind: str) -> list[str]:
         trials = methods[report.main].trials
         trials = trials[trials.kind == kind]
         about = prediction_error(trials)["all"]
-        if not about["launches"]:
+        if not about.launches:
             continue
-        errors.append(100 * about["mean"])
-        biases.append(100 * about["bias"])
+        errors.append(100 * about.mean)
+        biases.append(100 * about.bias)
         ranges = intervals(trials) if methods[report.main].confidence else None
-        if ranges and ranges["all"]["launches"]:
-            held, count = held + ranges["all"]["covered"], count + ranges["all"]["launches"]
-            widths.append(100 * ranges["all"]["width"])
-            off.append(about["mean"])
+        if ranges and ranges["all"].launches:
+            held, count = held + ranges["all"].covered, count + ranges["all"].launches
+            widths.append(100 * ranges["all"].width)
+            off.append(about.mean)
     if not errors:
         return []
     name = report.styles[report.main].name

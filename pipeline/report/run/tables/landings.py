@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -82,46 +83,68 @@ def _parts(trials: pd.DataFrame) -> dict[str, pd.Series]:
     return {"inside": inside, "beyond": ~inside, "all": inside | ~inside}
 
 
-def prediction_error(trials: pd.DataFrame) -> dict[str, dict]:
-    """Errors predicted / measured - 1 inside and beyond the recorded stretch.
+@dataclass(frozen=True)
+class PredictionError:
+    """Errors predicted / measured - 1 of some launches, as fractions; NaN of none.
 
-    Keys "inside", "beyond", "all", each with `launches` (those compared), `unpredicted` (their
-    simulation failed) of `tried`, and over those compared the mean and max of the error's size and
-    its signed mean, `bias` (fractions, NaN if none).
+    Attributes:
+        launches: That could be compared.
+        mean, max: Of the errors' size.
+        bias: Their signed mean.
+        tried, unpredicted: All launches, and those whose simulation failed.
     """
+
+    launches: int
+    mean: float
+    max: float
+    bias: float
+    tried: int
+    unpredicted: int
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How many of `launches` landings lie in their predicted 90 % intervals.
+
+    Attributes:
+        width: Median width of the intervals, as a share of the landing.
+    """
+
+    launches: int
+    covered: int
+    width: float
+
+
+def prediction_error(trials: pd.DataFrame) -> dict[str, PredictionError]:
+    """By "inside" and "beyond" the recorded stretch, and "all"."""
     signed = trials.predicted_y / trials.landing_y - 1
     error = signed.abs()
     return {
-        name: {
-            "launches": int((chosen & error.notna()).sum()),
-            "mean": float(error[chosen].mean()),
-            "max": float(error[chosen].max()),
-            "bias": float(signed[chosen].mean()),
-            "tried": int(chosen.sum()),
-            "unpredicted": int((chosen & trials.predicted_y.isna()).sum()),
-        }
+        name: PredictionError(
+            launches=int((chosen & error.notna()).sum()),
+            mean=float(error[chosen].mean()),
+            max=float(error[chosen].max()),
+            bias=float(signed[chosen].mean()),
+            tried=int(chosen.sum()),
+            unpredicted=int((chosen & trials.predicted_y.isna()).sum()),
+        )
         for name, chosen in _parts(trials).items()
     }
 
 
-def intervals(trials: pd.DataFrame) -> dict[str, dict] | None:
-    """How often landings lie in their predicted 90 % intervals, inside and beyond the recording.
-
-    Keys as above, each with `launches` (those that have both), how many are `covered`,
-    and the median `width` of the intervals as a share of the landing. None where no launch has an
-    interval.
-    """
+def intervals(trials: pd.DataFrame) -> dict[str, Coverage] | None:
+    """Of launches with landing and interval, by the same keys; None where none has an interval."""
     if trials.predicted_low.isna().all():
         return None
     both = trials.predicted_low.notna() & trials.landing_y.notna()
     covered = trials.landing_y.between(trials.predicted_low, trials.predicted_high)
     width = (trials.predicted_high - trials.predicted_low) / trials.landing_y
     return {
-        name: {
-            "launches": int((chosen & both).sum()),
-            "covered": int((chosen & both & covered).sum()),
-            "width": float(width[chosen & both].median()),
-        }
+        name: Coverage(
+            launches=int((chosen & both).sum()),
+            covered=int((chosen & both & covered).sum()),
+            width=float(width[chosen & both].median()),
+        )
         for name, chosen in _parts(trials).items()
     }
 
@@ -135,9 +158,9 @@ def prediction_summary(results: Results, styles: Styles) -> Table | None:
             if trials.empty:
                 continue
             parts, ranges = prediction_error(trials), intervals(trials) or {}
-            beyond |= parts["beyond"]["tried"] > 0
-            bias = number(100 * parts["all"]["bias"], "+.1f")
-            unpredicted = f"{parts['all']['unpredicted']} of {parts['all']['tried']}"
+            beyond |= parts["beyond"].tried > 0
+            bias = number(100 * parts["all"].bias, "+.1f")
+            unpredicted = f"{parts['all'].unpredicted} of {parts['all'].tried}"
             mark = "" if result.confidence else " †"
             covered = [coverage(ranges.get(name)) for name in ("inside", "beyond")]
             covered = [text + mark * (text != NONE) for text in covered]
@@ -152,16 +175,16 @@ def prediction_summary(results: Results, styles: Styles) -> Table | None:
     return (heads, rows) if rows else None
 
 
-def _share(part: dict) -> str:
-    if not part["launches"]:
+def _share(part: PredictionError) -> str:
+    if not part.launches:
         return NONE
-    mean, most = percent(part["mean"], ".1f"), percent(part["max"], ".1f")
-    return f"{mean} (max {most}, {part['launches']} launches)"
+    mean, most = percent(part.mean, ".1f"), percent(part.max, ".1f")
+    return f"{mean} (max {most}, {part.launches} launches)"
 
 
-def coverage(part: dict | None) -> str:
+def coverage(part: Coverage | None) -> str:
     """How many landings lie in their intervals, and how wide these are."""
-    if not part or not part["launches"]:
+    if not part or not part.launches:
         return NONE
-    width = percent(part["width"], ".2g")
-    return f"{part['covered']} of {part['launches']}, median width {width}"
+    width = percent(part.width, ".2g")
+    return f"{part.covered} of {part.launches}, median width {width}"

@@ -44,7 +44,7 @@ def outcome(results: Results, references: tuple[str, ...], styles: Styles) -> Ta
             cells += [number(own and floor and own / floor, ".1f")]
             failed = [str(one["failed"]) for one in found if one]
             cells += [" · ".join(failed) or NONE]
-            cells += [number(100 * parts["mean"], ".1f"), number(100 * parts["bias"], "+.1f")]
+            cells += [number(100 * parts.mean, ".1f"), number(100 * parts.bias, "+.1f")]
             rows.append([band, f"{len(trials[0])} {kind}", *cells, coverage(ranges.get("all"))])
     names = [styles[method].name for method in references]
     heads = ["band", "launches", *(f"{name} [cm]" for name in names)]

@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.report.run.tables.cells import markdown
 from pipeline.report.run.tables.landings import (
+    Coverage,
     intervals,
     landing_errors,
     prediction_error,
@@ -65,13 +66,13 @@ def test_prediction_error_inside_and_beyond() -> None:
         ]
     )
     error = prediction_error(launched)
-    assert error["inside"]["mean"] == pytest.approx(0.03) and error["inside"]["launches"] == 2
-    assert error["beyond"]["mean"] == pytest.approx(0.10) and error["beyond"]["launches"] == 1
-    assert error["all"]["mean"] == pytest.approx(0.16 / 3)
-    assert error["inside"]["bias"] == pytest.approx(0.02)
-    assert error["beyond"]["bias"] == pytest.approx(-0.10)
-    assert (error["beyond"]["unpredicted"], error["beyond"]["tried"]) == (1, 2)
-    assert error["inside"]["unpredicted"] == 0
+    assert error["inside"].mean == pytest.approx(0.03) and error["inside"].launches == 2
+    assert error["beyond"].mean == pytest.approx(0.10) and error["beyond"].launches == 1
+    assert error["all"].mean == pytest.approx(0.16 / 3)
+    assert error["inside"].bias == pytest.approx(0.02)
+    assert error["beyond"].bias == pytest.approx(-0.10)
+    assert (error["beyond"].unpredicted, error["beyond"].tried) == (1, 2)
+    assert error["inside"].unpredicted == 0
     text = markdown(predictions(launched))
     assert "+5.0%" in text and "−10.0%" in text and text.count("(beyond)") == 2
 
@@ -82,8 +83,8 @@ def test_predictions_are_held_against_landings_outside_the_area_too() -> None:
         launched = trials([(1.9, 2.0, None, 2.1, 1.4), (1.9, 2.6, failure, 1.95, 1.4)], kind)
         launched = launched.assign(predicted_low=1.9, predicted_high=2.2)
         error, inside = prediction_error(launched)["all"], intervals(launched)["inside"]
-        assert error["launches"] == 2 and error["max"] == pytest.approx(0.25)
-        assert (inside["launches"], inside["covered"]) == (2, 1)
+        assert error.launches == 2 and error.max == pytest.approx(0.25)
+        assert (inside.launches, inside.covered) == (2, 1)
         total = landing_errors(launched)["all"]
         assert total["failed"] == 1 and total["mean"] == pytest.approx(0.1)
 
@@ -102,7 +103,7 @@ def test_coverage_of_the_predicted_intervals() -> None:
         predicted_low=[1.95, 2.05, 1.0, 3.0], predicted_high=[2.25, 2.15, 3.0, 4.0]
     )
     parts = intervals(ranged)
-    assert (parts["inside"]["covered"], parts["inside"]["launches"]) == (1, 2)
-    assert parts["inside"]["width"] == pytest.approx((0.15 + 0.05) / 2)
-    assert parts["beyond"] == {"launches": 1, "covered": 1, "width": 0.25}
+    assert (parts["inside"].covered, parts["inside"].launches) == (1, 2)
+    assert parts["inside"].width == pytest.approx((0.15 + 0.05) / 2)
+    assert parts["beyond"] == Coverage(launches=1, covered=1, width=0.25)
     assert "| 1.950 – 2.250 |" in markdown(predictions(ranged))

@@ -17,20 +17,20 @@ from pipeline.base.schema import explained, read_json
 from pipeline.episode.episode import Episode
 from pipeline.episode.pull import launch_history
 from pipeline.identify.clamps import calibrate_clamps
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.identify.posterior import identify as posterior
 from pipeline.identify.posterior.launches import Observed
 from pipeline.identify.results.mounting import Mounting
-from pipeline.identify.results.theta import ThetaFile, load_samples, load_theta
+from pipeline.identify.results.theta import ThetaFile, load_samples, load_theta, parameters_of
 from pipeline.identify.search.build import explorer
 from pipeline.identify.search.history import History
-from pipeline.identify.search.loop import Free, budget, search
+from pipeline.identify.search.loop import budget, search
 from pipeline.launching.trials.stretch import recorded_stretch
-from pipeline.params.identification import LAWS, LEAST_SQUARES
-from pipeline.simulator.material import THETA
+from pipeline.params.identification import LEAST_SQUARES
 from pipeline.simulator.model import ClampedBand, LaunchHistory
+from pipeline.simulator.parameters import Parameters, searched_names
 from sling2sim2real.model import Band, Model, Theta, known
 from sling2sim2real.settings import Settings
 
@@ -126,6 +126,7 @@ class Identification(Model):
         about = settings.bands[band]
         content = load_theta(layout.theta(band, method), band)
         file = ThetaFile.model_validate(content)
+        samples = load_samples(layout.confidence(band, method), parameters_of(content))
         path, told = layout.mounting(band), content.get("confidence")
         there = layout.episode(band).is_dir()
         episodes = Episode.load_all(layout.episodes(band)) if there else []
@@ -136,7 +137,7 @@ class Identification(Model):
             history=file.history and LaunchHistory(**file.history.model_dump()),
             settings=settings,
             intervals=_intervals(content, told) if told else {},
-            samples=load_samples(layout.confidence(band, method)),
+            samples=samples and samples.values,
             settled=bool(told and told["settled"]),
             stretch=_stretch(episodes, settings, about),
         )
@@ -196,19 +197,20 @@ def identify(
             mounting = _mounting(episodes[0], band, settings)
             progress(f"mounting: clamps at {mounting.clamp_angle_deg:.0f} degrees")
         sling = _sling(band, settings, mounting)
-        point, rollouts = _explored(episodes[0], sling, settings)
+        nearest, rollouts = _explored(episodes[0], sling, settings)
         progress(f"explored {rollouts} points")
     else:
         mounting, theta = start.mounting, start.theta
-        names = (*THETA, *LAWS[settings.methods[METHOD].law])
-        point = np.array([getattr(theta, name) or 0.0 for name in names])
+        names = searched_names(settings.methods[METHOD].law)
+        values = {name: getattr(theta, name) or 0.0 for name in names}
+        nearest = Parameters.named(settings.methods[METHOD].law, values)
         sling = _sling(band, settings, mounting)
     found = posterior.identify(
         settings,
         METHOD,
         sling,
         episodes,
-        point,
+        nearest,
         observed=launches,
         workers=workers() or cores(),
         progress=lambda fit: progress(f"expansion {fit.steps}: misfit {fit.misfit:.2f}"),
@@ -223,7 +225,7 @@ def identify(
         history=file.history and LaunchHistory(**file.history.model_dump()),
         settings=settings,
         intervals=_intervals(content, told),
-        samples=found.points,
+        samples=found.parameters.values,
         settled=told["settled"],
         stretch=_stretch(episodes, settings, band),
     )
@@ -245,17 +247,17 @@ def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
     return Mounting.model_validate(found)
 
 
-def _explored(episode: Episode, sling: ClampedBand, settings: Settings) -> tuple[np.ndarray, int]:
-    """The best point (P,) of a design over the box, and of how many."""
-    about, space = settings.methods[METHOD], Space.of_method(settings, METHOD)
+def _explored(episode: Episode, sling: ClampedBand, settings: Settings) -> tuple[Parameters, int]:
+    """The best of a design over the box, and of how many."""
+    about, box = settings.methods[METHOD], SearchBox.of_method(settings, METHOD)
     loss = EpisodeLoss.of(settings, METHOD, episode, sling)
-    evaluate = Evaluator(episode, sling, loss, space, devices=devices(), workers=workers())
-    free, history = Free.of(space, about.fixed), History(METHOD, space.names)
+    evaluate = Evaluator(episode, sling, loss, box, devices=devices(), workers=workers())
+    history = History(METHOD, box.names)
     rollouts, _ = budget(settings.optimizer, LEAST_SQUARES)
-    optimizer = explorer(about, settings.optimizer, len(free.axes), rollouts)
-    search(optimizer, evaluate, history, rollouts=rollouts, free=free)
+    optimizer = explorer(about, settings.optimizer, len(box.free), rollouts)
+    search(optimizer, evaluate, history, rollouts=rollouts, box=box)
     best = history.best()
-    return np.array([best[name] for name in space.names]), rollouts
+    return Parameters.named(box.law, {name: best[name] for name in box.names}), rollouts
 
 
 def _intervals(content: dict, told: dict) -> dict[str, Interval]:

@@ -14,6 +14,7 @@ from pipeline.episode.episode import Episode
 from pipeline.episode.signal import as_recorded, cutoff_hz
 from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.interaction import interact
+from pipeline.simulator.parameters import Parameters
 from sling2sim2real.model import Model, Theta
 
 LANES = 16  # rollouts that cost as much as one
@@ -85,13 +86,12 @@ def simulate_batch(model: Model, episode: Episode, thetas: Sequence[Theta]) -> l
     """
     if not thetas or {one.law for one in thetas} != {model.theta.law}:
         raise UserError(f"thetas: give some, all of the model's law, {model.theta.law}")
-    points = np.stack([one.point for one in thetas])
+    parameters = Parameters(model.theta.law, np.stack([one.point for one in thetas]))
     cutoff = cutoff_hz(model.settings.force.cutoff, model.settings.force.cutoff_unit)
     start = episode.time[0] - episode.sample_period / 2
 
-    def part(some: np.ndarray) -> list[Simulation]:
-        sling, five = model.at(some)
-        done = interact(sling, episode, five)
+    def part(some: Parameters) -> list[Simulation]:
+        done = interact(model.sling, episode, some)
         steps = np.moveaxis(done.force, 0, 1)  # (S, N, 3)
         sampling = start, episode.sample_period, len(episode.time)
         force = np.moveaxis(as_recorded(done.times, steps, cutoff, *sampling), 0, 1)
@@ -109,7 +109,7 @@ def simulate_batch(model: Model, episode: Episode, thetas: Sequence[Theta]) -> l
         ]
 
     with ThreadPoolExecutor(cores()) as pool:
-        some = [points[i : i + LANES] for i in range(0, len(points), LANES)]
+        some = [parameters[i : i + LANES] for i in range(0, len(parameters), LANES)]
         return [one for each in pool.map(part, some) for one in each]
 
 

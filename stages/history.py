@@ -11,27 +11,26 @@ SLING_WORKERS say where it runs.
 from __future__ import annotations
 
 from pipeline.base.layout import Layout
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.session import service
-from pipeline.identify.objective.space import Space
 from pipeline.identify.search.build import explorer
 from pipeline.identify.search.history import History
-from pipeline.identify.search.loop import Free, budget, search
+from pipeline.identify.search.loop import budget, search
 from stages.start import run, started
 
 
 def main() -> None:
     params, band, method = started("band", "method")
     about = params.methods[method]
-    space = Space.of_method(params, method)
-    free = Free.of(space, about.fixed)
+    box = SearchBox.of_method(params, method)
     rollouts, _ = budget(params.optimizer, about.search)
-    history = History(method, space.names)
+    history = History(method, box.names)
     search(
-        explorer(about, params.optimizer, len(free.axes), rollouts),
+        explorer(about, params.optimizer, len(box.free), rollouts),
         service("history", band, method, params, rollouts),
         history,
         rollouts=rollouts,
-        free=free,
+        box=box,
     )
     history.save(Layout().history(band, method))
 

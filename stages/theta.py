@@ -17,27 +17,26 @@ where it runs.
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
 from pipeline.base.files import write_json
 from pipeline.base.launch_table import expect_apart
 from pipeline.base.layout import Layout, made
 from pipeline.base.machine import workers
 from pipeline.episode.pull import launch_history
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.session import load_episode, load_episodes, service
-from pipeline.identify.objective.space import Space
 from pipeline.identify.optimizers.cma.multistart import Multistart
 from pipeline.identify.posterior import identify
 from pipeline.identify.posterior.evidence import read_evidence
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.results.theta import calibrated
 from pipeline.identify.search.history import History, theta_content
-from pipeline.identify.search.loop import Free, search
+from pipeline.identify.search.loop import search
 from pipeline.identify.search.regions import Region, regions_of, save_regions
-from pipeline.params.identification import LAWS, LEAST_SQUARES
-from pipeline.simulator.material import THETA
+from pipeline.params.identification import LEAST_SQUARES
+from pipeline.simulator.parameters import EXTRA, Parameters, searched_names
 from pipeline.simulator.rubber import RUBBER
 from stages.start import run, started
 
@@ -45,14 +44,14 @@ from stages.start import run, started
 def main() -> None:
     params, band, method = started("band", "method")
     about, layout = params.methods[method], Layout()
-    free = Free.of(Space.of_method(params, method), about.fixed)
-    explored = History.load(method, free.names, made(layout.history(band, method)))
+    box = SearchBox.of_method(params, method)
+    explored = History.load(method, box.free, made(layout.history(band, method)))
     regions, asked = promising(about, params.optimizer, explored)
-    save_regions(layout.clusters(band, method), free.names, regions, asked)
+    save_regions(layout.clusters(band, method), box.free, regions, asked)
     if about.search == LEAST_SQUARES:
         content, samples = fitted(params, band, method)
     else:
-        content, samples = searched(params, band, method, free, regions), {"samples": []}
+        content, samples = searched(params, band, method, box, regions), {"samples": []}
     write_json(layout.confidence(band, method), samples | {"band": band})
     write_json(layout.theta(band, method), content)
     print(f"{band} {method}: loss {content['loss']['total']:.5g}")
@@ -61,24 +60,24 @@ def main() -> None:
         print(f"  {name} {value:.4g}{_trust(told['parameters'][name]) if told else ''}")
 
 
-def searched(params, band: str, method: str, free: Free, regions: list[Region]) -> dict:
+def searched(params, band: str, method: str, box: SearchBox, regions: list[Region]) -> dict:
     """The best of all that a search and a CMA-ES in each region evaluated."""
     layout, law = Layout(), params.methods[method].law
     if regions:
         print(
             f"{band} {method}: {len(regions)} regions, best loss {regions[0].loss:.5g}", flush=True
         )
-    refine(params, band, method, free, regions).save(layout.refined(band, method))
+    refine(params, band, method, box, regions).save(layout.refined(band, method))
     sources = layout.history(band, method), layout.refined(band, method)
-    history = History.load(method, (*THETA, *LAWS[law]), *sources)
+    history = History.load(method, searched_names(law), *sources)
     known = {"law": RUBBER, "history": launch_history(load_episode(band))} if law == RUBBER else {}
     return theta_content(history, band, known | unmounted(params, method))
 
 
 def fitted(params, band: str, method: str) -> tuple[dict, dict]:
     """The mode of the density over all evidence, from the best that was explored."""
-    layout, names = Layout(), (*THETA, *LAWS[params.methods[method].law])
-    explored = History.load(method, names, layout.history(band, method))
+    layout, box = Layout(), SearchBox.of_method(params, method)
+    explored = History.load(method, box.names, layout.history(band, method))
     best = explored.best()
     expect_apart(layout, band)
     sling = sling_of_method(params, band, method)
@@ -87,7 +86,7 @@ def fitted(params, band: str, method: str) -> tuple[dict, dict]:
         method,
         sling,
         load_episodes(band),
-        np.array([best[name] for name in names]),
+        Parameters.named(box.law, {name: best[name] for name in box.names}),
         observed=read_evidence(layout.evidence, band, params),
         workers=workers(),
         progress=lambda fit: print(
@@ -98,27 +97,27 @@ def fitted(params, band: str, method: str) -> tuple[dict, dict]:
     content["confidence"] = identify.confidence(found, params.parameters)
     content["rollouts"] = len(explored.total) + found.rollouts
 
-    space, episode = Space.of_method(params, method), found.recordings[0].episode
-    sling = calibrated(params, band, content)
-    mode = Evaluator(episode, sling, EpisodeLoss.of(params, method, episode, sling), space)
-    point = space.to_unit(np.array([[content["theta"][name] for name in space.names]]))
-    history = History(method, space.names)
-    history.add(mode(point), phase=LEAST_SQUARES, generation=found.fit.steps)
+    episode, beside = found.recordings[0].episode, found.mode.sample()
+    whole = replace(box, fixed={name: beside[name] for name in EXTRA})
+    mode = Evaluator(episode, sling, EpisodeLoss.of(params, method, episode, sling), whole)
+    history = History(method, box.names)
+    history.add(mode(box.unit_of(found.mode)), phase=LEAST_SQUARES, generation=found.fit.steps)
     history.save(layout.refined(band, method))
-    samples = {"names": found.names, "samples": found.points.tolist()}
+    told = found.parameters
+    samples = {"names": [*told.names], "samples": told.values.tolist()}
     return theta_content(history, band, content), samples
 
 
-def refine(params, band: str, method: str, free: Free, regions: list[Region]) -> History:
+def refine(params, band: str, method: str, box: SearchBox, regions: list[Region]) -> History:
     """What a CMA-ES in each region evaluates; no row where there is no region."""
-    optimizer, history = params.optimizer, History(method, Space.of_method(params, method).names)
+    optimizer, history = params.optimizer, History(method, box.names)
     if regions:
         search(
             Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed),
             service("refined", band, method, params, optimizer.cma_rollouts),
             history,
             rollouts=optimizer.cma_rollouts,
-            free=free,
+            box=box,
         )
     return history
 

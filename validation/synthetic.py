@@ -15,6 +15,7 @@ from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 
 DRAW = 0.35  # m
 THETA = (2e5, 0.45, 2e-3, 0.5, 0.5)  # of the band that is recorded
@@ -73,7 +74,7 @@ def recorded_yardstick(params) -> tuple[ClampedBand, Episode]:
     band = next(iter(params.bands))
     sling = yardstick(params.bands[band], params)
     episode = pull_and_release(band, params.episode, sling)
-    rollout = interact(sling, episode, np.array([THETA]))
+    rollout = interact(sling, episode, Parameters.of(sling.law, THETA))
     ridges = [
         _ridge(line, sling.radius, episode.camera, params.cloud.points)
         for line in rollout.center_line[0]

@@ -20,7 +20,7 @@ from pipeline.params.identification import (
     MethodDefaults,
     MethodParams,
     OptimizerParams,
-    Parameters,
+    ParameterBoxes,
     SlingParams,
     check_method,
 )
@@ -39,7 +39,7 @@ class Params(Section):
     force: ForceParams
     cloud: CloudParams
     sling: SlingParams
-    parameters: Parameters
+    parameters: ParameterBoxes
     loss: LossParams
     optimizer: OptimizerParams
     method_defaults: MethodDefaults

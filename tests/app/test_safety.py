@@ -10,7 +10,7 @@ from app import safety
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 from tests.project import ROOT
 
 VALUES = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))

@@ -18,19 +18,18 @@ import numpy as np
 
 from pipeline.base.machine import named
 from pipeline.episode.episode import Episode
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.cache import EvaluationCache
 from pipeline.identify.objective.evaluate import Evaluator, simulated
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.identify.optimizers.cma.multistart import Multistart
 from pipeline.identify.posterior.identify import identify
 from pipeline.identify.search.build import explorer
 from pipeline.identify.search.history import History
-from pipeline.identify.search.loop import Free, budget, latin_hypercube, search
+from pipeline.identify.search.loop import budget, latin_hypercube, search
 from pipeline.identify.search.regions import regions_asked, regions_of
 from pipeline.params import expect_known
 from pipeline.params.identification import LEAST_SQUARES
-from pipeline.simulator.material import THETA
 from pipeline.simulator.model import ClampedBand
 from validation.benchmarks.timing import seconds, shared, timed
 from validation.synthetic import recorded_yardstick
@@ -129,27 +128,26 @@ def complete(params, method: str, optimizer, evaluate) -> History:
     Of least squares that is the exploration; the fit has no history.
     """
     about = params.methods[method]
-    space = Space.of_method(params, method)
-    free = Free.of(space, about.fixed)
+    box = SearchBox.of_method(params, method)
     explore, refine = budget(optimizer, about.search)
-    history = History(method, space.names)
-    first = explorer(about, optimizer, len(free.axes), explore)
-    search(first, evaluate, history, rollouts=explore, free=free)
+    history = History(method, box.names)
+    first = explorer(about, optimizer, len(box.free), explore)
+    search(first, evaluate, history, rollouts=explore, box=box)
     if about.search == "multistart":
-        explored = History(method, free.names, [history.table])
+        explored = History(method, box.free, [history.table])
         regions, _ = regions_of(about, optimizer, explored)
         solvers = Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed)
-        search(solvers, evaluate, history, rollouts=refine, free=free)
+        search(solvers, evaluate, history, rollouts=refine, box=box)
     return history
 
 
 def _generation(params, sling: ClampedBand, episode: Episode, method: str, devices, count: int):
     """Seconds of one generation: simulated, and with the loss, on all cores or GPUs."""
     evaluate = evaluator(params, method, sling, episode, devices)
-    unit = latin_hypercube(evaluate.space.dimension, count, params.optimizer.seed)
-    thetas = evaluate.space.to_physical(unit)[:, : len(THETA)]
+    unit = latin_hypercube(evaluate.box.dimension, count, params.optimizer.seed)
+    parameters = evaluate.box.parameters(evaluate.box.to_physical(unit))
     simulate = partial(simulated, sling, episode, workers=os.cpu_count())
-    simulation = seconds(partial(shared, devices, simulate, thetas))
+    simulation = seconds(partial(shared, devices, simulate, parameters))
     whole = seconds(partial(evaluate, unit))
     return {"rollouts": count, "simulation_s": simulation, "with_loss_s": whole}
 
@@ -159,7 +157,7 @@ def evaluator(
 ) -> Evaluator:
     """A method's, with nothing remembered."""
     loss = EpisodeLoss.of(params, method, episode, sling)
-    return Evaluator(episode, sling, loss, Space.of_method(params, method), devices=devices)
+    return Evaluator(episode, sling, loss, SearchBox.of_method(params, method), devices=devices)
 
 
 def _import_and_compile(
@@ -169,7 +167,7 @@ def _import_and_compile(
     import torch  # noqa: F401
 
     evaluate = evaluator(params, method, sling, episode, devices)
-    evaluate(np.full((len(devices), evaluate.space.dimension), 0.5))
+    evaluate(np.full((len(devices), evaluate.box.dimension), 0.5))
 
 
 def table(result: dict) -> str:

@@ -30,7 +30,7 @@ from pipeline.base.files import write_json
 from pipeline.base.machine import cores, processor
 from pipeline.base.pool import Pool
 from pipeline.episode.episode import Episode
-from pipeline.identify.objective.space import Space
+from pipeline.identify.objective.box import SearchBox
 from pipeline.params import expect_known, load
 from rig.physics.launch import launch
 from validation.benchmarks.timing import environment
@@ -119,14 +119,14 @@ def identified(job: Job, params, folder: Path) -> dict:
     start, targets = time.perf_counter(), params.trials.targets
     outcome, told = found(params, job.method, sling, [Episode.load(folder / "episode")])
     seconds = time.perf_counter() - start
-    names = Space.of_method(params, job.method).names
+    names = SearchBox.of_method(params, job.method).names
     draws = aimed(outcome, params, targets)
     landing = [
         np.nan if np.isnan(draw).any() else launch(job.band, params, tuple(draw), None).landing_y
         for draw in draws
     ]
     return {
-        "theta": dict(zip(names, outcome.point.tolist(), strict=False)),
+        "theta": {name: outcome.identified[name] for name in names},
         "loss": told.get("loss"),
         "draws_m": draws,
         "error_m": np.array(landing) - targets,

@@ -29,7 +29,7 @@ from pipeline.base.layout import made
 from pipeline.base.machine import cores
 from pipeline.base.pool import Pool
 from pipeline.episode.episode import Episode
-from pipeline.identify.objective.space import Space
+from pipeline.identify.objective.box import SearchBox
 from pipeline.params import load
 from validation import orange
 from validation.benchmarks.timing import environment
@@ -134,10 +134,13 @@ def identified(case: Case, work: Path, recordings: Path | None) -> dict:
     params = params.model_copy(update={"optimizer": optimizer})
     start, sling = time.perf_counter(), sling_of(params, case.band, case.method, folder)
     outcome, told = found(params, case.method, sling, [Episode.load(folder / "episode")])
-    seconds, names = time.perf_counter() - start, Space.of_method(params, case.method).names
-    theta = dict(zip(names, outcome.point.tolist(), strict=False))
+    seconds, names = time.perf_counter() - start, SearchBox.of_method(params, case.method).names
+    theta = {name: outcome.identified[name] for name in names}
     about = {"theta": theta, "youngs_modulus": theta["youngs_modulus"], "seconds": seconds}
-    about |= {"point": outcome.point, "own_loss": told.get("loss", {}).get("total")}
+    about |= {
+        "point": [*outcome.identified.values()],
+        "own_loss": told.get("loss", {}).get("total"),
+    }
     seen = Episode.load(case.episode(work, AS_IS) / "episode")
     return about | forces(case.band, outcome, seen) | misses(case.band, outcome, seen, recordings)
 

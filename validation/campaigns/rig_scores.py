@@ -144,7 +144,7 @@ def result(params, band: str, numbers: tuple[int, ...], method: str, folder: Pat
                 ]
                 outcome, told = found(here, method, sling, episodes, seen)
             scores = scored(outcome, here, world, seed=numbers[0])
-        about = {"point": outcome.point, "told": told, "identification_s": seconds}
+        about = {"point": [*outcome.identified.values()], "told": told, "identification_s": seconds}
         path.parent.mkdir(parents=True, exist_ok=True)
         write_json(path, plain(scores | about))
     return json.loads(path.read_text())

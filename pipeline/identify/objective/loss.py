@@ -23,6 +23,9 @@ from pipeline.episode.phases import held_out_blocks, reach, within
 from pipeline.episode.signal import as_recorded, cutoff_hz
 from pipeline.identify.objective.chamfer import Chamfer, CloudDistance
 from pipeline.identify.objective.device_terms import DeviceTerms
+from pipeline.params import Params
+from pipeline.simulator.interaction import Rollouts
+from pipeline.simulator.model import ClampedBand
 
 TERMS = ("geom", "force", "work")
 LOCK = threading.Lock()  # while a filter is made, which takes a second
@@ -99,7 +102,7 @@ class EpisodeLoss:
             raise UserError(f"episode of {episode.band}: no camera frame shows the band")
 
     @classmethod
-    def of(cls, params, method: str, episode: Episode, sling) -> EpisodeLoss:
+    def of(cls, params: Params, method: str, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
         """Make it from params.yaml's `loss`, `force` and `methods.<method>`."""
         cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
         held = params.loss.held_out
@@ -116,7 +119,7 @@ class EpisodeLoss:
         )
 
     @classmethod
-    def plain(cls, params, episode: Episode, sling) -> EpisodeLoss:
+    def plain(cls, params: Params, episode: Episode, sling: ClampedBand) -> EpisodeLoss:
         """Geometry and force alone, for a part of an episode."""
         return cls(
             episode,
@@ -128,7 +131,7 @@ class EpisodeLoss:
             chamfer=params.loss.chamfer,
         )
 
-    def terms(self, rollouts) -> dict[str, np.ndarray]:
+    def terms(self, rollouts: Rollouts) -> dict[str, np.ndarray]:
         """Each term of N rollouts, shape (N,); NaN or infinite where a rollout is.
 
         They are computed on the device that holds the rollouts. A rollout's terms are the same to
@@ -147,7 +150,7 @@ class EpisodeLoss:
             "work": np.abs(work) / 2 * self.period,
         }
 
-    def residuals(self, rollouts) -> dict[str, dict[str, np.ndarray]]:
+    def residuals(self, rollouts: Rollouts) -> dict[str, dict[str, np.ndarray]]:
         """Fitted against held-out between grasp and release: `force` [N] and `cloud` [cm], (N,).
 
         NaN where nothing is held out.
@@ -169,7 +172,7 @@ class EpisodeLoss:
         """Weighted sum of the terms, shape (N,); one without weight may be NaN."""
         return sum(weight * terms[name] for name, weight in self.weights.items() if weight)
 
-    def filtered(self, rollouts) -> np.ndarray:
+    def filtered(self, rollouts: Rollouts) -> np.ndarray:
         """The simulated force as the record would have it [N], shape (N, T, 3), before `smooth`."""
         force = rollouts.force
         force = force if isinstance(force, np.ndarray) else force.numpy()
@@ -177,7 +180,7 @@ class EpisodeLoss:
         flat = force.transpose(1, 0, 2).reshape(steps, -1)
         return (self._filter(rollouts.times) @ flat).reshape(-1, count, 3).transpose(1, 0, 2)
 
-    def frames(self, rollouts) -> np.ndarray:
+    def frames(self, rollouts: Rollouts) -> np.ndarray:
         """Chamfer distance of each camera frame [m], shape (N, K); NaN where it shows nothing."""
         line = rollouts.center_line
         return self.chamfer(line, "cpu" if isinstance(line, np.ndarray) else str(line.device))

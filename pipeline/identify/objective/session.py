@@ -13,12 +13,13 @@ from pipeline.base.layout import Layout
 from pipeline.base.machine import devices, kind, workers
 from pipeline.base.progress import Progress
 from pipeline.episode.episode import Episode
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.cache import EvaluationCache
 from pipeline.identify.objective.engine import simulate_of, sources_of
 from pipeline.identify.objective.evaluate import Evaluation, Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.identify.results.mounting import sling_of_method
+from pipeline.params import Params
 from pipeline.params.identification import OUR_ENGINE
 
 PIPELINE = Path(__file__).parents[2]
@@ -50,7 +51,7 @@ class LoggingEvaluator:
         return evaluation
 
 
-def service(stage: str, band: str, method: str, params, rollouts: int) -> LoggingEvaluator:
+def service(stage: str, band: str, method: str, params: Params, rollouts: int) -> LoggingEvaluator:
     """The evaluator of a stage that has so many rollouts ahead; it says how it gets on."""
     evaluate, layout = evaluator(params, band, method), Layout()
     sections = (params.bands[band], params.setup, params.sling, params.force, params.loss)
@@ -76,7 +77,7 @@ def _folder(band: str, method) -> list[str]:
     return words if method.engine == OUR_ENGINE else [*words, method.engine.replace(":", ".")]
 
 
-def evaluator(params, band: str, method: str) -> Evaluator:
+def evaluator(params: Params, band: str, method: str) -> Evaluator:
     """The evaluator of a recorded band, on the devices that the environment names."""
     episode, engine = load_episode(band), params.methods[method].engine
     sling = sling_of_method(params, band, method)
@@ -84,7 +85,7 @@ def evaluator(params, band: str, method: str) -> Evaluator:
         episode,
         sling,
         EpisodeLoss.of(params, method, episode, sling),
-        Space.of_method(params, method),
+        SearchBox.of_method(params, method),
         devices=devices(),
         workers=workers(),
         simulate=simulate_of(engine),

@@ -20,10 +20,11 @@ from pipeline.identify.posterior.draws import truncated_gaussian
 from pipeline.identify.posterior.fit import Fit, fit
 from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
-from pipeline.identify.results.theta import EXTRA
-from pipeline.params.identification import LAWS, UNSEEN
-from pipeline.simulator.material import THETA
+from pipeline.identify.results.theta import content_of
+from pipeline.params import Params
+from pipeline.params.identification import UNSEEN, ParameterBoxes
 from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
+from pipeline.simulator.parameters import EXTRA, Parameters, searched_names
 from pipeline.simulator.rubber import RUBBER
 
 LEVEL = 0.9
@@ -58,9 +59,14 @@ class Identified:
     launches: LaunchLikelihood | None
 
     @property
-    def points(self) -> np.ndarray:
-        """Samples as `sling.theta.at_points` takes them, shape (SAMPLES, P)."""
-        return self.coordinates.points(self.samples)
+    def mode(self) -> Parameters:
+        """θ*, one sample."""
+        return self.coordinates.parameters(self.fit.phi[None])
+
+    @property
+    def parameters(self) -> Parameters:
+        """Of the SAMPLES samples."""
+        return self.coordinates.parameters(self.samples)
 
     @property
     def rollouts(self) -> int:
@@ -68,19 +74,13 @@ class Identified:
         each = len(self.coordinates.names) + 1 + len(SIMULATED)
         return self.fit.steps * len(self.recordings) * each
 
-    @property
-    def names(self) -> list[str]:
-        """Of the columns of `points`."""
-        law = self.recordings[0].sling.law
-        return [*THETA, *LAWS[law], *EXTRA]
-
 
 def identify(
-    params,
+    params: Params,
     method: str,
     sling: ClampedBand,
     episodes: Sequence[Episode],
-    start: np.ndarray,
+    start: Parameters,
     *,
     observed: Sequence[Observed] = (),
     workers: int | None = None,
@@ -91,7 +91,7 @@ def identify(
     Args:
         method: Of params.yaml, one that searches by least squares.
         episodes: Of the band's recordings, at least one.
-        start: θ and what its law adds, (P,): the nearest that an exploration found.
+        start: One sample: the nearest that an exploration found.
         observed: Launches that are evidence.
 
     Raises:
@@ -140,33 +140,20 @@ def disagreement(found: Fit) -> float:
 
 def theta_content(found: Identified, band: str, method: str) -> dict:
     """What a θ file holds, but its loss, its rollouts and where it was found."""
-    point = found.coordinates.points(found.fit.phi[None])[0]
-    values = dict(zip(found.names, point.tolist(), strict=True))
-    law, episode = found.recordings[0].sling.law, found.recordings[0].episode
-    known = {"law": RUBBER, "history": launch_history(episode)} if law == RUBBER else {}
-    return {
-        "band": band,
-        "method": method,
-        **known,
-        "theta": {name: values[name] for name in (*THETA, *LAWS[law])},
-        "nuisances": {"air_drag": values["air_drag"]},
-        "turn_damping": values["turn_damping"],
-        "returned_share": values["returned_share"],
-    }
+    recording = found.recordings[0]
+    history = recorded_history(recording.sling, recording.episode)
+    return {"band": band, "method": method, **content_of(found.mode, history)}
 
 
-def confidence(found: Identified, boxes) -> dict:
+def confidence(found: Identified, boxes: ParameterBoxes) -> dict:
     """What a θ file says under `confidence`, ready for JSON.
 
     Args:
         boxes: params.yaml's `parameters`.
     """
-    points, names = found.points, found.names
-    columns = dict(zip(names, points.T, strict=True))
-    mode = found.coordinates.points(found.fit.phi[None])[0].tolist()
-    mode = dict(zip(names, mode, strict=True))
-    parameters = {}
-    for name in names[: -len(EXTRA)]:
+    samples, mode, parameters = found.parameters, found.mode.sample(), {}
+    columns = {name: samples.column(name) for name in samples.names}
+    for name in searched_names(samples.law):
         low, high = interval(columns[name], mode[name])
         entry = {"low": low, "high": high, "identifiable": name not in UNSEEN}
         if name in UNSEEN:

@@ -18,6 +18,7 @@ import numpy as np
 
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import as_recorded
+from pipeline.simulator.model import ClampedBand
 
 BINS = 16  # along the band, equal at rest
 LEAST_POINTS = 4  # of a bin
@@ -83,7 +84,7 @@ class Residuals:
     """
 
     episode: Episode
-    sling: object
+    sling: ClampedBand
     cutoff: float
     reference: np.ndarray
     rule: Rule = field(default_factory=Rule)

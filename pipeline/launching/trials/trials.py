@@ -21,6 +21,9 @@ from pipeline.base.pool import Pool
 from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.measured import read_measured
 from pipeline.launching.trials.spread import landing_intervals
+from pipeline.params import Params
+from pipeline.simulator.launch import Launches
+from pipeline.simulator.parameters import Parameters
 
 SCHEMA = pa.schema(
     [
@@ -79,7 +82,7 @@ class Batch:
         return [None] * len(self.draws) if told is None else list(told)
 
 
-def measured(params, band: str, method: str, folder: Path) -> list[Batch]:
+def measured(params: Params, band: str, method: str, folder: Path) -> list[Batch]:
     """The user's launches of the band that say something about the method, if there are any.
 
     Args:
@@ -119,7 +122,9 @@ def launched(batch: Batch, launch: Callable) -> Batch:
     return replace(batch, kind="virtual", landing=landing, **told)
 
 
-def predict(batches: list[Batch], launcher: Callable, samples: np.ndarray | None, params):
+def predict(
+    batches: list[Batch], launcher: Callable, samples: Parameters | None, params: Params
+) -> tuple[Launches, np.ndarray]:
     """What the calibrated simulator makes of the draws of all batches, N in all.
 
     Args:
@@ -139,7 +144,7 @@ def predict(batches: list[Batch], launcher: Callable, samples: np.ndarray | None
     return launches, intervals
 
 
-def limited(launches, max_force: float):
+def limited(launches: Launches, max_force: float) -> Launches:
     """Launches of a simulator without a limit, by an arm that can hold no more than `max_force`."""
     force = launches.hold_force
     over = force > max_force

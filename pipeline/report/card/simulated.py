@@ -11,7 +11,7 @@ from pipeline.base.layout import Layout, NotMade
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import as_recorded, cutoff_hz
 from pipeline.identify.posterior.likelihood import opening_time
-from pipeline.identify.results.theta import calibrated, vector
+from pipeline.identify.results.theta import calibrated, parameters_of
 from pipeline.simulator.interaction import interact
 
 COARSE, FINE = 1 / 30, 1e-3  # s between states, around the release FINE
@@ -86,7 +86,7 @@ def simulate(params, band: str, method: str, episode: Episode, theta: dict) -> S
     )
     stamps = stamps[np.append(True, np.diff(stamps) > 1e-6)]
     played = replace(episode, cloud_time=stamps, clouds=[])
-    rollouts = interact(sling, played, vector(theta)[None])
+    rollouts = interact(sling, played, parameters_of(theta))
     if rollouts.failure[0]:
         raise NotMade(Layout().theta(band, method), rollouts.failure[0])
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.identify.posterior.coordinates import MOST_DRAG, MOST_LOST
-from pipeline.identify.results.theta import EXTRA
+from pipeline.simulator.parameters import EXTRA
 
 
 class Label(NamedTuple):

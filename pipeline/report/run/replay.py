@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.base.layout import Layout, NotMade
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.results.theta import calibrated, vector
+from pipeline.identify.results.theta import calibrated, parameters_of
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def replay(params, band: str, method: str, episode: Episode, theta: dict) -> Rep
 
     sling = calibrated(params, band, theta)
     loss = EpisodeLoss.of(params, method, episode, sling)
-    rollouts = interact(sling, episode, vector(theta)[None])
+    rollouts = interact(sling, episode, parameters_of(theta))
     if rollouts.failure[0]:
         raise NotMade(Layout().theta(band, method), rollouts.failure[0])
     return Replay(

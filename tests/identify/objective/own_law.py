@@ -9,6 +9,7 @@ from pipeline.episode.episode import Episode
 from pipeline.episode.signal import average, lowpass, uniform
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 
 RATE = 1000.0  # of the force sensor [Hz]
 ALONG, AROUND = 400, 16  # points of the band's surface before a camera sees them
@@ -18,7 +19,7 @@ POINTS = 1000  # of a cloud
 def own_law_episode(
     sling: ClampedBand,
     episode: Episode,
-    theta: np.ndarray,
+    theta: Parameters,
     *,
     cutoff: float,
     force_noise: float = 0.05,
@@ -28,13 +29,13 @@ def own_law_episode(
     """What would have been recorded, had the band of this episode the simulator's law and theta.
 
     Args:
-        theta: In the order of THETA, shape (5,).
+        theta: One sample.
         cutoff: Of the low-pass of params.force [Hz].
         force_noise: Standard deviation of one sample at 1 kHz [N].
         depth_noise: Standard deviation at 1 m, growing with the square of the distance [m].
     """
     rng = np.random.default_rng(seed)
-    rollout = interact(sling, episode, theta[None])
+    rollout = interact(sling, episode, theta)
     if rollout.failure[0]:
         raise ValueError(f"theta fails: {rollout.failure[0]}")
     times, force = uniform(rollout.times, np.asarray(rollout.force[0], float), RATE)

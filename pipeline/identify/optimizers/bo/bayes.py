@@ -14,7 +14,7 @@ from contextlib import contextmanager
 import numpy as np
 from scipy.stats import qmc
 
-from pipeline.identify.objective.space import reflect
+from pipeline.identify.objective.box import reflect
 from pipeline.identify.search.loop import latin_hypercube
 
 FIT_STEPS = 10  # of L-BFGS on the hyperparameters, which start where the last round's ended

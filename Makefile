@@ -28,19 +28,21 @@ ui: setup             # what `sling flow` does, in a browser on this machine: ht
 test: setup           # the tests
 	.venv/bin/python -m pytest
 
-lint: setup           # ruff: rules and format
+lint: setup           # ruff: rules and format; basedpyright: types; codespell
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
+	.venv/bin/basedpyright
+	.venv/bin/codespell
 
 validate: setup       # slow campaigns, and tests by other engines and readers; results are committed
 	.venv/bin/pip install --disable-pip-version-check -q -e '.[dev,validation]' -c constraints.txt
 	.venv/bin/sling verify
 	SLING_BROWSER=required .venv/bin/python -m pytest tests/report/run/test_browser.py tests/report/card/test_write.py
-	.venv/bin/python -m pytest tests/validation/engines tests/validation/benchmarks tests/app/export tests/recording/masks \
+	.venv/bin/python -m pytest tests/validation/engines tests/validation/benchmarks tests/export tests/recording/masks \
 		tests/recording/input/test_kinematics.py tests/app/preflight/test_pictures.py \
 		tests/rig/recorder/test_record.py
 	.venv/bin/python -m validation.campaigns.mutations
-	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation
+	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation tests/app/flow
 	.venv/bin/python -m validation.campaigns.kills
 
 clean:                # all but data, checkpoints and DVC's cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NotRequired, TypedDict
+from typing import NotRequired, TypedDict, cast
 
 import numpy as np
 
@@ -11,10 +11,11 @@ from app import safety
 from app.safety import Hazard
 from pipeline.base.layout import Layout
 from pipeline.identify.results.theta import history_of, load_samples, load_theta, parameters_of
+from pipeline.launching.surface.landing_map import Launcher
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.spread import landing_intervals
-from pipeline.params import expect_known
+from pipeline.params import Params, expect_known
 
 
 class Answer(TypedDict):
@@ -35,19 +36,19 @@ class Answer(TypedDict):
     warnings: list[Hazard]
 
 
-def pull_and_pause(params, content: dict) -> dict[str, list[float]]:
+def pull_and_pause(params: Params, content: dict) -> dict[str, list[float]]:
     """What a launch takes for granted of the hand, for a θ file whose law remembers it [s]."""
     history = history_of(params, content)
     return {} if history is None else {"pull_and_pause_s": [history.pull_time, history.pause]}
 
 
 def aim(
-    params,
+    params: Params,
     band: str,
     method: str,
     target: float,
     root: str | Path = ".",
-    launcher=None,
+    launcher: Launcher | None = None,
 ) -> Answer:
     """Where to draw `band` so that the projectile lands at `target` [m].
 
@@ -94,7 +95,7 @@ def aim(
     warnings += safety.of_confidence(content, file)
     warnings += safety.of_policy(params, band, method, content, layout.root)
     warnings += safety.of_mounting(band, layout.root)
-    return {
+    answer = {
         "draw_y_m": float(draw[0]),
         "draw_z_m": float(draw[1]),
         "predicted_landing_m": landing,
@@ -104,6 +105,7 @@ def aim(
         **pull_and_pause(params, content),
         "warnings": warnings,
     }
+    return cast(Answer, answer)
 
 
 def why_refused(answer: Answer) -> str | None:

@@ -16,7 +16,6 @@ from pipeline.base import launch_table as table
 from pipeline.base.schema import Range
 from pipeline.params.lab import BandParams
 
-ENGINES = "mjcf", "newton", "yaml", "usd"  # targets of an export
 METRES = {"centimetres": 1e-2, "millimetres": 1e-3}
 KILOGRAMS = {"grams": 1e-3}
 

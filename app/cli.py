@@ -12,6 +12,7 @@ from app import arguments as kinds
 from app.command_line import JSON, REFUSED, Done, Refusal, command, execute, flag, parser
 from app.sizes import DIAMETER, REST_LENGTH
 from pipeline.base.layout import Layout
+from pipeline.export import ENGINES
 from stages.start import run
 
 DEFAULT_METHOD = "least_squares"
@@ -270,22 +271,23 @@ def observe(arguments: argparse.Namespace) -> Done:
     flag(
         "--to",
         required=True,
-        choices=kinds.ENGINES,
+        choices=ENGINES,
         help="MuJoCo's XML, numbers and a loader for Newton, plain numbers, PhysX's USD",
     ),
     flag("--out", type=Path, metavar="FOLDER", help="default data/exports/<band>/<target>"),
     JSON,
 )
 def export(arguments: argparse.Namespace) -> Done:
-    from app.export.export import of_run, shown
+    from app.export import export_of_run, shown
     from pipeline.params import load
 
     band, method = arguments.band, arguments.method
-    folder, card = of_run(load(), band, method, arguments.to, arguments.out)
+    folder, card = export_of_run(load(), band, method, arguments.to, arguments.out)
     return kinds.shown(card, True) if arguments.json else shown(folder, card)
 
 
-from app import machine_commands  # noqa: E402, F401 - they come last in the help
+from app import machine_commands  # noqa: E402, F401, I001 - they come last in the help
+from app import developer  # noqa: E402, F401 - and these below them
 
 if __name__ == "__main__":
     main()

@@ -54,9 +54,10 @@ def joined(
     scores = table.scores(layout, band)
     there = table.rows(path, *table.EVIDENCE) if path.is_file() else []
     known = table.landed(path, *table.EVIDENCE) if there else []
-    rows, before = [row for _, row in there], len(there)
-    for *draw, error, landing in launches:
-        launch = (*draw, landing)
+    rows: list[dict] = [row for _, row in there]
+    before = len(there)
+    for y, z, error, landing in launches:
+        launch = (y, z, landing)
         if table.among(launch, scores):
             raise UserError(table.told_twice(launch, path, layout.measured / path.name))
         if table.among(launch, known):
@@ -66,6 +67,6 @@ def joined(
                 )
             known.remove(next(one for one in known if table.among(launch, [one])))
             continue
-        values = (*draw, "" if error is None else error, landing)
+        values = (y, z, "" if error is None else error, landing)
         rows.append(dict(zip(COLUMNS, values, strict=True)))
     return rows, len(rows) - before

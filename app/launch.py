@@ -8,12 +8,17 @@ from app import safety
 from app.aim import pull_and_pause
 from app.arguments import finite
 from pipeline.base.errors import UserError
-from pipeline.identify.results.theta import calibrated, launch_setup, load_theta, parameters_of
-from pipeline.params import expect_known
+from pipeline.identify.results.theta import (
+    calibrated,
+    launch_setup,
+    load_theta,
+    parameters_of,
+)
+from pipeline.params import Params, expect_known
 from pipeline.simulator.launch import launch
 
 
-def expect_above_floor(params, draw: tuple[float, float]) -> None:
+def expect_above_floor(params: Params, draw: tuple[float, float]) -> None:
     """Raises UserError where a draw (y, z) [m] lies below the floor."""
     floor = -params.setup.fork_height
     if draw[1] < floor:
@@ -24,7 +29,7 @@ def expect_above_floor(params, draw: tuple[float, float]) -> None:
 
 
 def launched(
-    params, band: str, theta: Path, draw: tuple[float, float], root: str | Path = "."
+    params: Params, band: str, theta: Path, draw: tuple[float, float], root: str | Path = "."
 ) -> dict:
     """What `sling launch --json` says of a draw (y, z) [m]; `warnings` are of app.safety.
 
@@ -47,7 +52,7 @@ def launched(
             *safety.of_launch(params, force, failure),
             *safety.of_draw(params, band, draw, root),
             *safety.of_confidence(content, theta),
-            *safety.of_identification(params, content, theta, root),
+            *safety.of_identification(params, content, theta),
             *safety.of_mounting(band, root),
         ],
     }

@@ -1,4 +1,4 @@
-"""Commands about this machine: what runs on it, how exactly and how fast."""
+"""Commands that run stages on this machine, and show them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from app import arguments as kinds
-from app.command_line import JSON, Done, command, flag
+from app.command_line import Done, command, flag
 
 
 @command(
@@ -50,59 +50,3 @@ def ui(arguments: argparse.Namespace) -> Done:
     from app.flow.server import serve
 
     return serve(Path.cwd(), arguments.port)
-
-
-@command(
-    "compare the simulator with closed forms, finer steps and other engines",
-    "--device cpu",
-    flag("--device", default="cpu", help="cpu (default) or cuda:0"),
-)
-def verify(arguments: argparse.Namespace) -> Done:
-    from pipeline.params import load
-    from validation.engines import checks as peers
-    from validation.simulator.verification import summary, verify
-
-    text, missed = summary(
-        verify(load(), arguments.device, extra={"against MuJoCo": peers.section})
-    )
-    return text, int(missed > 0)
-
-
-@command(
-    "measure rollouts and launches per second",
-    "--law rubber --json",
-    flag("--device", help="cpu (default), cuda:0, cuda:0,cuda:1, or cuda: all GPUs"),
-    flag(
-        "--scaling",
-        nargs="?",
-        const="",
-        metavar="BAND",
-        help="several GPUs against one, on a band's recording or on the yardstick",
-    ),
-    flag("--peers", action="store_const", const=True, help="MuJoCo and Newton beside ours"),
-    flag("--recording", type=Path, metavar="FILE.mcap", help="time how a recording becomes clouds"),
-    flag("--methods", nargs="*", metavar="METHOD", help="time searches: all, or these methods"),
-    flag("--budget", choices=("laptop", "large"), help="of --methods, --scaling; default laptop"),
-    flag("--law", choices=("neo_hookean", "rubber"), help="of the band; default neo_hookean"),
-    JSON,
-)
-def bench(arguments: argparse.Namespace) -> Done:
-    from app.bench import asked, bench
-
-    try:
-        what = asked(arguments)
-    except argparse.ArgumentTypeError as error:
-        arguments.refuse(str(error))
-    return bench(arguments, what)
-
-
-@command(
-    "say of which code each JSON under reports/ is, and whether it meets what it asks",
-    "--json",
-    JSON,
-)
-def figures(arguments: argparse.Namespace) -> Done:
-    from app.figures import as_json, listed, shown
-
-    found = listed(Path.cwd())
-    return as_json(found) if arguments.json else shown(found)

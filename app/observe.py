@@ -18,7 +18,7 @@ from pipeline.base.layout import Layout
 from pipeline.identify.results.theta import load_samples, load_theta, parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.trials.spread import LEVEL, landing_intervals
-from pipeline.params import expect_known
+from pipeline.params import Params, expect_known
 from pipeline.params.identification import LEAST_SQUARES
 from stages.start import stage_of
 
@@ -26,7 +26,7 @@ FAR = 3.0  # standard deviations of a predicted landing, from which a measured o
 
 
 def observe(
-    params,
+    params: Params,
     band: str,
     method: str,
     draw: tuple[float, float],
@@ -94,7 +94,7 @@ def doubted(before: dict | None, landing: float, file: str) -> Iterator[Hazard]:
 
 
 def known(
-    params,
+    params: Params,
     band: str,
     method: str,
     draw: tuple[float, float],
@@ -128,7 +128,7 @@ def known(
     return told
 
 
-def policy_stage(params, band: str, method: str) -> str:
+def policy_stage(params: Params, band: str, method: str) -> str:
     """Of dvc.yaml. Raises UserError where params.yaml runs the method on no such band."""
     if stage := stage_of(params, "policy", band, method):
         return stage

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from app.plan.hand import along_pull, quaternion
 from app.safety import Hazard
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
+from pipeline.episode.episode import read_metadata
+from pipeline.params import Params
+from pipeline.recording.geometry import KeptGeometry
 from pipeline.recording.input.frames import Transform
 
 
@@ -30,7 +34,7 @@ class PosedAnswer(Answer):
     tcp_quaternion_xyzw: list[float] | None
 
 
-def posed(answer: Answer, params, band: str, root: str | Path = ".") -> PosedAnswer:
+def posed(answer: Answer, params: Params, band: str, root: str | Path = ".") -> PosedAnswer:
     """The answer of `aim` with the hand's pose for its draw, before its warnings."""
     drawn = np.array([0.0, answer["draw_y_m"], answer["draw_z_m"]])
     warnings, frame, position, turn = list(answer["warnings"]), None, None, None
@@ -41,7 +45,7 @@ def posed(answer: Answer, params, band: str, root: str | Path = ".") -> PosedAns
     else:
         position = [round(float(value), 6) + 0.0 for value in fork.apply(drawn)]
         turn = quaternion(fork.rotation * along_pull(drawn)).tolist()
-    return {
+    pose = {
         **{name: value for name, value in answer.items() if name != "warnings"},
         "pitch_rad": math.atan2(-drawn[2], -drawn[1]),
         "tcp_frame": frame,
@@ -49,33 +53,25 @@ def posed(answer: Answer, params, band: str, root: str | Path = ".") -> PosedAns
         "tcp_quaternion_xyzw": turn,
         "warnings": warnings,
     }
+    return cast(PosedAnswer, pose)
 
 
-def fork_in_base(params, band: str, root: str | Path = ".") -> tuple[Transform, str]:
-    """Frame O to the robot's base, and the base's name, as the band's first recording has them.
+def fork_in_base(params: Params, band: str, root: str | Path = ".") -> tuple[Transform, str]:
+    """Frame O to the robot's base, and the base's name, as the band's first episode has them.
 
-    There, setup.base_to_fork comes before /tf_static; without a recording that can be read it
-    stands alone, and plan.frame names the base. Raises UserError where neither tells.
+    setup.base_to_fork comes before the episode's; without an episode it stands alone, and
+    plan.frame names the base. Raises UserError where neither tells.
     """
-    given = params.setup.base_to_fork
+    given, folder = params.setup.base_to_fork, Layout(Path(root)).episode(band)
     try:
-        fork, frame = _recorded(Layout(Path(root)), band, params.setup)
-    except UserError:
+        kept = KeptGeometry.of_episode(read_metadata(folder), band)
+    except UserError as error:
         if given is None:
-            raise
-        fork, frame = Transform.of(given), ""
-    return fork, frame or params.plan.frame
-
-
-def _recorded(layout: Layout, band: str, setup) -> tuple[Transform, str]:
-    recordings = layout.recordings(band)
-    if not recordings:
-        raise UserError(
-            f"setup.base_to_fork is null and {layout.raw(band)} holds no recording: measure where"
-            " the fork stands (docs/recording.md, Calibration)"
-        )
-    from pipeline.recording.geometry import geometry_of
-    from pipeline.recording.input.reader import read_recording
-
-    recording = read_recording(recordings[0], setup)
-    return geometry_of(recording, setup).base.inverse(), recording.pose.frame
+            raise UserError(
+                f"setup.base_to_fork is null and no episode says where the fork stands ({error}):"
+                f" `dvc repro episode@{band}` makes them of a recording, or measure it"
+                " (docs/recording.md, Calibration)"
+            ) from error
+        return Transform.of(given), params.plan.frame
+    fork = kept.base_to_fork if given is None else Transform.of(given)
+    return fork, kept.base_frame or params.plan.frame

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from app import arguments
-from app.trained_with import Change, since_card, since_run
 from pipeline.base.layout import Layout, NotMade, owner
 from pipeline.episode.episode import Episode
 from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
+from pipeline.params import Params
+from pipeline.params.provenance import Change, changed_since, changes, policy_settings_of
 from stages.start import stage_of, unmounted
 
 MISS = 0.05  # m from the target, in simulation, from which no pose is given
@@ -46,7 +47,7 @@ def as_json(hazards: Iterable[Hazard]) -> list[dict[str, str]]:
     return [asdict(hazard) for hazard in hazards]
 
 
-def shown(answer: dict, to_json: bool) -> str:
+def shown(answer: Mapping[str, Any], to_json: bool) -> str:
     """An answer with its `warnings`, which are told first: as one JSON object, or as lines."""
     hazards = answer["warnings"]
     tell(hazards)
@@ -55,7 +56,7 @@ def shown(answer: dict, to_json: bool) -> str:
     return arguments.shown({k: v for k, v in answer.items() if k != "warnings"}, False)
 
 
-def of_draw(params, band: str, draw: tuple[float, float], root: Path) -> Iterator[Hazard]:
+def of_draw(params: Params, band: str, draw: tuple[float, float], root: Path) -> Iterator[Hazard]:
     """A draw (y, z) [m] outside the box, or further than the band was drawn in its recordings."""
     for axis, value in zip("yz", draw, strict=True):
         low, high = getattr(params.setup, f"draw_{axis}")
@@ -82,7 +83,7 @@ def of_draw(params, band: str, draw: tuple[float, float], root: Path) -> Iterato
         )
 
 
-def of_launch(params, force: float, failure: str | None) -> Iterator[Hazard]:
+def of_launch(params: Params, force: float, failure: str | None) -> Iterator[Hazard]:
     """A simulated launch that fails, or whose draw takes more force [N] than the arm may hold."""
     if failure:
         yield Hazard("failure", f"the launch fails in simulation: {failure}")
@@ -108,32 +109,37 @@ def of_confidence(content: dict, path: Path) -> Iterator[Hazard]:
         )
 
 
-def of_identification(params, content: dict, path: Path, root: Path) -> Iterator[Hazard]:
-    """A θ file of a run whose parameters have changed since; a hand-written one has no run."""
+def of_identification(params: Params, content: dict, path: Path) -> Iterator[Hazard]:
+    """A θ file of a run whose settings have changed since; a hand-written one has no run."""
     known = owner(path)
-    if known and known[2]:
-        stage = stage_of(params, "theta", content["band"], known[2])
-        changes = since_run(root, stage)
-        if changes is None:
-            what = f"nothing tells with which params.yaml θ was identified: {_mended(stage)}"
+    if known and (method := known[2]):
+        mended = _mended(stage_of(params, "theta", content["band"], method))
+        if "made_with" not in content or method not in params.methods:
+            what = f"nothing tells with which params.yaml θ was identified: {mended}"
             yield Hazard("params", what)
-        yield from _of_changes(changes or [], "θ was identified", _mended(stage))
+        yield from _of_changes(changed_since(params, content, method), "θ was identified", mended)
 
 
-def of_policy(params, band: str, method: str, content: dict, root: Path) -> Iterator[Hazard]:
-    """A policy whose parameters, or θ, are no longer those that it was trained with."""
-    stage = stage_of(params, "policy", band, method)
-    changes = since_run(root, stage)
+def of_policy(
+    params: Params, band: str, method: str, content: dict, root: Path
+) -> Iterator[Hazard]:
+    """A policy whose settings, or θ, are no longer those that it was trained with."""
+    mended = _mended(stage_of(params, "policy", band, method))
     try:
         card = Stored(band, method, root).card()
     except NotMade as error:
         yield Hazard("params", f"{error}, so nothing tells what the policy was trained with")
-        card = {"theta": content["theta"]}
-    told = {change.key: change for change in (*since_card(root, band, card), *(changes or ()))}
-    changes = list(told.values())
-    yield from _of_changes(changes, "the policy was trained", _mended(stage))
+        card = {"theta": content["theta"], "made_with": {}}
+    else:
+        if card["made_with"] is None:
+            yield Hazard("params", f"nothing tells what the policy was trained with: {mended}")
+    found = {change.key: change for change in changed_since(params, content, method)}
+    if then := card["made_with"]:
+        now = policy_settings_of(params, band)
+        found |= {change.key: change for change in changes(then, now)}
+    yield from _of_changes([found[key] for key in sorted(found)], "the policy was trained", mended)
     if card.get("theta") != content["theta"]:
-        what = f"the policy was trained with another θ than there is now: {_mended(stage)}"
+        what = f"the policy was trained with another θ than there is now: {mended}"
         yield Hazard("params", what)
 
 

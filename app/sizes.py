@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pipeline.base.errors import UserError
+from pipeline.params import Params
 from pipeline.params.lab import BandParams
 
 MASS, DIAMETER, REST_LENGTH = 0.03, 0.010, 0.52  # kg, m: of a common band, where nothing is told
 
 
 def band_to_come(
-    params,
+    params: Params,
     mass: float | None = None,
     diameter: float | None = None,
     rest_length: float | None = None,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.episode.episode import Episode
+from pipeline.export.export import write
 from sling2sim2real.model import Model
 
 
@@ -51,7 +52,5 @@ def export(model: Model, to: str, out: str | Path, *, episode: Episode | None = 
         UserError: No such target, what it needs is missing, the folder holds something else, or
             the band cannot be matched.
     """
-    from app.export.export import write
-
     card = write(model, to, Path(out), episode)
     return Exported(Path(out), card.get("met"), card)

@@ -17,20 +17,20 @@ from pipeline.base.schema import explained, read_json
 from pipeline.episode.episode import Episode
 from pipeline.episode.pull import launch_history
 from pipeline.identify.clamps import calibrate_clamps
+from pipeline.identify.identify import identify as run_identification
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.posterior import identify as posterior
-from pipeline.identify.posterior.launches import Observed
+from pipeline.identify.posterior.launches import Evidence, Observed
 from pipeline.identify.results.mounting import Mounting
 from pipeline.identify.results.theta import ThetaFile, load_samples, load_theta, parameters_of
-from pipeline.identify.search.build import explorer
-from pipeline.identify.search.history import History
-from pipeline.identify.search.loop import budget, search
+from pipeline.identify.results.units import SI_UNITS
 from pipeline.launching.trials.stretch import recorded_stretch
-from pipeline.params.identification import LEAST_SQUARES
-from pipeline.simulator.model import ClampedBand, LaunchHistory
-from pipeline.simulator.parameters import Parameters, searched_names
+from pipeline.params.identification import parameter_names
+from pipeline.params.provenance import changed_since
+from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from sling2sim2real.model import Band, Model, Theta, known
 from sling2sim2real.settings import Settings
 
@@ -66,12 +66,15 @@ class Identification(Model):
         settled: Whether the fit has converged; if not, do not trust the intervals.
         stretch: The largest that the recordings show: length over rest length. Beyond it a launch
             is extrapolated.
+        changed: Settings of params.yaml that have changed since a run identified the band, in
+            words.
     """
 
     intervals: dict[str, Interval] = field(default_factory=dict, repr=False)
     samples: np.ndarray | None = field(default=None, repr=False, compare=False)
     settled: bool = False
     stretch: float | None = None
+    changed: tuple[str, ...] = field(default=(), repr=False)
 
     def save(self, path: str | Path) -> None:
         """Write all of it as one JSON file, settings included."""
@@ -127,7 +130,7 @@ class Identification(Model):
         content = load_theta(layout.theta(band, method), band)
         file = ThetaFile.model_validate(content)
         samples = load_samples(layout.confidence(band, method), parameters_of(content))
-        path, told = layout.mounting(band), content.get("confidence")
+        path, told = layout.clamps(band), content.get("confidence")
         there = layout.episode(band).is_dir()
         episodes = Episode.load_all(layout.episodes(band)) if there else []
         return cls(
@@ -140,6 +143,7 @@ class Identification(Model):
             samples=samples and samples.values,
             settled=bool(told and told["settled"]),
             stretch=_stretch(episodes, settings, about),
+            changed=tuple(map(str, changed_since(settings, content, method))),
         )
 
 
@@ -191,32 +195,33 @@ def identify(
             raise UserError(
                 f"launches: {launch}: draw y < 0, error >= 0 and landing > 0 are needed"
             )
+    evaluate = nearest = None
     if start is None:
         mounting = None
         if settings.methods[METHOD].mounting:
             mounting = _mounting(episodes[0], band, settings)
             progress(f"mounting: clamps at {mounting.clamp_angle_deg:.0f} degrees")
         sling = _sling(band, settings, mounting)
-        nearest, rollouts = _explored(episodes[0], sling, settings)
-        progress(f"explored {rollouts} points")
+        evaluate = _evaluator(episodes[0], sling, settings)
     else:
         mounting, theta = start.mounting, start.theta
-        names = searched_names(settings.methods[METHOD].law)
-        values = {name: getattr(theta, name) or 0.0 for name in names}
-        nearest = Parameters.named(settings.methods[METHOD].law, values)
+        law = settings.methods[METHOD].law
+        values = {name: getattr(theta, name) or 0.0 for name in parameter_names(law)}
+        nearest = Parameters.named(law, values)
         sling = _sling(band, settings, mounting)
-    found = posterior.identify(
+    density = run_identification(
         settings,
         METHOD,
         sling,
         episodes,
-        nearest,
-        observed=launches,
+        evaluate,
+        start=nearest,
+        evidence=Evidence(launches, LaunchSetup.of(settings.setup, settings.sling)),
         workers=workers() or cores(),
-        progress=lambda fit: progress(f"expansion {fit.steps}: misfit {fit.misfit:.2f}"),
-    )
-    content = posterior.theta_content(found, band.name, METHOD)
-    told = posterior.confidence(found, settings.parameters)
+        progress=progress,
+    ).density
+    content = {"band": band.name, **posterior.theta_entries(density)}
+    told = posterior.confidence(density, settings.parameters)
     file = ThetaFile.model_validate(content)
     return Identification(
         band=band,
@@ -225,7 +230,7 @@ def identify(
         history=file.history and LaunchHistory(**file.history.model_dump()),
         settings=settings,
         intervals=_intervals(content, told),
-        samples=found.parameters.values,
+        samples=density.parameters.values,
         settled=told["settled"],
         stretch=_stretch(episodes, settings, band),
     )
@@ -247,32 +252,22 @@ def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
     return Mounting.model_validate(found)
 
 
-def _explored(episode: Episode, sling: ClampedBand, settings: Settings) -> tuple[Parameters, int]:
-    """The best of a design over the box, and of how many."""
-    about, box = settings.methods[METHOD], SearchBox.of_method(settings, METHOD)
+def _evaluator(episode: Episode, sling: ClampedBand, settings: Settings) -> Evaluator:
+    box = SearchBox.of_method(settings, METHOD)
     loss = EpisodeLoss.of(settings, METHOD, episode, sling)
-    evaluate = Evaluator(episode, sling, loss, box, devices=devices(), workers=workers())
-    history = History(METHOD, box.names)
-    rollouts, _ = budget(settings.optimizer, LEAST_SQUARES)
-    optimizer = explorer(about, settings.optimizer, len(box.free), rollouts)
-    search(optimizer, evaluate, history, rollouts=rollouts, box=box)
-    best = history.best()
-    return Parameters.named(box.law, {name: best[name] for name in box.names}), rollouts
+    return Evaluator(episode, sling, loss, box, devices=devices(), workers=workers())
 
 
 def _intervals(content: dict, told: dict) -> dict[str, Interval]:
     """Of a θ file's content and its confidence."""
     found = {}
     for name, one in told["parameters"].items():
-        value, unit = content["theta"][name], UNITS.get(name, "")
+        value, unit = content["theta"][name], SI_UNITS.get(name, "")
         found[name] = Interval(value, one["low"], one["high"], one["identifiable"], unit)
     for name, one in told["derived"].items():
         value, low, high = (float(one[key]) for key in ("value", "low", "high"))
         found[name] = Interval(value, low, high, True, one["unit"])
     return found
-
-
-UNITS = {"youngs_modulus": "Pa", "elasticity_damping": "s"}
 
 
 def _stretch(episodes: Sequence[Episode], settings: Settings, band) -> float | None:

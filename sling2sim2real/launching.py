@@ -216,3 +216,5 @@ def _warnings(
             f"the draw stretches the band by {100 * (asked - 1):.1f} %, its recordings by"
             f" {100 * (known - 1):.1f} % at most: force and landing are extrapolated"
         )
+    for change in getattr(model, "changed", ()):
+        yield f"params.yaml: {change}, since θ was identified"

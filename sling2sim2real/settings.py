@@ -97,7 +97,8 @@ def _defaults() -> dict:
     with as_file(files(__package__) / "params.yaml") as path:
         content = load(path).model_dump()
     content["bands"] = {"band": NO_BAND}
-    content["run"] |= {"bands": ["band"], "rig": [], "ablations": {"bands": [], "methods": []}}
+    content["run"] |= {"bands": ["band"], "rig": []}
+    content["run"]["ablations"] |= {"bands": [], "rig": []}
     return content
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
+from pipeline.episode.planned import planned_pull
 from pipeline.episode.signal import as_recorded, cutoff_hz
 from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.interaction import interact
@@ -143,39 +144,6 @@ def pull(
     """
     if min(pull_time, pause, frame_rate) <= 0:
         raise UserError("pull: pull_time, pause and frame_rate must be above 0")
-    about = model.settings.episode
-    period = about.duration / about.samples
     hanging = hanging_guess(model.sling)[model.sling.middle, 2]
-    grasp, lifted = REST, REST + LIFT_TIME
-    drawn = lifted + pull_time
-    release = drawn + pause
-    end = release + about.tail + SPARE
-    time = period * (np.arange(int(end / period)) + 0.5)
-    start, below, there = (np.array(one) for one in ([0, 0, hanging], [0, 0, 0], [0, *draw]))
-    position = start + np.outer(_eased(time, grasp + GRASP_TIME, lifted), below - start)
-    position += np.outer(_eased(time, lifted, drawn), there)
-    frames = np.arange(int(time[-1] * frame_rate)) / frame_rate
-    return Episode(
-        band=model.band.name,
-        time=time,
-        position=position,
-        velocity=np.gradient(position, period, axis=0),
-        force=np.zeros_like(position),
-        opening=np.full(len(time), np.nan),
-        cloud_time=frames,
-        clouds=[np.zeros((0, 3), np.float32)] * len(frames),
-        grasp_time=grasp,
-        release_time=release,
-        camera=np.array(CAMERA),
-        metadata={"input": {"file": "planned"}},
-    )
-
-
-REST, GRASP_TIME, LIFT_TIME, SPARE = 0.3, 0.1, 1.2, 0.3  # s, of a planned pull
-CAMERA = (0.80, 0.32, 0.50)  # m, where a planned pull is looked at from
-
-
-def _eased(time: np.ndarray, start: float, end: float) -> np.ndarray:
-    """From 0 to 1, at rest at both ends, with continuous acceleration, shape (T,)."""
-    part = np.clip((time - start) / (end - start), 0, 1)
-    return part**3 * (10 - 15 * part + 6 * part**2)
+    times = {"pull_time": pull_time, "pause": pause, "frame_rate": frame_rate}
+    return planned_pull(model.settings.episode, model.band.name, hanging, draw, **times)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import re
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -16,20 +14,20 @@ from pipeline.base import errors
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, NotMade, owner
 from pipeline.params import Params, expect_known, load
+from pipeline.params.identification import steps_of
+from stages import dvc_files
 
-STEPS = {  # that make a folder of another name
+MAKERS = {  # steps that make a folder of another name
     "raw": "record",
     "episodes": "episode",
-    "clusters": "theta",
-    "refined": "theta",
-    "confidence": "theta",
+    "launches": "evidence",
     "policies": "policy",
 }
 
+OF_A_SEARCH = ("history", "clusters", "evaluations", "confidence")  # its last step writes the rest
+
 OF_DVC = "DVC_STAGE"  # in the environment of what DVC runs
 GRACE = 5.0  # s from the interrupt to the end
-HALF = re.compile(r"\.[\w-]{22}\.tmp")  # what DVC calls a file until it has copied it to the end
-COPIES = (".dvc/cache", "data", "reports")  # where it copies to
 
 
 def arguments(*names: str) -> list[str]:
@@ -55,8 +53,8 @@ def run(main: Callable[[], int | None]) -> None:
     """Run a stage or a command: a mistake is one line, which says what makes a missing file."""
 
     def explained() -> int | None:
-        if OF_DVC in os.environ:
-            _clear_up()
+        if OF_DVC in os.environ and any(dvc_files.half_files(Path())):
+            dvc_files.mend(Path())  # what a killed `dvc repro` has copied in part; DVC never does
         try:
             return main()
         except NotMade as error:
@@ -65,16 +63,6 @@ def run(main: Callable[[], int | None]) -> None:
     if OF_DVC in os.environ:
         Thread(target=_end_with_dvc, daemon=True).start()
     errors.run(explained)
-
-
-def _clear_up() -> None:
-    """Remove what a killed `dvc repro` has copied in part; DVC never does.
-
-    In a process of its own, so that no stage imports app/.
-    """
-    if any(HALF.fullmatch(name) for top in COPIES for *_, names in os.walk(top) for name in names):
-        command = [sys.executable, "-m", "app.flow.locks"]
-        subprocess.run(command, capture_output=True, check=False)
 
 
 def _end_with_dvc() -> None:
@@ -104,7 +92,13 @@ def remedy(error: NotMade) -> str:
     folder, band, method = known
     if folder == "raw" and band not in load().run.rig:
         return f"`sling add-recording --band {band} FILE.mcap` puts a recording there"
-    step, params = STEPS.get(folder, folder), load()
+    params = load()
+    step = MAKERS.get(folder, folder)
+    if folder in OF_A_SEARCH and method in params.methods:
+        steps = steps_of(params.methods[method].search)
+        step = folder if folder in steps else steps[-1]
+    elif error.path.name == "launches.parquet":
+        step = "launches"
     stage = f"{step}@{band}" if method is None else stage_of(params, step, band, method)
     if stage is None:
         return (
@@ -128,11 +122,11 @@ def stage_of(params: Params, step: str, band: str, method: str) -> str | None:
 
 def unmounted(band: str, root: str | Path = ".") -> list[str]:
     """A warning where nothing is known of how a band hangs: simulations go on without."""
-    path = Layout(Path(root)).mounting(band)
+    path = Layout(Path(root)).clamps(band)
     if path.exists():
         return []
     return [
-        f"{path} is missing, so the band hangs as `setup` says; `dvc repro mounting@{band}` fits it"
+        f"{path} is missing, so the band hangs as `setup` says; `dvc repro clamps@{band}` fits it"
         " to a recording"
     ]
 

@@ -13,12 +13,12 @@ from ruamel.yaml import YAML
 
 from app.cli import parser
 from tests.project import ROOT
+from validation.marked import CODE_BLOCK
 
 LINK = re.compile(r"\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)")
 OURS = "app|docs|examples|pipeline|reports|sling2sim2real|stages|tests|tools|validation"
 CODE = re.compile(rf"`((?:{OURS})/[\w./-]+)`")
 SPAN = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
-BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SETTING = re.compile(r"\w+=\S*")  # of the environment, before a command
 IGNORED = {
     "reports/index.html",
@@ -66,7 +66,7 @@ def blocks(language: str, *files: Path) -> list[tuple[Path, str]]:
     return [
         (page, code)
         for page in files or written()
-        for kind, code in BLOCK.findall(page.read_text(encoding="utf-8"))
+        for kind, code in CODE_BLOCK.findall(page.read_text(encoding="utf-8"))
         if kind == language
     ]
 
@@ -83,7 +83,7 @@ def commands(code: str) -> list[list[str]]:
 
 def anchors(page: Path) -> set[str]:
     """Of its headings, as GitHub names them."""
-    text = BLOCK.sub("", page.read_text(encoding="utf-8"))
+    text = CODE_BLOCK.sub("", page.read_text(encoding="utf-8"))
     heads = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
 

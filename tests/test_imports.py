@@ -12,25 +12,36 @@ from packaging.requirements import Requirement
 
 from tests.project import ROOT
 
-OURS = {"app", "examples", "pipeline", "sling2sim2real", "stages", "tests", "tools", "validation"}
+OURS = {
+    "app",
+    "examples",
+    "pipeline",
+    "rig",
+    "sling2sim2real",
+    "stages",
+    "tests",
+    "tools",
+    "validation",
+}
 # By path, extras that come beside what everybody has.
 EXTRAS = {
     "app/cluster/": "cluster",
-    "app/export/mujoco_replay.py": "validation",
-    "app/export/newton_band.py": "validation",
+    "pipeline/export/mujoco_replay.py": "validation",
+    "pipeline/export/newton_band.py": "validation",
     "app/preflight/timeline.py": "rerun",
     "pipeline/recording/masks/sam3.py": "sam3",
     "tests/": "dev",
     "tests/recording/input/test_kinematics.py": "validation",  # skipped where that is missing
     "tests/recording/masks/": "validation",
     "tests/validation/": "validation",
-    "tests/app/export/": "validation",
+    "tests/export/": "validation",
     "tests/app/preflight/": "validation",
     "tests/rig/recorder/test_record.py": "validation",
     "tools/": "dev",
     "tools/browser.py": "validation",
     "validation/": "validation",
     "validation/campaigns/": "dev",
+    "validation/recordings/": "dev",
     "validation/engines/physx/": "physx",
 }
 INSTALLED_AS = {
@@ -43,10 +54,13 @@ INDIRECT = {
     "fastapi": "newer ones break Prefect's server",
     "onnxscript": "torch's ONNX exporter imports it",
     "pytest-xdist": "a plug-in of pytest's",
+    "basedpyright": "make lint",
     "ruff": "make lint",
     "uv": "tools/setup.sh",
     "threadpoolctl": "by the script of a test",
+    "codespell": "the same",
     "pre-commit": "the same at each commit",
+    "pre-commit-hooks": "large files, at each commit",
 }
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 

@@ -2,48 +2,47 @@
 
 import json
 import shutil
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 from ruamel.yaml import YAML
 
-from tests import project
-from tests.project import ROOT, ROUGH, copy_project
+from tests.project import ROOT
+from validation.projects import TINY, ProjectCopy, copy_project, run_of
 
 pytestmark = pytest.mark.slow
-TINY = {
-    "run.bands": ["band1"],
-    "run.rig": ["band1"],
-    "run.methods": ["least_squares", "sling2sim2real"],
-    "run.ablations": {"bands": ["band1"], "methods": ["de"]},
-    "cloud.points": 100,
-    **{f"sling.{name}": value for name, value in ROUGH.items()},
-    "optimizer.population": 6,
-    "optimizer.generations": 2,
-    "optimizer.k_nn": 6,
-    "optimizer.k_top": 2,
-    "optimizer.cma_population": 4,
-    "optimizer.cma_rollouts": 8,
-    "policy.map_size": [7, 7],
-    "policy.envs": 32,
-    "policy.iterations": 3,
-    "trials.targets": [1.925],
-    "trials.repeats": 1,
-    "floor.map_size": [4, 4],
-    "floor.launches": 1,
-    "rig.edges": 16,
-    "rig.tolerance": 1e-3,
-    "rig.camera.drop_rate": 0.8,
+METHODS = ["least_squares", "sling2sim2real"]
+BANDS = ("band1", "band2")
+JUDGED = ("theta", "policy", "launches", "trials")
+SEARCH = {"sling2sim2real": ("history", "clusters", "cma"), "least_squares": ("history", "density")}
+
+
+def of_method(method: str, bands: Sequence[str] = BANDS, first: str = "") -> set[str]:
+    """The stages of a method from one step on; of a search of one phase that of its name."""
+    if method in SEARCH:
+        steps = [*SEARCH[method], *JUDGED]
+    else:
+        steps, bands = [f"ablation_{step}" for step in (method, *JUDGED)], bands[:1]
+    start = next((i for i, step in enumerate(steps) if step.endswith(first)), 0) if first else 0
+    return {f"{step}@{band}-{method}" for step in steps[start:] for band in bands}
+
+
+def of_bands(*steps: str, bands: Sequence[str] = BANDS) -> set[str]:
+    return {f"{step}@{band}" for step in steps for band in bands}
+
+
+EVERYTHING = {
+    *of_bands("record", "episode", "clamps", "evidence", "floor", "card"),
+    *(stage for method in (*METHODS, "de", "bo") for stage in of_method(method)),
+    "report",
 }
-SEARCHED = ("history", "theta", "policy", "trials")
-METHODS = [f"{step}@band1-sling2sim2real" for step in SEARCHED]
-FITTED = [f"{step}@band1-least_squares" for step in SEARCHED]
-ABLATIONS = [f"ablation_{step}@band1-de" for step in SEARCHED]
-OF_THE_BAND = {f"{step}@band1" for step in ("record", "episode", "mounting", "floor")}
-EVERYTHING = {*OF_THE_BAND, *METHODS, *FITTED, *ABLATIONS, "card@band1", "report"}
 
 
-class Copy(project.Copy):
+LAUNCH = "draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.17,2.0\n"
+
+
+class Copy(ProjectCopy):
     """A copy of the project's files in a Git repository of its own."""
 
     def __init__(self, folder: Path) -> None:
@@ -55,28 +54,15 @@ class Copy(project.Copy):
         )
         (folder.parent / "audit").mkdir()
         copy_project(folder)
-        self.set(TINY)
-        evidence = folder / "data" / "evidence" / "band1.csv"
-        evidence.write_text("draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.17,2.0\n")
-        self("git", "init", "-q")
-        self("git", "config", "user.name", "Test")
-        self("git", "config", "user.email", "test@example.org")
+        self.set(TINY | run_of(BANDS, METHODS, ("de", "bo")))
+        self.write("data/evidence/band1.csv", LAUNCH)
         self.commit()
 
-    def set(self, values: dict) -> None:
-        yaml, path = YAML(), self.folder / "params.yaml"
-        content = yaml.load(path)
-        for key, value in values.items():
-            *sections, name = key.split(".")
-            node = content
-            for section in sections:
-                node = node[section]
-            node[name] = value
-        yaml.dump(content, path)
+    def write(self, name: str, text: str) -> None:
+        (self.folder / name).write_text(text, encoding="utf-8")
 
-    def commit(self) -> None:
-        self("git", "add", "--all")
-        self("git", "commit", "-q", "-m", "state")
+    def append(self, name: str, text: str) -> None:
+        self.write(name, (self.folder / name).read_text(encoding="utf-8") + text)
 
 
 @pytest.fixture(scope="module")
@@ -102,15 +88,15 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
     stages = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
     everything_read, idle_keys = set(), {}
     for name in EVERYTHING:
-        script = name.removeprefix("ablation_")
-        step, *item = name.split("@")
+        step, *item = name.removeprefix("ablation_").split("@")
+        script = "@".join([stages[step]["cmd"].split()[2].removeprefix("stages."), *item])
         if step == "card":  # of the first method
-            script = f"{name}-{TINY['run.methods'][0]}"
+            script = f"{name}-{METHODS[0]}"
         band, _, method = item[0].partition("-") if item else ("", "", "")
         listed = [
             key.replace("${item.band}", band)
             .replace("${item.method}", method)
-            .replace("${run.methods[0]}", TINY["run.methods"][0])
+            .replace("${run.methods[0]}", METHODS[0])
             for key in stages[step].get("params", [])
         ]
         notes = list((project.folder.parent / "audit").glob(f"{script}.*.json"))
@@ -123,7 +109,7 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
             for key in listed
             if not any(covers(key, one) for one in read)
         }
-        if name not in ABLATIONS:  # methods share a list: what none of them reads is idle
+        if method not in ("de", "bo"):  # methods share a list: what none of them reads is idle
             idle_keys[step] = idle_keys.get(step, unread) & unread
         everything_read.update(read)
     assert not any(idle_keys.values()), f"dvc.yaml lists what no method reads: {idle_keys}"
@@ -183,9 +169,9 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
         "--force",
         "--no-run-cache",
         "--downstream",
-        METHODS[0],  # the ablation's search of one phase: tests/identify/objective/test_cache.py
+        "history@band1-sling2sim2real",  # of one phase: tests/identify/objective/test_cache.py
     )
-    assert ran == {*METHODS, "report"}
+    assert ran == {*of_method("sling2sim2real", ["band1"]), "report"}
     assert (project.folder / "dvc.lock").read_text() == before
     for file, content in reports.items():
         assert file.read_bytes() == content, file
@@ -193,7 +179,100 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
 
 def test_a_variation_of_k_top_keeps_the_history(project: Copy) -> None:
     project.commit()
-    theta = METHODS[1]
-    assert project.dvc("exp", "run", "-S", "optimizer.k_top=1", theta) == {theta}
+    theta = "theta@band1-sling2sim2real"
+    ran = project.dvc("exp", "run", "-S", "optimizer.k_top=1", theta)
+    assert ran == {"clusters@band1-sling2sim2real", "cma@band1-sling2sim2real", theta}
     content = YAML(typ="safe").load(project.folder / "params.yaml")
     assert content["optimizer"]["k_top"] == 1
+    project.dvc("repro")
+
+
+PAPER, OURS = "sling2sim2real", "least_squares"
+AFTER_A_LAUNCH = {  # whatever launches, or predicts a launch
+    *(stage for method in (*METHODS, "de", "bo") for stage in of_method(method, first="policy")),
+    *of_bands("floor", "card"),
+    "report",
+}
+# What is changed; the stages that must run; those that may besides, as far as outputs change.
+CHANGES: dict[str, tuple[Callable[[Copy], None], set[str], set[str]]] = {
+    "optimizer.k_top": (
+        lambda copy: copy.set({"optimizer.k_top": 2}),
+        of_method(PAPER, first="clusters") - of_method(PAPER, first="theta"),
+        {*of_method(PAPER, first="theta"), "report"},
+    ),
+    "optimizer.k_nn": (
+        lambda copy: copy.set({"optimizer.k_nn": 7}),
+        of_method(PAPER, first="clusters") - of_method(PAPER, first="cma"),
+        {*of_method(PAPER, first="cma"), "report"},
+    ),
+    "optimizer.delta": (
+        lambda copy: copy.set({"optimizer.delta": 0.11}),
+        of_method(PAPER, first="clusters") - of_method(PAPER, first="cma"),
+        {*of_method(PAPER, first="cma"), "report"},
+    ),
+    "optimizer.cma_population": (
+        lambda copy: copy.set({"optimizer.cma_population": 5, "optimizer.cma_rollouts": 10}),
+        {
+            *(of_method(PAPER, first="cma") - of_method(PAPER, first="theta")),
+            "ablation_de@band1-de",
+            "ablation_bo@band1-bo",
+            "report",
+        },
+        {stage for one in (PAPER, "de", "bo") for stage in of_method(one, first="theta")},
+    ),
+    "setup.projectile_mass": (
+        lambda copy: copy.set({"setup.projectile_mass": 0.040}),
+        {*AFTER_A_LAUNCH, *of_bands("evidence"), "density@band1-least_squares"},
+        of_method(OURS, ["band1"], first="theta"),
+    ),
+    "setup.arm_stiffness": (
+        lambda copy: copy.set({"setup.arm_stiffness": 11000.0}),
+        {
+            *(AFTER_A_LAUNCH - of_bands("floor")),
+            *of_bands("evidence"),
+            "density@band1-least_squares",
+        },
+        of_method(OURS, ["band1"], first="theta"),
+    ),
+    "evidence of band1": (
+        lambda copy: copy.write("data/evidence/band1.csv", LAUNCH.replace("2.0", "2.01")),
+        {*of_bands("evidence"), "density@band1-least_squares"},
+        {*of_method(OURS, ["band1"], first="theta"), "card@band1", "report"},
+    ),
+    "measured landings of band2": (
+        lambda copy: copy.write("data/trials/measured/band2.csv", LAUNCH),
+        {
+            *of_bands("evidence"),
+            *(f"trials@band2-{method}" for method in METHODS),
+            "card@band2",
+            "report",
+        },
+        set(),
+    ),
+    "rig.bands.band2": (
+        lambda copy: copy.set({"rig.bands.band2.viscosity": 0.0013}),
+        {
+            *(EVERYTHING & {f"{step}@band2" for step in ("record", "episode", "floor")}),
+            "report",
+        },
+        {stage for stage in EVERYTHING if "@band2" in stage},
+    ),
+    "the Bayesian optimiser": (
+        lambda copy: copy.append("pipeline/identify/optimizers/bo/bayes.py", "# edited\n"),
+        {"ablation_bo@band1-bo"},
+        set(),
+    ),
+    "a chapter of the report": (
+        lambda copy: copy.append("pipeline/report/run/chapters/appendix.py", "# edited\n"),
+        {"report"},
+        set(),
+    ),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_change_runs_what_depends_on_it(project: Copy, change: str) -> None:
+    make, must, may = CHANGES[change]
+    make(project)
+    ran = project.dvc("repro")
+    assert must <= ran <= must | may, (sorted(must - ran), sorted(ran - must - may))

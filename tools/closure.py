@@ -2,9 +2,10 @@
 
 DVC re-runs a stage when something listed changes; it cannot see Python's imports. This follows what
 a stage's script imports, at any depth and inside functions too, and lists the folder of each such
-file: one folder a concern. Two things are nobody's dependency, for no result hangs on them but by
+file: one folder a concern. Three things are nobody's dependency, for no result hangs on them but by
 the values in params.yaml, which DVC tracks by themselves: pipeline/params/, which holds no default,
-and stages/start.py, which reads the arguments.
+stages/start.py, which reads the arguments, and stages/dvc_files.py, which clears up. Optimisers are
+found by name, so that no import says which of them a stage runs: their folders are listed by hand.
 
     python tools/closure.py          # says what differs; exit status 1 if anything does
     python tools/closure.py --fix    # rewrite the code dependencies, comments kept
@@ -13,6 +14,8 @@ and stages/start.py, which reads the arguments.
 from __future__ import annotations
 
 import argparse
+import io
+import re
 import sys
 from pathlib import Path
 
@@ -21,7 +24,9 @@ from ruamel.yaml import YAML
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from validation.code import CODE, UNTRACKED, closure, concern  # noqa: E402
+from pipeline.base.code import CODE, UNTRACKED, closure, concern  # noqa: E402
+
+BY_NAME = "pipeline/identify/optimizers/"
 
 
 def folders(script: Path, root: Path = ROOT) -> list[str]:
@@ -52,14 +57,17 @@ def main() -> int:
         if not script_of(stage).is_file():
             print(f"{name}: there is no {script_of(stage).relative_to(ROOT)}")
             return 1
-        code = folders(script_of(stage))
         listed = [dep for dep in stage["deps"] if dep.startswith(CODE)]
+        by_hand = {dep for dep in listed if dep.startswith(BY_NAME)}
+        code = sorted({*folders(script_of(stage)), *by_hand})
         for part in sorted(set(listed) ^ set(code)):
             print(f"{name}: {'-' if part in listed else '+'} {part}")
         stale |= listed != code
         stage["deps"][:] = [dep for dep in stage["deps"] if dep not in listed] + code
     if fix and stale:
-        yaml.dump(content, path)
+        text = io.StringIO()
+        yaml.dump(content, text)
+        path.write_text(re.sub(" +$", "", text.getvalue(), flags=re.MULTILINE), encoding="utf-8")
     return int(stale and not fix)
 
 

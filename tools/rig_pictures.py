@@ -89,7 +89,7 @@ def pulls(done: dict) -> None:
 
 def recoil(done) -> None:
     """The frames around the release, colour and depth."""
-    recording, signals = done.recording, done.signals
+    recording, signals = done.pull.recording, done.signals
     times = recording.color.seconds(signals.origin)
     first = np.searchsorted(times, signals.release_time) - 1
     figure, axes = plt.subplots(2, 3, figsize=(8, 4.2))

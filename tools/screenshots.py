@@ -25,8 +25,14 @@ sys.path.insert(0, str(ROOT))
 
 from pipeline.base import errors  # noqa: E402
 from pipeline.base.errors import UserError  # noqa: E402
-from tests.test_pipeline import Copy  # noqa: E402
 from tools.browser import Browser, browsing  # noqa: E402
+from validation.projects import (  # noqa: E402
+    SLING,
+    TINY,
+    ProjectCopy,
+    copy_project,
+    run_of,
+)
 
 BUDGET = {  # long enough to be looked at, and to converge
     "sling.edges": 24,
@@ -41,7 +47,6 @@ BUDGET = {  # long enough to be looked at, and to converge
     "trials.targets": [1.725, 1.925, 2.125],
     "trials.repeats": 3,
 }
-SLING = [sys.executable, "-c", "from app.cli import main; main()"]
 SECONDS = 600.0  # that any wait may last
 STEM, BARS = "band1-sling2sim2real", (30, 95)  # whose pictures; % at which a bar is looked at
 
@@ -83,7 +88,7 @@ def until(happens, what: str):
 
 
 @contextlib.contextmanager
-def serving(copy: Copy) -> Iterator[Server]:
+def serving(copy: ProjectCopy) -> Iterator[Server]:
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         port = one.getsockname()[1]
@@ -99,7 +104,7 @@ def serving(copy: Copy) -> Iterator[Server]:
 
 
 @contextlib.contextmanager
-def flow(copy: Copy) -> Iterator[subprocess.Popen]:
+def flow(copy: ProjectCopy) -> Iterator[subprocess.Popen]:
     """A flow, which ends with the block."""
     command = [*SLING, "flow", "--workers", "2"]
     with (copy.folder.parent / "flow.log").open("a") as log:
@@ -113,7 +118,7 @@ def flow(copy: Copy) -> Iterator[subprocess.Popen]:
             process.wait(60)
 
 
-def shoot(copy: Copy, server: Server, page: Browser, folder: Path) -> None:
+def shoot(copy: ProjectCopy, server: Server, page: Browser, folder: Path) -> None:
     """Take all pictures."""
 
     def artifact(name: str, key: str, *texts: str, height: int | None = None) -> None:
@@ -153,8 +158,10 @@ def shoot(copy: Copy, server: Server, page: Browser, folder: Path) -> None:
 def main() -> None:
     folder = Path(sys.argv[1] if sys.argv[1:] else ROOT / "docs" / "flow")
     with tempfile.TemporaryDirectory() as place, browsing() as page:
-        copy = Copy(Path(place, "copy"))
-        copy.set(BUDGET)
+        copy = ProjectCopy(Path(place, "copy"), SLING_WORKERS="1")
+        copy_project(copy.folder)
+        copy.set(TINY | run_of(["band1"], ["least_squares", "sling2sim2real"], ["de"]) | BUDGET)
+        copy.commit()
         with serving(copy) as server:
             shoot(copy, server, page, folder)
     print(f"wrote {', '.join(sorted(str(one) for one in folder.glob('*.png')))}")

@@ -13,19 +13,18 @@ import numpy as np
 from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import cutoff_hz
+from pipeline.identify.identify import identify
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import TERMS, EpisodeLoss
-from pipeline.identify.posterior import identify
-from pipeline.identify.posterior.launches import Observed
+from pipeline.identify.posterior import identify as posterior
+from pipeline.identify.posterior.launches import Evidence, Observed
 from pipeline.launching.trials.spread import landing_intervals
-from pipeline.params.identification import LEAST_SQUARES
+from pipeline.params.identification import parameter_names
 from pipeline.simulator.launch import Launches, launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
-from pipeline.simulator.parameters import Parameters, searched_names
-from tests.identify.objective.own_law import disturbed, own_law_episode
-from validation.benchmarks.methods import complete
-from validation.synthetic import pull_and_release
+from pipeline.simulator.parameters import Parameters
+from validation.synthetic import disturbed, own_law_episode, pull_and_release
 
 WORKERS = cores()
 FLAWS = {
@@ -57,7 +56,7 @@ class Calibrated:
     @property
     def identified(self) -> dict[str, float]:
         """What the method has looked for, by name: without samples no more than its box has."""
-        names = searched_names(self.theta.law) if self.samples is None else self.theta.names
+        names = parameter_names(self.theta.law) if self.samples is None else self.theta.names
         return {name: self.theta.sample()[name] for name in names}
 
     def __call__(self, draws: np.ndarray, parameters: Parameters | None = None) -> Launches:
@@ -78,21 +77,22 @@ def found(
     Searches have their rollouts on `devices`, the fit of least squares on the CPU.
     Of another search than least squares it says "loss": the terms and the total of the best.
     """
-    about, box = params.methods[method], SearchBox.of_method(params, method)
+    box = SearchBox.of_method(params, method)
     loss = EpisodeLoss.of(params, method, episodes[0], sling)
     evaluate = Evaluator(episodes[0], sling, loss, box, workers=WORKERS, devices=devices)
-    best = complete(params, method, params.optimizer, evaluate).best()
-    start = Parameters.named(box.law, {name: best[name] for name in box.names})
-    history = identify.recorded_history(sling, episodes[0])
+    history = posterior.recorded_history(sling, episodes[0])
     setup = LaunchSetup.of(params.setup, params.sling, history)
-    if about.search != LEAST_SQUARES:
-        told = {"loss": {name: best[name] for name in (*TERMS, "total")}}
-        return Calibrated(sling, setup, start), told
-    one = identify.identify(
-        params, method, sling, episodes, start, observed=observed, workers=WORKERS
+    evidence = Evidence(observed, setup)
+    identified = identify(
+        params, method, sling, episodes, evaluate, evidence=evidence, workers=WORKERS
     )
-    told = identify.confidence(one, params.parameters)
-    return Calibrated(sling, setup, one.mode, one.parameters), told
+    density = identified.density
+    if density is None:
+        best = identified.evaluations.best()
+        told = {"loss": {name: best[name] for name in (*TERMS, "total")}}
+        return Calibrated(sling, setup, identified.theta), told
+    told = posterior.confidence(density, params.parameters)
+    return Calibrated(sling, setup, density.mode, density.parameters), told
 
 
 def own_law(params, method: str, number: int) -> dict:
@@ -109,7 +109,7 @@ def own_law(params, method: str, number: int) -> dict:
     band = next(iter(params.bands))
     about = params.methods[method]
     sling = ClampedBand.of(params.bands[band], params.setup, params.sling, law=about.law)
-    coordinates = identify.Coordinates.of_method(params, method, sling)
+    coordinates = posterior.Coordinates.of_method(params, method, sling)
     true = coordinates.expected.copy()
     true[0] = rng.uniform(*np.log([1.5e5, 4.5e5]))
     true[1] += rng.normal(0, coordinates.precision[1] ** -0.5)
@@ -141,7 +141,7 @@ def own_law(params, method: str, number: int) -> dict:
         "covers": {
             name: bool(told["parameters"][name]["low"] <= value <= told["parameters"][name]["high"])
             for name, value in truth.sample().items()
-            if name in searched_names(about.law) and name not in about.fixed
+            if name in parameter_names(about.law) and name not in about.fixed
         },
         "recoil": told["recordings"][0]["pictures"],
         "settled": told["settled"],

@@ -11,11 +11,14 @@ import tempfile
 from importlib.metadata import version
 from pathlib import Path
 
-from app.export.card import ASKED
-from app.export.export import of_run
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
+from pipeline.base.layout import Layout
+from pipeline.episode.episode import Episode
+from pipeline.export.card import ASKED
 from pipeline.params import load
+from sling2sim2real.exporting import export
+from sling2sim2real.identification import Identification
 from validation.benchmarks.timing import environment
 
 REPORTS = Path("reports/validation")
@@ -42,7 +45,9 @@ def main(target: str, bands: list[str]) -> None:
     params, found = load(), {}
     for band in bands or params.run.bands:
         with tempfile.TemporaryDirectory() as folder:
-            _, card = of_run(params, band, params.run.methods[0], target, Path(folder))
+            model = Identification.of_run(band, params.run.methods[0])
+            episode = Episode.load_all(Layout().episodes(band))[0]
+            card = export(model, target, folder, episode=episode).card
         found[band] = {name: card[name] for name in KEPT if name in card}
         print(f"{band}: {'met' if card['met'] else 'NOT met'}", flush=True)
     about = environment("cpu", COMMANDS[target])

@@ -1,8 +1,12 @@
-"""Blocks of pages that a script writes: what stands between two marks."""
+"""Blocks of pages: code, and what a script writes between two marks."""
 
 from __future__ import annotations
 
+import re
+
 from pipeline.base.errors import UserError
+
+CODE_BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)  # language, code
 
 
 def marks(name: str) -> tuple[str, str]:

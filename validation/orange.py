@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from pipeline.params import Params
+
 NAME = "orange"
 ABOUT = {"source": "recording", "mass": 0.0408, "diameter": 0.010, "rest_length": 0.52}
 
 
-def with_orange(params):
+def with_orange(params: Params) -> Params:
     """params.yaml with that band, whose hand was where its pose says."""
     content = params.model_dump(mode="json", exclude_unset=True)
     content["bands"][NAME], content["setup"]["arm_stiffness"] = ABOUT, None

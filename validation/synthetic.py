@@ -1,8 +1,9 @@
-"""A synthetic pull-and-release, which needs no recording: a yardstick on a fresh clone.
+"""Synthetic episodes, which need no recording: a pull, and what sensors would see of it.
 
 The first band of params.yaml is grasped where it hangs, lifted, drawn back 0.35 m, held, and let go
-at 8.1 of 9 s. What a loss compares with is one simulated band: its filtered force, and points on
-its ridge.
+at 8.1 of 9 s. As a yardstick on a fresh clone, a loss compares with one simulated band: its
+filtered force, and points on its ridge. Of the simulator's own law, with a recorder's noise and
+errors, an episode is truth for an identification without an error of the model.
 """
 
 from __future__ import annotations
@@ -10,9 +11,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pipeline.episode.episode import Episode
+from pipeline.episode.signal import average, lowpass, uniform
 from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.params import Params
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
@@ -20,6 +24,9 @@ from pipeline.simulator.parameters import Parameters
 DRAW = 0.35  # m
 THETA = (2e5, 0.45, 2e-3, 0.5, 0.5)  # of the band that is recorded
 GRASP, LIFTED, DRAWN, RELEASE, DURATION = 1.0, 2.0, 6.0, 8.1, 9.0  # s
+RATE = 1000.0  # of the force sensor [Hz]
+ALONG, AROUND = 400, 16  # points of the band's surface before a camera sees them
+POINTS = 1000  # of a cloud
 
 
 def yardstick(band, params) -> ClampedBand:
@@ -69,7 +76,7 @@ def unseen(
     )
 
 
-def recorded_yardstick(params) -> tuple[ClampedBand, Episode]:
+def recorded_yardstick(params: Params) -> tuple[ClampedBand, Episode]:
     """The first band, pulled and released with THETA, as sensors without noise would record it."""
     band = next(iter(params.bands))
     sling = yardstick(params.bands[band], params)
@@ -93,3 +100,108 @@ def _ridge(line: np.ndarray, radius: float, camera: np.ndarray, count: int) -> n
     towards = camera - points
     points += radius * towards / np.linalg.norm(towards, axis=1, keepdims=True)
     return points.astype(np.float32)
+
+
+def own_law_episode(
+    sling: ClampedBand,
+    episode: Episode,
+    theta: Parameters,
+    *,
+    cutoff: float,
+    force_noise: float = 0.05,
+    depth_noise: float = 0.0006,
+    seed: int = 0,
+) -> Episode:
+    """What would have been recorded, had the band of this episode the simulator's law and theta.
+
+    Args:
+        theta: One sample.
+        cutoff: Of the low-pass of params.force [Hz].
+        force_noise: Standard deviation of one sample at 1 kHz [N].
+        depth_noise: Standard deviation at 1 m, growing with the square of the distance [m].
+    """
+    rng = np.random.default_rng(seed)
+    rollout = interact(sling, episode, theta)
+    if rollout.failure[0]:
+        raise ValueError(f"theta fails: {rollout.failure[0]}")
+    times, force = uniform(rollout.times, np.asarray(rollout.force[0], float), RATE)
+    force = lowpass(force + rng.normal(0, force_noise, force.shape), RATE, cutoff)
+    start = episode.time[0] - episode.sample_period / 2
+    return replace(
+        episode,
+        force=average(times, force, start, episode.sample_period, len(episode.time)),
+        clouds=[
+            visible(line, sling.edge_lengths, sling.radius, episode.camera, depth_noise, rng)
+            for line in rollout.center_line[0]
+        ],
+    )
+
+
+def visible(
+    line: np.ndarray,
+    sizes: np.ndarray,
+    radius: float,
+    camera: np.ndarray,
+    noise: float,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """Points of the side of an incompressible tube that faces the camera, shape (P, 3), float32.
+
+    Args:
+        line: Its nodes [m], shape (M, 3).
+        sizes: Lengths of its edges at rest [m], shape (M - 1,).
+        radius: At rest [m].
+    """
+    line = np.asarray(line, float)
+    edges = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    place = np.append(0, np.cumsum(edges))
+    at = np.sort(rng.uniform(0, place[-1], ALONG))
+    centre = np.stack([np.interp(at, place, axis) for axis in line.T], axis=1)
+    edge = np.clip(np.searchsorted(place, at) - 1, 0, len(edges) - 1)
+    tangent = (np.diff(line, axis=0) / edges[:, None])[edge]
+    radius = radius * np.sqrt(sizes / edges)[edge]
+    towards = camera - centre
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    side = np.cross(tangent, towards)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    front = np.cross(side, tangent)
+    angle = rng.uniform(-np.pi / 2, np.pi / 2, (ALONG, AROUND, 1))
+    normal = np.cos(angle) * front[:, None] + np.sin(angle) * side[:, None]
+    points = (centre[:, None] + radius[:, None, None] * normal).reshape(-1, 3)
+    ray = points - camera
+    distance = np.linalg.norm(ray, axis=1, keepdims=True)
+    points = points + ray / distance * rng.normal(0, noise, distance.shape) * distance**2
+    return rng.permutation(points)[:POINTS].astype(np.float32)
+
+
+def disturbed(
+    episode: Episode,
+    rng: np.random.Generator,
+    *,
+    release: float,
+    camera: float,
+    shift: float,
+    turn: float,
+    bias: float,
+) -> Episode:
+    """The episode with the errors that a recorder makes; its metadata tell their size.
+
+    Args:
+        release, camera: Standard deviation of the release's time and of the camera's clock [s].
+        shift, turn: Of the camera's extrinsics, each axis [m], [rad].
+        bias: Of the tared force, each axis [N].
+    """
+    rotation = Rotation.from_rotvec(rng.normal(0, turn, 3))
+    moved = rng.normal(0, shift, 3) + episode.camera
+    clouds = [rotation.apply(cloud - episode.camera) + moved for cloud in episode.clouds]
+    late = rng.normal(0, 1, 2) * [release, camera]
+    return replace(
+        episode,
+        force=episode.force + rng.normal(0, bias, 3),
+        clouds=[cloud.astype(np.float32) for cloud in clouds],
+        release_time=episode.release_time + late[0],
+        cloud_time=episode.cloud_time + late[1],
+        metadata={
+            "preprocessing": {"release_error": release, "delays": {"camera": {"error": camera}}}
+        },
+    )

@@ -18,10 +18,12 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from app.cluster import exchange
 from app.cluster.worker import Order, introduce, versions, work
 from app.flow import child
+from app.flow.graph import Stage, stages_of
 from pipeline.base.errors import UserError
 
 ANSWER = 10.0  # seconds that a scheduler has to answer
@@ -47,7 +49,7 @@ class Cluster:
     def __init__(self, root: Path, address: str) -> None:
         self.root, self.address = root, address
         self.client = connect(address)
-        self._needs: dict[str, exchange.Needs] = {}
+        self._stages: dict[str, Stage] = {}
         self._shares: dict[str, bool] = {}  # whether a worker works in the head's copy, by address
         self._sent: set[str] = set()  # stages whose outputs the remote has
         self._lock = threading.Lock()
@@ -86,11 +88,11 @@ class Cluster:
             StageFailed, Cancelled: As `child.run_stage`.
         """
         with self._lock:
-            if not self._needs:
-                self._needs = exchange.needs(root)
+            if not self._stages:
+                self._stages = stages_of(root)
                 self._begin()
-        needs = self._needs[name]
-        if not needs.travels:
+        stage = self._stages[name]
+        if not stage.travels:
             on_line("runs on the head: what it makes is Git's, not DVC's")
             return child.run_stage(
                 root, name, environment=environment, on_line=on_line, cancelled=cancelled
@@ -98,18 +100,18 @@ class Cluster:
         workers = self._some(on_line, cancelled)
         if not all(self._shares[address] for address in workers):
             exchange.expect_remote(root)
-            self._send(needs.producers, cancelled)
+            self._send(stage.producers, cancelled)
         resources = {}
-        if needs.gpu and any(one["resources"].get(GPU) for one in workers.values()):
+        if stage.gpu and any(one["resources"].get(GPU) for one in workers.values()):
             resources = {GPU: 1}
-        elif needs.gpu:
+        elif stage.gpu:
             on_line(f"no worker offers {GPU} (dask worker --resources {GPU}=1): runs on any")
         order = Order(
             name,
             self.token,
-            exchange.digests(root, needs.sources),
-            needs.producers,
-            exchange.entries(root, (name, *needs.producers)),
+            exchange.digests(root, (*exchange.ALWAYS, *stage.sources)),
+            stage.producers,
+            exchange.entries(root, (name, *stage.producers)),
         )
         ran, entry = self._result(order, resources, on_line, cancelled)
         if entry:
@@ -127,7 +129,9 @@ class Cluster:
             old.unlink()
         token.touch()
 
-    def _some(self, on_line, cancelled) -> dict[str, dict]:
+    def _some(
+        self, on_line: Callable[[str], None], cancelled: Callable[[], bool]
+    ) -> dict[str, dict]:
         """The workers, once there are some. Raises UserError, Cancelled."""
         told = False
         while not (workers := self._meet(on_line)):
@@ -146,7 +150,7 @@ class Cluster:
             new = [address for address in workers if address not in self._shares]
             if not new:
                 return workers
-            answers = self.client.run(introduce, self.token, workers=new, on_error="return")
+            answers: Any = self.client.run(introduce, self.token, workers=new, on_error="return")
             ours = versions()
             for address, answer in answers.items():
                 if isinstance(answer, ImportError):
@@ -177,7 +181,13 @@ class Cluster:
             exchange.transfer(self.root, "push", new, cancelled)
             self._sent.update(new)
 
-    def _result(self, order, resources, on_line, cancelled) -> tuple[bool, dict | None]:
+    def _result(
+        self,
+        order: Order,
+        resources: dict[str, float],
+        on_line: Callable[[str], None],
+        cancelled: Callable[[], bool],
+    ) -> tuple[bool, dict | None]:
         """What `work` returns on a worker that has these resources; passes its lines on."""
         from concurrent.futures import CancelledError
 

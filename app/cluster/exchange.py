@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from app.flow import child
@@ -16,62 +14,10 @@ from pipeline.base.errors import UserError, one_line
 from pipeline.base.files import write_text
 
 # What DVC itself reads, whatever the stage, and code of every stage that DVC does not track.
-ALWAYS = ("dvc.yaml", "params.yaml", "pipeline/params", "stages/start.py")
+ALWAYS = ("dvc.yaml", "params.yaml", "pipeline/params", "stages/dvc_files.py", "stages/start.py")
 
 
-@dataclass(frozen=True)
-class Needs:
-    """What a stage hangs on; paths are those in the working copy.
-
-    Attributes:
-        sources: Files and folders that no stage makes: code, parameters, recordings.
-        producers: The stages that make the rest of what it reads.
-        gpu: Whether it computes where SLING_DEVICE says.
-        travels: Whether DVC keeps all that it makes, so that a remote can carry it; the report is
-            Git's.
-    """
-
-    sources: tuple[str, ...]
-    producers: tuple[str, ...]
-    gpu: bool
-    travels: bool
-
-
-def needs(root: Path) -> dict[str, Needs]:
-    """What each stage of dvc.yaml needs, by the stage's name."""
-    from dvc.dependency.param import ParamsDependency
-    from dvc.repo import Repo
-    from dvc.stage import PipelineStage
-
-    with Repo(str(root)) as repo:
-        found = [stage for stage in repo.index.stages if isinstance(stage, PipelineStage)]
-        makers = {Path(out.fs_path): {stage.name} for stage in found for out in stage.outs}
-        inside = defaultdict(set)  # by folder, who makes something in it
-        for out, who in makers.items():
-            for folder in out.parents:
-                inside[folder] |= who
-        result = {}
-        for stage in found:
-            deps = {Path(one.fs_path) for one in stage.deps if type(one) is not ParamsDependency}
-            made = {
-                dep: set().union(*(makers.get(one, ()) for one in (dep, *dep.parents)))
-                | inside.get(dep, set())
-                for dep in deps
-            }
-            result[stage.name] = Needs(
-                (*ALWAYS, *_inside(root, (dep for dep in deps if not made[dep]))),
-                tuple(sorted(set().union(*made.values()))),
-                bool((stage.meta or {}).get("gpu")),
-                all(out.use_cache for out in stage.outs),
-            )
-    return result
-
-
-def _inside(root: Path, paths: Iterable[Path]) -> tuple[str, ...]:
-    return tuple(sorted(os.path.relpath(path, root.resolve()) for path in paths))
-
-
-def digests(root: Path, sources: tuple[str, ...]) -> dict[str, str]:
+def digests(root: Path, sources: Iterable[str]) -> dict[str, str]:
     """Hash of each source's contents; empty for what is missing."""
     return {source: _digest(root / source) for source in sources}
 

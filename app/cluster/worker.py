@@ -13,9 +13,10 @@ from importlib.metadata import distributions
 from pathlib import Path
 
 from app.cluster import exchange
-from app.flow import child, locks
+from app.flow import child
 from pipeline.base import machine
 from pipeline.base.errors import UserError
+from stages import dvc_files
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ def work(order: Order, topic: str) -> tuple[bool, dict | None]:
         if differs := exchange.differing(copy, order.sources):
             raise UserError(f"{order.name}: refused by worker {worker.address}: {copy}: {differs}")
         exchange.expect_remote(copy)
-        locks.mend(copy)
+        dvc_files.mend(copy)
         exchange.merge(copy, order.entries)
         exchange.transfer(copy, "pull", order.producers, cancelled)
         ran = run()

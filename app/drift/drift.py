@@ -8,21 +8,20 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from app.drift.change import FALSE_ALARM, ChangeOfBand, changes, newest
-from app.drift.picture import AXES, over_time
+from app.drift.picture import over_time
 from app.drift.recordings import COMPARED, IdentifiedRecording, identified, in_time
 from app.sizes import DIAMETER, REST_LENGTH
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
 from pipeline.params import expect_known
+from pipeline.report.quantities import QUANTITIES
 from sling2sim2real.identification import METHOD
 from sling2sim2real.model import Band
 from sling2sim2real.settings import Settings
-from validation.benchmarks.timing import environment
 
 SAME = "no change beyond the intervals"
-SHORT = {"youngs_modulus": "E", "damping_product": "damping s·d"}
-UNITS = {"youngs_modulus": "kPa", "damping_product": "ms"}
 BECAME = {
     "youngs_modulus": ("softened", "stiffened"),
     "damping_product": ("damps less", "damps more"),
@@ -82,8 +81,8 @@ def drift(settings: Settings, band: str, root: Path | str = ".") -> dict:
         "verdict": verdict,
         "next": anew(own, fresh) if changed else None,
     }
-    titles = [f"{SHORT[one.quantity]} {_percent(one)}" for one in _first(changed)] or [SAME]
-    title = f"{band}: {', '.join(titles)}"
+    titles = [f"{QUANTITIES[one.quantity].symbol} {_percent(one)}" for one in _first(changed)]
+    title = f"{band}: {', '.join(titles or [SAME])}"
     over_time(written.with_suffix(".png"), found, bool(dated), changed, new, title)
     write_json(written, content)
     return content
@@ -101,11 +100,11 @@ def _first(changed: Sequence[ChangeOfBand]) -> list[ChangeOfBand]:
 def _changed(
     band: str, change: ChangeOfBand, found: Sequence[IdentifiedRecording], dated: bool
 ) -> str:
-    name, unit = change.quantity, UNITS[change.quantity]
+    name, quantity = change.quantity, QUANTITIES[change.quantity]
     one, other = found[change.earlier], found[change.later]
     before, after = (f"on {each.date}" if dated else f"in {each.file}" for each in (one, other))
     return (
-        f"{SHORT[name]} of {band} changed: {_interval(one, name)} {unit} {before},"
+        f"{quantity.symbol} of {band} changed: {_interval(one, name)} {quantity.unit} {before},"
         f" {_interval(other, name)} {after}: {_percent(change)};"
         f" it {BECAME[name][change.ratio > 1]}"
     )
@@ -116,7 +115,7 @@ def _percent(change: ChangeOfBand) -> str:
 
 
 def _interval(one: IdentifiedRecording, name: str) -> str:
-    value, factor = one.values[name], AXES[name][1]
+    value, factor = one.values[name], QUANTITIES[name].factor
     middle, low, high = (f"{factor * x:.3g}" for x in (value.value, value.low, value.high))
     return f"{middle} ({low} to {high})"
 
@@ -134,7 +133,7 @@ def anew(band: Band, files: Sequence[Path]) -> str:
 def shown(content: dict) -> str:
     """A table, and below it what came out."""
     dated = content["order"] == BY_TIME
-    rows = [("recording", *(f"{SHORT[name]} [{UNITS[name]}]" for name in COMPARED), "")]
+    rows = [("recording", *(QUANTITIES[name].heading for name in COMPARED), "")]
     for row in content["recordings"]:
         one = IdentifiedRecording.model_validate(row)
         left = "" if one.settled else "not settled, left out"

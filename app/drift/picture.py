@@ -10,15 +10,12 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 
 from app.drift.change import ChangeOfBand
-from app.drift.recordings import IdentifiedRecording
+from app.drift.recordings import COMPARED, IdentifiedRecording
 from app.labels import as_label
 from pipeline.report.drawing.canvas import key, mark, picture
 from pipeline.report.drawing.styles import INK, KNOWN
+from pipeline.report.quantities import QUANTITIES
 
-AXES = {
-    "youngs_modulus": ("Young's modulus E [kPa]", 1e-3),
-    "damping_product": ("damping s·d [ms]", 1e3),
-}
 CROWDED = 0.01  # of the whole time: recordings nearer than that would lie on one another
 NAMED = 8  # recordings that find room for their names
 LINE = 75  # letters side by side
@@ -42,8 +39,9 @@ def over_time(
         title: What came out.
     """
     places, true_times = _places(found, dated)
-    figure, axes = plt.subplots(len(AXES), 1, figsize=(8.4, 5.2), sharex=True)
-    for ax, (name, (label, factor)) in zip(axes, AXES.items(), strict=True):
+    figure, axes = plt.subplots(len(COMPARED), 1, figsize=(8.4, 5.2), sharex=True)
+    for ax, name in zip(axes, COMPARED, strict=True):
+        factor = QUANTITIES[name].factor
         for number, (place, one) in enumerate(zip(places, found, strict=True)):
             value = one.values[name]
             ends = factor * np.array([[value.value - value.low], [value.high - value.value]])
@@ -58,7 +56,7 @@ def over_time(
             said = f"{100 * (change.ratio - 1):+.0f} %"
             about = {"xytext": (6, 6), "textcoords": "offset points", "color": NEW}
             ax.annotate(said, middle, weight="bold", **about)
-        ax.set_ylabel(label)
+        ax.set_ylabel(QUANTITIES[name].heading)
         ax.margins(x=0.08, y=0.15)
     if true_times:
         locator = AutoDateLocator(maxticks=NAMED)

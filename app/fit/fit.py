@@ -12,6 +12,7 @@ from pathlib import Path
 from app import evidence
 from app.fit.countdown import Countdown
 from app.flow import child
+from app.flow.graph import leading_to, stages_of
 from app.preflight.add_band import NAME, add_band
 from app.preflight.recordings import add_recording, digests, renew_masks
 from pipeline.base.errors import UserError, printable
@@ -76,8 +77,9 @@ def fit(
         count = evidence.add(layout, name, told, again=True)
         say(f"{layout.evidence / name}.csv: {count} launches as evidence")
     read_evidence(layout.evidence, name, params)
-    countdown = Countdown(params.bands[name].source)
-    child.repro(root, f"card@{name}", countdown.line, countdown.begins)
+    card_stage = f"card@{name}"
+    countdown = Countdown(leading_to(stages_of(root), card_stage))
+    child.repro(root, card_stage, countdown.line, countdown.begins)
     countdown.ends()
     card = layout.card(name)
     return json.loads((card / "card.json").read_text("utf-8")) | {"card": str(card / "README.md")}

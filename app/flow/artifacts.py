@@ -58,13 +58,12 @@ def _theta(root: Path, band: str, method: str) -> Iterator[str]:
 
     layout, params, named = Layout(root), load(root / "params.yaml"), styles([method])
     theta = load_theta(layout.theta(band, method), band)
-    steps = [pd.read_parquet(file(band, method)) for file in (layout.history, layout.refined)]
     result = SimpleNamespace(  # as much of report.results.Result as is there by now
         band=band,
         method=method,
         theta=theta,
         confidence=theta.get("confidence") or {},
-        history=pd.concat([one for one in steps if len(one)], ignore_index=True),
+        history=pd.read_parquet(layout.evaluations(band, method)),
     )
     searches = {band: {method: result}}
     yield _drawn("convergence", lambda path: search.convergence(path, searches, named))

@@ -11,10 +11,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Event, Thread
 
-from app.flow import guard, locks
+from app.flow import guard
 from app.flow.disk import with_disk
 from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
+from stages import dvc_files
 
 # It reads and writes all of dvc.lock; to look for garbage meanwhile takes a seventh of its time.
 DVC = "import gc, sys; gc.disable(); from dvc.cli import main; sys.exit(main())"
@@ -111,13 +112,13 @@ def repro(
         on_stage(name)
 
     environment = stage_environment(cores())
-    locks.mend(root)
+    dvc_files.mend(root)
     try:
         status, said = dvc(
             root, ("repro", stage), environment=environment, on_line=on_line, on_stage=begins
         )
     finally:
-        locks.mend(root)
+        dvc_files.mend(root)
     if status:
         raise StageFailed(with_disk(f"{running[-1]}: {reason(running[-1], said, status)}", root))
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+import os
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import reduce
@@ -24,6 +26,11 @@ class Stage:
         item: For what: band1-sling2sim2real; empty where there is one such stage.
         producers: Names of the stages whose outputs it reads, sorted.
         gpu: Whether it computes where SLING_DEVICE says (`meta: {gpu: true}` in dvc.yaml).
+        sources: Files and folders that it reads and no stage makes: code, recordings; sorted,
+            relative to the root.
+        travels: Whether DVC keeps all that it makes, so that a remote can carry it; the report is
+            Git's.
+        description: In words, `desc` of dvc.yaml up to its first pause.
     """
 
     name: str
@@ -31,6 +38,26 @@ class Stage:
     item: str
     producers: tuple[str, ...]
     gpu: bool
+    sources: tuple[str, ...]
+    travels: bool
+    description: str = ""
+
+
+def stages_of(root: Path) -> dict[str, Stage]:
+    """The stages of a working copy by name; takes no lock. Raises UserError."""
+    from dvc.repo import Repo
+
+    with _clear(), Repo(str(root)) as repo:
+        return _stages(repo.index)
+
+
+def leading_to(stages: Mapping[str, Stage], name: str) -> list[Stage]:
+    """A stage and all that it reads from, in the order of `stages`."""
+    found = {name}
+    for stage in reversed([*stages.values()]):  # consumers first
+        if stage.name in found:
+            found |= {*stage.producers}
+    return [stage for stage in stages.values() if stage.name in found]
 
 
 class Graph:
@@ -45,25 +72,14 @@ class Graph:
         """Raises UserError where DVC cannot read the project, or another DVC is at work."""
         self._one_at_a_time = Lock()
         with _clear():
-            import networkx
             from dvc.repo import Repo
 
             # Its warnings, such as on empty files, come once more from each stage that runs.
             logging.getLogger("dvc").setLevel(logging.ERROR)
             repo = Repo(str(root))
             with repo.lock:  # dvc.lock is rewritten in place
-                graph = repo.index.graph  # from consumers to producers
-            # data sources, made by `dvc add`, are nodes too
-            known = {one: one.name for one in repo.index.stages if one.cmd}
-            height: dict = {}
-            for node in networkx.topological_sort(graph):
-                height[node] = 1 + max((height[one] for one in graph.predecessors(node)), default=0)
-            order = sorted(known, key=lambda one: -height[one])
-            self._dvc = {known[one]: one for one in order}
-            self.stages = {
-                known[one]: _stage(one, [known[to] for to in graph.successors(one) if to in known])
-                for one in order
-            }
+                self.stages = _stages(repo.index)
+            self._dvc = {one.name: one for one in repo.index.stages if one.cmd}
 
     def stale(self) -> list[str]:
         """Stages that DVC would run as things are, and all their consumers, in order."""
@@ -87,6 +103,43 @@ class Graph:
                 return False
             deps = [] if stage.frozen else stage.deps
             return all(map(seen.same, deps)) and not any(out.status() for out in stage.outs)
+
+
+def outdated(root: Path, names: Iterable[str], code: tuple[str, ...]) -> dict[str, bool | None]:
+    """Whether code or parameters of stages, or of any before them, are others than in dvc.lock.
+
+    Data count for nothing: they may lack in a clone.
+
+    Args:
+        names: Of stages.
+        code: How paths of code begin, relative to the root.
+
+    Returns:
+        By name; None where DVC cannot tell, such as of a band that params.yaml has not.
+    """
+    from dvc.dependency import ParamsDependency
+
+    try:
+        graph = Graph(root)
+    except UserError:
+        return dict.fromkeys(names)
+    seen, told = Seen(), {}
+
+    def changed(name: str) -> bool:
+        if name not in told:
+            told[name] = any(
+                isinstance(dep, ParamsDependency) or _inside(dep, root).startswith(code)
+                for dep in graph._dvc[name].deps
+                if not seen.same(dep)
+            ) or any(map(changed, graph.stages[name].producers))
+        return told[name]
+
+    with _clear():
+        return {name: changed(name) if name in graph.stages else None for name in names}
+
+
+def _inside(dep, root: Path) -> str:
+    return os.path.relpath(dep.fs_path, root.resolve())
 
 
 class Seen:
@@ -130,10 +183,40 @@ class Seen:
             return False
 
 
-def _stage(stage, producers: list[str]) -> Stage:
+def _stages(index) -> dict[str, Stage]:
+    """In the order of Graph.stages."""
+    import networkx
+
+    graph = index.graph  # from consumers to producers; makes of `dvc add` are nodes too
+    known, height = [one for one in index.stages if one.cmd], {}
+    for node in networkx.topological_sort(graph):
+        height[node] = 1 + max((height[one] for one in graph.predecessors(node)), default=0)
+    known.sort(key=lambda one: -height[one])
+    return {one.name: _stage(one, [to for to in graph.successors(one) if to.cmd]) for one in known}
+
+
+def _stage(stage, producers: list) -> Stage:
+    """A stage of DVC's, whose producers are stages of DVC's."""
+    from dvc.dependency import ParamsDependency
+
     step, _, item = stage.name.partition("@")
-    gpu = bool((stage.meta or {}).get("gpu"))
-    return Stage(stage.name, step, item, tuple(sorted(producers)), gpu)
+    made = [Path(out.fs_path) for one in producers for out in one.outs]
+    read = (Path(dep.fs_path) for dep in stage.deps if not isinstance(dep, ParamsDependency))
+    sources = (
+        os.path.relpath(path, stage.repo.root_dir)
+        for path in read
+        if not any(path.is_relative_to(out) or out.is_relative_to(path) for out in made)
+    )
+    return Stage(
+        stage.name,
+        step,
+        item,
+        producers=tuple(sorted(one.name for one in producers)),
+        gpu=bool((stage.meta or {}).get("gpu")),
+        sources=tuple(sorted(sources)),
+        travels=all(out.use_cache for out in stage.outs),
+        description=re.split("[,;:]", stage.desc or "")[0],
+    )
 
 
 @contextmanager

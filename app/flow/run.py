@@ -9,12 +9,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from app.flow import child, guard, locks
+from app.flow import child, guard
 from app.flow.graph import Graph
 from app.flow.scheduler import Scheduler, width
 from app.flow.tasks import Place, Tasks, lasted, perform, say
 from pipeline.base import machine
 from pipeline.base.errors import UserError
+from stages import dvc_files
 
 
 def run(
@@ -43,7 +44,7 @@ def run(
     """
     start, here = time.monotonic(), place is child.run_stage
     with alone(root):
-        locks.mend(root)
+        dvc_files.mend(root)
         graph = Graph(root)
         stale = [graph.stages[name] for name in graph.stale()]
         if not stale:
@@ -61,7 +62,7 @@ def run(
         try:
             perform(root, scheduler, tasks)
         finally:
-            locks.mend(root)  # what next comes may be a `dvc` of the user's
+            dvc_files.mend(root)  # what next comes may be a `dvc` of the user's
     summary = f"{scheduler.summary()} ({lasted(start)})"
     if scheduler.failed:
         say(summary)

@@ -69,7 +69,7 @@ class Tasks:
         from prefect.concurrency.sync import concurrency
 
         slot = ExitStack()
-        with suppress(Exception):  # the scheduler keeps the limit within this flow anyway
+        with _noted():  # the scheduler keeps the limit within this flow anyway
             slot.enter_context(
                 concurrency(
                     GPU_LIMIT,
@@ -81,8 +81,17 @@ class Tasks:
         try:
             yield
         finally:
-            with suppress(Exception):
+            with _noted():
                 slot.close()
+
+
+@contextmanager
+def _noted() -> Iterator[None]:
+    """Prefect's trouble with a limit is for its log alone."""
+    try:
+        yield
+    except Exception as error:
+        logging.getLogger(__name__).debug("limit of GPU stages", exc_info=error)
 
 
 def perform(root: Path, scheduler: Scheduler, tasks: Tasks) -> None:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from scipy.optimize import brentq
 
 from app.safety import of_mounting, tell
 from pipeline.base.errors import UserError
+from pipeline.params import Params
+from pipeline.params.lab import BandParams, SetupParams
 from pipeline.recording.input.frames import Transform
 
 ALIKE = 0.02  # relative: stretches that are as good as equal
@@ -40,33 +43,31 @@ class Earlier:
     problem: str | None
 
 
-def read_earlier(path: Path, params) -> Earlier:
+def read_earlier(path: Path, params: Params) -> Earlier:
     """Read a recording as far as a plan needs it: no pictures. Raises UserError.
 
     Of several pulls, the first that can be used.
     """
-    from pipeline.recording.geometry import geometry_of
     from pipeline.recording.input.reader import read_recording
-    from pipeline.recording.pulls import pulls_of
+    from pipeline.recording.pulls import Pull, pulls_of
     from pipeline.recording.signals import signals_of
 
-    recording = read_recording(Path(path), params.setup)
-    geometry = geometry_of(recording, params.setup)
-    source, frame = geometry.sources["base_to_fork"], recording.pose.frame
-    problem = None
+    whole = Pull.of(read_recording(Path(path), params.setup), params.setup)
+    base, source = whole.geometry.base, whole.geometry.sources["base_to_fork"]
+    frame, problem = whole.recording.pose.frame, None
     try:
-        for pull in pulls_of(recording, params.setup):
+        for pull in pulls_of(whole):
             try:
-                signals = signals_of(pull, geometry, params)
+                signals = signals_of(pull, params)
             except UserError as error:
                 problem = problem or f"{path}: {str(error).removeprefix(f'{path}: ')}"
                 continue
-            force = float(np.linalg.norm(signals.facts["hold_force"]))
+            force = float(np.linalg.norm(signals.facts.hold_force))
             drawn = signals.hand(signals.release_time)
-            return Earlier(path, geometry.base, source, frame, force, drawn, None)
+            return Earlier(path, base, source, frame, force, drawn, None)
     except UserError as error:
         problem = f"{path}: {error}"
-    return Earlier(path, geometry.base, source, frame, None, None, problem)
+    return Earlier(path, base, source, frame, None, None, problem)
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ class Held:
     rest_length: float
 
     @classmethod
-    def of(cls, band, setup) -> Held:
+    def of(cls, band: BandParams, setup: SetupParams) -> Held:
         return cls(setup.fork_width / 2, band.rest_length)
 
     def legs(self, point: np.ndarray) -> tuple[float, float]:
@@ -103,7 +104,8 @@ class Held:
 
     def reach(self, value: Callable[[np.ndarray], float], limit: float, drawn: np.ndarray) -> float:
         """Share of the way to `drawn` (3,) at which a value that grows along it meets a limit."""
-        return brentq(lambda part: value(part * drawn) - limit, 1e-6, 1.0)
+        part = brentq(lambda part: value(part * drawn) - limit, 1e-6, 1.0)
+        return cast(float, part)
 
 
 @dataclass(frozen=True)
@@ -115,14 +117,14 @@ class Prediction:
 
 
 def predict(
-    params, band: str, drawn: np.ndarray, theta: Path | None, earlier: Earlier | None
+    params: Params, band: str, drawn: np.ndarray, theta: Path | None, earlier: Earlier | None
 ) -> Prediction:
     """The force at `drawn` (3,): by the simulator, else by an earlier recording, else unknown."""
     held = Held.of(params.bands[band], params.setup)
     stretch = held.stretch(drawn)
     if theta is not None:
         return Prediction(_simulated(params, band, drawn, theta), f"simulated with {theta}")
-    if earlier is not None and earlier.force is not None:
+    if earlier and earlier.force is not None and earlier.drawn is not None:
         was = held.stretch(earlier.drawn)
         if was <= 1:
             raise UserError(
@@ -150,7 +152,7 @@ def predict(
     return Prediction(None, f"not checked: {why}; the band is stretched to {stretch:.2f}{advice}")
 
 
-def _simulated(params, band: str, drawn: np.ndarray, path: Path) -> float:
+def _simulated(params: Params, band: str, drawn: np.ndarray, path: Path) -> float:
     from pipeline.identify.results.theta import calibrated, launch_setup, load_theta, parameters_of
     from pipeline.simulator.launch import launch
 

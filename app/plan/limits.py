@@ -9,6 +9,8 @@ import numpy as np
 from app.plan.force import Held, Prediction
 from app.plan.trajectory import Trajectory
 from pipeline.base.errors import UserError
+from pipeline.params.lab import BandParams, PlanParams, SetupParams
+from pipeline.params.recording import EpisodeParams
 
 ROUNDING = 1e-6  # relative
 LEAST_STRETCH = 1.10  # below it the drawn band shows little of its rubber
@@ -16,7 +18,7 @@ LEAD = 0.1  # s of the lead-in that the episode holds at least
 MOST_ASKEW = 60.0  # degrees between the fingers and the way to the fork
 
 
-def check_draw(setup, held: Held, drawn: np.ndarray) -> None:
+def check_draw(setup: SetupParams, held: Held, drawn: np.ndarray) -> None:
     """The draw (3,) lies where the arm reaches, or at the tips' height, and stretches the band."""
     for axis, value, low, high in (
         ("y", drawn[1], setup.draw_y[0], 0.0),
@@ -42,7 +44,7 @@ def check_draw(setup, held: Held, drawn: np.ndarray) -> None:
         )
 
 
-def check_hand(plan, band, axis: np.ndarray, drawn: np.ndarray) -> None:
+def check_hand(plan: PlanParams, band: BandParams, axis: np.ndarray, drawn: np.ndarray) -> None:
     """The open fingers take the band, and point to the fork from the draw."""
     if plan.gripper.open <= band.diameter:
         raise UserError(
@@ -58,7 +60,7 @@ def check_hand(plan, band, axis: np.ndarray, drawn: np.ndarray) -> None:
         )
 
 
-def check_motion(trajectory: Trajectory, plan) -> None:
+def check_motion(trajectory: Trajectory, plan: PlanParams) -> None:
     """Largest speed and acceleration of every phase."""
     speeds, accelerations = trajectory.peaks(1), trajectory.peaks(2)
     for phase, speed, acceleration in zip(trajectory.phases, speeds, accelerations, strict=True):
@@ -74,7 +76,7 @@ def check_motion(trajectory: Trajectory, plan) -> None:
                 )
 
 
-def check_floor(trajectory: Trajectory, setup, plan) -> None:
+def check_floor(trajectory: Trajectory, setup: SetupParams, plan: PlanParams) -> None:
     """The hand keeps clear of the floor; legs are straight, so their ends tell."""
     heights = trajectory.position(trajectory.times)[:, 2] + setup.fork_height
     lowest = int(np.argmin(heights))
@@ -87,7 +89,9 @@ def check_floor(trajectory: Trajectory, setup, plan) -> None:
         )
 
 
-def check_window(trajectory: Trajectory, plan, episode) -> tuple[float, float]:
+def check_window(
+    trajectory: Trajectory, plan: PlanParams, episode: EpisodeParams
+) -> tuple[float, float]:
     """Grasp to release fits the episode. Returns what it takes, and what there is for it [s]."""
     taken = trajectory.start_of("release") - trajectory.start_of("grasp")
     most = episode.duration - episode.tail - LEAD
@@ -108,7 +112,7 @@ def check_window(trajectory: Trajectory, plan, episode) -> tuple[float, float]:
     return taken, most
 
 
-def check_force(setup, held: Held, drawn: np.ndarray, prediction: Prediction) -> None:
+def check_force(setup: SetupParams, held: Held, drawn: np.ndarray, prediction: Prediction) -> None:
     """Holding the band takes no more than the arm may; nothing to check where it is not known."""
     force = prediction.force
     if force is None or force <= setup.max_force:

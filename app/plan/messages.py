@@ -92,7 +92,7 @@ def gripper_commands(trajectory: Trajectory, force: float) -> list[dict]:
     ]
 
 
-def draw_picture(trajectory: Trajectory, path: Path) -> None:
+def draw_picture(trajectory: Trajectory, path: Path | io.BytesIO) -> None:
     """Path, speed and acceleration, frame O."""
     from matplotlib.figure import Figure
     from matplotlib.style import context

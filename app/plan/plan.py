@@ -18,7 +18,7 @@ from app.plan.trajectory import Trajectory
 from app.sizes import band_to_come
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_json, write_text
-from pipeline.params import expect_known
+from pipeline.params import Params, expect_known
 from pipeline.recording.input.frames import Transform
 
 RATES = (1.0, 10_000.0)  # Hz of the CSV
@@ -164,7 +164,7 @@ class Plan:
 
 
 def with_band(
-    params,
+    params: Params,
     name: str | None,
     mass: float | None = None,
     diameter: float | None = None,
@@ -187,7 +187,7 @@ def with_band(
 
 
 def plan_recording(
-    params,
+    params: Params,
     band: str,
     *,
     draw: tuple[float, float] | None = None,

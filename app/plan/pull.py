@@ -6,11 +6,14 @@ For several pulls in one recording the hand returns to where it began and does i
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import numpy as np
 from scipy.optimize import brentq
 
 from app.plan.trajectory import Phase, Trajectory, leg_time
+from pipeline.params.lab import BandParams, PlanParams, SetupParams
+from pipeline.params.recording import EpisodeParams
 from pipeline.recording.pulls import CALM
 
 TICK = 0.001  # s: phases last whole ticks
@@ -27,11 +30,13 @@ def catenary_sag(length: float, width: float) -> float:
     if ratio <= 1:
         raise ValueError(f"a string of {length} m does not reach across {width} m")
     high = math.sqrt(6 * (ratio - 1))  # since sinh(u) / u > 1 + u^2 / 6
-    u = brentq(lambda u: math.sinh(u) / u - ratio, 1e-9 * high, high) if high > 1e-4 else high
+    u = high
+    if high > 1e-4:
+        u = cast(float, brentq(lambda u: math.sinh(u) / u - ratio, 1e-9 * high, high))
     return width / (2 * u) * (math.cosh(u) - 1)
 
 
-def hanging_middle(plan, setup, band) -> np.ndarray:
+def hanging_middle(plan: PlanParams, setup: SetupParams, band: BandParams) -> np.ndarray:
     """Where the fingers take the band, frame O, shape (3,): plan.hanging, else a catenary's."""
     below = plan.hanging
     if below is None:
@@ -39,7 +44,14 @@ def hanging_middle(plan, setup, band) -> np.ndarray:
     return np.array([0.0, 0.0, -below])
 
 
-def trajectory_of(plan, setup, episode, band, axis: np.ndarray, pulls: int = 1) -> Trajectory:
+def trajectory_of(
+    plan: PlanParams,
+    setup: SetupParams,
+    episode: EpisodeParams,
+    band: BandParams,
+    axis: np.ndarray,
+    pulls: int = 1,
+) -> Trajectory:
     """The whole recording, frame O.
 
     Args:

@@ -94,7 +94,7 @@ class Trajectory:
         """
         return self.path(np.clip(time, 0.0, self.duration), derivative)
 
-    def opening(self, time: np.ndarray | float) -> np.ndarray:
+    def opening(self, time: np.ndarray | float) -> np.ndarray | float:
         """Distance between the fingers at times (...) [m], as commanded."""
         return np.interp(time, self.times, self.openings)
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -12,42 +12,46 @@ from app.preflight.coverage import by_phase, coverage, over_time
 from app.preflight.report import CheckReport, Topic
 from app.preflight.tips import Tips, along, measure_tips
 from app.preflight.verdict import cautions_of
-from app.sizes import DIAMETER, REST_LENGTH, band_to_come
+from app.sizes import DIAMETER, MASS, REST_LENGTH, band_to_come
 from pipeline.base.errors import UserError
-from pipeline.params import expect_known
-from pipeline.recording.build import Processed, process_recording
-from pipeline.recording.delays import Delays, delays_of
-from pipeline.recording.geometry import geometry_of
+from pipeline.params import Params, expect_known
+from pipeline.params.lab import BandParams
+from pipeline.recording.build import Processed
+from pipeline.recording.delays import Delays
 from pipeline.recording.input.container import Container, read_container, sha256
 from pipeline.recording.input.frames import Transform
 from pipeline.recording.input.reader import Recording, recording_of
-from pipeline.recording.pulls import pulls_of
-from pipeline.recording.signals import Signals, signals_of
-from pipeline.recording.view import Scene
+from pipeline.recording.pulls import Pull, pulls_of
 
 __all__ = ["Look", "check_recording", "coverage", "look_at"]
 
-COMMON = SimpleNamespace(diameter=DIAMETER, rest_length=REST_LENGTH)
+COMMON = BandParams(source="recording", mass=MASS, diameter=DIAMETER, rest_length=REST_LENGTH)
 ASSUMED = "assumed: give --band, or --diameter and --rest-length"
 
 
 @dataclass(frozen=True)
 class Look:
-    """The report, and as much of the recording as could be worked out for those who draw it."""
+    """The report, and as much of the recording as could be worked out for those who draw it.
+
+    Attributes:
+        recording: With its stamps corrected where the pull can be used.
+        done: The pull that the report is about, where it can be used.
+        pulls: All of the recording, as far as each goes.
+    """
 
     report: CheckReport
     recording: Recording | None = None
     done: Processed | None = None
     tips: Tips | None = None
+    pulls: Sequence[Processed] = ()
 
 
-def check_recording(path: Path, params: object, band: object | None = None) -> CheckReport:
+def check_recording(path: Path, params: Params, band: BandParams | None = None) -> CheckReport:
     """Look at a recording as far as it can be read.
 
     Args:
         path: The MCAP file.
-        params: The whole params.
-        band: Has diameter and rest_length [m]; a common one if None.
+        band: Of which diameter and rest_length count; a common one if None.
 
     Raises:
         UserError: where there is no MCAP file to look at. Anything else is in the report.
@@ -57,8 +61,8 @@ def check_recording(path: Path, params: object, band: object | None = None) -> C
 
 def look_at(
     path: Path,
-    params: object,
-    band: object | None = None,
+    params: Params,
+    band: BandParams | None = None,
     source: str = "given",
     pull: int | None = None,
 ) -> Look:
@@ -83,27 +87,29 @@ def look_at(
             "source": source if band else ASSUMED,
         },
     )
-    recording, pulls = None, []
+    recording = None
     try:
         recording = recording_of(container, params.setup)
         report.losses, report.notes = recording.losses, recording.notes
         _add_roles(report.topics, recording)
-        pulls = pulls_of(recording, params.setup)
+        pulls = pulls_of(Pull.of(recording, params.setup))
     except UserError as error:
         report.problem = _without(path, error)
+        report.pulls = [report.row] if recording else []
         return Look(report, recording)
     if pull is not None and pull > len(pulls):
         raise UserError(f"--pull {pull}: the last pull in {path} is number {len(pulls)}")
-    looks = [_look_at_pull(replace(report), one, about, params) for one in pulls]
+    processed = [Processed.of(one, about, params) for one in pulls]
+    looks = [_look_at_pull(replace(report), one) for one in processed]
     usable = [look for look in looks if look.report.usable]
     chosen = looks[pull - 1] if pull else (usable or looks)[0]
     chosen.report.pulls = [look.report.row for look in looks]
-    return chosen
+    return replace(chosen, pulls=processed)
 
 
 def band_of(
-    params: object, name: str | None, diameter: float | None, rest_length: float | None
-) -> tuple[object | None, str]:
+    params: Params, name: str | None, diameter: float | None, rest_length: float | None
+) -> tuple[BandParams | None, str]:
     """The band that a command line names, None where it names none, and where it is from.
 
     Raises:
@@ -121,35 +127,25 @@ def band_of(
     return band, f"given, but assumed: {left[0]}" if left else "given"
 
 
-def _look_at_pull(report: CheckReport, pull: Recording, band: object, params: object) -> Look:
+def _look_at_pull(report: CheckReport, done: Processed) -> Look:
     """Fills the report of what the file is with what the pull is."""
-    report.pull = pull.pull
-    try:
-        done = process_recording(pull, band, params)
-    except UserError as error:
-        report.problem = _without(pull.path, error)
-        _add_signals(report, pull, band, params)
-        return Look(report, pull)
-    return _whole_look(report, done, params)
-
-
-def _without(path: Path, error: UserError) -> str:
-    return str(error).removeprefix(f"{path}: ")
-
-
-def _whole_look(report: CheckReport, done: Processed, params: object) -> Look:
-    report.frames = done.geometry.sources
-    report.signals = _signal_facts(done.recording, done.signals, done.scene)
+    recording = done.pull.recording
+    report.pull, report.frames = done.pull.number, done.pull.geometry.sources
     report.delays = _delays(done.delays)
-    report.cloud = _cloud_facts(done)
+    try:
+        report.signals = _signal_facts(done)
+        report.cloud = _cloud_facts(done)
+    except UserError as error:
+        report.problem = _without(recording.path, error)
+        return Look(report, recording)
     report.coverage = over_time(done, report.signals["window_start_s"])
     report.phases = by_phase(report.coverage)
     tips = measure_tips(
         done.scene,
         done.clouds.time,
         done.clouds.points,
-        done.geometry.camera.translation,
-        np.array(params.setup.clamp_direction),
+        done.pull.geometry.camera.translation,
+        np.array(done.params.setup.clamp_direction),
     )
     if tips:
         report.extrinsics = _extrinsics(tips, done)
@@ -160,8 +156,12 @@ def _whole_look(report: CheckReport, done: Processed, params: object) -> Look:
             "no picture shows the band drawn taut at a rest length of"
             f" {report.band['rest_length_m']:g} m, {cure}, or record a longer pull"
         )
-    report.cautions = cautions_of(report, done, params.setup)
-    return Look(report, done.recording, done, tips)
+    report.cautions = cautions_of(report, done)
+    return Look(report, recording, done, tips)
+
+
+def _without(path: Path, error: UserError) -> str:
+    return str(error).removeprefix(f"{path}: ")
 
 
 def _topics(container: Container) -> list[Topic]:
@@ -181,22 +181,8 @@ def _add_roles(topics: list[Topic], recording: Recording) -> None:
         row.notes = list(stream.notes)
 
 
-def _add_signals(report: CheckReport, recording: Recording, band: object, params: object) -> None:
-    """What is known of force and motion where only the pictures cannot be used."""
-    try:
-        geometry = geometry_of(recording, params.setup)
-        report.frames = geometry.sources
-        delays = delays_of(recording, geometry, params)
-        report.delays = _delays(delays)
-        recording = delays.corrected(recording)
-        signals = signals_of(recording, geometry, params, delays.tool_inertia)
-    except UserError:  # it is the problem that was reported
-        return
-    scene = Scene.of(band, params.setup, signals)
-    report.signals = _signal_facts(recording, signals, scene)
-
-
-def _signal_facts(recording: Recording, signals: Signals, scene: Scene) -> dict[str, object]:
+def _signal_facts(done: Processed) -> dict[str, object]:
+    recording, signals, scene = done.pull.recording, done.signals, done.scene
     facts = signals.facts
     start = (signals.origin - recording.origin) * 1e-9
     by = recording.gripper or recording.pose
@@ -205,16 +191,16 @@ def _signal_facts(recording: Recording, signals: Signals, scene: Scene) -> dict[
         "grasp_s": start + signals.grasp_time,
         "grasp_error_s": by.period,
         "release_s": start + signals.release_time,
-        "release_error_s": facts["release_error"],
-        "release_resolution_s": facts["release_resolution"],
-        "bias_n": facts["bias"],
-        "drift_n_s": facts["drift"],
-        "noise_n": facts["noise"],
-        "slips_s": [start + time for time in facts["slips"]],
-        "peak_force_n": facts["peak_force"],
-        "hold_force_n": facts["hold_force"],
-        "sign": "flipped" if facts["flipped"] else "as recorded",
-        "turn_deg": float(np.degrees(facts["turn"])),
+        "release_error_s": facts.release_error,
+        "release_resolution_s": facts.release_resolution,
+        "bias_n": facts.bias,
+        "drift_n_s": facts.drift,
+        "noise_n": facts.noise,
+        "slips_s": [start + time for time in facts.slips],
+        "peak_force_n": facts.peak_force,
+        "hold_force_n": facts.hold_force,
+        "sign": "flipped" if facts.flipped else "as recorded",
+        "turn_deg": float(np.degrees(facts.turn)),
         "draw_m": signals.hand(signals.release_time).tolist(),
         "stretch": scene.stretch(signals.release_time - 1e-3),
     }
@@ -250,7 +236,7 @@ def _cloud_facts(done: Processed) -> dict[str, object]:
 
 
 def _extrinsics(tips: Tips, done: Processed) -> dict[str, object]:
-    geometry, turn = done.geometry, tips.correction.rotation.as_rotvec()
+    geometry, turn = done.pull.geometry, tips.correction.rotation.as_rotvec()
     believed = geometry.camera @ geometry.color.inverse()
     return {
         "pictures": tips.frames,

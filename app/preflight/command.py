@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.preflight.check import COMMON, band_of, look_at
+from app.preflight.check import band_of, look_at
 from app.preflight.output import expect_writable, written
+from pipeline.params import Params
 
 
 def check(
     recording: Path,
-    params: object,
+    params: Params,
     *,
     band: str | None = None,
     diameter: float | None = None,
@@ -63,7 +64,7 @@ def check(
             look.report.written.append(write_timeline(look, params, rrd))
     if pictures:
         with written(pictures):
-            said = write_pictures(recording, about or COMMON, params, pictures)
+            said = write_pictures(look.pulls, pictures)
         look.report.written.append(said)
     report = look.report
     return report.to_json(frames) if as_json else report.to_text(), int(not report.usable)

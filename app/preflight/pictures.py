@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,10 +12,8 @@ import cv2
 from app.preflight.output import expect_folder
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder
-from pipeline.recording.build import view_of
-from pipeline.recording.input.reader import read_recording
+from pipeline.recording.build import Processed
 from pipeline.recording.masks.folder import mask_name
-from pipeline.recording.pulls import pulls_of
 
 
 def expect_new(folder: Path) -> None:
@@ -24,13 +23,11 @@ def expect_new(folder: Path) -> None:
         raise UserError(f"{folder}: is there already, name a folder that is not")
 
 
-def write_pictures(recording: Path, band: object, params: object, folder: Path) -> str:
+def write_pictures(pulls: Sequence[Processed], folder: Path) -> str:
     """Write the colour pictures of each pull's window as PNG, named as their masks are to be.
 
     Args:
-        recording: The MCAP file.
-        band: Has diameter and rest_length [m].
-        params: The whole params.
+        pulls: Of one recording.
         folder: A new one.
 
     Returns:
@@ -41,10 +38,9 @@ def write_pictures(recording: Path, band: object, params: object, folder: Path) 
     """
     expect_new(folder)
     views = []
-    with suppress(UserError):  # the report says why there is nothing to see
-        for pull in pulls_of(read_recording(recording, params.setup), params.setup):
-            with suppress(UserError):
-                views.append(view_of(pull, band, params)[0])
+    for pull in pulls:
+        with suppress(UserError):  # the report says why there is nothing to see
+            views.append(pull.view)
     if not views:
         return f"{folder} was not written: no pull is understood"
     with replacing_folder(folder) as temporary:

@@ -13,6 +13,8 @@ from app.labels import as_label
 from app.preflight.check import Look
 from app.preflight.output import expect_writable
 from pipeline.base.files import replacing
+from pipeline.params import Params
+from pipeline.params.recording import CloudParams
 from pipeline.recording.build import Processed
 from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording
@@ -38,7 +40,7 @@ class Moment:
     points: np.ndarray
 
 
-def draw_sheet(look: Look, params: object, path: Path) -> str:
+def draw_sheet(look: Look, params: Params, path: Path) -> str:
     """Write a PNG, 1600 pixels wide, of what can be shown.
 
     Returns:
@@ -71,7 +73,7 @@ def draw_sheet(look: Look, params: object, path: Path) -> str:
 
 
 def masked_frames(
-    done: Processed, cloud: object, numbers: list[int] | None = None
+    done: Processed, cloud: CloudParams, numbers: list[int] | None = None
 ) -> Iterator[tuple[Frame, np.ndarray]]:
     """These or all pictures of the window with their masks, by the backend of params.cloud."""
     mask = masker(cloud.mask, done.view, cloud.sam3)
@@ -91,7 +93,7 @@ def moments(scene: Scene) -> dict[str, float]:
     return dict(zip(MOMENTS, when, strict=True))
 
 
-def _seen(look: Look, params: object) -> list[Moment]:
+def _seen(look: Look, params: Params) -> list[Moment]:
     done, when = look.done, moments(look.done.scene)
     times = done.clouds.time  # of the pictures that could be decoded
     which = [int(np.argmin(np.abs(times - time))) for time in when.values()]
@@ -103,7 +105,7 @@ def _seen(look: Look, params: object) -> list[Moment]:
     ]
 
 
-def _whole(figure: object, look: Look, params: object) -> None:
+def _whole(figure: object, look: Look, params: Params) -> None:
     done, seen = look.done, _seen(look, params)
     start = look.report.signals["window_start_s"]
     grid = figure.add_gridspec(5, len(seen), height_ratios=[0.88, 0.55, 0.92, 1.0, 0.55])

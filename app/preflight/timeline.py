@@ -16,6 +16,7 @@ from app.preflight.output import expect_writable
 from app.preflight.sheet import masked_frames
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing
+from pipeline.params import Params
 from pipeline.recording.build import Processed
 from pipeline.recording.input import images
 from pipeline.recording.input.camera import Camera
@@ -32,7 +33,7 @@ JPEG_QUALITY = 85  # of pictures that come raw
 BAND = (255, 0, 255, 150)  # RGBA of the mask
 
 
-def write_timeline(look: Look, params: object, path: Path) -> str:
+def write_timeline(look: Look, params: Params, path: Path) -> str:
     """Write an .rrd of what can be shown.
 
     Returns:
@@ -56,11 +57,10 @@ def write_timeline(look: Look, params: object, path: Path) -> str:
         stream.set_log_time_enabled(False)
         stream.set_log_tick_enabled(False)
         stream.save(temporary)
-        recording = look.done.recording if look.done else look.recording
-        log = _Log(stream, recording.origin)
+        log = _Log(stream, look.recording.origin)
         log.still("report", rerun.TextDocument(look.report.to_text()))
-        _raw_force(log, recording.wrench)
-        _pictures(log, recording)
+        _raw_force(log, look.recording.wrench)
+        _pictures(log, look.recording)
         if look.done:
             _scene(log, look.done)
             _motion(log, look)
@@ -143,14 +143,14 @@ def _scene(log: _Log, done: Processed) -> None:
     """What does not move: fork, cameras, floor's height."""
     import rerun
 
-    scene, geometry = done.scene, done.geometry
+    scene, geometry = done.scene, done.pull.geometry
     log.still("fork", rerun.ViewCoordinates.RIGHT_HAND_Z_UP)
     posts = [[tip, [*tip[:2], scene.floor]] for tip in scene.tips]
     log.still("fork/posts", rerun.LineStrips3D(posts, colors=[120, 120, 120], radii=0.006))
     log.still("fork/tips", rerun.Points3D(scene.tips, colors=[30, 30, 30], radii=0.008))
-    _camera(log, "fork/depth", done.recording.depth_camera, geometry.camera)
+    _camera(log, "fork/depth", done.pull.recording.depth_camera, geometry.camera)
     color = geometry.camera @ geometry.color.inverse()
-    _camera(log, "fork/color", done.recording.color_camera, color)
+    _camera(log, "fork/color", done.pull.recording.color_camera, color)
 
 
 def _camera(log: _Log, entity: str, camera: Camera, pose: Transform) -> None:
@@ -184,11 +184,11 @@ def _motion(log: _Log, look: Look) -> None:
         log.at(facts[f"{name}_s"], "events", rerun.TextLog(name, level="INFO"))
 
 
-def _clouds(log: _Log, look: Look, params: object) -> None:
+def _clouds(log: _Log, look: Look, params: Params) -> None:
     import rerun
 
     done, start = look.done, look.report.signals["window_start_s"]
-    depth, color = done.recording.depth_camera, done.recording.color_camera
+    depth, color = done.pull.recording.depth_camera, done.pull.recording.color_camera
     size = (depth.height, depth.width)
     one = depth.frame == color.frame and size == (color.height, color.width)
     entity = f"fork/{'color' if one else 'depth'}/mask"

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from app.preflight.report import Caution, CheckReport, Topic
+from pipeline.params.lab import SetupParams
 from pipeline.recording.build import Processed
 from pipeline.recording.events import SETTLE
 from pipeline.recording.pulls import CALM
@@ -31,14 +32,14 @@ RELEASE = 0.001  # s
 SEEN_AS = {"hanging": "hangs", "drawn": "is drawn", "recoil": "recoils", "swing": "swings"}
 
 
-def cautions_of(report: CheckReport, done: Processed, setup: object) -> list[Caution]:
+def cautions_of(report: CheckReport, done: Processed) -> list[Caution]:
     """In the order of a recording's way: file, topics, clocks, force, motion, pictures, frames.
 
     Args:
         report: With everything but its cautions.
         done: What it was told from.
-        setup: That section of params.
     """
+    setup = done.params.setup
     return [
         *_of_file(report),
         *_of_topics(report, done),
@@ -74,7 +75,7 @@ def _of_topics(report: CheckReport, done: Processed) -> Iterator[Caution]:
         elif row.missing > MISSING * row.messages:
             yield Caution("missing", f"{row.missing} messages of {row.topic} are missing", reliable)
         yield from _of_rate(row, roles)
-    if not done.recording.gripper:
+    if not done.pull.recording.gripper:
         what = "the gripper was not recorded, so the grasp is read from the lift"
         yield Caution("gripper", what, "record its joint states")
 
@@ -111,7 +112,7 @@ def _of_clocks(report: CheckReport) -> Iterator[Caution]:
             )
 
 
-def _of_force(report: CheckReport, setup: object) -> Iterator[Caution]:
+def _of_force(report: CheckReport, setup: SetupParams) -> Iterator[Caution]:
     facts = report.signals
     hold = float(np.linalg.norm(facts["hold_force_n"]))
     share = facts["noise_n"] / hold
@@ -140,7 +141,7 @@ def _of_force(report: CheckReport, setup: object) -> Iterator[Caution]:
         yield Caution("slip", what, "the band slipped in the pads: grip firmly and record again")
 
 
-def _of_motion(report: CheckReport, signals: Signals, setup: object) -> Iterator[Caution]:
+def _of_motion(report: CheckReport, signals: Signals, setup: SetupParams) -> Iterator[Caution]:
     facts = report.signals
     if round(facts["grasp_s"], 2) < LEAD_IN:
         what = f"only {facts['grasp_s']:.2f} s of the empty hand come before the grasp"
@@ -158,9 +159,8 @@ def _of_motion(report: CheckReport, signals: Signals, setup: object) -> Iterator
 
 def _of_rest(report: CheckReport, done: Processed) -> Iterator[Caution]:
     """Of the band before a pull that follows on another."""
-    pull, begin = done.recording, done.recording.wrench.seconds(done.recording.origin)[0]
-    since = report.signals["window_start_s"] - begin + SETTLE
-    if pull.pull > 1 and since < CALM:
+    since = report.signals["window_start_s"] - done.pull.force_time[0] + SETTLE
+    if done.pull.number > 1 and since < CALM:
         what = f"the pictures begin {since:.1f} s after the pull before, the band may still swing"
         yield Caution("rest", what, f"wait for {CALM - since:.1f} s longer between two pulls")
 
@@ -218,8 +218,9 @@ def _of_pictures(report: CheckReport) -> Iterator[Caution]:
 
 
 def _of_sensor(done: Processed) -> Iterator[Caution]:
-    frame, known = done.recording.wrench.frame, done.recording.transforms.frames
-    if frame not in known and not done.geometry.sensor_is_fixed:
+    recording = done.pull.recording
+    frame, known = recording.wrench.frame, recording.transforms.frames
+    if frame not in known and not done.pull.geometry.sensor_is_fixed:
         yield Caution(
             "sensor",
             f"/tf_static does not know the force's frame {frame!r}, so it is taken as the hand's",

@@ -6,6 +6,7 @@ import importlib
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 
 def is_import(text: str) -> bool:
@@ -13,7 +14,7 @@ def is_import(text: str) -> bool:
     return text.count(":") == 1 and all(part.isidentifier() for part in re.split("[.:]", text))
 
 
-def imported(text: str):
+def imported(text: str) -> Any:
     """What `package.module:name` names, seen from the working directory; raises what it raises."""
     if str(Path.cwd()) not in sys.path:  # a command's is where it is installed
         sys.path.append(str(Path.cwd()))

@@ -11,8 +11,10 @@ from pathlib import Path
 
 from pipeline.base.errors import UserError
 
-OF_A_BAND = ("raw", "episodes", "mounting", "floor")
-OF_A_METHOD = ("history", "clusters", "refined", "theta", "confidence", "policies", "trials")
+OF_A_BAND = ("raw", "episodes", "clamps", "launches", "floor")
+OF_A_METHOD = (
+    "history", "clusters", "evaluations", "confidence", "theta", "policies", "trials"
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -66,8 +68,17 @@ class Layout:
         """Folder of signals.parquet and clouds.parquet of one pull, numbered from 1 on."""
         return self.episodes(band) / str(number)
 
-    def mounting(self, band: str) -> Path:
-        return self.data / "mounting" / f"{band}.json"
+    def clamps(self, band: str) -> Path:
+        """How the band leaves its clamps and bends, as its recording shows."""
+        return self.data / "clamps" / f"{band}.json"
+
+    def observed(self, band: str) -> Path:
+        """The band's launches that are evidence, checked, from its CSV in `evidence`."""
+        return self.data / "launches" / band / "observed.json"
+
+    def scores(self, band: str) -> Path:
+        """The band's launches that score predictions, checked, from its CSV in `measured`."""
+        return self.data / "launches" / band / "scores.json"
 
     def floor(self, band: str) -> Path:
         return self.data / "floor" / f"{band}.json"
@@ -82,14 +93,15 @@ class Layout:
     def clusters(self, band: str, method: str) -> Path:
         return self.data / "clusters" / band / f"{method}.json"
 
-    def refined(self, band: str, method: str) -> Path:
-        return self.data / "refined" / band / f"{method}.parquet"
+    def evaluations(self, band: str, method: str) -> Path:
+        """Everything that a search evaluated, its exploration too."""
+        return self.data / "evaluations" / band / f"{method}.parquet"
 
     def theta(self, band: str, method: str) -> Path:
         return self.data / "theta" / band / f"{method}.json"
 
     def confidence(self, band: str, method: str) -> Path:
-        """Samples of the posterior and profiles, on which a θ file's confidence rests."""
+        """Samples of the posterior, and what a θ file says beside the best evaluation."""
         return self.data / "confidence" / band / f"{method}.json"
 
     def policy(self, band: str, method: str) -> Path:
@@ -99,6 +111,10 @@ class Layout:
     def card(self, band: str) -> Path:
         """Folder of a band's card."""
         return self.root / "reports" / "bands" / band
+
+    def launches(self, band: str, method: str) -> Path:
+        """What the rig's launches with the policy led to."""
+        return self.policy(band, method) / "launches.parquet"
 
     def trials(self, band: str, method: str) -> Path:
         return self.data / "trials" / band / f"{method}.parquet"

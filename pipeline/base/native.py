@@ -7,10 +7,11 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import cache
 from pathlib import Path
 from threading import Lock
+from typing import Any, TypeVar
 
 import warp as wp
 
@@ -18,8 +19,9 @@ wp.config.log_level = wp.LOG_ERROR
 wp.config.enable_backward = False
 # The CPU's own vectors, but no fused multiply-add: with lanes of a fixed number and no function of
 # the C library but the root, every x86-64 CPU gives the same bits.
-wp.config.cpu_compiler_flags += " -ffp-contract=off"
+wp.config.cpu_compiler_flags = f"{wp.config.cpu_compiler_flags or ''} -ffp-contract=off"
 _one_at_a_time = Lock()
+Built = TypeVar("Built")
 DRIVERS = "libcuda.so", "libcuda.so.1"  # as Warp looks for them
 
 
@@ -55,7 +57,7 @@ def _loads(library: str) -> bool:
     return True
 
 
-def text_of(*paths: Path, arrays: type, **macros) -> str:
+def text_of(*paths: Path, arrays: type, **macros: object) -> str:
     """Native text of some files after macros, in which the fields of `arrays` are names.
 
     No macro is defined beyond it.
@@ -67,16 +69,21 @@ def text_of(*paths: Path, arrays: type, **macros) -> str:
     return text + "\n" + "".join(f"#undef {name}\n" for name in names)
 
 
-def built_once(build: Callable[..., wp.Kernel]) -> Callable[..., wp.Kernel]:
+def built_once(build: Callable[..., Built]) -> Callable[..., Built]:
     """`functools.cache` for functions that make a kernel, safe to call from several threads."""
-    build = cache(build)
+    once = cache(build)
 
-    def built(*key) -> wp.Kernel:
+    def built(*key: Hashable) -> Built:
         with _one_at_a_time:
             start()  # two threads that start Warp at once would undo each other's modules
-            return build(*key)
+            return once(*key)
 
     return built
+
+
+def empty(size: int, dtype: Any, device: str) -> wp.array:
+    """An array for results there."""
+    return wp.empty(size, dtype=dtype, device=device)
 
 
 def launch(kernel: wp.Kernel, blocks: int, inputs: list, device: str) -> None:

@@ -167,6 +167,6 @@ def _closest(path: Sequence[str | int], model: type[Section]) -> str:
     kind: Any = model
     for part in path[:-1]:
         is_section = isinstance(kind, type) and issubclass(kind, BaseModel)
-        kind = kind.model_fields[part].annotation if is_section else get_args(kind)[-1]
+        kind = kind.model_fields[str(part)].annotation if is_section else get_args(kind)[-1]
     known = list(kind.model_fields)
     return difflib.get_close_matches(str(path[-1]), known, n=1, cutoff=0)[0]

@@ -10,13 +10,14 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.base.files import replacing
-from pipeline.base.layout import made
+from pipeline.base.layout import NotMade, made
 
 SCHEMA_VERSION = 1
 
@@ -51,7 +52,7 @@ class Episode:
     grasp_time: float
     release_time: float
     camera: np.ndarray
-    metadata: dict = field(default_factory=dict)
+    metadata: dict[str, Any] = field(default_factory=dict)
 
     @property
     def sample_period(self) -> float:
@@ -98,18 +99,18 @@ class Episode:
 
     @classmethod
     def load(cls, folder: Path) -> Episode:
-        """Read an episode that `save` wrote. Raises NotMade or ValueError."""
-        paths = [made(folder / f"{name}.parquet") for name in ("signals", "clouds")]
-        signals, clouds = map(pq.read_table, paths)
-        header = json.loads(signals.schema.metadata[b"episode"])
-        if header.pop("version") != SCHEMA_VERSION:
-            raise ValueError(f"{folder}: written by another version, run `dvc repro` again")
+        """Read an episode that `save` wrote. Raises NotMade."""
+        header = read_metadata(folder)
+        signals, clouds = (
+            pq.read_table(made(folder / f"{name}.parquet")) for name in ("signals", "clouds")
+        )
 
         def vectors(name: str) -> np.ndarray:
             return np.stack([signals[f"{name}_{axis}"].to_numpy() for axis in "xyz"], axis=1)
 
         points = [np.asarray(row.as_py(), np.float32).reshape(-1, 3) for row in clouds["points"]]
-        header.pop("frame"), header.pop("sample_period")
+        for name in ("frame", "sample_period"):  # which are not for the metadata
+            header.pop(name)
         return cls(
             band=header.pop("band"),
             time=signals["t"].to_numpy(),
@@ -124,3 +125,15 @@ class Episode:
             camera=np.array(header.pop("camera")),
             metadata=header,
         )
+
+
+def read_metadata(folder: Path) -> dict[str, Any]:
+    """The header of an episode that `Episode.save` wrote: its events and metadata, no arrays.
+
+    Raises NotMade: it is not there, or another version wrote it.
+    """
+    path = made(folder / "signals.parquet")
+    header = json.loads((pq.read_schema(path).metadata or {}).get(b"episode", b"{}"))
+    if header.pop("version", None) != SCHEMA_VERSION:
+        raise NotMade(path, "written by another version")
+    return header

@@ -6,6 +6,7 @@ enough for any lab. Every violation is a UserError of one line that names the ke
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +24,7 @@ from pipeline.params.identification import (
     ParameterBoxes,
     SlingParams,
     check_method,
+    methods_by_step,
 )
 from pipeline.params.lab import BandName, BandParams, PlanParams, RunParams, SetupParams
 from pipeline.params.launches import FloorParams, LaunchParams, PolicyParams, TrialsParams
@@ -76,13 +78,20 @@ class Params(Section):
         for band in self.run.ablations.bands:
             if band not in self.run.bands:
                 raise refusal(f"run.ablations.bands: {band} is not one of run.bands")
-        rig = [name for name in self.run.bands if self.bands[name].source == "rig"]
-        if list(self.run.rig) != rig:
-            raise refusal(
-                "run.rig: must list those of run.bands that have source: rig, in the same order:"
-                f" [{', '.join(rig)}]"
-            )
-        for name in rig:
+        for key, run in (("run", self.run), ("run.ablations", self.run.ablations)):
+            for step, names in methods_by_step(run.methods, self.methods).items():
+                if list(getattr(run.steps, step)) != names:
+                    raise refusal(
+                        f"{key}.steps.{step}: must list those of {key}.methods whose search has"
+                        f" this step: [{', '.join(names)}]"
+                    )
+            rig = [name for name in run.bands if self.bands[name].source == "rig"]
+            if list(run.rig) != rig:
+                raise refusal(
+                    f"{key}.rig: must list those of {key}.bands that have source: rig, in the same"
+                    f" order: [{', '.join(rig)}]"
+                )
+        for name in self.run.rig:
             if name not in self.rig.bands:
                 raise refusal(f"rig.bands: lacks {name}, which the rig is to record")
         return self
@@ -138,7 +147,7 @@ class Params(Section):
         return self
 
 
-def _expect_all(names, known, key: str) -> None:
+def _expect_all(names: Iterable[str], known: Collection[str], key: str) -> None:
     for name in names:
         if name not in known:
             raise refusal(f"{key}: {name} is not one of {', '.join(known)}")

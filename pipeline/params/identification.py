@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Generic, Literal, TypeVar
 
 from pydantic import AfterValidator, model_validator
 
 from pipeline.base.imported import is_import
 from pipeline.base.schema import ASCENDING, LIST, Range, Section, Seed, refusal
+from pipeline.params.lab import StepParams
 
 Step = Annotated[float, Range(1e-5, 0.05)]
-Bound = TypeVar("Bound")
+Bound = TypeVar("Bound", bound=float)
 KTop = Annotated[int, Range(1, 50)]
-LAWS = {  # of the band's material: what each has beside the five, and how far its box may reach
+# Of the band's material: what each has beside the five, and how far its box may reach.
+LAWS: dict[str, dict[str, tuple[float, float]]] = {
     "neo_hookean": {},
     "rubber": {"mooney_share": (-1.0, 1.0), "relaxation": (0.0, 0.2)},
 }
 LEAST_SQUARES = "least_squares"
 UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show
 SEARCHES = ("multistart", LEAST_SQUARES, "de", "bo", "adam")
+STEPS = {  # stages of a search before `theta`; a class of the user's has `search`
+    "multistart": ("history", "clusters", "cma"),
+    LEAST_SQUARES: ("history", "density"),
+    **{name: (name,) for name in ("de", "bo", "adam")},
+}
 OUR_ENGINE = "sling"
 ENGINES = OUR_ENGINE, "physx"
 
@@ -154,7 +162,7 @@ Bounds = Annotated[tuple[Value, Value], LIST]
 class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
-    law: Literal[tuple(LAWS)]
+    law: Literal["neo_hookean", "rubber"]  # of LAWS
     search: Annotated[str, AfterValidator(_is_search)]
     engine: Annotated[str, AfterValidator(_is_engine)]
     settings: dict[str, Setting]
@@ -207,6 +215,26 @@ class MethodParams(MethodDefaults):
                     f" {self.law} searches"
                 )
         return self
+
+
+def parameter_names(law: str) -> tuple[str, ...]:
+    """The parameters of a law, in the order of all tables: θ, then what the law adds."""
+    return (*ParameterBoxes.model_fields, *LAWS[law])
+
+
+def methods_by_step(methods: Iterable[str], known: Mapping[str, MethodParams]) -> dict[str, list]:
+    """What `run.steps` must hold for `methods`, each of which is in `known`."""
+    found: dict[str, list] = {step: [] for step in StepParams.model_fields}
+    for name in methods:
+        for step in steps_of(known[name].search):
+            if step in found:  # `cma` has the list of `clusters`
+                found[step].append(name)
+    return found
+
+
+def steps_of(search: str) -> tuple[str, ...]:
+    """The stages of a search, the last of which writes its evaluations."""
+    return STEPS.get(search, ("search",))
 
 
 def check_method(

@@ -42,17 +42,35 @@ def _is_free(name: str) -> str:
 BandName = Annotated[Name, AfterValidator(_is_free)]
 
 
+class StepParams(Section):
+    """The methods that go through a step of their search, by the step's stage in dvc.yaml.
+
+    They follow from `methods.<name>.search`, which DVC cannot look up.
+    """
+
+    history: Names
+    clusters: Names
+    density: Names
+    de: Names
+    bo: Names
+    adam: Names
+    search: Names
+
+
 class Ablations(Section):
     """Methods that run on some bands only."""
 
     bands: Names
+    rig: Names
     methods: Names
+    steps: StepParams
 
 
 class RunParams(Section):
     bands: Annotated[Names, FILLED]
     rig: Names
     methods: Annotated[Names, FILLED]
+    steps: StepParams
     ablations: Ablations
 
     @model_validator(mode="after")

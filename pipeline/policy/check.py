@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.launching.surface.landing_map import Launcher
 from pipeline.launching.surface.response_surface import TOO_MUCH_FORCE
+from pipeline.params import Params
 from pipeline.policy.train import CHECKED_TARGETS, Policy, Trained
 
 CONVERGED = 0.01  # mean |y_p - g| [m] over the checked targets that counts as converged
@@ -32,7 +33,7 @@ class Check:
     failures: dict[str, int]
 
 
-def check(policy: Policy, launcher: Launcher, params) -> Check:
+def check(policy: Policy, launcher: Launcher, params: Params) -> Check:
     """Launch the policy's draws for targets spread over the trained range, as they are.
 
     Args:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import io
+import sys
 from pathlib import Path
 
 import torch
 
+from pipeline.base.errors import one_line
 from pipeline.base.files import replacing
 
 
 class Checkpoint:
     """One state of a training in a file that DVC does not know."""
 
-    def __init__(self, path: Path, fingerprint: str):
+    def __init__(self, path: Path, fingerprint: str) -> None:
         """Look at `path`.
 
         Args:
@@ -23,11 +25,16 @@ class Checkpoint:
 
     def load(self) -> dict | None:
         """The state that `save` kept; None where there is none, or a damaged or foreign one."""
+        if not self.path.is_file():
+            return None
         try:
-            kept = torch.load(self.path, weights_only=True)
-            return kept["state"] if kept["fingerprint"] == self.fingerprint else None
-        except Exception:
-            return None  # not there, or damaged: a zip file can be in many ways
+            content = torch.load(self.path, weights_only=True)
+            state, fingerprint = content["state"], content["fingerprint"]
+        except Exception as error:  # a zip file can be damaged in many ways
+            why = f"damaged ({one_line(error)}), so the training begins anew"
+            print(f"note: {self.path}: {why}", file=sys.stderr)
+            return None
+        return state if fingerprint == self.fingerprint else None
 
     def save(self, state: dict) -> None:
         """Keep a state of tensors, numbers, texts, lists and dictionaries."""

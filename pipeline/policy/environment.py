@@ -21,6 +21,8 @@ from tensordict import TensorDict
 
 from pipeline.launching.surface.response_surface import Landings
 from pipeline.launching.surface.simulated import Source
+from pipeline.params.lab import BandParams, SetupParams
+from pipeline.params.launches import Reward
 
 
 class SlingshotEnv(VecEnv):
@@ -40,10 +42,10 @@ class SlingshotEnv(VecEnv):
         *,
         targets: tuple[float, float],
         num_envs: int,
-        reward,
+        reward: Reward,
         seed: int,
         projectile: tuple[float, float] | None = None,
-    ):
+    ) -> None:
         """Set targets.
 
         Args:
@@ -111,7 +113,7 @@ class SlingshotEnv(VecEnv):
 
 
 def rewarded(
-    surface: Source, draws: np.ndarray, targets: np.ndarray, reward
+    surface: Source, draws: np.ndarray, targets: np.ndarray, reward: Reward
 ) -> tuple[np.ndarray, Landings]:
     """Rewards, shape (N,), and landings of draws (N, 2) [m] for targets (N,) [m]."""
     launched = surface(draws)
@@ -125,7 +127,7 @@ def draw_box(surface: Source) -> tuple[torch.Tensor, torch.Tensor]:
     return (low + high) / 2, (high - low) / 2
 
 
-def projectile_start(setup, band) -> tuple[float, float]:
+def projectile_start(setup: SetupParams, band: BandParams) -> tuple[float, float]:
     """Where the projectile is before the hand draws it (y, z) [m]: in the slack band's middle.
 
     Each half of the band hangs straight from its tip.

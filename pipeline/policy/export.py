@@ -20,6 +20,8 @@ import torch
 from torch import nn
 
 from pipeline.base.files import replacing, write_json
+from pipeline.params import Params
+from pipeline.params.provenance import policy_settings_of
 from pipeline.policy.train import Policy, ProjectilePolicy, Trained
 from pipeline.simulator.rubber import NEO_HOOKEAN
 
@@ -31,7 +33,7 @@ USED = ("sling2sim2real", "torch", "rsl-rl-lib", "onnx", "numpy")
 
 
 def export(
-    trained: Trained, folder: Path, params, band: str, method: str, theta: dict, **about
+    trained: Trained, folder: Path, params: Params, band: str, method: str, theta: dict, **about
 ) -> None:
     """Write a policy's files into `folder`: networks and curve, and last its card.
 
@@ -121,7 +123,7 @@ def write_torchscript(policy: Policy, path: Path) -> None:
 
 def card(
     policy: Policy,
-    params,
+    params: Params,
     band: str,
     method: str,
     theta: dict,
@@ -172,6 +174,7 @@ def card(
             "high": high,
         },
         "max_force_n": setup.max_force,
+        "made_with": policy_settings_of(params, band),
         "setup": {
             "fork_width_m": setup.fork_width,
             "fork_height_m": setup.fork_height,

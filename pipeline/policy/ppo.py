@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from pipeline.params.launches import PolicyParams
 
-def settings(params, state: list[str]) -> dict:
+
+def settings(params: PolicyParams, state: list[str]) -> dict:
     """Configuration of rsl_rl's runner.
 
     Args:

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -23,9 +24,13 @@ from pipeline.base.fingerprint import fingerprint
 from pipeline.base.progress import Progress
 from pipeline.launching.surface import response_surface, simulated
 from pipeline.launching.surface.simulated import Source
+from pipeline.params.launches import PolicyParams, Reward
 from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.environment import SlingshotEnv, draw_box, rewarded
 from pipeline.policy.ppo import settings
+
+if TYPE_CHECKING:
+    from rsl_rl.runners import OnPolicyRunner
 
 CHECKED_TARGETS = 256
 KEPT_EVERY = 5  # iterations; a checkpoint takes some 10 ms
@@ -40,7 +45,15 @@ PACKAGES = ("torch", "rsl-rl-lib", "tensordict", "numpy", "scipy")
 class Policy(nn.Module):
     """Target in metres to draw in metres; the normalisation of both is part of it."""
 
-    def __init__(self, network: nn.Module, targets: tuple[float, float], surface: Source):
+    if TYPE_CHECKING:  # TorchScript would read them
+        target_center: torch.Tensor
+        target_half: torch.Tensor
+        draw_center: torch.Tensor
+        draw_half: torch.Tensor
+
+    def __init__(
+        self, network: nn.Sequential, targets: tuple[float, float], surface: Source
+    ) -> None:
         super().__init__()
         low, high = targets
         center, half = draw_box(surface)
@@ -64,18 +77,23 @@ class Policy(nn.Module):
 class ProjectilePolicy(Policy):
     """The same for a state as the paper prints it: where the projectile is, and the target."""
 
+    if TYPE_CHECKING:
+        projectile: torch.Tensor
+
     def __init__(
         self,
-        network: nn.Module,
+        network: nn.Sequential,
         targets: tuple[float, float],
         surface: Source,
         projectile: tuple[float, float],
-    ):
+    ) -> None:
         """Set `projectile`, where it starts (y, z) [m]."""
         super().__init__(network, targets, surface)
         self.register_buffer("projectile", torch.tensor(projectile))
 
-    def forward(self, projectile: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
+    def forward(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, projectile: torch.Tensor, target: torch.Tensor
+    ) -> torch.Tensor:
         """Draws (y, z) [m], shape (N, 2), for positions [m], (N, 2), and targets [m], (N, 1)."""
         position = (projectile - self.draw_center) / self.draw_half
         goal = (target - self.target_center) / self.target_half
@@ -113,7 +131,7 @@ class Trained:
 
 def train(
     surface: Source,
-    params,
+    params: PolicyParams,
     kept: Path | None = None,
     progress: Progress | None = None,
     *,
@@ -136,7 +154,7 @@ def train(
         torch.manual_seed(params.seed)
         env = SlingshotEnv(
             surface,
-            targets=tuple(params.targets),
+            targets=params.targets,
             num_envs=params.envs,
             reward=params.reward,
             seed=params.seed,
@@ -147,7 +165,7 @@ def train(
             runner = OnPolicyRunner(env, configured, log_dir=None, device="cpu")
         checkpoint = kept and Checkpoint(kept, _stamp(surface, params, projectile))
         training = _Training(runner, env, params, checkpoint, progress, projectile)
-        runner.logger = training
+        runner.logger = training  # pyright: ignore[reportAttributeAccessIssue]
         training.resume()
         # Once: a second call would start from stale observations.
         runner.learn(params.iterations - len(training.rows))
@@ -166,7 +184,7 @@ def one_thread() -> Iterator[None]:
 
 
 def earned(
-    surface: Source, draws: np.ndarray, targets: np.ndarray, reward
+    surface: Source, draws: np.ndarray, targets: np.ndarray, reward: Reward
 ) -> tuple[float, float, int]:
     """Mean reward and |y_p - g| [m] (NaN if all fail) of draws for targets, and failed targets."""
     rewards, launched = rewarded(surface, draws, targets, reward)
@@ -181,7 +199,7 @@ def told(error: float) -> str:
     return "every launch fails" if np.isnan(error) else f"mean error {100 * error:.2f} cm"
 
 
-def _stamp(surface: Source, params, projectile: tuple[float, float] | None) -> str:
+def _stamp(surface: Source, params: PolicyParams, projectile: tuple[float, float] | None) -> str:
     """Of everything that a training hangs on."""
     versions = (f"{name} {version(name)}" for name in PACKAGES)
     return fingerprint(*SOURCES, surface.fingerprint(), repr((params, projectile)), *versions)
@@ -201,38 +219,37 @@ class _Training:
 
     def __init__(
         self,
-        runner,
+        runner: OnPolicyRunner,
         env: SlingshotEnv,
-        params,
+        params: PolicyParams,
         checkpoint: Checkpoint | None,
         progress: Progress | None,
         projectile: tuple[float, float] | None,
-    ):
+    ) -> None:
         self.runner, self.env, self.checkpoint, self.progress = runner, env, checkpoint, progress
         self.log_std = None
         if params.exploration == "scheduled":
-            spread = np.log([params.init_std, params.final_std])
-            schedule = np.linspace(*spread, params.iterations)
-            self.log_std = np.append(
-                schedule, schedule[-1]
-            )  # of each iteration, and after the last
+            start, end = np.log([params.init_std, params.final_std])
+            schedule = np.linspace(start, end, params.iterations)
+            last = schedule[-1]
+            self.log_std = np.append(schedule, last)  # of each iteration, and after the last
         network = runner.alg.get_policy()
-        self.distribution = network.distribution
+        self.distribution: Any = network.distribution
         about = network.mlp, env.targets, env.surface
         self.policy = Policy(*about) if projectile is None else ProjectilePolicy(*about, projectile)
         self.checked = np.linspace(*env.targets, CHECKED_TARGETS)
         self.rewards: list[float] = []
         self.rows: list[dict] = []
         self.reasons: dict[str, int] = {}
-        self.best: dict | None = None
+        self.best: dict = {}
 
     def init_logging_writer(self) -> None:
         """Nothing to open."""
 
-    def process_env_step(self, rewards: torch.Tensor, dones, extras, intrinsic) -> None:
+    def process_env_step(self, rewards: torch.Tensor, *_: torch.Tensor | dict | None) -> None:
         self.rewards.append(float(rewards.mean()))
 
-    def log(self, it: int, learning_rate: float, action_std: torch.Tensor, **_) -> None:
+    def log(self, it: int, learning_rate: float, action_std: torch.Tensor, **_: object) -> None:
         reasons = self.env.take_failures()
         for reason, count in reasons.items():
             self.reasons[reason] = self.reasons.get(reason, 0) + count
@@ -252,7 +269,7 @@ class _Training:
         if self.log_std is not None:
             with torch.no_grad():
                 self.distribution.log_std_param.fill_(self.log_std[it + 1])
-        if self.best is None or worth > self.best["earned"]:
+        if not self.best or worth > self.best["earned"]:
             weights = copy.deepcopy(self.policy.state_dict())
             self.best = {"earned": worth, "row": it, "weights": weights}
         if self.checkpoint and len(self.rows) % KEPT_EVERY == 0:

@@ -3,49 +3,72 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from pipeline.base.errors import UserError
+from pipeline.base.schema import Section
 from pipeline.episode.episode import Episode
-from pipeline.params import expect_known
+from pipeline.params import Params, expect_known
+from pipeline.params.lab import BandParams
 from pipeline.recording.cloud import Clouds, clouds_of
-from pipeline.recording.delays import Delays, delays_of
-from pipeline.recording.geometry import Geometry, geometry_of
-from pipeline.recording.input.reader import Recording, explained, read_recording
-from pipeline.recording.pulls import pulls_of
+from pipeline.recording.delays import Delays, correct_delays
+from pipeline.recording.geometry import KeptGeometry
+from pipeline.recording.input.reader import explained, read_recording
+from pipeline.recording.pulls import Pull, pulls_of
 from pipeline.recording.signals import Signals, signals_of
 from pipeline.recording.view import Scene, View
 
 
 @dataclass(frozen=True)
 class Processed:
-    """Every step's result, for those who report on a recording.
+    """Every step's result for one pull. What is below `delays` is computed when first asked for.
 
     Attributes:
-        recording: With the stamps corrected by `delays`.
+        pull: With the stamps corrected by `delays`.
     """
 
-    recording: Recording
-    geometry: Geometry
-    signals: Signals
-    scene: Scene
-    clouds: Clouds
+    pull: Pull
     delays: Delays
-    view: View
+    band: BandParams
+    params: Params
+
+    @classmethod
+    def of(cls, pull: Pull, band: BandParams, params: Params) -> Processed:
+        return cls(*correct_delays(pull, params), band, params)
+
+    @cached_property
+    def signals(self) -> Signals:
+        """Raises UserError."""
+        return signals_of(self.pull, self.params, self.delays.tool_inertia)
+
+    @cached_property
+    def scene(self) -> Scene:
+        """Raises UserError."""
+        return Scene.of(self.band, self.params.setup, self.signals)
+
+    @cached_property
+    def view(self) -> View:
+        """Raises UserError."""
+        duration = self.params.episode.duration
+        return View(self.pull.recording, self.pull.geometry, self.scene, duration)
+
+    @cached_property
+    def clouds(self) -> Clouds:
+        """Raises UserError."""
+        return clouds_of(self.view, self.params.cloud)
 
 
-def process(path: Path, band: object, params: object) -> Processed:
+def process(path: Path, band: BandParams, params: Params) -> Processed:
     """Of a recording's pulls the first that can be used. Raises UserError."""
     return process_pulls(path, band, params)[0][0]
 
 
 def process_pulls(
-    path: Path, band: object, params: object
+    path: Path, band: BandParams, params: Params
 ) -> tuple[list[Processed], list[UserError]]:
     """Read, then for each pull resolve frames, set stamps right, find events, mask.
-
-    Args:
-        band: One of params.bands.
 
     Returns:
         The pulls that can be used, in time order, and why others cannot, in a line each.
@@ -54,53 +77,45 @@ def process_pulls(
         UserError: None can be used: about the first.
     """
     recording = read_recording(path, params.setup)
-    found, refused = [], []
+    usable: list[Processed] = []
+    refused: list[UserError] = []
     try:
-        pulls = pulls_of(recording, params.setup)
+        pulls = pulls_of(Pull.of(recording, params.setup))
     except UserError as error:
         raise explained(error, recording.path, recording.losses) from None
     for pull in pulls:
         try:
-            found.append(process_recording(pull, band, params))
+            usable.append(process_pull(pull, band, params))
         except UserError as error:
-            name = f"pull {pull.pull} of {pull.pulls}" if pull.pulls > 1 else ""
-            refused.append(explained(error, pull.path, pull.losses, name))
-    if not found:
+            name = f"pull {pull.number} of {pull.count}" if pull.count > 1 else ""
+            refused.append(explained(error, recording.path, recording.losses, name))
+    if not usable:
         raise refused[0]
-    return found, refused
+    return usable, refused
 
 
-def process_recording(recording: Recording, band: object, params: object) -> Processed:
-    """From a recording of one pull that was read already. Raises UserError."""
-    view, delays = view_of(recording, band, params)
-    clouds, scene = clouds_of(view, params.cloud), view.scene
-    return Processed(view.recording, view.geometry, scene.signals, scene, clouds, delays, view)
-
-
-def view_of(recording: Recording, band: object, params: object) -> tuple[View, Delays]:
-    """What the camera sees, with everything known that the mask needs. Raises UserError."""
-    geometry = geometry_of(recording, params.setup)
-    delays = delays_of(recording, geometry, params)
-    recording = delays.corrected(recording)
-    signals = signals_of(recording, geometry, params, delays.tool_inertia)
-    scene = Scene.of(band, params.setup, signals)
-    return View(recording, geometry, scene, params.episode.duration), delays
+def process_pull(pull: Pull, band: BandParams, params: Params) -> Processed:
+    """All of one pull. Raises UserError where it cannot be used."""
+    done = Processed.of(pull, band, params)
+    _ = done.clouds
+    return done
 
 
 def build_episodes(
-    path: Path, band_name: str, params: object
+    path: Path, band_name: str, params: Params
 ) -> tuple[list[Episode], list[UserError]]:
     """The episodes of a recording's pulls, and why others have none; see `process_pulls`."""
     expect_known(params, "band", band_name)
-    found, refused = process_pulls(path, params.bands[band_name], params)
-    return [episode_of(done, band_name, params) for done in found], refused
+    usable, refused = process_pulls(path, params.bands[band_name], params)
+    return [episode_of(done, band_name, params) for done in usable], refused
 
 
-def episode_of(done: Processed, band_name: str, params: object) -> Episode:
+def episode_of(done: Processed, band_name: str, params: Params) -> Episode:
     """The episode, with everything in its metadata that was chosen on the way."""
-    signals, clouds, recording = done.signals, done.clouds, done.recording
+    signals, clouds = done.signals, done.clouds
+    recording, geometry = done.pull.recording, done.pull.geometry
 
-    def of_streams(name: str) -> dict:
+    def of_streams(name: str) -> dict[str, Any]:
         return {role: getattr(stream, name) for role, stream in recording.streams.items()}
 
     removal = "statistical_neighbors", "statistical_ratio", "radius", "radius_neighbors", "sampling"
@@ -111,20 +126,21 @@ def episode_of(done: Processed, band_name: str, params: object) -> Episode:
         },
         "input": {
             "file": recording.path.name,
-            "pull": recording.pull,
+            "pull": done.pull.number,
             "sha256": recording.sha256,
             "start_ns": signals.origin,
             "topics": of_streams("topic"),
             "choices": recording.choices,
-            "frames": done.geometry.sources,
+            "frames": geometry.sources,
             "delays": of_streams("delay"),
             "lost": of_streams("lost"),
             "missing": of_streams("missing"),
             "losses": recording.losses,
             "notes": recording.notes,
         },
+        "geometry": KeptGeometry.of(recording, geometry).content(),
         "preprocessing": {
-            **signals.facts,
+            **asdict(signals.facts),
             "delays": asdict(done.delays),
             **_named(params.force, "cutoff", "cutoff_unit"),
             **_named(params.cloud, "mask", "points", *removal),
@@ -145,10 +161,10 @@ def episode_of(done: Processed, band_name: str, params: object) -> Episode:
         clouds=clouds.points,
         grasp_time=signals.grasp_time,
         release_time=signals.release_time,
-        camera=done.geometry.camera.translation,
+        camera=geometry.camera.translation,
         metadata=metadata,
     )
 
 
-def _named(section: object, *names: str) -> dict:
+def _named(section: Section, *names: str) -> dict[str, Any]:
     return {name: getattr(section, name) for name in names}

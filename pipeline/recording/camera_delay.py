@@ -10,11 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
-from pipeline.recording.events import events_of
-from pipeline.recording.geometry import Geometry
-from pipeline.recording.input.reader import Recording
-from pipeline.recording.motion import Motion
+from pipeline.recording.pulls import Pull
 from pipeline.recording.tool_inertia import LONGEST
 
 BLOCKS = 8  # of time, for errors by leaving one out
@@ -34,13 +32,11 @@ SEEN = 0.8  # share of the pictures in which the hand must be found
 ROUNDS, CLOSE = 4, 3e-4  # s
 
 
-def camera_delay(recording: Recording, geometry: Geometry) -> tuple[float, float] | None:
+def camera_delay(pull: Pull) -> tuple[float, float] | None:
     """Delay and its standard error [s]; None where the hand is not seen well enough."""
-    origin = recording.origin
-    motion = Motion.of(recording.pose, geometry, origin)
-    grasp, release = events_of(recording, motion)
-    release = release.time
-    stamps = recording.depth.seconds(origin)
+    recording, motion = pull.recording, pull.motion
+    grasp, release = pull.grasp, pull.release.time
+    stamps = recording.depth.seconds(recording.origin)
     used = np.flatnonzero((stamps > grasp + LONGEST) & (stamps < release - LONGEST))
     if len(used) < 2 * BLOCKS:
         return None
@@ -48,7 +44,7 @@ def camera_delay(recording: Recording, geometry: Geometry) -> tuple[float, float
     rays, random = recording.depth_camera.rays().astype(np.float32), np.random.default_rng(0)
     times, pictures = [], []
     for k in used:
-        points = random.permutation(_hand(recording, geometry, motion, rays, k, stamps[k]))
+        points = random.permutation(_hand(pull, rays, k, stamps[k]))
         if len(points) >= FEWEST:
             times.append(stamps[k])
             pictures.append(points)
@@ -78,17 +74,16 @@ def camera_delay(recording: Recording, geometry: Geometry) -> tuple[float, float
     return delay, float(np.hypot(errors.max(), np.ptp(steps) / 2))
 
 
-def _hand(
-    recording: Recording, geometry: Geometry, motion: Motion, rays: np.ndarray, k: int, time: float
-) -> np.ndarray:
+def _hand(pull: Pull, rays: np.ndarray, k: int, time: float) -> np.ndarray:
     """Points around the hand in picture k, frame O, (P, 3); none where it does not show the hand.
 
     Args:
         rays: Of the depth camera, shape (H, W, 3).
     """
-    camera, nothing = recording.depth_camera, np.zeros((0, 3))
+    camera, nothing = pull.recording.depth_camera, np.zeros((0, 3))
+    pose, motion = pull.geometry.camera, pull.motion
     palm = motion.position(time) + motion.orientation(time).apply([0, 0, -PALM])
-    middle = geometry.camera.inverse().apply(palm)
+    middle = pose.inverse().apply(palm)
     if middle[2] < 2 * REACH:
         return nothing
     size = np.array([camera.width, camera.height])
@@ -96,11 +91,11 @@ def _hand(
     pixel = camera.project(middle[None])[0]
     low, high = (np.clip(pixel + side * half, 0, size).astype(int) for side in (-1, 1))
     window = slice(low[1], high[1]), slice(low[0], high[0])
-    depth = recording.depth_picture(k)
+    depth = pull.recording.depth_picture(k)
     if depth is None:
         return nothing
     depth = depth[window]
-    points = geometry.camera.apply((rays[window] * depth[..., None])[depth > 0])
+    points = pose.apply((rays[window] * depth[..., None])[depth > 0])
     near = np.linalg.norm(points - palm, axis=1) < 1.3 * REACH
     return points[near].astype(float)
 
@@ -111,8 +106,21 @@ def _behind(points: np.ndarray) -> np.ndarray:
     return points[(away < REACH) & (points[:, 2] < -FINGERTIPS)]
 
 
-def _step(points, turns, hands, speed, part) -> tuple[float, float] | None:
-    """Delay and error that are left, against the slowest pictures of one part of the way."""
+def _step(
+    points: list[np.ndarray],
+    turns: Rotation,
+    hands: np.ndarray,
+    speed: np.ndarray,
+    part: np.ndarray,
+) -> tuple[float, float] | None:
+    """Delay and error that are left, against the slowest pictures of one part of the way.
+
+    Args:
+        points: Of the hand in each of K pictures, (P, 3) each, in the hand's frame.
+        turns: K rotations of that frame into frame O.
+        hands, speed: Tool centre point [m] and its velocity [m/s], both (K, 3).
+        part: Which pictures belong to that part of the way, (K,).
+    """
     slowest = np.flatnonzero(part)[np.argsort(np.linalg.norm(speed[part], axis=1))[:REST]]
     surface = _Surface(np.vstack([points[i] for i in slowest]))
     rows, wanted = [], []

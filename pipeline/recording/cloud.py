@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.params.recording import CloudParams
 from pipeline.recording.masks import masker
 from pipeline.recording.view import Frame, View
 
@@ -42,8 +43,8 @@ class Clouds:
         return sum(not len(points) for points in self.points)
 
 
-def clouds_of(view: View, cloud: object) -> Clouds:
-    """Mask and sample every frame. `cloud` is that section of params.
+def clouds_of(view: View, cloud: CloudParams) -> Clouds:
+    """Mask and sample every frame.
 
     Raises:
         UserError: if the band is seen in too few frames.
@@ -75,7 +76,7 @@ def clouds_of(view: View, cloud: object) -> Clouds:
     return clouds
 
 
-def cloud_of(view: View, frame: Frame, found: np.ndarray, cloud: object) -> np.ndarray:
+def cloud_of(view: View, frame: Frame, found: np.ndarray, cloud: CloudParams) -> np.ndarray:
     """Points of the pixels `found` (H, W), without outliers and sampled, (P, 3) float32."""
     if not found.any():
         return np.zeros((0, 3), np.float32)
@@ -84,14 +85,13 @@ def cloud_of(view: View, frame: Frame, found: np.ndarray, cloud: object) -> np.n
     return sample(frame.points[found], cloud, view.scene.diameter * per_square)
 
 
-def sample(points: np.ndarray, cloud: object, density: float = np.inf) -> np.ndarray:
+def sample(points: np.ndarray, cloud: CloudParams, density: float = np.inf) -> np.ndarray:
     """Statistical and radius outlier removal, and at most cloud.points of them, (P, 3) float32.
 
     Which of both comes first, cloud.sampling says.
 
     Args:
         points: Shape (S, 3).
-        cloud: That section of params.
         density: Points that a metre of the band may have; of a thin or far band no more neighbours
             are asked for than it can have.
     """

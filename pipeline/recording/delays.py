@@ -1,4 +1,9 @@
-"""How late the stamps of pose and camera are against the force's, seen in the recording itself."""
+"""How late the stamps of pose and camera are against the force's, seen in the recording itself.
+
+A delay is looked for where the hand moves freely, or draws the band: the events are found first,
+with the stamps as they were recorded. That they are off by such a delay does no harm, for what is
+close to them is left out. Of a pull with other stamps, motion and grasp are estimated anew.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from pipeline.base.errors import UserError
+from pipeline.params import Params
 from pipeline.recording.camera_delay import camera_delay
-from pipeline.recording.geometry import Geometry
-from pipeline.recording.input.reader import Recording
+from pipeline.recording.pulls import Pull
 from pipeline.recording.tool_inertia import ToolInertia, estimate_tool_inertia
 
 SIGMAS = 3.0  # what is less sure than this is not corrected
@@ -45,33 +50,31 @@ class Delays:
     camera: Estimate
     tool_inertia: ToolInertia | None = None
 
-    def corrected(self, recording: Recording) -> Recording:
-        """The recording with the stamps that it should have had."""
-        both = {"pose": self.pose, "camera": self.camera}
-        late = {role: one.value for role, one in both.items() if one.applied}
-        return recording.shifted(**late) if late else recording
 
+def correct_delays(pull: Pull, params: Params) -> tuple[Pull, Delays]:
+    """The pull with the stamps that it should have had, and by what they were late.
 
-def delays_of(recording: Recording, geometry: Geometry, params: object) -> Delays:
-    """Given delays as they are, others as far as the recording shows them.
+    Given delays are taken as they are, others as far as the recording shows them.
 
     The camera's is estimated against the pose, after that was corrected. An estimate is applied
     where it is more than three standard deviations: a wrong correction is worse than none.
     """
     given = params.episode.delays
     try:
-        inertia = estimate_tool_inertia(recording, geometry, params.setup.tool)
+        inertia = estimate_tool_inertia(pull, params.setup.tool)
     except UserError:  # the recording is refused for it later, in its own words
         inertia = None
     pose = _judged(given.pose, lambda: inertia and (inertia.delay, inertia.delay_error))
     if pose.applied:
-        recording = recording.shifted(pose=pose.value)
+        pull = pull.shifted(pose=pose.value)
     if inertia is not None:
         left = inertia.delay - (pose.value if pose.applied else 0.0)
         sure = abs(left) > SIGMAS * max(inertia.delay_error, LEAST_ERROR)
         inertia = replace(inertia, delay=left if sure else 0.0)
-    camera = _judged(given.camera, lambda: camera_delay(recording, geometry))
-    return Delays(pose, camera, inertia)
+    camera = _judged(given.camera, lambda: camera_delay(pull))
+    if camera.applied:
+        pull = pull.shifted(camera=camera.value)
+    return pull, Delays(pose, camera, inertia)
 
 
 def _judged(given: float | None, estimate: Callable[[], tuple[float, float] | None]) -> Estimate:

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from pipeline.base.errors import UserError
-from pipeline.recording.input.reader import Recording
-from pipeline.recording.motion import Motion
+
+Opening = tuple[np.ndarray, np.ndarray]  # of the gripper: times [s] and opening [m], both (G,)
 
 MARGIN = 0.05  # s kept clear of the grasp and of the release when means are taken
 SETTLE = 0.4  # s after the release until the hand is free and at rest
@@ -55,28 +55,19 @@ class Release:
     slips: list[float] = field(default_factory=list)
 
 
-def events_of(recording: Recording, motion: Motion) -> tuple[float, Release]:
-    """Time of the grasp [s] and the release, since the first force. Raises UserError."""
-    origin = recording.origin
-    gripper = opening_of(recording, origin)
-    release = find_release(recording.wrench.seconds(origin), recording.wrench.values, gripper)
-    return find_grasp(gripper, (motion.time, motion.path), release.time), release
-
-
-def releases_of(recording: Recording) -> list[float]:
-    """About when pulls end [s]; none where nothing tells.
+def find_releases(t: np.ndarray, force: np.ndarray, gripper: Opening | None) -> list[float]:
+    """About when the pulls of a recording end [s]; none where nothing tells.
 
     With a gripper they end where the fingers open, and where a band slips out that was grasped for
-    this pull, if it is grasped anew for the next one.
+    this pull, if it is grasped anew for the next one. Arguments are those of `find_release`.
     """
-    t, force = recording.wrench.seconds(recording.origin), recording.wrench.values
-    gripper, found = opening_of(recording, recording.origin), []
+    found: list[float] = []
     try:
         _, free, ends, _ = _drops(t, force, *_reach(t), gripper)
     except UserError:
         return []
     for i, later in pairwise([*free, None]):
-        if i not in ends:
+        if gripper is not None and i not in ends:
             grasp, again = (_closed(*gripper, t[k]) for k in (i, i if later is None else later))
             if grasp is None or (found and grasp < found[-1]):
                 continue
@@ -86,16 +77,7 @@ def releases_of(recording: Recording) -> list[float]:
     return found
 
 
-def opening_of(recording: Recording, origin: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Times [s] since `origin` [ns] and opening [m] of the gripper; None where not recorded."""
-    if recording.gripper is None:
-        return None
-    return recording.gripper.seconds(origin), recording.gripper.values[:, 0]
-
-
-def find_release(
-    t: np.ndarray, force: np.ndarray, gripper: tuple[np.ndarray, np.ndarray] | None = None
-) -> Release:
+def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = None) -> Release:
     """Find the release in a raw force, whose bias need not be known.
 
     Sudden drops that last are found first, by differences of short and of long means before and
@@ -106,7 +88,7 @@ def find_release(
     Args:
         t: Times [s], shape (S,).
         force: Any constant frame [N], shape (S, 3).
-        gripper: Times (G,) [s] and opening (G,) [m], or None where it was not recorded.
+        gripper: None where it was not recorded.
 
     Raises:
         UserError: if the force never drops as it does when a drawn band is let go, or does so
@@ -151,7 +133,7 @@ def _reach(t: np.ndarray) -> tuple[int, int]:
 
 
 def _steepest(
-    t: np.ndarray, force: np.ndarray, near: int, far: int, gripper: tuple | None
+    t: np.ndarray, force: np.ndarray, near: int, far: int, gripper: Opening | None
 ) -> tuple[int, list[int]]:
     """Sample at which the band is let go, and those of sudden drops before it."""
     drops, _, ends, size = _drops(t, force, near, far, gripper)
@@ -163,7 +145,7 @@ def _steepest(
 
 
 def _drops(
-    t: np.ndarray, force: np.ndarray, near: int, far: int, gripper: tuple | None
+    t: np.ndarray, force: np.ndarray, near: int, far: int, gripper: Opening | None
 ) -> tuple[np.ndarray, list[int], list[int], np.ndarray]:
     """Samples of sudden drops; which leave the hand free; which the fingers let go (all of these
     where none does); the drop at each sample of the force.
@@ -235,7 +217,7 @@ def _onset(
 
 
 def find_grasp(
-    gripper: tuple[np.ndarray, np.ndarray] | None,
+    gripper: Opening | None,
     pose: tuple[np.ndarray, np.ndarray],
     release: float,
 ) -> float:
@@ -245,7 +227,7 @@ def find_grasp(
     gripper's topic is late, and the end of the rest just before counts.
 
     Args:
-        gripper: Times (G,) [s] and opening (G,) [m], or None where it was not recorded.
+        gripper: None where it was not recorded.
         pose: Times (S,) [s] and path (S, 3) [m] of the hand, z up.
         release: Time of the release [s].
 

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
 
+import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
+from pipeline.params.lab import SetupParams
+from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.frames import Transform, TransformTree
 from pipeline.recording.input.reader import Recording
 
@@ -35,7 +40,58 @@ class Geometry:
     sources: dict[str, str]
 
 
-def geometry_of(recording: Recording, setup: object) -> Geometry:
+@dataclass(frozen=True)
+class KeptGeometry:
+    """What an episode keeps of its recording's geometry, for those who do not read the recording.
+
+    Attributes:
+        base_frame: Name of the pose topic's frame, the robot's base; "" where it has none.
+        base_to_fork: Frame O to the base, as setup.base_to_fork.
+        camera: The colour camera.
+        camera_to_fork: Frame O to the colour camera, as setup.camera_to_fork.
+    """
+
+    base_frame: str
+    base_to_fork: Transform
+    camera: Camera
+    camera_to_fork: Transform
+
+    @classmethod
+    def of(cls, recording: Recording, geometry: Geometry) -> KeptGeometry:
+        to_color = geometry.color @ geometry.camera.inverse()
+        frame, camera = recording.pose.frame, recording.color_camera
+        return cls(frame, geometry.base.inverse(), camera, to_color)
+
+    def content(self) -> dict[str, Any]:
+        """For an episode's metadata, under `geometry`."""
+        camera = asdict(self.camera)
+        return {
+            "base_frame": self.base_frame,
+            "base_to_fork": self.base_to_fork.pose(),
+            "camera": camera | {key: camera[key].tolist() for key in ("matrix", "distortion")},
+            "camera_to_fork": self.camera_to_fork.pose(),
+        }
+
+    @classmethod
+    def of_episode(cls, metadata: Mapping[str, Any], band: str) -> KeptGeometry:
+        """Of an episode's metadata. Raises UserError where an older version made the episode."""
+        kept = metadata.get("geometry")
+        if kept is None:
+            raise UserError(
+                f"the episodes of {band} are of an older version, without the rig's geometry:"
+                f" `dvc repro --force episode@{band}` makes them anew"
+            )
+        camera = kept["camera"]
+        arrays = {key: np.array(camera[key], float) for key in ("matrix", "distortion")}
+        return cls(
+            kept["base_frame"],
+            Transform.of(kept["base_to_fork"]),
+            Camera(**{**camera, **arrays}),
+            Transform.of(kept["camera_to_fork"]),
+        )
+
+
+def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
     """Resolve the frames; params come before /tf_static. Raises UserError where one is missing."""
     tree, sources = recording.transforms, {}
     pose_frame, wrench_frame = recording.pose.frame, recording.wrench.frame

@@ -1,60 +1,137 @@
-"""A recording of several pulls, one after the other, as a recording of each.
+"""One recorded pull and what follows from its streams; a recording of several, pull by pull.
 
-Labs record that way: the hand lets go, returns, and grasps again. A pull's part of the file begins
-when the hand is free of the pull before and ends when it grasps for the next one: the free hand
-between two pulls ends the one and leads in the other. Each part has a grasp, a release, a tare and
-delays of its own, and is judged by itself.
+Labs record several pulls into one file: the hand lets go, returns, and grasps again. A pull's part
+of the file begins when the hand is free of the pull before and ends when it grasps for the next
+one: the free hand between two pulls ends the one and leads in the other. Each part has a grasp, a
+release, a tare and delays of its own, and is judged by itself.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from functools import cached_property
+
 import numpy as np
 
 from pipeline.base.errors import UserError
-from pipeline.recording.events import MARGIN, SETTLE, find_grasp, opening_of, releases_of
+from pipeline.params.lab import SetupParams
+from pipeline.recording.events import (
+    MARGIN,
+    SETTLE,
+    Opening,
+    Release,
+    find_grasp,
+    find_release,
+    find_releases,
+)
 from pipeline.recording.geometry import Geometry, geometry_of
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.motion import Motion, expect_dense
 
 CALM = 3.0  # s after a release until the band hangs at rest again, to some 2 mm
 APART = 1.0  # s: what is let go twice within this is one pull, and not understood
+UNMOVED = ("force_time", "opening", "release")  # what a delay of the pose does not change
 
 
-def pulls_of(recording: Recording, setup: object) -> list[Recording]:
-    """Each pull in time order; the recording itself where it holds one, or is not understood.
+@dataclass(frozen=True)
+class Pull:
+    """One pull: its streams on one clock, where things stand, and what is derived of both.
 
-    Args:
-        setup: That section of params.
+    Everything derived is computed when it is first asked for, once; it raises UserError where the
+    recording does not show it. Times are seconds since the file's first force.
+
+    Attributes:
+        recording: The streams.
+        geometry: Static transforms.
+        number, count: Which of the file's pulls this is, from 1 on, and of how many.
+    """
+
+    recording: Recording
+    geometry: Geometry
+    number: int = 1
+    count: int = 1
+
+    @classmethod
+    def of(cls, recording: Recording, setup: SetupParams) -> Pull:
+        """All of a recording. Raises UserError where a frame is missing."""
+        return cls(recording, geometry_of(recording, setup))
+
+    @cached_property
+    def force_time(self) -> np.ndarray:
+        """Of the force's samples [s], shape (S,)."""
+        return self.recording.wrench.seconds(self.recording.origin)
+
+    @cached_property
+    def opening(self) -> Opening | None:
+        """Times [s] and opening [m] of the gripper; None where it was not recorded."""
+        gripper = self.recording.gripper
+        return gripper and (gripper.seconds(self.recording.origin), gripper.values[:, 0])
+
+    @cached_property
+    def motion(self) -> Motion:
+        return Motion.of(self.recording.pose, self.geometry, self.recording.origin)
+
+    @cached_property
+    def release(self) -> Release:
+        return find_release(self.force_time, self.recording.wrench.values, self.opening)
+
+    @cached_property
+    def releases(self) -> list[float]:
+        """About when the pulls of a recording of several end [s]."""
+        return find_releases(self.force_time, self.recording.wrench.values, self.opening)
+
+    @cached_property
+    def grasp(self) -> float:
+        """When the band is grasped [s]."""
+        return self.grasp_before(self.release.time)
+
+    def grasp_before(self, release: float) -> float:
+        """When the band is grasped [s] that is let go at `release` [s]."""
+        return find_grasp(self.opening, (self.motion.time, self.motion.path), release)
+
+    def shifted(self, pose: float = 0.0, camera: float = 0.0) -> Pull:
+        """With stamps that are late by so many seconds put right.
+
+        The pose's clock tells the motion and the grasp, which are estimated anew where it changes;
+        the camera's tells neither.
+        """
+        moved = replace(self, recording=self.recording.shifted(pose, camera))
+        kept = UNMOVED if pose else (*UNMOVED, "motion", "grasp")
+        vars(moved).update({name: vars(self)[name] for name in kept if name in vars(self)})
+        return moved
+
+
+def pulls_of(whole: Pull) -> list[Pull]:
+    """Each pull of a recording in time order; `whole` itself where it is one or not understood.
 
     Raises:
         UserError: Several pulls are in it, but not where the hand is.
     """
-    releases = np.array(releases_of(recording))
+    recording, releases = whole.recording, np.array(whole.releases)
     if len(releases) < 2 or np.diff(releases).min() < APART:
-        return [recording]
-    geometry, origin = geometry_of(recording, setup), recording.origin
+        return [whole]
     expect_dense(recording.pose)
-    begins = [float(recording.wrench.seconds(origin)[0]), *(releases[:-1] + SETTLE)]
-    last = max(stream.seconds(origin)[-1] for stream in recording.streams.values())
+    begins = [float(whole.force_time[0]), *(releases[:-1] + SETTLE)]
+    last = max(stream.seconds(recording.origin)[-1] for stream in recording.streams.values())
     ends = [
-        _next_grasp(recording.part(begin, release + SETTLE), geometry, release) - MARGIN
+        _next_grasp(replace(whole, recording=recording.part(begin, release + SETTLE)), release)
         for begin, release in zip(begins[1:], releases[1:], strict=True)
     ]
+    ends = [*(end - MARGIN for end in ends), last]
     return [
-        recording.part(begin, end, number, len(begins))
-        for number, (begin, end) in enumerate(zip(begins, [*ends, last], strict=True), start=1)
+        Pull(recording.part(begin, end), whole.geometry, number, len(begins))
+        for number, (begin, end) in enumerate(zip(begins, ends, strict=True), start=1)
     ]
 
 
-def _next_grasp(between: Recording, geometry: Geometry, release: float) -> float:
+def _next_grasp(between: Pull, release: float) -> float:
     """When the band is grasped again [s] to be let go at `release`; half way where nothing tells.
 
     Args:
         between: From the pull before to this one.
     """
-    motion = Motion.of(between.pose, geometry, between.origin)
+    _ = between.motion  # what is wrong with it is not to be guessed around
     try:
-        gripper = opening_of(between, between.origin)
-        return find_grasp(gripper, (motion.time, motion.path), release)
+        return between.grasp_before(release)
     except UserError:
-        return (between.wrench.seconds(between.origin)[0] + release) / 2
+        return (between.force_time[0] + release) / 2

@@ -8,15 +8,67 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.episode import signal
-from pipeline.recording.events import MARGIN, events_of, opening_of
-from pipeline.recording.geometry import Geometry, turned
-from pipeline.recording.input.reader import Recording
-from pipeline.recording.motion import VELOCITY_WINDOW, Motion, expect_dense
+from pipeline.params import Params
+from pipeline.params.lab import Tool
+from pipeline.params.recording import EpisodeParams
+from pipeline.recording.events import MARGIN
+from pipeline.recording.geometry import turned
+from pipeline.recording.motion import VELOCITY_WINDOW, expect_dense
+from pipeline.recording.pulls import Pull
 from pipeline.recording.tare import band_force
 from pipeline.recording.tool_inertia import ToolInertia
 
 MOST_TURN = np.deg2rad(5.0)  # of the hand; beyond it the tool's weight has to be known
 MOST_GAP = 0.3  # s over which force and pose may be interpolated
+
+
+@dataclass(frozen=True)
+class ToolFacts:
+    """The tool whose load was taken off the force: mass [kg], centre [m], and who tells of it."""
+
+    mass: float
+    center: list[float]
+    source: str
+
+
+@dataclass(frozen=True)
+class SignalFacts:
+    """What was found on the way from streams to samples, for the metadata.
+
+    Attributes:
+        bias, drift: Taken off the force, frame O [N], [N/s].
+        noise: Standard deviation of one force sample [N].
+        hold_force: Mean just before the release, frame O [N].
+        peak_force: Largest of the filtered force while the band is held [N].
+        flipped: The sensor reports the force of the gripper on the band.
+        turn: Largest turn of the hand before the release [rad].
+        tool: None where nothing was taken off.
+        rate: Of the force [Hz].
+        longest_gap: In the window, by topic [s].
+        cutoff_hz: Of the force's filter [Hz].
+        release_error, release_fall, release_resolution: Of `events.Release` [s].
+        slips: Sudden drops of the force before the release, since the window's start [s].
+        velocity_window: Of the fits that differentiate the path [s].
+        twist_difference: Median difference of speed to a recorded twist [m/s]; None without one.
+    """
+
+    bias: list[float]
+    drift: list[float]
+    noise: float
+    hold_force: list[float]
+    peak_force: float
+    flipped: bool
+    turn: float
+    tool: ToolFacts | None
+    rate: float
+    longest_gap: dict[str, float]
+    cutoff_hz: float
+    release_error: float
+    release_fall: float
+    release_resolution: float
+    slips: list[float]
+    velocity_window: float
+    twist_difference: float | None
 
 
 @dataclass(frozen=True)
@@ -29,7 +81,6 @@ class Signals:
         position, velocity, force: Shape (T, 3).
         opening: Shape (T,), NaN where it was not recorded.
         grasp_time, release_time: Events.
-        facts: Bias, noise, drift, turn, flip and the like, for the metadata.
         path_time, path: The hand at its native rate, for what needs more than samples.
         tool_axis: Where the hand points to (z of its frame), shape (3,).
     """
@@ -42,12 +93,12 @@ class Signals:
     opening: np.ndarray
     grasp_time: float
     release_time: float
-    facts: dict
+    facts: SignalFacts
     path_time: np.ndarray
     path: np.ndarray
     tool_axis: np.ndarray
 
-    def hand(self, times: np.ndarray) -> np.ndarray:
+    def hand(self, times: np.ndarray | float) -> np.ndarray:
         """Tool centre point at any times, shape (..., 3)."""
         axes = [np.interp(times, self.path_time, axis) for axis in self.path.T]
         return np.stack(axes, axis=-1)
@@ -57,22 +108,17 @@ class Signals:
         return float(np.nan_to_num(np.interp(time, self.time, self.opening)))
 
 
-def signals_of(
-    recording: Recording, geometry: Geometry, params: object, inertia: ToolInertia | None = None
-) -> Signals:
+def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -> Signals:
     """Turn raw streams into samples. Raises UserError if the recording cannot be used.
 
     Args:
-        params: Of which episode, force and setup.tool are used.
         inertia: The tool as the recording shows it; taken off where setup.tool does not say it.
     """
-    tool, episode = params.setup.tool, params.episode
+    tool, episode, recording = params.setup.tool, params.episode, pull.recording
     inertia = inertia if tool is None else None
     expect_dense(recording.wrench)
-    origin = recording.origin
-    t, raw = recording.wrench.seconds(origin), recording.wrench.values
-    motion = Motion.of(recording.pose, geometry, origin)
-    grasp, release = events_of(recording, motion)
+    t, raw, motion = pull.force_time, recording.wrench.values, pull.motion
+    grasp, release = pull.grasp, pull.release
     until = (motion.time >= t[0]) & (motion.time <= release.time)
     if until.sum() < 10:
         raise UserError(f"{recording.pose.topic} stops before the release at {release.time:.3f} s")
@@ -84,11 +130,11 @@ def signals_of(
             " params.yaml (mass 0 for a force without it), or keep the hand's orientation"
         )
     if inertia is not None:
-        raw = raw - inertia.force(motion, geometry, t, release.time)
-    band = band_force(t, raw, motion, geometry, tool, grasp, release)
+        raw = raw - inertia.force(motion, pull.geometry, t, release.time)
+    band = band_force(t, raw, motion, pull.geometry, tool, grasp, release)
 
-    start = _start(recording, origin, grasp, release.time, episode)
-    gaps = _gaps(recording, origin, start, start + episode.duration)
+    start = _start(pull, episode)
+    gaps = _gaps(pull, start, start + episode.duration)
     period = episode.duration / episode.samples
 
     def means(times: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -100,33 +146,32 @@ def signals_of(
     smooth = signal.lowpass(even, rate, cutoff)
     pulled = smooth[grid < release.time - MARGIN]
     pose_grid, position, velocity = motion.velocity()
-    gripper = opening_of(recording, origin)
-    facts = {
-        "bias": band.bias.tolist(),
-        "drift": band.drift.tolist(),
-        "noise": release.noise,
-        "hold_force": band.hold.tolist(),
-        "peak_force": float(np.linalg.norm(pulled, axis=1).max()),
-        "flipped": band.flipped,
-        "turn": turn,
-        "tool": _tool_facts(tool, "setup.tool") or _tool_facts(inertia, "its inertia"),
-        "rate": rate,
-        "longest_gap": gaps,
-        "cutoff_hz": cutoff,
-        "release_error": release.error,
-        "release_fall": release.fall,
-        "release_resolution": release.resolution,
-        "slips": [time - start for time in release.slips],
-        "velocity_window": VELOCITY_WINDOW,
-        "twist_difference": _twist_difference(recording, origin, pose_grid, velocity),
-    }
+    facts = SignalFacts(
+        bias=band.bias.tolist(),
+        drift=band.drift.tolist(),
+        noise=release.noise,
+        hold_force=band.hold.tolist(),
+        peak_force=float(np.linalg.norm(pulled, axis=1).max()),
+        flipped=band.flipped,
+        turn=turn,
+        tool=_tool_facts(tool, "setup.tool") or _tool_facts(inertia, "its inertia"),
+        rate=rate,
+        longest_gap=gaps,
+        cutoff_hz=cutoff,
+        release_error=release.error,
+        release_fall=release.fall,
+        release_resolution=release.resolution,
+        slips=[time - start for time in release.slips],
+        velocity_window=VELOCITY_WINDOW,
+        twist_difference=_twist_difference(pull, pose_grid, velocity),
+    )
     return Signals(
-        origin=origin + round(start * 1e9),
+        origin=recording.origin + round(start * 1e9),
         time=(np.arange(episode.samples) + 0.5) * period,
         position=means(pose_grid, position),
         velocity=means(pose_grid, velocity),
         force=means(grid, smooth),
-        opening=means(*gripper) if gripper else np.full(episode.samples, np.nan),
+        opening=means(*pull.opening) if pull.opening else np.full(episode.samples, np.nan),
         grasp_time=grasp - start,
         release_time=release.time - start,
         facts=facts,
@@ -136,11 +181,10 @@ def signals_of(
     )
 
 
-def _start(
-    recording: Recording, origin: int, grasp: float, release: float, episode: object
-) -> float:
+def _start(pull: Pull, episode: EpisodeParams) -> float:
     """Of the window [s]: as much lead-in as the tail after the release leaves room for."""
-    t, pose_t = recording.wrench.seconds(origin), recording.pose.seconds(origin)
+    recording, grasp, release = pull.recording, pull.grasp, pull.release.time
+    t, pose_t = pull.force_time, pull.motion.time
     first, last = max(t[0], pose_t[0]), min(t[-1], pose_t[-1])
     ends = recording.wrench.topic if t[-1] < pose_t[-1] else recording.pose.topic
     start = max(first, release + episode.tail - episode.duration)
@@ -164,11 +208,11 @@ def _start(
     return start
 
 
-def _gaps(recording: Recording, origin: int, start: float, end: float) -> dict[str, float]:
+def _gaps(pull: Pull, start: float, end: float) -> dict[str, float]:
     """Longest time without a message in the window [s], by topic: values are interpolated."""
     found = {}
-    for stream in (recording.wrench, recording.pose):
-        times = stream.seconds(origin)
+    for stream in (pull.recording.wrench, pull.recording.pose):
+        times = stream.seconds(pull.recording.origin)
         inside = times[(times > start) & (times < end)]
         gap = float(np.diff(inside).max()) if len(inside) > 1 else end - start
         if gap > MOST_GAP:
@@ -180,20 +224,18 @@ def _gaps(recording: Recording, origin: int, start: float, end: float) -> dict[s
     return found
 
 
-def _tool_facts(tool: object | None, source: str) -> dict | None:
-    return tool and {"mass": tool.mass, "center": list(tool.center), "source": source}
+def _tool_facts(tool: Tool | ToolInertia | None, source: str) -> ToolFacts | None:
+    return tool and ToolFacts(tool.mass, list(tool.center), source)
 
 
-def _twist_difference(
-    recording: Recording, origin: int, times: np.ndarray, velocity: np.ndarray
-) -> float | None:
+def _twist_difference(pull: Pull, times: np.ndarray, velocity: np.ndarray) -> float | None:
     """Median difference of speed to a recorded twist [m/s], in whatever frame that is given.
 
     The derivative of the pose is used all the same: a robot filters its twist, nobody says how.
     """
-    twist = recording.twist
-    if twist is None or twist.topic == recording.pose.topic:
+    twist = pull.recording.twist
+    if twist is None or twist.topic == pull.recording.pose.topic:
         return None
     said = np.linalg.norm(twist.values[:, :3], axis=1)
-    speed = np.interp(twist.seconds(origin), times, np.linalg.norm(velocity, axis=1))
+    speed = np.interp(twist.seconds(pull.recording.origin), times, np.linalg.norm(velocity, axis=1))
     return float(np.median(np.abs(said - speed)))

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
+from pipeline.params.lab import Tool
 from pipeline.recording.events import LEAD_IN, MARGIN, SETTLE, Release
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.motion import Motion
@@ -41,7 +42,7 @@ def band_force(
     raw: np.ndarray,
     motion: Motion,
     geometry: Geometry,
-    tool: object | None,
+    tool: Tool | None,
     grasp: float,
     release: Release,
 ) -> BandForce:
@@ -53,7 +54,7 @@ def band_force(
     Args:
         t: Times [s], shape (S,).
         raw: The wrench's frame, shape (S, 3) [N].
-        tool: setup.tool, or None where it is not known.
+        tool: None where it is not known.
         grasp: Time [s].
 
     Raises:

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import savgol_filter
 
-from pipeline.recording.events import MARGIN, SETTLE, events_of
+from pipeline.params.lab import Tool
+from pipeline.recording.events import MARGIN, SETTLE
 from pipeline.recording.geometry import Geometry
-from pipeline.recording.input.reader import Recording
 from pipeline.recording.motion import Motion
+from pipeline.recording.pulls import Pull
 from pipeline.recording.tare import load_per_mass
 
 LONGEST = 0.1  # s of either sign
@@ -59,27 +60,22 @@ class ToolInertia:
         )
 
 
-def estimate_tool_inertia(
-    recording: Recording, geometry: Geometry, tool: object | None
-) -> ToolInertia | None:
+def estimate_tool_inertia(pull: Pull, tool: Tool | None) -> ToolInertia | None:
     """None where the tool does not show: the sensor knows it already, or the hand hardly moves.
 
     Args:
         tool: setup.tool; only its centre of mass is used, the mass is fitted.
     """
-    origin = recording.origin
-    t, raw = recording.wrench.seconds(origin), recording.wrench.values
-    motion = Motion.of(recording.pose, geometry, origin)
-    grasp, release = events_of(recording, motion)
-    release = release.time
+    t, raw, motion = pull.force_time, pull.recording.wrench.values, pull.motion
+    grasp, release = pull.grasp, pull.release.time
     sure = MARGIN + WINDOW / 2
     inside = (t > max(t[0], motion.time[0]) + sure) & (t < min(t[-1], motion.time[-1]) - sure)
     free = np.flatnonzero(inside & ((t < grasp - sure) | (t > release + SETTLE + sure)))
-    if len(free) * recording.wrench.period < WINDOW:
+    if len(free) * pull.recording.wrench.period < WINDOW:
         return None
     center = np.zeros(3) if tool is None else np.array(tool.center)
     grid = np.arange(motion.time[0], motion.time[-1], STEP)
-    load = load_per_mass(motion, geometry, grid, center)
+    load = load_per_mass(motion, pull.geometry, grid, center)
     width = 2 * round(WINDOW / STEP / 2) + 1
     change = savgol_filter(load, width, 3, deriv=1, delta=STEP, axis=0)
     table = np.hstack([load, change])

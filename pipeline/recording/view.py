@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.params.lab import BandParams, SetupParams
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording
@@ -78,7 +79,7 @@ class Scene:
     signals: Signals
 
     @classmethod
-    def of(cls, band: object, setup: object, signals: Signals) -> Scene:
+    def of(cls, band: BandParams, setup: SetupParams, signals: Signals) -> Scene:
         tips = np.array([[-0.5, 0, 0], [0.5, 0, 0]]) * setup.fork_width
         return cls(tips, -setup.fork_height, band.diameter, band.rest_length, signals)
 

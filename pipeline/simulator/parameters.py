@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.params.identification import LAWS
+from pipeline.params.identification import parameter_names
 
 THETA = (
     "youngs_modulus",
@@ -101,11 +101,6 @@ class Parameters:
         return Parameters(self.law, np.broadcast_to(self.values, (count, len(self.names))))
 
 
-def searched_names(law: str) -> tuple[str, ...]:
-    """What a search looks for: THETA, and what the law adds."""
-    return (*THETA, *LAWS[law])
-
-
 def names_of(law: str) -> tuple[str, ...]:
     """All parameters of a law."""
-    return (*searched_names(law), *EXTRA)
+    return (*parameter_names(law), *EXTRA)

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.params import Params
 
-def trial_numbers(params) -> np.ndarray:
+
+def trial_numbers(params: Params) -> np.ndarray:
     """Numbers of a floor's launches, one row a target: first the trials' own, then others."""
     trials, more = params.trials, params.floor.launches
     shape = len(trials.targets), trials.repeats
@@ -19,7 +21,7 @@ def trial_numbers(params) -> np.ndarray:
     return np.hstack([own, others])
 
 
-def errors_of(draws: np.ndarray, landings: np.ndarray, params) -> dict:
+def errors_of(draws: np.ndarray, landings: np.ndarray, params: Params) -> dict:
     """How far launches land from the targets of the trials.
 
     Args:

@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 
 from pipeline.base.pool import Pool
 from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.params import load
+from pipeline.params.lab import SetupParams
 from rig.oracle.aim import hit
 from rig.physics.launch import Trial, launch
+
+
+@dataclass(frozen=True)
+class ExactLaunches:
+    """Launches without errors, as a landing map wants them.
+
+    Attributes:
+        landing_y: On the whole floor [m], NaN where there is none, shape (N,).
+        hold_force: Of the drawn band on the hand [N], shape (N,).
+        failure: None, or why there is no landing, length N.
+    """
+
+    landing_y: np.ndarray
+    hold_force: np.ndarray
+    failure: list[str | None]
 
 
 class World:
@@ -22,7 +38,9 @@ class World:
     A context, which ends them.
     """
 
-    def __init__(self, band: str, path: str | Path = "params.yaml", workers: int | None = None):
+    def __init__(
+        self, band: str, path: str | Path = "params.yaml", workers: int | None = None
+    ) -> None:
         """Launch `band` of the params.yaml at `path`."""
         self.band = band
         self._pool = Pool(_begin, band, Path(path).resolve(), workers=workers)
@@ -30,7 +48,7 @@ class World:
     def __enter__(self) -> World:
         return self
 
-    def __exit__(self, *error) -> None:
+    def __exit__(self, *error: object) -> None:
         self._pool.shutdown(cancel_futures=True)
 
     def trials(self, draws: np.ndarray, numbers: Sequence[int | None]) -> list[Trial]:
@@ -47,16 +65,16 @@ class World:
         landing = [one.landing_y if one.failure is None else np.nan for one in every]
         return np.reshape(landing, shape)
 
-    def exact(self, draws: np.ndarray) -> SimpleNamespace:
-        """Launches without errors, as a landing map wants them: on the whole floor."""
+    def exact(self, draws: np.ndarray) -> ExactLaunches:
+        """Launches without errors from draws (N, 2) [m]."""
         every = self.trials(draws, [None] * len(draws))
-        return SimpleNamespace(
+        return ExactLaunches(
             landing_y=np.array([one.landing_y for one in every]),
             hold_force=np.array([one.hold_force for one in every]),
             failure=[None if np.isfinite(one.landing_y) else one.failure for one in every],
         )
 
-    def landing_map(self, setup, size: tuple[int, int]) -> LandingMap:
+    def landing_map(self, setup: SetupParams, size: tuple[int, int]) -> LandingMap:
         """Of launches without errors over the box of draws of `setup`."""
         box = {"draw_y": setup.draw_y, "draw_z": setup.draw_z, "max_force": setup.max_force}
         return LandingMap.simulate(self.exact, **box, size=size, checks=0)
@@ -69,7 +87,7 @@ class World:
         return np.array(list(self._pool.map(_hit, targets, starts)))
 
 
-_launch = None  # of the world that this process launches in
+_launch: Callable[[np.ndarray, int | None], Trial]  # in this process's world; `_begin` sets it
 
 
 def _begin(band: str, path: Path) -> None:

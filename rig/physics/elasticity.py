@@ -17,15 +17,18 @@ import numpy as np
 class Law(Protocol):
     """An elastic law."""
 
-    @property
+    @cached_property
     def modulus(self) -> float:
         """Young's modulus, dP/dl at l = 1 [MPa]."""
+        ...
 
     def stress(self, stretch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Nominal stress P [MPa] and its derivative by stretch, shapes as given."""
+        ...
 
     def energy(self, stretch: np.ndarray) -> np.ndarray:
         """Work of the nominal stress from 1 to `stretch` [MJ/m3]."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,7 @@ class Ogden:
 
     def energy(self, stretch: np.ndarray) -> np.ndarray:
         mode = lambda a: (stretch**a - 1) / a + 2 * (stretch ** (-a / 2) - 1) / a  # noqa: E731
-        return sum(m * mode(a) for m, a in self.terms)
+        return sum((m * mode(a) for m, a in self.terms), np.zeros(()))
 
 
 class _OfInvariant:
@@ -199,5 +202,5 @@ def law_of(name: str, constants: tuple[float, ...]) -> Law:
     Those of Ogden's are its terms one after the other.
     """
     if name == "ogden" and constants:
-        constants = (tuple(zip(constants[::2], constants[1::2], strict=True)),)
+        return Ogden(tuple(zip(constants[::2], constants[1::2], strict=True)))
     return LAWS[name](*constants)

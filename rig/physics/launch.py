@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ from scipy.integrate import solve_ivp
 from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK, too_strong
 from pipeline.base.target import TARGET_AREA
 from rig.physics.scene import ROD
-from rig.physics.string import GRAVITY, ElasticString
+from rig.physics.string import GRAVITY, ElasticString, Falling
 from rig.physics.world import bent_at, pulled, string_of
 
 if TYPE_CHECKING:
@@ -44,7 +45,9 @@ class Trial:
     flight: np.ndarray | None = field(default=None, compare=False)
 
 
-def launch(band_name: str, params: Params, draw: tuple[float, float], number: int | None) -> Trial:
+def launch(
+    band_name: str, params: Params, draw: Sequence[float] | np.ndarray, number: int | None
+) -> Trial:
     """Launch from the commanded draw (y, z).
 
     Args:
@@ -134,10 +137,9 @@ def flight(position: np.ndarray, velocity: np.ndarray, floor: float, drag: float
     def height(time: float, state: np.ndarray) -> float:
         return state[1] - floor
 
-    height.terminal, height.direction = True, -1
     state = np.concatenate([position, velocity])
     path = solve_ivp(
-        rates, (0, FLIGHT), state, events=height, rtol=1e-9, atol=1e-9, dense_output=True
+        rates, (0, FLIGHT), state, events=Falling(height), rtol=1e-9, atol=1e-9, dense_output=True
     )
     end = path.t_events[0][0]
     way = path.sol(np.linspace(0, end, POINTS))[:2].T

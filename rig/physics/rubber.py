@@ -201,10 +201,11 @@ class Rubber:
         held, found = [], []
         if self.flow is not None:
             held.append(np.log(stretch))
-            found.append(self._flowed(stretch, step))
+            found.append(self._flowed(self.flow, stretch, step))
         if self.softening is not None:
             energy = self.law.energy(stretch)
-            most = np.maximum.accumulate(np.maximum(energy, self.law.energy(worst)))
+            before = self.law.energy(worst)  # pyright: ignore[reportArgumentType]
+            most = np.maximum.accumulate(np.maximum(energy, before))
             stress = stress * self.softening.kept(energy, most, self.law.modulus)
             held.append(energy)
             found.append(most)
@@ -218,7 +219,7 @@ class Rubber:
         relaxed = np.repeat(stress[:, None], len(self.times), axis=1)
         return np.column_stack([relaxed, *held]), np.column_stack([memory, *found])
 
-    def _flowed(self, stretch: np.ndarray, step: float) -> np.ndarray:
+    def _flowed(self, flow: Flow, stretch: np.ndarray, step: float) -> np.ndarray:
         """e along a history (T,) of equal steps [s]."""
         times = step * np.arange(len(stretch))
         path = PchipInterpolator(times, stretch)
@@ -226,11 +227,12 @@ class Rubber:
         def rate(time: float, strain: np.ndarray) -> np.ndarray:
             elastic = path(time) / np.exp(strain)
             stress = self.law.stress(elastic)[0] * elastic / self.law.modulus
-            return self.flow.speed(stress, strain)
+            return flow.speed(stress, strain)
 
         start, span = [np.log(stretch[0])], (times[0], times[-1])
-        tight = {"max_step": step, "rtol": 1e-7, "atol": 1e-9}
-        return solve_ivp(rate, span, start, "LSODA", times, **tight).y[0]
+        return solve_ivp(rate, span, start, "LSODA", times, max_step=step, rtol=1e-7, atol=1e-9).y[
+            0
+        ]
 
     def frozen(self, ratios: np.ndarray | None) -> tuple[Rubber, np.ndarray]:
         """This rubber while no memory changes, and the ratios of its own memories.

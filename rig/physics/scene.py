@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,7 +55,9 @@ def joined(meshes: list[Mesh]) -> Mesh:
     )
 
 
-def box(size: tuple, center: np.ndarray, color: tuple, axes: np.ndarray | None = None) -> Mesh:
+def box(
+    size: tuple, center: Sequence[float] | np.ndarray, color: tuple, axes: np.ndarray | None = None
+) -> Mesh:
     """A box of edge lengths `size` (3,) along the columns of `axes` (3, 3)."""
     axes = np.eye(3) if axes is None else axes
     vertices = np.asarray(center) + (_CORNERS * size) @ axes.T

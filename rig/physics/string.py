@@ -35,6 +35,18 @@ def still(time: float, x: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.nd
     return np.zeros_like(x)
 
 
+class Falling:
+    """Ends SciPy's integration where a value by time and state falls through zero."""
+
+    terminal, direction = True, -1
+
+    def __init__(self, value: Callable[[float, np.ndarray], float]) -> None:
+        self.value = value
+
+    def __call__(self, time: float, state: np.ndarray) -> float:
+        return self.value(time, state)
+
+
 TURN = 1.0  # diameters, in which clamps and hand turn the band
 GRADING = 0.75  # edges are 1 - GRADING to 1 + GRADING of their mean
 
@@ -225,16 +237,14 @@ class ElasticString:
             found[outside] = 0.0
             return found / NUDGE
 
-        if event is not None:
-            stop = lambda t, flat: event(t, flat.reshape(shape))  # noqa: E731
-            stop.terminal, stop.direction = True, -1
+        stop = None if event is None else Falling(lambda t, flat: event(t, flat.reshape(shape)))
         solution = solve_ivp(
             rates,
             (times[0], times[-1]),
             y.ravel(),
             method="LSODA",
             t_eval=times,
-            events=stop if event is not None else None,
+            events=stop,
             jac=jacobian,
             lband=reach,
             uband=reach,

@@ -23,8 +23,8 @@ def string_of(params: Params, band_name: str) -> ElasticString:
     """The band, its modulus such that the recorded pull peaks at `rig.bands.<band>.peak_force`."""
     rig, setup = params.rig, params.setup
     return _string_of(
-        params.bands[band_name],
-        rig.bands[band_name],
+        params.bands[band_name],  # pyright: ignore[reportArgumentType]
+        rig.bands[band_name],  # pyright: ignore[reportArgumentType]
         setup.fork_width,
         setup.clamp_direction,
         rig.edges,
@@ -97,7 +97,7 @@ def pulled(
     """
     path = np.multiply.outer(pull_history(HISTORY_STEP, *times), drawn)
     stretch = straight(string, path)
-    worst = straight(string, np.array([0.0, -PULL_LENGTH, 0.0])) if again else 1.0
+    worst = float(straight(string, np.array([0.0, -PULL_LENGTH, 0.0]))) if again else 1.0
     return path, stretch, *string.rubber.history(stretch, HISTORY_STEP, worst)
 
 

@@ -57,7 +57,9 @@ class VirtualCamera:
     size: tuple[int, int] = (WIDTH, HEIGHT)
 
     @classmethod
-    def looking(cls, position: np.ndarray, target: np.ndarray, focal: float, scale: float = 1.0):
+    def looking(
+        cls, position: np.ndarray, target: np.ndarray, focal: float, scale: float = 1.0
+    ) -> VirtualCamera:
         """A level camera that looks at `target`; `scale` shrinks its pictures."""
         ahead = (target - position) / np.linalg.norm(target - position)
         right = np.cross(ahead, [0.0, 0.0, 1.0])
@@ -95,10 +97,11 @@ class VirtualCamera:
         import open3d as o3d
 
         scene = o3d.t.geometry.RaycastingScene()
-        scene.add_triangles(mesh.vertices.astype(np.float32), mesh.triangles.astype(np.uint32))
+        corners, triangles = mesh.vertices.astype(np.float32), mesh.triangles.astype(np.uint32)
+        scene.add_triangles(corners, triangles)  # pyright: ignore[reportArgumentType]
         window = self.window(mesh.vertices)
         rays = np.ascontiguousarray(self.rays[window])
-        hits = scene.cast_rays(o3d.core.Tensor(rays))
+        hits = scene.cast_rays(o3d.core.Tensor(rays))  # pyright: ignore[reportCallIssue]
         reached = hits["t_hit"].numpy()
         seen = np.isfinite(reached)
         normals = hits["primitive_normals"].numpy()[seen]

@@ -76,7 +76,8 @@ def record(
     add_frames(bag, robot, camera.misplaced(rig.camera, camera_rng))
     clocks = clock_rng.spawn(4)
     add_gripper(bag, Clock(rig.clock, clocks[0]), motion)
-    late = interp1d(times, happened.hand, axis=0, fill_value="extrapolate")
+    extrapolated: Any = "extrapolate"  # which SciPy's default, NaN, hides from a type checker
+    late = interp1d(times, happened.hand, axis=0, fill_value=extrapolated)
     add_pose(bag, Clock(rig.clock, clocks[1]), robot, times, late(times - rig.pose_latency))
     measured = wrench(happened, robot, rig.wrench, sensor_rng)
     add_wrench(bag, Clock(rig.clock, clocks[2]), times, measured)
@@ -88,7 +89,7 @@ def record(
         if i % REPORT_EVERY == 0:
             progress(f"picture {i} of {len(frames)}")
         lines = happened.lines[np.searchsorted(seen, time + shutter)]
-        others = arm(robot, hand(time), float(motion.finger(time)))
+        others = arm(robot, hand(time), float(motion.finger(np.array(time))))
         instants = [
             camera.see(joined([tube(line, radius(string, line), color), others]))
             for line in instants_of(lines, camera)
@@ -152,10 +153,11 @@ def add_frames(bag: BagWriter, robot: Robot, believed: VirtualCamera) -> None:
         return bag.make("geometry_msgs/TransformStamped", bag.header(EPOCH, parent), child, pose)
 
     camera = robot.in_base(believed.position), robot.base.inv() * believed.rotation
+    lever = np.array([0, 0, -SENSOR_LEVER])
     frames = [
         transform("fork", "panda_link0", robot.base_position, robot.base),
         transform("panda_link0", OPTICAL, *camera),
-        transform("panda_hand_tcp", "ft_sensor", [0, 0, -SENSOR_LEVER], robot.sensor_in_tool),
+        transform("panda_hand_tcp", "ft_sensor", lever, robot.sensor_in_tool),
     ]
     bag.add("/tf_static", bag.make("tf2_msgs/TFMessage", frames), EPOCH, EPOCH)
 
@@ -164,7 +166,8 @@ def add_gripper(bag: BagWriter, clock: Clock, motion: HandMotion) -> None:
     for i in range(round(END * GRIPPER_RATE)):
         time = i / GRIPPER_RATE
         stamp, received = clock(time)
-        state = np.full(2, motion.finger(time)), np.zeros(2), np.zeros(2)  # velocity, effort
+        fingers, velocity, effort = motion.finger(np.array(time)), np.zeros(2), np.zeros(2)
+        state = np.full(2, fingers), velocity, effort
         message = bag.make("sensor_msgs/JointState", bag.header(stamp, ""), FINGERS, *state)
         bag.add("/franka_gripper/joint_states", message, stamp, received)
 

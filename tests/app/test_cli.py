@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from app import __version__, bench, cli
+from app import __version__, cli
 from app.command_line import COMMANDS, EXITS
 from pipeline.simulator.parameters import THETA
 from tests.policy.linear import write_policy
 from tests.project import ROOT, python
+from validation.benchmarks import bench
 
 SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 
@@ -211,7 +212,7 @@ def test_aim_prints_one_json_object(tmp_path: Path) -> None:
     shown = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
     assert shown["tcp_position_m"] == "0.5 -0.329 0.25"
     assert shown["max_force_n"] == "30" and "warnings" not in shown
-    for warning in ("does not tell how well", "data/mounting/band1.json is missing"):
+    for warning in ("does not tell how well", "data/clamps/band1.json is missing"):
         assert warning in done.stderr
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from app.export.export import replaceable
 from app.launch import launched
 from app.observe import known
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
+from pipeline.export.export import replaceable
 from pipeline.params import load
 from tests.edited import edits
 from tests.report.card.conftest import POINT, THETA, confidence, samples
@@ -33,7 +33,7 @@ def layout(tmp_path: Path) -> Layout:
     for path, content in (
         (layout.theta(BAND, METHOD), theta),
         (layout.confidence(BAND, METHOD), {"names": [*POINT], "samples": samples()[:3].tolist()}),
-        (layout.mounting(BAND), {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}),
+        (layout.clamps(BAND), {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}),
     ):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(content))
@@ -59,7 +59,7 @@ def answers(path: Path, ask: Callable[[], dict]) -> int:
 @pytest.mark.parametrize("name", ["theta", "mounting"])
 def test_launch(params, layout, name) -> None:
     theta = layout.theta(BAND, METHOD)
-    path = theta if name == "theta" else layout.mounting(BAND)
+    path = theta if name == "theta" else layout.clamps(BAND)
     assert answers(path, lambda: launched(params, BAND, theta, DRAW, layout.root)) > 0
 
 

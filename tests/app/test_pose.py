@@ -1,6 +1,7 @@
 """The hand's pose for a draw: by hand, by matrices, as the plan has it, as a robot reported it."""
 
 import csv
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +13,13 @@ from scipy.spatial.transform import Rotation
 
 from app.plan.plan import plan_recording
 from app.pose import posed
+from pipeline.base.layout import Layout
+from pipeline.episode.episode import Episode
 from pipeline.params import load
+from pipeline.recording.geometry import KeptGeometry, geometry_of
+from pipeline.recording.input.reader import read_recording
 from tests.project import ROOT, with_
-from tests.recording.bag import write_bag
+from validation.recordings.bag import write_bag
 
 pytestmark = pytest.mark.usefixtures("nowhere")
 
@@ -91,11 +96,25 @@ COLUMNS = "x y z", "qx qy qz qw"
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """(root, truth) of a project with a recording of band1 whose /tf_static joins base and fork."""
+    """(root, truth) of a project with a recording of band1 whose /tf_static joins base and fork.
+
+    Its episode holds no more than the geometry.
+    """
     root = tmp_path_factory.mktemp("project")
     (root / "data/raw/band1").mkdir(parents=True)
     path = root / RECORDING
-    return root, write_bag(path, cameras=False, rate=200, pose_rate=100)
+    truth = write_bag(path, cameras=False, rate=200, pose_rate=100)
+    recording = read_recording(path, PARAMS.setup)
+    kept = KeptGeometry.of(recording, geometry_of(recording, PARAMS.setup))
+    keep(root, {"geometry": kept.content()})
+    return root, truth
+
+
+def keep(root: Path, metadata: dict) -> None:
+    """An episode of band1 that holds no more than this."""
+    two, vectors = np.arange(2.0), np.zeros((2, 3))
+    signals = (two, vectors, vectors, vectors, two, two, [vectors, vectors])
+    Episode("band1", *signals, 0.2, 0.8, np.zeros(3), metadata).save(Layout(root).episode("band1"))
 
 
 def test_the_recorded_draw_is_the_pose_that_the_robot_reported(recorded) -> None:
@@ -120,12 +139,11 @@ def test_the_recorded_draw_is_the_pose_that_the_robot_reported(recorded) -> None
     assert pose["warnings"] == ["as before"]
 
 
-def test_setup_comes_before_tf_static_and_the_recording_names_the_base(recorded, tmp_path) -> None:
-    """As where a recording becomes an episode; without one that can be read, plan.frame does."""
+def test_setup_comes_before_tf_static_and_the_episode_names_the_base(recorded, tmp_path) -> None:
+    """As where a recording becomes an episode; without one that has a name, plan.frame does."""
     params = with_(standing(FORK_IN_BASE), "plan", frame="arm")
-    (tmp_path / RECORDING).parent.mkdir(parents=True)
     poses = [at(-0.3, -0.3, params, root) for root in (recorded[0], tmp_path)]
-    (tmp_path / RECORDING).write_bytes(b"no recording")
+    keep(tmp_path, {})
     poses.append(at(-0.3, -0.3, params, tmp_path))
     assert [pose["tcp_frame"] for pose in poses] == ["base", "arm", "arm"]
     for pose in poses:
@@ -139,9 +157,8 @@ def test_a_base_that_is_not_known_is_one_warning(tmp_path) -> None:
     assert pose["pitch_rad"] == pytest.approx(np.pi / 4)
     before, warning = pose["warnings"][0], pose["warnings"][1].what
     assert before == "as before" and "setup.base_to_fork is null" in warning
-    (tmp_path / RECORDING).parent.mkdir(parents=True)
-    (tmp_path / RECORDING).write_bytes(b"no recording")
-    damaged = at(-0.3, -0.3, standing(None), tmp_path)
-    assert damaged["tcp_position_m"] is None
-    said = damaged["warnings"][1].what
-    assert "band1.mcap" in said and "\n" not in said
+    keep(tmp_path, {})
+    old = at(-0.3, -0.3, standing(None), tmp_path)
+    assert old["tcp_position_m"] is None
+    said = old["warnings"][1].what
+    assert "older version" in said and "\n" not in said

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from app import safety
-from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
+from pipeline.params import load
+from pipeline.params.provenance import evidence_settings_of, policy_settings_of, settings_of
 from pipeline.simulator.parameters import THETA
 from tests.project import ROOT
 
@@ -43,21 +44,13 @@ def edit(root, old: str, new: str) -> None:
     path.write_text(path.read_text().replace(old, new))
 
 
-def lock(root, **stages: dict) -> None:
-    """A dvc.lock of stages with `params`, `deps` and `outs`."""
-    whole = {}
-    for name, one in stages.items():
-        paths = {key: [{"path": path} for path in one.get(key, ())] for key in ("deps", "outs")}
-        whole[name] = {**paths, "params": {"params.yaml": one["params"]}}
-    (root / "dvc.lock").write_text(json.dumps({"stages": whole}))
-
-
 def card(root, **content) -> None:
     errors = {"draws": 1, "mean_error_m": 0.0, "max_error_m": 0.0}
     whole = {
         "theta": VALUES,
         "training": {"converged": True, "mean_error_m": 0.0, "max_error_m": 0.0},
         "landing_map": {"box": errors, "target_range": errors},
+        "made_with": {},
         **content,
     }
     path = Layout(root).policy("band1", "least_squares") / "card.json"
@@ -111,78 +104,57 @@ def test_a_posterior_that_has_not_settled_or_is_not_there(tmp_path) -> None:
         assert found.about == "confidence" and "does not tell how well" in found.what
 
 
+def identified(params, **then) -> dict:
+    """Content of a θ file that was made with other settings than today's: `then`, by key."""
+    return CONTENT | {"made_with": settings_of(params, "band1", "least_squares") | then}
+
+
+def trained(params, **then) -> dict:
+    """The same of what a policy was trained with."""
+    return policy_settings_of(params, "band1") | then
+
+
 def test_params_that_changed_since_training_by_key_values_and_cure(params, project) -> None:
-    """Of the policy's stage, and of the one that made the θ which it reads."""
-    card(project)
-    lock(
-        project,
-        **{
-            "theta@band1-least_squares": {
-                "params": {"loss": {"chamfer": "symmetric", "median_window": 9}},
-                "outs": ["data/theta/band1/least_squares.json"],
-            },
-            "theta@band2-least_squares": {"params": {"launch": {"pause": 3.0}}, "outs": ["x"]},
-            STAGE: {
-                "params": {"setup.max_force": 30.0, "setup.draw_y": [-0.45, -0.25]},
-                "deps": ["data/theta/band1/least_squares.json"],
-            },
-        },
-    )
-    told = [hazard.what for hazard in of_policy(params, project)]
+    """Of the policy's own settings, and of those of the θ that it was trained with."""
+    then = identified(params, **{"loss.median_window": 9})
+    del then["made_with"]["loss.held_out.length"]
+    card(project, made_with=trained(params))
+    told = [hazard.what for hazard in of_policy(params, project, then)]
     cure = f"since the policy was trained: `dvc repro {STAGE}` mends it"
-    held_out = "{'blocks': 0, 'length': 0.6}"
-    assert told[0] == f"params.yaml: loss.held_out was not there, is {held_out}, {cure}"
+    assert told[0] == f"params.yaml: loss.held_out.length was not there, is 0.6, {cure}"
     assert told[1] == f"params.yaml: loss.median_window was 9, is 7, {cure}"
     assert len(told) == 2
     edit(project, "max_force: 30.0", "max_force: 25.0")
-    last = of_policy(params, project)[-1]
+    last = of_policy(load(project / "params.yaml"), project, then)[-1]
     assert last.what == f"params.yaml: setup.max_force was 30.0, is 25.0, {cure}"
 
 
-def test_a_stage_that_ran_anew_hides_no_change_of_one_that_did_not(params, project) -> None:
+def test_a_theta_identified_anew_hides_no_change_of_the_policys(params, project) -> None:
     """θ was identified with today's mass, the policy trained before."""
-    card(project)
-    new = params.bands["band1"].model_dump()
-    theta, made = "theta@band1-least_squares", ["data/theta/band1/least_squares.json"]
-    ran = {theta: {"params": {"bands.band1": new}, "outs": made}}
-    ran[STAGE] = {"params": {"bands.band1": new | {"mass": 0.05}}, "deps": made}
-    lock(project, **ran)
-    (found,) = of_policy(params, project)
+    card(project, made_with=trained(params, **{"bands.band1.mass": 0.05}))
+    (found,) = of_policy(params, project, identified(params))
     assert "bands.band1.mass was 0.05, is 0.023" in found.what
 
 
 def test_many_changes_are_three_and_the_names_of_the_others(params, project) -> None:
-    card(project)
     values = {f"setup.{name}": 1e-3 for name in ("max_force", "fork_width", "fork_height")}
-    lock(project, **{STAGE: {"params": values | {"policy.seed": 7, "trials.seed": 8}}})
+    card(project, made_with=trained(params, **values, **{"policy.seed": 7, "sling.mesh": "net"}))
     told = of_policy(params, project)
     assert abouts(told) == ["params"] * 4 and "policy.seed was 7, is 1" in told[0].what
-    assert told[3].what.endswith("also in setup.max_force, trials.seed")
+    assert told[3].what.endswith("also in setup.max_force, sling.mesh")
 
 
-def test_without_dvc_lock_the_card_tells(params, project) -> None:
-    card(
-        project,
-        input={"trained_range": [1.425, 2.425]},
-        max_force_n=28.0,
-        setup={"band_mass_kg": 0.023, "fork_width_m": 0.275, "arm_stiffness_n_m": 12000.0},
-    )
+def test_a_card_that_does_not_tell(params, project) -> None:
+    card(project, made_with=None)
     (found,) = of_policy(params, project)
-    assert "setup.max_force was 28.0, is 30.0, since the policy was trained" in found.what
-
-
-def test_a_damaged_lock_is_one_line(params, project) -> None:
-    (project / "dvc.lock").write_text("stages: {")
-    with pytest.raises(UserError, match="dvc.lock: damaged; `git checkout dvc.lock`"):
-        of_policy(params, project)
-    (project / "dvc.lock").write_text("- no mapping")
-    card(project)
-    assert not of_policy(params, project)
+    assert (
+        found.what
+        == f"nothing tells what the policy was trained with: `dvc repro {STAGE}` mends it"
+    )
 
 
 def test_a_policy_of_another_theta(params, project) -> None:
     card(project)
-    lock(project, **{STAGE: {"params": {"setup.max_force": 30.0}}})
     assert not of_policy(params, project)
     other = CONTENT | {"theta": VALUES | {"youngs_modulus": 5e5}}
     (found,) = of_policy(params, project, other)
@@ -195,20 +167,31 @@ def test_a_policy_without_a_card(params, project) -> None:
 
 
 def test_theta_of_a_run_and_by_hand(params, project) -> None:
-    band = params.bands["band1"].model_dump() | {"mass": 0.05}
-    lock(project, **{"theta@band1-least_squares": {"params": {"bands.band1": band}}})
-    path = Layout(project).theta("band1", "least_squares")
-    told = [hazard.what for hazard in safety.of_identification(params, CONTENT, path, project)]
+    content = identified(params, **{"bands.band1.mass": 0.05})
+    path, cure = Layout(project).theta("band1", "least_squares"), "theta@band1-least_squares"
+    told = [hazard.what for hazard in safety.of_identification(params, content, path)]
     assert told == [
         "params.yaml: bands.band1.mass was 0.05, is 0.023, since θ was identified:"
-        " `dvc repro theta@band1-least_squares` mends it"
+        f" `dvc repro {cure}` mends it"
     ]
-    by_hand = safety.of_identification(params, CONTENT, project / "mine.json", project)
-    assert not list(by_hand)
+    assert not list(safety.of_identification(params, content, project / "mine.json"))
+    assert not list(safety.of_identification(params, identified(params), path))
+    (found,) = safety.of_identification(params, CONTENT, path)
+    assert found.what.startswith("nothing tells with which params.yaml θ was identified")
+
+
+def test_launches_as_evidence_are_settings_too(params, project) -> None:
+    seen = {"settled": True, "steps": 7, "launches": [{}]}
+    then = settings_of(params, "band1", "least_squares") | evidence_settings_of(params)
+    content = CONTENT | {"confidence": seen, "made_with": then | {"setup.projectile_mass": 0.05}}
+    path = Layout(project).theta("band1", "least_squares")
+    (found,) = safety.of_identification(params, content, path)
+    assert "setup.projectile_mass was 0.05, is 0.039" in found.what
 
 
 def test_a_method_that_runs_no_more_is_mended_by_naming_it(params, project) -> None:
-    card(project, max_force_n=28.0)
-    run = SimpleNamespace(bands=[], methods=[], ablations=SimpleNamespace(bands=[], methods=[]))
-    (found,) = of_policy(SimpleNamespace(run=run), project)
+    card(project, made_with=trained(params, **{"setup.max_force": 28.0}))
+    run = params.run.model_copy(update={"bands": [], "methods": []})
+    run = run.model_copy(update={"ablations": SimpleNamespace(bands=[], methods=[])})
+    (found,) = of_policy(params.model_copy(update={"run": run}), project)
     assert "`run:` in params.yaml has to name" in found.what

@@ -9,8 +9,8 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.base.pool import Pool
-from tests.app.flow.killing import Run
-from tests.project import python, wait
+from tests.project import python
+from validation.projects import MarkedRun, wait
 
 CODE = """\
 import os, sys, time
@@ -38,7 +38,7 @@ def test_workers_end_with_their_pool(tmp_path: Path, number: int, status: int) -
     folder = tmp_path / "run"
     folder.mkdir()
     (folder / "busy.py").write_text(CODE)
-    run = Run(folder)
+    run = MarkedRun(folder)
     process = run.start(sys.executable, "busy.py")
     assert wait(lambda: len(list(folder.glob("worker-*"))) >= 2, 30), run.said
     if number == signal.SIGINT:

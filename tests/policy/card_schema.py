@@ -68,6 +68,7 @@ SCHEMA = {
         input=port("target", 1, trained_range=PAIR),
         output=port("draw", 2, axes={"const": ["y", "z"]}, frame=TEXT, low=PAIR, high=PAIR),
         max_force_n=POSITIVE,
+        made_with={"type": "object", "propertyNames": {"pattern": r"^[a-z]+\.\w+"}},
         setup=exactly(**dict.fromkeys(SETUP.split(), POSITIVE), arm_stiffness_n_m=ARM),
         training=exactly(**TRAINING),
         landing_map=exactly(box=READ_BETWEEN, target_range=READ_BETWEEN),

@@ -11,7 +11,7 @@ from pipeline.params import Params, load
 from pipeline.recording.build import process
 from pipeline.recording.masks.ridge import RidgeMask
 from tests import once
-from tests.recording.bag import Truth, write_bag
+from validation.recordings.bag import Truth, write_bag
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.input.frames import Transform
 from pipeline.recording.input.reader import Stream
-from tests.recording.bag import BASE, HAND, SENSOR, START, Truth
+from validation.recordings.bag import BASE, HAND, SENSOR, START, Truth
 
 GRAVITY = np.array([0, 0, -9.81])
 LEVER = np.array([0.0, 0.0, -0.1])  # from the tool centre point to the sensor, in the hand's frame

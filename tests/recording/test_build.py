@@ -9,11 +9,11 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
-from pipeline.recording.build import build_episodes, episode_of, process, process_recording
-from pipeline.recording.geometry import geometry_of
+from pipeline.recording.build import build_episodes, episode_of, process, process_pull
 from pipeline.recording.input.reader import read_recording
+from pipeline.recording.pulls import Pull
 from pipeline.recording.signals import signals_of
-from tests.recording.bag import EYE, Truth, blind_bag, edit, scores
+from validation.recordings.bag import EYE, Truth, blind_bag, edit, scores
 
 
 @pytest.fixture(scope="module")
@@ -22,9 +22,7 @@ def episode(seen, params) -> Episode:
 
 
 def signals(path, params):
-    recording = read_recording(path, params.setup)
-    geometry = geometry_of(recording, params.setup)
-    return signals_of(recording, geometry, params)
+    return signals_of(Pull.of(read_recording(path, params.setup), params.setup), params)
 
 
 def test_force_and_motion(episode, seen) -> None:
@@ -108,7 +106,7 @@ def test_an_unknown_mask_is_refused_by_name(seen, params) -> None:
 
 def test_a_late_camera_is_put_right_and_it_is_said(episode, seen, params) -> None:
     recording = read_recording(seen[0], params.setup).shifted(camera=-0.015)
-    done = process_recording(recording, params.bands["band1"], params)
+    done = process_pull(Pull.of(recording, params.setup), params.bands["band1"], params)
     late = episode_of(done, "band1", params).metadata["preprocessing"]["delays"]
     assert late["camera"]["applied"] and late["camera"]["source"] == "estimated"
     assert late["camera"]["value"] == pytest.approx(0.015, abs=1e-3)

@@ -12,9 +12,9 @@ from pipeline.base.errors import UserError
 from pipeline.params import load
 from pipeline.recording import cloud
 from pipeline.recording.masks import masker
-from tests.recording import looks
-from tests.recording.looks import BAND, LOOKS
 from validation.benchmarks import clouds as bench
+from validation.recordings import looks
+from validation.recordings.looks import BAND, LOOKS
 
 SETTINGS = load("params.yaml").cloud
 

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from pipeline.recording.camera_delay import camera_delay
-from pipeline.recording.delays import Estimate, delays_of
+from pipeline.recording.delays import Estimate, correct_delays
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.reader import read_recording
+from pipeline.recording.pulls import Pull
 from pipeline.recording.tool_inertia import estimate_tool_inertia
-from tests.recording.bag import Truth
 from tests.recording.played import Played
+from validation.recordings.bag import Truth
 
 SLOW = Truth(grasp=0.9, lifted=1.4, drawn=2.8, release=3.4, end=4.6)
 INJECTED = (-0.02, 0.0, 0.005, 0.015)  # s
@@ -49,7 +50,7 @@ def test_the_poses_delay_is_found_by_the_tools_inertia(heavy, noise) -> None:
         shaken = np.random.default_rng(seed).normal(0, noise, wrench.values.shape)
         one = replaced(recording, wrench=replace(wrench, values=wrench.values + shaken))
         seconds = INJECTED[seed % 4]
-        found = estimate_tool_inertia(late(one, "pose", seconds), geometry, None)
+        found = estimate_tool_inertia(Pull(late(one, "pose", seconds), geometry), None)
         off.append(found.delay - seconds)
         errors.append(found.delay_error)
         assert found.mass == pytest.approx(0.7, abs=5 * found.mass_error)
@@ -68,7 +69,7 @@ def test_a_slow_pose_that_loses_messages_makes_no_delay_up(heavy, share) -> None
         keep = keep[random.random(len(keep)) >= share]
         fewer = replace(pose, stamp=pose.stamp[keep], values=pose.values[keep])
         one = replaced(recording, pose=fewer)
-        found = estimate_tool_inertia(late(one, "pose", INJECTED[seed % 4]), geometry, None)
+        found = estimate_tool_inertia(Pull(late(one, "pose", INJECTED[seed % 4]), geometry), None)
         if found is None:
             continue
         off = found.delay - INJECTED[seed % 4]
@@ -79,7 +80,7 @@ def test_a_force_that_does_not_feel_the_tool_says_nothing_of_the_pose() -> None:
     played = Played(mass=0.0, truth=SLOW)
     for seconds in INJECTED:
         recording = late(played.recording(), "pose", seconds)
-        assert estimate_tool_inertia(recording, played.geometry(), None) is None
+        assert estimate_tool_inertia(Pull(recording, played.geometry()), None) is None
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +92,7 @@ def looked_at(seen, params):
 @pytest.mark.parametrize("seconds", INJECTED)
 def test_the_cameras_delay_is_found_by_the_hand_in_its_pictures(looked_at, seconds) -> None:
     recording, geometry = looked_at
-    value, error = camera_delay(late(recording, "depth", seconds), geometry)
+    value, error = camera_delay(Pull(late(recording, "depth", seconds), geometry))
     assert error < 0.002
     assert abs(value - seconds) <= 0.001
 
@@ -104,25 +105,26 @@ def test_wrong_extrinsics_are_no_delay(looked_at) -> None:
 
     recording, geometry = looked_at
     off = Transform(Rotation.from_rotvec([0.006, -0.004, 0.005]), np.array([0.002, 0.002, -0.001]))
-    value, _ = camera_delay(recording, replace(geometry, camera=off @ geometry.camera))
+    value, _ = camera_delay(Pull(recording, replace(geometry, camera=off @ geometry.camera)))
     assert abs(value) <= 0.0015
 
 
 def test_black_pictures_say_nothing(blind, params) -> None:
     recording = read_recording(blind[0], params.setup)
-    assert camera_delay(recording, geometry_of(recording, params.setup)) is None
+    assert camera_delay(Pull.of(recording, params.setup)) is None
 
 
 def test_what_is_applied(looked_at, params) -> None:
     recording, geometry = looked_at
-    found = delays_of(recording, geometry, params)
+    pull = Pull(recording, geometry)
+    right, found = correct_delays(pull, params)
     assert found.pose == Estimate(0.0, None, "not seen", False)
     assert found.camera.source == "estimated" and not found.camera.applied
-    assert found.corrected(recording) is recording
+    assert right is pull
 
-    found = delays_of(late(recording, "depth", 0.015), geometry, params)
+    right, found = correct_delays(Pull(late(recording, "depth", 0.015), geometry), params)
     assert found.camera.applied and found.camera.value == pytest.approx(0.015, abs=0.001)
-    right = found.corrected(late(recording, "depth", 0.015))
+    right = right.recording
     np.testing.assert_allclose((right.depth.stamp - recording.depth.stamp) * 1e-9, 0, atol=1e-3)
 
 
@@ -131,9 +133,9 @@ def test_given_delays_are_used_as_they_are(looked_at, params) -> None:
     delays = params.episode.delays.model_copy(update={"pose": -0.004, "camera": 0.0})
     episode = params.episode.model_copy(update={"delays": delays})
     given = params.model_copy(update={"episode": episode})
-    found = delays_of(recording, geometry, given)
+    right, found = correct_delays(Pull(recording, geometry), given)
     assert found.pose == Estimate(-0.004, 0.0, "setup", True)
     assert found.camera == Estimate(0.0, 0.0, "setup", False)
-    moved = found.corrected(recording)
+    moved = right.recording
     assert np.all(moved.pose.stamp - recording.pose.stamp == 4_000_000)
     assert np.all(moved.depth.stamp == recording.depth.stamp)

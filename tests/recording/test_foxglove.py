@@ -14,7 +14,7 @@ from pipeline.episode.episode import Episode
 from pipeline.recording.build import build_episodes
 from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording, read_recording
-from tests.recording.foxglove_bag import translate
+from validation.recordings.foxglove_bag import translate
 
 
 @pytest.fixture(scope="module")

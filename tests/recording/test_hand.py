@@ -11,6 +11,7 @@ from mcap.records import Schema
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.container import Channel, read_container
 from pipeline.recording.input.reader import Recording, read_recording, recording_of
+from pipeline.recording.pulls import Pull
 from pipeline.recording.signals import signals_of
 
 
@@ -20,8 +21,7 @@ def usual(blind, params) -> Recording:
 
 
 def signals(recording: Recording, params):
-    geometry = geometry_of(recording, params.setup)
-    return signals_of(recording, geometry, params)
+    return signals_of(Pull.of(recording, params.setup), params)
 
 
 def test_a_twist_alone(blind, params, usual) -> None:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
+from pipeline.recording import pulls
 from pipeline.recording.build import build_episodes, process_pulls
-from pipeline.recording.events import releases_of
+from pipeline.recording.input import reader
 from pipeline.recording.input.reader import read_recording
-from pipeline.recording.pulls import pulls_of
-from tests.recording.bag import START, Truth, blind_bag, edit
+from pipeline.recording.motion import Motion
+from pipeline.recording.pulls import Pull, pulls_of
 from tests.recording.conftest import written
 from tests.recording.joined import joined
+from validation.recordings.bag import START, Truth, blind_bag, edit
 
 DEEP, SHALLOW = Truth(), Truth(draw=0.26, release=3.1507)
 
@@ -61,25 +64,26 @@ def test_each_pull_is_as_its_truth_and_as_in_a_file_of_its_own(
 
 def test_a_shallow_pull_beside_a_deep_one_is_no_slip(both, params) -> None:
     """The fingers open, and the hand is free. Between the two it serves both."""
-    recording = read_recording(both[0], params.setup)
-    found = releases_of(recording)
+    whole = Pull.of(read_recording(both[0], params.setup), params.setup)
+    recording, found = whole.recording, whole.releases
     wanted = [DEEP.release, SHALLOW.release + both[1][1]]
     np.testing.assert_allclose(found, wanted, atol=0.01)
-    pulls = pulls_of(recording, params.setup)
-    assert [(one.pull, one.pulls) for one in pulls] == [(1, 2), (2, 2)]
-    assert {one.origin for one in pulls} == {recording.origin}
-    first, second = ([one.wrench.seconds(one.origin)[k] for k in (0, -1)] for one in pulls)
+    found = pulls_of(whole)
+    assert [(one.number, one.count) for one in found] == [(1, 2), (2, 2)]
+    assert {one.recording.origin for one in found} == {recording.origin}
+    first, second = ([one.force_time[k] for k in (0, -1)] for one in found)
     assert first[0] == 0 and second[1] == recording.wrench.seconds(recording.origin)[-1]
     assert DEEP.release < second[0] < first[1] < both[1][1] + SHALLOW.grasp  # they share it
 
 
 def test_what_holds_one_pull_or_is_not_understood_stays_whole(blind, params) -> None:
     recording = read_recording(blind[0], params.setup)
-    assert pulls_of(recording, params.setup) == [recording]
+    whole = Pull.of(recording, params.setup)
+    assert pulls_of(whole) == [whole]
     assert recording.origin == recording.wrench.stamp[0]
     still = replace(recording.wrench, values=0 * recording.wrench.values)
-    still = replace(recording, wrench=still)
-    assert releases_of(still) == [] and pulls_of(still, params.setup) == [still]
+    still = Pull.of(replace(recording, wrench=still), params.setup)
+    assert still.releases == [] and pulls_of(still) == [still]
 
 
 def test_a_pull_that_cannot_be_used_is_named_and_the_others_are_used(
@@ -89,7 +93,7 @@ def test_a_pull_that_cannot_be_used_is_named_and_the_others_are_used(
     path = tmp_path / "half.mcap"
     joined(path, [seen[0], blind_bag(tmp_path, SHALLOW)])
     found, refused = process_pulls(path, params.bands["band1"], params)
-    assert [done.recording.pull for done in found] == [1]
+    assert [done.pull.number for done in found] == [1]
     (line,) = map(str, refused)
     assert line.startswith(f"{path}: pull 2 of 2: ") and "empty mask" in line and "\n" not in line
 
@@ -107,12 +111,12 @@ def test_a_band_that_slips_out_between_two_pulls_is_a_pull_that_cannot_be_used(
     closed = blind_bag(tmp_path, change=edit(gripper=stay))
     joined(path, [seen[0], closed, seen[0]])
     found, refused = process_pulls(path, params.bands["band1"], params)
-    assert [done.recording.pull for done in found] == [1, 3]
+    assert [done.pull.number for done in found] == [1, 3]
     assert "pull 2 of 3: the force drops at" in str(refused[0])
     assert "gripper stays closed" in str(refused[0])
     alone = process_pulls(seen[0], params.bands["band1"], params)[0][0].signals
     for done in found:
-        np.testing.assert_allclose(done.signals.facts["bias"], alone.facts["bias"], atol=0.02)
+        np.testing.assert_allclose(done.signals.facts.bias, alone.facts.bias, atol=0.02)
 
 
 def test_a_force_that_fails_for_a_while_does_not_end_a_pull(seen, params) -> None:
@@ -122,7 +126,7 @@ def test_a_force_that_fails_for_a_while_does_not_end_a_pull(seen, params) -> Non
     force = recording.wrench.values.copy()
     force[(time > 2.4) & (time < 2.75)] = force[0]
     failed = replace(recording, wrench=replace(recording.wrench, values=force))
-    assert releases_of(failed) == pytest.approx([DEEP.release], abs=0.05)
+    assert Pull.of(failed, params.setup).releases == pytest.approx([DEEP.release], abs=0.05)
 
 
 def test_where_none_can_be_used_the_first_says_why(blind, tmp_path, params) -> None:
@@ -130,3 +134,48 @@ def test_where_none_can_be_used_the_first_says_why(blind, tmp_path, params) -> N
     joined(path, [blind[0], blind[0]])
     with pytest.raises(UserError, match=r"black.mcap: pull 1 of 2: .*empty mask"):
         process_pulls(path, params.bands["band1"], params)
+
+
+@pytest.mark.parametrize("delay", [None, 0.004])
+def test_one_recording_is_read_and_understood_once(seen, params, monkeypatch, delay) -> None:
+    """One motion for the stamps as recorded, one more where the pose's are corrected."""
+    calls: Counter[str] = Counter()
+
+    def count(module, name: str) -> None:
+        real = getattr(module, name)
+
+        def counted(*given, **named):
+            calls[name] += 1
+            return real(*given, **named)
+
+        monkeypatch.setattr(module, name, counted)
+
+    count(reader, "read_container")
+    count(pulls, "geometry_of")
+    count(Motion, "of")
+    for name in ("find_releases", "find_release", "find_grasp"):
+        count(pulls, name)
+    delays = params.episode.delays.model_copy(update={"pose": delay, "camera": None})
+    episode = params.episode.model_copy(update={"delays": delays})
+    build_episodes(seen[0], "band1", params.model_copy(update={"episode": episode}))
+    corrections = int(delay is not None)
+    assert calls == {
+        "read_container": 1,
+        "geometry_of": 1,
+        "find_releases": 1,  # whether there are several
+        "find_release": 1,
+        "of": 1 + corrections,
+        "find_grasp": 1 + corrections,
+    }
+
+
+def test_a_pull_with_other_stamps_keeps_what_they_do_not_change(seen, params) -> None:
+    pull = Pull.of(read_recording(seen[0], params.setup), params.setup)
+    grasp, release, motion = pull.grasp, pull.release, pull.motion
+    seen_late = pull.shifted(camera=0.01)
+    assert seen_late.motion is motion and seen_late.release is release
+    assert seen_late.recording.depth.stamp[0] == pull.recording.depth.stamp[0] - 10_000_000
+    moved = pull.shifted(pose=0.01)
+    assert moved.release is release and moved.motion is not motion
+    np.testing.assert_allclose(moved.motion.time, motion.time - 0.01, atol=1e-9)
+    assert moved.grasp == Pull(moved.recording, moved.geometry).grasp == pytest.approx(grasp)

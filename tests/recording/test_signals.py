@@ -10,10 +10,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
-from pipeline.recording.signals import signals_of
+from pipeline.recording.pulls import Pull
+from pipeline.recording.signals import ToolFacts, signals_of
 from pipeline.recording.tool_inertia import estimate_tool_inertia
-from tests.recording.bag import HAND, SENSOR, START, Truth
 from tests.recording.played import GRAVITY, Played, stream
+from validation.recordings.bag import HAND, SENSOR, START, Truth
 
 MASS = 0.73
 TOOL = (0.01, -0.02, 0.05)  # its centre of mass
@@ -27,7 +28,7 @@ def signals(played: Played, params, tool=None, recording=None, inertia=None):
     recording = recording or played.recording()
     setup = params.setup.model_copy(update={"tool": tool})
     params = params.model_copy(update={"setup": setup})
-    return signals_of(recording, played.geometry(), params, inertia)
+    return signals_of(Pull(recording, played.geometry()), params, inertia)
 
 
 def off(played: Played, found) -> np.ndarray:
@@ -61,7 +62,7 @@ def test_a_turning_hand_with_its_tool_gives_the_bands_force(turning, params) -> 
     found = signals(turning, params, tool())
     assert off(turning, found).max() < 0.15  # of 20 N; a kink where the band goes taut
     assert np.median(off(turning, found)) < 0.02
-    assert found.facts["tool"]["mass"] == MASS and np.degrees(found.facts["turn"]) > 10
+    assert found.facts.tool.mass == MASS and np.degrees(found.facts.turn) > 10
 
 
 def test_a_wrong_centre_of_mass_is_felt_where_the_hand_turns_fast(params) -> None:
@@ -82,13 +83,13 @@ def test_the_inertia_of_a_hand_that_does_not_turn(params) -> None:
 def test_a_tool_that_nobody_told_of_is_felt(params) -> None:
     """Its inertia in free motion shows its mass, with which it is gone from the pull, too."""
     played = Played(mass=MASS, truth=Truth(noise=0.005))
-    inertia = estimate_tool_inertia(played.recording(), played.geometry(), None)
+    inertia = estimate_tool_inertia(Pull(played.recording(), played.geometry()), None)
     assert inertia.mass == pytest.approx(MASS, rel=0.03)
     found = band_alone(played, params, inertia)
-    assert found.facts["tool"]["source"] == "its inertia"
+    assert found.facts.tool.source == "its inertia"
     told = signals(played, params, tool(mass=0.0), inertia=inertia)
-    given = {"mass": 0.0, "center": list(TOOL), "source": "setup.tool"}
-    assert told.facts["tool"] == given
+    given = ToolFacts(0.0, list(TOOL), "setup.tool")
+    assert told.facts.tool == given
 
 
 def test_a_sensor_that_takes_off_too_much_or_has_the_other_sign(params) -> None:
@@ -97,7 +98,7 @@ def test_a_sensor_that_takes_off_too_much_or_has_the_other_sign(params) -> None:
         Played(mass=-0.3, truth=Truth(noise=0.005)),
         Played(mass=MASS, truth=Truth(noise=0.005, sign=-1.0)),
     ):
-        inertia = estimate_tool_inertia(played.recording(), played.geometry(), None)
+        inertia = estimate_tool_inertia(Pull(played.recording(), played.geometry()), None)
         assert inertia.mass == pytest.approx(played.truth.sign * played.mass, rel=0.03)
         band_alone(played, params, inertia)
 
@@ -109,7 +110,7 @@ def test_a_sensor_that_knows_the_weight_but_not_the_inertia(params) -> None:
     t = recording.wrench.seconds(START)
     weight = (played.orientation(t) * SENSOR).inv().apply(MASS * GRAVITY)
     recording.wrench = replace(recording.wrench, values=recording.wrench.values - weight)
-    inertia = estimate_tool_inertia(recording, played.geometry(), None)
+    inertia = estimate_tool_inertia(Pull(recording, played.geometry()), None)
     assert inertia.mass == pytest.approx(MASS, rel=0.05)
     band_alone(played, params, replace(inertia, center=TOOL), recording)
 
@@ -120,7 +121,7 @@ def test_a_delay_that_is_left_does_not_displace_the_inertia(params) -> None:
     recording = played.recording()
     pose = recording.pose
     recording.pose = replace(pose, stamp=pose.stamp + 20_000_000)
-    inertia = estimate_tool_inertia(recording, played.geometry(), None)
+    inertia = estimate_tool_inertia(Pull(recording, played.geometry()), None)
     assert inertia.delay == pytest.approx(0.02, abs=0.002)
     band_alone(played, params, inertia, recording)
 
@@ -135,15 +136,15 @@ class Leaving(Played):
 def test_the_weight_of_a_hand_that_turns_away_is_no_drift(params) -> None:
     played = Leaving(mass=MASS)
     found = signals(played, params)
-    assert found.facts["drift"] == [0, 0, 0]
-    hold = np.array(found.facts["hold_force"]) - played.truth.force(played.truth.release - 0.1)
+    assert found.facts.drift == [0, 0, 0]
+    hold = np.array(found.facts.hold_force) - played.truth.force(played.truth.release - 0.1)
     assert np.linalg.norm(hold) < 0.05
 
 
 def test_a_sensor_of_the_other_sign_feels_its_tool_so_too(params) -> None:
     played = Played(turn=0.6, mass=MASS, truth=Truth(sign=-1.0))
     found = signals(played, params, tool())
-    assert found.facts["flipped"] and off(played, found).max() < 0.15
+    assert found.facts.flipped and off(played, found).max() < 0.15
 
 
 def test_a_wrench_in_the_base_of_a_hand_that_turns(params) -> None:
@@ -171,7 +172,7 @@ def test_gaps_are_said_and_long_ones_refused(params) -> None:
                 signals(played, params, recording=recording)
         else:
             found = signals(played, params, recording=recording)
-            assert found.facts["longest_gap"][whole.topic] == pytest.approx(length, abs=0.005)
+            assert found.facts.longest_gap[whole.topic] == pytest.approx(length, abs=0.005)
             hand = played.hand(found.time + (found.origin - START) * 1e-9)
             assert np.abs(found.position - hand).max() < 0.012  # a T^2 / 8, a = 2.4 m/s^2
 
@@ -195,13 +196,13 @@ def test_irregular_stamps_give_the_same_velocity(params) -> None:
 def test_a_recorded_twist_is_compared(params) -> None:
     played = Played()
     recording = played.recording()
-    assert signals(played, params, recording=recording).facts["twist_difference"] is None
+    assert signals(played, params, recording=recording).facts.twist_difference is None
     t = np.arange(0, played.truth.end, 0.01)
     speed = (played.hand(t + 1e-4) - played.hand(t - 1e-4)) / 2e-4
     for factor, size in ((1.0, 0.002), (1.5, None)):
         twist = np.hstack([factor * speed, np.zeros((len(t), 3))])
         recording.twist = stream("/arm/twist", t, twist)
-        said = signals(played, params, recording=recording).facts["twist_difference"]
+        said = signals(played, params, recording=recording).facts.twist_difference
         assert said < size if size else said > 0.02
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.episode.signal import cutoff_hz
+from pipeline.identify.identify import evaluations_of
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
@@ -14,9 +15,9 @@ from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
 from rig.physics.world import string_of
 from rig.recorder.record import EPOCH
-from tests.identify.objective.own_law import own_law_episode, visible
-from tests.project import ROUGH, with_
-from validation.benchmarks.methods import complete
+from tests.project import with_
+from validation.projects import ROUGH
+from validation.synthetic import own_law_episode, visible
 
 METHOD = "sling2sim2real"
 TRUTH = Parameters.of("neo_hookean", [2.5e5, 0.45, 4e-3, 0.7, 0.6])
@@ -54,5 +55,5 @@ def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorde
     own = own_law_episode(sling, rig, TRUTH, cutoff=cutoff, force_noise=noise)
     at_truth = evaluator(quick, sling, own)
     own_loss = at_truth(at_truth.box.unit_of(TRUTH)).total[0]  # its least is no more
-    best = complete(quick, METHOD, quick.optimizer, evaluator(quick, sling, rig)).best()
+    best = evaluations_of(quick, METHOD, evaluator(quick, sling, rig)).best()
     assert best["total"] > 3 * own_loss

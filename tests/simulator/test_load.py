@@ -21,7 +21,7 @@ VALUES = dict(zip(THETA, (2.5e5, 0.45, 3e-3, 0.7, 0.6), strict=True))
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
-    write_json(Layout(tmp_path).mounting("band1"), SHOWN)
+    write_json(Layout(tmp_path).clamps("band1"), SHOWN)
     return tmp_path
 
 

@@ -1,13 +1,20 @@
 """A band that the simulator made is found again; what is found is kept whole."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from sling2sim2real import Identification, Observed, aim, identify, launch
+from pipeline.base.files import write_json
+from pipeline.base.layout import Layout
+from pipeline.params.provenance import settings_of
+from pipeline.simulator.parameters import THETA
+from sling2sim2real import Identification, Observed, Settings, aim, identify, launch
+from sling2sim2real.launching import _warnings
+from tests.project import ROOT
 
 FITTED = "youngs_modulus", "elasticity_damping", "mooney_share", "relaxation"
 
@@ -63,3 +70,19 @@ def test_wrong_evidence_is_refused(band, settings, world, episode) -> None:
     still = replace(episode, position=np.zeros_like(episode.position))
     with pytest.raises(UserError, match="lets go at the fork"):
         identify([still], band, settings=settings, start=world)
+
+
+def test_a_run_of_other_settings_says_what_has_changed(tmp_path) -> None:
+    """And so does what is aimed by it."""
+    shutil.copy(ROOT / "params.yaml", tmp_path)
+    params = Settings.load(tmp_path / "params.yaml")
+    made = settings_of(params, "band1", "least_squares") | {"bands.band1.mass": 0.05}
+    soft = dict(zip(THETA, (2.2e5, 0.45, 2e-3, 0.5, 1.0), strict=True))
+    write_json(
+        Layout(tmp_path).theta("band1", "least_squares"),
+        {"band": "band1", "theta": soft, "made_with": made},
+    )
+    found = Identification.of_run("band1", root=tmp_path)
+    assert found.changed == ("bands.band1.mass was 0.05, is 0.023",)
+    told = [*_warnings(found, (-0.3, -0.1), None, (1.9, 2.1))]
+    assert told[-1] == f"params.yaml: {found.changed[0]}, since θ was identified"

@@ -7,7 +7,8 @@ import zipfile
 
 import pytest
 
-from tests.project import ROOT, copy_project
+from tests.project import ROOT
+from validation.projects import copy_project
 
 ASK = """
 import sys

@@ -19,7 +19,8 @@ from pipeline.identify.objective.loss import TERMS
 from pipeline.identify.search.history import History
 from pipeline.params import load
 from stages.start import remedy
-from tests.project import ROOT, alive, environment, python, until
+from tests.project import ROOT, alive, python, until
+from validation.projects import environment
 
 OF_A_BAND = ("record", "episode", "mounting")
 OF_A_METHOD = ("history", "theta", "policy", "trials", "card")
@@ -100,16 +101,21 @@ def test_a_file_that_is_missing_or_damaged_says_what_makes_it(stage) -> None:
     cases = {
         "data/raw/band1/band1.mcap": "record@band1",
         "data/episodes/band1/1/clouds.parquet": "episode@band1",
-        "data/mounting/band1.json": "mounting@band1",
+        "data/clamps/band1.json": "clamps@band1",
         "data/floor/band1.json": "floor@band1",
-        "/data/x/data/confidence/band1/de.json": "ablation_theta@band1-de",
+        "/data/x/data/confidence/band1/de.json": "ablation_de@band1-de",
+        "data/launches/band1/observed.json": "evidence@band1",
+        "data/policies/band1/adam/launches.parquet": "ablation_launches@band1-adam",
         "data/policies/band2/sling2sim2real/card.json": "policy@band2-sling2sim2real",
         **{
             f"data/{step}/band1/de.parquet": f"ablation_{step}@band1-de"
-            for step in ("history", "theta", "trials")
+            for step in ("theta", "trials")
         },
-        "data/clusters/band1/de.json": "ablation_theta@band1-de",
-        "data/refined/band1/de.parquet": "ablation_theta@band1-de",
+        "data/history/band1/no_work.parquet": "ablation_history@band1-no_work",
+        "data/clusters/band2/sling2sim2real.json": "clusters@band2-sling2sim2real",
+        "data/evaluations/band2/sling2sim2real.parquet": "cma@band2-sling2sim2real",
+        "data/evaluations/band2/least_squares.parquet": "density@band2-least_squares",
+        "data/evaluations/band1/package_si.parquet": "bo@band1-package_si",
     }
     for path, makes in cases.items():
         assert remedy(NotMade(Path(path))) == f"`dvc repro {makes}` makes it"

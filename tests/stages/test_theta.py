@@ -14,9 +14,8 @@ from pipeline.identify.results.theta import calibrated, load_theta
 from pipeline.params import load
 from pipeline.simulator.parameters import Parameters
 from sling2sim2real.identification import Identification
-from tests.identify.objective.own_law import own_law_episode
 from tests.project import ROOT
-from validation.synthetic import recorded_yardstick
+from validation.synthetic import own_law_episode, recorded_yardstick
 
 BUDGET = {"population": 5, "generations": 2, "k_top": 1, "k_nn": 6, "cma_population": 4}
 SHOWN = {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}
@@ -37,9 +36,9 @@ def test_what_a_method_leaves_out_is_left_out_everywhere(
     truth = Parameters.of(sling.law, [2e5, 0.45, 2e-3, 0.7, 0.6])
     episode = own_law_episode(sling, episode, truth, cutoff=35.0)
     episode.save(layout.episode("band1"))
-    write_json(layout.mounting("band1"), SHOWN)
+    write_json(layout.clamps("band1"), SHOWN)
     monkeypatch.setattr(sys, "argv", ["stage", "band1", "sling2sim2real"])
-    for stage in ("history", "theta"):
+    for stage in ("history", "clusters", "cma", "theta"):
         with pytest.raises(SystemExit) as ended:
             runpy.run_module(f"stages.{stage}", run_name="__main__")
         assert not ended.value.code

@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.identify.search.build import build
 from pipeline.identify.search.loop import latin_hypercube
-from validation.campaigns.ablations import FIRST, LAST, PAPER, Job, ResultLines, jobs_of, summary
+from validation.campaigns.ablations import FIRST, LAST, PAPER, Job, jobs_of, summary
 from validation.paired import compared, holm, mean_interval
 
 
@@ -108,14 +108,3 @@ def test_jobs_are_distinct_and_the_slow_ones_last() -> None:
     jobs = jobs_of(["band1", "band2"], [LAST, PAPER], 10, 5)
     assert len({*jobs}) == len(jobs) == 2 * 2 * (10 + 4)
     assert all(job.method == LAST for job in jobs[28:])
-
-
-def test_a_result_that_was_cut_short_is_done_again(tmp_path) -> None:
-    first, second = results({PAPER: 0})[:2]
-    kept = ResultLines(tmp_path)
-    kept.add(first)
-    with kept.path.open("a") as file:
-        file.write('{"band": "band1", "reco')
-    assert [*kept.all()] == [Job.of(first)]
-    kept.add(second)
-    assert kept.all() == {Job.of(first): first, Job.of(second): second}

@@ -36,6 +36,8 @@ def test_a_switch_is_the_key_that_it_is_called_by(switch: str) -> None:
             if content["methods"][method].get("law") == "rubber":
                 del content["methods"][method]
                 content["run"]["methods"].remove(method)
+                for step in ("history", "density"):
+                    content["run"]["steps"][step].remove(method)
     expected = check(content)
     if section != "method_defaults":
         assert getattr(found, section) == getattr(expected, section)
@@ -43,9 +45,9 @@ def test_a_switch_is_the_key_that_it_is_called_by(switch: str) -> None:
     assert found != load()
 
 
-def test_every_case_has_a_file_of_its_own(tmp_path: Path) -> None:
+def test_cases_are_distinct(tmp_path: Path) -> None:
     cases = deviations.cases_of(["band1", "orange"], 3, 2)
-    assert len({case.path(tmp_path) for case in cases}) == len(cases) == len(set(cases))
+    assert len(cases) == len(set(cases))
     assert {case.method for case in cases if "tetrahedra" in case.switch} == {PAPER}
     places = {deviations.place(tmp_path, "band1", 0, switch) for switch in SWITCHES}
     assert len(places) == 1 + len(deviations.EPISODES_ANEW)

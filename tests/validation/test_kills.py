@@ -15,11 +15,12 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from tests.app.flow.killing import Run
 from tests.project import ROOT, until
 from validation.campaigns.kills import __main__ as campaign
 from validation.campaigns.kills import compare, full_disk, strike
-from validation.campaigns.kills.__main__ import StruckLines, disturb, report, shares
+from validation.campaigns.kills.__main__ import disturb, report, shares
+from validation.campaigns.runner import ResultLines
+from validation.projects import MarkedRun
 
 CAME_OUT = ("files", "digests", "nothing_more", "cache_whole")
 EXPECTED = {"sling flow": {"seconds": 1.0, "files": {}, "begun": {}, "locks": {}}}
@@ -98,7 +99,7 @@ print(subprocess.run([sys.executable, "-c", code, "stages.floor"], stderr=subpro
         self.folder.mkdir(exist_ok=True)
         self.code = self.CODE.format(s="{s}", write="{write}").replace("{s}", str(seconds))
         self.code = self.code.replace("{write}", str(write))
-        self.run = Run(self.folder, place / "said.txt")
+        self.run = MarkedRun(self.folder, place / "said.txt")
 
     def start(self) -> subprocess.Popen:
         return self.run.start(sys.executable, "-c", self.code)
@@ -184,23 +185,26 @@ def test_disturbing_goes_on_where_it_was_and_ends_well(tmp_path: Path, monkeypat
 
     copy = Named()
     with pytest.raises(KeyboardInterrupt):
-        disturb(copy, "kill", 5, StruckLines(file), EXPECTED["sling flow"], attempt)
+        disturb(copy, "kill", 5, ResultLines(file), EXPECTED["sling flow"], attempt)
     with file.open("a") as cut:
         cut.write('{"what": "att')
-    disturb(copy, "kill", 5, StruckLines(file), EXPECTED["sling flow"], attempt)
+    disturb(copy, "kill", 5, ResultLines(file), EXPECTED["sling flow"], attempt)
     assert asked == [(0, 5), (1, 3), (2, 1), (2, 1), (3, 0)] and copy.begun == 1
-    lines = StruckLines(file)
+    lines = ResultLines(file)
     disturb(copy, "kill", 5, lines, EXPECTED["sling flow"], attempt)  # all is done
-    assert len(asked) == 5 and lines.of("round", "sling flow", "kill")[-1]["after"] == 5
+    assert (
+        len(asked) == 5
+        and lines.where(what="round", name="sling flow", by="kill")[-1]["after"] == 5
+    )
     names = ["sling flow"]
     assert report(lines, 5, 0, EXPECTED, names)["met"]
     assert not report(lines, 6, 0, EXPECTED, names)["met"]
     assert not report(lines, 5, 1, EXPECTED, names)["met"]
     for check in campaign.CHECKS:
-        other = StruckLines(file)
-        other.all[-1] = other.all[-1] | {check: False}
+        other = ResultLines(file)
+        other.lines[-1] = other.lines[-1] | {check: False}
         assert not report(other, 5, 0, EXPECTED, names)["met"], check
-    lines.all[0]["faults"].append("lives on")
+    lines.lines[0]["faults"].append("lives on")
     found = report(lines, 5, 0, EXPECTED, names)
     assert not found["met"] and found["figures"]["faults"][0]["fault"] == "lives on"
     assert found["figures"]["hit"] == {"flow": 5}

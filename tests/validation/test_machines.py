@@ -1,5 +1,6 @@
 """The campaign of the machines: equal inputs give an equal θ, and differences are noticed."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -17,11 +18,11 @@ from pipeline.params import load
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import LaunchSetup
 from pipeline.simulator.parameters import Parameters
-from tests.identify.objective.own_law import own_law_episode
-from tests.project import ROOT, ROUGH
+from tests.project import ROOT
 from validation.campaigns import machines
 from validation.campaigns.machines import DRAWS, FOLDER, LIMIT, OURS, PAPER, MachineReport
-from validation.synthetic import pull_and_release
+from validation.projects import ROUGH
+from validation.synthetic import own_law_episode, pull_and_release
 
 BAND, TRUE = "band1", (2e5, 0.45, 4e-3, 0.7, 0.6)
 BUDGET = {"population": 8, "generations": 1, "k_top": 1, "k_nn": 6}
@@ -38,7 +39,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     yaml.dump(content, root / "params.yaml")
     params, layout = load(root / "params.yaml"), Layout(root)
     clamps = {"clamp_direction": [0.0, 0.0, -1.0], "flexural_rigidity": 1e-5}
-    write_json(layout.mounting(BAND), clamps)
+    write_json(layout.clamps(BAND), clamps)
     sling = load_sling(params, BAND, root)
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
     plan = pull_and_release(BAND, params.episode, sling)
@@ -86,9 +87,7 @@ def test_another_input_has_another_digest(project, changed: str, tmp_path: Path)
         with (layout.episode(BAND) / "clouds.parquet").open("ab") as file:
             file.write(b" ")
     elif changed == "clamps":
-        layout.mounting(BAND).write_text(
-            layout.mounting(BAND).read_text().replace("1e-05", "2e-05")
-        )
+        layout.clamps(BAND).write_text(layout.clamps(BAND).read_text().replace("1e-05", "2e-05"))
     else:
         text = (root / "params.yaml").read_text()
         (root / "params.yaml").write_text(text.replace("mass: 0.023", "mass: 0.024"))
@@ -155,21 +154,50 @@ def test_what_is_not_of_the_same_is_not_compared(tmp_path, monkeypatch, what, va
         command(tmp_path, monkeypatch, told([1.5, 2.0]))
 
 
-def test_two_runs_are_compared_output_by_output(tmp_path, monkeypatch, capsys) -> None:
-    stages = {"record@a": {"outs": [{"path": "data/a", "md5": "1"}]}, "none": {"cmd": "x"}}
-    more = {"report": {"outs": [{"path": "reports/README.md", "md5": "2"}]}}
-    locks = [tmp_path / "one.lock", tmp_path / "two.lock"]
-    YAML().dump({"stages": stages | more}, locks[0])
-    monkeypatch.setattr("sys.argv", ["machines", "--twice", *map(str, locks)])
-    YAML().dump({"stages": stages | more}, locks[1])
-    assert machines.main() == 0
-    assert capsys.readouterr().out == "0 outputs differ; the first run has 2\n"
-    more["report"]["outs"][0]["md5"] = "3"
-    YAML().dump({"stages": more}, locks[1])
-    assert machines.main() == 1
-    assert capsys.readouterr().out.splitlines()[:-1] == ["data/a", "reports/README.md"]
-    locks[1].write_text("[]")
-    with pytest.raises(UserError, match="two.lock: no dvc.lock of a run"):
+@pytest.fixture
+def runs(tmp_path, monkeypatch):
+    """Compare two runs with these outputs; the exit status and what is written."""
+
+    def compare(*outputs: dict[str, str]) -> tuple[int, dict]:
+        folders = [tmp_path / name for name in ("one", "two")]
+        for folder, digests in zip(folders, outputs, strict=True):
+            (folder / machines.TABLE).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / machines.TABLE, folder / machines.TABLE)
+            outs = [{"path": path, "md5": digest} for path, digest in digests.items()]
+            stages = {"all": {"outs": outs}, "none": {"cmd": "x"}}
+            YAML().dump({"stages": stages}, folder / "dvc.lock")
+        report = tmp_path / "twice.json"
+        words = ["--twice", *map(str, folders), "--report", str(report)]
+        monkeypatch.setattr("sys.argv", ["machines", *words])
+        return machines.main(), json.loads(report.read_text())
+
+    return compare
+
+
+def test_equal_runs_and_one_that_has_more(runs, capsys) -> None:
+    status, content = runs({"a": "1", "b": "2"}, {"a": "1", "b": "2", "c": "3"})
+    assert status == 0
+    assert capsys.readouterr().out == "0 of 2 outputs differ\n"
+    assert (content["met"], content["outputs"], content["differing"]) == (True, 2, [])
+    landings = content["landings_cm"]
+    assert {"band1 least_squares", "band3 sling2sim2real"} <= landings.keys()
+    assert all(one["these_runs"] == one["committed"] for one in landings.values())
+
+
+def test_what_differs_or_lacks_is_named(runs, capsys) -> None:
+    status, content = runs({"a": "1", "b": "2", "c": "3"}, {"a": "1", "b": "x"})
+    assert status == 1
+    assert (content["met"], content["differing"]) == (False, ["b", "c"])
+    assert capsys.readouterr().out.splitlines()[:-1] == ["b", "c"]
+
+
+def test_what_is_no_run_is_one_line(tmp_path, monkeypatch) -> None:
+    (tmp_path / "dvc.lock").write_text("[]")
+    monkeypatch.setattr("sys.argv", ["machines", "--twice", str(tmp_path), str(tmp_path)])
+    with pytest.raises(UserError, match="dvc.lock: no dvc.lock of a run"):
+        machines.main()
+    monkeypatch.setattr("sys.argv", ["machines"])
+    with pytest.raises(UserError, match="--twice RUN OTHER is wanted"):
         machines.main()
 
 

@@ -11,7 +11,7 @@ from pipeline.base.errors import UserError
 from pipeline.recording.build import episode_of, process
 from validation.campaigns import mutations, outcomes
 from validation.campaigns.damage import mutated
-from validation.campaigns.small_recordings import (
+from validation.recordings.small import (
     FAMILIES,
     small_params,
     write_small,
@@ -84,7 +84,7 @@ def test_equal_seeds_do_equal_damage(name, tmp_path) -> None:
     assert len({content, *damaged}) > 18
 
 
-def test_a_run_that_was_killed_goes_on(tmp_path) -> None:
+def test_only_what_is_not_done_is_shared_out() -> None:
     parts = mutations.shares(1000, set())
     seeds = [(*part[:2], seed) for part in parts for seed in range(*part[2:])]
     assert len(seeds) == len(set(seeds)) == 1000
@@ -94,17 +94,9 @@ def test_a_run_that_was_killed_goes_on(tmp_path) -> None:
         ("json", "lz4", 3, 5),
         ("json", "lz4", 9, 10),
     ]
-    path = tmp_path / "results.jsonl"
-    ledger = mutations.Ledger(path)
-    ledger.add({"family": "json", "container": "lz4", "seed": 1, "outcome": outcomes.SAME})
-    with path.open("a") as file:
-        file.write('{"family": "json", "cont')
-    ledger = mutations.Ledger(path)
-    ledger.add({"family": "json", "container": "lz4", "seed": 2, "outcome": outcomes.SAME})
-    assert {key[2] for key in mutations.Ledger(path).results} == {1, 2}
 
 
-@pytest.mark.parametrize("end", ["hang", "exit"])
+@pytest.mark.parametrize("end", ["hang", "exit", "between"])
 def test_a_process_that_ends_too_early_names_its_recording(tmp_path, monkeypatch, end) -> None:
     """By another program in the place of the one that reads recordings."""
     about = {"family": "ros2", "container": "lz4"}
@@ -114,6 +106,8 @@ import faulthandler, json, os, signal, sys
 if "validation.campaigns.outcomes" in sys.orig_argv:
     first, end = map(int, sys.orig_argv[-2:])
     for seed in range(first, end):
+        if seed == 4 and {end!r} == "between":
+            os._exit(3)
         print(json.dumps(dict({about!r}, seed=seed)), flush=True)
         if seed == 4 and {end!r} == "hang":
             faulthandler.register(signal.SIGPROF, chain=True)
@@ -133,6 +127,7 @@ if "validation.campaigns.outcomes" in sys.orig_argv:
     (fault,) = mutations.faults(found)
     assert fault["seed"] == 4 and json.dumps(fault)
     assert ("sitecustomize.py" in fault["words"]) == (end == "hang")
+    assert ("before it began" in fault["words"]) == (end == "between")
 
 
 def test_nothing_begins_when_the_time_is_over(tmp_path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.params import load
-from pipeline.simulator.parameters import searched_names
+from pipeline.params.identification import parameter_names
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 from validation.campaigns import random_parameters
 from validation.simulator import robustness
@@ -20,7 +20,7 @@ def bench() -> Bench:
 
 def test_the_sets_fill_the_box_of_each_law(bench) -> None:
     sets = random_parameters.random_sets(bench, RUBBER, 500)
-    points = np.stack([sets.column(name) for name in searched_names(RUBBER)], axis=1)
+    points = np.stack([sets.column(name) for name in parameter_names(RUBBER)], axis=1)
     boxes = [(box.low, box.high) for _, box in bench.params.parameters]
     boxes += [(-0.3, 0.9), (0.0, 0.05)]
     low, high = np.array(boxes).T

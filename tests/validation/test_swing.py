@@ -9,9 +9,8 @@ from pipeline.episode.signal import cutoff_hz
 from pipeline.params import load
 from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import Parameters
-from tests.identify.objective.own_law import own_law_episode
 from validation.campaigns.swing import PARTS, D, S, SplitPictures, _damped, landed
-from validation.synthetic import pull_and_release
+from validation.synthetic import own_law_episode, pull_and_release
 
 THETA = Parameters.of("neo_hookean", [2.2e5, 0.45, 3e-3, 0.9, 0.8])
 

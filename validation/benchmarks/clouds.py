@@ -14,17 +14,20 @@ from pathlib import Path
 
 import cv2
 
-from pipeline.recording.build import view_of
+from pipeline.params import Params
+from pipeline.params.lab import BandParams
+from pipeline.recording.build import Processed
 from pipeline.recording.cloud import cloud_of
-from pipeline.recording.input.reader import read_recording
+from pipeline.recording.input.reader import Recording, read_recording
 from pipeline.recording.masks import masker
+from pipeline.recording.pulls import Pull
 from pipeline.recording.view import View
 from validation.benchmarks.timing import timed
 
 STEPS = ("decode", "points", "learn", "mask", "cloud")
 
 
-def bench_recording(path: Path, params: object) -> dict:
+def bench_recording(path: Path, params: Params) -> dict:
     """Time every step from the file to the clouds, with the first band of params.yaml.
 
     Returns:
@@ -40,7 +43,9 @@ def bench_recording(path: Path, params: object) -> dict:
     band = next(iter(params.bands.values()))
     with on_one_core() as how:
         recording, read, _ = timed(partial(read_recording, Path(path), params.setup))
-        (view, _), signals, _ = timed(partial(view_of, recording, band, params))
+        view, signals, _ = timed(
+            lambda: Processed.of(Pull.of(recording, params.setup), band, params).view
+        )
         spent, sizes = _steps(view, params.cloud)
     count = max(1, len(sizes))
     after = sum(spent.values()) - spent["decode"]
@@ -54,6 +59,10 @@ def bench_recording(path: Path, params: object) -> dict:
         "frames_per_s_after_decoding": count / after,
         "points": sorted(sizes)[len(sizes) // 2] if sizes else 0,
     }
+
+
+def _view_of(recording: Recording, band: BandParams, params: Params) -> View:
+    return Processed.of(Pull.of(recording, params.setup), band, params).view
 
 
 @contextmanager

@@ -8,13 +8,14 @@ import numpy as np
 from scipy.stats import qmc
 
 from pipeline.base.errors import UserError
+from pipeline.export.mesh import Tube, hand_path
 from pipeline.identify.objective.box import SearchBox
+from pipeline.params import Params
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
 from validation.benchmarks.timing import available, timed
 from validation.engines import mujoco_flex
-from validation.engines.mesh import Tube, hand_path
 from validation.engines.newton_vbd import Bands
 from validation.simulator.closed import String
 from validation.synthetic import DRAWN, pull_and_release, yardstick
@@ -26,7 +27,7 @@ ENVIRONMENTS = {"cpu": (64, 1), "cuda": (1024, 1024)}  # ours, Newton's
 TIMED_STEPS = 20  # of Newton, on a GPU
 
 
-def bench_peers(params, device: str = "cpu") -> list[dict]:
+def bench_peers(params: Params, device: str = "cpu") -> list[dict]:
     """One entry an engine and device: settings, cost, `ratio` to ours there, force error.
 
     On a CPU the cost is CPU seconds a rollout, on a GPU rollouts a second; a ratio above 1 is how

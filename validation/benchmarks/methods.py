@@ -18,18 +18,17 @@ import numpy as np
 
 from pipeline.base.machine import named
 from pipeline.episode.episode import Episode
+from pipeline.identify.identify import evaluations_of
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.cache import EvaluationCache
 from pipeline.identify.objective.evaluate import Evaluator, simulated
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.optimizers.cma.multistart import Multistart
-from pipeline.identify.posterior.identify import identify
-from pipeline.identify.search.build import explorer
+from pipeline.identify.posterior.identify import fit_posterior
 from pipeline.identify.search.history import History
-from pipeline.identify.search.loop import budget, latin_hypercube, search
-from pipeline.identify.search.regions import regions_asked, regions_of
-from pipeline.params import expect_known
-from pipeline.params.identification import LEAST_SQUARES
+from pipeline.identify.search.loop import latin_hypercube
+from pipeline.identify.search.regions import regions_asked
+from pipeline.params import Params, expect_known
+from pipeline.params.identification import LEAST_SQUARES, OptimizerParams
 from pipeline.simulator.model import ClampedBand
 from validation.benchmarks.timing import seconds, shared, timed
 from validation.synthetic import recorded_yardstick
@@ -51,7 +50,7 @@ class Clocked:
 
 
 def bench_methods(
-    params, device: str = "cpu", size: str = "laptop", methods: list[str] | None = None
+    params: Params, device: str = "cpu", size: str = "laptop", methods: list[str] | None = None
 ) -> dict:
     """Time a search with each of params.yaml's methods.
 
@@ -87,19 +86,24 @@ def bench_methods(
 
 
 def time_search(
-    params, method: str, optimizer, sling: ClampedBand, episode: Episode, devices: Sequence[str]
+    params: Params,
+    method: str,
+    optimizer: OptimizerParams,
+    sling: ClampedBand,
+    episode: Episode,
+    devices: Sequence[str],
 ) -> tuple[dict, History]:
     """One search from nothing, all its rollouts counted; and what it evaluated."""
+    params = params.model_copy(update={"optimizer": optimizer})
     about = params.methods[method]
     sling = replace(sling, law=about.law)
 
     def whole(evaluate) -> tuple[History, int]:
-        history = complete(params, method, optimizer, evaluate)
+        history = evaluations_of(params, method, evaluate)
         if about.search != LEAST_SQUARES:
             return history, len(history.total)
-        best = history.best()
-        start = np.array([best[name] for name in history.names])
-        fit = identify(params, method, sling, [episode], start, workers=os.cpu_count())
+        start = history.best_parameters(about.law)
+        fit = fit_posterior(params, method, sling, [episode], start, workers=os.cpu_count())
         return history, len(history.total) + fit.rollouts
 
     with tempfile.TemporaryDirectory() as folder:
@@ -122,26 +126,14 @@ def time_search(
     return row, history
 
 
-def complete(params, method: str, optimizer, evaluate) -> History:
-    """Everything that the stages history and theta evaluate in a search for a method.
-
-    Of least squares that is the exploration; the fit has no history.
-    """
-    about = params.methods[method]
-    box = SearchBox.of_method(params, method)
-    explore, refine = budget(optimizer, about.search)
-    history = History(method, box.names)
-    first = explorer(about, optimizer, len(box.free), explore)
-    search(first, evaluate, history, rollouts=explore, box=box)
-    if about.search == "multistart":
-        explored = History(method, box.free, [history.table])
-        regions, _ = regions_of(about, optimizer, explored)
-        solvers = Multistart(regions, population=optimizer.cma_population, seed=optimizer.seed)
-        search(solvers, evaluate, history, rollouts=refine, box=box)
-    return history
-
-
-def _generation(params, sling: ClampedBand, episode: Episode, method: str, devices, count: int):
+def _generation(
+    params: Params,
+    sling: ClampedBand,
+    episode: Episode,
+    method: str,
+    devices: Sequence[str],
+    count: int,
+) -> dict:
     """Seconds of one generation: simulated, and with the loss, on all cores or GPUs."""
     evaluate = evaluator(params, method, sling, episode, devices)
     unit = latin_hypercube(evaluate.box.dimension, count, params.optimizer.seed)
@@ -153,7 +145,7 @@ def _generation(params, sling: ClampedBand, episode: Episode, method: str, devic
 
 
 def evaluator(
-    params, method: str, sling: ClampedBand, episode: Episode, devices: Sequence[str]
+    params: Params, method: str, sling: ClampedBand, episode: Episode, devices: Sequence[str]
 ) -> Evaluator:
     """A method's, with nothing remembered."""
     loss = EpisodeLoss.of(params, method, episode, sling)
@@ -161,7 +153,7 @@ def evaluator(
 
 
 def _import_and_compile(
-    params, sling: ClampedBand, episode: Episode, method: str, devices: Sequence[str]
+    params: Params, sling: ClampedBand, episode: Episode, method: str, devices: Sequence[str]
 ) -> None:
     """What a machine does once, and a method should not pay for."""
     import torch  # noqa: F401

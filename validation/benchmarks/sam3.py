@@ -21,9 +21,9 @@ import numpy as np
 from pipeline.base import errors
 from pipeline.base.files import write_json
 from pipeline.recording.masks.sam3 import Sam3Mask
-from tests.recording import looks
-from tests.recording.masks.tiny_sam3 import save_tiny_sam3, save_tokenizer
 from validation.benchmarks.timing import environment, timed
+from validation.recordings import looks
+from validation.recordings.tiny_sam3 import save_tiny_sam3, save_tokenizer
 
 REPORT = Path("reports/benchmarks/sam3-h200.json")
 LOOK, PROMPT = "orange on grey, white arm", "rubber band"

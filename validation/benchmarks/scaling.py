@@ -19,7 +19,7 @@ from pipeline.identify.objective.session import load_episode
 from pipeline.identify.results.mounting import sling_of_method
 from pipeline.identify.search.history import History
 from pipeline.identify.search.loop import latin_hypercube
-from pipeline.params import expect_known
+from pipeline.params import Params, expect_known
 from pipeline.simulator.launch import Launches, launch
 from pipeline.simulator.model import LaunchSetup
 from validation.benchmarks.methods import BUDGETS, evaluator, time_search
@@ -31,7 +31,7 @@ LAUNCHES = (1024, 16384)
 
 
 def bench_scaling(
-    params,
+    params: Params,
     device: str,
     band: str | None = None,
     method: str = "sling2sim2real",
@@ -60,7 +60,9 @@ def bench_scaling(
     return scaling(params, devices, band, method, size)
 
 
-def scaling(params, devices: Sequence[str], band: str | None, method: str, size: str) -> dict:
+def scaling(
+    params: Params, devices: Sequence[str], band: str | None, method: str, size: str
+) -> dict:
     """`bench_scaling` on devices that are there."""
     expect_known(params, "method", method)
     if band:

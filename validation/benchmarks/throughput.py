@@ -16,6 +16,7 @@ from pipeline.base.machine import named
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.params import Params
 from pipeline.simulator.interaction import Rollouts, interact, schedule_of
 from pipeline.simulator.launch import Launches, launch
 from pipeline.simulator.model import LaunchSetup
@@ -34,7 +35,7 @@ BOXES = {  # of what a law adds to params.yaml's parameters
 }
 
 
-def bench(params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
+def bench(params: Params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
     """Time the yardstick.
 
     Args:

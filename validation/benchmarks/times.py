@@ -23,13 +23,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.base import errors
+from pipeline.base.code import ROOT, digests
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json, write_text
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import commit
 from validation.benchmarks.command import disk, measured
 from validation.benchmarks.timing import environment
-from validation.code import ROOT, digests
 from validation.marked import marks, with_block
 
 REPORT, PAGE = Path("reports/benchmarks/times.json"), Path("docs/times.md")
@@ -38,7 +38,8 @@ BAND = "timed"  # of the recording
 CHANGES = ("PYTHONPATH", "VIRTUAL_ENV", "UV_CACHE_DIR", "PIP_CACHE_DIR", "WARP_CACHE_PATH")
 STAGE = re.compile(r"^([a-z]+)(?:@[\w-]+)? \| done \((?:(\d+) min )?([\d.]+) s\)$", re.MULTILINE)
 ABLATION = re.compile("^ablation_", re.MULTILINE)
-STAGES = "record episode mounting history theta policy trials floor card report".split()
+STAGES = "record episode mounting clamps evidence history clusters cma density de bo adam search"
+STAGES = (STAGES + " theta policy launches trials floor card report").split()  # order of columns
 
 
 @dataclass(frozen=True)

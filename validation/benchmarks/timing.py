@@ -1,25 +1,17 @@
-"""How benchmarks take time, and what their figures belong to."""
+"""How benchmarks take time."""
 
 from __future__ import annotations
 
-import os
-import platform
-import sys
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
 
-import pipeline.simulator
-from pipeline.base.fingerprint import fingerprint
-from pipeline.base.machine import commit, gpus, named, processor
-from validation.code import digests
+from pipeline.base.environment import environment as environment
+from pipeline.base.machine import gpus
 
 REPEATS = 3  # the best of them counts: others may use the machine too
-SIMULATOR = fingerprint(Path(pipeline.simulator.__file__).parent)[:12]  # as it is imported
 
 
 def timed(work: Callable[[], object]) -> tuple:
@@ -48,30 +40,3 @@ def shared(devices: Sequence[str], simulate: Callable, thetas: np.ndarray, **opt
 
 def available(device: str) -> bool:
     return device in {"cpu", *gpus()}
-
-
-def environment(device: str, command: str = "", *scripts: Path) -> dict:
-    """What a figure belongs to: device, its name, command, versions, commit and code.
-
-    `code` has a digest of each folder that `scripts` import, by default the file that calls this;
-    it tells also where there is no git. `simulator` is that of pipeline/simulator.
-    """
-    import warp as wp
-
-    scripts = scripts or (Path(sys._getframe(1).f_code.co_filename),)
-    devices, name = named(device, "--device"), processor()
-    if device != "cpu":
-        name = wp.get_device(devices[0]).name
-    packages = ("warp-lang", "numpy", "scipy")
-    return {
-        "device": device,
-        "device_name": name,
-        "devices": len(devices),
-        "cores": os.cpu_count(),
-        "command": command or f"sling bench --device {device} --json",
-        "commit": commit(Path(__file__).parent),
-        "simulator": SIMULATOR,
-        "code": digests(*scripts),
-        "versions": {"python": platform.python_version()}
-        | {package: version(package) for package in packages},
-    }

@@ -13,35 +13,31 @@ a run that was killed goes on from there.
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import sys
 import time
 from collections import Counter
-from concurrent.futures import as_completed
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import spearmanr
 
+from pipeline.base import errors
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
-from pipeline.base.machine import cores, processor
-from pipeline.base.pool import Pool
-from pipeline.episode.episode import Episode
-from pipeline.identify.objective.box import SearchBox
-from pipeline.params import expect_known, load
-from rig.physics.launch import launch
+from pipeline.base.machine import processor
+from pipeline.params import Params, expect_known, load
+from pipeline.params.identification import MethodParams
 from validation.benchmarks.timing import environment
-from validation.campaigns.rig_scores import aimed, plain, recorded, sling_of
-from validation.density import found
+from validation.campaigns import runner
+from validation.campaigns.rig_scores import aimed, errors_on_the_rig, identified, recorded
+from validation.campaigns.runner import PAPER, ResultLines, plain, result_of
 from validation.paired import LEVEL, compared, mean_interval
 
 WORK = Path("data/ablations")
 REPORT = Path("reports/validation/ablations.json")
 FIRST, SEEDS = 1001, 5  # rig seed of the first recording; search seeds on it
-PAPER = "sling2sim2real"
 LAST = "plain_bo"  # takes as long as all others
 
 
@@ -54,13 +50,8 @@ class Job:
     method: str
     seed: int
 
-    @classmethod
-    def of(cls, result: dict) -> Job:
-        """The one that a result is of."""
-        return cls(*(result[one.name] for one in fields(cls)))
 
-
-def with_variants(params):
+def with_variants(params: Params) -> Params:
     """params.yaml's methods, and the paper's with one thing plain or left out."""
     one, optimizer = params.methods[PAPER], params.optimizer
     names = ("generations", "delta", "cma_population", "recombination")
@@ -82,7 +73,7 @@ def with_variants(params):
     return params.model_copy(update={"methods": methods})
 
 
-def jobs_of(bands, methods, recordings: int, seeds: int) -> list[Job]:
+def jobs_of(bands: Sequence[str], methods: Sequence[str], recordings: int, seeds: int) -> list[Job]:
     """Every identification, those first that tell most and cost least."""
     first = [
         Job(band, FIRST + number, method, 1)
@@ -103,75 +94,41 @@ def place(work: Path, band: str, recording: int) -> Path:
     return work / "episodes" / band / str(recording)
 
 
-def record(where: tuple[str, int, Path]) -> None:
+def record(where: tuple[str, int], work: Path) -> None:
     """Make a recording's episode, with its clamps; what is there stays."""
-    band, number, work = where
+    band, number = where
     params = load()
     params = params.model_copy(update={"rig": params.rig.model_copy(update={"seed": number})})
     recorded(params, band, place(work, band, number))
 
 
-def identified(job: Job, params, folder: Path) -> dict:
+@cache  # in each process
+def _params() -> Params:
+    return with_variants(load())
+
+
+def aimed_and_launched(job: Job, params: Params, folder: Path) -> dict:
     """What one identification found of the episode in `folder`, and where its launches land."""
-    optimizer = params.optimizer.model_copy(update={"seed": job.seed})
-    params = params.model_copy(update={"optimizer": optimizer})
-    sling = sling_of(params, job.band, job.method, folder)
-    start, targets = time.perf_counter(), params.trials.targets
-    outcome, told = found(params, job.method, sling, [Episode.load(folder / "episode")])
-    seconds = time.perf_counter() - start
-    names = SearchBox.of_method(params, job.method).names
-    draws = aimed(outcome, params, targets)
-    landing = [
-        np.nan if np.isnan(draw).any() else launch(job.band, params, tuple(draw), None).landing_y
-        for draw in draws
-    ]
+    one = identified(params, job.band, job.method, job.seed, folder)
+    draws = aimed(one.outcome, params, params.trials.targets)
     return {
-        "theta": {name: outcome.identified[name] for name in names},
-        "loss": told.get("loss"),
+        "theta": one.theta,
+        "loss": one.told.get("loss"),
         "draws_m": draws,
-        "error_m": np.array(landing) - targets,
-        "seconds": seconds,
+        "error_m": errors_on_the_rig(job.band, params, draws),
+        "seconds": one.seconds,
     }
 
 
-_params = None  # of this process
-
-
-def _begin() -> None:
-    global _params
-    _params = with_variants(load())
-
-
 def work_on(job: Job, work: Path) -> dict:
-    """A result; that no simulation can follow the recording is one too."""
-    try:
-        result = identified(job, _params, place(work, job.band, job.recording))
-    except UserError as error:
-        result = {"failed": str(error)}
-    return plain(vars(job) | {"processor": processor()} | result)
+    """The result of a job."""
+    folder = place(work, job.band, job.recording)
+    make = partial(aimed_and_launched, job, _params(), folder)
+    return result_of(job, make, processor=processor())
 
 
-class ResultLines:
-    """Lines of JSON in a file; the last may be cut short, where a run was killed."""
-
-    def __init__(self, work: Path) -> None:
-        self.path = work / "results.jsonl"
-
-    def all(self) -> dict[Job, dict]:
-        """Each job's, as it was written last."""
-        found = {}
-        for line in self.path.read_text().splitlines() if self.path.exists() else []:
-            try:
-                result = json.loads(line)
-            except json.JSONDecodeError:
-                continue
-            found[Job.of(result)] = result
-        return found
-
-    def add(self, result: dict) -> None:
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        with self.path.open("a") as file:  # an empty line ends one that was cut
-            file.write(f"\n{json.dumps(result)}\n")
+def lines_in(work: Path) -> ResultLines:
+    return ResultLines(work / "results.jsonl")
 
 
 def scores(results: list[dict], name: str) -> np.ndarray:
@@ -189,7 +146,7 @@ def lost(one: dict) -> bool:
     return "failed" in one or not np.isfinite(np.array(one["error_m"], float)).any()
 
 
-def summary(results: list[dict], bands, methods) -> dict:
+def summary(results: list[dict], bands: Sequence[str], methods: Sequence[str]) -> dict:
     """Of each band, and of all: methods' means, and how each compares with the paper's."""
     by = {(r["band"], r["recording"], r["method"], r["seed"]): r for r in results}
 
@@ -227,7 +184,7 @@ def summary(results: list[dict], bands, methods) -> dict:
     return figures
 
 
-def rank_correlations(results: list[dict], methods) -> np.ndarray:
+def rank_correlations(results: list[dict], methods: Sequence[str]) -> np.ndarray:
     """Spearman's, of loss and miss over searches of one loss on the same recording; one each.
 
     Positive: the lower the loss that a search reached, the nearer its launches land.
@@ -241,7 +198,7 @@ def rank_correlations(results: list[dict], methods) -> np.ndarray:
     return np.array([spearmanr(*pair).statistic for pair in pairs])
 
 
-def _of_one_loss(method, params) -> bool:
+def _of_one_loss(method: MethodParams, params: Params) -> bool:
     """Whether a method minimises what the paper's does, over the same simulations."""
     names = ("weights", "law", "mounting", "fixed", "bounds")
     return all(getattr(method, name) == getattr(params.methods[PAPER], name) for name in names)
@@ -253,10 +210,10 @@ def mean_of(values) -> float:
     return float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
 
 
-def report(args, params) -> None:
+def report(args: argparse.Namespace, params: Params) -> None:
     """Write what the results in the work folder say."""
     wanted = set(jobs_of(args.bands, args.methods, args.recordings, args.seeds))
-    results = [one for job, one in ResultLines(args.work).all().items() if job in wanted]
+    results = [one for job, one in lines_in(args.work).of(Job).items() if job in wanted]
     if not results:
         raise UserError(f"{args.work}: holds no result of these bands and methods")
     same = [name for name in args.methods if _of_one_loss(params.methods[name], params)]
@@ -290,15 +247,13 @@ def report(args, params) -> None:
         "figures": summary(results, args.bands, args.methods),
         **environment("cpu", command),
     }
-    args.report.parent.mkdir(parents=True, exist_ok=True)
     write_json(args.report, plain(content))
     print(f"{args.report}: {len(results)} of {len(wanted)} results", flush=True)
 
 
-def run(args) -> None:
+def run(args: argparse.Namespace) -> None:
     """Work through the jobs that have no result yet, until the time is over."""
-    end, results = time.monotonic() + 60 * args.minutes, ResultLines(args.work)
-    there = results.all()
+    results, there = lines_in(args.work), lines_in(args.work).of(Job)
     jobs = [
         job
         for job in jobs_of(args.bands, args.methods, args.recordings, args.seeds)
@@ -306,31 +261,16 @@ def run(args) -> None:
         and job not in there
     ]
     print(f"{len(jobs)} identifications on {args.workers} processes", flush=True)
-    if not jobs:
-        return
-    _begin()
-    results.add(work_on(jobs[0], args.work))  # compiles, once
-    with Pool(_begin, workers=args.workers) as pool:
-        waiting = {pool.submit(work_on, job, args.work): job for job in jobs[1:]}
-        try:
-            left = max(end - time.monotonic(), 0)
-            for count, done in enumerate(as_completed(waiting, timeout=left), 2):
-                results.add(done.result())
-                if count % 20 == 0:
-                    print(f"{count} of {len(jobs)}: {waiting[done]}", flush=True)
-        except TimeoutError:
-            print("the time is over; run it again to go on", flush=True)
-            pool.shutdown(wait=False, cancel_futures=True)
+    work, end = partial(work_on, work=args.work), time.monotonic() + 60 * args.minutes
+    runner.run(work, jobs[:1], results, 1)  # compiles, once
+    runner.run(work, jobs[1:], results, args.workers, (end - time.monotonic()) / 60)
 
 
 def main() -> None:
     params = with_variants(load())
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = runner.parser(__doc__, REPORT, WORK)
     parser.add_argument("--record", action="store_true", help="make the episodes, nothing else")
     parser.add_argument("--report-only", action="store_true", help="of what is there")
-    parser.add_argument("--workers", type=int, default=cores(), help="processes (default: cores)")
-    parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
-    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
     parser.add_argument("--bands", nargs="+", default=list(params.run.rig))
     parser.add_argument("--methods", nargs="+", default=list(params.methods))
     parser.add_argument("--recordings", type=int, default=10, help="a band (default: 10)")
@@ -342,14 +282,11 @@ def main() -> None:
             expect_known(params, kind, name)
     if PAPER not in args.methods:
         raise UserError(f"--methods: {PAPER} must be among them, all are compared with it")
-    for name in ("SLING_WORKERS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"  # of the processes that are started from here
     if args.record:
         numbers = range(FIRST, FIRST + args.recordings)
-        every = [(band, number, args.work) for number in numbers for band in args.bands]
-        with Pool(workers=args.workers) as pool:
-            for (band, number, _), _ in zip(every, pool.map(record, every), strict=True):
-                print(f"{band} {number}", flush=True)
+        every = [(band, number) for number in numbers for band in args.bands]
+        for _ in runner.each(partial(record, work=args.work), every, args.workers):
+            pass
         return
     if not args.report_only:
         run(args)
@@ -357,7 +294,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except UserError as error:
-        sys.exit(f"error: {error}")
+    errors.run(main)

@@ -6,18 +6,17 @@ A campaign writes its file before it asserts, so that a claim that fails leaves 
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+from pipeline.base.code import ROOT
 from pipeline.base.files import write_json
-from pipeline.params import load
+from pipeline.params import Params, load
 from validation.benchmarks.timing import environment
-
-ROOT = Path(__file__).parents[2]
+from validation.campaigns.runner import plain
 
 
 @pytest.fixture(scope="session")
-def params():
+def params() -> Params:
     return load(ROOT / "params.yaml")
 
 
@@ -54,17 +53,6 @@ def record(request) -> Callable[..., None]:
             f" validation/campaigns/{request.path.name}",
         }
         content = {"asked": asked, "met": met, "settings": settings, "figures": figures, **about}
-        write_json(ROOT / "reports/validation" / f"{name}.json", _plain(content))
+        write_json(ROOT / "reports/validation" / f"{name}.json", plain(content, digits=5))
 
     return write
-
-
-def _plain(value):
-    """For JSON: NumPy's numbers as Python's, floats to five digits, what is not finite as null."""
-    if isinstance(value, dict):
-        return {str(key): _plain(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [_plain(one) for one in value]
-    if isinstance(value, (float, np.floating)):
-        return float(f"{value:.5g}") if np.isfinite(value) else None
-    return value.item() if isinstance(value, np.generic) else value

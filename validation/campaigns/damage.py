@@ -11,9 +11,12 @@ import zlib
 
 import numpy as np
 import zstandard
+from mcap.opcode import Opcode
 
-HEAD = struct.Struct("<BQ")
-CHUNK, MESSAGE = 6, 5
+from pipeline.recording.input.records import CHUNK as CHUNK_FIELDS
+from pipeline.recording.input.records import HEAD
+
+CHUNK, MESSAGE = Opcode.CHUNK, Opcode.MESSAGE
 EXTREMES = [0, 1, 2, 255, 2**16, 2**31 - 1, 2**32 - 1, 2**40, 2**63 - 1, 2**63, 2**64 - 1]
 
 
@@ -137,8 +140,10 @@ def _opcode(content: bytes, random: np.random.Generator) -> bytes:
 def _garbage(content: bytes, random: np.random.Generator) -> bytes:
     """The records of one chunk damaged and its checksum mended: what reads messages must cope."""
     a, b = _record(content, random, CHUNK, CHUNK)
-    start, end, _, _, name = struct.unpack_from("<QQQII", content, a + 9)
-    data = bytes(8) + zstandard.ZstdDecompressor().decompress(content[a + 9 + 32 + name + 8 : b])
+    start, end, _, _, name = CHUNK_FIELDS.unpack_from(content, a + HEAD.size)
+    data = bytes(8) + zstandard.ZstdDecompressor().decompress(
+        content[a + HEAD.size + CHUNK_FIELDS.size + name + 8 : b]
+    )
     if random.random() < 0.5:  # one message, and its fields first of all
         x, y = _record(data + bytes(8), random, 1, MESSAGE)
         near = min(y - x, 130 if random.random() < 0.5 else y - x)
@@ -148,7 +153,7 @@ def _garbage(content: bytes, random: np.random.Generator) -> bytes:
         data = _hurt(data, random)
     data = data[8:]
     packed = zstandard.ZstdCompressor().compress(data)
-    fields = struct.pack("<QQQII", start, end, len(data), zlib.crc32(data), 4) + b"zstd"
+    fields = CHUNK_FIELDS.pack(start, end, len(data), zlib.crc32(data), 4) + b"zstd"
     body = fields + struct.pack("<Q", len(packed)) + packed
     return content[:a] + HEAD.pack(CHUNK, len(body)) + body + content[b:]
 

@@ -9,15 +9,14 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
-from pipeline.params import load
+from pipeline.params import Params, load
 from pipeline.simulator.interaction import interact
-from rig.physics.launch import launch
 from validation import orange
-from validation.campaigns.rig_scores import aimed
+from validation.campaigns.rig_scores import aimed, errors_on_the_rig
+from validation.campaigns.runner import PAPER
 from validation.density import Calibrated
 from validation.effects import AS_IS
 
-PAPER, OURS = "sling2sim2real", "least_squares"
 SWITCHES = {  # section and values, as the paper has them
     AS_IS: ("method_defaults", {}),
     "mounting: false": ("method_defaults", {"mounting": False}),
@@ -37,7 +36,7 @@ WORDS = {  # of a row of docs/paper.md
 }
 
 
-def params_of(band: str, switch: str):
+def params_of(band: str, switch: str) -> Params:
     """params.yaml with one setting as the paper has it; for `orange`, with that band."""
     params = load()
     params = orange.with_orange(params) if band == orange.NAME else params
@@ -78,12 +77,8 @@ def misses(band: str, outcome: Calibrated, seen: Episode, recordings: Path | Non
     return {"error": error, "miss": np.nanmean(error[inside]), "beyond": np.nanmean(error[~inside])}
 
 
-def launches(band: str, params, draws: np.ndarray) -> dict:
+def launches(band: str, params: Params, draws: np.ndarray) -> dict:
     """Where draws (T, 2) for the targets land on the rig, without errors."""
-    landing = [
-        np.nan if np.isnan(draw).any() else launch(band, params, tuple(draw), None).landing_y
-        for draw in draws
-    ]
-    error = np.array(landing) - params.trials.targets
+    error = errors_on_the_rig(band, params, draws)
     reached = np.isfinite(error).any()
     return {"error": error, "miss": np.nanmean(np.abs(error)) if reached else np.nan}

@@ -7,44 +7,37 @@ One setting at a time is put as the paper has it, for the paper's method with se
 and for ours. What they find in recordings of the rig, which took part in no choice, is aimed at the
 targets of the trials, as a perfect policy would, and launched on the rig without errors. Of the
 band `orange`, FOLDER has the recordings and the measured landings, which no fit sees. What trains
-policies has a campaign of its own, policy_as_printed. Results are files in --work: a run that was
-killed goes on from there.
+policies has a campaign of its own, policy_as_printed. Results are lines of results.jsonl in --work:
+a run that was killed goes on from there.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import os
-import sys
-import time
-from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from pipeline.base import errors
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json, write_text
 from pipeline.base.layout import made
-from pipeline.base.machine import cores
-from pipeline.base.pool import Pool
 from pipeline.episode.episode import Episode
-from pipeline.identify.objective.box import SearchBox
 from pipeline.params import load
 from validation import orange
 from validation.benchmarks.timing import environment
+from validation.campaigns import runner
 from validation.campaigns.deviation_scores import (
     MESH,
-    OURS,
-    PAPER,
     SWITCHES,
     WORDS,
     forces,
     misses,
     params_of,
 )
-from validation.campaigns.rig_scores import calibrated_clamps, plain, sling_of
-from validation.density import found
+from validation.campaigns.rig_scores import calibrated_clamps, identified
+from validation.campaigns.runner import OURS, PAPER, ResultLines, plain, result_of
 from validation.effects import AS_IS, effects, runs, table
 from validation.marked import marks, with_block
 from validation.paired import LEVEL
@@ -65,10 +58,6 @@ class Case:
     switch: str
     method: str
     seed: int
-
-    def path(self, work: Path) -> Path:
-        name = "-".join(map(str, vars(self).values()))
-        return work / "results" / f"{''.join(c if c.isalnum() else '_' for c in name)}.json"
 
     def episode(self, work: Path, switch: str | None = None) -> Path:
         """Where its episode lies, or that of another setting, with the clamps."""
@@ -127,53 +116,40 @@ def prepare(where: tuple[str, int], work: Path, recordings: Path | None) -> None
         raw.unlink()
 
 
-def identified(case: Case, work: Path, recordings: Path | None) -> dict:
+def scored(case: Case, work: Path, recordings: Path | None) -> dict:
     """What one identification found, and how near its forces and launches are."""
-    params, folder = params_of(case.band, case.switch), case.episode(work)
-    optimizer = params.optimizer.model_copy(update={"seed": case.seed})
-    params = params.model_copy(update={"optimizer": optimizer})
-    start, sling = time.perf_counter(), sling_of(params, case.band, case.method, folder)
-    outcome, told = found(params, case.method, sling, [Episode.load(folder / "episode")])
-    seconds, names = time.perf_counter() - start, SearchBox.of_method(params, case.method).names
-    theta = {name: outcome.identified[name] for name in names}
-    about = {"theta": theta, "youngs_modulus": theta["youngs_modulus"], "seconds": seconds}
-    about |= {
-        "point": [*outcome.identified.values()],
-        "own_loss": told.get("loss", {}).get("total"),
-    }
+    params = params_of(case.band, case.switch)
+    one = identified(params, case.band, case.method, case.seed, case.episode(work))
+    about = {"theta": one.theta, "youngs_modulus": one.theta["youngs_modulus"]}
+    about |= {"seconds": one.seconds, "point": [*one.outcome.identified.values()]}
+    about |= {"own_loss": one.told.get("loss", {}).get("total")}
     seen = Episode.load(case.episode(work, AS_IS) / "episode")
-    return about | forces(case.band, outcome, seen) | misses(case.band, outcome, seen, recordings)
+    about |= forces(case.band, one.outcome, seen)
+    return about | misses(case.band, one.outcome, seen, recordings)
 
 
-def work_on(case: Case, work: Path, recordings: Path | None) -> None:
-    """Keep a result; that no simulation can follow the recording is one too."""
-    if case.path(work).exists():
-        return
-    try:
-        done = identified(case, work, recordings)
-    except UserError as error:
-        done = {"failed": str(error)}
-    case.path(work).parent.mkdir(parents=True, exist_ok=True)
-    write_json(case.path(work), plain(vars(case) | done))
+def work_on(case: Case, work: Path, recordings: Path | None) -> dict:
+    """The result of a case."""
+    return result_of(case, partial(scored, case, work, recordings))
 
 
-def run(args, cases: list[Case]) -> None:
+def lines_in(work: Path) -> ResultLines:
+    return ResultLines(work / "results.jsonl")
+
+
+def run(args: argparse.Namespace, cases: list[Case]) -> None:
     """Episodes, then identifications, one a process."""
     recordings = [*dict.fromkeys((case.band, case.recording) for case in cases)]
-    make = partial(prepare, work=args.work, recordings=args.orange)
-    keep = partial(work_on, work=args.work, recordings=args.orange)
-    with Pool(workers=args.workers) as pool:
-        for work, todo in ((make, recordings), (keep, cases)):
-            waiting = [pool.submit(work, one) for one in todo]
-            for number, done in enumerate(as_completed(waiting), 1):
-                done.result()
-                print(f"{work.func.__name__} {number} of {len(todo)}", flush=True)
+    about = {"work": args.work, "recordings": args.orange}
+    for _ in runner.each(partial(prepare, **about), recordings, args.workers):
+        pass
+    runner.run(partial(work_on, **about), cases, lines_in(args.work), args.workers)
 
 
-def report(args, cases: list[Case]) -> None:
+def report(args: argparse.Namespace, cases: list[Case]) -> None:
     """Write what the results in the work folder say."""
-    there = [one.path(args.work) for one in cases]
-    results = [json.loads(path.read_text()) for path in there if path.exists()]
+    there = lines_in(args.work).of(Case)
+    results = [there[case] for case in cases if case in there]
     if not results:
         raise UserError(f"{args.work}: holds no result")
     params, rig = load(), [band for band in args.bands if band != orange.NAME]
@@ -201,7 +177,6 @@ def report(args, cases: list[Case]) -> None:
         "results": results,
         **environment("cpu", command + (" --orange FOLDER" if args.orange else "")),
     }
-    args.report.parent.mkdir(parents=True, exist_ok=True)
     write_json(args.report, plain(content))
     print(f"{args.report}: {len(results)} of {len(cases)} results", flush=True)
     print(block(content))
@@ -226,7 +201,7 @@ def block(content: dict) -> str:
     return begin + "\n".join(lines) + "\n" + end
 
 
-def refused(args) -> dict:
+def refused(args: argparse.Namespace) -> dict:
     """Why a recording's clamps were not calibrated under a setting, so that others' were taken."""
     told = {}
     for band in args.bands:
@@ -238,13 +213,10 @@ def refused(args) -> dict:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = runner.parser(__doc__, REPORT, WORK)
     parser.add_argument("--orange", type=Path, help="folder of its recordings and landings")
     parser.add_argument("--report-only", action="store_true", help="of what is there")
     parser.add_argument("--page", action="store_true", help=f"only write its table into {PAGE}")
-    parser.add_argument("--workers", type=int, default=cores(), help="processes (default: cores)")
-    parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
-    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
     parser.add_argument("--bands", nargs="+", default=list(load().run.rig), help="of the rig")
     parser.add_argument("--recordings", type=int, default=RECORDINGS, help="a band (default: 3)")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="of searches (default: 2)")
@@ -255,15 +227,10 @@ def main() -> None:
         return
     args.bands += [orange.NAME] * (args.orange is not None)
     cases = cases_of(args.bands, args.recordings, args.seeds)
-    for name in ("SLING_WORKERS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"  # of the processes that are started from here
     if not args.report_only:
         run(args, cases)
     report(args, cases)
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except UserError as error:
-        sys.exit(f"error: {error}")
+    errors.run(main)

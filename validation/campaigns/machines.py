@@ -2,14 +2,15 @@
 
     python -m validation.campaigns.machines --device cuda:0 --report NAME.json
     python -m validation.campaigns.machines --compare reports/validation/machines/*.json
-    python -m validation.campaigns.machines --twice dvc.lock other/dvc.lock
+    python -m validation.campaigns.machines --twice RUN OTHER
 
 The first identifies each band, by our method and by the paper's, from what a run has left under
-data/episodes and data/mounting, and launches fixed draws in the simulator. A GPU has the rollouts
+data/episodes and data/clamps, and launches fixed draws in the simulator. A GPU has the rollouts
 of searches, and the launches; the fit of least squares is on the CPU anywhere. The second prints
 how far machines differ, and fails where our landings do by more than 0.2 %; of the paper's method,
 whose search takes another way after the first other bit, it only tells. The third compares what
-two runs wrote.
+two runs of one machine wrote, byte by byte, with the committed one, of another, beside them. It
+writes reports/validation/twice.json.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
@@ -36,14 +38,15 @@ from pipeline.base.schema import JsonRecord, read_json
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.params import expect_known, load
+from pipeline.params import Params, expect_known, load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
 from validation.benchmarks.timing import environment
+from validation.campaigns.runner import OURS, PAPER
 from validation.density import found
 
-FOLDER = Path("reports/validation/machines")
-OURS, PAPER = "least_squares", "sling2sim2real"
+FOLDER, TWICE = Path("reports/validation/machines"), Path("reports/validation/twice.json")
+COMMITTED, TABLE = Path(), Path("reports/tables/table1.csv")
 DRAWS = [*product((-0.36, -0.31, -0.27), (-0.20, -0.15, -0.11))]  # (y, z) [m], all in the box
 LIMIT = 2e-3  # of a landing of ours, relative
 ALONE = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"  # one each, as stages have
@@ -70,7 +73,7 @@ class MachineReport(JsonRecord):
     bands: dict[str, dict[str, MachineLandings]]
 
 
-def inputs(params, band: str, root: Path) -> str:
+def inputs(params: Params, band: str, root: Path) -> str:
     """A digest of all that a band's identification hangs on but the code. Raises NotMade."""
     layout = Layout(root)
     names = ("signals", "clouds")
@@ -78,7 +81,7 @@ def inputs(params, band: str, root: Path) -> str:
     about = (params.bands[band], params.setup, params.sling, params.force, params.loss)
     about += (params.parameters, params.optimizer, params.methods[OURS], params.methods[PAPER])
     texts = [one.model_dump_json() for one in about]
-    return fingerprint(*map(made, [*files, layout.mounting(band)]), *texts)
+    return fingerprint(*map(made, [*files, layout.clamps(band)]), *texts)
 
 
 def identified(band: str, method: str, root: Path, device: str) -> dict:
@@ -193,18 +196,44 @@ def outputs(lock: Path) -> dict[str, str]:
         raise UserError(f"{lock}: no dvc.lock of a run: {one_line(error)}") from error
 
 
-def differing(locks: list[Path]) -> list[str]:
-    """Outputs of two runs that are not the same, or that only one has; sorted."""
-    one, other = map(outputs, locks)
-    return sorted(path for path in {*one, *other} if one.get(path) != other.get(path))
+def landings(folder: Path) -> dict[tuple[str, str], float]:
+    """Mean distance from all targets [cm], by band and method; nothing where no launch landed."""
+    table = pd.read_csv(made(folder / TABLE))
+    rows = table[(table.source == "virtual") & (table.target_m == "all")]
+    means = rows.set_index(["band", "method"])["mean_error_cm"]
+    return pd.to_numeric(means, errors="coerce").dropna().to_dict()
+
+
+def twice(run: Path, other: Path) -> dict:
+    """What two runs of one machine wrote, byte by byte, and how far the committed run is off.
+
+    Args:
+        run, other: Folders of clones in which everything has run, in `other` perhaps more.
+    """
+    first, second = (outputs(folder / "dvc.lock") for folder in (run, other))
+    differing = sorted(path for path, digest in first.items() if second.get(path) != digest)
+    committed = landings(COMMITTED)
+    return {
+        "kind": "virtual",
+        "asked": "Two runs of one machine write the same bytes.",
+        "met": not differing,
+        "outputs": len(first),
+        "differing": differing,
+        "landings_cm": {
+            f"{band} {method}": {"these_runs": value, "committed": committed.get((band, method))}
+            for (band, method), value in landings(run).items()
+        },
+    }
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("--report", type=Path, help="measure here and write this file")
+    parser.add_argument(
+        "--report", type=Path, help=f"file to write (of --twice, by default: {TWICE})"
+    )
+    what = parser.add_mutually_exclusive_group()
     what.add_argument("--compare", type=Path, nargs="+", metavar="JSON", help="of machines")
-    what.add_argument("--twice", type=Path, nargs=2, metavar="LOCK", help="dvc.lock of two runs")
+    what.add_argument("--twice", type=Path, nargs=2, metavar="RUN", help="folders of whole runs")
     parser.add_argument("--project", type=Path, default=Path(), help="folder (default: this)")
     parser.add_argument("--device", default="cpu", help="cpu (default) or cuda:0")
     parser.add_argument(
@@ -217,10 +246,14 @@ def main() -> int:
         print(*lines, sep="\n")
         return 0 if met else 1
     if args.twice:
-        others = differing(args.twice)
-        count = len(outputs(args.twice[0]))
-        print(*others, f"{len(others)} outputs differ; the first run has {count}", sep="\n")
-        return 1 if others else 0
+        content, report = twice(*args.twice), args.report or TWICE
+        command = "python -m validation.campaigns.machines --twice RUN OTHER"
+        write_json(report, content | environment("cpu", command))
+        differing = content["differing"]
+        print(*differing, f"{len(differing)} of {content['outputs']} outputs differ", sep="\n")
+        return 1 if differing else 0
+    if not args.report:
+        raise UserError("--report FILE, --compare JSON JSON or --twice RUN OTHER is wanted")
     content = measure(args.bands, args.project, args.device)
     command = f"python -m validation.campaigns.machines --device {args.device}"
     command += f" --report {FOLDER / args.report.name}"

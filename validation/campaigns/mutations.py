@@ -11,7 +11,6 @@ nobody can ask for the first; what remains is no traceback, no hang, no memory o
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import os
@@ -21,29 +20,25 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
-from threading import Lock
 
 from pipeline.base import errors
+from pipeline.base.code import ROOT, digests
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_json
 from pipeline.base.fingerprint import fingerprint
-from pipeline.base.machine import cores
 from validation.benchmarks.timing import environment
-from validation.campaigns import outcomes
+from validation.campaigns import outcomes, runner
 from validation.campaigns.outcomes import FAULT, HANGS, MOST, name_of
-from validation.campaigns.small_recordings import CHECKED, CONTAINERS, FAMILIES, write_small
-from validation.code import digests
+from validation.campaigns.runner import Result, ResultLines
+from validation.recordings.small import CHECKED, CONTAINERS, FAMILIES, write_small
 
-ROOT = Path(__file__).parents[2]
 WORK, REPORT = Path("build/mutations"), Path("reports/validation/mutations.json")
 LIBRARIES = ("mcap", "mcap-ros2-support", "mcap-protobuf-support", "rosbags", "protobuf")
 LIBRARIES += ("foxglove-sdk", "zstandard", "lz4", "opencv-python-headless")
 SHARE = 250  # recordings a process: what one process held is known a share at a time
 TOLD = 500
-Result = dict[str, object]
 
 
 def key(result: Result) -> tuple[str, str, int]:
@@ -103,11 +98,11 @@ def run(
 
 
 def _results(folder: Path, family: str, container: str, first: int, end: int) -> Iterator[Result]:
-    """Of one share; where a process ends too early, its last recording is a fault."""
+    """Of one share; where a process ends too early, the recording that was next is a fault."""
     module, log = "validation.campaigns.outcomes", folder / f"{family}-{container}-{first}.log"
     while first < end:
         command = [sys.executable, "-m", module, folder, family, container, first, end]
-        started = None
+        line: Result = {}
         with log.open("w") as said:
             process = subprocess.Popen(
                 list(map(str, command)),
@@ -118,20 +113,22 @@ def _results(folder: Path, family: str, container: str, first: int, end: int) ->
                 text=True,
             )
             try:
-                for started in map(json.loads, process.stdout):
-                    if "outcome" in started:
-                        yield started
-                        first = started["seed"] + 1
+                for line in map(json.loads, process.stdout):
+                    if "outcome" in line:
+                        yield line
+                        first = line["seed"] + 1
             except GeneratorExit:  # the time is over
                 process.kill()
                 process.wait()
                 raise
         if process.wait() and first < end:
-            if started is None:
+            if not line:
                 raise RuntimeError(f"{' '.join(map(str, command))}: {log.read_text()}")
-            words = f"ended by {process.returncode}{_place(log.read_text())}"
-            yield {**started, "outcome": FAULT, "words": words, "s": HANGS, "bytes": 0}
-            first = started["seed"] + 1
+            when = " before it began" if "outcome" in line else ""
+            words = f"ended by {process.returncode}{when}{_place(log.read_text())}"
+            about = {"family": family, "container": container, "seed": first}
+            yield {**about, "outcome": FAULT, "words": words, "s": HANGS, "bytes": 0}
+            first += 1
     log.unlink(missing_ok=True)
 
 
@@ -139,25 +136,6 @@ def _place(log: str) -> str:
     """Where a process was when it ended: what faulthandler wrote has the last call first."""
     calls = [line.strip() for line in log.splitlines() if line.strip().startswith("File ")]
     return f", {calls[0]}" if calls else ""
-
-
-class Ledger:
-    """Results as lines of JSON in a file; the last may be cut short, where a run was killed."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.results: dict[tuple, Result] = {}
-        self.lock = Lock()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        for line in path.read_text().splitlines() if path.exists() else ():
-            with suppress(json.JSONDecodeError):
-                result = json.loads(line)
-                self.results[key(result)] = result
-
-    def add(self, result: Result) -> None:
-        with self.lock, self.path.open("a") as file:  # an empty line ends one that was cut
-            file.write(f"\n{json.dumps(result)}\n")
-            self.results[key(result)] = result
 
 
 def faults(results: list[Result]) -> list[Result]:
@@ -209,34 +187,30 @@ def _named(one: Result) -> Result:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = runner.parser(__doc__, REPORT, WORK)
     parser.add_argument("--count", type=int, default=20_000, help="recordings (default: 20000)")
-    parser.add_argument("--workers", type=int, default=cores(), help="processes (default: cores)")
     parser.add_argument("--minutes", type=float, default=1e4, help="then stop and report")
-    parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
-    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
     args = parser.parse_args()
     if min(args.count, args.workers) < 1:
         raise UserError("--count, --workers: from 1 on")
     code = fingerprint(json.dumps(digests(Path(outcomes.__file__))))[:12]
-    ledger = Ledger(args.work / code / "results.jsonl")
-    parts = shares(args.count, set(ledger.results))
-    start, before = time.monotonic(), len(ledger.results)
+    lines = ResultLines(args.work / code / "results.jsonl")
+    parts = shares(args.count, {key(one) for one in lines.lines})
+    start, before = time.monotonic(), len(lines.lines)
     print(f"{before} recordings are done, {sum(b - a for *_, a, b in parts)} are to do", flush=True)
 
     def told(result: Result) -> None:
-        ledger.add(result)
+        lines.add(result)
         if result["outcome"] == FAULT:
             print(json.dumps(result), flush=True)
-        if len(ledger.results) % TOLD == 0:
+        if len(lines.lines) % TOLD == 0:
             minutes = (time.monotonic() - start) / 60
-            failed = len(faults(list(ledger.results.values())))
-            print(f"{len(ledger.results)}, {minutes:.1f} min: {failed} faults", flush=True)
+            failed = len(faults([*lines.lines]))
+            print(f"{len(lines.lines)}, {minutes:.1f} min: {failed} faults", flush=True)
 
-    run(ledger.path.parent, parts, args.workers, told, start + 60 * args.minutes)
-    results = [ledger.results[one] for one in sorted(ledger.results)]
+    run(lines.path.parent, parts, args.workers, told, start + 60 * args.minutes)
+    results = sorted(lines.lines, key=key)
     command = f"python -m validation.campaigns.mutations --count {args.count}"
-    args.report.parent.mkdir(parents=True, exist_ok=True)
     content = summary(results, args.count)
     write_json(args.report, content | environment("cpu", f"{command} --workers {args.workers}"))
     print(f"{args.report}: {len(results)} recordings, {len(faults(results))} faults", flush=True)

@@ -24,7 +24,7 @@ from pipeline.episode.episode import Episode
 from pipeline.params import Params
 from pipeline.recording.build import Processed, episode_of, process
 from validation.campaigns.damage import mutated
-from validation.campaigns.small_recordings import CHECKED, small_params
+from validation.recordings.small import CHECKED, small_params
 
 SAME, SAID, LINE = "same episode", "episode with loss said", "one line"
 OTHER = "another episode"  # which only a recording without checksums may become
@@ -52,7 +52,7 @@ def same(a: Episode, b: Episode) -> bool:
 
 def said(done: Processed) -> list[str]:
     """Everything by which a user is told of damage."""
-    words = [*done.recording.losses, *done.recording.notes]
+    words = [*done.pull.recording.losses, *done.pull.recording.notes]
     if done.clouds.damaged or done.clouds.unpaired:
         words.append(f"{done.clouds.damaged} pictures damaged, {done.clouds.unpaired} unpaired")
     return words

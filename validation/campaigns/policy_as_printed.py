@@ -4,20 +4,21 @@
 
 A policy of each band is trained in the simulator of one θ file (data/theta/<band>/<method>.json):
 with the settings of params.yaml, with each of the paper's alone, and with all of them. Its draws
-are launched in the same simulator, so nothing but the training differs. Results lie in --work, one
-file a training: a run that was killed goes on from there, and a training within it too.
+are launched in the same simulator, so nothing but the training differs. Results lie as lines of
+results.jsonl in --work: a run that was killed goes on from there, and a training within it too.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.base import errors
+from pipeline.base.code import ROOT, digest
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
@@ -26,17 +27,18 @@ from pipeline.identify.results.theta import load_theta
 from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.launching.surface.simulated import SimulatedLandings
 from pipeline.launching.surface.simulator import simulator
-from pipeline.params import expect_known, load
+from pipeline.params import Params, expect_known, load
+from pipeline.params.launches import PolicyParams
 from pipeline.policy.check import check
 from pipeline.policy.environment import projectile_start
 from pipeline.policy.train import train
 from validation.benchmarks.timing import environment, timed
-from validation.code import ROOT, digest
+from validation.campaigns import runner
+from validation.campaigns.runner import PAPER, ResultLines, plain
 from validation.paired import mean_interval
 
 WORK = Path("data/policy_as_printed")
 REPORT = Path("reports/validation/policy-as-printed.json")
-METHOD = "sling2sim2real"  # whose θ: the paper's
 USUAL = {"landings": "map", "exploration": "scheduled", "state": "target"}
 PRINTED = {"landings": "simulated", "exploration": "learned", "state": "projectile_target"}
 SWITCHES = {"usual": {}, **{name: {name: PRINTED[name]} for name in PRINTED}, "all": PRINTED}
@@ -56,13 +58,15 @@ class Lesson:
     switch: str
     seed: int
 
-    def settings(self, params):
+    def settings(self, params: Params) -> PolicyParams:
         """`policy` of params.yaml, with the switches as this has them."""
         changes = USUAL | SWITCHES[self.switch] | {"seed": self.seed}
         return params.policy.model_copy(update=changes)
 
 
-def taught(lesson: Lesson, params, theta: dict, kept: Path, progress: Progress | None) -> dict:
+def taught(
+    lesson: Lesson, params: Params, theta: dict, kept: Path, progress: Progress | None
+) -> dict:
     """How a policy hits that is trained so, and what the training took."""
     settings, setup = lesson.settings(params), params.setup
     launcher = simulator(params, lesson.band, theta)
@@ -92,29 +96,23 @@ def taught(lesson: Lesson, params, theta: dict, kept: Path, progress: Progress |
     }
 
 
-def result(lesson: Lesson, params, work: Path, method: str) -> dict:
-    """Of the file in `work`; trained where it is missing, or of another θ, settings or code."""
+def result(lesson: Lesson, params: Params, work: Path, method: str) -> dict:
+    """The one in `work`; trained where it is missing, or of another θ, settings or code."""
     theta = load_theta(Path("data/theta", lesson.band, f"{method}.json"), lesson.band)
     about = theta, lesson.settings(params).model_dump(), params.setup.model_dump()
     code = [digest(ROOT / part) for part in TRAINING]
     stamp = fingerprint(json.dumps([about, params.trials.targets, code], sort_keys=True))
-    name = f"{lesson.band}-{lesson.switch}-{lesson.seed}"
-    path = work / f"{name}.json"
-    kept = json.loads(path.read_text()) if path.is_file() else {}
+    lines = ResultLines(work / "results.jsonl")
+    kept = lines.of(Lesson).get(lesson, {})
     if kept.get("stamp") != stamp:
+        name = f"{lesson.band}-{lesson.switch}-{lesson.seed}"
         checkpoint = work / f"{name}.pt"
         progress = Progress(name, params.policy.iterations, "iterations", every=10)
         found = taught(lesson, params, theta, checkpoint, progress)
-        kept = plain({"stamp": stamp, **asdict(lesson), **found})
-        write_json(path, kept)
+        kept = plain({"stamp": stamp, **vars(lesson), **found})
+        lines.add(kept)
         checkpoint.unlink(missing_ok=True)
     return {key: value for key, value in kept.items() if key != "stamp"}
-
-
-def plain(found: dict) -> dict:
-    """As strict JSON has it: null for what is not a number."""
-    text = json.dumps(found, default=float)
-    return json.loads(text, parse_constant=lambda _: None)
 
 
 def summary(results: list[dict]) -> dict:
@@ -132,7 +130,7 @@ def _of_seeds(own: list[dict]) -> dict:
     errors_cm = 100 * np.array([one["error_m"] for one in own], float)  # null becomes NaN
     return {
         "miss_cm": mean_interval(errors_cm.mean(axis=1)),
-        "miss_cm_each": plain({"": errors_cm.tolist()})[""],  # a row for each seed
+        "miss_cm_each": plain(errors_cm),  # a row for each seed
         "range_miss_cm": mean_interval(
             100 * np.array([one["range_mean_error_m"] for one in own], float)
         ),
@@ -145,19 +143,17 @@ def _of_seeds(own: list[dict]) -> dict:
 
 def main() -> None:
     params = load()
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = runner.parser(__doc__, REPORT)
     parser.add_argument("--bands", nargs="+", default=list(params.run.bands))
-    parser.add_argument("--method", default=METHOD, help=f"whose θ (default: {METHOD})")
+    parser.add_argument("--method", default=PAPER, help=f"whose θ (default: {PAPER})")
     parser.add_argument("--seeds", nargs="+", type=int, default=SEEDS)
     parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
-    parser.add_argument("--report", type=Path, default=REPORT, help=f"(default: {REPORT})")
     args = parser.parse_args()
     if min(args.seeds) < 1:
         raise UserError("--seeds: from 1 on")
     expect_known(params, "method", args.method)
     for band in args.bands:
         expect_known(params, "band", band)
-    args.work.mkdir(parents=True, exist_ok=True)
     lessons = [
         Lesson(band, switch, seed)
         for seed in args.seeds
@@ -170,7 +166,9 @@ def main() -> None:
         write_report(args, params, results, len(lessons))
 
 
-def write_report(args, params, results: list[dict], wanted: int) -> None:
+def write_report(
+    args: argparse.Namespace, params: Params, results: list[dict], wanted: int
+) -> None:
     command = "python -m validation.campaigns.policy_as_printed"
     command += f" --bands {' '.join(args.bands)} --method {args.method}"
     content = {
@@ -192,7 +190,6 @@ def write_report(args, params, results: list[dict], wanted: int) -> None:
         "results": results,
         **environment("cpu", f"{command} --seeds {' '.join(map(str, args.seeds))}"),
     }
-    args.report.parent.mkdir(parents=True, exist_ok=True)
     write_json(args.report, content)
     last = results[-1]
     told = f"{last['band']} {last['switch']} {last['seed']}: {last['error_m']}"

@@ -23,19 +23,19 @@ from pipeline.params.identification import LAWS
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 from validation.benchmarks.timing import environment, timed
+from validation.campaigns.runner import OURS
 from validation.simulator.agreement import random_thetas
 from validation.simulator.experiment import band_of
 from validation.simulator.finding import Bench
 from validation.simulator.robustness import HELD_FAST, SEED, survey, survey_launches
 
-METHOD = "least_squares"  # whose bounds the law `rubber` has
 BATCH = 2_000
 REPORT = "reports/validation/random-parameters-{}.json"
 
 
 def random_sets(bench: Bench, law: str, count: int) -> Parameters:
     """`count` random ones of the box."""
-    bounds = bench.params.methods[METHOD].bounds
+    bounds = bench.params.methods[OURS].bounds  # of the law `rubber`
     boxes = np.array([bounds[name] for name in LAWS[law]]).reshape(-1, 2)
     own = np.random.default_rng(SEED).uniform(*boxes.T, (count, len(boxes)))
     others = dict(zip(LAWS[law], own.T, strict=True))

@@ -5,9 +5,9 @@ Recordings are made once and kept as episodes; the rig is launched after a metho
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,21 +17,25 @@ from pipeline.base.files import replacing, write_json
 from pipeline.base.schema import read_json
 from pipeline.episode.episode import Episode
 from pipeline.identify.clamps import calibrate_clamps
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.posterior.launches import Observed
 from pipeline.identify.results.mounting import Mounting
 from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.launching.trials.spread import landing_intervals
+from pipeline.params import Params
 from pipeline.simulator.model import ClampedBand
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.world import World
+from rig.physics.launch import launch
+from validation.campaigns.runner import made_once, plain
 from validation.density import Calibrated, found
 
 TARGETS = np.linspace(1.525, 2.325, 9)  # m
 MAP = 17, 13  # simulated launches that tell where to seek
 
 
-def recorded(params, band: str, folder: Path) -> Episode:
+def recorded(params: Params, band: str, folder: Path) -> Episode:
     """The episode of a recording that the rig makes, clamps beside it; kept in `folder`."""
     from pipeline.recording.build import build_episodes  # both need Open3D, scores do not
     from rig.recorder.record import record
@@ -47,7 +51,7 @@ def recorded(params, band: str, folder: Path) -> Episode:
     return Episode.load(folder / "episode")
 
 
-def calibrated_clamps(params, band: str, episode: Episode, folder: Path) -> None:
+def calibrated_clamps(params: Params, band: str, episode: Episode, folder: Path) -> None:
     """Keep an episode in `folder`, with its clamps beside it."""
     episode.save(folder / "episode")
     sling = ClampedBand.of(params.bands[band], params.setup, params.sling, as_rod=True)
@@ -57,7 +61,7 @@ def calibrated_clamps(params, band: str, episode: Episode, folder: Path) -> None
     write_json(folder / "mounting.json", clamps)
 
 
-def sling_of(params, band: str, method: str, folder: Path) -> ClampedBand:
+def sling_of(params: Params, band: str, method: str, folder: Path) -> ClampedBand:
     """The band as a method takes it, with or without the clamps of its first recording."""
     about = params.methods[method]
     mounting = read_json(folder / "mounting.json", Mounting) if about.mounting else None
@@ -65,7 +69,45 @@ def sling_of(params, band: str, method: str, folder: Path) -> ClampedBand:
     return ClampedBand.of(params.bands[band], *lab, mounting, law=about.law)
 
 
-def aimed(outcome: Calibrated, params, targets: Sequence[float] = TARGETS) -> np.ndarray:
+@dataclass(frozen=True)
+class RigIdentification:
+    """What a method has found in one episode.
+
+    Attributes:
+        told: What `found` says of it.
+        theta: Parameters by name.
+        seconds: Of the identification.
+    """
+
+    outcome: Calibrated
+    told: dict
+    theta: dict[str, float]
+    seconds: float
+
+
+def identified(
+    params: Params, band: str, method: str, seed: int, folder: Path
+) -> RigIdentification:
+    """Identify the episode in `folder` with a seed of the search. Raises UserError."""
+    optimizer = params.optimizer.model_copy(update={"seed": seed})
+    params = params.model_copy(update={"optimizer": optimizer})
+    sling, start = sling_of(params, band, method, folder), time.perf_counter()
+    outcome, told = found(params, method, sling, [Episode.load(folder / "episode")])
+    seconds, names = time.perf_counter() - start, SearchBox.of_method(params, method).names
+    theta = {name: outcome.identified[name] for name in names}
+    return RigIdentification(outcome, told, theta, seconds)
+
+
+def errors_on_the_rig(band: str, params: Params, draws: np.ndarray) -> np.ndarray:
+    """Landing less target [m] of draws (T, 2), launched on the rig without errors; NaN: none."""
+    landing = [
+        np.nan if np.isnan(draw).any() else launch(band, params, tuple(draw), None).landing_y
+        for draw in draws
+    ]
+    return np.array(landing) - params.trials.targets
+
+
+def aimed(outcome: Calibrated, params: Params, targets: Sequence[float] = TARGETS) -> np.ndarray:
     """Draws (T, 2) that a perfect policy would choose for targets; NaN where it finds none."""
     setup = params.setup
     box = {"draw_y": setup.draw_y, "draw_z": setup.draw_z, "max_force": setup.max_force}
@@ -83,7 +125,7 @@ def aimed(outcome: Calibrated, params, targets: Sequence[float] = TARGETS) -> np
     return np.array(draws)
 
 
-def scored(outcome: Calibrated, params, world: World, seed: int = 0) -> dict:
+def scored(outcome: Calibrated, params: Params, world: World, seed: int = 0) -> dict:
     """Launches at TARGETS in the world: errors without noise, and one launch each with noise.
 
     Returns:
@@ -111,7 +153,14 @@ def scored(outcome: Calibrated, params, world: World, seed: int = 0) -> dict:
     }
 
 
-def result(params, band: str, numbers: tuple[int, ...], method: str, folder: Path, known=0) -> dict:
+def result(
+    params: Callable[[int], Params],
+    band: str,
+    numbers: tuple[int, ...],
+    method: str,
+    folder: Path,
+    known: int = 0,
+) -> dict:
     """Scores of a band by some of its recordings, kept in `folder`, from which it resumes.
 
     Args:
@@ -120,8 +169,8 @@ def result(params, band: str, numbers: tuple[int, ...], method: str, folder: Pat
             own, as a lab would make them.
     """
     name = "-".join([band, *map(str, numbers), method, str(known)])
-    path = folder / "scores" / f"{name}.json"
-    if not path.exists():
+
+    def make() -> dict:
         here = params(0)
         places = [folder / f"{band}_{number}" for number in numbers]
         episodes = [
@@ -145,29 +194,18 @@ def result(params, band: str, numbers: tuple[int, ...], method: str, folder: Pat
                 outcome, told = found(here, method, sling, episodes, seen)
             scores = scored(outcome, here, world, seed=numbers[0])
         about = {"point": [*outcome.identified.values()], "told": told, "identification_s": seconds}
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_json(path, plain(scores | about))
-    return json.loads(path.read_text())
+        return plain(scores | about)
+
+    return made_once(folder / "scores" / f"{name}.json", make)
 
 
-def saved(params, path: Path) -> Path:
+def saved(params: Params, path: Path) -> Path:
     """params.yaml as the rig's processes read it."""
     content = params.model_dump(mode="json", exclude_unset=True)
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:
         YAML().dump(content, temporary)
     return path
-
-
-def plain(value):
-    """For JSON: NumPy's numbers as Python's, what is not finite as null."""
-    if isinstance(value, dict):
-        return {key: plain(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [plain(one) for one in value]
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def summary(results: list[dict]) -> dict:

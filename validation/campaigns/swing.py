@@ -25,19 +25,26 @@ from pipeline.base.layout import Layout, made
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.results.theta import calibrated, launch_setup, load_theta, parameters_of
+from pipeline.identify.results.theta import (
+    calibrated,
+    launch_setup,
+    load_theta,
+    parameters_of,
+)
 from pipeline.params import Params, load
+from pipeline.params.identification import parameter_names
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
-from pipeline.simulator.parameters import THETA, Parameters, searched_names
+from pipeline.simulator.parameters import THETA, Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.benchmarks.timing import environment
+from validation.campaigns.runner import OURS, PAPER
+from validation.effects import AS_IS
 
 REPORT = Path("reports/validation/swing.json")
 DEVIATIONS = Path("reports/validation/deviations.json")
-AS_IS, AS_TETRAHEDRA = "as it is", "sling.mesh: tetrahedra"  # its rows
-OURS, PAPER, MESHES = "least_squares", "sling2sim2real", ("rod", "tetrahedra")
+MESHES, AS_TETRAHEDRA = ("rod", "tetrahedra"), "sling.mesh: tetrahedra"  # its switch
 DAMPINGS = np.geomspace(2e-4, 1e-2, 35)  # s d [s]
 PARTS = {  # begin and end, s after the release
     "pull": (-100.0, 0.0),
@@ -71,7 +78,7 @@ class SplitPictures:
         self.reach = middle[..., 1].max(axis=1)  # beyond the fork [m]
 
 
-def by_mesh(params, band: str, episode: Episode) -> dict:
+def by_mesh(params: Params, band: str, episode: Episode) -> dict:
     """By mesh: the damping that each part's pictures would have.
 
     `sensitivity_cm` is how far the part's pictures alone move the geometric term over DAMPINGS;
@@ -100,12 +107,12 @@ def by_mesh(params, band: str, episode: Episode) -> dict:
     return {"own_damping_s": own, "own_theta": theta.theta[0].tolist(), **found}
 
 
-def sling_with(params, band: str, mesh: str) -> ClampedBand:
+def sling_with(params: Params, band: str, mesh: str) -> ClampedBand:
     section = params.sling.model_copy(update={"mesh": mesh})
     return sling_of_method(params.model_copy(update={"sling": section}), band, PAPER)
 
 
-def as_found(params, band: str, results: list[dict]) -> dict:
+def as_found(params: Params, band: str, results: list[dict]) -> dict:
     """Launches in both meshes of what the paper's method found in one recording with each.
 
     `landing_ratio` is the mean over DRAWS, and `hold_force_ratio` too, beside rod and rod.
@@ -145,11 +152,11 @@ def landed(sling: ClampedBand, setup: LaunchSetup, parameters: Parameters) -> np
     return landing.reshape(count, -1)
 
 
-def by_rounding(params, band: str, method: str, episode: Episode) -> dict:
+def by_rounding(params: Params, band: str, method: str, episode: Episode) -> dict:
     """How far TINY changes of all parameters move the loss, each part and landings."""
     content = load_theta(Layout().theta(band, method), band)
     sling, best = calibrated(params, band, content), parameters_of(content)
-    names = searched_names(best.law)
+    names = parameter_names(best.law)
     tiny = 1 + TINY * np.random.default_rng(0).standard_normal((TIMES, len(names)))
     moved = {name: best.column(name) * by for name, by in zip(names, tiny.T, strict=True)}
     points = best.changed(**moved)

@@ -14,25 +14,23 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from pipeline.base.files import write_json
+from pipeline.base.code import ROOT, digests
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import cores
-from pipeline.base.pool import Pool
 from pipeline.episode.episode import Episode
 from pipeline.launching.trials.spread import landing_intervals
-from pipeline.params import load
+from pipeline.params import Params, load
 from pipeline.recording.build import build_episodes
-from tests.project import ROOT
 from validation import density
 from validation.campaigns import rig_scores
 from validation.campaigns.rig_scores import calibrated_clamps, result, sling_of, summary
-from validation.code import digests
+from validation.campaigns.runner import OURS, PAPER, each, made_once
 from validation.orange import landings, with_orange
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
 pytestmark = pytest.mark.validation
 
-METHODS = OURS, PAPER = "least_squares", "sling2sim2real"
+METHODS = OURS, PAPER
 BANDS, FIVE = ("band1", "band2", "band3"), 5
 FOLDER = Path(os.environ.get("SLING_DENSITY", ROOT / ".checkpoints/density"))
 CODE = fingerprint(json.dumps(digests(Path(rig_scores.__file__))))[:12]  # of what scores hang on
@@ -54,7 +52,7 @@ class Identifications(NamedTuple):
     method: str = OURS
     known: int = 0
 
-    def params(self, recording: int):
+    def params(self, recording: int) -> Params:
         """params.yaml with the rubbers, of a recording."""
         return with_rubbers(load(PARAMS), self.seed, recording)
 
@@ -90,14 +88,6 @@ ALL = {
 }
 
 
-def side_by_side(work, *lists) -> list:
-    """One process a core, each with one thread: results in order."""
-    with pytest.MonkeyPatch.context() as patch, Pool(workers=cores()) as pool:
-        for name in ("SLING_WORKERS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-            patch.setenv(name, "1")
-        return list(pool.map(work, *lists))
-
-
 def make(seed: int, band: str) -> None:
     """Everything of one band, whose identifications share recordings."""
     for one in ALL.values():
@@ -111,12 +101,13 @@ def results():
     there = set()
 
     def of(name: str) -> dict:
-        seed, bands = ALL[name].seed, ALL[name].bands
-        if seed not in there:
+        asked = ALL[name]
+        if (seed := asked.seed) not in there:
             every = dict.fromkeys(b for one in ALL.values() if one.seed == seed for b in one.bands)
-            side_by_side(partial(make, seed), every)
+            for _ in each(partial(make, seed), every, cores()):
+                pass
             there.add(seed)
-        return {band: summary(ALL[name].results(band)) for band in bands}
+        return {band: summary(asked.results(band)) for band in asked.bands}
 
     return of
 
@@ -194,7 +185,7 @@ def test_rubbers_that_were_sealed(results, progress, record) -> None:
     not (RECORDINGS_OF_ORANGE / "orange_landings.csv").exists(),
     reason="the recordings of the orange band are not beside the project",
 )
-def test_recordings_that_this_project_did_not_make(params, progress, record) -> None:
+def test_recordings_that_this_project_did_not_make(params: Params, progress, record) -> None:
     params = with_orange(params)
     draws, measured = landings(RECORDINGS_OF_ORANGE)
     names = ("orange", "orange_2", "orange_3")
@@ -229,7 +220,7 @@ def test_recordings_that_this_project_did_not_make(params, progress, record) -> 
     assert all(one["inside"] >= 0.85 * one["launches"] for one in figures.values())
 
 
-def orange_episode(params, name: str):
+def orange_episode(params: Params, name: str) -> Episode:
     path, folder = RECORDINGS_OF_ORANGE / f"{name}.mcap", FOLDER / name
     if not (folder / "mounting.json").exists():
         calibrated_clamps(params, "orange", build_episodes(path, "orange", params)[0][0], folder)
@@ -241,10 +232,11 @@ def own_law(number: int) -> dict:
 
 
 def test_episodes_of_its_own_law(progress, record) -> None:
-    kept = FOLDER / CODE / "own-law.json"
-    if not kept.exists():
-        write_json(kept, side_by_side(own_law, range(EPISODES)))
-    found = json.loads(kept.read_text())
+    def make() -> list[dict]:
+        done = dict(each(own_law, range(EPISODES), cores()))
+        return [done[number] for number in range(EPISODES)]
+
+    found = made_once(FOLDER / CODE / "own-law.json", make)
     young, loss = (np.abs([each[name] for each in found]) for name in ("E", "loss_factor"))
     inside = [each["low"] <= each["landing"] <= each["high"] for each in found]
     width = [(each["high"] - each["low"]) / each["landing"] for each in found]

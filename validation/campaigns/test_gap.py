@@ -13,31 +13,32 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
+from pipeline.base.code import ROOT
 from pipeline.base.files import write_json
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.results.theta import load_theta, parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
-from pipeline.params import load
+from pipeline.params import Params, load
+from pipeline.params.identification import STEPS
 from pipeline.report.drawing.styles import COLORS, INK, THEME
 from pipeline.simulator.parameters import EXTRA
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.world import World
-from tests.project import ROOT
+from validation.campaigns.runner import OURS, PAPER
 from validation.campaigns.test_orange import copy_of_the_project, run
 
 pytestmark = pytest.mark.validation
 
-PAPER, OURS = METHODS = ("sling2sim2real", "least_squares")
+METHODS = PAPER, OURS
 FACTOR = 1.5  # times the floor, asked of ours
 SHOTS, REACH = 40, 0.05  # launches that the oracle's θ is fitted to; m beyond the trained range
 STARTS, STEP, LOST = 48, 2e-3, 0.5  # of the fit: points, of the unit cube, m for a failed launch
-STAGES = ("history", "theta", "policy")
 AS_IT_IS, THETA_, AIMED, HIT = "as it is", "oracle θ", "exact policy", "oracle policy"
 
 
-def shots(params, landing_map, seed: int = 1) -> np.ndarray:
+def shots(params: Params, landing_map, seed: int = 1) -> np.ndarray:
     """Draws (SHOTS, 2) spread over those of the box that land in the trained range, by the map."""
     setup, (near, far) = params.setup, params.policy.targets
     low, high = np.array([setup.draw_y, setup.draw_z]).T
@@ -83,7 +84,7 @@ def oracle_theta(launcher, box: SearchBox, draws: np.ndarray, landing: np.ndarra
     return dict(zip(box.names, box.to_physical(unit).tolist(), strict=True)), fit.fun
 
 
-def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
+def split(params: Params, root: Path, world: World, known: tuple, method: str) -> dict:
     """What the error of one method on one band is made of.
 
     Args:
@@ -146,7 +147,7 @@ def split(params, root: Path, world: World, known: tuple, method: str) -> dict:
     }
 
 
-def band_figures(params, root: Path, band: str, methods, progress) -> dict:
+def band_figures(params: Params, root: Path, band: str, methods, progress) -> dict:
     """Floor and split of every method on one band."""
     targets = params.trials.targets
     with World(band, root / "params.yaml") as world:
@@ -204,10 +205,10 @@ def test_what_the_error_of_a_landing_is_made_of(tmp_path, progress, record) -> N
     params = load(project / "params.yaml")
     figures = {}
     for band in (name for name, about in params.bands.items() if about.source == "rig"):
-        for stage in ("record", "episode", "mounting"):
+        for stage in ("record", "episode", "clamps", "evidence"):
             run(project, "python", "-m", f"stages.{stage}", band)
         for method in METHODS:
-            for stage in STAGES:
+            for stage in (*STEPS[params.methods[method].search], "theta", "policy"):
                 run(project, "python", "-m", f"stages.{stage}", band, method)
         figures[band] = band_figures(params, project, band, METHODS, progress)
     draw_figure(figures, ROOT / "reports/validation/gap.png")

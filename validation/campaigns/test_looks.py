@@ -2,9 +2,10 @@
 
 import pytest
 
+from pipeline.params import Params
 from pipeline.recording.cloud import clouds_of
-from tests.recording import looks
-from tests.recording.scores import figures
+from validation.recordings import looks
+from validation.recordings.scores import figures
 
 pytestmark = pytest.mark.validation
 
@@ -12,7 +13,7 @@ FRAMES = 60
 MOST_OFF, LEAST_COVERED, MOST_STRAYS = 0.003, 0.9, 0.01  # m, shares
 
 
-def test_the_band_is_found_in_every_look(params, progress, record) -> None:
+def test_the_band_is_found_in_every_look(params: Params, progress, record) -> None:
     found = {}
     for name, look in looks.LOOKS.items():
         view, truths = looks.view_of(look, looks.times(FRAMES))

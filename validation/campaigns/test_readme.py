@@ -5,9 +5,10 @@ import shutil
 
 import pytest
 
+from pipeline.base.code import ROOT
 from pipeline.params import load
-from tests.project import ROOT, Copy, copy_project
-from tests.test_docs import BLOCK
+from validation.marked import CODE_BLOCK
+from validation.projects import ProjectCopy, copy_project
 
 pytestmark = pytest.mark.validation
 
@@ -15,12 +16,12 @@ RECORDING, MASS, BAND = "my.mcap", "0.0408", "my"  # of README's
 
 
 @pytest.fixture(scope="module")
-def project(tmp_path_factory: pytest.TempPathFactory) -> Copy:
+def project(tmp_path_factory: pytest.TempPathFactory) -> ProjectCopy:
     """A copy of the project with a recording in it that nothing knows; the rig's band is gone."""
     folder = tmp_path_factory.mktemp("readme") / "copy"
     folder.mkdir()
     copy_project(folder)
-    copy = Copy(folder)
+    copy = ProjectCopy(folder)
     copy("git", "init", "-q")
     copy("dvc", "repro", "record@band1")
     (folder / "data/raw/band1/band1.mcap").rename(folder / RECORDING)
@@ -32,10 +33,10 @@ def section(title: str, language: str) -> str:
     """The code of a section of README."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     part = text.split(f"\n## {title}\n")[1].split("\n## ")[0]
-    return next(code for kind, code in BLOCK.findall(part) if kind == language)
+    return next(code for kind, code in CODE_BLOCK.findall(part) if kind == language)
 
 
-def test_your_band_runs_as_it_is_written(project: Copy, progress) -> None:
+def test_your_band_runs_as_it_is_written(project: ProjectCopy, progress) -> None:
     """Only the mass is that of the recording at hand."""
     mass = load(ROOT / "params.yaml").bands["band1"].mass
     lines = section("Your band", "bash").splitlines()
@@ -53,7 +54,7 @@ def test_your_band_runs_as_it_is_written(project: Copy, progress) -> None:
         assert (project.folder / made).is_file(), made
 
 
-def test_the_python_runs(project: Copy) -> None:
+def test_the_python_runs(project: ProjectCopy) -> None:
     """After the commands above, of their band."""
     code = section("From Python", "python").replace("band1", BAND)
     (project.folder / "readme.py").write_text(code)

@@ -49,7 +49,7 @@ SAME_MESH = {"edges": 52, "grading": 1.0}  # of `tet_edges`, evenly spaced
 
 
 @dataclass(frozen=True)
-class Pull:
+class EnginePull:
     """Both engines while the hand holds the band.
 
     Attributes:
@@ -94,7 +94,7 @@ def episode_of(sling: ClampedBand) -> Episode:
     return unseen("peers", t, position, stamps, GRASP, RELEASE)
 
 
-def pull(bench: Bench, theta, step: float = 5e-4, **mesh) -> Pull:
+def pull(bench: Bench, theta, step: float = 5e-4, **mesh) -> EnginePull:
     """The same episode in both engines.
 
     Args:
@@ -112,7 +112,7 @@ def pull(bench: Bench, theta, step: float = 5e-4, **mesh) -> Pull:
     first = int(np.searchsorted(episode.cloud_time, theirs.cloud_time[0]))
     frames = ours.center_line[0, first : first + len(theirs.cloud_time)]
     lines = np.array([_interpolate(theirs.arc, sling.arc, line) for line in frames])
-    return Pull(
+    return EnginePull(
         times=theirs.times,
         force=np.array([force, theirs.force]),
         frames=theirs.cloud_time,
@@ -120,7 +120,7 @@ def pull(bench: Bench, theta, step: float = 5e-4, **mesh) -> Pull:
     )
 
 
-def pull_checks(result: Pull, title: str, fine: bool) -> list[Finding]:
+def pull_checks(result: EnginePull, title: str, fine: bool) -> list[Finding]:
     """Force and centre line; without limits where the mesh is known to be too coarse."""
     worst = result.line_errors
     frame = int(worst.argmax())
@@ -199,7 +199,7 @@ def section(bench: Bench) -> Theme:
     return Theme("Against MuJoCo", checks, TEXT, pictures)
 
 
-def draw(result: Pull, path) -> None:
+def draw(result: EnginePull, path) -> None:
     """Force over time, and centre lines at five moments from the side and from the front."""
     import matplotlib
 

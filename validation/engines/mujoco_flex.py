@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.export.mesh import Tube, hand_path
 from pipeline.simulator.launch import ballistic_landing
 from pipeline.simulator.model import GRAVITY, ClampedBand, LaunchSetup
-from validation.engines.mesh import Tube, hand_path
 
 LED = 1e3  # kg: the inertia of what leads a vertex; a step moves it by less than a nanometre
 SETTLE_STEP, SETTLE_STEPS = 0.02, 60

@@ -10,8 +10,8 @@ import numpy as np
 import warp as wp
 
 from pipeline.base.errors import UserError
+from pipeline.export.mesh import Tube
 from pipeline.simulator.model import GRAVITY
-from validation.engines.mesh import Tube
 
 
 @wp.kernel

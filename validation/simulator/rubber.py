@@ -10,9 +10,10 @@ from scipy.linalg import expm
 from scipy.optimize import least_squares
 
 from pipeline.identify.objective.box import SearchBox
+from pipeline.params.identification import parameter_names
 from pipeline.simulator.initial import drawn_guess
 from pipeline.simulator.model import ClampedBand, LaunchHistory
-from pipeline.simulator.parameters import Parameters, searched_names
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip
 from pipeline.simulator.rubber import RUBBER, TIMES
 from pipeline.simulator.schedule import steps
@@ -300,7 +301,7 @@ def random_points(bench: Bench, count: int) -> Parameters:
 def survey(bench: Bench, count: int = 10_000, progress=print) -> tuple[list[Finding], dict]:
     sling = replace(rubber_of(bench), grip_force=robustness.HELD_FAST)
     found = robustness.survey(bench, sling, random_points(bench, count), progress)
-    names = searched_names(RUBBER)
+    names = parameter_names(RUBBER)
     failed = robustness.ranges(found["unconverged"], names) if found["unconverged"] else ""
     return [
         Finding(

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from pipeline.params import Params
-from pipeline.params.identification import ParameterBoxes
-from pipeline.simulator.parameters import Parameters, searched_names
+from pipeline.params.identification import ParameterBoxes, parameter_names
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
 
 
@@ -47,7 +47,7 @@ class SearchBox:
         A method's `bounds` take the place of a parameter's own, and say those of what its law adds.
         """
         own, bounds = dict(boxes), bounds or {}
-        names = searched_names(law)
+        names = parameter_names(law)
         ends = [bounds[n] if n in bounds else (own[n].low, own[n].high) for n in names]
         low, high = np.array(ends, float).T
         log = np.array([name in own and own[name].scale == "log" for name in names])

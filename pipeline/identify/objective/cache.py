@@ -9,14 +9,18 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+import sys
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
+from pipeline.base.errors import one_line
 from pipeline.base.files import replacing
 from pipeline.identify.objective.evaluate import NOT_FINITE, Evaluation, Evaluator, weighed
 from pipeline.identify.objective.loss import TERMS
+
+ARRAYS = ("theta", "failure", "weighed", *(f"term_{name}" for name in TERMS))  # of a file
 
 
 class EvaluationCache:
@@ -57,6 +61,7 @@ class EvaluationCache:
         with replacing(path) as temporary, temporary.open("wb") as file:
             np.savez(
                 file,
+                allow_pickle=False,
                 theta=evaluation.theta,
                 failure=np.array([reason or "" for reason in evaluation.failure]),
                 weighed=np.array(self._weighed),
@@ -65,15 +70,22 @@ class EvaluationCache:
 
     def _recalled(self, path: Path, unit: np.ndarray, theta: np.ndarray) -> Evaluation | None:
         """The evaluation of these points under this method's weights; None: simulate them."""
+        if not path.is_file():
+            return None
         try:
-            with np.load(path, allow_pickle=False) as arrays:
-                if not np.array_equal(arrays["theta"], theta):
-                    return None
-                terms = {name: arrays[f"term_{name}"] for name in TERMS}
-                failure = [str(reason) or None for reason in arrays["failure"]]
-                kept = arrays["weighed"].tolist()
-        except Exception:
-            return None  # not there, or damaged: a zip file can be in many ways
+            with np.load(path, allow_pickle=False) as file:
+                arrays = {name: file[name] for name in ARRAYS}
+        except FileNotFoundError:  # another run has just thrown the folder away
+            return None
+        except Exception as error:  # a zip file can be damaged in many ways
+            why = f"damaged ({one_line(error)}), so its points are simulated anew"
+            print(f"note: {path}: {why}", file=sys.stderr)
+            return None
+        if not np.array_equal(arrays["theta"], theta):
+            return None
+        terms = {name: arrays[f"term_{name}"] for name in TERMS}
+        failure = [str(reason) or None for reason in arrays["failure"]]
+        kept = arrays["weighed"].tolist()
         if NOT_FINITE in failure and kept != self._weighed:
             return None
         return weighed(self.evaluate.loss, unit, theta, terms, failure)

@@ -9,8 +9,12 @@ counts for nothing.
 from __future__ import annotations
 
 import threading
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import warp as wp
 
 LANES = {"cpu": 16, "cuda": 32}
 SAMPLES = 3  # simulated points an edge
@@ -45,9 +49,10 @@ class Chamfer:
         self.radius, self.rest_length = float(radius), np.asarray(rest_length, np.float32)
         self.symmetric, self.culled, self.clouds = symmetric, culled, clouds
         self.frames = len(clouds)
-        self._packed, self._lock = {}, threading.Lock()
+        self._packed: dict[str, list[wp.array]] = {}
+        self._lock = threading.Lock()
 
-    def __call__(self, center_line: np.ndarray, device: str = "cpu") -> np.ndarray:
+    def __call__(self, center_line: np.ndarray | wp.array, device: str = "cpu") -> np.ndarray:
         """Distances [m], shape (N, K), of centre lines [m], (N, K, L, 3), computed on `device`.
 
         A frame's distance depends on no other frame or rollout, and so not on who shares its batch.
@@ -59,11 +64,11 @@ class Chamfer:
         both = self.errors(center_line, device).numpy().reshape(count, frames, 2).astype(float)
         return both.mean(axis=2) if self.symmetric else both[:, :, 0]
 
-    def errors(self, center_line: np.ndarray, device: str):
+    def errors(self, center_line: np.ndarray | wp.array, device: str) -> wp.array:
         """Both directions' distances [m], as Warp's float32 (N * K * 2,) on that device."""
         import warp as wp
 
-        from pipeline.base.native import launch
+        from pipeline.base.native import empty, launch
 
         count, frames, nodes, _ = center_line.shape
         if frames != self.frames:
@@ -86,11 +91,11 @@ class Chamfer:
         arrays.rest_edges = wp.array(rest, device=device)
         arrays.line, arrays.frames = center_line.flatten(), frames
         arrays.radius, arrays.camera = self.radius, wp.vec3(*self.camera)
-        arrays.errors = errors = wp.empty(count * frames * 2, dtype=wp.float32, device=device)
+        arrays.errors = errors = empty(count * frames * 2, wp.float32, device)
         launch(kernel, count * frames, [arrays], device)
         return errors
 
-    def _kernel(self, edges: int, lanes: int):
+    def _kernel(self, edges: int, lanes: int) -> tuple[wp.Kernel, type]:
         from pipeline.identify.objective.kernel import chamfer_kernel
 
         return chamfer_kernel(edges, SAMPLES, self.symmetric, lanes, self.culled)
@@ -104,7 +109,7 @@ class CloudDistance(Chamfer):
     the unstretched band, on the side that no camera sees too.
     """
 
-    def _kernel(self, edges: int, lanes: int):
+    def _kernel(self, edges: int, lanes: int) -> tuple[wp.Kernel, type]:
         from pipeline.identify.objective.kernel import clouds_kernel
 
         return clouds_kernel(edges, RINGS, AROUND, lanes, self.culled)

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import threading
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from pipeline.identify.objective.chamfer import Chamfer
+from pipeline.simulator.interaction import Rollouts
+
+if TYPE_CHECKING:
+    import warp as wp
 
 
 class DeviceTerms:
@@ -39,9 +44,10 @@ class DeviceTerms:
             "sample_weights": sample_weights,
             "frame_weights": frame_weights,
         }
-        self._copies, self._lock = {}, threading.Lock()
+        self._copies: dict[str, tuple[csr_array, dict[str, wp.array]]] = {}
+        self._lock = threading.Lock()
 
-    def __call__(self, rollouts, matrix: csr_array) -> np.ndarray:
+    def __call__(self, rollouts: Rollouts, matrix: csr_array) -> np.ndarray:
         """Terms (N, 3) in the order of TERMS; 0 where no sample or frame has weight.
 
         Args:
@@ -49,7 +55,7 @@ class DeviceTerms:
         """
         import warp as wp
 
-        from pipeline.base.native import launch
+        from pipeline.base.native import empty, launch
         from pipeline.identify.objective.kernel import terms_kernel
 
         line, force = rollouts.center_line, rollouts.force
@@ -59,15 +65,15 @@ class DeviceTerms:
         for name, values in self._on(device, matrix).items():
             setattr(arrays, name, values)
         arrays.force, arrays.errors = force, self._chamfer.errors(line, device)
-        arrays.samples, arrays.frames = matrix.shape[0], self._chamfer.frames
+        arrays.samples, arrays.frames = len(matrix.indptr) - 1, self._chamfer.frames
         arrays.both = int(self._chamfer.symmetric)
         filtered = count * 3 * arrays.samples
-        arrays.filtered = wp.empty(filtered, dtype=wp.float64, device=device)
-        arrays.terms = terms = wp.empty(count * 3, dtype=wp.float64, device=device)
+        arrays.filtered = empty(filtered, wp.float64, device)
+        arrays.terms = terms = empty(count * 3, wp.float64, device)
         launch(kernel, count, [arrays], device)
         return terms.numpy().reshape(count, 3)
 
-    def _on(self, device: str, matrix: csr_array) -> dict:
+    def _on(self, device: str, matrix: csr_array) -> dict[str, wp.array]:
         """What all rollouts share, there; another filter replaces the last one."""
         import warp as wp
 

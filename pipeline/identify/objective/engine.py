@@ -8,35 +8,47 @@ the rollouts (interaction.py) stay on the host. It runs on one device, whichever
 from __future__ import annotations
 
 import inspect
+from importlib.metadata import entry_points
 from pathlib import Path
+from typing import cast
 
 from pipeline.base.errors import UserError, one_line
-from pipeline.base.imported import imported
-from pipeline.identify.objective.evaluate import simulated
+from pipeline.base.imported import imported, is_import
+from pipeline.identify.objective.evaluate import Simulate, simulated
 from pipeline.params.identification import OUR_ENGINE
 
-KNOWN = {"physx": "validation.engines.physx.rollouts:simulate"}
+GROUP = "sling2sim2real.engines"  # of entry points: engines that installed packages offer
 
 
-def simulate_of(engine: str):
-    """The function of an engine: OUR_ENGINE, one of KNOWN, or a user's `package.module:function`.
+def simulate_of(engine: str) -> Simulate:
+    """The function of an engine: OUR_ENGINE, one of GROUP, or a user's `package.module:function`.
 
     Raises UserError where there is no such function.
     """
     if engine == OUR_ENGINE:
         return simulated
     try:
-        found = imported(KNOWN.get(engine, engine))
+        found = imported(engine if is_import(engine) else _installed(engine))
     except Exception as error:  # a module of the user's may raise anything
         said = one_line(f"{type(error).__name__}: {error}")
         raise UserError(f"engine {engine}: cannot be imported ({said})") from error
     if not callable(found):
         raise UserError(f"engine {engine}: must be a function; see docs/simulator.md")
-    return found
+    return cast(Simulate, found)
+
+
+def _installed(engine: str) -> str:
+    """Where an installed package has an engine, as `package.module:function`."""
+    for entry in entry_points(group=GROUP, name=engine):
+        return entry.value
+    raise LookupError(f"no installed package has it among its {GROUP}; install this one anew")
 
 
 def sources_of(engine: str) -> list[Path]:
     """The folder of another engine's code, which its rollouts hang on; none for ours."""
     if engine == OUR_ENGINE:
         return []
-    return [Path(inspect.getsourcefile(simulate_of(engine))).parent]
+    source = inspect.getsourcefile(simulate_of(engine))
+    if source is None:
+        raise UserError(f"engine {engine}: must be a function of Python, in a file of its own")
+    return [Path(source).parent]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -15,13 +15,14 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.loss import TERMS, EpisodeLoss
-from pipeline.simulator.interaction import interact
+from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.model import ClampedBand
 
 NOT_FINITE = "the loss is not finite"  # the one failure that depends on the weights
 SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
 
-simulated = partial(interact, fetch=False)  # the loss is computed where the rollouts are
+Simulate = Callable[..., Rollouts]
+simulated: Simulate = partial(interact, fetch=False)  # the loss is computed where the rollouts are
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Evaluator:
         *,
         devices: Sequence[str] = ("cpu",),
         workers: int | None = None,
-        simulate=simulated,
+        simulate: Simulate = simulated,
         whole: bool = False,
     ) -> None:
         """Keep what every batch needs.

@@ -1,5 +1,9 @@
 """The texts of this folder as Warp kernels. (Warp reads annotations: no postponed ones here.)"""
 
+# Warp's annotations are values, and what its decorators give is no function any more:
+# pyright: reportInvalidTypeForm=false, reportGeneralTypeIssues=false, reportReturnType=false
+# pyright: reportArgumentType=false
+
 import math
 from pathlib import Path
 
@@ -27,13 +31,13 @@ def clouds_kernel(
 ) -> tuple[wp.Kernel, type]:
     """Compile clouds.h for a mesh; as `chamfer_kernel`."""
     angles = [2 * math.pi * k / around for k in range(around)]
-    macros = {"RINGS": rings, "AROUND": around}
+    macros: dict[str, int | str] = {"RINGS": rings, "AROUND": around}
     for name, turn in (("COSINES", math.cos), ("SINES", math.sin)):
         macros[name] = "{" + ", ".join(f"{turn(angle):.9f}f" for angle in angles) + "}"
     return _cloud_kernel("clouds.h", EDGES=edges, CULLED=int(culled), CPU_LANES=lanes, **macros)
 
 
-def _cloud_kernel(file: str, **macros) -> tuple[wp.Kernel, type]:
+def _cloud_kernel(file: str, **macros: int | str) -> tuple[wp.Kernel, type]:
     """Of points.h and a text after it, for the arrays of `Chamfer`."""
     floats, integers = wp.array(dtype=wp.float32), wp.array(dtype=wp.int32)
 

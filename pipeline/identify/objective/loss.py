@@ -170,7 +170,8 @@ class EpisodeLoss:
 
     def total(self, terms: dict[str, np.ndarray]) -> np.ndarray:
         """Weighted sum of the terms, shape (N,); one without weight may be NaN."""
-        return sum(weight * terms[name] for name, weight in self.weights.items() if weight)
+        weighed = (weight * terms[name] for name, weight in self.weights.items() if weight)
+        return sum(weighed, np.zeros(()))
 
     def filtered(self, rollouts: Rollouts) -> np.ndarray:
         """The simulated force as the record would have it [N], shape (N, T, 3), before `smooth`."""
@@ -190,7 +191,7 @@ class EpisodeLoss:
         window = (1,) * (signal.ndim - 2) + (self.median_window, 1)
         return median_filter(signal, size=window, mode="nearest")
 
-    def _gap(self, rollouts) -> np.ndarray:
+    def _gap(self, rollouts: Rollouts) -> np.ndarray:
         """Measured less simulated force [N], shape (N, T, 3)."""
         return self.force - self.smooth(self.filtered(rollouts))
 
@@ -226,14 +227,14 @@ def _mean(chosen: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=128)  # shared by all losses of an episode, such as the report's replays
 def _recording_filter(
-    times: bytes, cutoff: float, start: float, period: float, samples: int
+    stamps: bytes, cutoff: float, start: float, period: float, samples: int
 ) -> csr_array:
     """Matrix (T, S) from forces at simulated times (S,) to the episode's T filtered samples.
 
     It is the recorded force's way (interpolation, low-pass, averages), which is linear, and
     forgets: weights that no rounding would show are left out.
     """
-    times, parts = np.frombuffer(times), []
+    times, parts = np.frombuffer(stamps), []
     for first in range(0, len(times), 32):
         pulses = np.eye(len(times), min(32, len(times) - first), -first)
         parts.append(as_recorded(times, pulses, cutoff, start, period, samples))

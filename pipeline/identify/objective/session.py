@@ -20,7 +20,7 @@ from pipeline.identify.objective.evaluate import Evaluation, Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import sling_of_method
 from pipeline.params import Params
-from pipeline.params.identification import OUR_ENGINE
+from pipeline.params.identification import OUR_ENGINE, MethodParams
 
 PIPELINE = Path(__file__).parents[2]
 SOURCES = (  # the code that a term of the loss hangs on
@@ -61,7 +61,7 @@ def service(stage: str, band: str, method: str, params: Params, rollouts: int) -
         fingerprint(
             *SOURCES,
             *(layout.episode(band) / f"{name}.parquet" for name in ("signals", "clouds")),
-            layout.mounting(band),
+            layout.clamps(band),
             *sources_of(params.methods[method].engine),
             *(section.model_dump_json() for section in sections),
             *(f"{package} {version(package)}" for package in ("warp-lang", "numpy", "scipy")),
@@ -71,7 +71,7 @@ def service(stage: str, band: str, method: str, params: Params, rollouts: int) -
     return LoggingEvaluator(cache, Progress(f"{stage}-{band}-{method}", rollouts, "rollouts"))
 
 
-def _folder(band: str, method) -> list[str]:
+def _folder(band: str, method: MethodParams) -> list[str]:
     """Words that tell methods apart whose rollouts differ."""
     words = [band] if method.mounting else [band, "unmounted"]
     return words if method.engine == OUR_ENGINE else [*words, method.engine.replace(":", ".")]

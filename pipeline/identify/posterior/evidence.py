@@ -1,22 +1,31 @@
 """Launches that are evidence: data/evidence/<band>.csv, which `sling observe` writes.
 
 Columns draw_y_m, draw_z_m, draw_error_m, landing_y_m. A launch is evidence or a score
-(data/trials/measured/), never both.
+(data/trials/measured/), never both. The stage `evidence` checks them, and the density reads what it
+writes: {"launches": [{"draw", "error", "landing"}, ...], "setup": {...}}; "setup" is what launches
+them (a LaunchSetup) and missing where there is no launch; "made_with" its keys in params.yaml.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 from pipeline.base import launch_table as table
 from pipeline.base.errors import UserError
-from pipeline.identify.posterior.launches import Observed
+from pipeline.base.files import write_json
+from pipeline.base.schema import LIST, JsonRecord, read_json
+from pipeline.identify.posterior.launches import Evidence, Observed
+from pipeline.params import Params
+from pipeline.params.provenance import evidence_settings_of
+from pipeline.simulator.model import LaunchSetup
 
 COLUMNS = (*table.DRAW, "draw_error_m", table.LANDING)  # as they are written
 MOST_ERROR = 0.1  # of a draw [m]
 
 
-def read_evidence(folder: Path, band: str, params) -> list[Observed]:
+def read_evidence(folder: Path, band: str, params: Params) -> list[Observed]:
     """Of a band, oldest first; none where it has no file.
 
     A draw without an error of its own has that of a commanded one, `trials.actuation_error`.
@@ -47,6 +56,47 @@ def read_launches(path: Path, error: float | None) -> list[Observed]:
         own = expect_error(where, table.number(where, "draw_error_m", own)) if own else error
         launches.append(Observed(table.drawn(where, row), own, landing))
     return launches
+
+
+class LaunchRecord(JsonRecord):
+    draw: Annotated[tuple[float, float], LIST]
+    error: float
+    landing: float
+
+
+class SetupRecord(JsonRecord):
+    projectile_mass: float
+    fork_height: float
+    foot_height: float
+    arm_stiffness: float | None
+    step: float
+    duration: float
+
+
+class ObservedFile(JsonRecord):
+    launches: list[LaunchRecord]
+    setup: SetupRecord | None = None
+    made_with: dict[str, float | None] = {}
+
+
+def save_observed(path: Path, launches: Sequence[Observed], params: Params) -> None:
+    """Write an `ObservedFile`; without launches it is the same whatever the lab is."""
+    content: dict = {"launches": [vars(one) for one in launches]}
+    if launches:
+        setup = vars(LaunchSetup.of(params.setup, params.sling))
+        content["setup"] = {name: setup[name] for name in SetupRecord.model_fields}
+        content["made_with"] = evidence_settings_of(params)
+    write_json(path, content)
+
+
+def load_observed(path: Path) -> Evidence | None:
+    """What an `ObservedFile` holds, None without launches. Raises NotMade."""
+    read = read_json(path, ObservedFile)
+    if not read.launches or read.setup is None:
+        return None
+    launches = [Observed(one.draw, one.error, one.landing) for one in read.launches]
+    setup = {name: getattr(read.setup, name) for name in SetupRecord.model_fields}
+    return Evidence(launches, LaunchSetup(**setup), read.made_with)
 
 
 def expect_error(where: str, error: float) -> float:

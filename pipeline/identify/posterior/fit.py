@@ -73,10 +73,11 @@ def fit(
         progress: Is told of each expansion that is nearer.
     """
     phi, nuisances = np.array(start, float), np.zeros((len(recordings), 3))
-    best, damp, new = None, DAMP, [None] * len(recordings)
+    best: Fit | None = None
+    damp, new = DAMP, [None] * len(recordings)
     with ThreadPoolExecutor(workers) as pool:
         for steps in range(1, ITERATIONS + 1):
-            bins = [one.residuals for one in best.expansions] if steps > BINNED else new
+            bins = [one.residuals for one in best.expansions] if best and steps > BINNED else new
             around = coordinates.parameters, phi, _steps(coordinates, phi)
             try:
                 expansions = [
@@ -98,6 +99,7 @@ def fit(
                 progress(best)
             else:
                 damp *= HARDER
+            assert best is not None  # else NoFit
             step = _step(best, coordinates, damp)
             if _size(best, step) < STILL or damp > HARDEST:
                 # Damping makes any step short, also where the fit is stuck.
@@ -110,7 +112,8 @@ def fit(
                     for own, one in zip(best.nuisances, best.expansions, strict=True)
                 ]
             )
-    return replace(best, steps=steps)
+    assert best is not None
+    return replace(best, steps=ITERATIONS)
 
 
 def _size(fit: Fit, step: np.ndarray) -> float:
@@ -124,7 +127,14 @@ def _steps(coordinates: Coordinates, phi: np.ndarray) -> np.ndarray:
     return np.where(phi + steps > coordinates.high, -steps, steps)
 
 
-def _density(coordinates, phi, nuisances, expansions, launches, steps) -> Fit:
+def _density(
+    coordinates: Coordinates,
+    phi: np.ndarray,
+    nuisances: np.ndarray,
+    expansions: list[Expansion],
+    launches: tuple[float, np.ndarray, np.ndarray] | None,
+    steps: int,
+) -> Fit:
     prior, gap = coordinates.precision, phi - coordinates.expected
     misfit, hessian, gradient = launches or (0.0, 0.0, 0.0)
     return Fit(

@@ -8,7 +8,7 @@ open is the model's discrepancy, and no other is assumed but the returned share'
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,26 +18,19 @@ from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.posterior.coordinates import Coordinates
 from pipeline.identify.posterior.draws import truncated_gaussian
 from pipeline.identify.posterior.fit import Fit, fit
-from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
+from pipeline.identify.posterior.launches import Evidence, LaunchLikelihood
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
 from pipeline.identify.results.theta import content_of
+from pipeline.identify.results.units import SI_UNITS
 from pipeline.params import Params
-from pipeline.params.identification import UNSEEN, ParameterBoxes
-from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
-from pipeline.simulator.parameters import EXTRA, Parameters, searched_names
+from pipeline.params.identification import UNSEEN, ParameterBoxes, parameter_names
+from pipeline.simulator.model import ClampedBand, LaunchHistory
+from pipeline.simulator.parameters import EXTRA, Parameters
 from pipeline.simulator.rubber import RUBBER
 
 LEVEL = 0.9
 SAMPLES = 200
 FILLS = 2 / 3  # of the box: an interval as wide tells nothing
-UNITS = {
-    "damping_product": "s",
-    "air_drag": "1/s",
-    "turn_damping": "",
-    "returned_share": "",
-    "release_time": "s",
-    "camera_delay": "s",
-}
 
 
 @dataclass(frozen=True)
@@ -75,24 +68,24 @@ class Identified:
         return self.fit.steps * len(self.recordings) * each
 
 
-def identify(
+def fit_posterior(
     params: Params,
     method: str,
     sling: ClampedBand,
     episodes: Sequence[Episode],
     start: Parameters,
     *,
-    observed: Sequence[Observed] = (),
+    evidence: Evidence | None = None,
     workers: int | None = None,
     progress: Callable[[Fit], None] = lambda fit: None,
 ) -> Identified:
-    """Identify a band.
+    """Fit the density of a band.
 
     Args:
         method: Of params.yaml, one that searches by least squares.
         episodes: Of the band's recordings, at least one.
         start: One sample: the nearest that an exploration found.
-        observed: Launches that are evidence.
+        evidence: Launches, drawn as the first recording was.
 
     Raises:
         NoFit: Simulations fail at the start.
@@ -102,9 +95,9 @@ def identify(
     recordings = [Likelihood(one, sling, cutoff, friction) for one in episodes]
     coordinates = Coordinates.of_method(params, method, sling)
     launches = None
-    if observed:
-        setup = LaunchSetup.of(params.setup, params.sling, recorded_history(sling, episodes[0]))
-        launches = LaunchLikelihood(observed, sling, setup)
+    if evidence and evidence.launches:
+        setup = replace(evidence.setup, history=recorded_history(sling, episodes[0]))
+        launches = LaunchLikelihood(evidence.launches, sling, setup)
     known = {"launches": launches, "workers": workers, "progress": progress}
     found = fit(recordings, coordinates, coordinates.of(start), **known)
     birge = disagreement(found)
@@ -138,11 +131,10 @@ def disagreement(found: Fit) -> float:
     return float(np.sqrt(max(total / max(freedom, 1e-9), 1.0)))
 
 
-def theta_content(found: Identified, band: str, method: str) -> dict:
-    """What a θ file holds, but its loss, its rollouts and where it was found."""
+def theta_entries(found: Identified) -> dict:
+    """What a θ file holds of the mode."""
     recording = found.recordings[0]
-    history = recorded_history(recording.sling, recording.episode)
-    return {"band": band, "method": method, **content_of(found.mode, history)}
+    return content_of(found.mode, recorded_history(recording.sling, recording.episode))
 
 
 def confidence(found: Identified, boxes: ParameterBoxes) -> dict:
@@ -153,7 +145,7 @@ def confidence(found: Identified, boxes: ParameterBoxes) -> dict:
     """
     samples, mode, parameters = found.parameters, found.mode.sample(), {}
     columns = {name: samples.column(name) for name in samples.names}
-    for name in searched_names(samples.law):
+    for name in parameter_names(samples.law):
         low, high = interval(columns[name], mode[name])
         entry = {"low": low, "high": high, "identifiable": name not in UNSEEN}
         if name in UNSEEN:
@@ -166,7 +158,9 @@ def confidence(found: Identified, boxes: ParameterBoxes) -> dict:
     shown = {name: columns[name] for name in EXTRA}
     for one, kept in ((columns, shown), (mode, mode)):
         kept["damping_product"] = one["elasticity_damping"] * one["damping_scale"]
-    derived = {name: _told(samples, mode[name], UNITS[name]) for name, samples in shown.items()}
+    derived = {
+        name: _told(samples, mode[name], SI_UNITS.get(name, "")) for name, samples in shown.items()
+    }
     derived |= _clocks(found)
     matrix = np.corrcoef(found.samples.T + 1e-12 * np.arange(SAMPLES))
     return {
@@ -218,7 +212,7 @@ def _clocks(found: Identified) -> dict:
 def _left(found: Identified, number: int) -> dict:
     """What a recording shows that the simulation does not, and what the others alone say of it."""
     one, recording = found.fit.expansions[number], found.recordings[number]
-    about = {"force_rms": one.rms("force"), "held_rms": one.rms("held")}
+    about: dict = {"force_rms": one.rms("force"), "held_rms": one.rms("held")}
     about |= {"recoil_rms": one.rms("recoil"), "pictures": one.pictures}
     about["source"] = recording.episode.metadata.get("input", {})
     if len(found.recordings) > 1:

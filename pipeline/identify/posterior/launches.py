@@ -9,8 +9,8 @@ the returned share, a coordinate of the density.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,11 +25,27 @@ CROSS = NUDGE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
 
 @dataclass(frozen=True)
 class Observed:
-    """A launch: draw (y, z) and its standard deviation along each axis, landing [m]."""
+    """A launch: draw (y, z) and its standard deviation along each axis, landing [m].
+
+    The deviation is None where a table leaves it out.
+    """
 
     draw: tuple[float, float]
-    error: float
+    error: float | None
     landing: float
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Launches of one band, and what launches them.
+
+    Attributes:
+        made_with: The settings that `setup` comes from, by their keys in params.yaml.
+    """
+
+    launches: Sequence[Observed]
+    setup: LaunchSetup
+    made_with: Mapping[str, float | None] = field(default_factory=dict)
 
 
 class LaunchLikelihood:

@@ -11,6 +11,7 @@ Gaussians the minimum over n is, up to a constant, the integral over n.
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -168,7 +169,7 @@ class Likelihood:
         phi: np.ndarray,
         steps: np.ndarray,
         nuisances: np.ndarray,
-        pool,
+        pool: Executor,
         residuals: Residuals | None = None,
     ) -> Expansion:
         """Expand around coordinates (D,) with finite differences `steps` (D,). Raises Failed.
@@ -191,7 +192,14 @@ class Likelihood:
         slopes = ((vectors[1:] - gap) / steps[:, None], (moved - gap) / NUDGE[:, None])
         return self._eliminated(residuals, gap, *slopes, nuisances)
 
-    def _eliminated(self, residuals, gap, slopes, own, nuisances) -> Expansion:
+    def _eliminated(
+        self,
+        residuals: Residuals,
+        gap: np.ndarray,
+        slopes: np.ndarray,
+        own: np.ndarray,
+        nuisances: np.ndarray,
+    ) -> Expansion:
         has = self.tolerances
         linear = self._linear(residuals, own[SIMULATED.index("camera")])
         weight = 1 / residuals.spread(has.force, has.cloud, has.way)

@@ -18,6 +18,7 @@ import numpy as np
 
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import as_recorded
+from pipeline.simulator.interaction import Rollouts
 from pipeline.simulator.model import ClampedBand
 
 BINS = 16  # along the band, equal at rest
@@ -145,7 +146,7 @@ class Residuals:
         window = edge[:, None] + np.arange(-WINDOW, WINDOW + 1)
         self._window = np.clip(window, 0, len(self._edges) - 1)
 
-    def __call__(self, rollouts) -> np.ndarray:
+    def __call__(self, rollouts: Rollouts) -> np.ndarray:
         """Residual vectors of N rollouts, shape (N, R)."""
         gap = (self.episode.force - self.force(rollouts))[:, self.samples]
         line = np.asarray(rollouts.center_line, np.float32)
@@ -160,7 +161,7 @@ class Residuals:
         cloud = [_dot(offset, self.depth) - self._bias[0], _dot(offset, self.side) - self._bias[1]]
         return np.concatenate([*gap.transpose(2, 0, 1), *cloud], axis=1).astype(float)
 
-    def force(self, rollouts) -> np.ndarray:
+    def force(self, rollouts: Rollouts) -> np.ndarray:
         """Of N rollouts on the gripper, as the recorded one was filtered [N], shape (N, T, 3)."""
         episode = self.episode
         steps = np.moveaxis(np.asarray(rollouts.force, float), 0, 1)  # (S, N, 3)

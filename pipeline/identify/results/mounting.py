@@ -34,7 +34,7 @@ def load_sling(
 
     Raises NotMade where the file of the mounting is damaged.
     """
-    path = Layout(Path(root)).mounting(band)
+    path = Layout(Path(root)).clamps(band)
     mounting = read_json(path, Mounting) if mounted and path.exists() else None
     return ClampedBand.of(params.bands[band], params.setup, params.sling, mounting, law=law)
 

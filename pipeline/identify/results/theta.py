@@ -5,7 +5,8 @@
 seconds the recording's hand drew the band and how long it waited. Where a stage wrote it, also
 "method", "nuisances": {"air_drag": ...}, "turn_damping", "returned_share", "loss":
 {"geom", "force", "work", "total"}, "rollouts", "confidence"; "mounted": false where the method
-leaves out the calibration of the clamps. What is read of "confidence": confidence.py.
+leaves out the calibration of the clamps; "made_with": the settings of params.yaml that it rests on
+(params/provenance.py). What is read of "confidence": confidence.py.
 
 What its confidence rests on, samples of θ, lies beside in data/confidence/.
 """
@@ -13,7 +14,7 @@ What its confidence rests on, samples of θ, lies beside in data/confidence/.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import create_model, model_validator
@@ -24,9 +25,9 @@ from pipeline.base.schema import JsonRecord, Name, Range, Section, read_json, re
 from pipeline.identify.results.confidence import Confidence, Count
 from pipeline.identify.results.mounting import load_sling
 from pipeline.params import Params
-from pipeline.params.identification import LAWS, ParameterBoxes
+from pipeline.params.identification import LAWS, ParameterBoxes, parameter_names
 from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
-from pipeline.simulator.parameters import EXTRA, THETA, Parameters, searched_names
+from pipeline.simulator.parameters import EXTRA, THETA, Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 
 
@@ -64,6 +65,7 @@ class ThetaFile(JsonRecord):
     mounted: bool = True
     loss: dict[Name, float] = {}
     rollouts: Count = 0
+    made_with: dict[str, Any] = {}
     confidence: Confidence | None = None
 
     @model_validator(mode="after")
@@ -115,7 +117,7 @@ def load_samples(path: Path, theta: Parameters) -> Parameters | None:
     if not file.samples:
         return None
     columns = dict(zip(file.names, np.array(file.samples, float).T, strict=True))
-    if {*columns} - {*EXTRA} != {*searched_names(theta.law)}:
+    if {*columns} - {*EXTRA} != {*parameter_names(theta.law)}:
         raise NotMade(path, f"names: must be those of the law {theta.law}, as its θ file is")
     return Parameters.named(theta.law, columns, theta.sample())
 
@@ -165,7 +167,7 @@ def content_of(parameters: Parameters, history: LaunchHistory | None = None) -> 
     values, law = parameters.sample(), parameters.law
     return {
         **({"law": law, "history": history and vars(history)} if law == RUBBER else {}),
-        "theta": {name: values[name] for name in searched_names(law)},
+        "theta": {name: values[name] for name in parameter_names(law)},
         "nuisances": {"air_drag": values["air_drag"]},
         "turn_damping": values["turn_damping"],
         "returned_share": values["returned_share"],

@@ -7,7 +7,7 @@ import inspect
 from pipeline.base.errors import UserError, one_line
 from pipeline.base.imported import imported
 from pipeline.identify.search.loop import Optimizer
-from pipeline.params.identification import LEAST_SQUARES
+from pipeline.params.identification import LEAST_SQUARES, MethodParams, OptimizerParams
 
 OURS = {
     "design": "pipeline.identify.optimizers.design.design:Design",
@@ -17,7 +17,9 @@ OURS = {
 }
 
 
-def explorer(method, optimizer, dimension: int, rollouts: int) -> Optimizer:
+def explorer(
+    method: MethodParams, optimizer: OptimizerParams, dimension: int, rollouts: int
+) -> Optimizer:
     """The optimiser that searches the whole box for a method.
 
     Args:

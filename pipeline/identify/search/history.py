@@ -12,12 +12,15 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.objective.loss import TERMS
+from pipeline.params.identification import LEAST_SQUARES
+from pipeline.simulator.parameters import Parameters
 
 
 @dataclass
@@ -80,6 +83,20 @@ class History:
         """Read files that `save` wrote, one after the other."""
         return cls(method, names, [pq.read_table(path) for path in paths])
 
+    def followed_by(self, other: History) -> History:
+        """These rows, then those of `other`."""
+        return History(self.method, self.names, [self.table, other.table])
+
+    def of_phase(self, phase: str) -> History:
+        """The rows of one phase alone."""
+        chosen = pc.equal(self.table["phase"], phase)
+        return History(self.method, self.names, [self.table.filter(chosen)])
+
+    def best_parameters(self, law: str) -> Parameters:
+        """One sample, of the best row. Raises UserError as `best`."""
+        best = self.best()
+        return Parameters.named(law, {name: best[name] for name in self.names})
+
     def best(self) -> dict:
         """The row with the least total; among equals the first. Raises UserError if all failed."""
         total = self.total
@@ -92,8 +109,15 @@ class History:
         return self.table.slice(int(np.argmin(total)), 1).to_pylist()[0]
 
 
-def theta_content(history: History, band: str, about: dict | None = None) -> dict:
-    """What a theta file holds: the best of everything that was evaluated, and `about`."""
+def theta_content(evaluations: History, band: str, estimate: dict) -> dict:
+    """What a θ file holds: the mode of a density where one was fitted, else the best evaluation.
+
+    Args:
+        evaluations: Everything that a search evaluated; a density's mode is a phase of its own.
+        estimate: What else the search says of θ (identify/results/estimate.py).
+    """
+    mode = evaluations.of_phase(LEAST_SQUARES)
+    history = mode if len(mode.total) else evaluations
     best = history.best()
     terms = {name: best[name] for name in (*TERMS, "total") if np.isfinite(best[name])}
     return {
@@ -106,5 +130,5 @@ def theta_content(history: History, band: str, about: dict | None = None) -> dic
         "failed": int(np.isinf(history.total).sum()),
         "found": {name: best[name] for name in ("phase", "generation", "solver")},
         "confidence": None,
-        **(about or {}),
+        **estimate,
     }

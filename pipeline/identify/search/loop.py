@@ -17,7 +17,6 @@ from pipeline.base.errors import UserError
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluation, Penalty
 from pipeline.identify.search.history import History
-from pipeline.params.identification import LEAST_SQUARES
 
 
 class Optimizer(Protocol):
@@ -47,17 +46,6 @@ def latin_hypercube(dimension: int, count: int, seed: int) -> np.ndarray:
     """
     points = qmc.LatinHypercube(dimension, rng=np.random.default_rng(seed)).random(count)
     return (points - 0.5) + 0.5
-
-
-def budget(optimizer, search: str) -> tuple[int, int]:
-    """Rollouts to explore with and to refine with, of params.yaml's `optimizer`.
-
-    A search of one phase explores with both together: all methods spend the same.
-    """
-    explore = optimizer.population * (optimizer.generations + 1)
-    refine = optimizer.cma_rollouts
-    two_phases = search in ("multistart", LEAST_SQUARES)
-    return (explore, refine) if two_phases else (explore + refine, 0)
 
 
 def search(

@@ -14,6 +14,7 @@ from pydantic import model_validator
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.schema import JsonRecord, Name, read_json, refusal
+from pipeline.params.identification import MethodParams, OptimizerParams
 
 RIDGE = 1e-3  # of the mean variance, added to every variance
 LEAST_VARIANCE = 1e-6  # a thousandth of the box, where all neighbours are one point
@@ -36,12 +37,14 @@ class Region:
     members: list[int]
 
 
-def regions_asked(about, optimizer) -> int:
+def regions_asked(about: MethodParams, optimizer: OptimizerParams) -> int:
     """How many regions params.yaml's `methods.<name>` and `optimizer` ask for."""
     return about.k_top or optimizer.k_top
 
 
-def regions_of(about, optimizer, history) -> tuple[list[Region], int]:
+def regions_of(
+    about: MethodParams, optimizer: OptimizerParams, history
+) -> tuple[list[Region], int]:
     """Where a method's refinement begins, and how many regions were asked for.
 
     Args:

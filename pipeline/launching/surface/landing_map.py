@@ -8,10 +8,11 @@ million launches in seconds, and the error of reading between is itself measured
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import pyarrow as pa
@@ -20,9 +21,27 @@ import pyarrow.parquet as pq
 from pipeline.base.files import replacing
 from pipeline.launching.surface.response_surface import NO_FAILURE, Landings, ResponseSurface
 
-# draws (N, 2) [m] -> object with landing_y (N,) [m], hold_force (N,) [N], failure
-# list[str | None]; without a force limit of its own
-Launcher = Callable[..., object]
+
+class Launched(Protocol):
+    """N simulated launches."""
+
+    @property
+    def landing_y(self) -> np.ndarray:
+        """Landing on the floor [m], NaN where failed, shape (N,)."""
+        ...
+
+    @property
+    def hold_force(self) -> np.ndarray:
+        """Force that the hand holds before the release [N], shape (N,)."""
+        ...
+
+    @property
+    def failure(self) -> Sequence[str | None]:
+        """None, or the reason, length N."""
+        ...
+
+
+Launcher = Callable[..., Launched]  # of draws (N, 2) [m], without a force limit of its own
 
 
 @dataclass(frozen=True)
@@ -70,17 +89,24 @@ class LandingMap:
             checks: Number of random draws that validate the interpolation.
             seed: Seed of those draws.
         """
-        grid = [np.linspace(*draw_y, size[0]), np.linspace(*draw_z, size[1])]
+        grid_y, grid_z = np.linspace(*draw_y, size[0]), np.linspace(*draw_z, size[1])
         low, high = np.array([draw_y, draw_z]).T
         random = np.random.default_rng(seed).uniform(low, high, (checks, 2))
-        nodes = np.stack(np.meshgrid(*grid, indexing="ij"), -1).reshape(-1, 2)  # y slowest
+        nodes = np.stack(np.meshgrid(grid_y, grid_z, indexing="ij"), -1).reshape(-1, 2)  # y slowest
         launched = launcher(np.concatenate([nodes, random]))
         failure = np.array([reason or NO_FAILURE for reason in launched.failure], object)
         landing = np.where(failure == NO_FAILURE, launched.landing_y, np.nan)
-        columns = landing, np.asarray(launched.hold_force, float), failure
-        at_nodes = (column[: len(nodes)].reshape(size) for column in columns)
-        beside = (column[len(nodes) :] for column in columns[:2])
-        return cls(*grid, *at_nodes, float(max_force), np.column_stack([random, *beside]))
+        force = np.asarray(launched.hold_force, float)
+        count = len(nodes)
+        return cls(
+            draw_y=grid_y,
+            draw_z=grid_z,
+            landing_y=landing[:count].reshape(size),
+            hold_force=force[:count].reshape(size),
+            failure=failure[:count].reshape(size),
+            max_force=float(max_force),
+            checks=np.column_stack([random, landing[count:], force[count:]]),
+        )
 
     @property
     def reasons(self) -> list[str]:

@@ -46,7 +46,7 @@ class ResponseSurface:
         hold_force: np.ndarray,
         failure: np.ndarray,
         max_force: float,
-    ):
+    ) -> None:
         """Read between launches of a grid.
 
         Args:
@@ -103,7 +103,7 @@ def _continued(values: np.ndarray) -> np.ndarray:
         return np.zeros(values.shape)
     if known.all():
         return values
-    nodes = np.stack(np.indices(values.shape), -1).astype(float)
+    nodes = np.stack(list(np.indices(values.shape)), -1).astype(float)
     continuation = RBFInterpolator(
         nodes[known], values[known], neighbors=min(24, int(known.sum())), kernel="linear"
     )

@@ -21,7 +21,7 @@ class SimulatedLandings:
         low, high: Corners of the box of draws [m], shape (2,).
     """
 
-    def __init__(self, launcher: Launcher, surface: ResponseSurface):
+    def __init__(self, launcher: Launcher, surface: ResponseSurface) -> None:
         """Launch in the box and under the force limit of a surface.
 
         Args:

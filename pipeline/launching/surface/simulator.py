@@ -17,7 +17,7 @@ from pipeline.simulator.parameters import Parameters
 
 def asked_of_the_hand(
     params: Params, band: str, content: dict, draw: np.ndarray, root: str | Path = "."
-) -> dict[str, float] | None:
+) -> dict[str, float | None] | None:
     """How the hand must draw a band whose law remembers it, and what it costs not to.
 
     Returns:

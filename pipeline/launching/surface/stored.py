@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -42,6 +42,7 @@ class Card(JsonRecord):
 
     training: Training
     landing_map: LandingMapErrors
+    made_with: dict[str, Any] | None = None  # settings of params.yaml (params/provenance.py)
     projectile: Projectile | None = None  # of a policy that sees it
 
 
@@ -86,7 +87,7 @@ class Stored:
             if "projectile" in {port.name for port in session.get_inputs()}:
                 at = np.array(self._projectile(), np.float32)
                 given["projectile"] = np.tile(at, (len(given["target"]), 1))
-            return session.run(["draw"], given)[0].astype(float)
+            return np.asarray(session.run(["draw"], given)[0], float)
         except NotMade:
             raise
         except Exception as error:  # onnxruntime has an error of its own for each kind of damage

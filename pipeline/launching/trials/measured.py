@@ -1,15 +1,21 @@
-"""Launches that a user measured: data/trials/measured/<band>.csv (format: README.md beside it)."""
+"""Launches that a user measured: data/trials/measured/<band>.csv (format: README.md beside it).
+
+The stage `evidence` checks them, and whatever predicts them reads what it writes.
+"""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from pipeline.base import launch_table as table
 from pipeline.base.errors import UserError
+from pipeline.base.files import write_json
+from pipeline.base.schema import LIST, JsonRecord, read_json
 from pipeline.base.target import TARGET_AREA
+from pipeline.params import Params
 
 REQUIRED, OPTIONAL = table.SCORES
 LIMITS = {**table.LIMITS, "target_m": (0, 20, "beyond the fork")}
@@ -17,52 +23,82 @@ LIMITS = {**table.LIMITS, "target_m": (0, 20, "beyond the fork")}
 
 @dataclass(frozen=True)
 class Measured:
-    """One launch: draw (y, z) [m], landing [m] (None: it did not land), target [m] if aimed."""
+    """One launch that a user measured.
+
+    Attributes:
+        draw: (y, z) [m].
+        landing: [m]; None: it did not land.
+        target: [m], of a launch that a policy aimed.
+        method: Whose policy; "" of a launch that nobody aimed, which every method predicts.
+    """
 
     draw: tuple[float, float]
     landing: float | None
     target: float | None
+    method: str = ""
 
 
-def named(path: Path) -> Counter[str]:
-    """How many launches of a measured CSV name each method; "" stands for none.
+def read_scores(folder: Path, band: str, params: Params) -> list[Measured]:
+    """A band's measured launches, from its CSV in `folder`; none where it has no file.
 
     Raises:
-        UserError: The file cannot be read.
+        UserError: A file is no band's, or the band's own cannot be used.
     """
-    return Counter(row["method"] for _, row in table.rows(path, REQUIRED, OPTIONAL))
+    path = table.file_of(folder, band, params.bands)
+    return read_measured(path, params.methods) if path else []
 
 
-def read_measured(path: Path, method: str, known: Collection[str]) -> list[Measured]:
-    """Measured launches of a CSV: those of `method`, and those that name no method.
+def read_measured(path: Path, methods: Collection[str]) -> list[Measured]:
+    """Measured launches of a CSV.
 
     Nobody aimed a launch without a method, so its target, if any, is left out: such launches are
     held against predictions alone.
 
     Args:
-        known: Methods of params.yaml; a row that names another is refused.
+        methods: Of params.yaml; a row that names another is refused.
 
     Raises:
         UserError: The file cannot be read, or a row says what no launch can have done.
     """
     launches = []
     for line, row in table.rows(path, REQUIRED, OPTIONAL):
-        where = f"{path}, line {line}"
-        if row["method"] and row["method"] not in known:
+        where, method = f"{path}, line {line}", row["method"]
+        if method and method not in methods:
             raise UserError(
-                f"{where}: method {row['method']!r} is not in params.yaml, which has"
-                f" {', '.join(known)}; leave it empty for a launch that no policy aimed"
+                f"{where}: method {method!r} is not in params.yaml, which has"
+                f" {', '.join(methods)}; leave it empty for a launch that no policy aimed"
             )
         draw = table.drawn(where, row)
         landing, target = (
             table.metres(where, name, row[name], LIMITS) for name in (table.LANDING, "target_m")
         )
-        target = target if row["method"] else None
+        target = target if method else None
         if target is not None and not TARGET_AREA[0] <= target <= TARGET_AREA[1]:
             raise UserError(
                 f"{where}: target_m {target} lies outside the target on the floor,"
                 f" {list(TARGET_AREA)}, where every landing counts as failed"
             )
-        if row["method"] in ("", method):
-            launches.append(Measured(draw, landing, target))
+        launches.append(Measured(draw, landing, target, method))
     return launches
+
+
+class MeasuredRecord(JsonRecord):
+    draw: Annotated[tuple[float, float], LIST]
+    landing: float | None
+    target: float | None
+    method: str
+
+
+class ScoresFile(JsonRecord):
+    launches: list[MeasuredRecord]
+
+
+def save_scores(path: Path, launches: Sequence[Measured]) -> None:
+    """Write a `ScoresFile`."""
+    write_json(path, {"launches": [vars(one) for one in launches]})
+
+
+def load_scores(path: Path) -> list[Measured]:
+    """The launches of a `ScoresFile`. Raises NotMade."""
+    read = read_json(path, ScoresFile)
+    return [Measured(one.draw, one.landing, one.target, one.method) for one in read.launches]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy.special import ndtri
 
+from pipeline.launching.surface.landing_map import Launched, Launcher
 from pipeline.simulator.parameters import Parameters
 
 LEVEL = 0.9
@@ -17,7 +16,7 @@ ERRORS = ndtri((np.arange(401) + 0.5) / 401)  # equally likely; 41 end 6 % too s
 
 
 def landing_intervals(
-    launcher: Callable,
+    launcher: Launcher,
     draws: np.ndarray,
     samples: Parameters | None,
     error: float,
@@ -57,6 +56,6 @@ def landing_intervals(
     return result
 
 
-def _landing(launched) -> np.ndarray:
+def _landing(launched: Launched) -> np.ndarray:
     good = np.array([failure is None for failure in launched.failure])
     return np.where(good, np.asarray(launched.landing_y, float), np.nan)

@@ -6,7 +6,7 @@ the simulator's), "measured" (a user's CSV) or "predicted" (nothing but the cali
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -16,10 +16,10 @@ import pyarrow.parquet as pq
 
 from pipeline.base.failures import too_strong
 from pipeline.base.files import replacing
-from pipeline.base.launch_table import file_of
+from pipeline.base.layout import made
 from pipeline.base.pool import Pool
 from pipeline.launching.surface.stored import Stored
-from pipeline.launching.trials.measured import read_measured
+from pipeline.launching.trials.measured import Measured
 from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params import Params
 from pipeline.simulator.launch import Launches
@@ -81,24 +81,49 @@ class Batch:
         told = getattr(self, name)
         return [None] * len(self.draws) if told is None else list(told)
 
+    def save(self, path: Path) -> None:
+        """Write one row a launch."""
+        ways = self.every("flight")
+        columns = {
+            "kind": pa.array([self.kind] * len(self.draws), pa.string()),
+            "draw_y": self.draws[:, 0],
+            "draw_z": self.draws[:, 1],
+            "target": pa.array(self.targets, pa.float64()),
+            "landing": pa.array(self.every("landing"), pa.float64()),
+            "failure": pa.array(self.every("failure"), pa.string()),
+            "hold_force": pa.array(self.every("hold_force"), pa.float64()),
+        }
+        for axis, letter in enumerate("yz"):
+            course = [None if way is None else way[:, axis] for way in ways]
+            columns[f"flight_{letter}"] = pa.array(course, pa.list_(pa.float64()))
+        with replacing(path) as temporary:
+            pq.write_table(pa.table(columns), temporary)
 
-def measured(params: Params, band: str, method: str, folder: Path) -> list[Batch]:
-    """The user's launches of the band that say something about the method, if there are any.
+    @classmethod
+    def load(cls, path: Path) -> Batch:
+        """Read what `save` wrote. Raises NotMade."""
+        rows = pq.read_table(made(path)).to_pylist()
+        ways = [
+            None if row["flight_y"] is None else np.stack([row["flight_y"], row["flight_z"]], 1)
+            for row in rows
+        ]
+        return cls(
+            kind=rows[0]["kind"],
+            draws=np.array([(row["draw_y"], row["draw_z"]) for row in rows]),
+            flight=ways,
+            targets=[row["target"] for row in rows],
+            **{name: [row[name] for row in rows] for name in ("landing", "failure", "hold_force")},
+        )
 
-    Args:
-        params: The whole of params.yaml.
-        folder: Of the users' files, one a band.
 
-    Raises:
-        UserError: A file is no band's, or the band's own cannot be used.
-    """
-    path = file_of(folder, band, params.bands)
-    launches = read_measured(path, method, params.methods) if path else []
-    if not launches:
+def scored(launches: Sequence[Measured], method: str) -> list[Batch]:
+    """The user's launches that say something about a method's predictions, if there are any."""
+    chosen = [one for one in launches if one.method in ("", method)]
+    if not chosen:
         return []
-    landing = [one.landing for one in launches]
+    landing = [one.landing for one in chosen]
     failure = [None if y is not None else "did not land" for y in landing]
-    draws, targets = np.array([o.draw for o in launches]), [o.target for o in launches]
+    draws, targets = np.array([one.draw for one in chosen]), [one.target for one in chosen]
     return [Batch("measured", draws, targets, landing, failure)]
 
 
@@ -123,7 +148,10 @@ def launched(batch: Batch, launch: Callable) -> Batch:
 
 
 def predict(
-    batches: list[Batch], launcher: Callable, samples: Parameters | None, params: Params
+    batches: list[Batch],
+    launcher: Callable[..., Launches],
+    samples: Parameters | None,
+    params: Params,
 ) -> tuple[Launches, np.ndarray]:
     """What the calibrated simulator makes of the draws of all batches, N in all.
 
@@ -165,7 +193,7 @@ def table(
     method: str,
     batches: list[Batch],
     *,
-    predicted,
+    predicted: Launches,
     intervals: np.ndarray,
     stretch: np.ndarray,
     recorded: float | None,
@@ -185,7 +213,7 @@ def table(
     def each(name: str) -> list:
         return [getattr(batch, name) for batch in batches for _ in batch.draws]
 
-    def known(values) -> pa.Array:
+    def known(values: np.ndarray | list) -> pa.Array:
         return pa.array(values, pa.float64(), from_pandas=True)
 
     force = zip(every("hold_force"), predicted.hold_force, strict=True)

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.recording.input.decode import Message
 from pipeline.recording.input.images import LARGEST
 from pipeline.recording.input.readings import Reading, first_of, frame_of, stamp_of
 
@@ -87,7 +88,7 @@ class Calibration:
         return camera.width, camera.height, numbers, self.model, self.binning, self.region
 
 
-def read_calibration(message: object) -> Reading:
+def read_calibration(message: Message) -> Reading:
     """CameraInfo of ROS 2 (k, d, p) and ROS 1, foxglove.CameraCalibration (K, D, P)."""
     matrix = np.array(first_of(message, "k", "K"), float).reshape(3, 3)
     projection = np.array(first_of(message, "p", "P"), float)

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 from functools import lru_cache
 from types import SimpleNamespace
+from typing import Any, TypeVar
 
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
@@ -15,15 +16,27 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from pipeline.base.errors import UserError
 from pipeline.recording.input.container import Channel
 
-Decoder = Callable[[bytes], object]
+Message = Any  # it has the attributes that its schema says, and whoever reads it finds out
+Decoder = Callable[[bytes], Message]
+Read = TypeVar("Read")
 LONGEST = {"json": 2**25}  # bytes of one message: objects of JSON take fifty times as much
 USUAL = 2**27
 LONGEST_SCHEMA = 2**16  # characters of ROS, with all types within; those of robots have a tenth
 MOST_ELEMENTS = 9999
+# What readers raise where fields are missing, of other types or beyond all bounds.
+UNFIT = (AttributeError, LookupError, TypeError, ValueError, OverflowError)
+
+
+class Unreadable(Exception):
+    """A message that cannot be read; it says why, in one line."""
+
+    @classmethod
+    def by(cls, error: Exception) -> Unreadable:
+        return cls(str(error).partition("\n")[0] or type(error).__name__)
 
 
 def decoder(channel: Channel) -> Decoder:
-    """A function from payload to a message with attributes; it raises whatever damage makes it.
+    """A function from payload to a message with attributes; it raises Unreadable.
 
     Raises:
         UserError: where the encoding is not known or the schema is bad, in one line.
@@ -40,15 +53,31 @@ def decoder(channel: Channel) -> Decoder:
     try:
         read = _compiled(schema.encoding, channel.encoding, schema.name, schema.data)
     except Exception as error:  # the parsers raise many kinds
-        reason = str(error).partition("\n")[0]
+        reason = Unreadable.by(error)
         raise UserError(f"topic {channel.topic}: bad schema {schema.name} ({reason})") from error
 
-    def bounded(payload: bytes) -> object:
+    def bounded(payload: bytes) -> Message:
         if len(payload) > most:
-            raise ValueError("a message that is too long")
-        return read(payload)
+            raise Unreadable("a message that is too long")
+        try:
+            return read(payload)
+        except Exception as error:  # damaged bytes make the libraries raise anything
+            raise Unreadable.by(error) from error
 
     return bounded
+
+
+def reader(decode: Decoder, read: Callable[[Message], Read]) -> Callable[[bytes], Read]:
+    """From payload to what `read` takes of its message; it raises Unreadable."""
+
+    def decoded(payload: bytes) -> Read:
+        message = decode(payload)
+        try:
+            return read(message)
+        except UNFIT as error:
+            raise Unreadable.by(error) from error
+
+    return decoded
 
 
 @lru_cache(64)

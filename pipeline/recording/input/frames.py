@@ -25,6 +25,10 @@ class Transform:
     def identity(cls) -> Transform:
         return cls(Rotation.identity(), np.zeros(3))
 
+    def pose(self) -> list[float]:
+        """[x, y, z, qx, qy, qz, qw], as `of` takes it."""
+        return [*self.translation.tolist(), *self.rotation.as_quat(canonical=True).tolist()]
+
     def apply(self, points: np.ndarray) -> np.ndarray:
         """Points, shape (3,) or (N, 3), in their own precision."""
         points = np.asarray(points)

@@ -44,7 +44,12 @@ def is_depth(picture: Picture) -> bool:
     """Whether a picture says that it holds depth; a grey PNG of 16 bits is taken to."""
     if picture.encoding or "compressedDepth" in picture.format:
         return picture.encoding in ("16UC1", "32FC1") or "compressedDepth" in picture.format
-    return picture.format.startswith(("16UC1", "32FC1")) or _header(picture.data)[1] == "I;16"
+    if picture.format.startswith(("16UC1", "32FC1")):
+        return True
+    try:
+        return _header(picture.data)[1] == "I;16"
+    except Undecodable:
+        return False
 
 
 def color(picture: Picture) -> np.ndarray:
@@ -89,7 +94,10 @@ def depth(picture: Picture) -> np.ndarray:
 
 def grey(data: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """A grey PNG of this width and height to uint8, shape (H, W). Raises Undecodable."""
-    found, mode = _header(data)
+    try:
+        found, mode = _header(data)
+    except Undecodable as error:
+        raise Undecodable(f"is not a grey PNG of 8 bits or 1: {error}") from error
     if mode not in ("L", "1") or data[0] == 0xFF:
         raise Undecodable("is not a grey PNG of 8 bits or 1")
     if found != size:
@@ -106,7 +114,10 @@ def size_of(picture: Picture) -> tuple[int, int] | None:
         data = data[DEPTH_HEADER.size :]
         if "rvl" in picture.format.lower():
             return RVL_SIZE.unpack_from(data) if len(data) >= RVL_SIZE.size else None
-    return _header(data)[0]
+    try:
+        return _header(data)[0]
+    except Undecodable:
+        return None
 
 
 def rvl(data: np.ndarray) -> np.ndarray:
@@ -163,19 +174,20 @@ def _within(firsts: list[int], counts: list[int], size: int) -> np.ndarray:
     return np.cumsum(begins - ends)[:size] > 0
 
 
-def _header(data: np.ndarray) -> tuple[tuple[int, int] | None, str]:
-    """Size and Pillow's mode of a JPEG or PNG, by its header alone; (None, "") for others."""
+def _header(data: np.ndarray) -> tuple[tuple[int, int], str]:
+    """Size and Pillow's mode of a JPEG or PNG, by its header alone. Raises Undecodable."""
     try:
         with Image.open(io.BytesIO(data), formats=("JPEG", "PNG")) as image:
             return image.size, image.mode
-    except Exception:  # damaged bytes raise many kinds
-        return None, ""
+    except Exception as error:  # damaged bytes make Pillow raise anything
+        kind = type(error).__name__  # its words hold addresses, which differ from run to run
+        raise Undecodable(f"damaged image, or neither JPEG nor PNG ({kind})") from error
 
 
 def _unpacked(data: np.ndarray, flags: int, kind: str) -> np.ndarray:
-    size, _ = _header(data)
-    if size is None or size[0] * size[1] > LARGEST:
-        raise Undecodable(f"damaged image, or neither JPEG nor PNG ({kind})")
+    (width, height), _ = _header(data)
+    if width * height > LARGEST:
+        raise Undecodable(f"an image of {width} x {height} pixels ({kind})")
     if data[0] == 0xFF and b"\xff\xd9" not in data[-4096:].tobytes():
         raise Undecodable("JPEG is cut off")  # OpenCV would fill it up with grey
     if data[0] == 0xFF and data.tobytes().count(b"\xff\xda") > SCANS:

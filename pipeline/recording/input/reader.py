@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base.errors import UserError, printable
+from pipeline.params.lab import SetupParams
 from pipeline.recording.input import images
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.container import Container, read_container, sha256
@@ -43,7 +44,6 @@ class Recording:
         notes: What else to know of it, which cost nothing.
         choices: Why each role has its topic.
         sha256: Hash of the file.
-        pull, pulls: Which of the file's pulls this is, from 1 on, and of how many.
         start: From which seconds count [ns]: the file's first force, also in a part of it; None
             for that of `wrench`.
     """
@@ -62,8 +62,6 @@ class Recording:
     twist: Stream | None = None
     notes: list[str] = field(default_factory=list)
     choices: dict[str, str] = field(default_factory=dict)
-    pull: int = 1
-    pulls: int = 1
     start: int | None = None
 
     @property
@@ -84,11 +82,11 @@ class Recording:
             return None
         return depth if depth.shape == (self.depth_camera.height, self.depth_camera.width) else None
 
-    def part(self, begin: float, end: float, pull: int = 1, pulls: int = 1) -> Recording:
-        """What was recorded from `begin` to `end` [s], as one pull of so many."""
+    def part(self, begin: float, end: float) -> Recording:
+        """What was recorded from `begin` to `end` [s]."""
         first, last = (self.origin + round(time * 1e9) for time in (begin, end))
         cut = {role: stream.between(first, last) for role, stream in self.streams.items()}
-        return replace(self, **cut, pull=pull, pulls=pulls, start=self.origin)
+        return replace(self, **cut, start=self.origin)
 
     def shifted(self, pose: float = 0.0, camera: float = 0.0) -> Recording:
         """With stamps that are late by so many seconds put right: pose and twist; pictures."""
@@ -101,12 +99,12 @@ class Recording:
         )
 
 
-def read_recording(path: Path, setup: object) -> Recording:
+def read_recording(path: Path, setup: SetupParams) -> Recording:
     """Read and check a recording. Raises UserError with one line about what is missing or wrong."""
     return recording_of(read_container(Path(path)), setup)
 
 
-def recording_of(container: Container, setup: object) -> Recording:
+def recording_of(container: Container, setup: SetupParams) -> Recording:
     """As `read_recording`, from a file that was read already."""
     try:
         chosen = choose(container, setup)

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import printable
+from pipeline.recording.input.decode import Message
 
 LATEST = 2**62  # ns; a stamp beyond it is damage
 FRANKA_BASE = "franka_base"  # frame of Franka states whose header names none, as franka_ros writes
@@ -73,7 +74,7 @@ def kind_of(schema: str) -> str:
     return "WrenchStamped" if kind.endswith("WrenchStamped") else kind
 
 
-def first_of(message: object, *names: str) -> object:
+def first_of(message: Message, *names: str) -> Message:
     """The first of these fields that the message has. Raises AttributeError."""
     for name in names:
         if hasattr(message, name):
@@ -81,7 +82,7 @@ def first_of(message: object, *names: str) -> object:
     raise AttributeError(f"none of the fields {', '.join(names)}")
 
 
-def stamp_of(message: object) -> int | None:
+def stamp_of(message: Message) -> int | None:
     """header.stamp (ROS) or timestamp (Foxglove) [ns]; None where there is neither."""
     header = getattr(message, "header", None)
     time = getattr(message, "timestamp", None) if header is None else header.stamp
@@ -97,26 +98,26 @@ def stamp_of(message: object) -> int | None:
     return stamp
 
 
-def frame_of(message: object) -> str:
+def frame_of(message: Message) -> str:
     header = getattr(message, "header", message)
     return printable(str(getattr(header, "frame_id", ""))).lstrip("/")
 
 
-def read_wrench(message: object) -> Reading:
+def read_wrench(message: Message) -> Reading:
     return _reading(message, _vector(getattr(message, "wrench", message).force))
 
 
-def read_pose(message: object) -> Reading:
+def read_pose(message: Message) -> Reading:
     pose = getattr(message.pose, "pose", message.pose)  # PoseWithCovariance
     return _reading(message, pose_of(pose))
 
 
-def read_twist(message: object) -> Reading:
+def read_twist(message: Message) -> Reading:
     twist = getattr(message.twist, "twist", message.twist)  # TwistWithCovariance
     return _reading(message, (*_vector(twist.linear), *_vector(twist.angular)))
 
 
-def read_state_pose(message: object) -> Reading:
+def read_state_pose(message: Message) -> Reading:
     """O_T_EE: a PoseStamped in FrankaRobotState, a column-major 4 x 4 in FrankaState."""
     pose = first_of(message, "o_t_ee", "O_T_EE")
     if hasattr(pose, "pose"):
@@ -130,7 +131,7 @@ def read_state_pose(message: object) -> Reading:
     return Reading(stamp_of(message), frame_of(message) or FRANKA_BASE, value)
 
 
-def read_state_wrench(message: object) -> Reading:
+def read_state_wrench(message: Message) -> Reading:
     """O_F_ext_hat_K, the external force that the arm estimates, in the frame of O_T_EE."""
     wrench = first_of(message, "o_f_ext_hat_k", "O_F_ext_hat_K")
     if not hasattr(wrench, "wrench"):
@@ -140,19 +141,19 @@ def read_state_wrench(message: object) -> Reading:
     return Reading(stamp_of(message), frame, _vector(wrench.wrench.force))
 
 
-def opening_reader(names: tuple[str, ...]) -> Callable[[object], Reading]:
+def opening_reader(names: tuple[str, ...]) -> Callable[[Message], Reading]:
     """Sum of these joints: two fingers that each move half the opening, or one value."""
     read = joints_reader(names, "")
     return lambda message: _reading(message, (sum(read(message).value),))
 
 
-def joints_reader(names: tuple[str, ...], frame: str) -> Callable[[object], Reading]:
+def joints_reader(names: tuple[str, ...], frame: str) -> Callable[[Message], Reading]:
     """Positions of these joints, in this order, of a robot whose root is `frame`.
 
     The reader raises ValueError for a message in which one is missing.
     """
 
-    def read(message: object) -> Reading:
+    def read(message: Message) -> Reading:
         joints = joints_of(message)
         missing = [name for name in names if name not in joints]
         if missing:
@@ -162,7 +163,7 @@ def joints_reader(names: tuple[str, ...], frame: str) -> Callable[[object], Read
     return read
 
 
-def read_image(message: object) -> Reading:
+def read_image(message: Message) -> Reading:
     """Image and foxglove.RawImage, CompressedImage and foxglove.CompressedImage."""
     data, stamp = _bytes(message.data), stamp_of(message) or 0
     if hasattr(message, "format"):
@@ -173,7 +174,7 @@ def read_image(message: object) -> Reading:
     return _reading(message, Picture(str(message.encoding), "", data, *size, swapped, stamp))
 
 
-def joints_of(message: object) -> dict[str, float]:
+def joints_of(message: Message) -> dict[str, float]:
     """Position of each joint, of JointState, foxglove.JointStates or a Franka state."""
     message = getattr(message, "measured_joint_state", message)
     if hasattr(message, "joints"):
@@ -181,12 +182,12 @@ def joints_of(message: object) -> dict[str, float]:
     return dict(zip(map(str, message.name), map(float, message.position), strict=True))
 
 
-def pose_of(pose: object) -> tuple[float, ...]:
+def pose_of(pose: Message) -> tuple[float, ...]:
     """x y z qx qy qz qw of a Pose."""
     return (*_vector(pose.position), *quaternion_of(pose.orientation))
 
 
-def quaternion_of(turn: object) -> tuple[float, ...]:
+def quaternion_of(turn: Message) -> tuple[float, ...]:
     """x y z w. Raises ValueError where it has no length."""
     quaternion = tuple(float(getattr(turn, axis)) for axis in "xyzw")
     if not sum(x * x for x in quaternion) > 1e-12:
@@ -194,15 +195,15 @@ def quaternion_of(turn: object) -> tuple[float, ...]:
     return quaternion
 
 
-def _reading(message: object, value: tuple[float, ...] | Picture) -> Reading:
+def _reading(message: Message, value: tuple[float, ...] | Picture) -> Reading:
     return Reading(stamp_of(message), frame_of(message), value)
 
 
-def _vector(vector: object) -> tuple[float, float, float]:
+def _vector(vector: Message) -> tuple[float, float, float]:
     return float(vector.x), float(vector.y), float(vector.z)
 
 
-def _bytes(data: object) -> np.ndarray:
+def _bytes(data: Message) -> np.ndarray:
     """Bytes, base64 as JSON has it, or a list of numbers, to uint8."""
     if isinstance(data, str):
         data = base64.b64decode(data, validate=True)

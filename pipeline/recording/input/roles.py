@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
+from typing import TypeVar
 
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.params.lab import SetupParams
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import read_calibration
 from pipeline.recording.input.container import Channel
-from pipeline.recording.input.decode import Decoder
+from pipeline.recording.input.decode import Decoder, Message, Unreadable, reader
 from pipeline.recording.input.kinematics import chain_of, integrated
 from pipeline.recording.input.readings import Reading
 
@@ -28,7 +30,8 @@ OPTIONAL = ("twist", "gripper")
 COMMANDS = ("goal", "desired", "command", "commanded", "cmd", "target", "reference", "setpoint")
 THINGS = ("camera", "object", "tag", "marker")
 
-Read = Callable[[object], Reading]
+Value = TypeVar("Value")
+Read = Callable[[Message], Reading]
 Convert = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Source = tuple[Read, Convert | None]
 
@@ -39,7 +42,7 @@ class Choice:
 
     Attributes:
         channel: Raw payloads.
-        read: Payload to reading; raises anything on damaged bytes.
+        read: Payload to reading; raises Unreadable.
         why: One phrase.
         convert: Sorted stamps [ns], shape (S,), and values, shape (S, C), to what the role asks
             for, shape (S, 7); None where the values are that already.
@@ -60,17 +63,17 @@ class Choice:
 
 
 def readable(
-    read: Callable[[bytes], object], payloads: Iterable[bytes], most: int | None = TRIES
-) -> tuple[list, str]:
+    read: Callable[[bytes], Value], payloads: Iterable[bytes], most: int | None = TRIES
+) -> tuple[list[Value], str]:
     """What the first messages say that can be read, and why the last of the others cannot be."""
     reasons = ["all are damaged"]
 
-    def readings():
+    def readings() -> Iterator[Value]:
         for payload in payloads:
             try:
                 yield read(payload)
-            except Exception as error:  # whatever damaged bytes do to the decoder
-                reasons.append(str(error).partition("\n")[0] or reasons[-1])
+            except Unreadable as error:
+                reasons.append(str(error))
 
     return list(islice(readings(), most)), reasons[-1]
 
@@ -196,7 +199,7 @@ class Candidate:
 
 
 def source_of(
-    role: str, channel: Channel, decode: Decoder, setup: object, named: bool
+    role: str, channel: Channel, decode: Decoder, setup: SetupParams, named: bool
 ) -> Source | None:
     """How to read a channel for a role, and how to convert what was read.
 
@@ -205,7 +208,6 @@ def source_of(
     Args:
         role: One of ROLES; the channel's schema is among those of its readers.
         channel, decode: The topic.
-        setup: params.setup.
         named: Whether params name the topic.
 
     Raises:
@@ -232,7 +234,7 @@ def _gripper(channel: Channel, decode: Decoder, named: bool) -> Source | None:
     return None
 
 
-def _arm(channel: Channel, decode: Decoder, setup: object) -> Source | None:
+def _arm(channel: Channel, decode: Decoder, setup: SetupParams) -> Source | None:
     """Joint states through params' URDF."""
     known = _joint_names(channel, decode)
     arms = [some for some in known if not all(_has(FINGERS, name) for name in some)]
@@ -256,11 +258,10 @@ def _arm(channel: Channel, decode: Decoder, setup: object) -> Source | None:
     return read, lambda stamps, values: chain.poses(values)
 
 
-def _motion(channel: Channel, decode: Decoder, setup: object, read: Read) -> Source:
+def _motion(channel: Channel, decode: Decoder, setup: SetupParams, read: Read) -> Source:
     """A twist alone, integrated from params' start pose."""
-    messages, _ = readable(decode, channel.payloads[:JOINT_TRIES], None)
-    frames = Counter(of.frame_of(message) for message in messages)
-    frame = max(frames, key=frames.get, default="")
+    frames, _ = readable(reader(decode, of.frame_of), channel.payloads[:JOINT_TRIES], None)
+    frame = Counter(frames).most_common(1)[0][0] if frames else ""
     if set(frame.lower().split("_")) & TOOLS:
         raise UserError(
             f"the twist on {channel.topic} is along the axes of the hand ({frame}), publish it"
@@ -276,8 +277,8 @@ def _motion(channel: Channel, decode: Decoder, setup: object, read: Read) -> Sou
 
 def _joint_names(channel: Channel, decode: Decoder) -> list[tuple[str, ...]]:
     """Names in the first messages, the most frequent first. Raises UserError if there are none."""
-    messages, _ = readable(decode, channel.payloads[:JOINT_TRIES], None)
-    found, _ = readable(lambda message: tuple(of.joints_of(message)), messages, None)
+    read = reader(decode, lambda message: tuple(of.joints_of(message)))
+    found, _ = readable(read, channel.payloads[:JOINT_TRIES], None)
     names = [some for some, _ in Counter(found).most_common() if some]
     if not names:
         raise UserError(f"{channel.topic} has fewer than two readable messages (no positions)")

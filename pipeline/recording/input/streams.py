@@ -8,16 +8,18 @@ the stamp of another, or, of force and pose, is alone far off those around it.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.ndimage import median_filter
 
-from pipeline.base.errors import UserError
+from pipeline.base.errors import UserError, printable
 from pipeline.recording.input import clocks
+from pipeline.recording.input.decode import Unreadable
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.input.roles import OPTIONAL, Choice
-from pipeline.recording.input.words import counted, few
+from pipeline.recording.input.words import counted, few, shortened
 
 ABSURD = 1e6  # N, m, m/s, rad: nothing here is as large
 # What a lone message may be off the four around it: a knock or a fall lasts for more than one.
@@ -29,6 +31,7 @@ ENDS = 0.3  # s by which a topic may start later or stop earlier than the others
 FROZEN = 0.25  # s of one and the same value of a sensor that has noise
 FROZEN_FRAMES = 3  # pictures that are the same, byte for byte
 NAMED = 3  # places named in one line
+REASON = 100  # characters of why a message is damaged
 CORRECTABLE = ("pose", "twist", "gripper")  # by log_time, if they have a clock of their own
 
 
@@ -94,6 +97,7 @@ class Raw:
     log: np.ndarray
     values: list
     lost: Counter[str]
+    reason: str = ""  # why the first damaged message cannot be read
     notes: list[str] = field(default_factory=list)
     late: int = 0  # how often the stamps go back
 
@@ -148,20 +152,20 @@ def streams_of(chosen: dict[str, Choice]) -> tuple[dict[str, Stream], list[str]]
 
 def _read(role: str, choice: Choice) -> Raw:
     stamps, logs, values, frames, lost = [], [], [], [], Counter()
-    seen, bare = set(), 0
+    seen, bare, reason = set(), 0, ""
     channel = choice.channel
     for log_time, payload in zip(channel.log_times, channel.payloads, strict=True):
         try:
             stamp, frame, value = choice.read(payload)
-            finite = isinstance(value, Picture) or all(abs(x) < ABSURD for x in value)
-        except Exception:  # whatever damaged bytes do to the decoder
+        except Unreadable as error:
             lost["damaged"] += 1
+            reason = reason or shortened(printable(str(error)), REASON)
             continue
         if (log_time, payload) in seen:
             lost["doubled"] += 1
             continue
         seen.add((log_time, payload))
-        if not finite:
+        if not isinstance(value, Picture) and not all(abs(x) < ABSURD for x in value):
             lost["not finite"] += 1
             continue
         if not stamp:
@@ -173,7 +177,7 @@ def _read(role: str, choice: Choice) -> Raw:
         frames.append(frame)
     frame = Counter(frames).most_common(1)[0][0] if frames else ""
     stamp, log = np.array(stamps, np.int64), np.array(logs, np.uint64).astype(np.int64)
-    raw = Raw(role, choice, frame, stamp, log, values, lost)
+    raw = Raw(role, choice, frame, stamp, log, values, lost, reason)
     if bare == len(stamps) > 0:
         if role not in TIMED:
             raise UserError(f"topic {raw.topic} has no header stamps, record with time stamps")
@@ -182,7 +186,7 @@ def _read(role: str, choice: Choice) -> Raw:
     raw.drop(np.array([one != frame for one in frames], bool), "in another frame")
     raw.drop(raw.stamp == 0, "without a stamp")
     if len(raw.stamp) < 2:
-        reasons = f" ({_words(raw.lost)})" if raw.lost else ""
+        reasons = f" ({_words(raw)})" if raw.lost else ""
         raise UserError(f"topic {raw.topic} has fewer than two readable messages{reasons}")
     return raw
 
@@ -222,7 +226,9 @@ def _take_steps_out(raw: dict[str, Raw]) -> None:
         one.late -= sum(step.size < 0 for step in jumps)
 
 
-def _agreed(raw: dict[str, Raw], find) -> dict[str, list[clocks.Jump]]:
+def _agreed(
+    raw: dict[str, Raw], find: Callable[[np.ndarray, np.ndarray], list[clocks.Jump]]
+) -> dict[str, list[clocks.Jump]]:
     """Steps of each role; those at one time have the size that the fastest topic tells."""
     found = {role: find(one.stamp, one.log) for role, one in raw.items()}
     found = {role: steps for role, steps in found.items() if steps}
@@ -284,7 +290,7 @@ def _sorted(raw: Raw) -> Stream:
         if raw.choice.convert is not None:
             values = raw.choice.convert(raw.stamp, values)
     if raw.lost:
-        raw.notes.append(f"lost {_words(raw.lost)}")
+        raw.notes.append(f"lost {_words(raw)}")
     delay = float(np.median(raw.log - raw.stamp)) * 1e-9
     lost = sum(raw.lost.values())
     return Stream(raw.topic, raw.frame, raw.stamp, values, delay, lost, raw.notes)
@@ -303,8 +309,9 @@ def _without_lone(raw: Raw, values: np.ndarray) -> np.ndarray:
     return values[~lone]
 
 
-def _words(lost: Counter[str]) -> str:
-    return ", ".join(f"{count} {why}" for why, count in sorted(lost.items()))
+def _words(raw: Raw) -> str:
+    words = ", ".join(f"{count} {why}" for why, count in sorted(raw.lost.items()))
+    return f"{words}; the first damaged one: {raw.reason}" if raw.reason else words
 
 
 def _gaps(stream: Stream, origin: int, first: int, last: int) -> list[str]:

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pipeline.base.errors import UserError
+from pipeline.params.lab import SetupParams
 from pipeline.recording.input import images
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import Camera, camera_from
 from pipeline.recording.input.container import Channel, Container
-from pipeline.recording.input.decode import decoder
+from pipeline.recording.input.decode import decoder, reader
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.input.roles import OPTIONAL, ROLES, Candidate, Choice, readable, source_of
 from pipeline.recording.input.words import few
@@ -19,7 +20,7 @@ from pipeline.recording.input.words import few
 SHOWN = 12  # topics named in a message
 
 
-def choose(container: Container, setup: object) -> dict[str, Choice]:
+def choose(container: Container, setup: SetupParams) -> dict[str, Choice]:
     """Role to channel, for every role of ROLES that the file has.
 
     Args:
@@ -51,7 +52,7 @@ def camera_of(chosen: dict[str, Choice], role: str) -> Camera:
 class _Chooser:
     """Goes through the channels of one file, role by role."""
 
-    def __init__(self, container: Container, setup: object) -> None:
+    def __init__(self, container: Container, setup: SetupParams) -> None:
         self.container, self.setup = container, setup
         self.problems: list[str] = []  # why channels of the right type could not be used
 
@@ -114,7 +115,7 @@ class _Chooser:
             if source is None:
                 return None
             read, convert = source
-            choice = Choice(channel, lambda payload: read(decode(payload)), "", convert)
+            choice = Choice(channel, reader(decode, read), "", convert)
             return Candidate(ROLES[role], choice, choice.typical())
         except UserError as error:
             self.problems.append(str(error))

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.base.errors import UserError, printable
 from pipeline.recording.input.container import Container
-from pipeline.recording.input.decode import decoder
+from pipeline.recording.input.decode import Message, decoder, reader
 from pipeline.recording.input.frames import Transform, TransformTree
 from pipeline.recording.input.readings import kind_of, quaternion_of
 from pipeline.recording.input.roles import readable
@@ -35,11 +35,7 @@ def transforms_of(container: Container) -> TransformTree:
             decode = decoder(channel)
         except UserError:
             continue
-
-        def read(payload: bytes, decode=decode) -> list[tuple[Edge, np.ndarray]]:
-            return _edges(decode(payload))
-
-        found, _ = readable(read, channel.payloads, None)
+        found, _ = readable(reader(decode, _edges), channel.payloads, None)
         for edge, pose in chain.from_iterable(found):
             if not static and np.abs(poses.setdefault(edge, pose) - pose).max() > STILL:
                 moving.add(edge)
@@ -53,7 +49,7 @@ def transforms_of(container: Container) -> TransformTree:
     return tree
 
 
-def _edges(message: object) -> list[tuple[Edge, np.ndarray]]:
+def _edges(message: Message) -> list[tuple[Edge, np.ndarray]]:
     """Parent and child, and pose of the child in the parent: x y z qx qy qz qw."""
     found = []
     for one in getattr(message, "transforms", [message]):

@@ -5,16 +5,27 @@ A backend is made for one view, learns once from its frames, and then masks each
 
 from __future__ import annotations
 
+from typing import Protocol
+
+import numpy as np
+
 from pipeline.base.errors import UserError
+from pipeline.params.recording import Sam3
 from pipeline.recording.masks.folder import FolderMask
 from pipeline.recording.masks.ridge import RidgeMask
-from pipeline.recording.view import View
+from pipeline.recording.view import Frame, View
 
 
-def masker(name: str, view: View, sam3: object | None = None) -> object:
-    """The backend of params.cloud.mask, with `mask(frame)`: pixels of the band (H, W), bool.
+class Mask(Protocol):
+    """A backend that has learned from a view."""
 
-    `sam3` is params.cloud.sam3.
+    def mask(self, frame: Frame) -> np.ndarray:
+        """Pixels of the band, shape (H, W), bool."""
+        ...
+
+
+def masker(name: str, view: View, sam3: Sam3 | None = None) -> Mask:
+    """The backend of params.cloud.mask.
 
     Raises:
         UserError: There is no such backend, or it lacks something.

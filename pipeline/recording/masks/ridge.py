@@ -58,7 +58,7 @@ class RidgeMask:
         taut = some(scene.taut)
         free = some(lambda time: time > scene.signals.release_time + SETTLED)
         hand = [self._around_hand(frame) for _, frame in view.frames(taut, whole=True)]
-        if scene.signals.facts["turn"] > MOST_TURN:  # then it has no one shape in frame O
+        if scene.signals.facts.turn > MOST_TURN:  # then it has no one shape in frame O
             self.closed = self.open = None
         else:
             self.closed = Shape.learn(points for points, _ in hand)

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.params.recording import Sam3
 from pipeline.recording.view import Frame, View
 
 TOKENS = 32  # of a prompt
@@ -27,8 +29,8 @@ class Sam3Mask:
     picture of logits in its own low resolution.
     """
 
-    def __init__(self, view: View, settings: object):
-        """`settings` is params.cloud.sam3. Raises UserError where something is missing."""
+    def __init__(self, view: View, settings: Sam3):
+        """Raises UserError where something is missing."""
         self.view = view
         model, tokenizer = _load(Path(settings.weights), settings.device)
         self.numbers = [k for k in range(len(view)) if view.color(k) is not None]
@@ -41,7 +43,7 @@ class Sam3Mask:
         logits = cv2.resize(self.logits[frame.number], (camera.width, camera.height))
         return self.view.marked(logits > 0, frame)
 
-    def _track(self, model, tokenizer, settings: object) -> list[np.ndarray]:
+    def _track(self, model: Any, tokenizer: Any, settings: Sam3) -> list[np.ndarray]:
         """Logits (h, w) of each picture."""
         import torch
         from transformers.models.sam3_video.modeling_sam3_video import Sam3VideoInferenceSession
@@ -74,7 +76,7 @@ class Sam3Mask:
         return found
 
 
-def _together(out: object, session: object) -> np.ndarray:
+def _together(out: Any, session: Any) -> np.ndarray:
     """The objects of one picture as one picture of logits (h, w); hidden ones are left out."""
     hidden = (out.suppressed_obj_ids or set()) | session.hotstart_removed_obj_ids
     shown = [mask for key, mask in sorted(out.obj_id_to_mask.items()) if key not in hidden]
@@ -84,7 +86,7 @@ def _together(out: object, session: object) -> np.ndarray:
     return logits.max(axis=0)
 
 
-def _load(folder: Path, device: str) -> tuple:
+def _load(folder: Path, device: str) -> tuple[Any, Any]:
     """Model and tokenizer. Raises UserError with one line about what is missing."""
     try:
         import torch
@@ -114,7 +116,7 @@ def _load(folder: Path, device: str) -> tuple:
         tokenizer = AutoTokenizer.from_pretrained(folder, local_files_only=True)
     except Exception as error:  # whatever transformers says of files that it cannot read
         reason = str(error).strip().splitlines() or [type(error).__name__]
-        raise UserError(f"cloud.sam3.weights {folder}: cannot be loaded ({reason[0]})") from None
+        raise UserError(f"cloud.sam3.weights {folder}: cannot be loaded ({reason[0]})") from error
     if missing := sorted(loaded["missing_keys"]):
         raise UserError(
             f"cloud.sam3.weights {folder}: incomplete, {len(missing)} weights such as"

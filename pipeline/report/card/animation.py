@@ -19,12 +19,12 @@ from pipeline.report.card.simulated import Simulated
 from pipeline.report.drawing.styles import INK
 
 SLOWER = 50
-STEP = 1.25e-3  # s between frames, of the recording
+STEP = 2.5e-3  # s between frames, of the recording
 BEGIN, END = -0.03, 0.105  # of the release [s]
 LOOK = 700  # ms for which a new picture is looked at
 LAST = 1500  # ms for the last frame
-WIDE, TALL, HEAD = 480, 440, 52  # pixels of each half, and of the line above
-QUALITY = 62
+WIDE, TALL, HEAD = 400, 366, 52  # pixels of each half, and of the line above
+QUALITY = 36
 REACH = (-0.46, 0.36)  # y that is shown [m]
 ABOVE, BELOW = (-0.2, 0.2), (-0.27, 0.17)  # x from above, z from the side [m]
 DOT = 1  # radius of a point
@@ -51,7 +51,7 @@ def animate(
     with replacing(path) as temporary:
         frames[0].save(
             temporary, format="webp", save_all=True, append_images=frames[1:], loop=0,
-            duration=[round(one) for one in lasts], quality=QUALITY, method=2,
+            duration=[round(one) for one in lasts], quality=QUALITY, method=4,
         )  # fmt: skip
 
 

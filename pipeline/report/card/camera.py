@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,11 +10,13 @@ import numpy as np
 
 from pipeline.base.layout import NotMade
 from pipeline.episode.episode import Episode
-from pipeline.recording.geometry import geometry_of
+from pipeline.params.lab import SetupParams
+from pipeline.recording.geometry import KeptGeometry
 from pipeline.recording.input import images
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.frames import Transform
 from pipeline.recording.input.reader import read_recording
+from pipeline.recording.input.readings import Picture
 
 CLOSEST = 0.05  # m before the camera
 
@@ -30,26 +33,24 @@ class Pictures:
     time: np.ndarray
     camera: Camera
     pose: Transform
-    _packed: list
+    _packed: Sequence[Picture]
 
     @classmethod
-    def of(cls, path: Path, episode: Episode, setup) -> Pictures:
+    def of(cls, path: Path, episode: Episode, setup: SetupParams) -> Pictures:
         """Of the recording that an episode was made from.
 
         Raises:
             NotMade: It is not there.
-            UserError: It cannot be read.
+            UserError: It cannot be read, or an older version made the episode.
         """
         if not path.is_file():
             raise NotMade(path)
-        recording = read_recording(path, setup)
-        geometry = geometry_of(recording, setup)
+        kept = KeptGeometry.of_episode(episode.metadata, episode.band)
         delay = (episode.metadata["preprocessing"].get("delays") or {}).get("camera") or {}
         late = delay["value"] if delay.get("applied") else 0.0
-        color = recording.color.shifted(late)
-        pose = geometry.color @ geometry.camera.inverse()
+        color = read_recording(path, setup).color.shifted(late)
         time = color.seconds(episode.metadata["input"]["start_ns"])
-        return cls(time, recording.color_camera, pose, color.values)
+        return cls(time, kept.camera, kept.camera_to_fork, color.values)
 
     def __getitem__(self, number: int) -> np.ndarray | None:
         """A picture, BGR, shape (H, W, 3); None where it is damaged."""

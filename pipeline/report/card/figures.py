@@ -10,9 +10,10 @@ from pipeline.report.card.camera import Pictures
 from pipeline.report.card.camera_view import SIMULATED, CameraView
 from pipeline.report.card.known import Aims, Known
 from pipeline.report.card.simulated import Simulated
-from pipeline.report.card.values import LABELS, ShownValue, rounded
+from pipeline.report.card.values import ShownValue
 from pipeline.report.drawing.canvas import key, mark, picture
 from pipeline.report.drawing.styles import INK
+from pipeline.report.quantities import QUANTITIES, rounded
 
 CUT = (520, 470)  # pixels of each camera picture
 MOVED = 0.005  # s after the release: in a picture from then on the band has left the hand
@@ -101,7 +102,7 @@ def values(shown: list[ShownValue], boxes: dict[str, tuple[float, float, str]]) 
     figure, ax = plt.subplots(figsize=(9.6, 0.5 * max(len(rows), 1) + 1.1))
     for row, one in enumerate(rows):
         low, high, scale = boxes[one.name]
-        ends = LABELS[one.name].factor * np.array([low, high])
+        ends = QUANTITIES[one.name].factor * np.array([low, high])
 
         def place(value: float, ends=ends, scale=scale) -> float:
             if scale == "log":

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.report.card.known import Known
-from pipeline.report.card.values import LABELS, boxes, rounded
+from pipeline.report.card.values import boxes
 from pipeline.report.card.verdict import FURTHER, Findings
 from pipeline.report.drawing.markdown import as_code
+from pipeline.report.quantities import QUANTITIES, rounded
 
 SIDE = 0.01  # of a box's width: as near is at its side
 
@@ -77,10 +78,10 @@ def _at_sides(known: Known) -> list[tuple[str, str]]:
             ends = np.log(ends)
         place = (ends[0] - ends[1]) / (ends[2] - ends[1])
         sides = {"lower": place < SIDE and low != 0, "upper": place > 1 - SIDE}
-        about = LABELS[name]
-        box = " to ".join(f"{rounded(about.factor * end):.6g}" for end in (low, high))
+        quantity = QUANTITIES[name]
+        box = " to ".join(f"{rounded(quantity.factor * end):.6g}" for end in (low, high))
         found += [
-            (about.text, f"{side} side of its box, {f'{box} {about.unit}'.strip()}")
+            (quantity.label, f"{side} side of its box, {f'{box} {quantity.unit}'.strip()}")
             for side, there in sides.items()
             if there
         ]

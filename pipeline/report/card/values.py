@@ -3,40 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.identify.posterior.coordinates import MOST_DRAG, MOST_LOST
+from pipeline.report.quantities import QUANTITIES, rounded
 from pipeline.simulator.parameters import EXTRA
-
-
-class Label(NamedTuple):
-    """Name, unit, and the factor from SI to it."""
-
-    text: str
-    unit: str = ""
-    factor: float = 1.0
-
-
-LABELS = {
-    "youngs_modulus": Label("Young's modulus", "kPa", 1e-3),
-    "mooney_share": Label("Mooney share"),
-    "relaxation": Label("relaxation a half decade", "%", 100.0),
-    "elasticity_damping": Label("damping time", "ms", 1e3),
-    "damping_scale": Label("damping scale"),
-    "poissons_ratio": Label("Poisson's ratio"),
-    "dynamic_friction": Label("friction of the pads"),
-    "air_drag": Label("drag beyond a cylinder's", "1/s"),
-    "turn_damping": Label("damping of turns"),
-    "returned_share": Label("energy that a launch returns", "%", 100.0),
-}
-DIGITS = 3
 
 
 @dataclass(frozen=True)
 class ShownValue:
-    """One value in its label's unit; `low` and `high` are None where no interval is known."""
+    """One value in its quantity's unit; `low` and `high` are None where no interval is known."""
 
     name: str
     label: str
@@ -48,7 +25,7 @@ class ShownValue:
 
 
 def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
-    """Of a θ file's content, in the order of LABELS.
+    """Of a θ file's content, in the order of QUANTITIES.
 
     Args:
         fixed: Parameters that the method did not search.
@@ -60,20 +37,15 @@ def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
     if not told:  # nothing was searched but θ
         known = theta["theta"]
     found = []
-    for name, label in LABELS.items():
+    for name, quantity in QUANTITIES.items():
         if name not in known:
             continue
         numbers = known[name], *(intervals.get(name, {}).get(end) for end in ("low", "high"))
-        shown = [None if x is None else rounded(label.factor * x) for x in numbers]
+        shown = [None if x is None else rounded(quantity.factor * x) for x in numbers]
         still = name in fixed
         ends = (None, None) if still else shown[1:]
-        found.append(ShownValue(name, label.text, label.unit, shown[0], *ends, still))
+        found.append(ShownValue(name, quantity.label, quantity.unit, shown[0], *ends, still))
     return found
-
-
-def rounded(value: float, digits: int = DIGITS) -> float:
-    """To so many digits: another kind of CPU differs beyond them."""
-    return float(f"{value:.{digits}g}")
 
 
 def boxes(params, method: str) -> dict[str, tuple[float, float, str]]:

@@ -19,13 +19,6 @@ from pipeline.base.files import replacing
 from pipeline.report.drawing.styles import THEME
 
 WEBP_QUALITY = 88
-PARAMETERS = {  # name and unit on an axis, and the factor from SI to that unit
-    "youngs_modulus": ("E [MPa]", 1e-6),
-    "poissons_ratio": ("ν", 1.0),
-    "elasticity_damping": ("d [ms]", 1e3),
-    "dynamic_friction": ("friction", 1.0),
-    "damping_scale": ("s", 1.0),
-}
 
 
 def mark(**style) -> plt.Line2D:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from pipeline.base.launch_table import file_of
 from pipeline.base.layout import Layout, NotMade, made
 from pipeline.base.schema import JsonRecord, read_json
 from pipeline.episode.episode import Episode
@@ -17,7 +16,8 @@ from pipeline.identify.results.theta import load_theta
 from pipeline.identify.search.regions import Region, load_regions
 from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.launching.surface.stored import Stored
-from pipeline.launching.trials.measured import named
+from pipeline.launching.trials.measured import load_scores
+from pipeline.params import Params
 
 PRINTED = ("geom", "force", "work")  # the paper's loss is their sum (docs/method.md)
 
@@ -104,25 +104,22 @@ def gather(params, root: str | Path = ".") -> Results:
     for band in params.run.bands:
         ablations = params.run.ablations.methods if band in params.run.ablations.bands else ()
         ran = dict.fromkeys([*params.run.methods, *ablations])
-        methods[band] = {method: _result(layout, band, method) for method in ran}
+        methods[band] = {method: _result(params, layout, band, method) for method in ran}
     floors = {band: load_floor(layout.floor(band)) for band in params.run.rig}
-    unused = {band: _unused(params, layout, band, methods[band]) for band in methods}
+    unused = {band: _unused(layout, band, methods[band]) for band in methods}
     return Results(episodes, methods, floors, {band: n for band, n in unused.items() if n})
 
 
-def _unused(params, layout: Layout, band: str, methods: Collection[str]) -> int:
+def _unused(layout: Layout, band: str, methods: Collection[str]) -> int:
     """How many measured launches name a method that does not run on the band."""
-    path = file_of(layout.measured, band, params.bands)
-    launches = named(path) if path else {}
-    return sum(n for method, n in launches.items() if method not in ("", *methods))
+    return sum(one.method not in ("", *methods) for one in load_scores(layout.scores(band)))
 
 
-def _result(layout: Layout, band: str, method: str) -> Result:
-    steps = layout.history(band, method), layout.refined(band, method)
-    parts = [pd.read_parquet(made(path)) for path in steps]
-    history = pd.concat([part for part in parts if len(part)], ignore_index=True)
+def _result(params: Params, layout: Layout, band: str, method: str) -> Result:
+    history = pd.read_parquet(made(layout.evaluations(band, method)))
     found = layout.clusters(band, method)
-    regions, axes = load_regions(found)
+    clustered = params.methods[method].search == "multistart"
+    regions, axes = load_regions(found) if clustered else ([], [])
     if missing := [name for name in axes if f"unit_{name}" not in history]:
         raise NotMade(found, f"names: {missing[0]} was not searched")
     theta = load_theta(layout.theta(band, method), band)

@@ -5,8 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests import project
 from tests.project import until
+from validation.projects import ProjectCopy
 
 STEP = """\
 import os, pathlib, sys, time
@@ -53,7 +53,7 @@ CONFIG = """\
 """
 
 
-class Copy(project.Copy):
+class Copy(ProjectCopy):
     """A working copy of the toy project."""
 
     def clone(self, name: str) -> "Copy":
@@ -82,11 +82,7 @@ def toy(folder: Path) -> Copy:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text)
     copy = Copy(folder)
-    copy("git", "init", "-q")
-    copy("git", "config", "user.name", "Test")
-    copy("git", "config", "user.email", "test@example.org")
-    copy("git", "add", "--all")
-    copy("git", "commit", "-q", "-m", "toy")
+    copy.commit()
     return copy
 
 

@@ -9,6 +9,7 @@ from ruamel.yaml import YAML
 
 from app.cluster import exchange
 from app.flow import child
+from app.flow.graph import stages_of
 from pipeline.base.errors import UserError
 from tests.app.cluster.several import Copy, toy
 from tests.project import alive
@@ -37,11 +38,11 @@ def copies(head: Copy) -> tuple[Copy, Copy]:
 
 def test_what_differs_in_a_copy_is_named(copies, tmp_path: Path) -> None:
     head, other = copies
-    needs = exchange.needs(head.folder)["search@a"]
-    untracked = {"pipeline/params", "stages/start.py"}  # by DVC, and yet the code of every stage
-    always = {"dvc.yaml", "params.yaml", *untracked}
-    assert set(needs.sources) == {*always, "step.py", "recordings"}
-    digests = exchange.digests(head.folder, needs.sources)
+    sources = stages_of(head.folder)["search@a"].sources
+    assert sources == ("recordings", "step.py")
+    # pipeline/params, start.py: untracked by DVC, and yet the code of every stage
+    assert {"dvc.yaml", "params.yaml", "pipeline/params", "stages/start.py"} < {*exchange.ALWAYS}
+    digests = exchange.digests(head.folder, (*exchange.ALWAYS, *sources))
     for number, (changes, says) in enumerate(
         (
             ({}, None),
@@ -61,9 +62,9 @@ def test_what_differs_in_a_copy_is_named(copies, tmp_path: Path) -> None:
         assert answer is None if says is None else answer.startswith(says)
 
 
-def test_needs_follow_folders(head: Copy) -> None:
+def test_producers_follow_folders(head: Copy) -> None:
     """The report reads the folder in which others write."""
-    needs = exchange.needs(head.folder)
+    needs = stages_of(head.folder)
     assert needs["report"].producers == ("search@a", "train")
     assert needs["train"].producers == ("search@b",)
     assert {name for name, one in needs.items() if one.gpu} == {"train"}

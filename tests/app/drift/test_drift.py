@@ -14,7 +14,8 @@ from app.drift.drift import BY_NAME, BY_TIME, SAME, anew, drift, shown
 from app.drift.recordings import IdentifiedRecording, in_time
 from pipeline.base.errors import UserError
 from sling2sim2real import Band, Model, Settings, Theta, episode_from_arrays, rehearse
-from tests.project import ROOT, SLING, python
+from tests.project import ROOT, python
+from validation.projects import CLI
 
 BAND = Band(0.023, 0.010, 0.52, "mine")
 SECOND, DAY = 10**9, 86400 * 10**9
@@ -153,7 +154,7 @@ def test_a_mistake_is_one_line(tmp_path) -> None:
     (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
 
     def told(band: str) -> str:
-        done = python(*SLING, "drift", band, folder=tmp_path)
+        done = python(*CLI, "drift", band, folder=tmp_path)
         assert done.returncode == 1 and done.stdout == ""
         (line,) = (one for one in done.stderr.splitlines() if not one.endswith(" ..."))
         return line

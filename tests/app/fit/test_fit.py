@@ -8,9 +8,10 @@ import pytest
 
 from app import cli
 from app.fit import fit as module
-from app.fit.countdown import STEPS, Countdown
+from app.fit.countdown import OTHER, SECONDS, Countdown
 from app.fit.screen import shown
 from app.flow import child
+from app.flow.graph import Stage
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.params import load
@@ -55,6 +56,7 @@ def project(tmp_path, monkeypatch):
         return 0, []
 
     monkeypatch.setattr(child, "dvc", dvc)
+    monkeypatch.setattr(module, "stages_of", lambda root: {})  # no DVC here
 
     def recording(name: str, content: str):
         (tmp_path / name).write_text(content)
@@ -163,19 +165,21 @@ def test_the_screen() -> None:
 def test_the_countdown_tells_each_stage_and_falls(capsys, monkeypatch) -> None:
     clock = [0.0]
     monkeypatch.setattr("app.fit.countdown.time.monotonic", lambda: clock[0])
-    countdown = Countdown("recording")
-    chain = [step for step in STEPS if step != "record"]
+    worth = SECONDS | {"trials": OTHER}
+    chain = ["episode", "history", "theta", "policy", "trials", "card"]
+    stages = [Stage(f"{step}@mine", step, "mine", (), False, (), True, step) for step in chain]
+    countdown = Countdown(stages)
     for step in chain:
         countdown.begins(f"{step}@mine")
-        clock[0] += 2 * STEPS[step][0]  # a machine half as fast
+        clock[0] += 2 * worth[step]  # a machine half as fast
     countdown.line("history-mine-x 48/600 rollouts")
     countdown.line("mine: 300 samples")
     countdown.ends()
     lines = capsys.readouterr().err.splitlines()
     left = [line.rpartition("about ")[2].split()[0] for line in lines[: len(chain)]]
     seconds = [60 * int(one.split(":")[0]) + int(one.split(":")[1]) for one in left]
-    assert lines[0].startswith(f"[1/{len(chain)}]") and seconds[1] == 2 * (
-        sum(STEPS[step][0] for step in chain[1:])
+    assert lines[0].startswith(f"[1/{len(chain)}] episode; about") and seconds[1] == 2 * (
+        sum(worth[step] for step in chain[1:])
     )
     assert seconds[1:] == sorted(seconds[1:], reverse=True)
     assert lines[-2:] == [

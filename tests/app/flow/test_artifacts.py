@@ -37,7 +37,7 @@ def test_theta_shows_its_search_and_each_parameter_with_its_interval(root) -> No
     text = shown(root, "theta")
     assert picture(text, "convergence").shape[1] > 500
     values = dict(rows(text))
-    assert values["E [Pa]"] == "3.00E+5 (2.70E+5 – 3.30E+5)"
+    assert values["E [kPa]"] == "300 (270 – 330)"
     assert values["friction"] == "0.50, not identifiable"
     assert values["loss"] == "1.2500"
     assert shown(root, "ablation_theta") == text

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from app.flow import guard, locks
+from app.flow import guard
 from app.flow.child import StageFailed, run_stage
-from tests.app.flow.killing import OUTPUTS, SLING, STEPS, Toy, send, told
+from stages import dvc_files
+from tests.app.flow.killing import OUTPUTS, STEPS, Toy
 from tests.app.flow.serving import serving
-from tests.project import wait
+from validation.projects import SLING, command_line, send, wait
 
 pytestmark = pytest.mark.slow
 READY = 90.0  # s in which a flow must have begun its stages, or ended them, on a busy machine
@@ -103,8 +104,8 @@ def test_a_killed_stage_fails_with_one_line_and_leaves_nothing(toy: Toy) -> None
             stage = one.submit(run, lines)
             assert wait(lambda: "step 3" in lines or stage.done(), READY)  # noqa: B023
             python = [one for one in toy.run.named(victim) if one.name().startswith("python")]
-            found = [one for one in python if victim != "repro" or "guard" not in told(one)]
-            assert len(found) == 1, [told(one) for one in toy.run.alive()]
+            found = [one for one in python if victim != "repro" or "guard" not in command_line(one)]
+            assert len(found) == 1, [command_line(one) for one in toy.run.alive()]
             send(found[0])
             with pytest.raises(StageFailed, match=f"^count@a: {reason}$"):
                 stage.result(20)
@@ -151,7 +152,7 @@ def test_a_full_disk_is_one_clear_line_and_room_is_all_it_needs(disk: Path) -> N
             run_stage(toy.folder, "count@a", environment=toy.environment, on_line=lambda line: None)
         assert "\n" not in str(failure.value)
         ballast.unlink()
-        locks.mend(toy.folder)  # as the next flow does
+        dvc_files.mend(toy.folder)  # as the next flow does
         assert not temporaries(toy)
         toy.dvc("repro", "count@a")
         assert toy.outputs()["out/a.txt"] == "a" * 400_000 + "\n"

@@ -14,7 +14,8 @@ from app.flow import guard, run
 from pipeline.base.errors import UserError
 from tests.app.flow.serving import ask, serving
 from tests.app.flow.toy import Toy, stage
-from tests.project import SLING, python
+from tests.project import python
+from validation.projects import CLI
 
 GPU = {"gpu": True}
 STAGES = {
@@ -46,7 +47,7 @@ def api(toy: Toy) -> Iterator[str]:
 
 def sling(toy: Toy, *arguments: str, **exported: str) -> subprocess.CompletedProcess:
     """`sling flow`."""
-    return python(*SLING, "flow", *arguments, folder=toy.folder, **{**toy.environment, **exported})
+    return python(*CLI, "flow", *arguments, folder=toy.folder, **{**toy.environment, **exported})
 
 
 def overlap(toy: Toy, *names: str) -> bool:

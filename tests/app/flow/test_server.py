@@ -214,6 +214,18 @@ def listens(url: str) -> bool:
         return one.connect_ex(("127.0.0.1", int(url.rpartition(":")[2]))) == 0
 
 
+@pytest.mark.validation
+def test_a_server_that_is_gone_keeps_no_stage(flow) -> None:
+    """It is killed while a stage runs."""
+    url = flow.stdout.readline().strip()
+    for one in psutil.Process(flow.pid).children(recursive=True):  # the guard and the server
+        one.kill()
+    until(lambda: not listens(url))
+    flow.stdin.write("\n")
+    flow.stdin.flush()
+    assert float(flow.stdout.readline()) < 30  # s: the task's code ended, without an error
+
+
 @pytest.mark.slow
 def test_a_flows_own_server_shows_it_and_ends_with_it(flow, tmp_path: Path) -> None:
     url = flow.stdout.readline().strip()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ruamel.yaml import YAML
 
-from tests import project
+from validation.projects import ProjectCopy
 
 # Writes the first line of everything it reads, so that another second line changes nothing.
 WORK = """
@@ -45,7 +45,7 @@ def stage(name: str, *sources: str, seconds: float | str = 0.0, **more) -> dict:
     return {"cmd": command, "deps": ["work.py", *sources], "outs": [f"{name}.out"], **more}
 
 
-class Toy(project.Copy):
+class Toy(ProjectCopy):
     """The project in `folder`; its inputs are files with one word a line."""
 
     def __init__(self, folder: Path, stages: dict, work: str = WORK, **inputs: str) -> None:

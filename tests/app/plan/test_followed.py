@@ -13,7 +13,7 @@ from pipeline.base.errors import UserError
 from pipeline.params import load
 from pipeline.recording.input.reader import read_recording
 from tests.project import ROOT, with_
-from tests.recording.bag import BASE, HAND, REST, Truth, write_bag
+from validation.recordings.bag import BASE, HAND, REST, Truth, write_bag
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def test_of_several_pulls_the_first_that_can_be_used_tells(recorded, monkeypatch
     from pipeline.recording import pulls, signals
 
     path, _, params, truth = recorded
-    (whole,) = pulls.pulls_of(read_recording(path, params.setup), params.setup)
+    (whole,) = pulls.pulls_of(pulls.Pull.of(read_recording(path, params.setup), params.setup))
     tell = signals.signals_of
 
     def signals_of(pull, *others):

@@ -13,7 +13,7 @@ from app.preflight.verdict import cautions_of, pause
 from pipeline.base.errors import UserError, printable
 from tests.hostile import MARKUP
 from tests.project import with_
-from tests.recording.bag import RADIUS, START, Truth, blind_bag, edit, head, write_bag
+from validation.recordings.bag import RADIUS, START, Truth, blind_bag, edit, head, write_bag
 
 
 def abouts(report) -> set[str]:
@@ -106,10 +106,10 @@ def test_cautions_come_from_the_report_alone(looked, params) -> None:
         phases=[{**report.phases[2], "coverage": 0.5}],
         extrinsics={**report.extrinsics, "off_m": 0.02, "hand_off_m": 0.05},
     )
-    found = {caution.about for caution in cautions_of(bad, looked.done, params.setup)}
+    found = {caution.about for caution in cautions_of(bad, looked.done)}
     said = "checksums losses lead_in drift turn release slip delay empty damaged unpaired coverage"
     assert {*said.split(), "extrinsics", "hand"} <= found
-    none = cautions_of(replace(report, extrinsics={}), looked.done, params.setup)
+    none = cautions_of(replace(report, extrinsics={}), looked.done)
     assert "extrinsics" in {caution.about for caution in none}
 
 
@@ -123,7 +123,7 @@ def test_times_of_receipt_tell_of_another_clock(looked, params) -> None:
         for offset, said in cases.items():
             rows = looked.report.topics
             topics = [replace(r, clock_offset=offset) if r.role == role else r for r in rows]
-            found = cautions_of(replace(looked.report, topics=topics), looked.done, params.setup)
+            found = cautions_of(replace(looked.report, topics=topics), looked.done)
             words = [caution.what for caution in found if caution.about == "clock"]
             assert len(words) == said and all(f"{offset:+.3f} s" in what for what in words)
 
@@ -143,23 +143,24 @@ def test_a_clock_ahead_is_shown_with_its_sign(tmp_path, params) -> None:
 
 def test_a_camera_that_stops_before_the_release_is_said(looked, params) -> None:
     phases = [row for row in looked.report.phases if row["phase"] in ("hanging", "held", "drawn")]
-    found = cautions_of(replace(looked.report, phases=phases), looked.done, params.setup)
+    found = cautions_of(replace(looked.report, phases=phases), looked.done)
     said = [caution.what for caution in found if caution.about == "unseen"]
     assert said == [f"no picture shows how the band {how}" for how in ("recoils", "swings")]
 
 
 def test_a_sensor_that_tf_static_does_not_know_is_said(looked, params) -> None:
     assert "sensor" not in abouts(looked.report)
-    recording = looked.done.recording
+    recording = looked.done.pull.recording
     loose = replace(recording, wrench=replace(recording.wrench, frame="elsewhere"))
-    found = cautions_of(looked.report, replace(looked.done, recording=loose), params.setup)
+    done = replace(looked.done, pull=replace(looked.done.pull, recording=loose))
+    found = cautions_of(looked.report, done)
     assert any(c.about == "sensor" and "'elsewhere'" in c.what for c in found)
 
 
 def test_tips_are_off_from_three_standard_errors(looked, params) -> None:
     for off, error, said in ((0.0039, 0.0001, 0), (0.0045, 0.0016, 0), (0.0045, 0.0014, 1)):
         facts = {**looked.report.extrinsics, "off_m": off, "off_error_m": error}
-        found = cautions_of(replace(looked.report, extrinsics=facts), looked.done, params.setup)
+        found = cautions_of(replace(looked.report, extrinsics=facts), looked.done)
         assert sum(caution.about == "extrinsics" for caution in found) == said
 
 

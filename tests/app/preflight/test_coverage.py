@@ -17,11 +17,11 @@ def test_points_of_the_arm_in_the_hanging_band_are_said(looked, params) -> None:
     arm = np.array([[0.0, -0.05, -0.2]], np.float32).repeat(len(clouds.points[1]) // 20, 0)
     points = [*clouds.points]
     points[1] = np.vstack([points[1], arm])
-    done = replace(looked.done, clouds=replace(clouds, points=points))
+    done = SimpleNamespace(scene=looked.done.scene, clouds=replace(clouds, points=points))
     rows = over_time(done, 0.0)
     assert rows[1]["phase"] == "hanging" and rows[1]["off_plane"] == pytest.approx(0.05, abs=0.01)
     assert all(row["off_plane"] in (None, 0.0) for row in (rows[0], *rows[2:]))
-    found = cautions_of(replace(looked.report, coverage=rows), done, params.setup)
+    found = cautions_of(replace(looked.report, coverage=rows), looked.done)
     (said,) = [caution.what for caution in found if caution.about == "off_plane"]
     told = sum(row["off_plane"] is not None for row in rows)
     assert said.startswith(f"1 of {told} pictures of the hanging band hold points off the plane")

@@ -18,8 +18,8 @@ from app.preflight.command import check
 from app.preflight.recordings import add_recording
 from pipeline.base.errors import UserError
 from tests.app.preflight.test_add_band import add, content, project
-from tests.recording.bag import Truth, blind_bag
 from tests.recording.joined import joined
+from validation.recordings.bag import Truth, blind_bag
 
 __all__ = ["project"]
 

@@ -53,7 +53,7 @@ def test_check_lists_the_pulls_and_looks_at_the_first_that_can_be_used(three, se
 
 
 def test_a_pull_alone_has_nothing_to_rest_from(looked, params) -> None:
-    found = {one.about for one in cautions_of(looked.report, looked.done, params.setup)}
+    found = {one.about for one in cautions_of(looked.report, looked.done)}
     assert "rest" not in found and looked.report.pulls == [looked.report.row]
 
 

@@ -11,7 +11,7 @@ from app.preflight.check import look_at
 from app.preflight.tips import measure_tips
 from pipeline.recording.view import Scene
 from tests.project import with_
-from tests.recording.bag import BASE, EYE, TIPS, edit, write_bag
+from validation.recordings.bag import BASE, EYE, TIPS, edit, write_bag
 
 DIAMETER, REST = 0.010, 0.52
 DOWN = np.array([0.0, 0.0, -1.0])

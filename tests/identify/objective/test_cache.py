@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from pipeline.base.code import closure
 from pipeline.base.fingerprint import fingerprint
 from pipeline.identify.objective.cache import EvaluationCache
 from pipeline.identify.objective.evaluate import NOT_FINITE, Evaluation, Evaluator
@@ -22,7 +23,6 @@ from tests.identify.search import toy
 from tests.identify.search.functions import NAMES, Evaluate, quadratic
 from tests.identify.search.killed import ROLLOUTS, VALLEY, searched
 from tests.project import ROOT, python
-from validation.code import closure
 
 
 @pytest.fixture(scope="module")

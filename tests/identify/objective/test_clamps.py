@@ -12,8 +12,8 @@ from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import Mounting
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
-from tests.identify.objective.own_law import own_law_episode
 from tests.identify.objective.pulls import PARAMS, pulled, sling_of
+from validation.synthetic import own_law_episode
 
 YOUNG = 3e5
 THETA = Parameters.of("neo_hookean", [YOUNG, 0.45, 4e-3, 1.0, 1.0])

@@ -17,9 +17,8 @@ from pipeline.identify.objective.loss import TERMS, EpisodeLoss
 from pipeline.params import load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.parameters import Parameters
-from tests.identify.objective.own_law import own_law_episode
 from tests.identify.search import toy
-from validation.synthetic import THETA, recorded_yardstick
+from validation.synthetic import THETA, own_law_episode, recorded_yardstick
 
 WEIGHTS = dict.fromkeys(TERMS, 1.0)
 CROSSING = [-0.4, -0.3, -0.1, 0.02, *46 * [0.1]]  # y of the frames from the release on

@@ -1,14 +1,20 @@
 """A method's engine: ours, one of another package's, or a function of the user's."""
 
+import tomllib
+from importlib.metadata import EntryPoint, EntryPoints
+
 import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.identify.objective import session
+from pipeline.identify.objective import engine, session
 from pipeline.identify.objective.engine import simulate_of, sources_of
 from pipeline.identify.objective.evaluate import simulated
+from pipeline.params.identification import ENGINES, OUR_ENGINE
 from tests.identify.objective import toy_engine
 from tests.identify.objective.test_evaluate import PARAMS, recorded_yardstick
+from tests.project import ROOT
+from validation.engines.physx import rollouts
 
 
 def test_ours_needs_no_import() -> None:
@@ -16,17 +22,30 @@ def test_ours_needs_no_import() -> None:
     assert sources_of("sling") == []
 
 
+def test_an_installed_engine_is_found_by_its_name(monkeypatch) -> None:
+    """As pyproject.toml offers it; an installation from before that says what to do."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    offered = project["entry-points"][engine.GROUP]
+    points = EntryPoints(EntryPoint(*one, engine.GROUP) for one in offered.items())
+    monkeypatch.setattr(engine, "entry_points", points.select)
+    assert [*offered] == [name for name in ENGINES if name != OUR_ENGINE]
+    assert simulate_of("physx") is rollouts.simulate
+    monkeypatch.setattr(engine, "entry_points", EntryPoints().select)
+    with pytest.raises(UserError, match="engine physx: .* install this one anew"):
+        simulate_of("physx")
+
+
 @pytest.mark.parametrize(
-    "engine, words",
+    "name, words",
     [
         ("nowhere.at_all:simulate", "No module named 'nowhere'"),
         ("tests.identify.objective.toy_engine:none", "no attribute 'none'"),
         ("tests.identify.objective.toy_engine:SOFTER", "must be a function"),
     ],
 )
-def test_what_is_no_function_is_one_line(engine, words) -> None:
+def test_what_is_no_function_is_one_line(name, words) -> None:
     with pytest.raises(UserError, match=words):
-        simulate_of(engine)
+        simulate_of(name)
 
 
 def test_another_engine_changes_the_loss_and_gets_whole_batches(monkeypatch) -> None:

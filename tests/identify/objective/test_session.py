@@ -13,8 +13,9 @@ from pipeline.identify.objective import session
 from pipeline.params import load
 from tests.identify.search import toy
 from tests.identify.search.functions import Evaluate, rosenbrock
+from tests.project import ROOT
 
-PARAMS = load(Path(__file__).parents[2] / "params.yaml")
+PARAMS = load(ROOT / "params.yaml")
 UNIT = np.random.default_rng(1).random((4, 5))
 
 
@@ -23,7 +24,7 @@ def evaluators(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Evaluate
     """A folder with an episode; the evaluators that a service makes, of a known function."""
     monkeypatch.chdir(tmp_path)
     toy.episode().save(Layout().episode("band1"))
-    write_json(Layout().mounting("band1"), {})
+    write_json(Layout().clamps("band1"), {})
     made = []
 
     def evaluator(params, band: str, method: str) -> Evaluate:
@@ -85,7 +86,7 @@ def test_another_episode_starts_over(evaluators: list[Evaluate]) -> None:
     serve("sling2sim2real")
     toy.episode(release_time=1.3).save(Layout().episode("band1"))
     serve("sling2sim2real")
-    write_json(Layout().mounting("band1"), {"clamp_angle_deg": 1.0})
+    write_json(Layout().clamps("band1"), {"clamp_angle_deg": 1.0})
     serve("sling2sim2real")
     assert [one.count for one in evaluators] == [1, 1, 1]
 

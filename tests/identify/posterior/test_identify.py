@@ -12,11 +12,11 @@ from pipeline.identify.posterior.coordinates import Coordinates
 from pipeline.identify.posterior.likelihood import Likelihood
 from pipeline.identify.posterior.residuals import Residuals, Rule
 from pipeline.identify.results.theta import load_theta
+from pipeline.params.identification import parameter_names
 from pipeline.simulator.interaction import interact
-from pipeline.simulator.parameters import searched_names
 from tests import once
-from tests.identify.objective.own_law import own_law_episode
 from tests.identify.objective.pulls import PARAMS, pulled, sling_of
+from validation.synthetic import own_law_episode
 
 METHOD, WORKERS, LOSS = "least_squares", 2, "log_loss_factor"
 SLING = replace(sling_of(0.03), law="rubber")
@@ -37,7 +37,7 @@ def recorded(phase: float, seed: int, noise=(0.0, 0.0)):
 
 
 def found_of(*episodes, workers: int = WORKERS):
-    return identify.identify(PARAMS, METHOD, SLING, episodes, FROM, workers=workers)
+    return identify.fit_posterior(PARAMS, METHOD, SLING, episodes, FROM, workers=workers)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def test_the_loss_factors_prior_pulls_towards_it_and_no_farther(first):
 
 def test_intervals_hold_the_truth_and_two_recordings_narrow_them(first, both):
     one, two = (told_of(found)["parameters"] for found in (first, both))
-    for name in searched_names(SLING.law):
+    for name in parameter_names(SLING.law):
         value = TRUTH.sample()[name]
         for about in (one[name], two[name]):
             assert about["low"] <= value * (1 + 1e-9) and value * (1 - 1e-9) <= about["high"]
@@ -94,7 +94,7 @@ def test_alike_recordings_agree(both):
 
 def test_what_is_written_is_a_theta_file(first, tmp_path):
     path = tmp_path / "least_squares.json"
-    content = identify.theta_content(first, "known", METHOD)
+    content = {"band": "known", **identify.theta_entries(first)}
     content["confidence"] = told_of(first)
     content |= {"loss": dict.fromkeys(("geom", "force", "work", "total"), 1.0), "rollouts": 1}
     path.write_text(json.dumps(content, allow_nan=False))

@@ -9,7 +9,8 @@ from pipeline.identify.results.mounting import load_sling
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import LaunchHistory, LaunchSetup
 from pipeline.simulator.parameters import Parameters
-from tests.project import ROUGH, with_
+from tests.project import with_
+from validation.projects import ROUGH
 
 THETA = Parameters.of("rubber", [5e5, 0.47, 5e-3, 0.7, 0.6], relaxation=0.02)
 DRAW, FURTHER = (-0.30, -0.17), 1.04

@@ -11,7 +11,7 @@ from pipeline.identify.objective.loss import TERMS
 from pipeline.identify.optimizers.cma.multistart import Multistart
 from pipeline.identify.search.build import build
 from pipeline.identify.search.history import History
-from pipeline.identify.search.loop import budget, search
+from pipeline.identify.search.loop import search
 from pipeline.identify.search.regions import Region, find_regions
 
 NAMES = ("a", "b", "c", "d", "e")
@@ -89,7 +89,7 @@ def correlated() -> np.ndarray:
 
 def chain(evaluate, optimizer=BUDGET, names=NAMES) -> tuple[History, History, list[Region]]:
     """Explore, find regions, refine: both histories and the regions."""
-    first, second = budget(optimizer, "multistart")
+    first, second = optimizer.population * (optimizer.generations + 1), optimizer.cma_rollouts
     explored = alone("de", evaluate, first, optimizer, names)
     sizes = {name: getattr(optimizer, name) for name in ("k_top", "k_nn", "delta")}
     regions = find_regions(explored.unit, explored.total, **sizes)

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from pipeline.base.errors import UserError
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.search.build import build
+from pipeline.identify.search.explore import rollouts_of
 from pipeline.identify.search.history import History, theta_content
-from pipeline.identify.search.loop import budget, latin_hypercube, search
+from pipeline.identify.search.loop import latin_hypercube, search
 from pipeline.params import load
 from tests.identify.search import functions
 from tests.identify.search.functions import (
@@ -126,11 +127,10 @@ def test_one_free_axis_is_enough() -> None:
 
 
 def test_every_search_has_the_same_budget() -> None:
-    optimizer = load("params.yaml").optimizer
-    explore, refine = budget(optimizer, "multistart")
+    params = load("params.yaml")
+    optimizer, explore = params.optimizer, rollouts_of(params, "sling2sim2real")
     assert explore == optimizer.population * (optimizer.generations + 1)
-    assert budget(optimizer, "bo") == (explore + refine, 0)
-    assert explore + refine == 600
+    assert rollouts_of(params, "bo") == explore + optimizer.cma_rollouts == 600
 
 
 @pytest.fixture

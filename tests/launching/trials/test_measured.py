@@ -6,7 +6,14 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.base.launch_table import file_of
-from pipeline.launching.trials.measured import OPTIONAL, REQUIRED, Measured, named, read_measured
+from pipeline.launching.trials.measured import (
+    OPTIONAL,
+    REQUIRED,
+    Measured,
+    load_scores,
+    read_measured,
+    save_scores,
+)
 
 KNOWN = ("ours", "theirs")
 HEAD = "draw_y_m,draw_z_m,landing_y_m"
@@ -15,7 +22,10 @@ HEAD = "draw_y_m,draw_z_m,landing_y_m"
 def read(tmp_path: Path, text: str | bytes, method: str = "ours") -> list[Measured]:
     file = tmp_path / "toy.csv"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return read_measured(file, method, KNOWN)
+    launches = read_measured(file, KNOWN)
+    save_scores(tmp_path / "scores.json", launches)
+    assert load_scores(tmp_path / "scores.json") == launches
+    return [one for one in launches if one.method in ("", method)]
 
 
 def test_launches_of_a_method_and_plain_ones(tmp_path) -> None:
@@ -27,8 +37,8 @@ def test_launches_of_a_method_and_plain_ones(tmp_path) -> None:
     )
     assert read(tmp_path, text) == [
         Measured((-0.3, -0.17), 2.2, None),
-        Measured((-0.31, -0.17), 1.9, 1.925),
-        Measured((-0.35, -0.17), None, 1.925),
+        Measured((-0.31, -0.17), 1.9, 1.925, "ours"),
+        Measured((-0.35, -0.17), None, 1.925, "ours"),
     ]
     assert [one.landing for one in read(tmp_path, text, "theirs")] == [2.2, 1.8]
 
@@ -45,7 +55,7 @@ def test_a_target_without_a_method_is_nobodys(tmp_path) -> None:
 
 def test_a_method_may_launch_without_a_target(tmp_path) -> None:
     text = f"{HEAD},method\n-0.3,-0.1,1.9,ours\n"
-    assert read(tmp_path, text) == [Measured((-0.3, -0.1), 1.9, None)]
+    assert read(tmp_path, text) == [Measured((-0.3, -0.1), 1.9, None, "ours")]
     assert read(tmp_path, text, "theirs") == []
 
 
@@ -83,15 +93,6 @@ def test_refuses_what_no_launch_can_have_done(tmp_path, text: str | bytes, messa
         read(tmp_path, text)
     assert str(refused.value).startswith(str(tmp_path / "toy.csv"))
     assert "\n" not in str(refused.value)
-
-
-def test_launches_are_counted_by_the_method_that_they_name(tmp_path) -> None:
-    file = tmp_path / "toy.csv"
-    file.write_text(f"{HEAD},method\n-0.3,-0.1,1,mine\n-0.3,-0.1,1,ours\n-0.3,-0.1,1,\n,,,\n")
-    assert named(file) == {"mine": 1, "ours": 1, "": 1}
-    file.write_text("speed\n")
-    with pytest.raises(UserError, match="lacks the column"):
-        named(file)
 
 
 def test_the_bands_own_file_is_taken(tmp_path) -> None:

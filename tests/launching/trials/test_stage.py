@@ -8,6 +8,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from pipeline.base.errors import UserError
+from pipeline.params import load
 from tests.report.run.conftest import BAND, METHOD
 from tests.report.run.conftest import root as root  # noqa: PLC0414
 from tests.report.run.conftest import template as template  # noqa: PLC0414
@@ -19,15 +20,19 @@ HEAD = "draw_y_m,draw_z_m,landing_y_m,target_m,method"
 def tried(root: Path, monkeypatch):
     """Run the stage in a finished project; its rows."""
     monkeypatch.chdir(root)
-    monkeypatch.setattr(sys, "argv", ["", BAND, METHOD])
 
     def run(csv: str | None = None) -> pd.DataFrame:
         if csv is not None:
             file = Path("data/trials/measured", f"{BAND}.csv")
             file.parent.mkdir(exist_ok=True)
             file.write_text(csv)
-        from stages import trials
+        from stages import evidence, launches, trials
 
+        monkeypatch.setattr(sys, "argv", ["", BAND])
+        evidence.main()
+        monkeypatch.setattr(sys, "argv", ["", BAND, METHOD])
+        if load().bands[BAND].source == "rig":
+            launches.main()
         trials.main()
         return pd.read_parquet(Path("data/trials", BAND, f"{METHOD}.parquet"))
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pipeline.base.errors import UserError
 from pipeline.recording.input import clocks
 from pipeline.recording.input.reader import Recording, read_recording
-from tests.recording.bag import START, blind_bag, edit, head
+from validation.recordings.bag import START, blind_bag, edit, head
 
 MS = 1_000_000
 

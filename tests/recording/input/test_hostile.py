@@ -9,7 +9,7 @@ from pipeline.base.errors import UserError, printable
 from pipeline.params import load
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.input.words import shortened
-from tests.recording.bag import blind_bag
+from validation.recordings.bag import blind_bag
 
 EVIL = "/../../x\x1b[2J\n\r\u202e<script>alert(1)</script>|`$(touch pwned)`"
 

@@ -15,7 +15,7 @@ from pipeline.base.errors import UserError
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.container import read_container
 from pipeline.recording.input.reader import read_recording, recording_of
-from tests.recording.bag import START, blind_bag, edit, head
+from validation.recordings.bag import START, blind_bag, edit, head
 
 
 def read(path: Path, params):

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.base.errors import UserError
 from pipeline.recording.input import kinematics
 from pipeline.recording.input.container import Channel
+from pipeline.recording.input.decode import Unreadable
 from tests.recording.input.messages import (
     COUNT,
     FORCE,
@@ -32,6 +33,7 @@ from tests.recording.input.messages import (
     twist,
     wrench,
 )
+from validation.recordings.small import STATE, STATE_FIELDS
 
 
 def test_a_pose_with_covariance(params) -> None:
@@ -47,21 +49,12 @@ def test_a_pose_with_covariance(params) -> None:
     assert_poses(found)
 
 
-ROBOT_STATE = """std_msgs/Header header
-sensor_msgs/JointState measured_joint_state
-geometry_msgs/WrenchStamped o_f_ext_hat_k
-geometry_msgs/PoseStamped o_t_ee
-uint8 robot_mode
-"""
-
-
 def robot_state(topic: str = "/franka_robot_state_broadcaster/robot_state") -> Channel:
     """FrankaRobotState in CDR by mcap-ros2-support; some of its fields."""
-    name = "franka_msgs/msg/FrankaRobotState"
     store = get_typestore(Stores.ROS2_HUMBLE)
-    store.register(get_types_from_msg(ROBOT_STATE, name))
-    text = store.generate_msgdef(name, ros_version=2)[0]
-    encode = serialize_dynamic(name, text)[name]
+    store.register(get_types_from_msg(STATE_FIELDS, STATE))
+    text = store.generate_msgdef(STATE, ros_version=2)[0]
+    encode = serialize_dynamic(STATE, text)[STATE]
     payloads = []
     for k in range(COUNT):
         message = {
@@ -74,7 +67,7 @@ def robot_state(topic: str = "/franka_robot_state_broadcaster/robot_state") -> C
         message["measured_joint_state"].update(velocity=[], effort=[])
         payloads.append(encode(_named(message)))
     times = [5_000_000_000 + round(1e9 * t) for t in TIMES]
-    return Channel(topic, Schema(1, text.encode(), "ros2msg", name), "cdr", times, payloads)
+    return Channel(topic, Schema(1, text.encode(), "ros2msg", STATE), "cdr", times, payloads)
 
 
 def _named(value: object) -> object:
@@ -169,7 +162,7 @@ def test_arm_and_gripper_that_share_a_topic(params, gantry) -> None:
     assert len(roles["pose"].read(both[1]).value) == 6
     assert roles["gripper"].read(both[0]).value == (gantry[0, 0] + gantry[0, 1],)
     for role, payload in (("pose", both[0]), ("gripper", both[1])):
-        with pytest.raises(ValueError, match="is missing"):
+        with pytest.raises(Unreadable, match="is missing"):
             roles[role].read(payload)
 
 

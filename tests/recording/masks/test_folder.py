@@ -12,12 +12,13 @@ import pytest
 from PIL import Image
 
 from pipeline.base.errors import UserError
-from pipeline.recording.build import build_episodes, process_pulls, process_recording
+from pipeline.recording.build import build_episodes, process_pull, process_pulls
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.masks import masker
-from tests.recording import looks
+from pipeline.recording.pulls import Pull
 from tests.recording.joined import joined
-from tests.recording.looks import LOOKS
+from validation.recordings import looks
+from validation.recordings.looks import LOOKS
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +64,7 @@ def test_each_mask_counts_for_its_own_picture_and_no_other(mine, params, by_fold
 
 def test_a_late_camera_does_not_change_the_names(masked, params, by_folder) -> None:
     recording = read_recording(masked, params.setup).shifted(camera=-0.015)
-    done = process_recording(recording, params.bands["band1"], by_folder)
+    done = process_pull(Pull.of(recording, params.setup), params.bands["band1"], by_folder)
     assert done.delays.camera.applied
     assert done.clouds.pixels.min() > 0
 

@@ -15,9 +15,9 @@ from pipeline.recording.input.frames import Transform
 from pipeline.recording.masks.hand import Colors, Shape
 from pipeline.recording.masks.ridge import RidgeMask
 from pipeline.recording.view import View
-from tests.recording import looks, strand
-from tests.recording.looks import LOOKS
-from tests.recording.scores import PHASES, figures
+from validation.recordings import looks, strand
+from validation.recordings.looks import LOOKS
+from validation.recordings.scores import PHASES, figures
 
 FRAMES = 24
 # Depth alone decides in looks that differ in colour alone: these differ in what matters.
@@ -53,7 +53,7 @@ def test_clouds_lie_on_the_band_and_cover_it(name, cloud) -> None:
 def test_a_hand_that_is_not_seen_alone_is_left_out_with_more_room(cloud) -> None:
     """It turns, so what is learned of it in one picture does not fit the next."""
     view, truths = looks.view_of(LOOKS["near white beside a white arm"], looks.times(FRAMES))
-    view.scene.signals.facts["turn"] = 0.5
+    view.scene.signals.facts.turn = 0.5
     found = figures(view, truths, clouds_of(view, cloud))
     assert found["all"]["median_off_m"] <= 0.003
     assert found["all"]["covered"] >= 0.85

@@ -14,9 +14,9 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.recording.masks import masker
-from tests.recording import looks
-from tests.recording.looks import LOOKS
-from tests.recording.masks.tiny_sam3 import save_tiny_sam3
+from validation.recordings import looks
+from validation.recordings.looks import LOOKS
+from validation.recordings.tiny_sam3 import save_tiny_sam3
 
 pytest.importorskip("transformers", reason="sam3 is an extra")
 

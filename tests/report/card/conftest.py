@@ -10,14 +10,15 @@ import pytest
 from ruamel.yaml import YAML
 
 from pipeline.base.layout import Layout
-from pipeline.identify.results.theta import EXTRA
 from pipeline.params import Params, load
 from pipeline.recording.build import build_episodes
 from pipeline.report.card.known import Known, known
+from pipeline.simulator.parameters import EXTRA
 from tests import once
 from tests.policy.stored import write_stored
-from tests.project import ROOT, ROUGH
-from tests.recording.bag import Truth, write_bag
+from tests.project import ROOT, set_methods
+from validation.projects import ROUGH
+from validation.recordings.bag import Truth, write_bag
 
 BAND, METHOD = "toy", "least_squares"
 TRUTH = Truth()
@@ -78,8 +79,9 @@ def trials() -> pd.DataFrame:
 def make(root: Path) -> None:
     yaml = YAML()
     content = yaml.load(ROOT / "params.yaml")
-    content["run"].update(bands=[BAND], rig=[], methods=[METHOD])
-    content["run"]["ablations"].update(bands=[], methods=[])
+    content["run"].update(bands=[BAND], rig=[])
+    content["run"]["ablations"].update(bands=[], rig=[])
+    set_methods(content, [METHOD])
     band = {"source": "recording", "mass": 0.03, "diameter": 0.01, "rest_length": 0.52}
     content["bands"][BAND] = band
     content["episode"].update(duration=3.6, samples=120, tail=0.5)

@@ -1,5 +1,6 @@
 """Where points of frame O are seen: against the truth of a recording, and OpenCV with a lens."""
 
+import json
 from dataclasses import replace
 
 import cv2
@@ -7,11 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, NotMade
+from pipeline.recording.geometry import KeptGeometry, geometry_of
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.frames import Transform
 from pipeline.recording.input.reader import read_recording
-from pipeline.report.card import camera
 from pipeline.report.card.camera import Pictures
 from pipeline.report.card.camera_view import CameraView
 from pipeline.report.card.simulated import Simulated, simulate
@@ -96,14 +98,23 @@ def test_a_simulated_pull_holds_the_hand_and_its_states_are_smooth(told, card_pa
     assert simulated.force[(told.episode.time > 2.5) & (told.episode.time < 2.9), 1].min() > 3
 
 
-def test_a_colour_camera_beside_the_depth_camera(told, project, monkeypatch) -> None:
+def test_a_colour_camera_beside_the_depth_camera(told, project) -> None:
     """What lies before the depth camera is seen where the colour camera's own frame has it."""
-    path = Layout(project).raw(BAND) / "seen.mcap"
-    real = camera.geometry_of
+    path, setup = Layout(project).raw(BAND) / "seen.mcap", told.params.setup
+    recording = read_recording(path, setup)
+    geometry = geometry_of(recording, setup)
     beside = Transform(Rotation.from_rotvec([0.02, -0.05, 0.01]), np.array([0.06, 0.01, -0.02]))
-    monkeypatch.setattr(camera, "geometry_of", lambda *given: replace(real(*given), color=beside))
-    pictures = Pictures.of(path, told.episode, told.params.setup)
+    kept = KeptGeometry.of(recording, replace(geometry, color=beside)).content()
+    metadata = told.episode.metadata | {"geometry": json.loads(json.dumps(kept))}
+    pictures = Pictures.of(path, replace(told.episode, metadata=metadata), setup)
     before = np.array([[0.1, -0.05, 0.9], [-0.2, 0.1, 1.3]])  # the depth camera
-    fork = real(read_recording(path, told.params.setup), told.params.setup).camera.apply(before)
+    fork = geometry.camera.apply(before)
     expected = pictures.camera.project(beside.apply(before))
     np.testing.assert_allclose(pictures.project(fork), expected, atol=1e-6)
+
+
+def test_an_episode_of_an_older_version_is_named_with_its_remedy(told, project) -> None:
+    path = Layout(project).raw(BAND) / "seen.mcap"
+    old = {key: value for key, value in told.episode.metadata.items() if key != "geometry"}
+    with pytest.raises(UserError, match=f"older version.*dvc repro --force episode@{BAND}"):
+        Pictures.of(path, replace(told.episode, metadata=old), told.params.setup)

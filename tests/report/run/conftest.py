@@ -11,10 +11,12 @@ from ruamel.yaml import YAML
 
 from pipeline.episode.episode import Episode
 from pipeline.identify.search.regions import Region, save_regions
+from pipeline.launching.trials.measured import save_scores
 from pipeline.params import load
 from pipeline.report.run.results import Result, Results, gather
-from pipeline.simulator.material import THETA as NAMES
+from pipeline.simulator.parameters import THETA as NAMES
 from tests.policy.stored import write_stored
+from tests.project import set_methods
 
 BAND, METHOD = "toy", "sling2sim2real"
 THETA = {
@@ -120,20 +122,20 @@ def template(tmp_path_factory) -> Path:
     """A project folder with params.yaml and everything that the report reads."""
     root, yaml = tmp_path_factory.mktemp("report"), YAML()
     content = yaml.load(Path("params.yaml"))
-    content["run"].update(bands=[BAND], rig=[], methods=[METHOD])
-    content["run"]["ablations"].update(bands=[], methods=[])
+    content["run"].update(bands=[BAND], rig=[])
+    content["run"]["ablations"].update(bands=[], rig=[])
+    set_methods(content, [METHOD])
     band = {"source": "recording", "mass": 0.04, "diameter": 0.01, "rest_length": 0.52}
     content["bands"][BAND] = band
     yaml.dump(content, root / "params.yaml")
     data = root / "data"
-    for name in ("history", "clusters", "refined", "theta", "confidence", "trials"):
+    for name in ("evaluations", "clusters", "theta", "confidence", "trials", "launches"):
         (data / name / BAND).mkdir(parents=True)
     episode().save(data / "episodes" / BAND / "1")
-    for step, rows in (
-        ("history", history("de", [3.0, np.inf, 2.0])),
-        ("refined", history("cma", [2.5, 1.25], solver=0)),
-    ):
-        rows.to_parquet(data / step / BAND / f"{METHOD}.parquet")
+    phases = history("de", [3.0, np.inf, 2.0]), history("cma", [2.5, 1.25], solver=0)
+    evaluations = pd.concat(phases, ignore_index=True)
+    evaluations.to_parquet(data / "evaluations" / BAND / f"{METHOD}.parquet")
+    save_scores(data / "launches" / BAND / "scores.json", [])
     region = Region(np.full(5, 0.4), 0.01 * np.eye(5), 2.0, [2, 0])
     save_regions(data / "clusters" / BAND / f"{METHOD}.json", NAMES, [region], 5)
     loss = {"geom": 0.5, "force": 0.25, "work": 0.5, "total": 1.25}

@@ -11,8 +11,8 @@ from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.params import load
 from pipeline.report.run.replay import replay
 from pipeline.simulator.interaction import interact
-from pipeline.simulator.material import THETA as NAMES
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import THETA as NAMES
 from pipeline.simulator.parameters import Parameters
 from tests.project import ROOT
 

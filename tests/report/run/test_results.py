@@ -14,21 +14,11 @@ from pipeline.report.run.results import PRINTED, best_so_far, gather, has_anothe
 from tests.report.run.conftest import BAND, METHOD
 
 
-def test_a_search_of_one_phase_has_no_refinement(root, params, result) -> None:
-    assert result.history.phase.tolist() == ["de"] * 3 + ["cma"] * 2
-    file = root / "data" / "refined" / BAND / f"{METHOD}.parquet"
-    pd.read_parquet(file).iloc[:0].to_parquet(file)
-    alone = gather(params, root).methods[BAND][METHOD]
-    assert alone.history.phase.tolist() == ["de"] * 3
-    assert alone.history.total.dtype == result.history.total.dtype == float
-    assert alone.history.solver.isna().all()
-
-
 def test_further_methods_run_on_some_bands_only(root, params) -> None:
     more = params.run.ablations.model_copy(update={"bands": (BAND,), "methods": ("de",)})
     run = params.run.model_copy(update={"ablations": more})
     plain, params = params, params.model_copy(update={"run": run})
-    with pytest.raises(UserError, match=f"history/{BAND}/de.parquet: missing"):
+    with pytest.raises(UserError, match=f"evaluations/{BAND}/de.parquet: missing"):
         gather(params, root)
     for file in (root / "data").glob(f"*/{BAND}/{METHOD}*"):
         copy = file.with_name(file.name.replace(METHOD, "de"))

@@ -147,7 +147,7 @@ def test_a_theta_by_hand_needs_no_confidence(root, params, text_alone) -> None:
     theta = json.loads((root / THETA_FILE).read_text())
     (root / THETA_FILE).write_text(json.dumps({"band": BAND, "theta": theta["theta"]}))
     text = written(root, params)
-    assert "| 3.00E+5 | 0.45 |" in text and "correlation" not in text
+    assert "| 300 | 0.45 |" in text and "correlation" not in text
     assert "† The interval holds the draw's error alone" in text
 
 
@@ -192,7 +192,7 @@ def test_says_of_a_policy_what_it_was_trained_on(root, params, text_alone) -> No
 def test_names_the_input_that_is_missing(root, params) -> None:
     for name in (
         f"episodes/{BAND}/1/signals.parquet",
-        *(f"{step}/{BAND}/{METHOD}.parquet" for step in ("history", "refined", "trials")),
+        *(f"{step}/{BAND}/{METHOD}.parquet" for step in ("evaluations", "trials")),
         *(f"{step}/{BAND}/{METHOD}.json" for step in ("clusters", "theta")),
         *(f"policies/{BAND}/{METHOD}/{file}" for file in ("card.json", "map.parquet")),
     ):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
+from pipeline.export.mesh import CLAMPED, Tube
 from pipeline.params import load
 from pipeline.simulator.model import ClampedBand
 from validation.engines import checks
-from validation.engines.mesh import CLAMPED, Tube
 from validation.simulator.closed import String
 from validation.simulator.finding import Bench
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.export.mesh import Tube
 from pipeline.params import load
 from validation.engines import checks
-from validation.engines.mesh import Tube
 from validation.engines.mujoco_flex import FlexBand
 from validation.simulator.finding import Bench, unmet
 

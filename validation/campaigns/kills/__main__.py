@@ -11,7 +11,6 @@ where it was stopped.
 
 from __future__ import annotations
 
-import argparse
 import json
 import shutil
 import time
@@ -20,14 +19,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
-from threading import Lock
 
 from pipeline.base import errors
+from pipeline.base.code import ROOT, digests
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
-from tests.app.flow.killing import PROMPT, send
-from tests.project import ROOT
 from validation.benchmarks.timing import environment
 from validation.campaigns.kills import compare, full_disk, strike
 from validation.campaigns.kills.commands import (
@@ -40,7 +37,8 @@ from validation.campaigns.kills.commands import (
     orphans,
     source,
 )
-from validation.code import digests
+from validation.campaigns.runner import ResultLines, made_once, parser
+from validation.projects import PROMPT, send
 
 WORK = Path("data/kills")
 REPORT = ROOT / "reports/validation/kills.json"
@@ -55,35 +53,12 @@ ASKED = (
 )
 
 
-class StruckLines:
-    """Lines of JSON in a file; the last may be cut short, where the campaign was stopped."""
-
-    def __init__(self, path: Path) -> None:
-        self.path, self._lock = path, Lock()
-        self.all: list[dict] = []
-        for line in path.read_text().splitlines() if path.exists() else []:
-            try:
-                self.all.append(json.loads(line))
-            except json.JSONDecodeError:
-                continue
-
-    def of(self, what: str, name: str, disturbance: str) -> list[dict]:
-        """Those of a kind, of a command and of what disturbs it."""
-        asked = (what, name, disturbance)
-        return [one for one in self.all if (one["what"], one["name"], one["by"]) == asked]
-
-    def add(self, what: str, name: str, disturbance: str, result: dict) -> None:
-        line = {"what": what, "name": name, "by": disturbance, **result}
-        with self._lock, self.path.open("a") as file:
-            self.all.append(line)
-            file.write(f"\n{json.dumps(line)}\n")
-
-
 def undisturbed(work: Path) -> dict[str, dict]:
     """What `dvc repro` and `sling fit` make when nobody disturbs them; kept in `work`."""
-    kept = work / "undisturbed.json"
-    if kept.is_file():
-        return json.loads(kept.read_text())
+    return made_once(work / "undisturbed.json", lambda: _undisturbed(work))
+
+
+def _undisturbed(work: Path) -> dict[str, dict]:
     found = {}
     for kind in (ReproCopy, FitCopy):
         copy = kind(work / "undisturbed" / kind.name.replace(" ", "-"), work)
@@ -99,7 +74,6 @@ def undisturbed(work: Path) -> dict[str, dict]:
         say(f"undisturbed {kind.name}: {found[kind.name]['seconds']:.0f} s")
         if kind is ReproCopy:
             shutil.copy(copy.folder / "data/raw/band1/band1.mcap", work / RECORDING)
-    write_json(kept, found)
     return found
 
 
@@ -126,16 +100,16 @@ def disturb(
     copy: StruckCopy,
     by: str,
     wanted: int,
-    lines: StruckLines,
+    lines: ResultLines,
     expected: dict,
     attempt: Callable[[int, int], dict],
 ) -> None:
     """Disturb a command so often, and let it end well then."""
     name, going = copy.name, False
     while True:
-        before = lines.of("attempt", name, by)
+        before = lines.where(what="attempt", name=name, by=by)
         count = sum(map(disturbances, before))
-        whole = lines.of("round", name, by)
+        whole = lines.where(what="round", name=name, by=by)
         if count >= wanted and whole and whole[-1]["after"] == count:
             return
         if not going and not (before and not before[-1]["ended"] and copy.folder.is_dir()):
@@ -148,7 +122,7 @@ def disturb(
                 one["faults"].append(f"neither as before nor as in the end: {halves[:5]}")
         one["mended"] = copy.mend()
         one["ended"] = one["status"] == 0
-        lines.add("attempt", name, by, one)
+        lines.add({"what": "attempt", "name": name, "by": by, **one})
         count += disturbances(one)
         told = [kill["hit"] for kill in one.get("kills", ())] or one.get("said") or "not disturbed"
         say(f"{name}, {by} {count} of {wanted}: {one['seconds']:.0f} s, {told}")
@@ -160,7 +134,8 @@ def disturb(
                 "temporaries": [file for here in copy.copies for file in compare.temporaries(here)],
                 "left_in_tmp": sorted(file.name for file in (copy.place / "tmp").iterdir()),
             }
-            lines.add("round", name, by, {"after": count, **same, **left})
+            about = {"what": "round", "name": name, "by": by, "after": count}
+            lines.add({**about, **same, **left})
             say(f"{name}, {by}: whole after {count}: {same}")
             going = False
         elif not disturbances(one) and one["faults"]:
@@ -180,7 +155,7 @@ def shares(count: int, names: list[str]) -> dict[str, int]:
 
 
 def campaign(
-    name: str, by: str, wanted: int, work: Path, lines: StruckLines, expected: dict
+    name: str, by: str, wanted: int, work: Path, lines: ResultLines, expected: dict
 ) -> None:
     """All kills, or all full disks, of a command."""
     copy = COMMANDS[name](work / by.replace(" ", "-") / name.replace(" ", "-"), work)
@@ -200,13 +175,13 @@ def campaign(
         disturb(copy, by, wanted, lines, expected.get(name, expected[ReproCopy.name]), attempt)
 
 
-def report(lines: StruckLines, kills: int, disks: int, expected: dict, names: list[str]) -> dict:
+def report(lines: ResultLines, kills: int, disks: int, expected: dict, names: list[str]) -> dict:
     """What the lines come to."""
-    attempts = [one for one in lines.all if one["what"] == "attempt"]
-    rounds = [one for one in lines.all if one["what"] == "round"]
+    attempts = lines.where(what="attempt")
+    rounds = lines.where(what="round")
     done = {
         name: {
-            by: sum(map(disturbances, lines.of("attempt", name, by)))
+            by: sum(map(disturbances, lines.where(what="attempt", name=name, by=by)))
             for by in ("kill", "full disk")
         }
         for name in names
@@ -219,7 +194,8 @@ def report(lines: StruckLines, kills: int, disks: int, expected: dict, names: li
     ]
     same = all(one[check] for one in rounds for check in CHECKS)
     complete = killed >= kills and filled >= disks and all(
-        (whole := lines.of("round", name, by)) and whole[-1]["after"] == done[name][by]
+        (whole := lines.where(what="round", name=name, by=by))
+        and whole[-1]["after"] == done[name][by]
         for name in names
         for by in ("kill", "full disk")
         if done[name][by]
@@ -257,20 +233,19 @@ def report(lines: StruckLines, kills: int, disks: int, expected: dict, names: li
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--kills", type=int, default=100)
-    parser.add_argument("--full-disks", type=int, default=20)
-    parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
-    parser.add_argument("--at-once", type=int, default=2, help="commands at a time (default: 2)")
-    parser.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
-    parser.add_argument("--report", type=Path, default=REPORT)
-    arguments = parser.parse_args()
+    options = parser(__doc__, REPORT)
+    options.add_argument("--kills", type=int, default=100)
+    options.add_argument("--full-disks", type=int, default=20)
+    options.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
+    options.add_argument("--at-once", type=int, default=2, help="commands at a time (default: 2)")
+    options.add_argument("--work", type=Path, default=WORK, help=f"folder (default: {WORK})")
+    arguments = options.parse_args()
     work, names = arguments.work.resolve(), arguments.commands
     work.mkdir(parents=True, exist_ok=True)
     for one in orphans(work):
         send(one)
     project = source(work)
-    lines, expected = StruckLines(work / "results.jsonl"), undisturbed(work)
+    lines, expected = ResultLines(work / "results.jsonl"), undisturbed(work)
     todo = {
         "kill": shares(arguments.kills, names),
         "full disk": shares(arguments.full_disks, names),

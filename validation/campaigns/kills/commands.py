@@ -14,18 +14,24 @@ from pathlib import Path
 import psutil
 from ruamel.yaml import YAML, YAMLError
 
-from app.flow import locks
+from pipeline.base.code import ROOT
 from pipeline.base.files import write_json
 from pipeline.base.machine import commit
-from tests import project
-from tests.app.flow.killing import SLING, Run, send
-from tests.project import ROOT, copy_project, wait
-from tests.test_pipeline import TINY
+from stages import dvc_files
+from validation.projects import (
+    SLING,
+    TINY,
+    MarkedRun,
+    ProjectCopy,
+    copy_project,
+    marked,
+    run_of,
+    send,
+    set_params,
+    wait,
+)
 
-BUDGET = TINY | {
-    "run.methods": ["sling2sim2real"],  # the fit's: least_squares
-    "run.ablations": {"bands": [], "methods": []},
-}
+BUDGET = TINY | run_of(["band1"], ["sling2sim2real"])  # the fit's: least_squares
 SOURCE = "project"
 RECORDING, NAME = "mine.mcap", "mine"  # of the fit
 MASS = 0.023  # kg, of band1, whose recording it is
@@ -40,26 +46,13 @@ def source(work: Path) -> Path:
         shutil.rmtree(temporary, ignore_errors=True)
         temporary.mkdir()
         copy_project(temporary)
-        set_values(temporary, BUDGET)
+        set_params(temporary, BUDGET)
         write_json(work / "source.json", {"commit": commit(ROOT)})
         temporary.rename(folder)
     return folder
 
 
-def set_values(folder: Path, values: dict) -> None:
-    """In params.yaml there, by keys with dots."""
-    yaml, path = YAML(), folder / "params.yaml"
-    content = yaml.load(path)
-    for key, value in values.items():
-        *sections, name = key.split(".")
-        node = content
-        for section in sections:
-            node = node[section]
-        node[name] = value
-    yaml.dump(content, path)
-
-
-class StruckCopy(project.Copy):
+class StruckCopy(ProjectCopy):
     """A working copy whose command is struck again and again, until it ends well.
 
     Attributes:
@@ -85,7 +78,7 @@ class StruckCopy(project.Copy):
         )
         self.environment["DVC_SITE_CACHE_DIR"] = str(place / "site")
         temporary.mkdir(parents=True, exist_ok=True)
-        self.run = Run(self.folder, place / "said.txt", **self._more())
+        self.run = MarkedRun(self.folder, place / "said.txt", **self._more())
 
     def _more(self) -> dict[str, str]:
         """What it has in its environment that we have not."""
@@ -107,12 +100,8 @@ class StruckCopy(project.Copy):
         shutil.rmtree(self.folder, ignore_errors=True)
         source = Path(self.environment[OF_CAMPAIGN], SOURCE)
         shutil.copytree(source, self.folder, symlinks=True)
-        set_values(self.folder, self.values)
-        self("git", "init", "-q")
-        self("git", "config", "user.name", "Test")
-        self("git", "config", "user.email", "test@example.org")
-        self("git", "add", "--all")
-        self("git", "commit", "-q", "-m", "state")
+        set_params(self.folder, self.values)
+        self.commit()
 
     def start(self) -> subprocess.Popen:
         return self.run.start(*self.words)
@@ -155,7 +144,7 @@ class ReproCopy(StruckCopy):
             except (ValueError, YAMLError):
                 half = True
         if half:
-            locks.mend(self.folder)
+            dvc_files.mend(self.folder)
         return half
 
 
@@ -170,7 +159,7 @@ class FitCopy(StruckCopy):
     """`sling fit` of a recording that the project does not know yet."""
 
     name = "sling fit"
-    values = {"run.methods": ["least_squares"]}
+    values = run_of(["band1"], ["least_squares"])
     stages = (f"card@{NAME}",)
     words = (*SLING, "fit", RECORDING, "--mass", str(MASS), "--name", NAME)
 
@@ -256,11 +245,4 @@ COMMANDS = {one.name: one for one in (ReproCopy, FlowCopy, FitCopy, ClusterCopy)
 
 def orphans(work: Path) -> list[psutil.Process]:
     """What a killed campaign in the same folder has left."""
-    found = []
-    for process in psutil.process_iter():
-        try:
-            if process.environ().get(OF_CAMPAIGN) == str(work):
-                found.append(process)
-        except (psutil.NoSuchProcess, psutil.AccessDenied):
-            continue
-    return found
+    return marked(OF_CAMPAIGN, str(work))

@@ -14,10 +14,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from pipeline.base.errors import UserError, one_line
-from tests.app.flow.killing import PROMPT
-from tests.project import wait
 from validation.campaigns.kills.commands import StruckCopy
 from validation.campaigns.kills.strike import chance
+from validation.projects import PROMPT, wait
 
 SIZE = 300  # MB
 ROOM = 100_000  # bytes at most that stay free

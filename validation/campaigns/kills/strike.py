@@ -10,9 +10,8 @@ import time
 import numpy as np
 import psutil
 
-from tests.app.flow.killing import PROMPT, Run, told
-from tests.project import wait
 from validation.campaigns.kills.commands import StruckCopy
+from validation.projects import PROMPT, MarkedRun, command_line, wait
 
 VICTIMS = ("process", "group", "process", "command")
 MEAN = 15.0  # s until a kill, at any moment as likely
@@ -43,17 +42,17 @@ def kind(command: str) -> str:
 
 
 def strike(
-    run: Run, command: subprocess.Popen, victim: str, rng: np.random.Generator
+    run: MarkedRun, command: subprocess.Popen, victim: str, rng: np.random.Generator
 ) -> str | None:
     """Kill at once; what was hit, None if nothing was there any more."""
     if victim == "command":
         command.kill()
         return "the command"
-    others = [one for one in run.alive() if one.pid != command.pid and kind(told(one))]
+    others = [one for one in run.alive() if one.pid != command.pid and kind(command_line(one))]
     if not others:
         return None
     hit = others[rng.integers(len(others))]
-    what = kind(told(hit))
+    what = kind(command_line(hit))
     try:
         if victim == "group":
             os.killpg(os.getpgid(hit.pid), signal.SIGKILL)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base.errors import UserError
-from validation.engines.mesh import Tube
+from pipeline.export.mesh import Tube
 from validation.engines.physx import scene, worker
 
 INTERPRETER = "SLING_PHYSX"  # the Python that has ovphysx; this one by default

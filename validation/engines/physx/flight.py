@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.export.mesh import Tube
 from pipeline.simulator.launch import Launches, outcomes
 from pipeline.simulator.model import GRAVITY, ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import LANE, Outcome
-from validation.engines.mesh import Tube
 from validation.engines.physx.law import energy, force_on
 from validation.engines.physx.rollouts import BURST, SPACE
 from validation.engines.physx.study import clamped

@@ -17,9 +17,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.arguments import count
 from pipeline.base import errors
 from pipeline.base.errors import UserError
+from pipeline.export.mesh import Tube
 from pipeline.identify.results.mounting import load_sling
 from pipeline.params import Params, load
 from pipeline.simulator.launch import launch
@@ -27,7 +27,6 @@ from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.engines.checks import SAME_MESH
-from validation.engines.mesh import Tube
 from validation.engines.physx.bands import Drive, Engine
 from validation.engines.physx.flight import Flight, Pushed, led_to
 from validation.engines.physx.rollouts import ITERATIONS, RATE
@@ -95,9 +94,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("band")
     parser.add_argument("--theta", required=True, help="E,nu,d,mu,s")
-    parser.add_argument("--rate", type=count, default=RATE, help="PhysX's steps a second")
+    parser.add_argument("--rate", type=int, default=RATE, help="PhysX's steps a second")
     parser.add_argument("--params", default="params.yaml")
     asked = parser.parse_args()
+    if asked.rate < 1:
+        raise UserError(f"--rate {asked.rate}: must be a whole number above 0")
     params = load(asked.params)
     if asked.band not in params.bands:
         raise UserError(f"no band {asked.band} in {asked.params}")

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.export import usd
+from pipeline.export import usd
+from pipeline.export.mesh import Tube
 from pipeline.simulator.model import ClampedBand
-from validation.engines.mesh import Tube
 from validation.simulator.closed import String
 
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
+from pipeline.export.mesh import Tube
 from pipeline.simulator.interaction import Rollouts
 from pipeline.simulator.model import GRAVITY, ClampedBand
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.engines.checks import SAME_MESH
-from validation.engines.mesh import Tube
 from validation.engines.physx.bands import Engine
 from validation.engines.physx.study import MARK, motions, phases
 

@@ -6,8 +6,8 @@ from collections import Counter
 
 import numpy as np
 
+from pipeline.export.mesh import Tube
 from pipeline.simulator.model import GRAVITY
-from validation.engines.mesh import Tube
 
 SPACING = np.array([1.0, 2.5])  # m along x and y from band to band: none reaches the next
 COLUMNS = 32

@@ -23,18 +23,18 @@ from pipeline.base import errors
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.machine import devices
+from pipeline.identify.identify import evaluations_of
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.loss import TERMS
 from pipeline.identify.objective.session import service
 from pipeline.identify.results.mounting import sling_of_method
+from pipeline.identify.search.explore import rollouts_of
 from pipeline.identify.search.history import History
-from pipeline.identify.search.loop import budget
 from pipeline.params import load
 from pipeline.params.identification import OUR_ENGINE
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import LaunchSetup
 from pipeline.simulator.parameters import Parameters
-from validation.benchmarks.methods import complete
 from validation.benchmarks.timing import environment
 from validation.engines.physx.bands import Engine, release
 from validation.engines.physx.launches import FINE, alike, draws_of, launch_in_physx
@@ -64,10 +64,10 @@ class Comparison:
     def search(self, engine: str) -> tuple[History, float]:
         """Everything that was evaluated, and the seconds that it took (less what was recalled)."""
         optimizer = self.params.optimizer
-        total = sum(budget(optimizer, self.params.methods[engine].search))
+        total = rollouts_of(self.params, engine) + optimizer.cma_rollouts  # a multistart
         evaluate = service("search", self.band, engine, self.params, total)
         began = time.perf_counter()
-        history = complete(self.params, engine, optimizer, evaluate)
+        history = evaluations_of(self.params, engine, evaluate)
         return history, time.perf_counter() - began
 
     def losses(self, thetas: np.ndarray) -> dict[str, list[dict]]:

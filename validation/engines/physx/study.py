@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from pipeline.export.mesh import Tube
 from pipeline.simulator.interaction import GRASP_BLEND, interact
 from pipeline.simulator.model import GRAVITY, ClampedBand
 from validation.benchmarks.timing import timed
 from validation.engines import checks
-from validation.engines.mesh import Tube
 from validation.engines.physx.bands import Course, Drive, Engine
 from validation.engines.physx.law import energy_left, equal_modulus, force_on
 from validation.simulator.finding import Bench, Finding, off

@@ -10,12 +10,16 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import qmc
 
 from pipeline.identify.objective.box import reflect
 from pipeline.identify.search.loop import latin_hypercube
+
+if TYPE_CHECKING:
+    from botorch.models import SingleTaskGP
 
 FIT_STEPS = 10  # of L-BFGS on the hyperparameters, which start where the last round's ended
 CANDIDATES = 512  # from which a batch is put together, half of them near the best points
@@ -98,7 +102,7 @@ class Bayes:
         )
         return batch[0].numpy().clip(0, 1)
 
-    def _fitted(self, unit: np.ndarray, value: np.ndarray):
+    def _fitted(self, unit: np.ndarray, value: np.ndarray) -> SingleTaskGP:
         """BoTorch's model of values (N,) at points (N, D); the fit starts where the last ended."""
         import torch
         from botorch.models import SingleTaskGP
@@ -107,7 +111,7 @@ class Bayes:
         from gpytorch.mlls import ExactMarginalLogLikelihood
 
         kernel = get_covar_module_with_dim_scaled_prior(unit.shape[1], use_rbf_kernel=False)
-        kernel.nu = 0.5
+        kernel.nu = 0.5  # pyright: ignore[reportArgumentType]
         points, values = torch.from_numpy(unit), torch.from_numpy(value)[:, None]
         model = SingleTaskGP(points, values, covar_module=kernel, outcome_transform=None)
         if self._hyperparameters:

@@ -92,7 +92,7 @@ def _run(dimension: int, options: dict, asked: SimpleQueue, told: SimpleQueue) -
             updating="deferred",
             polish=False,
             tol=0.0,
-            atol=-1.0,  # never met: every method spends its whole budget
+            atol=-1,  # never met: every method spends its whole budget
         )
         asked.put(RuntimeError("differential evolution was asked beyond its budget"))
     except _Dropped:

@@ -7,9 +7,8 @@ import numpy as np
 
 from pipeline.report.drawing.canvas import picture
 from pipeline.report.drawing.styles import INK
+from pipeline.report.quantities import coordinate
 from pipeline.report.run.figures.panels import panels
-
-SYMBOL = {"youngs modulus": "E", "mooney": "Mooney"}
 
 
 @picture({"axes.grid": False})
@@ -37,11 +36,3 @@ def correlation(confidences: dict[str, dict]) -> plt.Figure:
         ax.spines[:].set_visible(False)
     figure.colorbar(image, ax=list(found.values()), label="correlation", shrink=0.8)
     return figure
-
-
-def coordinate(name: str) -> str:
-    """A coordinate of the density in words."""
-    words = name.replace("_", " ")
-    for long, short in SYMBOL.items():
-        words = words.replace(long, short)
-    return words

@@ -10,8 +10,9 @@ import pandas as pd
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Ellipse
 
-from pipeline.report.drawing.canvas import PARAMETERS, few_ticks, key, log_y, mark, picture
+from pipeline.report.drawing.canvas import few_ticks, key, log_y, mark, picture
 from pipeline.report.drawing.styles import INK, Styles
+from pipeline.report.quantities import QUANTITIES
 from pipeline.report.run.figures.panels import entitle, explain, panels
 from pipeline.report.run.figures.policy import DASHES
 from pipeline.report.run.results import Result, best_so_far, printed
@@ -115,11 +116,11 @@ def corner(result: Result, boxes, title: str) -> plt.Figure:
         ax.set(xlim=(0, 1))
         ax.set_xticks(*_ticks(x, boxes, history), fontsize=7)
         if row == size - 1:
-            ax.set_xlabel(_label(x))
+            ax.set_xlabel(QUANTITIES[x].heading)
         else:
             ax.tick_params(labelbottom=False)
         if column == 0 and row > 0:
-            ax.set_ylabel(_label(free[row]))
+            ax.set_ylabel(QUANTITIES[free[row]].heading)
         elif row != column:
             ax.tick_params(labelleft=False)
     side = figure.add_axes((0.62, 0.9, 0.31, 0.016))
@@ -168,13 +169,9 @@ def _key(figure: plt.Figure, result: Result, failures: bool) -> None:
     key(figure, entries, 1, loc="upper right", bbox_to_anchor=(0.95, 0.84), fontsize=8)
 
 
-def _label(name: str) -> str:
-    return PARAMETERS.get(name, (name.replace("_", " "), 1.0))[0]
-
-
 def _ticks(name: str, boxes, history: pd.DataFrame) -> tuple[list[float], list[str]]:
     """Places in the unit cube of round physical values, and those values in words."""
-    unit, value = history[f"unit_{name}"], history[name] * PARAMETERS.get(name, ("", 1.0))[1]
+    unit, value = history[f"unit_{name}"], history[name] * QUANTITIES[name].factor
     log = name in THETA and getattr(boxes, name).scale == "log"
     scaled = np.log10(value) if log else value
     first, last = int(unit.argmin()), int(unit.argmax())

@@ -9,19 +9,12 @@ import numpy as np
 from pipeline.params.identification import LEAST_SQUARES
 from pipeline.report.drawing.markdown import as_code, cell
 from pipeline.report.drawing.styles import Styles
+from pipeline.report.quantities import QUANTITIES, Quantity, coordinate
 from pipeline.report.run.replay import Replay
 from pipeline.report.run.results import Results
 from pipeline.report.run.tables.cells import NONE, Table, number, percent
-from pipeline.report.run.tables.parameters import HEADS, exactly, printed_loss
+from pipeline.report.run.tables.parameters import exactly, printed_loss
 
-DERIVED = {  # heading and factor from SI; others keep their name and unit
-    "damping_product": ("s·d [ms]", 1e3),
-    "air_drag": ("drag beside the air's [1/s]", 1.0),
-    "turn_damping": ("turn damping", 1.0),
-    "returned_share": ("returned share", 1.0),
-    "release_time": ("release [s]", 1.0),
-    "camera_delay": ("camera delay [ms]", 1e3),
-}
 PARTS = ("fitted", "held out", "ratio")
 SEARCHES = {
     LEAST_SQUARES: "a design, then Levenberg-Marquardt",
@@ -57,9 +50,8 @@ def methods(results: Results, params, styles: Styles) -> Table:
 
 
 def _held(name: str, value: float) -> str:
-    """As in "d 5.00E-3 s"."""
-    symbol, _, unit = HEADS.get(name, name).partition(" [")
-    return f"{symbol} {exactly(name, value)} {unit.rstrip(']')}".rstrip()
+    """As in "d 5.00 ms"."""
+    return f"{QUANTITIES[name].symbol} {exactly(name, value)} {QUANTITIES[name].unit}".rstrip()
 
 
 def derived(results: Results, styles: Styles) -> Table | None:
@@ -68,15 +60,16 @@ def derived(results: Results, styles: Styles) -> Table | None:
     if not shown:
         return None
     found = {name: one for r in shown for name, one in r.confidence["derived"].items()}
-    titles = {name: title for name, title in DERIVED.items() if name in found}
-    for name in sorted(found.keys() - titles):
-        titles[name] = f"{name.replace('_', ' ')} [{found[name]['unit']}]", 1.0
+    quantities = {name: one for name, one in QUANTITIES.items() if name in found}
+    for name in sorted(found.keys() - quantities):
+        words = name.replace("_", " ")
+        quantities[name] = Quantity(words, words, found[name]["unit"])
     rows = []
     for result in shown:
         own = result.confidence["derived"]
-        cells = [ranged(own.get(name), factor) for name, (_, factor) in titles.items()]
+        cells = [ranged(own.get(name), one.factor) for name, one in quantities.items()]
         rows.append([result.band, styles[result.method].name, *cells])
-    return ["band", "method", *(title for title, _ in titles.values())], rows
+    return ["band", "method", *(one.heading for one in quantities.values())], rows
 
 
 def ranged(about: dict | None, factor: float) -> str:
@@ -113,7 +106,7 @@ def recordings(results: Results, styles: Styles) -> Table | None:
                     _scaled(about["recoil_rms"], 1e3, ".1f"),
                     ", ".join(f"{1e3 * time:.0f}" for time in about["pictures"]) or NONE,
                     f"{without['misfit']:.1f}" if without else NONE,
-                    f"{_word(moved[0])} {moved[1]:+.1f} sd" if moved else NONE,
+                    f"{coordinate(moved[0])} {moved[1]:+.1f} sd" if moved else NONE,
                 ]
             )
     heads = ["band", "method", "recording", "force [mN]", "held band [mm]", "recoil [mm]"]
@@ -123,10 +116,6 @@ def recordings(results: Results, styles: Styles) -> Table | None:
 
 def _scaled(value: float, factor: float, form: str) -> str:
     return f"{factor * value:{form}}"
-
-
-def _word(name: str) -> str:
-    return name.replace("_", " ")
 
 
 def observed(results: Results, styles: Styles) -> Table | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from pipeline.report.drawing.styles import Styles
+from pipeline.report.quantities import QUANTITIES
 from pipeline.report.run.results import Result, Results
 from pipeline.report.run.tables.cells import NONE, Table, number, without_empty
 from pipeline.report.run.tables.identified import ranged
@@ -16,12 +17,7 @@ from pipeline.report.run.tables.landings import (
     prediction_error,
 )
 
-VALUES = {  # heading, and factor from SI
-    "youngs_modulus": ("E [kPa]", 1e-3),
-    "mooney_share": ("Mooney share", 1.0),
-    "relaxation": ("relaxation [%]", 1e2),
-    "damping_product": ("damping s·d [ms]", 1e3),
-}
+VALUES = "youngs_modulus", "mooney_share", "relaxation", "damping_product"
 
 
 def outcome(results: Results, references: tuple[str, ...], styles: Styles) -> Table | None:
@@ -75,5 +71,5 @@ def values(results: Results, bands: list[str], method: str) -> Table:
         for group in ("parameters", "derived"):
             for name, about in result.confidence.get(group, {}).items():
                 known[name] = known.get(name, {}) | about
-        rows.append([band, *(ranged(known.get(n), factor) for n, (_, factor) in VALUES.items())])
-    return without_empty((["band", *(title for title, _ in VALUES.values())], rows))
+        rows.append([band, *(ranged(known.get(n), QUANTITIES[n].factor) for n in VALUES)])
+    return without_empty((["band", *(QUANTITIES[name].heading for name in VALUES)], rows))

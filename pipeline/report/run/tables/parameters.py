@@ -9,8 +9,10 @@ import numpy as np
 import pandas as pd
 
 from pipeline.identify.objective.box import SearchBox
+from pipeline.identify.results.units import SI_UNITS
 from pipeline.params.identification import LAWS
 from pipeline.report.drawing.styles import Styles
+from pipeline.report.quantities import QUANTITIES
 from pipeline.report.run import paper
 from pipeline.report.run.results import PRINTED, Result, Results
 from pipeline.report.run.tables.benchmark import PAPER, band_name, method_name, ordered
@@ -18,15 +20,7 @@ from pipeline.report.run.tables.cells import NONE, Table, number
 from pipeline.simulator.parameters import THETA
 from pipeline.simulator.rubber import RUBBER
 
-HEADS = {  # as the paper has them, with units
-    "youngs_modulus": "E [Pa]",
-    "poissons_ratio": "ν",
-    "elasticity_damping": "d [s]",
-    "dynamic_friction": "friction",
-    "damping_scale": "s",
-    **{name: name.replace("_", " ").replace("mooney", "Mooney") for name in LAWS[RUBBER]},
-}
-UNITS = {"youngs_modulus": "_pa", "elasticity_damping": "_s"}
+NAMES = (*THETA, *LAWS[RUBBER])
 RECORDED = {"rig": "virtual", "recording": "measured"}
 
 
@@ -65,7 +59,7 @@ def identified(results: Results, params) -> list[IdentifiedRow]:
     for band, ran in results.methods.items():
         for method in ordered(ran):
             result, source = ran[method], RECORDED[params.bands[band].source]
-            names = (name for name in HEADS if name in result.theta["theta"])
+            names = (name for name in NAMES if name in result.theta["theta"])
             values = {name: _value(params, result, name) for name in names}
             rows.append(IdentifiedRow(band, method, source, values, printed_loss(result)))
             if cells := paper.THETA.get((band, method)):
@@ -116,12 +110,13 @@ def as_table(rows: list[IdentifiedRow], styles: Styles) -> Table:
         loss = f"**{loss}**" if row.loss == least.get((row.band, row.source)) else loss
         whose = band_name(row.band), method_name(row.method, styles), row.source
         lines.append([*whose, *cells, loss])
-    return ["band", "method", "source", *(HEADS[name] for name in names), "loss"], lines
+    heads = [QUANTITIES[name].heading for name in names]
+    return ["band", "method", "source", *heads, "loss"], lines
 
 
 def _shown(rows: list[IdentifiedRow]) -> list[str]:
     """The five, and what a law that any method runs with has beside them."""
-    return [name for name in HEADS if name in THETA or any(name in row.values for row in rows)]
+    return [name for name in NAMES if name in THETA or any(name in row.values for row in rows)]
 
 
 def _cell(name: str, one: Value) -> str:
@@ -143,15 +138,17 @@ def _between(name: str, low: float, high: float) -> str:
 
 def exactly(name: str, value: float) -> str:
     """A setting as the tables print parameters, with more digits where it has more."""
-    shown = (_physical(name, value, digits) for digits in (2, 3, 4, 5))
-    return next((text for text in shown if float(text) == value), f"{value:g}")
+    texts = [_physical(name, value, digits) for digits in (2, 3, 4, 5)]
+    value *= QUANTITIES[name].factor
+    return next((text for text in texts if math.isclose(float(text), value)), f"{value:g}")
 
 
 def _physical(name: str, value: float, digits: int = 2) -> str:
-    """As the paper prints it: 9.29E+5, 0.46."""
-    if name in UNITS:
-        mantissa, exponent = f"{value:.{digits}E}".split("E")
-        return f"{mantissa}E{int(exponent):+d}"
+    """As in 929, 11.1, 0.46: one digit more where there is a unit, or so many after the point."""
+    quantity = QUANTITIES[name]
+    value *= quantity.factor
+    if quantity.unit and value:
+        digits = max(digits - math.floor(math.log10(abs(value))), 0)
     return f"{value:.{digits}f}"
 
 
@@ -162,7 +159,7 @@ def records(rows: list[IdentifiedRow]) -> pd.DataFrame:
         line = {"band": row.band, "method": row.method, "source": row.source}
         for name in _shown(rows):
             one = row.values.get(name, Value(math.nan))
-            unit = UNITS.get(name, "")
+            unit = f"_{SI_UNITS[name].lower()}" if name in SI_UNITS else ""
             for part, value in (("", one.value), ("_low", one.low), ("_high", one.high)):
                 line[f"{name}{part}{unit}"] = value
             line[f"{name}_state"] = one.state or None

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from pipeline.report.quantities import coordinate
 from pipeline.report.run.figures import confidence
 from tests.report.run.conftest import BAND, METHOD
 
@@ -19,4 +20,4 @@ def test_correlations_are_written_into_half_of_their_cells(kept, result) -> None
 def test_coordinates_have_words() -> None:
     names = "log_youngs_modulus", "mooney_share", "log_loss_factor"
     words = ["log E", "Mooney share", "log loss factor"]
-    assert [confidence.coordinate(name) for name in names] == words
+    assert [coordinate(name) for name in names] == words

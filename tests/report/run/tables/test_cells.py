@@ -12,7 +12,7 @@ from pipeline.report.run.tables.cells import NAMES, latex, markdown, text
 from tests.report.run.tables.toy_results import TARGETS, floor, launches, result, results
 
 TABLE = (
-    ["band", "method", "source", "E [Pa]", "± over all"],
+    ["band", "method", "source", "E [kPa]", "± over all"],
     [
         ["my_band", "DE_L", "virtual", "**1.00 ± 0.10**", "50 %"],
         ["my_band", "DE_L", "paper", "N/A", "–"],

@@ -51,7 +51,7 @@ def test_what_a_method_holds_fixed(results, params, named) -> None:
     method = params.methods[METHOD].model_copy(update={"fixed": fixed})
     params = params.model_copy(update={"methods": {METHOD: method}})
     assert column(methods(results, params, named), "held fixed") == [
-        "ν 0.45, d 5.00E-3 s, friction 0.125"
+        "ν 0.45, d 5.00 ms, friction 0.125"
     ]
 
 
@@ -70,8 +70,8 @@ def test_what_a_method_minimises_and_by_what_search(params) -> None:
 
 def test_derived_quantities_keep_the_digits_that_their_width_deserves(results, named) -> None:
     table = derived(results, named)
-    assert column(table, "s·d [ms]") == ["2.10 (1.90 – 2.30)"]
-    assert column(table, "returned share") == ["1.000 (0.970 – 1.030)"]
+    assert column(table, "damping s·d [ms]") == ["2.10 (1.90 – 2.30)"]
+    assert column(table, "returned share [%]") == ["100.0 (97.0 – 103.0)"]
     results.methods[BAND][METHOD].theta["confidence"] = None
     assert derived(results, named) is None and recordings(results, named) is None
 

@@ -10,10 +10,10 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.base.machine import gpus
+from pipeline.export.mesh import Tube
 from pipeline.params import load
 from pipeline.simulator.cylinder import volumes
 from validation.engines import checks
-from validation.engines.mesh import Tube
 from validation.engines.physx import bands, scene, study
 from validation.simulator.finding import Bench
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from app.export import usd
 from pipeline.base.errors import UserError
+from pipeline.export import usd
+from pipeline.export.mesh import Tube
 from pipeline.params import load
 from pipeline.simulator.cylinder import volumes
 from pipeline.simulator.model import GRAVITY
 from validation.engines import checks
-from validation.engines.mesh import Tube
 from validation.engines.physx import law
 from validation.engines.physx.exported import LIMIT, SLIP, ExportedBand, compared, met, yielded
 from validation.simulator.finding import Bench

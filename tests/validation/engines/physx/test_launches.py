@@ -9,11 +9,11 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.base.failures import DRAGGED, NEVER_LEFT, SLACK
+from pipeline.export.mesh import Tube
 from pipeline.identify.results.mounting import load_sling
 from pipeline.params import load
 from pipeline.simulator.model import GRAVITY
 from validation.engines.checks import SAME_MESH
-from validation.engines.mesh import Tube
 from validation.engines.physx import bands, flight, launches, worker
 from validation.engines.physx.rollouts import BURST
 

@@ -5,10 +5,10 @@ import re
 import numpy as np
 import pytest
 
+from pipeline.export.mesh import Tube
 from pipeline.params import load
 from pipeline.simulator.model import ClampedBand
 from tests.project import ROOT
-from validation.engines.mesh import Tube
 from validation.engines.physx import law
 
 YOUNG, POISSON = 2.2e5, 0.45

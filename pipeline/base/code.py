@@ -1,0 +1,109 @@
+"""What code a result hangs on: the folders that a script imports, and a digest of each.
+
+Python's imports are followed at any depth and inside functions too. `tools/closure.py` writes them
+into dvc.yaml; environment.py notes them with every figure, and
+`sling figures` says whether they are still the same.
+"""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+from pipeline.base.fingerprint import fingerprint
+
+ROOT = Path(__file__).parents[2]
+CODE = ("pipeline/", "rig/", "stages/", "app/", "sling2sim2real/", "validation/")
+UNTRACKED = (
+    "pipeline/params/",
+    "stages/start.py",
+    "stages/dvc_files.py",
+)  # nobody's dependency: see tools/closure.py
+UNCOUNTED = {"pipeline/params", *UNTRACKED[1:]}  # among digests
+NESTED = (  # folders of folders: what lies in them is a concern by itself, be it folder or file
+    "pipeline/",
+    "pipeline/identify/",
+    "pipeline/identify/optimizers/",
+    "pipeline/launching/",
+    "pipeline/report/",
+    "rig/",
+)
+NATIVE = (".h", ".cpp", ".html", ".css", ".js")
+
+
+def files_of(module: str, root: Path = ROOT) -> list[Path]:
+    """Files that `import module` runs: the module and its packages; none if it is not ours."""
+    parts = module.split(".")
+    packages = [root.joinpath(*parts[:n], "__init__.py") for n in range(1, len(parts) + 1)]
+    leaf = root.joinpath(*parts).with_suffix(".py")
+    if not (leaf.is_file() or packages[-1].is_file()):
+        return []
+    return [file for file in (*packages, leaf) if file.is_file()]
+
+
+class _WithoutTypes(ast.NodeTransformer):
+    """Leaves out what `if TYPE_CHECKING:` imports: no program runs it."""
+
+    def visit_If(self, node: ast.If) -> ast.AST | None:
+        typed = isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+        return None if typed else self.generic_visit(node)
+
+
+def imports(file: Path, root: Path = ROOT) -> set[Path]:
+    """Project files that `file` imports itself, with native sources that lie beside a module."""
+    package = file.relative_to(root).parent.parts
+    found: set[Path] = set()
+    tree = ast.parse(file.read_text(encoding="utf-8"), str(file))
+    for node in ast.walk(_WithoutTypes().visit(tree)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = [*package[: len(package) + 1 - node.level]] if node.level else []
+            base = ".".join([*base, *filter(None, [node.module])])
+            names = [base, *(f"{base}.{alias.name}" for alias in node.names)]
+        else:
+            continue
+        found.update(file for name in names for file in files_of(name, root))
+    return found
+
+
+def closure(script: Path, root: Path = ROOT) -> list[str]:
+    """All project files that `script` may run, itself included, sorted, relative to `root`."""
+    seen: set[Path] = set()
+    queue = {script}
+    while queue:
+        file = queue.pop()
+        seen.add(file)
+        queue |= imports(file, root) - seen
+    native = {
+        beside for file in seen for beside in file.parent.iterdir() if beside.suffix in NATIVE
+    }
+    return sorted(file.relative_to(root).as_posix() for file in seen | native)
+
+
+def concern(file: str) -> str:
+    """What a file counts to, relative to the root: the outermost folder that is not NESTED.
+
+    A script of validation/ knows little of the others and is a concern by itself.
+    """
+    if file.startswith("validation/"):
+        return file
+    top = max((name for name in NESTED if file.startswith(name)), key=len, default="")
+    return "/".join(file.split("/")[: top.count("/") + 1 if top else 2])
+
+
+def digests(*scripts: Path, root: Path = ROOT) -> dict[str, str]:
+    """A digest of each concern that scripts run, by its path, sorted."""
+    files = {file for script in scripts for file in closure(script, root)}
+    tracked = {concern(one) for one in files if one.startswith(CODE)}
+    tracked -= {*UNCOUNTED, *(f"{top}__init__.py" for top in CODE)}
+    return {one: digest(root / one) for one in sorted(tracked)}
+
+
+def digest(part: Path) -> str | None:
+    """Of a file, or of a folder with all below it; None where there is none of that name."""
+    if not part.exists():
+        return None
+    if part.is_file():
+        return fingerprint(part)[:12]
+    return fingerprint(part, *sorted(one for one in part.rglob("*") if one.is_dir()))[:12]

@@ -1,0 +1,96 @@
+"""Export a calibrated band: match, prove, write a folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+
+from pipeline.base.errors import UserError
+from pipeline.base.files import replacing_folder, write_json, write_text
+from pipeline.episode.episode import Episode
+from pipeline.export import ENGINES, card, mjcf, mjcf_card, newton_file, usd, yaml_file
+from pipeline.export.band import CalibratedBand, pull_to
+from pipeline.export.match import compared, draws_of, matched, proof_draws
+from pipeline.export.mujoco_replay import MujocoBand, mujoco
+from pipeline.export.pull import compare_pull
+
+
+def write(model: CalibratedBand, to: str, folder: Path, episode: Episode | None = None) -> dict:
+    """What sling2sim2real.export does; what card.json holds. `to` is a key of TARGETS.
+
+    Raises UserError.
+    """
+    if to not in TARGETS:
+        raise UserError(f"to: must be one of {', '.join(TARGETS)}, got {to!r}")
+    if folder.exists() and not replaceable(folder):
+        raise UserError(f"{folder}: holds something else than an export; name an empty folder")
+    with replacing_folder(folder) as temporary:
+        content = TARGETS[to](model, temporary, episode)
+        write_json(temporary / "card.json", content)
+    return content
+
+
+def replaceable(folder: Path) -> bool:
+    """Whether a folder holds nothing but an earlier export."""
+    if not folder.is_dir():
+        return False
+    there = {file.name for file in folder.iterdir()}
+    try:
+        card = json.loads((folder / "card.json").read_text("utf-8"))
+    except (OSError, ValueError):
+        return not there
+    files = card.get("files") if isinstance(card, dict) and "target" in card else None
+    known = set(files) if isinstance(files, dict) else set()
+    return there <= known | {"card.json", "README.md"} and bool(known)
+
+
+def to_mjcf(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
+    """The chain of mjcf.py, proven by a replay of the written file."""
+    engine = f"MuJoCo {version(mujoco().__name__)}"
+    name, chain = model.band.name, matched(model)
+    path, proof = folder / f"{name}.xml", proof_draws(model)
+    write_text(path, mjcf.text(name, chain, _keys(name, chain, proof)))
+
+    replay = MujocoBand(path, chain)
+    draws = draws_of(model)
+    shots = [replay.launch(draw, fly=True) for draw in proof]
+    half = replace(chain, step=chain.step / 2)
+    finer = MujocoBand(mjcf.text(name, half), half)
+    moved = [
+        finer.launch(draw).landing / shot.landing - 1
+        for draw, shot in zip(proof, shots, strict=True)
+    ]
+    done = card.Matched(
+        chain=chain,
+        match=compared(model, draws, [replay.launch(draw) for draw in draws]),
+        proof=compared(model, proof, shots),
+        pull=compare_pull(model, episode or pull_to(model, tuple(proof[-1])), replay),
+        finer=max(map(abs, moved)),
+        engine=engine,
+    )
+    files = {path.name: "the model", "README.md": "how to use it, and what came out"}
+    content = card.content(model, done, "mjcf", files)
+    springs = content["springs_error"]
+    how = mjcf_card.how(path.name, chain.step, content["time_step_error"], springs)
+    write_text(folder / "README.md", card.readme(content, how))
+    return content
+
+
+def _keys(name: str, chain, proof) -> dict[str, dict]:
+    """Keyframes: hanging, and drawn for each draw of the proof."""
+    replay, keys = MujocoBand(mjcf.text(name, chain), chain), {}
+    replay.hang()
+    keys["hanging"] = replay.key()
+    for i, draw in enumerate(proof, 1):
+        replay.draw(draw)
+        keys[f"draw{i}"] = replay.key()
+    return keys
+
+
+Target = Callable[[CalibratedBand, Path, Episode | None], dict]
+TARGETS: dict[str, Target] = dict(
+    zip(ENGINES, (to_mjcf, newton_file.to_newton, yaml_file.to_yaml, usd.to_usd), strict=True)
+)

@@ -1,0 +1,182 @@
+"""Draw, launch and pull the exported band in MuJoCo, with what its file holds alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.base.errors import UserError
+from pipeline.export.chain import SpringChain
+from pipeline.export.mjcf import HAND_MASS, STIFF
+from pipeline.simulator.launch import ballistic_landing
+
+SETTLE, BRAKE = 0.25, 250.0  # s and 1/s: how long and how a drawn band is brought to rest
+LONGEST = 0.5  # s from a release until nothing has left the pouch
+HANG = 3.0  # s for the slack band
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A launch in MuJoCo, frame O, SI units; NaN where nothing left the pouch."""
+
+    landing: float
+    speed: float
+    angle: float
+    hold_force: float
+
+
+@dataclass(frozen=True)
+class Pulled:
+    """A pull while the hand holds: ends of steps (S,), force (S, 3), nodes (K, L, 3) at stamps."""
+
+    time: np.ndarray
+    force: np.ndarray
+    line_time: np.ndarray
+    line: np.ndarray
+
+
+class MujocoBand:
+    """One model in MuJoCo.
+
+    Args:
+        source: Path of the XML file, or its text.
+        chain: Whose model it is.
+    """
+
+    def __init__(self, source: Path | str, chain: SpringChain):
+        mj = mujoco()
+        load = mj.MjModel.from_xml_path if isinstance(source, Path) else mj.MjModel.from_xml_string
+        self.chain, self.model = chain, load(str(source))
+        self.data, self._step = mj.MjData(self.model), mj.mj_step
+        nodes = range(1, chain.edges)
+        self._nodes = np.concatenate([self._dofs(f"node{i}") for i in nodes])
+        self._hand, self._ball = self._dofs("hand"), self._dofs("projectile")
+        self._hold, self._pouch = (self.model.equality(one).id for one in ("hold", "pouch"))
+        self._start = np.array([self.model.body(f"node{i}").pos for i in nodes])
+        self._ball_start = self.model.body("projectile").pos.copy()
+
+    def _dofs(self, body: str) -> np.ndarray:
+        first = self.model.joint(f"{body}_x").dofadr[0]
+        return first + np.arange(3)
+
+    @property
+    def line(self) -> np.ndarray:
+        """Nodes, clamps included, shape (edges + 1, 3)."""
+        moved = self._start + self.data.qpos[self._nodes].reshape(-1, 3)
+        return np.concatenate([self.chain.tips[:1], moved, self.chain.tips[1:]])
+
+    @property
+    def force(self) -> np.ndarray:
+        """Of the band on the hand in the last step, shape (3,)."""
+        return self.data.qfrc_constraint[self._hand]
+
+    def key(self) -> dict[str, np.ndarray]:
+        """The state as a keyframe."""
+        return {"qpos": self.data.qpos.copy(), "ctrl": self.data.ctrl.copy()}
+
+    def hang(self, *, held: bool = False) -> None:
+        """Let the band hang at rest, beside the hand or in it."""
+        self._put(self.chain.hanging(), held, pouch=True)
+        self._settle(HANG)
+        place = self.line[self.chain.edges // 2]
+        self.data.qpos[self._hand] = self.data.ctrl[:] = place
+
+    def draw(self, draw) -> float:
+        """Hold the band with the projectile at rest; the arm is sent to (y, z). Its force [N]."""
+        self._put(self.chain.drawn(np.array([0.0, *draw])), True, pouch=True)
+        self._settle(SETTLE)
+        return float(np.linalg.norm(self.force))
+
+    def launch(self, draw, *, fly: bool = False) -> Shot:
+        """Draw and let go.
+
+        Args:
+            fly: Whether MuJoCo flies the projectile to the floor; else a parabola does.
+        """
+        hold_force = self.draw(draw)
+        forward = -np.array([0.0, *draw]) / np.linalg.norm(draw)
+        self.data.eq_active[self._hold] = 0
+        for _ in range(round(LONGEST / self.chain.step)):
+            self._step(self.model, self.data)
+            if self.data.qfrc_constraint[self._ball] @ forward <= 0:  # the pouch cannot pull
+                break
+        else:
+            return Shot(np.nan, np.nan, np.nan, hold_force)
+        self.data.eq_active[self._pouch] = 0
+        (_, y, z), (_, vy, vz) = self._flying()
+        landing = ballistic_landing(y, z, vy, vz, self.chain.floor)
+        if fly:
+            landing = self._fly()
+        return Shot(float(landing), float(np.hypot(vy, vz)), float(np.arctan2(vz, vy)), hold_force)
+
+    def _flying(self) -> tuple[np.ndarray, np.ndarray]:
+        """Place and velocity of the projectile, (3,) each."""
+        place = self._ball_start + self.data.qpos[self._ball]
+        return place, self.data.qvel[self._ball].copy()
+
+    def _fly(self) -> float:
+        """Where the projectile meets the floor, along y [m]."""
+        after = self._flying()[0]
+        while after[2] > self.chain.floor:
+            before = after
+            self._step(self.model, self.data)
+            after = self._flying()[0]
+        part = (before[2] - self.chain.floor) / (before[2] - after[2])
+        return before[1] + part * (after[1] - before[1])
+
+    def pull(self, path, times: np.ndarray, stamps: np.ndarray) -> Pulled:
+        """Take the hanging band and lead it without the projectile.
+
+        The recorded hand is where it is, so that the arm does not give way here.
+
+        Args:
+            path: Where the held node is at `times` given where it hung: (3,) -> (S, 3).
+            times: Ends of the steps, at the time step's distance, shape (S,).
+            stamps: When to look at the nodes, between `times`' ends, shape (K,).
+        """
+        self.hang()
+        gain, brake = STIFF, 2 * np.sqrt(STIFF * HAND_MASS)
+        before = self.model.actuator_gainprm.copy(), self.model.actuator_biasprm.copy()
+        self.model.actuator_gainprm[:, 0] = gain
+        self.model.actuator_biasprm[:, 1:3] = -gain, -brake
+        self.data.eq_active[[self._hold, self._pouch]] = 1, 0
+        places = path(self.line[self.chain.edges // 2])
+        looks = np.searchsorted(times, stamps)
+        force, lines = np.empty((len(times), 3)), []
+        for i, place in enumerate(places):
+            self.data.ctrl[:] = place
+            self._step(self.model, self.data)
+            force[i] = self.force
+            lines += [self.line] * int(np.count_nonzero(looks == i))
+        self.model.actuator_gainprm[:], self.model.actuator_biasprm[:] = before
+        return Pulled(times, force, times[looks], np.array(lines))
+
+    def _put(self, line: np.ndarray, held: bool, pouch: bool) -> None:
+        """The band at rest through nodes (edges + 1, 3), hand and projectile at its middle."""
+        middle = line[self.chain.edges // 2]
+        data = self.data
+        data.qpos[self._nodes] = (line[1:-1] - self._start).ravel()
+        data.qpos[self._hand] = data.ctrl[:] = middle
+        data.qpos[self._ball] = middle - self._ball_start
+        data.qvel[:] = data.qacc_warmstart[:] = 0
+        data.eq_active[[self._hold, self._pouch]] = held, pouch
+
+    def _settle(self, duration: float) -> None:
+        """Brake all motion for a while."""
+        dofs = np.r_[self._nodes, self._ball]
+        self.model.dof_damping[dofs] = BRAKE * self.model.dof_M0[dofs]
+        self._step(self.model, self.data, nstep=round(duration / self.chain.step))
+        self.model.dof_damping[dofs] = 0
+        self.data.qvel[:] = 0
+        self._step(self.model, self.data)
+
+
+def mujoco():
+    """The module. Raises UserError where it is not installed."""
+    try:
+        import mujoco
+    except ImportError as error:
+        raise UserError("mujoco is not installed: pip install -e '.[validation]'") from error
+    return mujoco

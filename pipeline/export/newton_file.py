@@ -1,0 +1,52 @@
+"""The chain as numbers and a loader for Newton, which need nothing of this project."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+
+from pipeline.base.files import write_json, write_text
+from pipeline.episode.episode import Episode
+from pipeline.export import card, newton_card
+from pipeline.export.band import CalibratedBand, pull_to
+from pipeline.export.match import compared, draws_of, matched, proof_draws
+from pipeline.export.newton_replay import NewtonReplay, loader, numbers
+from pipeline.export.pull import compare_pull
+
+
+def to_newton(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
+    """<band>.json and newton_band.py, proven by a replay on the CPU.
+
+    The chain is matched in MuJoCo, which steps the same springs the same way. All that is said
+    about it is measured in Newton.
+    """
+    source = Path(loader().__file__)
+    name, chain = model.band.name, matched(model)
+    replay, proof, draws = NewtonReplay(chain), proof_draws(model), draws_of(model)
+    path = folder / f"{name}.json"
+    write_json(path, numbers(name, chain, proof))
+    write_text(folder / source.name, source.read_text("utf-8"))
+
+    shots = replay.launches(proof)
+    moved = [
+        finer.landing / shot.landing - 1
+        for finer, shot in zip(replay.finer.launches(proof), shots, strict=True)
+    ]
+    done = card.Matched(
+        chain=chain,
+        match=compared(model, draws, replay.launches(draws)),
+        proof=compared(model, proof, shots),
+        pull=compare_pull(model, episode or pull_to(model, tuple(proof[-1])), replay),
+        finer=max(map(abs, moved)),
+        engine=f"Newton {version('newton')}, Warp {version('warp-lang')}, CPU",
+    )
+    files = {
+        path.name: "the numbers",
+        source.name: "builds and launches the band",
+        "README.md": "how to use it, and what came out",
+    }
+    content = card.content(model, done, "newton", files)
+    del content["springs_error"]  # the kernel has the law itself
+    how = newton_card.how(path.name, chain.edges, chain.step, content["time_step_error"])
+    write_text(folder / "README.md", card.readme(content, how))
+    return content

@@ -1,0 +1,83 @@
+"""Draw, launch and pull the exported band in Newton, with what its files hold alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import ModuleType
+
+import numpy as np
+
+from pipeline.base.errors import UserError
+from pipeline.export.chain import SpringChain
+from pipeline.export.mujoco_replay import HANG, Pulled, Shot
+
+
+def numbers(name: str, chain: SpringChain, draws: np.ndarray) -> dict:
+    """What the JSON file holds; `draws` (N, 2) are for an example."""
+    return {
+        "name": name,
+        "edges": chain.edges,
+        "rest_length_m": chain.rest_length,
+        "mass_kg": chain.mass,
+        "half_width_m": chain.half_width,
+        "floor_m": chain.floor,
+        "projectile_mass_kg": chain.projectile_mass,
+        "arm_stiffness_n_per_m": chain.arm_stiffness,
+        "strength_n": chain.strength,
+        "mooney_share": chain.mooney_share,
+        "damping_time_s": chain.damping_time,
+        "largest_strain": chain.largest_strain,
+        "time_step_s": chain.step,
+        "draws_m": np.asarray(draws).tolist(),
+    }
+
+
+class NewtonReplay:
+    """A chain in Newton, on the CPU. Raises UserError where Newton is not installed."""
+
+    def __init__(self, chain: SpringChain):
+        self.chain, self._module = chain, loader()
+        self._numbers = numbers("band", chain, np.empty((0, 2)))
+
+    @property
+    def finer(self) -> NewtonReplay:
+        """With half the time step."""
+        return NewtonReplay(replace(self.chain, step=self.chain.step / 2))
+
+    def launches(self, draws: np.ndarray) -> list[Shot]:
+        """Draw all (N, 2), let go, and fly to the floor."""
+        bands = self._module.SpringBands(self._numbers, len(draws))
+        hold_force = bands.draw(draws)
+        landing, left = bands.launch()
+        speed, angle = np.linalg.norm(left, axis=1), np.arctan2(left[:, 2], left[:, 1])
+        columns = np.stack([landing, speed, angle, hold_force], axis=1)
+        return [Shot(*row) for row in columns.tolist()]
+
+    def pull(self, path, times: np.ndarray, stamps: np.ndarray) -> Pulled:
+        """As MujocoBand.pull: take the hanging band and lead it without the projectile."""
+        bands, middle = self._module.SpringBands(self._numbers), self.chain.edges // 2
+        bands.put([self.chain.hanging()], held=False)
+        bands.settle(HANG)
+        bands.put(bands.lines, loaded=False)
+        bands.drive(self._module.STIFF)
+        looks = np.searchsorted(times, stamps)
+        force, lines = np.empty((len(times), 3)), []
+        now, after = bands.states
+        for i, place in enumerate(path(bands.lines[0, middle])):
+            bands.lead(place[None])
+            bands.advance(now, after)
+            now, after = after, now
+            force[i] = bands.force[0]
+            seen = int(np.count_nonzero(looks == i))
+            if seen:
+                lines += [now.particle_q.numpy()[:-1].astype(float)] * seen
+        return Pulled(times, force, times[looks], np.array(lines))
+
+
+def loader() -> ModuleType:
+    """pipeline.export.newton_band. Raises UserError where Newton is not installed."""
+    try:
+        from pipeline.export import newton_band
+    except ImportError as error:
+        raise UserError("newton is not installed: pip install -e '.[validation]'") from error
+    return newton_band

@@ -1,0 +1,124 @@
+"""What an export says of the identified band, whatever the target."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.export.band import CalibratedBand
+from pipeline.identify.results.units import SI_UNITS
+from pipeline.report.quantities import QUANTITIES, rounded
+from pipeline.simulator.rubber import RUBBER
+
+FRAMES = (
+    "SI units throughout. Frame O: origin midway between the fork's tips, x along the fork, y"
+    " towards the target, z up. A draw is the place (y, z) to which the arm is sent with the"
+    " projectile; a landing is a distance along y on the floor."
+)
+
+
+def values(model: CalibratedBand) -> list[dict]:
+    """Each parameter with its 90 % interval where one is known: name, value, unit, low, high."""
+    intervals, found = getattr(model, "intervals", {}), []
+    for name in QUANTITIES:
+        value, known = getattr(model.theta, name, None), intervals.get(name)
+        if value is None:
+            continue
+        sure = known is not None and known.low < known.high
+        found.append(
+            {
+                "name": name,
+                "value": rounded(value, 6),
+                "unit": SI_UNITS.get(name, ""),
+                "low": rounded(known.low, 6) if sure else None,
+                "high": rounded(known.high, 6) if sure else None,
+                "identified": bool(sure and known.identifiable),
+            }
+        )
+    return found
+
+
+def sizes(model: CalibratedBand) -> dict[str, float | list[float] | None]:
+    """What was weighed and measured, and how the band is mounted; SI units are in the names."""
+    band, setup, mounting = model.band, model.settings.setup, model.mounting
+    return {
+        "mass_kg": band.mass,
+        "diameter_m": band.diameter,
+        "rest_length_m": band.rest_length,
+        "fork_width_m": setup.fork_width,
+        "fork_height_m": setup.fork_height,
+        "projectile_mass_kg": setup.projectile_mass,
+        "arm_stiffness_n_per_m": setup.arm_stiffness,
+        "clamp_direction": [rounded(float(one), 6) for one in model.sling.clamp_direction],
+        "flexural_rigidity_n_m2": mounting and rounded(mounting.flexural_rigidity, 6),
+    }
+
+
+def history(model: CalibratedBand) -> dict[str, float] | None:
+    """In how long the hand must draw, and how long it must wait; None: it does not matter."""
+    told = model.launch_setup.history
+    return told and {"pull_time_s": rounded(told.pull_time, 6), "pause_s": rounded(told.pause, 6)}
+
+
+def without_slot(model: CalibratedBand) -> list[dict]:
+    """What springs cannot express, its value, and what stands in for it."""
+    theta, setup, sling = model.theta, model.settings.setup, model.sling
+    direction, rigidity = sling.clamp_direction, sling.flexural_rigidity
+    angle = np.degrees(np.arctan2(np.hypot(direction[0], direction[1]), -direction[2]))
+    bending = "a solid band's" if rigidity is None else f"{rigidity:.2g} N m²"
+    damping = f"{1e3 * theta.elasticity_damping:.2g} ms, {theta.damping_scale:.2g}"
+    rows = [
+        (
+            "elasticity_damping, damping_scale",
+            damping,
+            "One damping time, of lengthening alone.",
+        ),
+        ("turn_damping", f"{theta.turn_damping:.2g}", "None: turns of a spring cost nothing."),
+        (
+            "returned_share",
+            f"{100 * theta.returned_share:.3g} %",
+            "The springs' damping, matched to landings.",
+        ),
+        (
+            "poissons_ratio",
+            f"{theta.poissons_ratio:.2g}",
+            "None: springs have no section; they pull as a string of constant volume.",
+        ),
+        (
+            "dynamic_friction",
+            f"{theta.dynamic_friction:.2g}",
+            "None: the hand is tied to the middle, and lets go at once.",
+        ),
+        (
+            "clamp angle, bending stiffness",
+            f"{angle:.0f} degrees, {bending}",
+            "None: the chain bends freely, at its clamps too. The slack band hangs otherwise.",
+        ),
+        (
+            "air",
+            f"{setup.air_density:.2g} kg/m³",
+            "The springs' damping, matched to landings.",
+        ),
+    ]
+    if theta.law == RUBBER:
+        rows = [*_of_rubber(model), *rows]
+    return [dict(zip(("name", "value", "instead"), row, strict=True)) for row in rows]
+
+
+def _of_rubber(model: CalibratedBand) -> list[tuple[str, str, str]]:
+    theta, told = model.theta, history(model)
+    after = "it has forgotten every pull"
+    if told:
+        after = f"a pull of {told['pull_time_s']:.1f} s and a pause of {told['pause_s']:.1f} s"
+    return [
+        (
+            "relaxation",
+            f"{100 * theta.relaxation:.2g} % a half decade",
+            f"None: the springs hold what the band holds after {after}. What relaxation takes from"
+            " a launch is in their damping.",
+        ),
+        (
+            "mooney_share",
+            f"{theta.mooney_share:.2g}",
+            "The shape of the springs' pull, with a share of its own.",
+        ),
+    ]

@@ -1,0 +1,109 @@
+"""A method of params.yaml, from episodes to parameters in memory.
+
+The stages run the same functions one by one, each of which DVC caches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.episode.episode import Episode
+from pipeline.identify.objective.box import SearchBox
+from pipeline.identify.objective.evaluate import Evaluation
+from pipeline.identify.optimizers.cma.refine import refine
+from pipeline.identify.posterior.identify import Identified, fit_posterior
+from pipeline.identify.posterior.launches import Evidence
+from pipeline.identify.search.explore import explore
+from pipeline.identify.search.history import History
+from pipeline.identify.search.regions import regions_of
+from pipeline.params import Params
+from pipeline.params.identification import LEAST_SQUARES
+from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
+
+
+@dataclass(frozen=True)
+class IdentifiedBand:
+    """What a method makes of a band's episodes.
+
+    Attributes:
+        law: Of the method.
+        evaluations: Everything that its search evaluated; None where it started from a point.
+        density: Of a method that searches by least squares, else None.
+    """
+
+    law: str
+    evaluations: History | None
+    density: Identified | None
+
+    @property
+    def theta(self) -> Parameters:
+        """θ*, one sample."""
+        if self.density is None:
+            return self.evaluations.best_parameters(self.law)
+        return self.density.mode
+
+
+def evaluations_of(
+    params: Params, method: str, evaluate: Callable[[np.ndarray], Evaluation]
+) -> History:
+    """Everything that the search of a method evaluates: exploration, then refinement if it has one.
+
+    Args:
+        evaluate: Losses of points of the whole unit cube, shape (N, D).
+    """
+    explored = explore(params, method, evaluate)
+    method_params = params.methods[method]
+    if method_params.search != "multistart":
+        return explored
+    free = SearchBox.of_method(params, method).free
+    on_free_axes = History(method, free, [explored.table])
+    regions, _ = regions_of(method_params, params.optimizer, on_free_axes)
+    return explored.followed_by(refine(params, method, regions, evaluate))
+
+
+def identify(
+    params: Params,
+    method: str,
+    sling: ClampedBand,
+    episodes: Sequence[Episode],
+    evaluate: Callable[[np.ndarray], Evaluation] | None = None,
+    *,
+    start: Parameters | None = None,
+    evidence: Evidence | None = None,
+    workers: int | None = None,
+    progress: Callable[[str], None] = lambda line: None,
+) -> IdentifiedBand:
+    """Identify a band by a method: least squares takes all episodes, other searches the first.
+
+    Args:
+        sling: Of the band, with the method's law and clamps.
+        evaluate: Losses of points of the whole unit cube, shape (N, D), for the search.
+        start: One sample to fit the density from, without any search.
+        evidence: Launches, of methods that search by least squares.
+        workers: Threads of the fit; they change no result.
+        progress: Called with a line after the exploration and at each step of the fit.
+
+    Raises:
+        UserError: All simulations fail.
+    """
+    evaluations, law = None, params.methods[method].law
+    if start is None:
+        evaluations = evaluations_of(params, method, evaluate)
+        progress(f"explored {len(evaluations.total)} points")
+    if params.methods[method].search != LEAST_SQUARES:
+        return IdentifiedBand(law, evaluations, None)
+    density = fit_posterior(
+        params,
+        method,
+        sling,
+        episodes,
+        evaluations.best_parameters(law) if start is None else start,
+        evidence=evidence,
+        workers=workers,
+        progress=lambda fit: progress(f"expansion {fit.steps}: misfit {fit.misfit:.2f}"),
+    )
+    return IdentifiedBand(law, evaluations, density)

@@ -1,0 +1,39 @@
+"""The second search of a multistart: a CMA-ES in each region of its exploration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from pipeline.identify.objective.box import SearchBox
+from pipeline.identify.objective.evaluate import Evaluation
+from pipeline.identify.optimizers.cma.multistart import Multistart
+from pipeline.identify.search.history import History
+from pipeline.identify.search.loop import search
+from pipeline.identify.search.regions import Region
+from pipeline.params import Params
+
+
+def refine(
+    params: Params,
+    method: str,
+    regions: Sequence[Region],
+    evaluate: Callable[[np.ndarray], Evaluation],
+) -> History:
+    """Everything that a CMA-ES in each region evaluates, `optimizer.cma_rollouts` in all.
+
+    Args:
+        regions: On the method's free axes.
+        evaluate: Losses of points of the whole unit cube, shape (N, D).
+    """
+    optimizer, box = params.optimizer, SearchBox.of_method(params, method)
+    history = History(method, box.names)
+    search(
+        Multistart(list(regions), population=optimizer.cma_population, seed=optimizer.seed),
+        evaluate,
+        history,
+        rollouts=optimizer.cma_rollouts,
+        box=box,
+    )
+    return history

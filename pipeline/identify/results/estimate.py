@@ -1,0 +1,45 @@
+"""data/confidence/: what a search says of θ beside its evaluations, as every search writes it.
+
+{"band": "...", "names": [...], "samples": [[...], ...], "estimate": {...}}: samples of the
+posterior, none where the search has none; and the entries of the θ file that no table of
+evaluations holds, such as its confidence.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.base.files import write_json
+from pipeline.base.schema import read_json
+from pipeline.episode.episode import Episode
+from pipeline.episode.pull import launch_history
+from pipeline.identify.results.theta import PosteriorFile
+from pipeline.simulator.parameters import Parameters
+from pipeline.simulator.rubber import RUBBER
+
+
+class EstimateFile(PosteriorFile):
+    band: str
+    estimate: dict
+
+
+def save_estimate(
+    path: Path,
+    band: str,
+    estimate: dict,
+    samples: Parameters | None = None,
+) -> None:
+    """Write an `EstimateFile`."""
+    names, values = ([], []) if samples is None else ([*samples.names], samples.values.tolist())
+    content = {"band": band, "names": names, "samples": values, "estimate": estimate}
+    write_json(path, content)
+
+
+def load_estimate(path: Path) -> dict:
+    """The entries of the θ file that such a file holds. Raises NotMade."""
+    return read_json(path, EstimateFile).estimate
+
+
+def pull_of(episode: Episode, law: str) -> dict:
+    """What a θ file of a law with memory says of the recorded pull; nothing for another law."""
+    return {"law": RUBBER, "history": launch_history(episode)} if law == RUBBER else {}

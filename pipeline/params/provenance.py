@@ -1,0 +1,118 @@
+"""The settings that a θ file or a policy rests on, and how those of today differ from them.
+
+They are stored in the file itself, under `made_with`, flat: {"setup.fork_width": 0.275, ...}. The
+budget and the seed of a search are not among them: another θ shows by its values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pipeline.params import Params
+
+RECORDING = ("force", "cloud", "episode")  # whole sections
+RECORDED_SETUP = ("base_to_fork", "camera_to_fork", "start_pose", "tip_link", "tool", "topics")
+RECORDED_SETUP += ("urdf",)
+PULL_SETUP = ("air_density", "clamp_direction", "finger_opening_time", "fork_width", "grip_force")
+LAUNCH_SETUP = ("arm_stiffness", "foot_height", "fork_height", "projectile_mass")
+POLICY_SETUP = ("draw_y", "draw_z", "max_force")
+MESH = ("edges", "grading", "mesh", "tet_edges")
+PULL_STEPS = ("grip_step", "hold_step", "recoil_step", "recoil_time", "swing_step")
+LAUNCH_STEPS = ("launch_step", "launch_time")
+METHOD = ("bounds", "engine", "fixed", "law", "mounting", "search", "weights")
+NOT_THERE = "not there"
+
+
+@dataclass(frozen=True)
+class Change:
+    """A key of params.yaml with its value then and now; NOT_THERE where it was or is missing."""
+
+    key: str
+    old: Any
+    new: Any
+
+    def __str__(self) -> str:
+        return f"{self.key} was {_short(self.old)}, is {_short(self.new)}"
+
+
+def settings_of(params: Params, band: str, method: str) -> dict[str, Any]:
+    """The settings that θ of a band and a method rests on, by their keys in params.yaml.
+
+    But for those of launches that are evidence: `evidence_settings_of`. Values are those of JSON:
+    numbers, texts, lists, None.
+    """
+    found = dict(_leaves(f"bands.{band}", params.bands[band]))
+    for name in RECORDING:
+        found.update(_leaves(name, getattr(params, name)))
+    found.update(_part(params, "setup", *RECORDED_SETUP, *PULL_SETUP))
+    found.update(_part(params, "sling", *MESH, *PULL_STEPS))
+    found.update(_leaves("loss", params.loss))
+    found.update(_leaves("parameters", params.parameters))
+    for name in METHOD:
+        found.update(_leaves(f"methods.{method}.{name}", getattr(params.methods[method], name)))
+    return found
+
+
+def evidence_settings_of(params: Params) -> dict[str, Any]:
+    """The settings that launches as evidence rest on, as `settings_of` gives them."""
+    found = _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
+    return found | {"trials.actuation_error": params.trials.actuation_error}
+
+
+def policy_settings_of(params: Params, band: str) -> dict[str, Any]:
+    """The settings that a policy rests on beside its θ, as `settings_of` gives them."""
+    found = dict(_leaves(f"bands.{band}", params.bands[band]))
+    found.update(_launch_settings(params))
+    found.update(_part(params, "setup", *PULL_SETUP, *POLICY_SETUP))
+    found.update(_part(params, "sling", *MESH))
+    found.update(_leaves("policy", params.policy))
+    return found
+
+
+def changes(then: Mapping[str, Any], now: Mapping[str, Any]) -> list[Change]:
+    """What differs between two sets of settings, sorted by key."""
+    found = (
+        Change(key, then.get(key, NOT_THERE), now.get(key, NOT_THERE)) for key in {*then, *now}
+    )
+    return sorted((one for one in found if one.old != one.new), key=lambda one: one.key)
+
+
+def changed_since(params: Params, content: Mapping[str, Any], method: str) -> list[Change]:
+    """What has changed since the θ of a file's content was identified, as far as it tells."""
+    then = content.get("made_with")
+    if not then or method not in params.methods:
+        return []
+    now = settings_of(params, content["band"], method)
+    if (content.get("confidence") or {}).get("launches"):
+        now |= evidence_settings_of(params)
+    return changes(then, now)
+
+
+def _launch_settings(params: Params) -> dict[str, Any]:
+    found = _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
+    return found | dict(_leaves("launch", params.launch))
+
+
+def _part(params: Params, section: str, *names: str) -> dict[str, Any]:
+    values = getattr(params, section)
+    return dict(
+        leaf for name in names for leaf in _leaves(f"{section}.{name}", getattr(values, name))
+    )
+
+
+def _leaves(key: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """A value, or those below it, by their keys."""
+    if value is None or isinstance(value, bool | int | float | str):
+        yield key, value
+    elif isinstance(value, list | tuple):
+        yield key, [*value]
+    else:  # a section yields its names and values, as a mapping's items do
+        for name, part in value.items() if isinstance(value, Mapping) else value:
+            yield from _leaves(f"{key}.{name}", part)
+
+
+def _short(value: Any) -> str:
+    text = "null" if value is None else str(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,38 @@
+"""Fit how the band leaves its clamps and how stiff it bends, to the slack part of the recording.
+
+    python -m stages.clamps band1
+
+Reads data/episodes/<band>/; writes data/clamps/<band>.json.
+"""
+
+from __future__ import annotations
+
+from pipeline.base.files import write_json
+from pipeline.base.layout import Layout
+from pipeline.base.machine import cores
+from pipeline.identify.clamps import calibrate_clamps
+from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.objective.session import load_episode
+from pipeline.simulator.model import ClampedBand
+from stages.start import run, started
+
+
+def main() -> None:
+    params, band = started("band")
+    # with the rod, whatever simulates afterwards: a solid mesh has no rigidity to fit
+    sling = ClampedBand.of(params.bands[band], params.setup, params.sling, as_rod=True)
+    content = calibrate_clamps(
+        sling,
+        load_episode(band),
+        lambda part: EpisodeLoss.plain(params, part, sling),
+        workers=cores(),
+    )
+    write_json(Layout().clamps(band), content)
+    print(
+        f"{band}: clamps at {content['clamp_angle_deg']:.1f} deg, bending"
+        f" {content['relative_rigidity']:.2f} of a solid round band's"
+    )
+
+
+if __name__ == "__main__":
+    run(main)

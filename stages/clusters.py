@@ -1,0 +1,32 @@
+"""Choose the distinct regions of an exploration, with their covariances.
+
+    python -m stages.clusters band1 sling2sim2real
+
+Reads data/history/<band>/<method>.parquet; writes data/clusters/<band>/<method>.json. A CMA-ES will
+start in each region.
+"""
+
+from __future__ import annotations
+
+from pipeline.base.layout import Layout, made
+from pipeline.identify.search.history import History
+from pipeline.identify.search.regions import regions_of, save_regions
+from pipeline.params.identification import parameter_names
+from stages.start import run, started
+
+
+def main() -> None:
+    params, band, method = started("band", "method")
+    method_params, layout = params.methods[method], Layout()
+    names = tuple(
+        name for name in parameter_names(method_params.law) if name not in method_params.fixed
+    )
+    explored = History.load(method, names, made(layout.history(band, method)))
+    explored.best()  # says why, where all failed
+    regions, asked = regions_of(method_params, params.optimizer, explored)
+    save_regions(layout.clusters(band, method), names, regions, asked)
+    print(f"{band} {method}: {len(regions)} regions, best loss {regions[0].loss:.5g}")
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,36 @@
+"""Refine the regions of an exploration by a CMA-ES in each.
+
+    python -m stages.cma band1 sling2sim2real
+
+Reads data/history/ and data/clusters/ of the method, data/episodes/<band>/ and
+data/clamps/<band>.json; writes everything evaluated, the exploration too, to
+data/evaluations/<band>/<method>.parquet, and data/confidence/<band>/<method>.json, which has no
+samples. Killed, it resumes from .checkpoints/. SLING_DEVICE and SLING_WORKERS say where it runs.
+"""
+
+from __future__ import annotations
+
+from pipeline.base.layout import Layout, made
+from pipeline.identify.objective.session import load_episode, service
+from pipeline.identify.optimizers.cma.refine import refine
+from pipeline.identify.results.estimate import pull_of, save_estimate
+from pipeline.identify.search.history import History
+from pipeline.identify.search.regions import load_regions
+from pipeline.params.identification import parameter_names
+from stages.start import run, started
+
+
+def main() -> None:
+    params, band, method = started("band", "method")
+    law, layout = params.methods[method].law, Layout()
+    regions, _ = load_regions(made(layout.clusters(band, method)))
+    names = parameter_names(law)
+    explored = History.load(method, names, made(layout.history(band, method)))
+    evaluate = service("cma", band, method, params, params.optimizer.cma_rollouts)
+    refined = refine(params, method, regions, evaluate)
+    explored.followed_by(refined).save(layout.evaluations(band, method))
+    save_estimate(layout.confidence(band, method), band, pull_of(load_episode(band), law))
+
+
+if __name__ == "__main__":
+    run(main)

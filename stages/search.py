@@ -1,0 +1,30 @@
+"""Search the box of parameters with one optimiser, to the end.
+
+    python -m stages.search band1 real2sim2real
+
+The stages `de`, `bo`, `adam` and `search` of dvc.yaml run it, each for the methods that search so.
+Reads data/episodes/<band>/ and data/clamps/<band>.json; writes everything evaluated to
+data/evaluations/<band>/<method>.parquet, and data/confidence/<band>/<method>.json, which has no
+samples. Killed, it resumes from .checkpoints/. SLING_DEVICE and SLING_WORKERS say where it runs.
+"""
+
+from __future__ import annotations
+
+from pipeline.base.layout import Layout
+from pipeline.identify.objective.session import load_episode, service
+from pipeline.identify.results.estimate import pull_of, save_estimate
+from pipeline.identify.search.explore import explore, rollouts_of
+from stages.start import run, started
+
+
+def main() -> None:
+    params, band, method = started("band", "method")
+    layout, rollouts = Layout(), rollouts_of(params, method)
+    evaluations = explore(params, method, service("search", band, method, params, rollouts))
+    evaluations.save(layout.evaluations(band, method))
+    estimate = pull_of(load_episode(band), params.methods[method].law)
+    save_estimate(layout.confidence(band, method), band, estimate)
+
+
+if __name__ == "__main__":
+    run(main)

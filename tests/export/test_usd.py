@@ -1,0 +1,60 @@
+"""PhysX's USD: valid by usd-core and by PhysX's own schemas; its law on paper."""
+
+import numpy as np
+import pytest
+
+from pipeline.export.usd import nominal
+from sling2sim2real import export
+
+
+@pytest.fixture(scope="module")
+def done(model, tmp_path_factory):
+    return export(model, "usd", tmp_path_factory.mktemp("exports") / "toy")
+
+
+def test_its_law_is_hookes_when_small_and_stiffer_than_rubber_when_large() -> None:
+    small = np.array([1.0, 1.001])
+    assert nominal(small, 0.45) == pytest.approx([0, 1e-3], rel=2e-3)
+    large, incompressible = np.array([1.5, 2.0]), 0.499
+    rubber = (large - large**-2) / 3
+    assert (nominal(large, incompressible) > 1.1 * rubber).all()
+
+
+def test_it_says_that_nobody_has_run_it(done) -> None:
+    assert done.met is None and done.card["replayed"] is False
+    assert "**Match it before you rely on it.**" in (done.folder / "README.md").read_text()
+    assert done.card["factor_on_youngs_modulus"] < 1  # its law is stiffer
+    errors = np.array(done.card["tension_errors"])
+    assert errors.min() < 0 < errors.max() and np.abs(errors).max() < 0.25
+
+
+def test_usd_and_the_schemas_of_physx_know_all_that_is_in_it(done) -> None:
+    pytest.importorskip("pxr", reason="usd-core: pip install -e '.[validation]'")
+    pytest.importorskip("physx_usd_schemas", reason="pip install -e '.[validation]'")
+    import physx_usd_schemas
+    from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
+
+    physx_usd_schemas.register_all()
+    stage = Usd.Stage.Open(str(done.folder / "toy.usda"))
+    assert UsdGeom.GetStageMetersPerUnit(stage) == UsdPhysics.GetStageKilogramsPerUnit(stage) == 1
+    found = UsdValidation.ValidationContext(
+        UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    ).Validate(stage)
+    assert [one.GetMessage() for one in found] == []
+    for prim in stage.Traverse():
+        known = set(prim.GetPrimDefinition().GetPropertyNames())
+        unknown = {one.GetName() for one in prim.GetAuthoredProperties()} - known
+        assert {one for one in unknown if not one.startswith(("xformOp", "material:"))} == set()
+    band = UsdGeom.TetMesh(stage.GetPrimAtPath("/World/Band"))
+    points, tets = (
+        np.array(one.Get()) for one in (band.GetPointsAttr(), band.GetTetVertexIndicesAttr())
+    )
+    corners = points[tets]
+    assert (np.linalg.det(corners[:, 1:] - corners[:, :1]) > 0).all()
+    for side, x in (("Left", -0.1375), ("Right", 0.1375)):
+        hold = stage.GetPrimAtPath(f"/World/Hold{side}")
+        vertices = hold.GetAttribute("omniphysics:vtxIndicesSrc0").Get()
+        offsets = np.array(hold.GetAttribute("omniphysics:localPositionsSrc1").Get())
+        assert points[list(vertices)] - offsets == pytest.approx(
+            np.tile([x, 0, 0], (len(offsets), 1)), abs=1e-6
+        )

@@ -1,0 +1,72 @@
+"""What campaigns share: a run that was killed goes on, and a failure is a result."""
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.base.errors import UserError
+from validation.campaigns.runner import (
+    THREADS,
+    ResultLines,
+    made_once,
+    plain,
+    result_of,
+    run,
+    single_threaded,
+)
+
+
+@dataclass(frozen=True)
+class Square:
+    number: int
+
+    def __call__(self) -> dict:
+        if self.number < 0:
+            raise UserError("no square")
+        return {"square": self.number**2, "threads": os.environ["OMP_NUM_THREADS"]}
+
+
+def work_on(job: Square) -> dict:
+    return result_of(job, job)
+
+
+def test_a_run_that_was_killed_goes_on(tmp_path) -> None:
+    """The last line may be cut short; that one is done again."""
+    path = tmp_path / "work" / "results.jsonl"
+    ResultLines(path).add({"number": 2, "square": "kept"})
+    with path.open("a") as file:
+        file.write('{"number": 3, "squ')
+    run(work_on, [Square(2), Square(3), Square(-1)], ResultLines(path), 1)
+    assert ResultLines(path).of(Square) == {
+        Square(2): {"number": 2, "square": "kept"},
+        Square(3): {"number": 3, "square": 9, "threads": "1"},
+        Square(-1): {"number": -1, "failed": "no square"},
+    }
+    run(None, [Square(2), Square(3)], ResultLines(path), 1)  # nothing is left to do
+    assert ResultLines(path).where(number=-1) == [{"number": -1, "failed": "no square"}]
+
+
+def test_nothing_begins_when_the_time_is_over(tmp_path, capsys) -> None:
+    lines = ResultLines(tmp_path / "results.jsonl")
+    run(work_on, [Square(n) for n in range(50)], lines, 1, minutes=0.0)
+    assert len(lines.lines) < 50 and "the time is over" in capsys.readouterr().out
+
+
+def test_threads_are_as_before_after_the_block(monkeypatch) -> None:
+    monkeypatch.setenv(THREADS[0], "7")
+    monkeypatch.delenv(THREADS[1], raising=False)
+    with single_threaded():
+        assert {os.environ[name] for name in THREADS} == {"1"}
+    assert os.environ[THREADS[0]] == "7" and THREADS[1] not in os.environ
+
+
+def test_what_is_there_is_not_made_again(tmp_path) -> None:
+    path = tmp_path / "kept.json"
+    assert made_once(path, lambda: {"a": 1}) == made_once(path, None) == {"a": 1}
+
+
+def test_results_are_plain_json() -> None:
+    value = {1: (np.float64(1 / 3), np.nan, np.int64(2), np.bool_(True)), "a": np.zeros(2)}
+    assert plain(value) == {"1": [1 / 3, None, 2, True], "a": [0.0, 0.0]}
+    assert plain(1 / 3, 3) == 0.333

@@ -1,0 +1,214 @@
+"""Copies of the project, commands in them, and every process that such a command starts."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import psutil
+from ruamel.yaml import YAML
+
+from pipeline.base.code import ROOT
+from pipeline.params import load
+from pipeline.params.identification import methods_by_step
+
+CLI = ("-c", "from app.cli import main; main()")  # after `python`: this project's `sling`
+SLING = (sys.executable, *CLI)
+PROMPT = 10.0  # s after which no process of a command that has ended may live
+MARK = "SLING_TEST_RUN"  # in the environment of every process of a MarkedRun
+ROUGH = {  # keys of `sling` for a fast simulation
+    "edges": 16,
+    "grip_step": 0.01,
+    "hold_step": 0.02,
+    "recoil_step": 5e-4,
+    "swing_step": 2e-3,
+}
+TINY = {  # keys of params.yaml for a whole run of a band in minutes
+    "cloud.points": 100,
+    **{f"sling.{name}": value for name, value in ROUGH.items()},
+    "optimizer.population": 6,
+    "optimizer.generations": 2,
+    "optimizer.k_nn": 6,
+    "optimizer.k_top": 2,
+    "optimizer.cma_population": 4,
+    "optimizer.cma_rollouts": 8,
+    "policy.map_size": [7, 7],
+    "policy.envs": 32,
+    "policy.iterations": 3,
+    "trials.targets": [1.925],
+    "trials.repeats": 1,
+    "floor.map_size": [4, 4],
+    "floor.launches": 1,
+    "rig.edges": 16,
+    "rig.tolerance": 1e-3,
+    "rig.camera.drop_rate": 0.8,
+}
+Value = TypeVar("Value")
+
+
+def copy_project(folder: Path) -> None:
+    """Copy into `folder` what Git would commit, but for dvc.lock: every stage is stale there."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT,
+        capture_output=True,
+        check=True,
+        text=True,
+    ).stdout
+    for name in filter(None, listed.split("\0")):
+        if (ROOT / name).is_file() and name != "dvc.lock":
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, folder / name, follow_symlinks=False)
+
+
+def set_params(folder: Path, values: Mapping[str, object]) -> None:
+    """Set values in params.yaml of a project, by keys with dots."""
+    yaml, path = YAML(), folder / "params.yaml"
+    content = yaml.load(path)
+    for key, value in values.items():
+        *sections, name = key.split(".")
+        node = content
+        for section in sections:
+            node = node[section]
+        node[name] = value
+    yaml.dump(content, path)
+
+
+def run_of(
+    bands: Sequence[str], methods: Sequence[str], ablations: Sequence[str] = ()
+) -> dict[str, object]:
+    """Keys of `run`: bands of the rig, methods, and further methods on the first band."""
+    known = load(ROOT / "params.yaml").methods
+    first = [*bands[:1]] if ablations else []
+    further = {"bands": first, "rig": first, "methods": [*ablations]}
+    return {
+        "run.bands": [*bands],
+        "run.rig": [*bands],
+        "run.methods": [*methods],
+        "run.steps": methods_by_step(methods, known),
+        "run.ablations": further | {"steps": methods_by_step(ablations, known)},
+    }
+
+
+def environment(**more: str) -> dict[str, str]:
+    """Ours, with this Python and this project first, one thread a process, and `more`."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    ours = {"PATH": path, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    return {**os.environ, **ours, **more}
+
+
+class ProjectCopy:
+    """A folder in which commands run, with `more` in their environment."""
+
+    def __init__(self, folder: Path, **more: str) -> None:
+        self.folder = folder
+        site = str(folder.parent / f"site-{folder.name}")
+        self.environment = environment(DVC_SITE_CACHE_DIR=site, **more)
+
+    def __call__(self, *command: str) -> str:
+        """What a command prints. Raises AssertionError where it fails."""
+        about = {"cwd": self.folder, "env": self.environment, "capture_output": True}
+        done = subprocess.run(command, text=True, timeout=1200, **about)
+        assert done.returncode == 0, f"{' '.join(command)}:\n{done.stdout}\n{done.stderr}"
+        self.errors = done.stderr
+        return done.stdout
+
+    def dvc(self, *arguments: str) -> set[str]:
+        """Run DVC; the stages that really ran."""
+        return set(re.findall(r"^Running stage '(.+)':$", self("dvc", *arguments), re.MULTILINE))
+
+    def set(self, values: Mapping[str, object]) -> None:
+        """Set values in params.yaml, by keys with dots."""
+        set_params(self.folder, values)
+
+    def commit(self) -> None:
+        """Commit all files, in a Git repository of the folder's own."""
+        if not (self.folder / ".git").is_dir():
+            self("git", "init", "-q")
+            self("git", "config", "user.name", "Test")
+            self("git", "config", "user.email", "test@example.org")
+        self("git", "add", "--all")
+        self("git", "commit", "-q", "-m", "state")
+
+
+class MarkedRun:
+    """Commands in a folder, whose processes all bear a mark in their environment."""
+
+    def __init__(self, folder: Path, log: Path | None = None, **more: str) -> None:
+        self.folder, self.mark = folder, uuid.uuid4().hex
+        self.log = log or folder.parent / "said.txt"
+        self.environment = environment(**{MARK: self.mark}, **more)
+
+    def start(self, *command: str) -> subprocess.Popen:
+        """In a session of its own; its lines, errors among them, go to `log`."""
+        with self.log.open("w") as said:
+            return subprocess.Popen(
+                command, cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
+                stdout=said, stderr=subprocess.STDOUT, start_new_session=True,
+            )  # fmt: skip
+
+    @property
+    def said(self) -> str:
+        return self.log.read_text(errors="replace")
+
+    def alive(self) -> list[psutil.Process]:
+        return marked(MARK, self.mark)
+
+    def named(self, word: str) -> list[psutil.Process]:
+        """Processes with `word` in their command line."""
+        return [process for process in self.alive() if word in command_line(process)]
+
+    def left(self, seconds: float = PROMPT) -> list[str]:
+        """Commands of what still lives after so long; what does is killed then."""
+        wait(lambda: not self.alive(), seconds)
+        left = self.alive()
+        said = [command_line(process) for process in left]
+        for process in left:
+            send(process)
+        return said
+
+
+def marked(name: str, value: str) -> list[psutil.Process]:
+    """Processes with a variable in their environment; zombies, which wait for a parent, apart."""
+    found = []
+    for process in psutil.process_iter():
+        try:
+            zombie = process.status() == psutil.STATUS_ZOMBIE
+            if not zombie and process.environ().get(name) == value:
+                found.append(process)
+        except (psutil.NoSuchProcess, psutil.AccessDenied):
+            continue
+    return found
+
+
+def command_line(process: psutil.Process) -> str:
+    """Empty if the process has just ended."""
+    try:
+        return " ".join(process.cmdline())
+    except psutil.NoSuchProcess:
+        return ""
+
+
+def send(process: psutil.Process, number: int = signal.SIGKILL) -> None:
+    """A signal to what may have ended by now."""
+    try:
+        process.send_signal(number)
+    except psutil.NoSuchProcess:
+        pass
+
+
+def wait(happens: Callable[[], Value], seconds: float) -> Value:
+    """What `happens` returns once that is true, or after so long."""
+    latest = time.monotonic() + seconds
+    while not (value := happens()) and time.monotonic() < latest:
+        time.sleep(0.05)
+    return value

@@ -7,7 +7,7 @@ the covariance by plain algebra.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +40,7 @@ class LandingModel:
     @classmethod
     def of(
         cls,
-        names: list[str],
+        names: Sequence[str],
         samples: np.ndarray,
         landings: np.ndarray,
         draw: np.ndarray,
@@ -115,7 +115,7 @@ class LandingModel:
         return precision
 
 
-def unknowns(names: list[str], samples: np.ndarray) -> dict[str, np.ndarray]:
+def unknowns(names: Sequence[str], samples: np.ndarray) -> dict[str, np.ndarray]:
     """Columns (M,) of samples (M, P) that vary, as they are Gaussian."""
     columns = {}
     for name, column in zip(names, samples.T, strict=True):

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.identify.posterior.coordinates import MOST_DRAG, MOST_LOST
-from pipeline.identify.results.theta import EXTRA
 from pipeline.params import Params
 from pipeline.report.quantities import QUANTITIES, rounded
+from pipeline.simulator.parameters import EXTRA
 
 
 @dataclass(frozen=True)

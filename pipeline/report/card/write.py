@@ -36,8 +36,10 @@ def write(params: Params, band: str, method: str, root: str | Path = ".") -> dic
     found = findings(inputs)
     verdict, against = judge(found)
     reasons, shown = reasons_of(found, against), values(inputs.theta, about.fixed)
-    aims = inputs.aims
-    model = LandingModel.of(inputs.names, inputs.samples, aims.samples, aims.slope, aims.half_width)
+    samples, aims, model = inputs.samples, inputs.aims, None
+    if samples:
+        landings = aims.samples, aims.slope, aims.half_width
+        model = LandingModel.of(samples.names, samples.values, *landings)
     launches = len(inputs.confidence.get("launches", []))
     steps = next_steps(band, against, model, aims.target, inputs.episodes, launches)
     card = content(inputs, verdict, reasons, shown, steps)

@@ -10,7 +10,7 @@ import numpy as np
 from app import safety
 from app.safety import Hazard
 from pipeline.base.layout import Layout
-from pipeline.identify.results.theta import history_of, load_samples, load_theta
+from pipeline.identify.results.theta import history_of, load_samples, load_theta, parameters_of
 from pipeline.launching.surface.landing_map import Launcher
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
@@ -83,7 +83,8 @@ def aim(
         if abs(landing - target) > safety.MISS:
             what = f"the simulated landing is {landing - target:+.2f} m off the target"
             warnings.append(Hazard("miss", what))
-        samples = load_samples(layout.confidence(band, method))
+        path = layout.confidence(band, method)
+        samples = load_samples(path, parameters_of(content))
         found = landing_intervals(launcher, draw, samples, params.trials.actuation_error)[0]
         if np.isfinite(found).all():
             interval = found.tolist()

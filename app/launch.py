@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from app import safety
 from app.aim import pull_and_pause
 from app.arguments import finite
 from pipeline.base.errors import UserError
-from pipeline.identify.results.theta import calibrated, launch_setup, load_theta, vector
+from pipeline.identify.results.theta import (
+    calibrated,
+    launch_setup,
+    load_theta,
+    parameters_of,
+)
 from pipeline.params import Params, expect_known
 from pipeline.simulator.launch import launch
 
@@ -37,7 +40,7 @@ def launched(
     expect_above_floor(params, draw)
     content, root = load_theta(theta, band), Path(root)
     sling, setup = calibrated(params, band, content, root), launch_setup(params, content)
-    result = launch(sling, setup, vector(content), np.array(draw), max_force=params.setup.max_force)
+    result = launch(sling, setup, parameters_of(content), draw, max_force=params.setup.max_force)
     force, failure = result.hold_force[0], result.failure[0]
     return {
         "landing_y_m": finite(result.landing_y[0]),

@@ -15,7 +15,7 @@ from app.launch import expect_above_floor
 from app.safety import Hazard
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
-from pipeline.identify.results.theta import load_samples, load_theta
+from pipeline.identify.results.theta import load_samples, load_theta, parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.trials.spread import LEVEL, landing_intervals
 from pipeline.params import Params, expect_known
@@ -110,7 +110,8 @@ def known(
     file = layout.theta(band, method)
     if not file.is_file():
         return None
-    content, samples = load_theta(file, band), load_samples(layout.confidence(band, method))
+    content = load_theta(file, band)
+    samples = load_samples(layout.confidence(band, method), parameters_of(content))
     launcher = simulator(params, band, content, root=root)
     once = launcher(np.array([draw]))
     told = {"landing_m": None, "interval_90_m": None, "failure": once.failure[0]}
@@ -121,7 +122,9 @@ def known(
         told["interval_90_m"] = found.tolist() if np.isfinite(found).all() else None
     told["returned_share"] = content.get("returned_share", 1.0)
     ends = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
-    told["share_90"] = None if samples is None else np.quantile(samples[:, -1], ends).tolist()
+    told["share_90"] = (
+        None if samples is None else np.quantile(samples.column("returned_share"), ends).tolist()
+    )
     return told
 
 

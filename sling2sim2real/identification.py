@@ -18,18 +18,19 @@ from pipeline.episode.episode import Episode
 from pipeline.episode.pull import launch_history
 from pipeline.identify.clamps import calibrate_clamps
 from pipeline.identify.identify import identify as run_identification
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.identify.posterior import identify as posterior
 from pipeline.identify.posterior.launches import Evidence, Observed
 from pipeline.identify.results.mounting import Mounting
-from pipeline.identify.results.theta import ThetaFile, load_samples, load_theta
+from pipeline.identify.results.theta import ThetaFile, load_samples, load_theta, parameters_of
 from pipeline.identify.results.units import SI_UNITS
 from pipeline.launching.trials.stretch import recorded_stretch
 from pipeline.params.identification import parameter_names
 from pipeline.params.provenance import changed_since
 from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from sling2sim2real.model import Band, Model, Theta, known
 from sling2sim2real.settings import Settings
 
@@ -128,6 +129,7 @@ class Identification(Model):
         about = settings.bands[band]
         content = load_theta(layout.theta(band, method), band)
         file = ThetaFile.model_validate(content)
+        samples = load_samples(layout.confidence(band, method), parameters_of(content))
         path, told = layout.clamps(band), content.get("confidence")
         there = layout.episode(band).is_dir()
         episodes = Episode.load_all(layout.episodes(band)) if there else []
@@ -138,7 +140,7 @@ class Identification(Model):
             history=file.history and LaunchHistory(**file.history.model_dump()),
             settings=settings,
             intervals=_intervals(content, told) if told else {},
-            samples=load_samples(layout.confidence(band, method)),
+            samples=samples and samples.values,
             settled=bool(told and told["settled"]),
             stretch=_stretch(episodes, settings, about),
             changed=tuple(map(str, changed_since(settings, content, method))),
@@ -193,7 +195,7 @@ def identify(
             raise UserError(
                 f"launches: {launch}: draw y < 0, error >= 0 and landing > 0 are needed"
             )
-    evaluate = point = None
+    evaluate = nearest = None
     if start is None:
         mounting = None
         if settings.methods[METHOD].mounting:
@@ -203,8 +205,9 @@ def identify(
         evaluate = _evaluator(episodes[0], sling, settings)
     else:
         mounting, theta = start.mounting, start.theta
-        names = parameter_names(settings.methods[METHOD].law)
-        point = np.array([getattr(theta, name) or 0.0 for name in names])
+        law = settings.methods[METHOD].law
+        values = {name: getattr(theta, name) or 0.0 for name in parameter_names(law)}
+        nearest = Parameters.named(law, values)
         sling = _sling(band, settings, mounting)
     density = run_identification(
         settings,
@@ -212,7 +215,7 @@ def identify(
         sling,
         episodes,
         evaluate,
-        start=point,
+        start=nearest,
         evidence=Evidence(launches, LaunchSetup.of(settings.setup, settings.sling)),
         workers=workers() or cores(),
         progress=progress,
@@ -227,7 +230,7 @@ def identify(
         history=file.history and LaunchHistory(**file.history.model_dump()),
         settings=settings,
         intervals=_intervals(content, told),
-        samples=density.points,
+        samples=density.parameters.values,
         settled=told["settled"],
         stretch=_stretch(episodes, settings, band),
     )
@@ -250,9 +253,9 @@ def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
 
 
 def _evaluator(episode: Episode, sling: ClampedBand, settings: Settings) -> Evaluator:
-    space = Space.of_method(settings, METHOD)
+    box = SearchBox.of_method(settings, METHOD)
     loss = EpisodeLoss.of(settings, METHOD, episode, sling)
-    return Evaluator(episode, sling, loss, space, devices=devices(), workers=workers())
+    return Evaluator(episode, sling, loss, box, devices=devices(), workers=workers())
 
 
 def _intervals(content: dict, told: dict) -> dict[str, Interval]:

@@ -11,6 +11,8 @@ from pipeline.base.errors import UserError
 from pipeline.launching.trials.spread import landing_intervals
 from pipeline.launching.trials.stretch import stretch_of
 from pipeline.launching.trials.trials import limited
+from pipeline.simulator.launch import Launches
+from pipeline.simulator.parameters import Parameters
 from sling2sim2real.model import Model
 
 FINE = 201  # nodes along y and z, between which a target is sought on the map
@@ -133,8 +135,13 @@ def aim(model: Model, target: float) -> Aim:
     if found.failure:
         raise UserError(f"target {target:g} m: the draw for it fails: {found.failure}")
     samples = getattr(model, "samples", None)
+
+    def launcher(draws: np.ndarray, parameters: Parameters = model.theta.parameters) -> Launches:
+        return model.launches(draws, parameters.values)
+
     error = model.settings.trials.actuation_error
-    low, high = landing_intervals(model.launches, draw, samples, error)[0].tolist()
+    known = None if samples is None else Parameters(model.theta.law, samples)
+    low, high = landing_intervals(launcher, draw, known, error)[0].tolist()
     interval, history = ((low, high) if low == low else None), model.launch_setup.history
     return Aim(
         target=float(target),

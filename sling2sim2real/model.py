@@ -14,13 +14,13 @@ from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 from pipeline.base.schema import explained, read_json
 from pipeline.identify.results.mounting import Mounting
-from pipeline.identify.results.theta import EXTRA, ThetaFile, at_points
+from pipeline.identify.results.theta import ThetaFile, parameters_of
 from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.params.identification import LAWS
 from pipeline.simulator.launch import Launches
 from pipeline.simulator.launch import launch as launch_many
-from pipeline.simulator.material import THETA
 from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
+from pipeline.simulator.parameters import THETA, Parameters, names_of
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 from sling2sim2real.settings import Settings
 
@@ -104,12 +104,17 @@ class Theta:
     @property
     def names(self) -> tuple[str, ...]:
         """Of what `point` holds."""
-        return (*THETA, *LAWS[self.law], *EXTRA)
+        return names_of(self.law)
 
     @property
     def point(self) -> np.ndarray:
         """All of it in one vector, by `names`, shape (P,)."""
-        return np.array([getattr(self, name) for name in self.names], float)
+        return self.parameters.values[0]
+
+    @property
+    def parameters(self) -> Parameters:
+        """As the simulator takes it, one sample."""
+        return Parameters.named(self.law, {name: getattr(self, name) for name in self.names})
 
     @classmethod
     def of(cls, names: Sequence[str], point: np.ndarray) -> Theta:
@@ -139,12 +144,7 @@ class Theta:
     @classmethod
     def of_file(cls, file: ThetaFile) -> Theta:
         """From a θ file's content, checked."""
-        return cls(
-            **file.theta.model_dump(),
-            air_drag=file.nuisances.air_drag or 0.0,
-            turn_damping=file.turn_damping,
-            returned_share=file.returned_share,
-        )
+        return cls(**parameters_of(file.model_dump(exclude_unset=True)).sample())
 
 
 @dataclass(frozen=True)
@@ -178,9 +178,9 @@ class Model:
 
     @cached_property
     def sling(self) -> ClampedBand:
-        """What the simulator takes, with all that θ says beside the five."""
-        sling, _ = self.at(self.theta.point[None])
-        return sling
+        """The band as the simulator takes it."""
+        lab = self.settings.setup, self.settings.sling
+        return ClampedBand.of(self.band, *lab, self.mounting, law=self.theta.law)
 
     @cached_property
     def launch_setup(self) -> LaunchSetup:
@@ -206,14 +206,9 @@ class Model:
         No arm limits the force here.
         """
         draws = np.atleast_2d(np.asarray(draws, float))
-        points = self.theta.point[None] if points is None else points
-        sling, five = self.at(np.broadcast_to(points, (len(draws), points.shape[-1])))
-        return launch_many(sling, self.launch_setup, five, draws, workers=cores())
-
-    def at(self, points: np.ndarray) -> tuple[ClampedBand, np.ndarray]:
-        """The band and the five (N, 5) of points (N, P)."""
-        lab = self.settings.setup, self.settings.sling
-        return at_points(ClampedBand.of(self.band, *lab, self.mounting, law=self.theta.law), points)
+        law = self.theta.law
+        parameters = self.theta.parameters if points is None else Parameters(law, points)
+        return launch_many(self.sling, self.launch_setup, parameters, draws, workers=cores())
 
     def _history(self) -> LaunchHistory | None:
         told = dict(vars(self.history)) if self.history else {}

@@ -10,10 +10,10 @@ import numpy as np
 from pipeline.base.errors import UserError
 from pipeline.base.machine import devices, workers
 from pipeline.episode.episode import Episode
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
-from pipeline.identify.search.loop import Free
+from pipeline.simulator.parameters import EXTRA
 from sling2sim2real.model import Model, Theta
 from sling2sim2real.simulation import Simulation, simulate_batch
 
@@ -52,7 +52,8 @@ class Objective:
         """Prepare the loss; several episodes count alike.
 
         Args:
-            model: The band, its mounting and settings; its own θ is not used.
+            model: The band, its mounting and settings. Of its θ the paper's loss takes what has no
+                axis (drag, damping of turns), your own nothing.
             episodes: At least one.
             method: Of `settings.methods`: its law, box, fixed parameters and weights.
             loss: Your own, of a simulation; None: the paper's, of geometry, force and work.
@@ -65,12 +66,10 @@ class Objective:
             raise UserError(f"method {method}: settings.methods has {', '.join(methods)}")
         if not episodes:
             raise UserError("episodes: give at least one")
-        self._space = Space.of_method(model.settings, method)
-        self._free = Free.of(self._space, methods[method].fixed)
-        self.names = self._free.names
-        self.low, self.high = (
-            ends[self._free.axes] for ends in (self._space.low, self._space.high)
-        )
+        box, theta = SearchBox.of_method(model.settings, method), model.theta.parameters.sample()
+        box = replace(box, fixed={**box.fixed, **{name: theta[name] for name in EXTRA}})
+        self._box, self.names = box, box.free
+        self.low, self.high = (ends[box.axes] for ends in (box.low, box.high))
         self._model, self._own, self._episodes = model, loss, list(episodes)
         self._evaluators = [] if loss else [self._evaluator(one, method) for one in episodes]
 
@@ -78,7 +77,7 @@ class Objective:
         law = self._model.settings.methods[method].law
         sling = replace(self._model.sling, law=law)
         loss = EpisodeLoss.of(self._model.settings, method, episode, sling)
-        return Evaluator(episode, sling, loss, self._space, devices=devices(), workers=workers())
+        return Evaluator(episode, sling, loss, self._box, devices=devices(), workers=workers())
 
     def __call__(self, unit: np.ndarray) -> np.ndarray:
         """Losses (N,) of points of the unit cube (N, D); +inf where a simulation fails.
@@ -92,7 +91,7 @@ class Objective:
         if not ((unit >= 0) & (unit <= 1)).all():
             raise UserError("points: must lie in the unit cube, 0 to 1")
         if self._own is None:
-            whole = self._free.fill(unit)
+            whole = self._box.fill(unit)
             return np.sum([evaluate(whole).total for evaluate in self._evaluators], axis=0)
         thetas = [self.theta(one) for one in unit]
         model = replace(self._model, theta=thetas[0])
@@ -104,10 +103,9 @@ class Objective:
 
     def theta(self, unit: np.ndarray) -> Theta:
         """θ at a point of the unit cube (D,)."""
-        whole = self._free.fill(np.asarray(unit, float)[None])[0]
-        return Theta.of(self._space.names, self._space.to_physical(whole))
+        whole = self._box.fill(np.asarray(unit, float)[None])[0]
+        return Theta.of(self._box.names, self._box.to_physical(whole))
 
     def unit(self, theta: Theta) -> np.ndarray:
         """The point (D,) of θ; fixed parameters are left out."""
-        values = np.array([getattr(theta, name) for name in self._space.names], float)
-        return self._space.to_unit(values)[self._free.axes]
+        return self._box.unit_of(theta.parameters)[0, self._box.axes]

@@ -13,6 +13,7 @@ from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
 from pipeline.episode.planned import planned_pull
 from pipeline.simulator.initial import hanging_guess
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.replay import replay
 from sling2sim2real.model import Model, Theta
 
@@ -85,11 +86,10 @@ def simulate_batch(model: Model, episode: Episode, thetas: Sequence[Theta]) -> l
     """
     if not thetas or {one.law for one in thetas} != {model.theta.law}:
         raise UserError(f"thetas: give some, all of the model's law, {model.theta.law}")
-    points = np.stack([one.point for one in thetas])
+    parameters = Parameters(model.theta.law, np.stack([one.point for one in thetas]))
 
-    def part(some: np.ndarray) -> list[Simulation]:
-        sling, five = model.at(some)
-        done = replay(sling, episode, five, model.settings.force)
+    def part(some: Parameters) -> list[Simulation]:
+        done = replay(model.sling, episode, some, model.settings.force)
         rollouts = done.rollouts
         return [
             Simulation(
@@ -105,7 +105,7 @@ def simulate_batch(model: Model, episode: Episode, thetas: Sequence[Theta]) -> l
         ]
 
     with ThreadPoolExecutor(cores()) as pool:
-        some = [points[i : i + LANES] for i in range(0, len(points), LANES)]
+        some = [parameters[i : i + LANES] for i in range(0, len(parameters), LANES)]
         return [one for each in pool.map(part, some) for one in each]
 
 

@@ -25,8 +25,8 @@ from stages.start import run, started
 
 def main() -> None:
     params, band, method = started("band", "method")
-    layout, names = Layout(), parameter_names(params.methods[method].law)
-    explored = History.load(method, names, made(layout.history(band, method)))
+    layout, law = Layout(), params.methods[method].law
+    explored = History.load(method, parameter_names(law), made(layout.history(band, method)))
     sling, episodes = sling_of_method(params, band, method), load_episodes(band)
     evidence = load_observed(layout.observed(band))
     density = fit_posterior(
@@ -34,7 +34,7 @@ def main() -> None:
         method,
         sling,
         episodes,
-        explored.best_point(),
+        explored.best_parameters(law),
         evidence=evidence,
         workers=workers(),
         progress=lambda fit: print(
@@ -43,9 +43,9 @@ def main() -> None:
     )
     mode = evaluated_mode(params, method, sling, episodes[0], density)
     explored.followed_by(mode).save(layout.evaluations(band, method))
-    estimate, samples = estimate_of(params, density, explored), density.points.tolist()
+    estimate, samples = estimate_of(params, density, explored), density.parameters
     estimate["made_with"] = evidence.made_with if evidence else {}
-    save_estimate(layout.confidence(band, method), band, estimate, density.names, samples)
+    save_estimate(layout.confidence(band, method), band, estimate, samples)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
-from pipeline.identify.results.theta import load_samples, load_theta
+from pipeline.identify.results.theta import load_samples, load_theta, parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials import trials
@@ -28,7 +28,7 @@ def main() -> None:
     about, fork_width = params.bands[band], params.setup.fork_width
     layout = Layout()
     theta = load_theta(layout.theta(band, method), band)
-    samples = load_samples(layout.confidence(band, method))
+    samples = load_samples(layout.confidence(band, method), parameters_of(theta))
     episodes = Episode.load_all(layout.episodes(band))
 
     batches = trials.scored(load_scores(layout.scores(band)), method)

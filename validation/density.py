@@ -14,17 +14,16 @@ from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.identify import identify
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import TERMS, EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.identify.posterior import identify as posterior
 from pipeline.identify.posterior.launches import Evidence, Observed
-from pipeline.identify.results.theta import EXTRA, at_points
 from pipeline.launching.trials.spread import landing_intervals
-from pipeline.params.identification import LAWS
-from pipeline.simulator.launch import launch
-from pipeline.simulator.material import THETA
+from pipeline.params.identification import parameter_names
+from pipeline.simulator.launch import Launches, launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from validation.synthetic import disturbed, own_law_episode, pull_and_release
 
 WORKERS = cores()
@@ -42,23 +41,27 @@ class Calibrated:
 
     Attributes:
         sling, setup: As it is launched.
-        point, samples: As `at_points` has them, (P,) and (S, P) or None.
+        theta, samples: One sample, and those of what is known of it, or None.
     """
 
     def __init__(
         self,
         sling: ClampedBand,
         setup: LaunchSetup,
-        point: np.ndarray,
-        samples: np.ndarray | None = None,
+        theta: Parameters,
+        samples: Parameters | None = None,
     ) -> None:
-        self.sling, self.setup, self.point, self.samples = sling, setup, point, samples
+        self.sling, self.setup, self.theta, self.samples = sling, setup, theta, samples
 
-    def __call__(self, draws: np.ndarray, points: np.ndarray | None = None):
-        """Launches of draws (N, 2) with θ, or with points (N, P)."""
-        points = self.point[None] if points is None else points
-        sling, theta = at_points(self.sling, points)
-        return launch(sling, self.setup, theta, draws, workers=WORKERS)
+    @property
+    def identified(self) -> dict[str, float]:
+        """What the method has looked for, by name: without samples no more than its box has."""
+        names = parameter_names(self.theta.law) if self.samples is None else self.theta.names
+        return {name: self.theta.sample()[name] for name in names}
+
+    def __call__(self, draws: np.ndarray, parameters: Parameters | None = None) -> Launches:
+        """Launches of draws (N, 2) with θ, or with N parameters."""
+        return launch(self.sling, self.setup, parameters or self.theta, draws, workers=WORKERS)
 
 
 def found(
@@ -74,9 +77,9 @@ def found(
     Searches have their rollouts on `devices`, the fit of least squares on the CPU.
     Of another search than least squares it says "loss": the terms and the total of the best.
     """
-    space = Space.of_method(params, method)
+    box = SearchBox.of_method(params, method)
     loss = EpisodeLoss.of(params, method, episodes[0], sling)
-    evaluate = Evaluator(episodes[0], sling, loss, space, workers=WORKERS, devices=devices)
+    evaluate = Evaluator(episodes[0], sling, loss, box, workers=WORKERS, devices=devices)
     history = posterior.recorded_history(sling, episodes[0])
     setup = LaunchSetup.of(params.setup, params.sling, history)
     evidence = Evidence(observed, setup)
@@ -87,9 +90,9 @@ def found(
     if density is None:
         best = identified.evaluations.best()
         told = {"loss": {name: best[name] for name in (*TERMS, "total")}}
-        return Calibrated(sling, setup, identified.point), told
+        return Calibrated(sling, setup, identified.theta), told
     told = posterior.confidence(density, params.parameters)
-    return Calibrated(sling, setup, identified.point, density.points), told
+    return Calibrated(sling, setup, density.mode, density.parameters), told
 
 
 def own_law(params, method: str, number: int) -> dict:
@@ -115,21 +118,20 @@ def own_law(params, method: str, number: int) -> dict:
     true[4] = abs(rng.normal(0, coordinates.precision[4] ** -0.5))
     true[5] = rng.uniform() if number % 4 > 1 else 0.0
     true[6] = rng.normal(0, coordinates.precision[6] ** -0.5)
-    point = coordinates.points(true[None])
+    truth = coordinates.parameters(true[None])
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
     plan = pull_and_release(band, params.episode, sling)
     plan = replace(plan, cloud_time=plan.cloud_time + rng.uniform(0, 1 / 30))
-    world, theta = at_points(sling, point)
-    exact = own_law_episode(world, plan, theta[0], cutoff=cutoff, seed=number)
+    exact = own_law_episode(sling, plan, truth, cutoff=cutoff, seed=number)
     episode = disturbed(exact, rng, **FLAWS)
     small = params.optimizer.model_copy(update={"population": 12, "generations": 2, "k_nn": 6})
     params = params.model_copy(update={"optimizer": small})
     outcome, told = found(params, method, sling, [episode])
     draw = np.array([[rng.uniform(-0.36, -0.30), rng.uniform(-0.18, -0.12)]])
     off = rng.normal(0, params.trials.actuation_error, 2)
-    landed = outcome(draw + off, point)
+    landed = outcome(draw + off, truth)
     low, high = landing_intervals(outcome, draw, outcome.samples, params.trials.actuation_error)[0]
-    found_at = coordinates.of(outcome.point[: -len(EXTRA)])
+    found_at = coordinates.of(outcome.theta)
     return {
         "E": float(np.expm1(found_at[0] - true[0])),
         "loss_factor": float(np.expm1(found_at[1] - true[1])),
@@ -138,8 +140,8 @@ def own_law(params, method: str, number: int) -> dict:
         "high": float(high),
         "covers": {
             name: bool(told["parameters"][name]["low"] <= value <= told["parameters"][name]["high"])
-            for name, value in zip((*THETA, *LAWS[about.law]), point[0], strict=False)
-            if name not in about.fixed
+            for name, value in truth.sample().items()
+            if name in parameter_names(about.law) and name not in about.fixed
         },
         "recoil": told["recordings"][0]["pictures"],
         "settled": told["settled"],

@@ -19,6 +19,7 @@ from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.params import Params
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 
 DRAW = 0.35  # m
 THETA = (2e5, 0.45, 2e-3, 0.5, 0.5)  # of the band that is recorded
@@ -80,7 +81,7 @@ def recorded_yardstick(params: Params) -> tuple[ClampedBand, Episode]:
     band = next(iter(params.bands))
     sling = yardstick(params.bands[band], params)
     episode = pull_and_release(band, params.episode, sling)
-    rollout = interact(sling, episode, np.array([THETA]))
+    rollout = interact(sling, episode, Parameters.of(sling.law, THETA))
     ridges = [
         _ridge(line, sling.radius, episode.camera, params.cloud.points)
         for line in rollout.center_line[0]
@@ -104,7 +105,7 @@ def _ridge(line: np.ndarray, radius: float, camera: np.ndarray, count: int) -> n
 def own_law_episode(
     sling: ClampedBand,
     episode: Episode,
-    theta: np.ndarray,
+    theta: Parameters,
     *,
     cutoff: float,
     force_noise: float = 0.05,
@@ -114,13 +115,13 @@ def own_law_episode(
     """What would have been recorded, had the band of this episode the simulator's law and theta.
 
     Args:
-        theta: In the order of THETA, shape (5,).
+        theta: One sample.
         cutoff: Of the low-pass of params.force [Hz].
         force_noise: Standard deviation of one sample at 1 kHz [N].
         depth_noise: Standard deviation at 1 m, growing with the square of the distance [m].
     """
     rng = np.random.default_rng(seed)
-    rollout = interact(sling, episode, theta[None])
+    rollout = interact(sling, episode, theta)
     if rollout.failure[0]:
         raise ValueError(f"theta fails: {rollout.failure[0]}")
     times, force = uniform(rollout.times, np.asarray(rollout.force[0], float), RATE)

@@ -153,13 +153,13 @@ def predict(
 
 
 def _simulated(params: Params, band: str, drawn: np.ndarray, path: Path) -> float:
-    from pipeline.identify.results.theta import calibrated, launch_setup, load_theta, vector
+    from pipeline.identify.results.theta import calibrated, launch_setup, load_theta, parameters_of
     from pipeline.simulator.launch import launch
 
     content = load_theta(path, band)
     tell(of_mounting(band, Path()))
     sling, setup = calibrated(params, band, content), launch_setup(params, content)
-    force = float(launch(sling, setup, vector(content), drawn[1:]).hold_force[0])
+    force = float(launch(sling, setup, parameters_of(content), drawn[1:]).hold_force[0])
     if not np.isfinite(force):
         raise UserError(
             f"{path}: the simulated hold of draw [{drawn[1]:g}, {drawn[2]:g}] does not converge:"

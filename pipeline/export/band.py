@@ -13,6 +13,7 @@ from pipeline.params import Params
 from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.launch import Launches
 from pipeline.simulator.model import BandSizes, ClampedBand, LaunchSetup
+from pipeline.simulator.parameters import Parameters
 
 
 class NamedBand(BandSizes, Protocol):
@@ -45,7 +46,7 @@ class MaterialParameters(Protocol):
     @property
     def returned_share(self) -> float: ...
     @property
-    def point(self) -> np.ndarray: ...
+    def parameters(self) -> Parameters: ...
 
 
 class CalibratedBand(Protocol):
@@ -65,10 +66,6 @@ class CalibratedBand(Protocol):
     def launch_setup(self) -> LaunchSetup: ...
     def launches(self, draws: np.ndarray) -> Launches:
         """Launch draws (N, 2) [m]."""
-        ...
-
-    def at(self, points: np.ndarray) -> tuple[ClampedBand, np.ndarray]:
-        """The clamped band and the five parameters (N, 5) of points (N, P)."""
         ...
 
 

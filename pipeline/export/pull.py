@@ -40,8 +40,7 @@ def compare_pull(
     model: CalibratedBand, episode: Episode, replay: MujocoBand | NewtonReplay
 ) -> PullCompared:
     """Pull as in `episode`, in both. Raises UserError where our simulation fails."""
-    sling, five = model.at(model.theta.point[None])
-    ours, chain = interact(sling, episode, five), replay.chain
+    ours, chain = interact(model.sling, episode, model.theta.parameters), replay.chain
     if ours.failure[0]:
         raise UserError(f"the pull of {episode.band}: {ours.failure[0]}")
     count = int((episode.release_time - episode.grasp_time) / chain.step)

@@ -20,6 +20,7 @@ from pipeline.episode.episode import Episode
 from pipeline.episode.phases import taut_time
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 
 ANGLE = (-30.0, 60.0)  # of the clamps, towards the middle of the fork [deg]
 RIGIDITY = (0.1, 20.0)  # relative to a solid round band
@@ -87,7 +88,7 @@ def calibrate_clamps(sling: ClampedBand, episode: Episode, make_loss, *, workers
     solid = young * np.pi * sling.radius**4 / 4
     part = slack_part(episode)
     loss = make_loss(part)
-    theta = np.array([young, POISSON, 5e-3, 1.0, 1.0])
+    one = Parameters.of(sling.law, np.array([young, POISSON, 5e-3, 1.0, 1.0]))
     held_fast = replace(sling, grip_force=1e6)
 
     def direction(angle: float) -> np.ndarray:
@@ -96,10 +97,8 @@ def calibrate_clamps(sling: ClampedBand, episode: Episode, make_loss, *, workers
 
     def losses(angle: float, rigidity: np.ndarray) -> np.ndarray:
         """One angle with several rigidities, which share a batch, shape (len(rigidity),)."""
-        trial = replace(
-            held_fast, clamp_direction=direction(angle), flexural_rigidity=solid * rigidity
-        )
-        rollouts = interact(trial, part, np.tile(theta, (len(rigidity), 1)))
+        trial = replace(held_fast, clamp_direction=direction(angle))
+        rollouts = interact(trial, part, one.spread(len(rigidity)), rigidity=solid * rigidity)
         terms = loss.terms(rollouts)
         total = sum(terms[name] / unit for name, unit in UNITS.items())
         return np.where([reason is None for reason in rollouts.failure], total, np.inf)

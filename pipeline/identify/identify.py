@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.episode.episode import Episode
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.optimizers.cma.refine import refine
 from pipeline.identify.posterior.identify import Identified, fit_posterior
@@ -21,6 +22,7 @@ from pipeline.identify.search.regions import regions_of
 from pipeline.params import Params
 from pipeline.params.identification import LEAST_SQUARES
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 
 
 @dataclass(frozen=True)
@@ -28,19 +30,21 @@ class IdentifiedBand:
     """What a method makes of a band's episodes.
 
     Attributes:
+        law: Of the method.
         evaluations: Everything that its search evaluated; None where it started from a point.
         density: Of a method that searches by least squares, else None.
     """
 
+    law: str
     evaluations: History | None
     density: Identified | None
 
     @property
-    def point(self) -> np.ndarray:
-        """θ* and what its law adds, and of a density its nuisances too, shape (P,)."""
+    def theta(self) -> Parameters:
+        """θ*, one sample."""
         if self.density is None:
-            return self.evaluations.best_point()
-        return self.density.coordinates.points(self.density.fit.phi[None])[0]
+            return self.evaluations.best_parameters(self.law)
+        return self.density.mode
 
 
 def evaluations_of(
@@ -55,7 +59,7 @@ def evaluations_of(
     method_params = params.methods[method]
     if method_params.search != "multistart":
         return explored
-    free = tuple(name for name in explored.names if name not in method_params.fixed)
+    free = SearchBox.of_method(params, method).free
     on_free_axes = History(method, free, [explored.table])
     regions, _ = regions_of(method_params, params.optimizer, on_free_axes)
     return explored.followed_by(refine(params, method, regions, evaluate))
@@ -68,7 +72,7 @@ def identify(
     episodes: Sequence[Episode],
     evaluate: Callable[[np.ndarray], Evaluation] | None = None,
     *,
-    start: np.ndarray | None = None,
+    start: Parameters | None = None,
     evidence: Evidence | None = None,
     workers: int | None = None,
     progress: Callable[[str], None] = lambda line: None,
@@ -78,7 +82,7 @@ def identify(
     Args:
         sling: Of the band, with the method's law and clamps.
         evaluate: Losses of points of the whole unit cube, shape (N, D), for the search.
-        start: A point (P,) to fit the density from, without any search.
+        start: One sample to fit the density from, without any search.
         evidence: Launches, of methods that search by least squares.
         workers: Threads of the fit; they change no result.
         progress: Called with a line after the exploration and at each step of the fit.
@@ -86,20 +90,20 @@ def identify(
     Raises:
         UserError: All simulations fail.
     """
-    evaluations = None
+    evaluations, law = None, params.methods[method].law
     if start is None:
         evaluations = evaluations_of(params, method, evaluate)
         progress(f"explored {len(evaluations.total)} points")
     if params.methods[method].search != LEAST_SQUARES:
-        return IdentifiedBand(evaluations, None)
+        return IdentifiedBand(law, evaluations, None)
     density = fit_posterior(
         params,
         method,
         sling,
         episodes,
-        evaluations.best_point() if start is None else start,
+        evaluations.best_parameters(law) if start is None else start,
         evidence=evidence,
         workers=workers,
         progress=lambda fit: progress(f"expansion {fit.steps}: misfit {fit.misfit:.2f}"),
     )
-    return IdentifiedBand(evaluations, density)
+    return IdentifiedBand(law, evaluations, density)

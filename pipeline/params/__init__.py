@@ -21,7 +21,7 @@ from pipeline.params.identification import (
     MethodDefaults,
     MethodParams,
     OptimizerParams,
-    Parameters,
+    ParameterBoxes,
     SlingParams,
     check_method,
     methods_by_step,
@@ -41,7 +41,7 @@ class Params(Section):
     force: ForceParams
     cloud: CloudParams
     sling: SlingParams
-    parameters: Parameters
+    parameters: ParameterBoxes
     loss: LossParams
     optimizer: OptimizerParams
     method_defaults: MethodDefaults

@@ -68,7 +68,7 @@ class Box(Section, Generic[Bound]):
         return self
 
 
-class Parameters(Section):
+class ParameterBoxes(Section):
     youngs_modulus: Box[Annotated[float, Range(1e3, 1e9)]]
     poissons_ratio: Box[Annotated[float, Range(0, 0.495)]]
     elasticity_damping: Box[Annotated[float, Range(1e-6, 1)]]
@@ -219,7 +219,7 @@ class MethodParams(MethodDefaults):
 
 def parameter_names(law: str) -> tuple[str, ...]:
     """The parameters of a law, in the order of all tables: θ, then what the law adds."""
-    return (*Parameters.model_fields, *LAWS[law])
+    return (*ParameterBoxes.model_fields, *LAWS[law])
 
 
 def methods_by_step(methods: Iterable[str], known: Mapping[str, MethodParams]) -> dict[str, list]:
@@ -238,7 +238,7 @@ def steps_of(search: str) -> tuple[str, ...]:
 
 
 def check_method(
-    method: MethodParams, path: str, parameters: Parameters, optimizer: OptimizerParams
+    method: MethodParams, path: str, parameters: ParameterBoxes, optimizer: OptimizerParams
 ) -> None:
     """Refuse what a method, whose key ends with `path`, asks for outside the box or the budget."""
     boxes = {name: (box.low, box.high) for name, box in parameters} | LAWS[method.law]

@@ -2,7 +2,16 @@
 
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.launch import Launches, launch
-from pipeline.simulator.material import THETA
 from pipeline.simulator.model import ClampedBand, LaunchSetup
+from pipeline.simulator.parameters import THETA, Parameters
 
-__all__ = ["THETA", "ClampedBand", "LaunchSetup", "Launches", "Rollouts", "interact", "launch"]
+__all__ = [
+    "THETA",
+    "ClampedBand",
+    "LaunchSetup",
+    "Launches",
+    "Parameters",
+    "Rollouts",
+    "interact",
+    "launch",
+]

@@ -12,6 +12,7 @@ from scipy.ndimage import maximum_filter1d
 from pipeline.base.errors import UserError
 from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip, Outcome
 from pipeline.simulator.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.simulator.solver import Frames, Options, Slings, run
@@ -120,30 +121,31 @@ def _lead(rows: np.ndarray, hand: CubicSpline, sling: ClampedBand, episode: Epis
 
 
 def interact(
-    sling: ClampedBand,
+    band: ClampedBand,
     episode: Episode,
-    thetas: np.ndarray,
+    parameters: Parameters,
     *,
+    rigidity: np.ndarray | None = None,
     device: str = "cpu",
     workers: int = 1,
     fetch: bool = True,
     refine: int = 1,
     double: bool = False,
 ) -> Rollouts:
-    """Simulate the episode's interaction with physical thetas (N, 5).
+    """Simulate the episode's interaction with N parameters.
 
     Args:
+        rigidity: Flexural, of each sample [N m^2], shape (N,); None: the band's.
         workers: Threads, on the CPU; results do not depend on their number.
         fetch: Copy forces and centre lines from a GPU; else they stay there as Warp arrays.
-        refine: How many times finer the steps are than `sling` says.
+        refine: How many times finer the steps are than `band` says.
     """
-    thetas = np.atleast_2d(thetas)
-    schedule = schedule_of(sling, episode, refine)
+    schedule = schedule_of(band, episode, refine)
     times = schedule.steps["time"]
     done = run(
-        sling,
+        band,
         schedule,
-        Slings.of(sling, thetas, hanging_guess(sling)),
+        Slings.of(band, parameters, hanging_guess(band), rigidity),
         _frames(schedule, episode.cloud_time),
         Options(device, workers, fetch=fetch, double=double),
     )

@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK, too_strong
 from pipeline.simulator.initial import drawn_guess
 from pipeline.simulator.model import GRAVITY, ClampedBand, LaunchHistory, LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip, Outcome
 from pipeline.simulator.rubber import RUBBER, TIMES, overstress, uniaxial
 from pipeline.simulator.schedule import RELAX_STEPS, Schedule, relaxation, steps
@@ -63,7 +64,9 @@ def schedule_of(setup: LaunchSetup, refine: int = 1) -> Schedule:
     return Schedule(np.concatenate([relax, first, rest]), first_free=RELAX_STEPS)
 
 
-def unrelaxed(band: ClampedBand, history: LaunchHistory | None, draws: np.ndarray) -> np.ndarray:
+def unrelaxed(
+    band: ClampedBand, history: LaunchHistory | None, parameters: Parameters, draws: np.ndarray
+) -> np.ndarray:
     """What share of a drawn band's stress at rest its branches carry besides, shape (N, 8).
 
     Of draws (N, 2) by a history, the band's halves taken as straight and, while they are slack, as
@@ -74,7 +77,7 @@ def unrelaxed(band: ClampedBand, history: LaunchHistory | None, draws: np.ndarra
     part = np.linspace(0, 1, HISTORY_STEPS + 1)
     drawn = np.linalg.norm(draws, axis=1)[:, None] * (part**2 * (3 - 2 * part))
     stretch = np.maximum(2 * np.hypot(band.half_width, drawn) / band.rest_length, 1.0)
-    stress = uniaxial(stretch, np.reshape(band.mooney_share, (-1, 1)))
+    stress = uniaxial(stretch, parameters.column("mooney_share")[:, None])
     carried = overstress(stress, history.pull_time / HISTORY_STEPS)
     return carried * np.exp(-history.pause / TIMES) / np.maximum(stress[:, -1:], 1e-9)
 
@@ -82,7 +85,7 @@ def unrelaxed(band: ClampedBand, history: LaunchHistory | None, draws: np.ndarra
 def launch(
     band: ClampedBand,
     setup: LaunchSetup,
-    thetas: np.ndarray,
+    parameters: Parameters,
     draws: np.ndarray,
     *,
     max_force: float = np.inf,
@@ -91,7 +94,7 @@ def launch(
     refine: int = 1,
     double: bool = False,
 ) -> Launches:
-    """Launch the projectile from draws (N, 2) with physical thetas (N, 5); one of each fits all.
+    """Launch the projectile from draws (N, 2) with N parameters; one of each fits all.
 
     Args:
         max_force: A draw that takes more is a failed launch [N].
@@ -99,14 +102,14 @@ def launch(
         workers: Threads, on the CPU; results depend on them as little as on the devices' number.
         refine: How many times finer the steps are than `setup.step`.
     """
-    thetas, draws = np.atleast_2d(thetas).astype(float), np.atleast_2d(draws).astype(float)
-    count = max(len(thetas), len(draws))
-    thetas, draws = np.broadcast_to(thetas, (count, 5)), np.broadcast_to(draws, (count, 2))
+    draws = np.atleast_2d(draws).astype(float)
+    count = max(len(parameters), len(draws))
+    parameters, draws = parameters.spread(count), np.broadcast_to(draws, (count, 2))
     distance = np.linalg.norm(draws, axis=1, keepdims=True)
     direction = np.column_stack([np.zeros(count), -draws / np.maximum(distance, 1e-9)])
     slings = Slings.of(
-        band, thetas, drawn_guess(band, draws), direction=direction,
-        payload=setup.projectile_mass, unrelaxed=unrelaxed(band, setup.history, draws),
+        band, parameters, drawn_guess(band, draws), direction=direction,
+        payload=setup.projectile_mass, unrelaxed=unrelaxed(band, setup.history, parameters, draws),
     )  # fmt: skip
     schedule = schedule_of(setup, refine)
 
@@ -118,18 +121,23 @@ def launch(
     shares = np.array_split(np.arange(count), len(devices))
     with ThreadPoolExecutor(len(devices)) as pool:
         lanes = np.concatenate(list(pool.map(launched, devices, shares)))
-    return outcomes(band, setup, lanes, draws, max_force)
+    return outcomes(band, setup, parameters, lanes, draws, max_force)
 
 
 def outcomes(
-    band: ClampedBand, setup: LaunchSetup, lanes: np.ndarray, draws: np.ndarray, max_force: float
+    band: ClampedBand,
+    setup: LaunchSetup,
+    parameters: Parameters,
+    lanes: np.ndarray,
+    draws: np.ndarray,
+    max_force: float,
 ) -> Launches:
     """Of launches from draws (N, 2), by the slings' records (N,) of records.LANE."""
     outcome = np.round(lanes["outcome"])
     hold_force = np.linalg.norm(lanes["hold_force"], axis=1)
     hold_force[outcome > 0] = np.nan
     time, y, z, vy, vz = lanes["separation"].T
-    vy, vz = np.sqrt(band.returned_share) * np.stack([vy, vz])
+    vy, vz = np.sqrt(parameters.column("returned_share")) * np.stack([vy, vz])
     floor = -setup.fork_height
     landing = ballistic_landing(y, z, vy, vz, floor)
 

@@ -93,27 +93,17 @@ class ClampedBand:
         half_width: Half the distance of the fork's tips [m].
         clamp_direction: Unit vector along which the band leaves the tip at -x, shape (3,); it
             leaves the other tip along the mirror image.
-        flexural_rigidity: E I of the band where it was measured [N m^2], one or one a theta; None
-            takes a solid round band's, which follows Young's modulus. Tetrahedra are solid and
-            round: they bend as their mesh does, whatever was measured.
+        flexural_rigidity: E I of the band where it was measured [N m^2]; None takes a solid round
+            band's, which follows Young's modulus. Tetrahedra are solid and round: they bend as
+            their mesh does, whatever was measured.
         grip_force, finger_opening_time: Of the fingers that hold the middle of a recorded band, as
             in params.yaml `setup` [N, s].
         steps: The step sizes and the mesh's grading, as in params.yaml `sling`.
         clamped: Whether the first and the last end are held; experiments on a free band let go.
         clamp_twist: Of the last clamp about the band, against the first [rad].
-        air_drag: Of the moving band: force for its mass and speed [1/s], one or one a theta;
-            whatever brakes it besides the cylinder's drag.
-        turn_damping: Share of the damping that brakes a turn of a stressed band besides, one or one
-            a theta: 0 in a material, whose stress turns with it; 1 in engines that damp the rate of
-            the nominal stress.
-        returned_share: Of the energy that the law gives a launch, what it truly gets, one or one a
-            theta.
         air_density: For the drag of a cylinder across the wind [kg/m^3], which tetrahedra do not
             feel.
         law: NEO_HOOKEAN, or RUBBER (rubber.h), which the rod alone knows.
-        mooney_share: Of `rubber`: Mooney's second constant over the sum of both, one or one a
-            theta. The shear modulus is that sum.
-        relaxation: Of `rubber`: weight of each branch (rubber.py), one or one a theta.
         mesh: ROD, or TETRAHEDRA: a solid cylinder, whose edges are equally long. What of the band
             is inside the clamps does not deform there, so that the mesh ends at them.
     """
@@ -131,13 +121,8 @@ class ClampedBand:
     clamped: tuple[bool, bool] = (True, True)
     clamp_twist: float = 0.0
     mesh: str = ROD
-    air_drag: float | np.ndarray = 0.0
-    turn_damping: float | np.ndarray = 0.0
-    returned_share: float | np.ndarray = 1.0
     air_density: float = 0.0
     law: str = NEO_HOOKEAN
-    mooney_share: float | np.ndarray = 0.0
-    relaxation: float | np.ndarray = 0.0
 
     @classmethod
     def of(

@@ -11,6 +11,7 @@ from pipeline.episode.signal import as_recorded, cutoff_hz
 from pipeline.params.recording import ForceParams
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 
 
 @dataclass(frozen=True)
@@ -27,17 +28,19 @@ class Replay:
     force: np.ndarray
 
 
-def replay(band: ClampedBand, episode: Episode, theta: np.ndarray, force: ForceParams) -> Replay:
+def replay(
+    band: ClampedBand, episode: Episode, parameters: Parameters, force: ForceParams
+) -> Replay:
     """Simulate an episode's pull with N θ; `failure` of the rollouts says which count for nothing.
 
     Args:
-        theta: As `interact` takes it, shape (N, 5).
+        parameters: N of them.
         force: The filter of params.yaml.
 
     Raises:
         UserError: The episode has no pull.
     """
-    rollouts = interact(band, episode, theta)
+    rollouts = interact(band, episode, parameters)
     cutoff = cutoff_hz(force.cutoff, force.cutoff_unit)
     return Replay(rollouts, recorded_force(rollouts, episode, cutoff))
 

@@ -12,6 +12,7 @@ from pipeline.simulator import tetrahedra
 from pipeline.simulator.initial import fixed_frames
 from pipeline.simulator.material import material
 from pipeline.simulator.model import CYLINDER_DRAG, GRAVITY, TETRAHEDRA, ClampedBand
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import LANE, OUTPUT, SETTING, numbers, records, width
 from pipeline.simulator.rubber import RUBBER, memories
 from pipeline.simulator.schedule import Schedule
@@ -36,13 +37,23 @@ class Slings:
     lanes: np.ndarray
 
     @classmethod
-    def of(cls, sling: ClampedBand, thetas: np.ndarray, state: np.ndarray, **lanes) -> Slings:
-        """With physical thetas (N, 5), at rest; `lanes` are fields of records.LANE, else 0."""
-        records = np.zeros(len(thetas), LANE)
+    def of(
+        cls,
+        band: ClampedBand,
+        parameters: Parameters,
+        state: np.ndarray,
+        rigidity: float | np.ndarray | None = None,
+        **lanes: float | np.ndarray,
+    ) -> Slings:
+        """With N parameters, at rest; `lanes` are fields of records.LANE, else 0.
+
+        `rigidity` is as of `material`.
+        """
+        records = np.zeros(len(parameters), LANE)
         for name, values in lanes.items():
             records[name] = values
-        shape = len(thetas), sling.sections, sling.dofs
-        return cls(material(sling, thetas), np.broadcast_to(state, shape), records)
+        shape = len(parameters), band.sections, band.dofs
+        return cls(material(band, parameters, rigidity), np.broadcast_to(state, shape), records)
 
     def __len__(self) -> int:
         return len(self.lanes)

@@ -9,7 +9,7 @@ import pytest
 from app.aim import aim, why_refused
 from pipeline.base.errors import UserError
 from pipeline.launching.surface.stored import Stored
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 from tests.policy import toy
 from tests.policy.linear import write_policy
 

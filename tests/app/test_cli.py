@@ -11,7 +11,7 @@ import pytest
 
 from app import __version__, cli
 from app.command_line import COMMANDS, EXITS
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 from tests.policy.linear import write_policy
 from tests.project import ROOT, python
 from validation.benchmarks import bench

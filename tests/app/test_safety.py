@@ -11,7 +11,7 @@ from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.params import load
 from pipeline.params.provenance import evidence_settings_of, policy_settings_of, settings_of
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 from tests.project import ROOT
 
 VALUES = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))

@@ -37,16 +37,17 @@ from pipeline.params import load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from validation.synthetic import THETA, recorded_yardstick
 
 wp.config.cpu_compiler_flags = wp.config.cpu_compiler_flags.replace("-march=native", sys.argv[1])
 params = load()
 sling, episode = recorded_yardstick(params)
-thetas = np.array([THETA, THETA]) * [[0.8], [1.1]]
+thetas = Parameters.of(sling.law, np.array([THETA, THETA]) * [[0.8], [1.1]])
 rollouts = interact(sling, episode, thetas)
 losses = EpisodeLoss.of(params, "sling2sim2real", episode, sling).terms(rollouts)
 setup = LaunchSetup.of(params.setup, params.sling)
-shots = launch(sling, setup, thetas=thetas, draws=np.array([[-0.35, -0.15]]))
+shots = launch(sling, setup, thetas, draws=np.array([[-0.35, -0.15]]))
 numbers = [rollouts.force, rollouts.center_line, *losses.values(), *vars(shots).values()]
 for array in numbers:
     print(hashlib.sha256(np.asarray(array, float).tobytes()).hexdigest())

@@ -7,7 +7,7 @@ import sys
 import pytest
 from ruamel.yaml import YAML
 
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 from sling2sim2real import UserError, export
 from tests.project import ROOT, python
 from validation.projects import CLI

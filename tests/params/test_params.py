@@ -11,7 +11,7 @@ from ruamel.yaml import YAML
 from pipeline.base.errors import UserError
 from pipeline.base.schema import Section
 from pipeline.params import Params, check, load, parse
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 from tests.project import ROOT
 
 TEXT = (ROOT / "params.yaml").read_text(encoding="utf-8")

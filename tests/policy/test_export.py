@@ -16,7 +16,7 @@ from pipeline.launching.surface.stored import Stored
 from pipeline.params import load
 from pipeline.policy.check import Check, figures
 from pipeline.policy.export import card, write_onnx, write_torchscript
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 from tests.policy import toy
 from tests.policy.card_schema import SCHEMA
 from tests.project import ROOT, python

@@ -11,7 +11,7 @@ from ruamel.yaml import YAML
 
 from pipeline.base.files import write_json
 from pipeline.launching.surface.stored import Stored
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 from stages import policy
 from tests.policy import toy
 from tests.project import ROOT

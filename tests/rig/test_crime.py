@@ -7,11 +7,12 @@ import pytest
 
 from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.identify import evaluations_of
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.recording.build import build_episodes
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 from rig.physics.world import string_of
 from rig.recorder.record import EPOCH
 from tests.project import with_
@@ -19,12 +20,12 @@ from validation.projects import ROUGH
 from validation.synthetic import own_law_episode, visible
 
 METHOD = "sling2sim2real"
-TRUTH = np.array([2.5e5, 0.45, 4e-3, 0.7, 0.6])
+TRUTH = Parameters.of("neo_hookean", [2.5e5, 0.45, 4e-3, 0.7, 0.6])
 
 
 def evaluator(params, sling, episode) -> Evaluator:
     loss = EpisodeLoss.of(params, METHOD, episode, sling)
-    return Evaluator(episode, sling, loss, Space.of(params.parameters))
+    return Evaluator(episode, sling, loss, SearchBox.of(params.parameters))
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +54,6 @@ def test_the_rigs_rubber_leaves_more_loss_than_the_simulators_own(quick, recorde
     noise = quick.rig.wrench.noise
     own = own_law_episode(sling, rig, TRUTH, cutoff=cutoff, force_noise=noise)
     at_truth = evaluator(quick, sling, own)
-    own_loss = at_truth(at_truth.space.to_unit(TRUTH[None])).total[0]  # its least is no more
+    own_loss = at_truth(at_truth.box.unit_of(TRUTH)).total[0]  # its least is no more
     best = evaluations_of(quick, METHOD, evaluator(quick, sling, rig)).best()
     assert best["total"] > 3 * own_loss

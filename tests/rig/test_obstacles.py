@@ -12,12 +12,13 @@ from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.params import Params
 from pipeline.policy.environment import SlingshotEnv
 from pipeline.simulator import ClampedBand, LaunchSetup, launch
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA, Parameters
 from rig.physics.launch import launch as on_the_rig
 from tests.policy.linear import write_policy
 from tests.project import with_
 
-BAND = [1.86e5, 0.47, 2e-3, 0.5, 1.0]  # holds a draw of 0.43 m as the rig's band1 does
+FIVE = [1.86e5, 0.47, 2e-3, 0.5, 1.0]  # holds a draw of 0.43 m as the rig's band1 does
+BAND = Parameters.of("neo_hookean", FIVE)
 LOW, HEAVY = {"fork_height": 0.1}, {"projectile_mass": 0.5}
 CASES = [
     ({}, (-0.40, 0.00), None),
@@ -82,7 +83,7 @@ def test_aiming_says_so(low, tmp_path) -> None:
     write_policy(tmp_path / f"data/policies/band1/{name}/policy.onnx", (0, 0), (-0.27, -0.11))
     file = tmp_path / f"data/theta/band1/{name}.json"
     file.parent.mkdir(parents=True)
-    theta = dict(zip(THETA, BAND, strict=True))
+    theta = dict(zip(THETA, FIVE, strict=True))
     file.write_text(json.dumps({"band": "band1", "theta": theta}))
     answer = aim(world, "band1", name, 1.925, tmp_path, launcher=launcher)
     assert answer["predicted_landing_m"] is None and answer["interval_90_m"] is None

@@ -4,7 +4,9 @@ import numpy as np
 
 from pipeline.simulator.cylinder import cylinder, volumes
 from pipeline.simulator.initial import sections_of
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip
+from pipeline.simulator.rubber import NEO_HOOKEAN
 from pipeline.simulator.schedule import Schedule, relaxation
 from pipeline.simulator.solver import Options, Slings, run
 
@@ -12,6 +14,11 @@ BASE = np.array([2e5, 0.42, 3e-3, 0.6, 0.6])
 BOX = np.array([[3e4, 1e7], [0.30, 0.49], [1e-4, 5e-2], [0.05, 1.0], [0.0, 1.0]])
 THETA = np.array([2.5e5, 0.45, 2e-3, 0.5, 1.0])  # of launches
 DRAW = [-0.38, -0.2]
+
+
+def neo(theta: np.ndarray, **others: float | np.ndarray) -> Parameters:
+    """Of the neo-Hookean law, of thetas (N, 5) or (5,)."""
+    return Parameters.of(NEO_HOOKEAN, theta, **others)
 
 
 def random_thetas(count: int, seed: int) -> np.ndarray:
@@ -33,16 +40,16 @@ def along_x(sling, stretch: float = 1.0) -> np.ndarray:
     return sections_of(sling, nodes)
 
 
-def stepped(sling, steps, theta, start, first_free=None, **lanes):
+def stepped(sling, steps, parameters, start, first_free=None, **lanes):
     """In double precision."""
-    slings = Slings.of(sling, np.atleast_2d(theta), start, **lanes)
+    slings = Slings.of(sling, parameters, start, **lanes)
     schedule = Schedule(steps, len(steps) if first_free is None else first_free)
     return run(sling, schedule, slings, options=Options(double=True, tolerance=1e-10))
 
 
-def at_rest(sling, theta, start) -> np.ndarray:
+def at_rest(sling, parameters, start) -> np.ndarray:
     """Cross-sections (L, dofs) under gravity."""
-    slings = Slings.of(sling, np.atleast_2d(theta), start)
+    slings = Slings.of(sling, parameters, start)
     done = run(sling, Schedule(relaxation(Grip.FREE), 0), slings, options=Options(double=True))
     assert done.lanes["outcome"][0] == 0
     return done.state[0]

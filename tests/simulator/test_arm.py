@@ -9,26 +9,27 @@ from pipeline.simulator import launch
 from pipeline.simulator.initial import drawn_guess
 from pipeline.simulator.launch import schedule_of, unrelaxed
 from pipeline.simulator.model import LaunchHistory
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import RUBBER
 from pipeline.simulator.schedule import Schedule
 from pipeline.simulator.solver import Options, Slings, run
-from tests.simulator.bands import DRAW, THETA, random_draws, random_thetas
+from tests.simulator.bands import DRAW, THETA, neo, random_draws, random_thetas
 
 ARM = 12000.0
 LONG_HELD = LaunchHistory(4.0, 2.0)
 
 
-def held(sling, setup, thetas, draws):
+def held(sling, setup, parameters, draws):
     """How far the middle rests from where it is sent (N, 3), and the force on the hand there."""
     whole = schedule_of(setup)
     schedule = Schedule(whole.steps[: whole.first_free], whole.first_free)
     guess = drawn_guess(sling, draws)
     slings = Slings.of(
         sling,
-        thetas,
+        parameters,
         guess,
         payload=setup.projectile_mass,
-        unrelaxed=unrelaxed(sling, setup.history, draws),
+        unrelaxed=unrelaxed(sling, setup.history, parameters, draws),
     )
     done = run(sling, schedule, slings, options=Options(double=True))
     assert not done.lanes["outcome"].any()
@@ -40,13 +41,17 @@ def held(sling, setup, thetas, draws):
 @pytest.mark.parametrize("law", ["rod", RUBBER, "tetrahedra"])
 def test_band_and_arm_are_springs_in_series(sling, solid, launch_setup, law, stiffness):
     """The pouch moves by force over stiffness; the force is less by the band's slope."""
-    band = {
-        "rod": sling,
-        RUBBER: replace(sling, law=RUBBER, mooney_share=0.4, relaxation=0.02),
-        "tetrahedra": replace(solid, edges=26),
+    two = np.array([THETA, THETA])
+    band, thetas = {
+        "rod": (sling, neo(two)),
+        RUBBER: (
+            replace(sling, law=RUBBER),
+            Parameters.of(RUBBER, two, mooney_share=0.4, relaxation=0.02),
+        ),
+        "tetrahedra": (replace(solid, edges=26), neo(two)),
     }[law]
     stiff = replace(launch_setup, history=LONG_HELD)
-    thetas, draws = np.array([THETA, THETA]), np.array([DRAW, [-0.44, -0.12]])
+    draws = np.array([DRAW, [-0.44, -0.12]])
     moved, force = held(band, replace(stiff, arm_stiffness=stiffness), thetas, draws)
     places = moved.reshape(2, -1, 3) if law == "tetrahedra" else moved[:, None, :3]
     expected = np.broadcast_to(force[:, None] / stiffness, places.shape)
@@ -64,11 +69,11 @@ def test_band_and_arm_are_springs_in_series(sling, solid, launch_setup, law, sti
 
 def test_it_costs_of_a_landing_what_it_costs_of_the_draw(sling, launch_setup):
     """As a firm arm from where it rests, a millimetre or two nearer."""
-    theta = np.array([THETA])
+    theta = neo(THETA)
     gives = replace(launch_setup, arm_stiffness=ARM)
     force = held(sling, gives, theta, np.array([DRAW]))[1][0]
-    firm, soft = (launch(sling, one, THETA, DRAW) for one in (launch_setup, gives))
-    there = launch(sling, launch_setup, THETA, np.array(DRAW) + force[1:] / ARM)
+    firm, soft = (launch(sling, one, neo(THETA), DRAW) for one in (launch_setup, gives))
+    there = launch(sling, launch_setup, neo(THETA), np.array(DRAW) + force[1:] / ARM)
     assert soft.landing_y == pytest.approx(there.landing_y, abs=2e-3)
     assert soft.hold_force == pytest.approx(there.hold_force, rel=1e-4)
     assert 0.005 < 1 - soft.landing_y[0] / firm.landing_y[0] < 0.02
@@ -78,11 +83,11 @@ def test_an_arm_that_the_band_pulls_along_fails_by_name_or_is_balanced(sling, la
     """Over the whole box of θ, where some bands are stiffer than the arm."""
     weak = replace(launch_setup, arm_stiffness=500.0)
     thetas, draws = random_thetas(256, 3), random_draws(256, np.random.default_rng(3))
-    done, firm = (launch(sling, one, thetas, draws) for one in (weak, launch_setup))
+    done, firm = (launch(sling, one, neo(thetas), draws) for one in (weak, launch_setup))
     known = np.isfinite(done.hold_force)
     assert all("converge" in done.failure[i] for i in np.flatnonzero(~known))
     assert known[firm.hold_force < 100].all() and not known.all()
     along = draws / np.linalg.norm(draws, axis=1, keepdims=True)
     there = draws - along * np.nan_to_num(done.hold_force)[:, None] / weak.arm_stiffness
-    balanced = launch(sling, launch_setup, thetas, there).hold_force
+    balanced = launch(sling, launch_setup, neo(thetas), there).hold_force
     assert done.hold_force[known] == pytest.approx(balanced[known], rel=5e-3)

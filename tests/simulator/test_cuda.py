@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from pipeline.base.machine import gpus
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.params import load
 from pipeline.simulator import interact, launch
 from pipeline.simulator.model import LaunchHistory
-from tests.simulator.bands import random_draws, random_thetas
+from pipeline.simulator.parameters import Parameters
+from tests.simulator.bands import neo, random_draws, random_thetas
 
 pytestmark = pytest.mark.skipif(not gpus(), reason="no CUDA device on this machine")
 
@@ -25,8 +26,8 @@ LAWS = {"neo_hookean": {}, "rubber": RUBBER}
 @pytest.mark.parametrize("law", LAWS)
 def test_interaction_agrees_with_the_cpu(strong_grip, episode, law):
     """Held force within 0.1 %; the middle of the taut band within 1 mm in the first recoil."""
-    strong_grip = replace(strong_grip, law=law, **LAWS[law])
-    thetas = random_thetas(64, seed=2)
+    strong_grip = replace(strong_grip, law=law)
+    thetas = Parameters.of(law, random_thetas(64, seed=2), **LAWS[law])
     cpu = interact(strong_grip, episode, thetas, workers=2)
     gpu = interact(strong_grip, episode, thetas, device="cuda:0")
     good = np.array(
@@ -43,10 +44,10 @@ def test_interaction_agrees_with_the_cpu(strong_grip, episode, law):
 @pytest.mark.parametrize("law", LAWS)
 def test_launches_agree_with_the_cpu(sling, law, launch_setup):
     """Landing within 0.1 %, by an arm that gives way."""
-    sling = replace(sling, law=law, **LAWS[law])
+    sling = replace(sling, law=law)
     launch_setup = replace(launch_setup, arm_stiffness=12000.0, history=LaunchHistory(4.0, 2.0))
     draws = random_draws(64, np.random.default_rng(4))
-    theta = [2.5e5, 0.45, 2e-3, 0.5, 1.0]
+    theta = Parameters.of(law, [2.5e5, 0.45, 2e-3, 0.5, 1.0], **LAWS[law])
     cpu, gpu = (
         launch(sling, launch_setup, theta, draws),
         launch(sling, launch_setup, theta, draws, device="cuda:0"),
@@ -58,8 +59,8 @@ def test_launches_agree_with_the_cpu(sling, law, launch_setup):
 def test_what_stays_on_the_gpu_is_what_is_fetched(strong_grip, episode):
     """Forces and centre lines of 65 slings, which fill no warp."""
     thetas = random_thetas(65, seed=5)
-    stays = interact(strong_grip, episode, thetas, device="cuda:0", fetch=False)
-    fetched = interact(strong_grip, episode, thetas, device="cuda:0")
+    stays = interact(strong_grip, episode, neo(thetas), device="cuda:0", fetch=False)
+    fetched = interact(strong_grip, episode, neo(thetas), device="cuda:0")
     assert not isinstance(stays.center_line, np.ndarray)
     assert np.array_equal(stays.center_line.numpy(), fetched.center_line)
     assert np.array_equal(stays.force.numpy(), fetched.force)
@@ -76,7 +77,7 @@ def test_gpus_share_a_batch_and_change_nothing(
     weights = {"geom": 1.0, "force": 1.0, "work": 1.0}
     shape = {"radius": sling.radius, "rest_length": sling.edge_lengths}
     loss = EpisodeLoss(seen, **shape, weights=weights, cutoff=30.0)
-    space = Space.of(load("params.yaml").parameters)
+    space = SearchBox.of(load("params.yaml").parameters)
     unit = np.random.default_rng(8).random((67, space.dimension))
     teams = ("cuda:0",), ("cuda:1",), ("cuda:0", "cuda:1")
     one, *others = (Evaluator(seen, strong_grip, loss, space, devices=team)(unit) for team in teams)
@@ -87,7 +88,7 @@ def test_gpus_share_a_batch_and_change_nothing(
             np.testing.assert_array_equal(other.terms[name], values)
 
     monkeypatch.setattr(import_module("pipeline.simulator.launch"), "SHARE", 1)
-    thetas = space.to_physical(unit)
+    thetas = space.parameters(space.to_physical(unit))
     one, *others = (
         launch(sling, launch_setup, thetas, [-0.4, -0.2], device=team) for team in teams
     )
@@ -98,7 +99,7 @@ def test_gpus_share_a_batch_and_change_nothing(
 
 def test_result_depends_on_no_neighbour_on_the_gpu(strong_grip, episode):
     thetas = random_thetas(20, seed=3)
-    together = interact(strong_grip, episode, thetas, device="cuda:0")
-    alone = interact(strong_grip, episode, thetas[7], device="cuda:0")
+    together = interact(strong_grip, episode, neo(thetas), device="cuda:0")
+    alone = interact(strong_grip, episode, neo(thetas[7]), device="cuda:0")
     assert np.array_equal(together.force[7], alone.force[0])
     assert np.array_equal(together.center_line[7], alone.center_line[0])

@@ -10,7 +10,7 @@ from pipeline.simulator.launch import launch
 from pipeline.simulator.model import GRAVITY, ROD, TETRAHEDRA, ClampedBand
 from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import steps
-from tests.simulator.bands import along_x, stepped, vertex_masses
+from tests.simulator.bands import along_x, neo, stepped, vertex_masses
 
 THETA = [3e5, 0.45, 2e-3, 0.5, 1.0]
 H, COUNT = 1e-3, 60
@@ -22,9 +22,9 @@ def fallen(sling: ClampedBand, drags: np.ndarray, payload=0.0, stretch=1.0) -> n
     Args:
         payload: At the middle [kg].
     """
-    loose = replace(sling, clamped=(False, False), air_drag=drags, air_density=0.0)
+    loose = replace(sling, clamped=(False, False), air_density=0.0)
     table, start = steps(H * np.arange(COUNT + 1), H, grip=Grip.FREE), along_x(loose, stretch)
-    done = stepped(loose, table, [THETA] * len(drags), start, payload=payload)
+    done = stepped(loose, table, neo(THETA, air_drag=drags), start, payload=payload)
     if sling.mesh == ROD:
         return start[sling.middle, 2] - done.state[:, sling.middle, 2]
     drop = start[:, 2::3] - done.state[:, :, 2::3]
@@ -61,9 +61,9 @@ def test_the_projectile_feels_no_wind(sling):
 def test_drag_differs_by_rollout_and_slows_the_recoil(strong_grip, episode):
     """Three drags in one batch, each as if alone; the swing loses speed."""
     drags = np.array([0.0, 2.0, 6.0])
-    both = interact(replace(strong_grip, air_drag=drags), episode, np.array([THETA] * 3))
+    both = interact(strong_grip, episode, neo(THETA, air_drag=drags))
     for drag, line in zip(drags, both.center_line, strict=True):
-        alone = interact(replace(strong_grip, air_drag=drag), episode, np.array([THETA]))
+        alone = interact(strong_grip, episode, neo(THETA, air_drag=drag))
         np.testing.assert_array_equal(alone.center_line[0], line)
     swing = both.cloud_time > episode.release_time + 0.2
     moved = np.abs(np.diff(both.center_line[:, swing, strong_grip.middle], axis=1)).sum((1, 2))
@@ -71,8 +71,8 @@ def test_drag_differs_by_rollout_and_slows_the_recoil(strong_grip, episode):
 
 
 def test_drag_shortens_a_launch(sling, launch_setup):
-    blown = replace(sling, air_drag=np.array([0.0, 3.0]))
-    still, slowed = launch(blown, launch_setup, [THETA, THETA], [-0.33, -0.17]).landing_y
+    blown = neo(THETA, air_drag=np.array([0.0, 3.0]))
+    still, slowed = launch(sling, launch_setup, blown, [-0.33, -0.17]).landing_y
     assert 0.93 < slowed / still < 0.995
 
 
@@ -85,19 +85,20 @@ def test_air_brakes_a_band_as_a_cylinder_across_the_wind_and_not_along_it(sling)
     table = steps(H * np.arange(301), H, grip=Grip.FREE, order=2)
     table[0] = steps([0.0, H], H, grip=Grip.FREE)[0]
     start, time = along_x(light, 1.0), 0.3
-    done = stepped(light, table, [THETA], start)
+    done = stepped(light, table, neo(THETA), start)
     told = terminal**2 / GRAVITY * np.log(np.cosh(GRAVITY * time / terminal))
     assert told < 0.9 * GRAVITY * time**2 / 2  # it counts
     fallen = start[:, 2] - done.state[0, :, 2]
     assert fallen == pytest.approx(np.full(len(fallen), told), rel=5e-3)
     upright = start[:, [1, 2, 0, 4, 5, 3, 7, 8, 6]]
-    done = stepped(light, table, [THETA], upright)
+    done = stepped(light, table, neo(THETA), upright)
     drop = (upright[:, 2] - done.state[0, :, 2]).mean()
     assert drop == pytest.approx(GRAVITY * time**2 / 2, rel=5e-3)
 
 
 def test_air_takes_energy_from_a_recoil(sling, launch_setup):
     """Little: the projectile is heavier and slower than a band alone."""
-    far = [launch(replace(sling, air_density=rho), launch_setup, THETA, [-0.35, -0.15]).landing_y[0]
-           for rho in (0.0, 1.2, 2.4)]  # fmt: skip
+    blown = (replace(sling, air_density=rho) for rho in (0.0, 1.2, 2.4))
+    draw = [-0.35, -0.15]
+    far = [launch(one, launch_setup, neo(THETA), draw).landing_y[0] for one in blown]
     assert 0.99 * far[0] < far[2] < far[1] < 0.9999 * far[0]

@@ -8,6 +8,7 @@ from pipeline.base.layout import Layout
 from pipeline.identify.results.mounting import load_sling
 from pipeline.identify.results.theta import load_samples
 from pipeline.params import load
+from pipeline.simulator.parameters import Parameters
 from tests.edited import edits
 from tests.report.run.conftest import posterior
 
@@ -37,6 +38,7 @@ def test_the_calibration_of_clamps(tmp_path: Path) -> None:
 
 def test_samples(tmp_path: Path) -> None:
     path = tmp_path / "data" / "confidence" / "toy" / "method.json"
+    best = Parameters.of("rubber", [2e5, 0.45, 2e-3, 0.5, 0.5])
     content = posterior() | {"samples": posterior()["samples"][:2]}
-    read, refused = read_or_refused(path, content, lambda: load_samples(path))
+    read, refused = read_or_refused(path, content, lambda: load_samples(path, best))
     assert refused > 20 > read

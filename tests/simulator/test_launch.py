@@ -12,7 +12,7 @@ import pytest
 from pipeline.simulator import launch, solver
 from pipeline.simulator.launch import ballistic_landing
 from pipeline.simulator.model import GRAVITY
-from tests.simulator.bands import DRAW, THETA
+from tests.simulator.bands import DRAW, THETA, neo
 
 
 def test_ballistic_landing_in_closed_form():
@@ -26,7 +26,7 @@ def test_ballistic_landing_in_closed_form():
 def test_damping_takes_speed_and_the_projectile_separates_before_the_fork(sling, launch_setup):
     thetas = np.tile(THETA, (3, 1))
     thetas[:, 2] = 1e-4, 5e-3, 2e-2
-    shots = launch(sling, launch_setup, thetas, DRAW)
+    shots = launch(sling, launch_setup, neo(thetas), DRAW)
     assert shots.failure == [None] * 3 and np.all(np.diff(shots.speed) < 0)
     # the band goes slack about 0.2 m before the fork
     assert np.all((-0.3 < shots.separation_y) & (shots.separation_y < -0.1))
@@ -37,7 +37,7 @@ def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch, launch_se
     rng = np.random.default_rng(6)
     draws = np.column_stack([rng.uniform(-0.45, -0.1, 9), rng.uniform(-0.3, -0.1, 9)])
     thetas = np.column_stack([10 ** rng.uniform(5, 6.2, 9), np.tile(THETA[1:], (9, 1))])
-    one, asked = launch(sling, launch_setup, thetas, draws), []
+    one, asked = launch(sling, launch_setup, neo(thetas), draws), []
 
     def run(sling, schedule, slings, options):
         asked.append((options.device, len(slings)))
@@ -52,7 +52,7 @@ def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch, launch_se
     ):
         monkeypatch.setattr(module, "SHARE", share)
         asked.clear()
-        several = launch(sling, launch_setup, thetas, draws, device=("a", "b", "c"))
+        several = launch(sling, launch_setup, neo(thetas), draws, device=("a", "b", "c"))
         assert set(asked) == expected and several.failure == one.failure
         for name in ("landing_y", "speed", "angle", "hold_force", "separation_time"):
             np.testing.assert_array_equal(getattr(several, name), getattr(one, name))
@@ -60,16 +60,16 @@ def test_devices_that_share_a_batch_change_nothing(sling, monkeypatch, launch_se
 
 
 def test_failures_have_names(sling, launch_setup):
-    strong = launch(sling, launch_setup, [5e6, 0.45, 2e-3, 0.5, 1.0], DRAW, max_force=30.0)
+    strong = launch(sling, launch_setup, neo([5e6, 0.45, 2e-3, 0.5, 1.0]), DRAW, max_force=30.0)
     assert "30 N" in strong.failure[0] and np.isnan(strong.landing_y[0])
     assert strong.hold_force[0] > 30
-    slack = launch(sling, launch_setup, THETA, [-0.15, -0.05])
+    slack = launch(sling, launch_setup, neo(THETA), [-0.15, -0.05])
     assert slack.failure[0] is not None and np.isnan(slack.landing_y[0])
 
 
 def test_farther_draws_land_farther(sling, launch_setup):
     landings = launch(
-        sling, launch_setup, THETA, [[-0.34, -0.2], [-0.38, -0.2], [-0.42, -0.2]]
+        sling, launch_setup, neo(THETA), [[-0.34, -0.2], [-0.38, -0.2], [-0.42, -0.2]]
     ).landing_y
     assert np.all(np.diff(landings) > 0.2)
 
@@ -77,11 +77,11 @@ def test_farther_draws_land_farther(sling, launch_setup):
 def test_a_projectile_that_passes_too_low_hits_the_fork(sling, launch_setup):
     """The same launch, with a foot that reaches above its way and one just below it."""
     draw = [-0.30, -0.05]
-    free = launch(sling, launch_setup, THETA, draw)
+    free = launch(sling, launch_setup, neo(THETA), draw)
     assert free.failure == [None]
     time = -free.separation_y[0] / (free.speed[0] * np.cos(free.angle[0]))
     rise = free.speed[0] * np.sin(free.angle[0]) * time - GRAVITY * time**2 / 2
     above = free.separation_z[0] + rise + launch_setup.fork_height
     for foot, failure in ((0.99 * above, None), (1.01 * above, "hits the fork: too low")):
-        done = launch(sling, replace(launch_setup, foot_height=foot), THETA, draw)
+        done = launch(sling, replace(launch_setup, foot_height=foot), neo(THETA), draw)
         assert done.failure == [None] if failure is None else done.failure[0].startswith(failure)

@@ -3,7 +3,6 @@
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from pipeline.base.files import write_json
@@ -12,7 +11,7 @@ from pipeline.identify.results.mounting import load_sling, sling_of_method
 from pipeline.identify.results.theta import calibrated, launch_setup, load_theta
 from pipeline.params import load
 from pipeline.simulator import ClampedBand, interact, launch
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA, Parameters
 from tests.project import ROOT
 
 PARAMS = load(ROOT / "params.yaml")
@@ -49,7 +48,9 @@ def test_a_theta_file_says_so_and_its_launches_land_elsewhere(root: Path) -> Non
         sling = calibrated(PARAMS, "band1", load_theta(path, "band1"), root)
         assert (sling.flexural_rigidity is None) == (mounted == {"mounted": False})
         landings.append(
-            launch(sling, setup, np.array([*VALUES.values()]), (-0.35, -0.2)).landing_y[0]
+            launch(
+                sling, setup, Parameters.of("neo_hookean", [*VALUES.values()]), (-0.35, -0.2)
+            ).landing_y[0]
         )
     assert landings[0] == landings[1]
     assert 1e-3 < abs(landings[2] - landings[0]) < 0.5
@@ -63,4 +64,6 @@ def test_a_recorded_pull_reads_no_launch_setting(episode) -> None:
         for one in (PARAMS.setup, PARAMS.sling)
     )
     band = ClampedBand.of(PARAMS.bands["band1"], setup, resolution)
-    assert interact(band, episode, np.array([*VALUES.values()])).failure == [None]
+    assert interact(band, episode, Parameters.of("neo_hookean", [*VALUES.values()])).failure == [
+        None
+    ]

@@ -13,6 +13,7 @@ import pytest
 
 from pipeline.simulator.initial import drawn_guess
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip
 from pipeline.simulator.rubber import RUBBER
 from rig.physics.elasticity import law_of
@@ -50,17 +51,15 @@ def string_like(sling: ClampedBand, eta: float, edges: int = 96) -> ElasticStrin
 
 def middles(bench: Bench, eta: float, turn_damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Of simulator and string at TIMES after a free release at DEPTH [m], shape (T, 3) each."""
-    sling = replace(
-        band_of(bench), law=RUBBER, mooney_share=SHARE, relaxation=0.0, air_density=1.2,
-        turn_damping=turn_damping,
-    )  # fmt: skip
+    sling = replace(band_of(bench), law=RUBBER, air_density=1.2)
     drawn = np.array([0.0, -DEPTH, 0.0])
     string = string_like(sling, eta)
     y = string.at_rest(bent_at(string, drawn), 1e-6, held=True)
     truth = string.integrate(y, np.append(0.0, TIMES), 1e-6)[1][1:, string.middle, :3]
     before = settling(Grip.POUCH, drawn)
     table = np.concatenate([before, launched(STEP, int(np.ceil(TIMES[-1] / STEP)))])
-    theta = (YOUNG, 0.49, eta / 0.6, 0.5, 0.6)
+    five = (YOUNG, 0.49, eta / 0.6, 0.5, 0.6)
+    theta = Parameters.of(RUBBER, five, mooney_share=SHARE, turn_damping=turn_damping)
     motion = move(bench, sling, theta, table, drawn_guess(sling, drawn[None, 1:])[0], double=True)
     at = len(before) - 1 + np.rint(TIMES / STEP).astype(int)
     return motion.x[0, at, sling.middle, :3], truth

@@ -13,11 +13,18 @@ from pipeline.episode.pull import launch_history
 from pipeline.simulator import interact, launch
 from pipeline.simulator.launch import unrelaxed
 from pipeline.simulator.model import LaunchHistory
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import RUBBER, TIMES, overstress, update
 from rig.physics.motion import pull_history
+from tests.simulator.bands import neo
 
 THETA = np.array([3e5, 0.45, 2e-3, 0.5, 0.7])
 DRAW = np.array([-0.35, -0.15])
+
+
+def gum(**others: float | np.ndarray) -> Parameters:
+    """THETA, and what the law has of its own."""
+    return Parameters.of(RUBBER, THETA, **others)
 
 
 @pytest.fixture(scope="module")
@@ -29,8 +36,8 @@ def test_without_its_parameters_it_is_the_neo_hookean_law_to_the_bit(
     sling, rubber, episode, launch_setup
 ):
     for one, other in zip(
-        (interact(sling, episode, THETA), launch(sling, launch_setup, THETA, DRAW)),
-        (interact(rubber, episode, THETA), launch(rubber, launch_setup, THETA, DRAW)),
+        (interact(sling, episode, neo(THETA)), launch(sling, launch_setup, neo(THETA), DRAW)),
+        (interact(rubber, episode, gum()), launch(rubber, launch_setup, gum(), DRAW)),
         strict=True,
     ):
         same = "force", "center_line", "landing_y", "hold_force"
@@ -40,15 +47,13 @@ def test_without_its_parameters_it_is_the_neo_hookean_law_to_the_bit(
 
 def test_each_parameter_has_its_effect(rubber, launch_setup):
     """A negative share stiffens a drawn band; what relaxes holds more at once, and later less."""
-    plain = launch(rubber, launch_setup, THETA, DRAW)
-    soft, stiff = (
-        launch(replace(rubber, mooney_share=m), launch_setup, THETA, DRAW) for m in (0.5, -0.3)
-    )
+    plain = launch(rubber, launch_setup, gum(), DRAW)
+    soft, stiff = (launch(rubber, launch_setup, gum(mooney_share=m), DRAW) for m in (0.5, -0.3))
     assert soft.hold_force < 0.9 * plain.hold_force < 0.9 * stiff.hold_force
-    memory = replace(rubber, relaxation=0.02)
+    memory = gum(relaxation=0.02)
     histories = LaunchHistory(1.0, 0.1), LaunchHistory(1.0, 600.0)
     fresh, old = (
-        launch(memory, replace(launch_setup, history=one), THETA, DRAW) for one in histories
+        launch(rubber, replace(launch_setup, history=one), memory, DRAW) for one in histories
     )
     assert fresh.hold_force > 1.03 * plain.hold_force
     assert old.hold_force == pytest.approx(plain.hold_force, rel=1e-4)
@@ -58,11 +63,11 @@ def test_each_parameter_has_its_effect(rubber, launch_setup):
 def test_every_theta_may_have_its_own_parameters(rubber, launch_setup):
     shares, weights = np.array([0.0, 0.5, -0.2]), np.array([0.0, 0.01, 0.03])
     history = LaunchHistory(2.0, 1.0)
-    many = replace(rubber, mooney_share=shares, relaxation=weights)
+    many = gum(mooney_share=shares, relaxation=weights)
     launch_setup = replace(launch_setup, history=history)
-    together = launch(many, launch_setup, np.tile(THETA, (3, 1)), DRAW).landing_y
+    together = launch(rubber, launch_setup, many, DRAW).landing_y
     alone = [
-        launch(replace(many, mooney_share=m, relaxation=w), launch_setup, THETA, DRAW).landing_y[0]
+        launch(rubber, launch_setup, gum(mooney_share=m, relaxation=w), DRAW).landing_y[0]
         for m, w in zip(shares, weights, strict=True)
     ]
     np.testing.assert_array_equal(together, alone)
@@ -70,7 +75,7 @@ def test_every_theta_may_have_its_own_parameters(rubber, launch_setup):
 
 def test_memory_of_a_pull_is_that_of_short_steps_and_fades(rubber):
     drawn = np.array([[-0.40, 0.0]])
-    carried = unrelaxed(rubber, LaunchHistory(4.0, 2.0), drawn)[0]
+    carried = unrelaxed(rubber, LaunchHistory(4.0, 2.0), gum(), drawn)[0]
     step = 1e-3  # Euler's method on o' = p' - o/t
     part = np.clip(np.arange(0, 6, step) / 4, 0, 1)
     depth = 0.4 * part**2 * (3 - 2 * part)
@@ -81,9 +86,9 @@ def test_memory_of_a_pull_is_that_of_short_steps_and_fades(rubber):
         told += change - step * told / TIMES
     np.testing.assert_allclose(carried, told / stress[-1], atol=2e-3)
     assert np.all(np.diff(carried) >= -1e-12)  # slow branches keep more
-    assert unrelaxed(rubber, LaunchHistory(4.0, 1e4), drawn).max() < 1e-6
+    assert unrelaxed(rubber, LaunchHistory(4.0, 1e4), gum(), drawn).max() < 1e-6
     slack = np.array([[-0.01, 0.0]])
-    assert unrelaxed(rubber, LaunchHistory(4.0, 0.0), slack).max() == 0
+    assert unrelaxed(rubber, LaunchHistory(4.0, 0.0), gum(), slack).max() == 0
 
 
 def test_updates_are_exact_for_straight_histories():
@@ -98,7 +103,7 @@ def test_updates_are_exact_for_straight_histories():
 
 def test_tetrahedra_refuse_it_by_name(solid, launch_setup):
     with pytest.raises(UserError, match="tetrahedra do not know the law `rubber`"):
-        launch(replace(solid, law=RUBBER), launch_setup, THETA, DRAW)
+        launch(replace(solid, law=RUBBER), launch_setup, gum(), DRAW)
 
 
 def test_history_of_a_recording():
@@ -124,7 +129,7 @@ def test_a_pause_fades_the_memory_by_its_own_length(rubber):
     """Whatever the pull's: exp(-pause / t) of what it left."""
     for pull_time in (0.05, 4.0, 100.0):
         none, some = (
-            unrelaxed(rubber, LaunchHistory(pull_time, pause), DRAW[None])[0]
+            unrelaxed(rubber, LaunchHistory(pull_time, pause), gum(), DRAW[None])[0]
             for pause in (0.0, 0.7)
         )
         np.testing.assert_allclose(some, none * np.exp(-0.7 / TIMES), rtol=1e-12)

@@ -14,7 +14,7 @@ from pipeline.simulator.model import GRAVITY, TETRAHEDRA
 from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.simulator.solver import Frames, Options, Slings, run
-from tests.simulator.bands import DRAW, THETA, at_rest, random_thetas, stepped
+from tests.simulator.bands import DRAW, THETA, at_rest, neo, random_thetas, stepped
 from validation.simulator.closed import String
 
 
@@ -45,7 +45,7 @@ def forces(sling, theta, sections):
 
 
 def test_hanging_band_is_an_equilibrium_of_the_energy(solid):
-    sections = at_rest(solid, THETA, hanging_guess(solid))
+    sections = at_rest(solid, neo(THETA), hanging_guess(solid))
     pull = forces(solid, THETA, sections).sum(axis=1)[1:-1]
     weight = solid.mass / solid.edges * GRAVITY
     assert np.abs(pull - [0.0, 0.0, weight]).max() < 0.02 * weight
@@ -56,7 +56,7 @@ def test_hand_feels_what_the_drawn_band_pulls_with(solid, launch_setup):
     """The force on the hand is that of the energy on the held section, and the sections' weight."""
     table = schedule_of(launch_setup).steps[:RELAX_STEPS]
     start = drawn_guess(solid, np.array([DRAW]))
-    done = stepped(solid, table, THETA, start, payload=launch_setup.projectile_mass)
+    done = stepped(solid, table, neo(THETA), start, payload=launch_setup.projectile_mass)
     held = forces(solid, THETA, done.state[0])[solid.middle].sum(axis=0)
     held[2] -= (launch_setup.projectile_mass + solid.mass / solid.edges) * GRAVITY
     assert done.lanes["hold_force"][0] == pytest.approx(held, abs=1e-4 * np.abs(held).max())
@@ -71,7 +71,9 @@ def test_thin_band_pulls_as_a_string_the_finer_its_mesh(solid, launch_setup):
         half = np.hypot(0.4, thin.half_width)
         pull = String.of(thin, THETA).force(2 * half / thin.rest_length)
         expected = 2 * pull * 0.4 / half
-        gaps.append(launch(thin, launch_setup, THETA, [-0.4, 0.0]).hold_force[0] / expected - 1)
+        gaps.append(
+            launch(thin, launch_setup, neo(THETA), [-0.4, 0.0]).hold_force[0] / expected - 1
+        )
     assert 0 < gaps[1] < 0.02
     assert gaps[1] == pytest.approx(gaps[0] / 2, rel=0.1)
 
@@ -86,10 +88,10 @@ def test_clamps_set_the_sections_across_their_direction(solid):
 
 def test_random_thetas_converge_whatever_their_neighbours(solid, episode):
     strong, thetas = replace(solid, grip_force=1e5), random_thetas(20, seed=4)
-    together = interact(strong, episode, thetas, workers=2)
+    together = interact(strong, episode, neo(thetas), workers=2)
     assert together.failure == [None] * 20
     assert np.isfinite(together.force).all() and np.isfinite(together.center_line).all()
-    alone = interact(strong, episode, thetas[7])
+    alone = interact(strong, episode, neo(thetas[7]))
     assert np.array_equal(together.force[7], alone.force[0])
 
 
@@ -100,7 +102,7 @@ def test_mesh_is_chosen_in_params_and_not_for_a_gpu(params, launch_setup):
     assert (solid.sections, solid.dofs) == (53, 21)
     assert ClampedBand.of(band, params.setup, params.sling).dofs == 9
     with pytest.raises(UserError, match="CPU"):
-        launch(solid, launch_setup, THETA, DRAW, device="cuda:0")
+        launch(solid, launch_setup, neo(THETA), DRAW, device="cuda:0")
 
 
 def held_steps(count=20):
@@ -116,7 +118,7 @@ def held_steps(count=20):
 def recorded(solid, table, **options):
     """All of the mesh after each step."""
     count = len(table)
-    slings = Slings.of(solid, THETA[None], drawn_guess(solid, np.array([DRAW])))
+    slings = Slings.of(solid, neo(THETA), drawn_guess(solid, np.array([DRAW])))
     frames = Frames(np.arange(count), np.ones(count), solid.dofs)
     return run(solid, Schedule(table, count), slings, frames, Options(**options))
 

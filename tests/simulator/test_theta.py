@@ -1,15 +1,15 @@
 """θ files: read as written, and every mistake in them is one line that names it."""
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.identify.results.theta import at_points, load_samples, load_theta, point, vector
-from pipeline.simulator.material import THETA
+from pipeline.identify.results.theta import content_of, load_samples, load_theta, parameters_of
+from pipeline.simulator.model import LaunchHistory
+from pipeline.simulator.parameters import THETA, Parameters
 
 SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 
@@ -25,7 +25,7 @@ def refusal(file: Path, text: str) -> str:
 def test_a_theta_file_comes_back(tmp_path: Path) -> None:
     file = tmp_path / "theta.json"
     file.write_text(json.dumps({"band": "red", "theta": SOFT}))
-    assert vector(load_theta(file, "red")).tolist() == list(SOFT.values())
+    assert parameters_of(load_theta(file, "red")).theta.tolist() == [list(SOFT.values())]
 
 
 def test_values_out_of_range_are_named(tmp_path: Path) -> None:
@@ -47,23 +47,15 @@ def test_what_is_no_json_object(tmp_path: Path) -> None:
         assert "cannot be read as JSON" in refusal(tmp_path / "theta.json", text)
 
 
-def test_the_drag_comes_back_and_the_sling_gets_it(tmp_path: Path) -> None:
+def test_the_drag_comes_back(tmp_path: Path) -> None:
     file = tmp_path / "theta.json"
     said = {"air_drag": 2.5}
     file.write_text(json.dumps({"band": "red", "theta": SOFT, "nuisances": said}))
     assert load_theta(file, "red")["nuisances"] == said
-    sling, theta = at_points(Windless(), np.array([[1.0, 2, 3, 4, 5, 0.7], [1.0, 2, 3, 4, 5, 0.9]]))
-    assert theta.tolist() == [[1, 2, 3, 4, 5]] * 2
-    np.testing.assert_array_equal(sling.air_drag, [0.7, 0.9])
-    assert at_points(Windless(), theta)[0].air_drag == 0.0
-
-
-@dataclass(frozen=True)
-class Windless:
-    air_drag: float = 0.0
-    law: str = "neo_hookean"
-    mooney_share: float = 0.0
-    relaxation: float = 0.0
+    found = parameters_of(load_theta(file, "red"))
+    assert found.column("air_drag").tolist() == [2.5]
+    assert parameters_of({"theta": SOFT}).column("air_drag").tolist() == [0.0]
+    assert parameters_of(content_of(found)).values.tolist() == found.values.tolist()
 
 
 def test_the_law_rubber_names_its_parameters(tmp_path: Path) -> None:
@@ -72,12 +64,15 @@ def test_the_law_rubber_names_its_parameters(tmp_path: Path) -> None:
     whole = {"band": "red", "law": "rubber", "theta": SOFT | rubber, "history": history}
     file.write_text(json.dumps(whole))
     content = load_theta(file, "red")
-    assert point(content).tolist() == [*SOFT.values(), 0.3, 0.02]
-    assert vector(content).tolist() == list(SOFT.values())
-    points = np.array([[*range(1, 6), 0.2, 0.01, 0.7]])
-    sling, theta = at_points(Windless(law="rubber"), points)
-    assert theta.tolist() == [[1, 2, 3, 4, 5]]
-    assert (sling.mooney_share, sling.relaxation, sling.air_drag) == (0.2, 0.01, 0.7)
+    found = parameters_of(content)
+    assert found.values.tolist() == [[*SOFT.values(), 0.3, 0.02, 0.0, 0.0, 1.0]]
+    assert found.theta.tolist() == [list(SOFT.values())]
+    written = content_of(found, LaunchHistory(**history))
+    assert (written["law"], written["theta"], written["history"]) == (
+        "rubber",
+        SOFT | rubber,
+        history,
+    )
     for change, message in (
         ({"theta": SOFT}, "theta: of the law rubber it must have exactly youngs_modulus"),
         ({"law": "neo_hookean"}, "theta: of the law neo_hookean it must have exactly"),
@@ -104,20 +99,25 @@ def test_bad_nuisances_are_one_line(tmp_path: Path) -> None:
 
 
 def test_samples_come_from_the_theta_stages_file(tmp_path) -> None:
+    best = Parameters.of("neo_hookean", [*SOFT.values()], air_drag=0.7)
     path, samples = tmp_path / "none.json", np.linspace(0.1, 1, 15).reshape(3, 5)
-    assert load_samples(path) is None
+    assert load_samples(path, best) is None
     content = {"names": list(THETA), "samples": samples.tolist()}
     path.write_text(json.dumps(content))
-    np.testing.assert_array_equal(load_samples(path), samples)
+    found = load_samples(path, best)
+    np.testing.assert_array_equal(found.theta, samples)
+    assert found.column("air_drag").tolist() == [0.7] * 3  # as the best one, where it has none
     path.write_text('{"samples": []}')  # of a θ without confidence
-    assert load_samples(path) is None
+    assert load_samples(path, best) is None
     with_drag = {"names": [*THETA, "air_drag"], "samples": [[0.5] * 6] * 4}
     path.write_text(json.dumps(with_drag))
-    assert load_samples(path).shape == (4, 6)
+    assert load_samples(path, best).column("air_drag").tolist() == [0.5] * 4
+    with pytest.raises(UserError, match="none.json: names: must be those of the law rubber"):
+        load_samples(path, Parameters.of("rubber", [*SOFT.values()]))
     path.write_text(json.dumps(content | {"names": with_drag["names"]}))
     with pytest.raises(UserError, match="samples: must have a column for each"):
-        load_samples(path)
+        load_samples(path, best)
     for damaged in ("{", "[]", json.dumps(content | {"names": ["a"]}), '{"names": []}'):
         path.write_text(damaged)
         with pytest.raises(UserError, match="none.json: "):
-            load_samples(path)
+            load_samples(path, best)

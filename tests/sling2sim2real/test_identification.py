@@ -11,7 +11,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
 from pipeline.params.provenance import settings_of
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 from sling2sim2real import Identification, Observed, Settings, aim, identify, launch
 from sling2sim2real.launching import _warnings
 from tests.project import ROOT

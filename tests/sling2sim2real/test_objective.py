@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.simulator.model import ClampedBand
 from sling2sim2real import Objective, Theta, simulate_batch
 
@@ -18,8 +18,8 @@ def test_it_is_the_loss_of_the_method(world, episode) -> None:
     settings = world.settings
     sling = ClampedBand.of(world.band, settings.setup, settings.sling)
     loss = EpisodeLoss.of(settings, "real2sim2real", episode, sling)
-    space = Space.of_method(settings, "real2sim2real")
-    whole = [space.to_unit(objective.theta(one).point[:5]) for one in unit]
+    space = SearchBox.of_method(settings, "real2sim2real")
+    whole = [space.unit_of(objective.theta(one).parameters)[0] for one in unit]
     theirs = Evaluator(episode, sling, loss, space)(np.array(whole)).total
     assert np.allclose(objective(unit), 2 * theirs)
 

@@ -14,7 +14,7 @@ from sling2sim2real import Theta, pull, simulate, simulate_batch
 def test_a_simulation_is_the_librarys(world) -> None:
     planned = pull(world)
     ours = simulate(world, planned)
-    theirs = interact(world.sling, planned, world.theta.point[None, :5])
+    theirs = interact(world.sling, planned, world.theta.parameters)
     assert np.array_equal(ours.step_force, theirs.force[0])
     assert np.array_equal(ours.center_line, theirs.center_line[0])
     cutoff = cutoff_hz(world.settings.force.cutoff, world.settings.force.cutoff_unit)

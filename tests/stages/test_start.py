@@ -13,9 +13,9 @@ import pytest
 from dvc.lock import Lock
 
 from pipeline.base.layout import NotMade
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.objective.loss import TERMS
-from pipeline.identify.objective.space import Space
 from pipeline.identify.search.history import History
 from pipeline.params import load
 from stages.start import remedy
@@ -59,7 +59,7 @@ def test_unknown_names(stage) -> None:
 
 
 def test_a_history_that_failed_says_why(stage) -> None:
-    space = Space.of(load(ROOT / "params.yaml").parameters)
+    space = SearchBox.of(load(ROOT / "params.yaml").parameters)
     unit = np.random.default_rng(1).random((30, 5))
     nothing = {term: np.full(30, np.nan) for term in TERMS}
     theta, reasons = space.to_physical(unit), ["the band slipped"] * 30

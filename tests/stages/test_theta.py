@@ -5,7 +5,6 @@ import runpy
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
@@ -13,6 +12,7 @@ from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
 from pipeline.identify.results.theta import calibrated, load_theta
 from pipeline.params import load
+from pipeline.simulator.parameters import Parameters
 from sling2sim2real.identification import Identification
 from tests.project import ROOT
 from validation.synthetic import own_law_episode, recorded_yardstick
@@ -33,7 +33,7 @@ def test_what_a_method_leaves_out_is_left_out_everywhere(
     yaml.dump(content, tmp_path / "params.yaml")
     params, layout = load(), Layout()
     sling, episode = recorded_yardstick(params)
-    truth = np.array([2e5, 0.45, 2e-3, 0.7, 0.6])
+    truth = Parameters.of(sling.law, [2e5, 0.45, 2e-3, 0.7, 0.6])
     episode = own_law_episode(sling, episode, truth, cutoff=35.0)
     episode.save(layout.episode("band1"))
     write_json(layout.clamps("band1"), SHOWN)

@@ -17,6 +17,7 @@ from pipeline.identify.results.mounting import load_sling
 from pipeline.params import load
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from tests.project import ROOT
 from validation.campaigns import machines
 from validation.campaigns.machines import DRAWS, FOLDER, LIMIT, OURS, PAPER, MachineReport
@@ -42,7 +43,9 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     sling = load_sling(params, BAND, root)
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
     plan = pull_and_release(BAND, params.episode, sling)
-    own_law_episode(sling, plan, np.array(TRUE), cutoff=cutoff).save(layout.episode(BAND))
+    own_law_episode(sling, plan, Parameters.of(sling.law, TRUE), cutoff=cutoff).save(
+        layout.episode(BAND)
+    )
     return root
 
 
@@ -64,7 +67,7 @@ def test_the_same_inputs_give_the_same_theta_with_other_threads(
     assert len(paper["theta"]) == 5 and len(ours["theta"]) == 10
     params = load(project / "params.yaml")
     world = load_sling(params, BAND, project), LaunchSetup.of(params.setup, params.sling)
-    true = launch(*world, np.array(TRUE), np.array(DRAWS)).landing_y
+    true = launch(*world, Parameters.of(world[0].law, TRUE), np.array(DRAWS)).landing_y
     assert np.isfinite(true).sum() >= 8
     np.testing.assert_allclose(np.array(ours["landing"], float), true, rtol=0.05)
 

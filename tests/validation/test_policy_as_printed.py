@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.base.files import write_json
 from pipeline.params import load
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 from tests.policy import toy
 from tests.project import ROOT
 from validation.campaigns import policy_as_printed as campaign

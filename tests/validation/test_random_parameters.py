@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.params import load
+from pipeline.params.identification import parameter_names
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 from validation.campaigns import random_parameters
 from validation.simulator import robustness
@@ -18,14 +19,15 @@ def bench() -> Bench:
 
 
 def test_the_sets_fill_the_box_of_each_law(bench) -> None:
-    points = random_parameters.points(bench, RUBBER, 500)
+    sets = random_parameters.random_sets(bench, RUBBER, 500)
+    points = np.stack([sets.column(name) for name in parameter_names(RUBBER)], axis=1)
     boxes = [(box.low, box.high) for _, box in bench.params.parameters]
     boxes += [(-0.3, 0.9), (0.0, 0.05)]
     low, high = np.array(boxes).T
     assert points.shape == (500, 7)
     assert ((low <= points) & (points <= high)).all()
     assert (np.ptp(points[:, 5:], axis=0) > 0.9 * (high - low)[5:]).all()
-    assert random_parameters.points(bench, NEO_HOOKEAN, 3).shape == (3, 5)
+    assert len(random_parameters.random_sets(bench, NEO_HOOKEAN, 3)) == 3
 
 
 def test_what_is_not_finite_and_not_marked_is_counted(bench, monkeypatch) -> None:

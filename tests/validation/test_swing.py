@@ -8,10 +8,11 @@ import pytest
 from pipeline.episode.signal import cutoff_hz
 from pipeline.params import load
 from pipeline.simulator.model import ClampedBand, LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from validation.campaigns.swing import PARTS, D, S, SplitPictures, _damped, landed
 from validation.synthetic import own_law_episode, pull_and_release
 
-THETA = np.array([2.2e5, 0.45, 3e-3, 0.9, 0.8])
+THETA = Parameters.of("neo_hookean", [2.2e5, 0.45, 3e-3, 0.9, 0.8])
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,7 @@ def episode(params, sling):
 def test_the_pictures_of_every_part_after_the_release_show_the_true_damping(
     params, sling, episode
 ) -> None:
-    true = THETA[D] * THETA[S]
+    true = THETA.column(D)[0] * THETA.column(S)[0]
     dampings = true * np.array([0.25, 0.5, 1.0, 2.0, 4.0])
     done = SplitPictures(params, episode, sling, _damped(THETA, dampings))
     assert done.count == {"pull": 5, "taut": 2, "swing": 13, "later": 10}

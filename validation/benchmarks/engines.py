@@ -9,10 +9,11 @@ from scipy.stats import qmc
 
 from pipeline.base.errors import UserError
 from pipeline.export.mesh import Tube, hand_path
-from pipeline.identify.objective.space import Space
+from pipeline.identify.objective.box import SearchBox
 from pipeline.params import Params
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 from validation.benchmarks.timing import available, timed
 from validation.engines import mujoco_flex
 from validation.engines.newton_vbd import Bands
@@ -42,23 +43,23 @@ def bench_peers(params: Params, device: str = "cpu") -> list[dict]:
     band = params.bands[next(iter(params.bands))]
     sling = yardstick(band, params)
     episode = pull_and_release(next(iter(params.bands)), params.episode, sling)
-    space = Space.of(params.parameters)
-    core = _ours(sling, episode, space, "cpu")
+    box = SearchBox.of(params.parameters)
+    core = _ours(sling, episode, box, "cpu")
     entries = [core, _mujoco(sling, episode, core)]
     here = core
     if kind == "cuda":
-        here = _ours(sling, episode, space, device)
+        here = _ours(sling, episode, box, device)
         entries.append(here)
     return [*entries, _newton(sling, episode, here, device)]
 
 
-def _ours(sling: ClampedBand, episode, space: Space, device: str) -> dict:
-    held = interact(sling, episode, THETA[None], device=device)  # compiles, too
+def _ours(sling: ClampedBand, episode, box: SearchBox, device: str) -> dict:
+    held = interact(sling, episode, Parameters.of(sling.law, THETA), device=device)
     force = held.force[0, np.searchsorted(held.times, episode.release_time) - 1]
     kind = device.partition(":")[0]
     count = ENVIRONMENTS[kind][0]
-    thetas = space.to_physical(qmc.LatinHypercube(5, rng=1).random(count))
-    _, cpu, wall = timed(lambda: interact(sling, episode, thetas, device=device))
+    parameters = box.parameters(box.to_physical(qmc.LatinHypercube(5, rng=1).random(count)))
+    _, cpu, wall = timed(lambda: interact(sling, episode, parameters, device=device))
     return _entry(
         "sling", f"warp {version('warp-lang')}", device, (cpu if kind == "cpu" else wall) / count,
         f"{count} random thetas at once, {sling.edges} edges, {len(held.times)} steps",

@@ -19,17 +19,16 @@ import numpy as np
 from pipeline.base.machine import named
 from pipeline.episode.episode import Episode
 from pipeline.identify.identify import evaluations_of
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.cache import EvaluationCache
 from pipeline.identify.objective.evaluate import Evaluator, simulated
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.identify.posterior.identify import fit_posterior
 from pipeline.identify.search.history import History
 from pipeline.identify.search.loop import latin_hypercube
 from pipeline.identify.search.regions import regions_asked
 from pipeline.params import Params, expect_known
 from pipeline.params.identification import LEAST_SQUARES, OptimizerParams
-from pipeline.simulator.material import THETA
 from pipeline.simulator.model import ClampedBand
 from validation.benchmarks.timing import seconds, shared, timed
 from validation.synthetic import recorded_yardstick
@@ -103,7 +102,7 @@ def time_search(
         history = evaluations_of(params, method, evaluate)
         if about.search != LEAST_SQUARES:
             return history, len(history.total)
-        start = history.best_point()
+        start = history.best_parameters(about.law)
         fit = fit_posterior(params, method, sling, [episode], start, workers=os.cpu_count())
         return history, len(history.total) + fit.rollouts
 
@@ -137,10 +136,10 @@ def _generation(
 ) -> dict:
     """Seconds of one generation: simulated, and with the loss, on all cores or GPUs."""
     evaluate = evaluator(params, method, sling, episode, devices)
-    unit = latin_hypercube(evaluate.space.dimension, count, params.optimizer.seed)
-    thetas = evaluate.space.to_physical(unit)[:, : len(THETA)]
+    unit = latin_hypercube(evaluate.box.dimension, count, params.optimizer.seed)
+    parameters = evaluate.box.parameters(evaluate.box.to_physical(unit))
     simulate = partial(simulated, sling, episode, workers=os.cpu_count())
-    simulation = seconds(partial(shared, devices, simulate, thetas))
+    simulation = seconds(partial(shared, devices, simulate, parameters))
     whole = seconds(partial(evaluate, unit))
     return {"rollouts": count, "simulation_s": simulation, "with_loss_s": whole}
 
@@ -150,7 +149,7 @@ def evaluator(
 ) -> Evaluator:
     """A method's, with nothing remembered."""
     loss = EpisodeLoss.of(params, method, episode, sling)
-    return Evaluator(episode, sling, loss, Space.of_method(params, method), devices=devices)
+    return Evaluator(episode, sling, loss, SearchBox.of_method(params, method), devices=devices)
 
 
 def _import_and_compile(
@@ -160,7 +159,7 @@ def _import_and_compile(
     import torch  # noqa: F401
 
     evaluate = evaluator(params, method, sling, episode, devices)
-    evaluate(np.full((len(devices), evaluate.space.dimension), 0.5))
+    evaluate(np.full((len(devices), evaluate.box.dimension), 0.5))
 
 
 def table(result: dict) -> str:

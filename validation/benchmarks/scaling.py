@@ -17,7 +17,6 @@ from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.objective.loss import TERMS
 from pipeline.identify.objective.session import load_episode
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.results.theta import at_points
 from pipeline.identify.search.history import History
 from pipeline.identify.search.loop import latin_hypercube
 from pipeline.params import Params, expect_known
@@ -74,19 +73,19 @@ def scaling(
     optimizer = params.optimizer.model_copy(update=BUDGETS[size])
     teams = [devices[:count] for count in _counts(len(devices))]
     evaluates = [evaluator(params, method, sling, episode, team) for team in teams]
-    space = evaluates[0].space
-    evaluates[-1](np.full((len(devices), space.dimension), 0.5))  # compiles
+    box = evaluates[0].box
+    evaluates[-1](np.full((len(devices), box.dimension), 0.5))  # compiles
 
     def generation(count: int) -> dict:
-        unit = latin_hypercube(space.dimension, count, optimizer.seed)
+        unit = latin_hypercube(box.dimension, count, optimizer.seed)
         works = [partial(evaluate, unit) for evaluate in evaluates]
         return {"rollouts": count} | _compared(works, teams, _evaluated)
 
     def launches(count: int) -> dict:
-        unit = latin_hypercube(space.dimension, count, optimizer.seed)
-        own, thetas = at_points(sling, space.to_physical(unit))
+        unit = latin_hypercube(box.dimension, count, optimizer.seed)
+        parameters = box.parameters(box.to_physical(unit))
         setup = LaunchSetup.of(params.setup, params.sling)
-        work = partial(launch, own, setup, thetas, [-DRAW, -0.15])
+        work = partial(launch, sling, setup, parameters, [-DRAW, -0.15])
         works = [partial(work, device=team) for team in teams]
         return {"launches": count} | _compared(works, teams, _launched)
 

@@ -13,14 +13,14 @@ import numpy as np
 from scipy.stats import qmc
 
 from pipeline.base.machine import named
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
-from pipeline.identify.results.theta import at_points
 from pipeline.params import Params
-from pipeline.simulator.interaction import interact, schedule_of
-from pipeline.simulator.launch import launch
+from pipeline.simulator.interaction import Rollouts, interact, schedule_of
+from pipeline.simulator.launch import Launches, launch
 from pipeline.simulator.model import LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 from pipeline.simulator.schedule import RELAX_STEPS
@@ -54,25 +54,25 @@ def bench(params: Params, device: str = "cpu", law: str = NEO_HOOKEAN) -> dict:
     kind = devices[0].partition(":")[0]
     sling, episode = recorded_yardstick(params)
     sling, setup = replace(sling, law=law), LaunchSetup.of(params.setup, params.sling)
-    space = Space.of(params.parameters, bounds=BOXES[law], law=law)
+    box = SearchBox.of(params.parameters, bounds=BOXES[law], law=law)
     loss = EpisodeLoss.of(params, next(iter(params.methods)), episode, sling)
 
-    def on_one(points: np.ndarray, **options):
-        own, thetas = at_points(sling, points)
-        return interact(own, episode, thetas, fetch=False, **options)
+    def on_one(parameters: Parameters, **options) -> Rollouts:
+        return interact(sling, episode, parameters, fetch=False, **options)
 
-    def shoot(points: np.ndarray, **options):
-        own, thetas = at_points(sling, points)
-        return launch(own, setup, thetas, np.array([[-DRAW, -0.15]]), device=devices, **options)
+    def shoot(parameters: Parameters, **options) -> Launches:
+        return launch(
+            sling, setup, parameters, np.array([[-DRAW, -0.15]]), device=devices, **options
+        )
 
     simulate = partial(shared, devices, on_one)
 
     batches = []
     for count in BATCHES[kind]:
-        unit = qmc.LatinHypercube(space.dimension, rng=1).random(count)
-        points = space.to_physical(unit)
+        unit = qmc.LatinHypercube(box.dimension, rng=1).random(count)
+        points = box.parameters(box.to_physical(unit))
         for workers in sorted({1, os.cpu_count() or 1} if kind == "cpu" else {1}):
-            evaluate = Evaluator(episode, sling, loss, space, devices=devices, workers=workers)
+            evaluate = Evaluator(episode, sling, loss, box, devices=devices, workers=workers)
             evaluate(unit[: len(devices)]), shoot(points[:1])  # what compiles
             alone = seconds(partial(simulate, points, workers=workers))
             with_loss = seconds(partial(evaluate, unit))
@@ -121,10 +121,11 @@ def first_start(device: str) -> dict[str, float]:
     """Seconds that a new process needs for one launch: with an empty kernel cache, and again."""
     code = (
         "from pipeline.params import load; p = load();"
-        "from pipeline.simulator import ClampedBand, LaunchSetup, launch;"
+        "from pipeline.simulator import ClampedBand, LaunchSetup, Parameters, launch;"
         "b = next(iter(p.bands.values())); lab = p.setup, p.sling;"
         "launch(ClampedBand.of(b, *lab), LaunchSetup.of(*lab),"
-        f" [3e5, 0.45, 2e-3, 0.5, 1.0], [-0.38, -0.2], device={device!r})"
+        "Parameters.of('neo_hookean', [3e5, 0.45, 2e-3, 0.5, 1.0]),"
+        f"[-0.38, -0.2], device={device!r})"
     )
     with tempfile.TemporaryDirectory() as cache:
         start = partial(

@@ -8,7 +8,6 @@ import numpy as np
 
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.results.theta import at_points
 from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
 from pipeline.params import Params, load
 from pipeline.simulator.interaction import interact
@@ -51,7 +50,7 @@ def params_of(band: str, switch: str) -> Params:
 def forces(band: str, outcome: Calibrated, episode: Episode) -> dict:
     """Peak and rms of the predicted force against the recorded one, and the default's loss."""
     params = params_of(band, AS_IS)
-    sling, theta = at_points(outcome.sling, outcome.point[None])
+    sling, theta = outcome.sling, outcome.theta
     loss, rollouts = EpisodeLoss.of(params, PAPER, episode, sling), interact(sling, episode, theta)
     if rollouts.failure[0]:
         return {"rollout_failed": rollouts.failure[0]}

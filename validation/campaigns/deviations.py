@@ -121,7 +121,7 @@ def scored(case: Case, work: Path, recordings: Path | None) -> dict:
     params = params_of(case.band, case.switch)
     one = identified(params, case.band, case.method, case.seed, case.episode(work))
     about = {"theta": one.theta, "youngs_modulus": one.theta["youngs_modulus"]}
-    about |= {"seconds": one.seconds, "point": one.outcome.point}
+    about |= {"seconds": one.seconds, "point": [*one.outcome.identified.values()]}
     about |= {"own_loss": one.told.get("loss", {}).get("total")}
     seen = Episode.load(case.episode(work, AS_IS) / "episode")
     about |= forces(case.band, one.outcome, seen)

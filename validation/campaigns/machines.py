@@ -38,12 +38,9 @@ from pipeline.base.schema import JsonRecord, read_json
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.results.theta import EXTRA, at_points
 from pipeline.params import Params, expect_known, load
-from pipeline.params.identification import LAWS
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
-from pipeline.simulator.material import THETA
 from validation.benchmarks.timing import environment
 from validation.campaigns.runner import OURS, PAPER
 from validation.density import found
@@ -95,14 +92,12 @@ def identified(band: str, method: str, root: Path, device: str) -> dict:
     episode = Episode.load(Layout(root).episode(band))
     outcome, _ = found(params, method, sling, [episode], devices=devices)
     seconds = time.perf_counter() - start
-    sling, theta = at_points(outcome.sling, outcome.point[None])
     loss = EpisodeLoss.of(params, method, episode, sling)
-    terms = loss.terms(interact(sling, episode, theta, device=devices[0], fetch=False))
+    terms = loss.terms(interact(sling, episode, outcome.theta, device=devices[0], fetch=False))
     total = float(loss.total(terms)[0])
-    landed = launch(sling, outcome.setup, theta, np.array(DRAWS), device=devices)
-    names = [*THETA, *LAWS[sling.law], *EXTRA]
+    landed = launch(sling, outcome.setup, outcome.theta, np.array(DRAWS), device=devices)
     return {
-        "theta": dict(zip(names, outcome.point.tolist(), strict=False)),
+        "theta": outcome.identified,
         "loss": total if np.isfinite(total) else None,
         "landing": [one if np.isfinite(one) else None for one in landed.landing_y.tolist()],
         "failure": landed.failure,

@@ -20,6 +20,7 @@ from pipeline.base.files import write_json
 from pipeline.base.machine import cores
 from pipeline.params import load
 from pipeline.params.identification import LAWS
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 from validation.benchmarks.timing import environment, timed
 from validation.campaigns.runner import OURS
@@ -32,17 +33,18 @@ BATCH = 2_000
 REPORT = "reports/validation/random-parameters-{}.json"
 
 
-def points(bench: Bench, law: str, count: int) -> np.ndarray:
-    """Random points (count, 5 + what the law adds) of the box."""
+def random_sets(bench: Bench, law: str, count: int) -> Parameters:
+    """`count` random ones of the box."""
     bounds = bench.params.methods[OURS].bounds  # of the law `rubber`
     boxes = np.array([bounds[name] for name in LAWS[law]]).reshape(-1, 2)
     own = np.random.default_rng(SEED).uniform(*boxes.T, (count, len(boxes)))
-    return np.hstack([random_thetas(bench, count, SEED), own])
+    others = dict(zip(LAWS[law], own.T, strict=True))
+    return Parameters.of(law, random_thetas(bench, count, SEED), **others)
 
 
 def surveyed(bench: Bench, law: str, count: int, progress=print) -> dict:
     """What comes of `count` rollouts and as many launches of one law, and the seconds they took."""
-    sling, sets = replace(band_of(bench), law=law), points(bench, law, count)
+    sling, sets = replace(band_of(bench), law=law), random_sets(bench, law, count)
     fast = replace(sling, grip_force=HELD_FAST)
     half = count // 2
     tasks = {

@@ -17,8 +17,8 @@ from pipeline.base.files import replacing, write_json
 from pipeline.base.schema import read_json
 from pipeline.episode.episode import Episode
 from pipeline.identify.clamps import calibrate_clamps
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.identify.posterior.launches import Observed
 from pipeline.identify.results.mounting import Mounting
 from pipeline.launching.surface.landing_map import LandingMap
@@ -93,8 +93,8 @@ def identified(
     params = params.model_copy(update={"optimizer": optimizer})
     sling, start = sling_of(params, band, method, folder), time.perf_counter()
     outcome, told = found(params, method, sling, [Episode.load(folder / "episode")])
-    seconds, names = time.perf_counter() - start, Space.of_method(params, method).names
-    theta = dict(zip(names, outcome.point.tolist(), strict=False))
+    seconds, names = time.perf_counter() - start, SearchBox.of_method(params, method).names
+    theta = {name: outcome.identified[name] for name in names}
     return RigIdentification(outcome, told, theta, seconds)
 
 
@@ -193,7 +193,7 @@ def result(
                 ]
                 outcome, told = found(here, method, sling, episodes, seen)
             scores = scored(outcome, here, world, seed=numbers[0])
-        about = {"point": outcome.point, "told": told, "identification_s": seconds}
+        about = {"point": [*outcome.identified.values()], "told": told, "identification_s": seconds}
         return plain(scores | about)
 
     return made_once(folder / "scores" / f"{name}.json", make)

@@ -25,11 +25,19 @@ from pipeline.base.layout import Layout, made
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import sling_of_method
-from pipeline.identify.results.theta import at_points, calibrated, launch_setup, load_theta, point
+from pipeline.identify.results.theta import (
+    calibrated,
+    launch_setup,
+    load_theta,
+    parameters_of,
+)
 from pipeline.params import Params, load
+from pipeline.params.identification import parameter_names
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
+from pipeline.simulator.parameters import THETA, Parameters
+from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.benchmarks.timing import environment
 from validation.campaigns.runner import OURS, PAPER
 from validation.effects import AS_IS
@@ -45,16 +53,17 @@ PARTS = {  # begin and end, s after the release
     "later": (0.5, 100.0),
 }
 DRAWS = np.array([(-0.27, -0.20), (-0.30, -0.15), (-0.33, -0.17)])  # (y, z) [m]
-D, S = 2, 4  # places of damping and its scale in theta
+D, S = "elasticity_damping", "damping_scale"
 TINY, TIMES = 1e-7, 64  # relative change of a parameter; how often
 
 
 class SplitPictures:
-    """A band's first pull as simulated at points of a sling, beside the recorded one."""
+    """A band's first pull as simulated with some parameters, beside the recorded one."""
 
-    def __init__(self, params, episode: Episode, sling: ClampedBand, points: np.ndarray) -> None:
-        self.sling, theta = at_points(sling, points)
-        rollouts = interact(self.sling, episode, theta)
+    def __init__(
+        self, params: Params, episode: Episode, sling: ClampedBand, parameters: Parameters
+    ) -> None:
+        rollouts = interact(sling, episode, parameters)
         loss = EpisodeLoss.of(params, PAPER, episode, sling)
         self.total = loss.total(loss.terms(rollouts))
         after = episode.cloud_time - episode.release_time
@@ -75,8 +84,8 @@ def by_mesh(params: Params, band: str, episode: Episode) -> dict:
     `sensitivity_cm` is how far the part's pictures alone move the geometric term over DAMPINGS;
     `reach_m` is how far beyond the fork a picture sees the middle of the band with theta as it is.
     """
-    theta, found = point(load_theta(Layout().theta(band, PAPER), band)), {}
-    own = theta[D] * theta[S]
+    theta, found = parameters_of(load_theta(Layout().theta(band, PAPER), band)), {}
+    own = float(theta.column(D)[0] * theta.column(S)[0])
     dampings = np.append(DAMPINGS, own)
     for mesh in MESHES:
         done = SplitPictures(
@@ -95,7 +104,7 @@ def by_mesh(params: Params, band: str, episode: Episode) -> dict:
             }
             for part, mean in done.mean.items()
         }
-    return {"own_damping_s": own, "own_theta": theta.tolist(), **found}
+    return {"own_damping_s": own, "own_theta": theta.theta[0].tolist(), **found}
 
 
 def sling_with(params: Params, band: str, mesh: str) -> ClampedBand:
@@ -109,7 +118,7 @@ def as_found(params: Params, band: str, results: list[dict]) -> dict:
     `landing_ratio` is the mean over DRAWS, and `hold_force_ratio` too, beside rod and rod.
     """
     found = {
-        one["switch"]: np.array(one["point"])
+        one["switch"]: Parameters.of(NEO_HOOKEAN, one["point"][: len(THETA)])
         for one in results
         if (one["band"], one["method"], one["recording"], one["seed"]) == (band, PAPER, 0, 1)
     }
@@ -117,7 +126,7 @@ def as_found(params: Params, band: str, results: list[dict]) -> dict:
     for mesh in MESHES:
         sling = sling_with(params, band, mesh)
         for whose, switch in zip(MESHES, (AS_IS, AS_TETRAHEDRA), strict=True):
-            outcome = launch(sling, setup, np.tile(found[switch], (len(DRAWS), 1)), DRAWS)
+            outcome = launch(sling, setup, found[switch], DRAWS)
             done[f"launched with {mesh}, found with {whose}"] = outcome
     first = next(iter(done.values()))
     return {
@@ -130,25 +139,27 @@ def as_found(params: Params, band: str, results: list[dict]) -> dict:
     }
 
 
-def _damped(theta: np.ndarray, dampings) -> np.ndarray:
-    """Theta with other products s d, shape (N, 5)."""
-    thetas = np.tile(theta, (len(dampings), 1))
-    thetas[:, D] = np.asarray(dampings) / theta[S]
-    return thetas
+def _damped(theta: Parameters, dampings) -> Parameters:
+    """One sample with N other products s d."""
+    return theta.changed(**{D: np.asarray(dampings) / theta.column(S)[0]})
 
 
-def landed(sling: ClampedBand, setup: LaunchSetup, points: np.ndarray) -> np.ndarray:
-    """Where DRAWS land with points (N, P) [m], shape (N, 3)."""
-    each, every = np.repeat(points, len(DRAWS), axis=0), np.tile(DRAWS, (len(points), 1))
-    sling, thetas = at_points(sling, each)
-    return launch(sling, setup, thetas, every).landing_y.reshape(len(points), -1)
+def landed(sling: ClampedBand, setup: LaunchSetup, parameters: Parameters) -> np.ndarray:
+    """Where DRAWS land with N parameters [m], shape (N, 3)."""
+    count = len(parameters)
+    each = parameters[np.repeat(np.arange(count), len(DRAWS))]
+    landing = launch(sling, setup, each, np.tile(DRAWS, (count, 1))).landing_y
+    return landing.reshape(count, -1)
 
 
 def by_rounding(params: Params, band: str, method: str, episode: Episode) -> dict:
     """How far TINY changes of all parameters move the loss, each part and landings."""
     content = load_theta(Layout().theta(band, method), band)
-    sling, best = calibrated(params, band, content), point(content)
-    points = best * (1 + TINY * np.random.default_rng(0).standard_normal((TIMES, len(best))))
+    sling, best = calibrated(params, band, content), parameters_of(content)
+    names = parameter_names(best.law)
+    tiny = 1 + TINY * np.random.default_rng(0).standard_normal((TIMES, len(names)))
+    moved = {name: best.column(name) * by for name, by in zip(names, tiny.T, strict=True)}
+    points = best.changed(**moved)
     done, landing = (
         SplitPictures(params, episode, sling, points),
         landed(sling, launch_setup(params, content), points),

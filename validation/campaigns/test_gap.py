@@ -4,6 +4,7 @@ One thing at a time is made perfect, by an oracle that may launch on the rig. No
 finds: the oracle's θ and draws live in this campaign alone.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -14,13 +15,14 @@ from scipy.stats import qmc
 
 from pipeline.base.code import ROOT
 from pipeline.base.files import write_json
-from pipeline.identify.objective.space import Space
-from pipeline.identify.results.theta import load_theta
+from pipeline.identify.objective.box import SearchBox
+from pipeline.identify.results.theta import load_theta, parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
 from pipeline.params import Params, load
 from pipeline.params.identification import STEPS
 from pipeline.report.drawing.styles import COLORS, INK, THEME
+from pipeline.simulator.parameters import EXTRA
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.floor import errors_of, trial_numbers
 from rig.oracle.world import World
@@ -45,20 +47,20 @@ def shots(params: Params, landing_map, seed: int = 1) -> np.ndarray:
     return draws[(landing > near - REACH) & (landing < far + REACH)][:SHOTS]
 
 
-def oracle_theta(launcher, space: Space, draws: np.ndarray, landing: np.ndarray, start: dict):
+def oracle_theta(launcher, box: SearchBox, draws: np.ndarray, landing: np.ndarray, start: dict):
     """θ of a method's box whose launches come nearest to landings (N,), and its misses (N,) [m].
 
     Friction takes no part in a launch and stays. Least squares from the best of STARTS points and
     from what was identified.
     """
-    free = np.array([name != "dynamic_friction" for name in space.names])
-    found = space.to_unit(np.array([start[name] for name in space.names]))
+    free = np.array([name != "dynamic_friction" for name in box.names])
+    found = box.to_unit(np.array([start[name] for name in box.names]))
 
     def misses(points: np.ndarray) -> np.ndarray:
         unit = np.tile(found, (len(points), 1))
         unit[:, free] = points
-        thetas = np.repeat(space.to_physical(unit), len(draws), axis=0)
-        landed = launcher(np.tile(draws, (len(points), 1)), thetas)
+        values = np.repeat(box.to_physical(unit), len(draws), axis=0)
+        landed = launcher(np.tile(draws, (len(points), 1)), box.parameters(values))
         good = np.array([reason is None for reason in landed.failure])
         landed = np.where(good, landed.landing_y, np.nan).reshape(len(points), -1)
         return np.where(np.isfinite(landed), landed - landing, LOST)
@@ -79,7 +81,7 @@ def oracle_theta(launcher, space: Space, draws: np.ndarray, landing: np.ndarray,
     fit = min(fits, key=lambda one: one.cost)
     unit = found.copy()
     unit[free] = fit.x
-    return dict(zip(space.names, space.to_physical(unit).tolist(), strict=True)), fit.fun
+    return dict(zip(box.names, box.to_physical(unit).tolist(), strict=True)), fit.fun
 
 
 def split(params: Params, root: Path, world: World, known: tuple, method: str) -> dict:
@@ -102,7 +104,9 @@ def split(params: Params, root: Path, world: World, known: tuple, method: str) -
     draws[AIMED] = np.array([hit(land, g, draw) for g, draw in zip(targets, own, strict=True)])
     draws[HIT] = world.hits(targets, own)
 
-    best, missed = oracle_theta(launcher, Space.of_method(params, method), *known, values)
+    beside = parameters_of(content).sample()
+    box = replace(SearchBox.of_method(params, method), fixed={name: beside[name] for name in EXTRA})
+    best, missed = oracle_theta(launcher, box, *known, values)
     fitted = content | {"theta": best, "confidence": None}
     predicted, aimed = launcher(own).landing_y, simulator(params, band, fitted, root=root)
     write_json(path, fitted)

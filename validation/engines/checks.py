@@ -10,6 +10,8 @@ from pipeline.episode.episode import Episode
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import ROD, TETRAHEDRA, ClampedBand
+from pipeline.simulator.parameters import Parameters
+from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.engines import mujoco_flex
 from validation.simulator.experiment import setup_of
 from validation.simulator.finding import Bench, Finding, Theme
@@ -105,7 +107,7 @@ def pull(bench: Bench, theta, step: float = 5e-4, **mesh) -> EnginePull:
     sling = sling_of(bench)
     episode = episode_of(sling)
     theirs = mujoco_flex.interact(sling, episode, theta, step, **mesh)
-    ours = interact(sling, episode, np.array([theta]), device=bench.device)
+    ours = interact(sling, episode, damped(theta), device=bench.device)
     force = _interpolate(theirs.times, ours.times, ours.force[0])
     first = int(np.searchsorted(episode.cloud_time, theirs.cloud_time[0]))
     frames = ours.center_line[0, first : first + len(theirs.cloud_time)]
@@ -150,7 +152,7 @@ def launch_check(
     sling, setup = sling_of(bench), setup_of(bench)
     thetas = np.array([[young, poisson, d, 1.0, 1.0] for young, poisson, d, _ in cases])
     draws = np.array([draw for *_, draw in cases])
-    ours = launch(sling, setup, thetas, draws, device=bench.device)
+    ours = launch(sling, setup, damped(thetas), draws, device=bench.device)
     theirs = [
         mujoco_flex.launch(sling, setup, theta, draw, step, **mesh)
         for theta, draw in zip(thetas, draws, strict=True)
@@ -241,8 +243,12 @@ def sling_of(bench: Bench) -> ClampedBand:
     """The first band of params.yaml, mounted as `setup` says."""
     params = bench.params
     sling = ClampedBand.of(params.bands[next(iter(params.bands))], params.setup, params.sling)
-    # MuJoCo has no air, and damps the rate of the nominal stress
-    return replace(sling, air_density=0.0, turn_damping=1.0)
+    return replace(sling, air_density=0.0)  # MuJoCo has no air
+
+
+def damped(thetas: np.ndarray) -> Parameters:
+    """Of thetas (N, 5): MuJoCo and PhysX damp the rate of the nominal stress."""
+    return Parameters.of(NEO_HOOKEAN, thetas, turn_damping=1.0)
 
 
 def _interpolate(at: np.ndarray, places: np.ndarray, rows: np.ndarray) -> np.ndarray:

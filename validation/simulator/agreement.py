@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.identify.objective.space import Space
+from pipeline.identify.objective.box import SearchBox
 from pipeline.simulator.initial import drawn_guess, hanging_guess
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import relaxation, steps
 from validation.simulator.experiment import (
@@ -31,7 +32,7 @@ SEED = 7
 def random_thetas(bench: Bench, count: int, seed: int = SEED) -> np.ndarray:
     """Of the box in params.yaml, shape (count, 5)."""
     unit = np.random.default_rng(seed).random((count, 5))
-    return Space.of(bench.params.parameters).to_physical(unit)
+    return SearchBox.of(bench.params.parameters).to_physical(unit)
 
 
 @dataclass(frozen=True)
@@ -91,14 +92,18 @@ def scenes(sling: ClampedBand, payload: float) -> dict[str, Start]:
 
 
 def compare(
-    bench: Bench, thetas: np.ndarray, sling: ClampedBand | None = None
+    bench: Bench, thetas: np.ndarray, sling: ClampedBand | None = None, **others: float
 ) -> dict[str, tuple[float, float]]:
-    """Largest difference of a scene's states and forces, by what the reference says they do."""
+    """Largest difference of a scene's states and forces, by what the reference says they do.
+
+    `others` are parameters beside thetas (N, 5).
+    """
     result = {}
     mass = bench.params.setup.projectile_mass
     for name, scene in scenes(sling or band_of(bench), mass).items():
         states, forces = [], []
-        for theta in thetas:
+        for one in thetas:
+            theta = Parameters.of(scene.sling.law, one, **others)
             start = scene.guess.copy()
             if scene.before is not None:
                 table = relaxation(scene.grip)
@@ -107,8 +112,8 @@ def compare(
             start = _turned(scene.sling, start, scene.turned)
             options = {"payload": scene.payload}
             motion = move(bench, scene.sling, theta, scene.steps, start, **options, **TIGHT)
-            band = ReferenceRod(scene.sling, tuple(theta), **options)
-            expected = march(band, scene.steps, start, friction=2 * theta[3])
+            band = ReferenceRod(scene.sling, theta, **options)
+            expected = march(band, scene.steps, start, friction=2 * one[3])
             size, pull = np.abs(expected.x - start).max(), np.abs(expected.force).max()
             states.append(np.abs(motion.x[0] - expected.x).max() / size)
             forces.append(np.abs(motion.force[0] - expected.force).max() / max(pull, 1e-9))
@@ -116,11 +121,14 @@ def compare(
     return result
 
 
-def checks(bench: Bench, count: int = 4, sling: ClampedBand | None = None) -> list[Finding]:
+def checks(
+    bench: Bench, count: int = 4, sling: ClampedBand | None = None, **others: float
+) -> list[Finding]:
     against = "NumPy reference implementation, Newton's method to rounding"
     note = f"{count} random θ of the box, double precision"
     result = []
-    for name, (states, forces) in compare(bench, random_thetas(bench, count), sling).items():
+    found = compare(bench, random_thetas(bench, count), sling, **others)
+    for name, (states, forces) in found.items():
         result.append(
             Finding(f"states of a band {name}", against, states, "of its motion", LIMIT, note)
         )

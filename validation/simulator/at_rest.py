@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.simulator import launch
 from pipeline.simulator.model import GRAVITY
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip
 from validation.simulator import figures
 from validation.simulator.closed import String, cantilever, clamped_beam
@@ -57,7 +58,14 @@ def straight_pull(
     sling = straight(sling, (stretch + 1) * half)
     target = (stretch * half - sling.half_width, 0.0, 0.0)
     start = straight_guess(sling, stretch * half)
-    motion = move(bench, sling, theta, settling(Grip.HELD, target), start, gravity=0.0)
+    motion = move(
+        bench,
+        sling,
+        Parameters.of(sling.law, theta),
+        settling(Grip.HELD, target),
+        start,
+        gravity=0.0,
+    )
     measured = np.where(motion.failed, np.nan, -motion.force[:, -1, 0])
     return measured, np.array([float(String.of(sling, one).force(stretch)) for one in theta])
 
@@ -67,7 +75,10 @@ def drawn_pull(bench: Bench, depth: float, theta: np.ndarray) -> tuple[np.ndarra
     sling, setup = replace(band_of(bench), mass=1e-4), setup_of(bench, projectile_mass=1e-6)
     half = np.hypot(depth, sling.half_width)
     stretch = 2 * half / sling.rest_length
-    done = launch(sling, setup, theta, [-depth, 0.0], device=bench.device, workers=bench.workers)
+    parameters = Parameters.of(sling.law, theta)
+    done = launch(
+        sling, setup, parameters, [-depth, 0.0], device=bench.device, workers=bench.workers
+    )
     strings = [String.of(sling, one) for one in theta]
     expected = [2 * float(one.force(stretch)) * depth / half for one in strings]
     return done.hold_force, np.array(expected)
@@ -128,9 +139,8 @@ def _beam(
     sling = with_edges(band_of(bench), times)
     young = BEAM_YOUNG
     sling = straight(sling, sling.rest_length, clamped=clamped, mass=sling.mass / 200)
-    sections = rest(
-        bench, sling, [young, poisson, 2e-3, 0.5, 1.0], straight_guess(sling), double=double
-    )
+    theta = Parameters.of(sling.law, [young, poisson, 2e-3, 0.5, 1.0])
+    sections = rest(bench, sling, theta, straight_guess(sling), double=double)
     load = sling.mass * GRAVITY / sling.rest_length
     rigidity = young * np.pi * sling.radius**4 / 4
     both = all(clamped)
@@ -177,14 +187,15 @@ def torque_ratio(bench: Bench, angle: float, poisson: float) -> float:
     """Torque on the last clamp over G J angle / L, from the energy of the band at rest."""
     sling = band_of(bench)
     sling = straight(sling, sling.rest_length, clamp_twist=angle)
-    theta = (1e6, poisson, 2e-3, 0.5, 1.0)
+    young = 1e6
+    theta = Parameters.of(sling.law, [young, poisson, 2e-3, 0.5, 1.0])
     sections = rest(bench, sling, theta, straight_guess(sling), gravity=0.0, **TIGHT)
     step = 1e-5
     sides = [
         ReferenceRod(replace(sling, clamp_twist=angle + turn), theta).elastic(sections)
         for turn in (step, -step)
     ]
-    shear = theta[0] / (2 * (1 + poisson))
+    shear = young / (2 * (1 + poisson))
     expected = shear * np.pi * sling.radius**4 / 2 * angle / sling.rest_length
     return (sides[0] - sides[1]) / (2 * step) / expected
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from pipeline.simulator.material import material
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class String:
     Attributes:
         mu, lam: As `model.material` gives them [Pa].
         damping, scale: d [s] and s.
+        turn_damping: Share of the damping that brakes turns.
     """
 
     sling: ClampedBand
@@ -33,10 +35,13 @@ class String:
     lam: float
     damping: float
     scale: float
+    turn_damping: float = 0.0
 
     @classmethod
-    def of(cls, sling: ClampedBand, theta) -> String:
-        return cls(sling, *list(material(sling, np.array([theta]))[0].tolist())[:4])
+    def of(cls, sling: ClampedBand, theta, turn_damping: float = 0.0) -> String:
+        """Of THETA's values (5,)."""
+        coefficients = material(sling, Parameters.of(sling.law, theta))[0].tolist()
+        return cls(sling, *list(coefficients)[:4], turn_damping)
 
     def volume(self, stretch):
         """J at a stretch."""
@@ -77,7 +82,7 @@ class String:
     def transverse(self, stretch: float) -> tuple[float, float]:
         """The same across the band, k = 4 T / (l L): c is what brakes a turn of s d k."""
         k = 4 * float(self.force(stretch)) / (stretch * self.sling.rest_length)
-        return k, self.sling.turn_damping * self.scale * self.damping * k
+        return k, self.turn_damping * self.scale * self.damping * k
 
 
 def cantilever(load: float, length: float, rigidity: float) -> float:

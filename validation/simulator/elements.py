@@ -6,7 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.simulator import ClampedBand, Launches, LaunchSetup, Rollouts, interact, launch
+from pipeline.simulator import (
+    ClampedBand,
+    Launches,
+    LaunchSetup,
+    Parameters,
+    Rollouts,
+    interact,
+    launch,
+)
 from pipeline.simulator.initial import sections_of
 from pipeline.simulator.interaction import schedule_of
 from pipeline.simulator.model import GRAVITY, ROD, TETRAHEDRA
@@ -93,11 +101,11 @@ def bending(sling: ClampedBand, poissons=POISSON) -> np.ndarray:
     nodes = np.zeros((beam.sections, 3))
     nodes[:, 0] = beam.arc - beam.half_width
     table = statics(Grip.FREE)
-    thetas = np.array([[young, nu, 2e-3, 0.5, 1.0] for nu in poissons])
+    thetas = [[young, nu, 2e-3, 0.5, 1.0] for nu in poissons]
     done = run(
         beam,
         Schedule(table, first_free=len(table)),
-        Slings.of(beam, thetas, sections_of(beam, nodes)),
+        Slings.of(beam, Parameters.of(beam.law, thetas), sections_of(beam, nodes)),
         options=Options(double=True),
     )
     load = beam.mass * GRAVITY / beam.rest_length
@@ -115,13 +123,16 @@ def pull(
     half = np.hypot(depths, light.half_width)
     tension = String.of(light, theta).force(2 * half / light.rest_length)
     draws = np.column_stack([-np.array(depths), np.zeros(len(depths))])
-    return launch(light, setup, theta, draws).hold_force / (2 * tension * depths / half)
+    return launch(light, setup, Parameters.of(light.law, theta), draws).hold_force / (
+        2 * tension * depths / half
+    )
 
 
 def measure(bench: Bench, sling: ClampedBand, count: int = COUNT) -> Figures:
     band = next(iter(bench.params.bands))
     episode = pull_and_release(band, bench.params.episode, sling)
     setup, (thetas, draws) = setup_of(bench), random_launches(count)
+    thetas = Parameters.of(sling.law, thetas)
     firm = replace(sling, grip_force=1e6)  # no theta slips out of it
     launch(sling, setup, thetas[:1], draws[:1])  # compiles
     rollouts, rollout_seconds, _ = timed(lambda: interact(firm, episode, thetas))

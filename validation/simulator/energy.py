@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.interaction import schedule_of
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip, Mode
 from pipeline.simulator.schedule import RELAX_STEPS
 from validation.simulator import figures
@@ -88,7 +89,7 @@ def remembered(
     """Of states (S, L, 9) after steps from `start`, relaxed; steps at rest forget all."""
     columns = rod.columns(np.concatenate([start[None], x]))
     stress = rod.uniaxial(rod.stretch(columns))
-    weight, carried = rod.sling.relaxation, np.zeros((len(x), rod.sling.edges))
+    weight, carried = rod.value("relaxation"), np.zeros((len(x), rod.sling.edges))
     overstress = np.zeros((len(x) + 1, rod.sling.edges, table["forget"].shape[1]))
     moving = table["mode"] == Mode.MOVE
     follow = np.where(moving[:, None], table["follow"], 0.0)
@@ -101,12 +102,18 @@ def remembered(
     return Remembered(carried, weight * follow.sum(-1)[:, None], free[1:], lost)
 
 
-def balance(bench: Bench, theta=THETA, sling: ClampedBand | None = None) -> Balance:
-    """The bench's pull and release in double precision, every step of it accounted for."""
+def balance(
+    bench: Bench, theta=THETA, sling: ClampedBand | None = None, **others: float
+) -> Balance:
+    """The bench's pull and release in double precision, every step of it accounted for.
+
+    `others` are parameters beside `theta` (5,).
+    """
     sling = sling or band_of(bench)
+    parameters = Parameters.of(sling.law, theta, **others)
     episode = pull_and_release("band", bench.params.episode, sling)
     table = schedule_of(sling, episode).steps
-    motion = move(bench, sling, theta, table, hanging_guess(sling), double=True)
+    motion = move(bench, sling, parameters, table, hanging_guess(sling), double=True)
     first = RELAX_STEPS - 1  # the band hangs
     rows = table[first + 1 :]
     x1, x = motion.x[0, first:-1], motion.x[0, first + 1 :]
@@ -114,7 +121,7 @@ def balance(bench: Bench, theta=THETA, sling: ClampedBand | None = None) -> Bala
     v2 = np.concatenate([v1[:1], v1[:-1]])
     past, beta = (rows[name][:, None, None] for name in ("past", "beta"))
     moved = x - x1
-    rod = ReferenceRod(sling, tuple(theta))
+    rod = ReferenceRod(sling, parameters)
     memory = remembered(rod, table, motion.start[0], motion.x[0])
     carried, following = memory.carried[first + 1 :], memory.following[first + 1 :]
     free, lost = memory.free[first + 1 :], memory.lost[first + 1 :]

@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.simulator.initial import fixed_frames, sections_of
 from pipeline.simulator.model import ClampedBand, LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip, Mode
 from pipeline.simulator.schedule import Schedule, statics, steps
 from pipeline.simulator.solver import Frames, Options, Slings, run
@@ -82,25 +83,26 @@ def settling(grip: Grip = Grip.FREE, target=(0.0, 0.0, 0.0)) -> np.ndarray:
 
 
 def move(
-    bench: Bench, sling: ClampedBand, thetas, table: np.ndarray, start: np.ndarray, *,
+    bench: Bench, sling: ClampedBand, parameters: Parameters, table: np.ndarray,
+    start: np.ndarray, *,
     payload: float = 0.0, unrelaxed=0.0, **options,
 ) -> Trajectories:  # fmt: skip
-    """Step N thetas (N, 5) from `start` (N, L, 9) or (L, 9), at rest, through steps (S,).
+    """Step N parameters from `start` (N, L, 9) or (L, 9), at rest, through steps (S,).
 
     Other options are those of the solver.
     """
-    thetas, start = np.atleast_2d(thetas), np.array(start, float)
+    start = np.array(start, float)
     start[..., -1, 3:] = fixed_frames(sling)[1].ravel()  # the last clamp's, whatever was before
     count = len(table)
     done = run(
         sling,
         Schedule(table, first_free=count),
-        Slings.of(sling, thetas, start, payload=payload, unrelaxed=unrelaxed),
+        Slings.of(sling, parameters, start, payload=payload, unrelaxed=unrelaxed),
         Frames(np.arange(count), np.ones(count), width=9),
         Options(bench.device, bench.workers, **options),
     )
     x = done.frames.astype(float)
-    start = np.broadcast_to(start, (len(thetas), *x.shape[2:]))
+    start = np.broadcast_to(start, (len(parameters), *x.shape[2:]))
     return Trajectories(
         table,
         start,
@@ -129,8 +131,10 @@ def rates(
     return v, at
 
 
-def rest(bench: Bench, sling: ClampedBand, theta, start, *, table=None, **options) -> np.ndarray:
+def rest(
+    bench: Bench, sling: ClampedBand, parameters: Parameters, start, *, table=None, **options
+) -> np.ndarray:
     """Sections (L, 9) of one band at rest."""
     table = settling() if table is None else table
-    motion = move(bench, sling, theta, table, start, **options)
+    motion = move(bench, sling, parameters, table, start, **options)
     return np.full_like(motion.x[0, -1], np.nan) if motion.failed[0] else motion.x[0, -1]

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.simulator import ClampedBand, interact
+from pipeline.simulator import ClampedBand, Parameters, interact
 from pipeline.simulator.records import Grip
+from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.simulator.at_rest import STRING
 from validation.simulator.closed import String
 from validation.simulator.damping import oscillate
@@ -20,22 +21,23 @@ THIN = f"a string {STRING} times thinner than the band"
 SLIP = "the band slipped out of the fingers"
 
 
-def _with(**changes: float) -> list[float]:
-    names = ("young", "poisson", "damping", "friction", "scale")
-    return [changes.get(name, value) for name, value in zip(names, THETA, strict=True)]
+def _with(**changes: float | np.ndarray) -> Parameters:
+    return Parameters.of(NEO_HOOKEAN, THETA).changed(**changes)
 
 
-def held_force(bench: Bench, sling: ClampedBand, thetas: list, when: float = 7.9) -> np.ndarray:
+def held_force(
+    bench: Bench, sling: ClampedBand, parameters: Parameters, when: float = 7.9
+) -> np.ndarray:
     """Force (N,) on the hand in the yardstick's pause before the release."""
     episode = pull_and_release("band", bench.params.episode, sling)
-    done = interact(sling, episode, np.array(thetas), device=bench.device, workers=bench.workers)
+    done = interact(sling, episode, parameters, device=bench.device, workers=bench.workers)
     force = np.linalg.norm(done.force[:, np.argmin(np.abs(done.times - when))], axis=1)
     return np.where([reason is None for reason in done.failure], force, np.nan)
 
 
 def young(bench: Bench) -> list[Finding]:
     sling = replace(band_of(bench), mass=1e-4, grip_force=1e5)
-    one, two = held_force(bench, sling, [_with(), _with(young=2 * THETA[0])])
+    one, two = held_force(bench, sling, _with(youngs_modulus=THETA[0] * np.array([1.0, 2.0])))
     return [
         Finding(
             "held force at 2 E over that at E",
@@ -55,12 +57,12 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Finding]:
     half = sling.rest_length / 2
     sling = straight(sling, (stretch + 1) * half)
     target = (stretch * half - sling.half_width, 0.0, 0.0)
-    thetas = [_with(poisson=nu) for nu in (0.30, 0.49)]
+    thetas = _with(poissons_ratio=np.array([0.30, 0.49]))
     motion = move(
         bench, sling, thetas, settling(Grip.HELD, target), straight_guess(sling, stretch * half),
         gravity=0.0, double=True,
     )  # fmt: skip
-    strings = [String.of(sling, theta) for theta in thetas]
+    strings = [String.of(sling, theta) for theta in thetas.theta]
     edge = sling.middle // 2  # away from the ends
     sections = motion.x[:, -1]
     g = (sections[:, edge + 1, :3] - sections[:, edge, :3]) / sling.edge_lengths[edge]
@@ -92,7 +94,7 @@ def damping(bench: Bench) -> list[Finding]:
     """Decay of the heavy middle: d scales it, s its shape part and not its volume part."""
 
     def decay(d: float, s: float) -> tuple[float, float]:
-        theta = _with(young=1e6, poisson=0.30, damping=d, scale=s)
+        theta = (1e6, 0.30, d, THETA[3], s)
         _, _, fitted, closed = oscillate(bench, theta)
         return fitted[1], closed[1]
 
@@ -133,9 +135,7 @@ def friction(bench: Bench, count: int = 33) -> list[Finding]:
     """Coulomb: pads with the normal force N hold a pull of 2 mu N; then they open."""
     sling = band_of(bench)
     episode = pull_and_release("band", bench.params.episode, sling)
-    strong = interact(
-        replace(sling, grip_force=1e5), episode, np.array([_with()]), device=bench.device
-    )
+    strong = interact(replace(sling, grip_force=1e5), episode, _with(), device=bench.device)
     held = strong.times <= episode.release_time + 1e-9
     force = np.linalg.norm(strong.force[0], axis=1)
     peak = force[held].max()
@@ -144,7 +144,7 @@ def friction(bench: Bench, count: int = 33) -> list[Finding]:
     done = interact(
         sling,
         episode,
-        np.array([_with(friction=mu) for mu in tries]),
+        _with(dynamic_friction=tries),
         device=bench.device,
         workers=bench.workers,
     )
@@ -154,7 +154,7 @@ def friction(bench: Bench, count: int = 33) -> list[Finding]:
     found = tries[holds].min() if holds.any() and named else np.nan
 
     mu = max(2 * least, 0.05)
-    open_ = interact(sling, episode, np.array([_with(friction=mu)]), device=bench.device)
+    open_ = interact(sling, episode, _with(dynamic_friction=mu), device=bench.device)
     size, times = np.linalg.norm(open_.force[0], axis=1), open_.times - episode.release_time
     first = np.argmin(np.abs(times))
     window = (times > 1e-9) & (times <= sling.finger_opening_time)

@@ -6,6 +6,7 @@ import numpy as np
 
 from pipeline.simulator.initial import sections_of
 from pipeline.simulator.model import GRAVITY, ClampedBand
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import steps
 from validation.simulator.experiment import TIGHT, band_of, launched, move, straight, straight_guess
@@ -56,7 +57,8 @@ def free_fall(bench: Bench, count: int = 60) -> list[Finding]:
         table = steps(times, times[1], grip=Grip.FREE, order=order)
         for field, value in {"past": 0, "beta": 1}.items():
             table[field][0] = value
-        motion = move(bench, sling, THETA, table, straight_guess(sling), **TIGHT)
+        theta = Parameters.of(sling.law, THETA)
+        motion = move(bench, sling, theta, table, straight_guess(sling), **TIGHT)
         miss = np.abs(motion.x[0, :, :, 2] - fall_of_a_point(times, order)[1:, None]).max()
         fallen = -motion.x[0, -1, 0, 2]
         checks.append(
@@ -107,7 +109,7 @@ def recoil(bench: Bench, h: float, order: int, damping: float, span: float = 0.0
     """
     sling = loose_band(bench)
     sections = bent(sling)
-    theta = (THETA[0], THETA[1], damping, *THETA[3:])
+    theta = Parameters.of(sling.law, THETA).changed(elasticity_damping=damping)
     table = launched(h, int(round(span / h)), order)
     motion = move(bench, sling, theta, table, sections, gravity=0.0, **TIGHT)
     x, v = motion.x[0], motion.v[0]

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pipeline.simulator import ClampedBand, Launches, launch
+from pipeline.simulator import ClampedBand, Launches, Parameters, launch
 from pipeline.simulator.initial import drawn_guess
 from pipeline.simulator.launch import schedule_of
-from pipeline.simulator.model import GRAVITY
+from pipeline.simulator.model import GRAVITY, LaunchHistory
 from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import relaxation
 from validation.simulator.experiment import band_of, rest, setup_of
@@ -72,10 +72,12 @@ def convergence(
     meshes=(2, 4),
     progress=print,
     sling: ClampedBand | None = None,
-    **changes,
+    history: LaunchHistory | None = None,
+    **others: float,
 ) -> list[Finding]:
     sling, (thetas, draws) = sling or band_of(bench), random_launches(count)
-    setup = setup_of(bench, **changes)
+    setup = setup_of(bench, history=history)
+    thetas = Parameters.of(sling.law, thetas, **others)
     default = launch(sling, setup, thetas, draws, device=bench.device, workers=bench.workers)
     finer = {f"{REFINE} times finer steps": (sling, {"refine": REFINE})}
     finer |= {f"a mesh {n} times finer": (with_edges(sling, n), {}) for n in meshes}
@@ -108,10 +110,11 @@ def convergence(
 def order_in_time(bench: Bench, count: int = COUNT) -> list[Finding]:
     """Observed order of each launch's speed, from the default steps to the finest of REFINED."""
     sling, setup, (thetas, draws) = band_of(bench), setup_of(bench), random_launches(count)
+    parameters = Parameters.of(sling.law, thetas)
 
     def speed(refine: int) -> np.ndarray:
         common = {"device": bench.device, "workers": bench.workers}
-        return launch(sling, setup, thetas, draws, double=True, refine=refine, **common).speed
+        return launch(sling, setup, parameters, draws, double=True, refine=refine, **common).speed
 
     finest = speed(REFERENCE)
     errors = np.array([np.abs(speed(refine) / finest - 1) for refine in REFINED])
@@ -150,17 +153,19 @@ def _flight(y: float, z: float, speed: float, angle: float, floor: float) -> flo
 def physics(bench: Bench, count: int = COUNT) -> list[Finding]:
     """Ballistic flight, and the energy that the drawn band holds."""
     sling, setup, (thetas, draws) = band_of(bench), setup_of(bench), random_launches(count)
-    done = launch(sling, setup, thetas, draws, device=bench.device, workers=bench.workers)
+    parameters = Parameters.of(sling.law, thetas)
+    done = launch(sling, setup, parameters, draws, device=bench.device, workers=bench.workers)
     state = zip(done.separation_y, done.separation_z, done.speed, done.angle, strict=True)
     flights = [_flight(*one, -setup.fork_height) for one in state]
     shares = []
-    for k, (theta, draw) in enumerate(zip(thetas, draws, strict=True)):
+    for k, draw in enumerate(draws):
+        theta = parameters[[k]]
         table = relaxation(Grip.POUCH)
         table["target"] = 0.0, *draw
         drawn = rest(
             bench, sling, theta, drawn_guess(sling, draw[None])[0], table=table, double=True
         )
-        rod = ReferenceRod(sling, tuple(theta))
+        rod = ReferenceRod(sling, theta)
         lift = setup.projectile_mass * GRAVITY * (done.separation_z[k] - draw[1])
         gained = setup.projectile_mass / 2 * done.speed[k] ** 2 + lift
         shares.append(gained / rod.elastic(drawn))

@@ -41,7 +41,7 @@ def march(
         direction: Of the pull that opening pads resist, until a held step says, shape (3,).
         unrelaxed: What share of a stress at rest the branches carry besides, shape (8,).
     """
-    middle = rod.sling.middle
+    middle, weight = rod.sling.middle, rod.value("relaxation")
     x1 = x2 = np.array(start, float)
     v1 = v2 = np.zeros_like(x1)
     offset, pull, direction = None, 0.0, np.asarray(direction, float)
@@ -58,8 +58,8 @@ def march(
             rod,
             share=step["bending"],
             gripped=grip == Grip.HELD,
-            carried=rod.sling.relaxation * (forget * overstress - np.outer(stress, follow)).sum(-1),
-            following=rod.sling.relaxation * np.sum(follow),
+            carried=weight * (forget * overstress - np.outer(stress, follow)).sum(-1),
+            following=weight * np.sum(follow),
         )
         free = _free(band)
         at = x1 + h * v1

@@ -18,6 +18,7 @@ import numpy as np
 from pipeline.simulator.initial import fixed_frames
 from pipeline.simulator.material import material
 from pipeline.simulator.model import GRAVITY, ClampedBand
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import RUBBER, TIMES
 
 TURNS = 1e-2  # of the modulus: keeps the spin of an unstressed edge regular
@@ -52,6 +53,7 @@ class ReferenceRod:
     """One band with one theta.
 
     Attributes:
+        theta: One sample.
         gravity: Along -z [m/s^2].
         payload: Mass at the middle node [kg].
         gripped: The fingers hold the direction of the middle.
@@ -61,7 +63,7 @@ class ReferenceRod:
     """
 
     sling: ClampedBand
-    theta: tuple[float, ...]
+    theta: Parameters
     gravity: float = GRAVITY
     payload: float = 0.0
     gripped: bool = False
@@ -72,7 +74,11 @@ class ReferenceRod:
     @property
     def parameters(self) -> tuple[float, ...]:
         """mu, lam, d, s of state.h."""
-        return material(self.sling, np.array([self.theta]))[0].tolist()[:4]
+        return material(self.sling, self.theta)[0].tolist()[:4]
+
+    def value(self, name: str) -> float:
+        """Of a parameter; 0 where the law has none."""
+        return self.theta.sample().get(name, 0.0)
 
     # ---- edges
 
@@ -114,7 +120,7 @@ class ReferenceRod:
 
         Mooney and Rivlin's; below STRAIGHT the stress goes on straight.
         """
-        mu, share = self.parameters[0], self.sling.mooney_share if share is None else share
+        mu, share = self.parameters[0], self.value("mooney_share") if share is None else share
         at = np.where(np.real(stretch) > STRAIGHT, stretch, STRAIGHT)
         past = stretch - at
         stress = (at - at**-2) * (1 - share + share / at)
@@ -140,7 +146,7 @@ class ReferenceRod:
         q = self.stretch_at(kept)
         free = self.uniaxial(stretch, -1) - self.uniaxial(q, -1) - kept * (stretch - q)
         lost = overstress * (stretch - q) / TIMES
-        volume = self.sling.relaxation * self.sling.area * self.sling.edge_lengths
+        volume = self.value("relaxation") * self.sling.area * self.sling.edge_lengths
         return tuple((one.sum(-1) * volume).sum(-1) for one in (free, lost))
 
     def viscous_stress(self, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -160,7 +166,7 @@ class ReferenceRod:
         p = np.clip(lam * (j - 1) - mu, least, 0.7 * bound)
         holds = min(HOLDS / max(d * s, 1e-30), 1)
         holds = holds * np.clip((TAUT - self.stretch(f)) / (TAUT - 1), 0, 1)
-        braked = np.maximum(self.sling.turn_damping, np.where(j > 0, holds, 1))
+        braked = np.maximum(self.value("turn_damping"), np.where(j > 0, holds, 1))
         if self.sling.law == RUBBER:  # as the relaxed stress grows against the neo-Hookean
             stretch = np.maximum(self.stretch(f), STRAIGHT)
             s = s * (self.uniaxial(stretch, 1) / self.uniaxial(stretch, 1, share=0.0))
@@ -202,7 +208,7 @@ class ReferenceRod:
         sizes = np.array([*sizes, *sling.edge_lengths[middle:], 0.0])
         per_length = self.share * sling.area * self.parameters[0] * 2 / (sizes[1:] + sizes[:-1])
         per_length[[0, -1]] *= sling.clamped
-        bending = material(sling, np.array([self.theta]))["bending"]
+        bending = material(sling, self.theta)["bending"]
         return bending * per_length, sling.radius**2 / 4 * per_length
 
     def _joint_forces(self, x, rate, at, bounded: bool) -> np.ndarray:

@@ -8,10 +8,9 @@ from itertools import product
 
 import numpy as np
 
-from pipeline.identify.objective.space import Space
-from pipeline.identify.results.theta import at_points
-from pipeline.params.identification import LAWS
-from pipeline.simulator import THETA, ClampedBand, interact, launch
+from pipeline.identify.objective.box import SearchBox
+from pipeline.simulator import THETA, ClampedBand, Parameters, interact, launch
+from pipeline.simulator.parameters import EXTRA
 from validation.simulator.agreement import random_thetas
 from validation.simulator.experiment import band_of, setup_of
 from validation.simulator.finding import Bench, Finding, Theme
@@ -23,18 +22,20 @@ UNCONVERGED = "the simulation did not converge"
 ALLOWED = 10  # of 10,000 that did not converge, each marked so
 
 
-def corners(bench: Bench) -> np.ndarray:
-    """Thetas (32, 5) at a bound of the box each."""
+def corners(bench: Bench) -> Parameters:
+    """At a bound of the box each, 32."""
     unit = np.array(list(product((0.0, 1.0), repeat=len(THETA))))
-    return Space.of(bench.params.parameters).to_physical(unit)
+    box = SearchBox.of(bench.params.parameters)
+    return box.parameters(box.to_physical(unit))
 
 
-def on_faces(bench: Bench, count: int) -> np.ndarray:
-    """Random thetas (count, 5) of the box, one parameter of each at a bound, every one in turn."""
+def on_faces(bench: Bench, count: int) -> Parameters:
+    """`count` random ones of the box, one parameter of each at a bound, every one in turn."""
     unit = np.random.default_rng(SEED).random((count, len(THETA)))
     turn = np.arange(count)
     unit[turn, turn % len(THETA)] = turn // len(THETA) % 2
-    return Space.of(bench.params.parameters).to_physical(unit)
+    box = SearchBox.of(bench.params.parameters)
+    return box.parameters(box.to_physical(unit))
 
 
 def ranges(thetas: list[dict[str, float]], names=THETA) -> str:
@@ -48,29 +49,28 @@ def ranges(thetas: list[dict[str, float]], names=THETA) -> str:
 
 
 def survey(
-    bench: Bench, sling: ClampedBand, thetas: np.ndarray, progress=print, batch: int = BATCH
+    bench: Bench, sling: ClampedBand, parameters: Parameters, progress=print, batch: int = BATCH
 ) -> dict:
-    """Roll thetas (N, 5), or points with what the law adds, out; count what comes of them."""
+    """Roll N parameters out; count what comes of them."""
     episode = pull_and_release("band", bench.params.episode, sling)
     reasons, bad, farthest, failed = Counter(), 0, 0.0, []
-    for first in range(0, len(thetas), batch):
-        part = thetas[first : first + batch]
-        own, theta = at_points(sling, part)
-        done = interact(own, episode, theta, device=bench.device, workers=bench.workers)
+    for first in range(0, len(parameters), batch):
+        part = parameters[first : first + batch]
+        done = interact(sling, episode, part, device=bench.device, workers=bench.workers)
         good = np.array([reason is None for reason in done.failure])
         reasons.update(reason for reason in done.failure if reason is not None)
         lines, force = done.center_line[good], done.force[good]
         bad += int(np.sum(~np.isfinite(lines).all((1, 2, 3)) | ~np.isfinite(force).all((1, 2))))
         farthest = max(farthest, float(np.linalg.norm(lines, axis=3).max(initial=0)))
         failed += [
-            dict(zip((*THETA, *LAWS[sling.law]), map(float, part[k]), strict=True))
+            {name: value for name, value in part.sample(k).items() if name not in EXTRA}
             for k in np.flatnonzero(~good)
             if done.failure[k] == UNCONVERGED
         ]
         if first // batch % 4 == 3:
-            progress(f"  {first + len(part)}/{len(thetas)} rollouts, {dict(reasons)}")
+            progress(f"  {first + len(part)}/{len(parameters)} rollouts, {dict(reasons)}")
     return {
-        "rollouts": len(thetas),
+        "rollouts": len(parameters),
         "reasons": dict(reasons),
         "unconverged": failed,
         "not_finite": bad,
@@ -78,17 +78,18 @@ def survey(
     }
 
 
-def survey_launches(bench: Bench, sling: ClampedBand, thetas: np.ndarray) -> dict:
-    """Launch with all thetas from random draws of the arm's box, and count what comes of them."""
+def survey_launches(bench: Bench, sling: ClampedBand, parameters: Parameters) -> dict:
+    """Launch with all from random draws of the arm's box, and count what comes of them."""
     rng, box = np.random.default_rng(SEED), bench.params.setup
-    draws = np.column_stack([rng.uniform(*ends, len(thetas)) for ends in (box.draw_y, box.draw_z)])
-    own, theta = at_points(sling, thetas)
+    draws = np.column_stack(
+        [rng.uniform(*ends, len(parameters)) for ends in (box.draw_y, box.draw_z)]
+    )
     options = {"device": bench.device, "workers": bench.workers}
-    done = launch(own, setup_of(bench), theta, draws, **options)
+    done = launch(sling, setup_of(bench), parameters, draws, **options)
     good = np.array([reason is None for reason in done.failure])
     outcome = np.column_stack([done.landing_y, done.speed, done.angle, done.hold_force])
     return {
-        "launches": len(thetas),
+        "launches": len(parameters),
         "reasons": dict(Counter(reason for reason in done.failure if reason is not None)),
         "not_finite": int(np.sum(~np.isfinite(outcome[good]).all(1))),
     }
@@ -101,7 +102,8 @@ def section(
     faces: int = FACES,
     progress=print,
 ) -> Theme:
-    sling, thetas = band_of(bench), random_thetas(bench, count, SEED)
+    sling = band_of(bench)
+    thetas = Parameters.of(sling.law, random_thetas(bench, count, SEED))
     fast = replace(sling, grip_force=HELD_FAST)
     held = survey(bench, fast, thetas, progress)
     edges = {

@@ -9,11 +9,11 @@ from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.optimize import least_squares
 
-from pipeline.identify.objective.space import Space
-from pipeline.params.identification import LAWS
+from pipeline.identify.objective.box import SearchBox
+from pipeline.params.identification import parameter_names
 from pipeline.simulator.initial import drawn_guess
-from pipeline.simulator.material import THETA
 from pipeline.simulator.model import ClampedBand, LaunchHistory
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip
 from pipeline.simulator.rubber import RUBBER, TIMES
 from pipeline.simulator.schedule import steps
@@ -44,9 +44,13 @@ HISTORY = LaunchHistory(pull_time=4.0, pause=2.0)
 SEED = 5
 
 
-def rubber_of(bench: Bench, share: float = 0.3, weight: float = WEIGHT) -> ClampedBand:
-    sling = band_of(bench)
-    return replace(sling, law=RUBBER, mooney_share=share, relaxation=weight)
+def rubber_of(bench: Bench) -> ClampedBand:
+    return replace(band_of(bench), law=RUBBER)
+
+
+def own(share: float = 0.3, weight: float = WEIGHT) -> dict[str, float]:
+    """Parameters that the law has of its own."""
+    return {"mooney_share": share, "relaxation": weight}
 
 
 def stress(stretch, share: float):
@@ -58,35 +62,38 @@ def slope(stretch: float, share: float) -> float:
     return (1 - share) * (1 + 2 * stretch**-3) + 3 * share * stretch**-4
 
 
-def _string(bench: Bench, share: float, weight: float, lighter: float = 1.0) -> ClampedBand:
+def _string(bench: Bench, lighter: float = 1.0) -> ClampedBand:
     """A straight, thin, light band at its rest length, to be drawn across at its middle."""
-    sling = rubber_of(bench, share, weight)
+    sling = rubber_of(bench)
     sling = replace(sling, radius=sling.radius / THIN, mass=sling.mass / THIN**2 / lighter)
     return straight(sling, sling.rest_length)
 
 
 def drawn_across(
-    bench: Bench, sling: ClampedBand, stretch: np.ndarray, times: np.ndarray
+    bench: Bench, sling: ClampedBand, stretch: np.ndarray, times: np.ndarray, **own: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pull along the band [N] over A mu as its middle is drawn to stretches (T,), and the times."""
-    theta = np.array([1e6, FULL, 2e-4, 0.5, 1.0])
+    young = 1e6
+    theta = Parameters.of(RUBBER, [young, FULL, 2e-4, 0.5, 1.0], **own)
     depth = sling.rest_length / 2 * np.sqrt(np.maximum(stretch**2 - 1, 0))
     table = steps(times, np.diff(times)[0], grip=Grip.POUCH)
     table["target"][:, 1] = -depth[1:]
     motion = move(bench, sling, theta, table, straight_guess(sling), gravity=0.0, double=True)
     half = np.hypot(depth[1:], sling.half_width)
     pull = motion.force[0, :, 1] * half / depth[1:].clip(1e-9) / 2
-    return pull / (sling.area * theta[0] / (2 * (1 + FULL))), table["time"]
+    return pull / (sling.area * young / (2 * (1 + FULL))), table["time"]
 
 
 def pull(bench: Bench, stretches=(1.2, 1.6, 2.2), shares=SHARES) -> list[Finding]:
     """At rest, drawn so slowly that branches with weight 0 do nothing."""
     worst = 0.0
     for share in shares:
-        sling = _string(bench, share, 0.0)
+        sling = _string(bench)
         for stretch in stretches:
             path = np.append(np.linspace(1.001, stretch, 40), [stretch] * 20)
-            got, _ = drawn_across(bench, sling, path, 10.0 * np.arange(len(path)))
+            got, _ = drawn_across(
+                bench, sling, path, 10.0 * np.arange(len(path)), **own(share, 0.0)
+            )
             worst = max(worst, off(got[-1], stress(stretch, share)))
     return [
         Finding(
@@ -129,7 +136,7 @@ def relaxation(bench: Bench, share: float = 0.3, most: float = 1.6) -> list[Find
     for name, (history, end, first) in histories.items():
         times = np.append(np.linspace(0, 0.25, 251), np.linspace(0.252, end, 400))
         stretch = np.maximum(history(times), 1.0)
-        got, at = drawn_across(bench, _string(bench, share, WEIGHT, 10.0), stretch, times)
+        got, at = drawn_across(bench, _string(bench, 10.0), stretch, times, **own(share))
         chosen = np.flatnonzero((at > first) & (stretch[1:] > 1.05))[::40]
         told = np.array([integral(history, at[k], share) for k in chosen])
         worst = 100 * np.abs(got[chosen] - told).max() / told.max()
@@ -149,8 +156,8 @@ def relaxation(bench: Bench, share: float = 0.3, most: float = 1.6) -> list[Find
 def oscillator(bench: Bench, share: float = 0.3, stretch: float = 1.5) -> list[Finding]:
     """A heavy middle, its memory relaxed where it is let go, by the matrix exponential."""
     mass, theta = 0.5, [1e6, FULL, 1e-6, 0.5, 0.0]
-    sling = rubber_of(bench, share)
-    time, place, _, _ = oscillate(bench, theta, mass=mass, stretch=stretch, sling=sling)
+    sling, options = rubber_of(bench), {"mass": mass, "stretch": stretch, **own(share)}
+    time, place, _, _ = oscillate(bench, theta, sling=sling, **options)
     thin = replace(sling, radius=sling.radius / STRING, mass=sling.mass / 20)
     k = 4 * thin.area / thin.rest_length * theta[0] / (2 * (1 + FULL)) * slope(stretch, share)
     moving = mass + thin.mass / 3
@@ -189,13 +196,15 @@ def growth(bench: Bench, count: int = 16, kinds=tuple(STATES)) -> list[Finding]:
         thetas = agreement.random_thetas(bench, count, SEED)
         starts = random_states(band_of(bench), kind, count, rng)
         for theta, start in zip(thetas, starts, strict=True):
-            sling = rubber_of(bench, rng.uniform(-0.3, 0.9), rng.uniform(0, 0.05))
+            beside = own(rng.uniform(-0.3, 0.9), rng.uniform(0, 0.05))
+            parameters = Parameters.of(RUBBER, theta, **beside)
+            sling = rubber_of(bench)
             sling = straight(sling, sling.rest_length)
             table = launched(bench.params.sling.recoil_step, 60, 1)
-            motion = move(bench, sling, theta, table, start, gravity=0.0, double=True)
+            motion = move(bench, sling, parameters, table, start, gravity=0.0, double=True)
             if motion.failed[0]:
                 continue
-            rod, kept = ReferenceRod(sling, tuple(theta), gravity=0.0), kept + 1
+            rod, kept = ReferenceRod(sling, parameters, gravity=0.0), kept + 1
             total = rod.elastic(motion.x[0]) + rod.kinetic(motion.v[0])
             total = total + energy.remembered(rod, table, motion.start[0], motion.x[0]).free
             total = np.append(rod.elastic(motion.start[0]), total)
@@ -218,7 +227,8 @@ def slack(bench: Bench) -> list[Finding]:
 
     It is longer than it was; it bends out and grows short again.
     """
-    sling, theta = rubber_of(bench, 0.3, 0.05), np.array([3e5, 0.45, 1e-3, 0.5, 0.5])
+    sling = rubber_of(bench)
+    theta = Parameters.of(RUBBER, [3e5, 0.45, 1e-3, 0.5, 0.5], **own(0.3, 0.05))
     sling = straight(sling, sling.rest_length)
     out, back = np.linspace(0.01, 1, 100), 30 + np.linspace(0.005, 0.5, 100)
     later = np.linspace(1.1, 30, 40), 30.5 + np.linspace(0.05, 60, 200)
@@ -244,6 +254,7 @@ def slack(bench: Bench) -> list[Finding]:
 def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Finding]:
     """`launch` starts with what a pull and a pause leave in the memory: the march of that pull."""
     sling, draw = rubber_of(bench), np.array([-0.35, -0.15])
+    theta = Parameters.of(RUBBER, theta, **own())
     setup = setup_of(bench, history=HISTORY)
     done = launching.launch(sling, setup, theta, draw, device=bench.device)
     none = launching.launch(sling, setup_of(bench), theta, draw, device=bench.device)
@@ -280,16 +291,17 @@ def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Finding]:
     ]
 
 
-def random_points(bench: Bench, count: int) -> np.ndarray:
-    """Of the box in params.yaml, and BOX of what the law adds, shape (count, 7)."""
-    space = Space.of(bench.params.parameters, bounds=BOX, law=RUBBER)
-    return space.to_physical(np.random.default_rng(SEED).random((count, space.dimension)))
+def random_points(bench: Bench, count: int) -> Parameters:
+    """Of the box in params.yaml, and BOX of what the law adds."""
+    box = SearchBox.of(bench.params.parameters, bounds=BOX, law=RUBBER)
+    unit = np.random.default_rng(SEED).random((count, box.dimension))
+    return box.parameters(box.to_physical(unit))
 
 
 def survey(bench: Bench, count: int = 10_000, progress=print) -> tuple[list[Finding], dict]:
     sling = replace(rubber_of(bench), grip_force=robustness.HELD_FAST)
     found = robustness.survey(bench, sling, random_points(bench, count), progress)
-    names = (*THETA, *LAWS[RUBBER])
+    names = parameter_names(RUBBER)
     failed = robustness.ranges(found["unconverged"], names) if found["unconverged"] else ""
     return [
         Finding(
@@ -313,7 +325,7 @@ def survey(bench: Bench, count: int = 10_000, progress=print) -> tuple[list[Find
 
 def section(bench: Bench, count: int = 10_000, progress=print) -> Theme:
     sling = rubber_of(bench)
-    balance = energy.balance(bench, sling=sling)
+    balance = energy.balance(bench, sling=sling, **own())
     surveyed, found = survey(bench, count, progress)
     return Theme(
         "The law `rubber`",
@@ -321,12 +333,12 @@ def section(bench: Bench, count: int = 10_000, progress=print) -> Theme:
             *pull(bench),
             *relaxation(bench),
             *oscillator(bench),
-            *agreement.checks(bench, 2, sling=sling),
+            *agreement.checks(bench, 2, sling=sling, **own()),
             *energy.checks(balance),
             *growth(bench),
             *slack(bench),
             *histories(bench),
-            *launching.convergence(bench, progress=progress, sling=sling, history=HISTORY),
+            *launching.convergence(bench, progress=progress, sling=sling, history=HISTORY, **own()),
             *surveyed,
         ],
         "Mooney's share m and eight relaxing branches of one weight beside the neo-Hookean material"

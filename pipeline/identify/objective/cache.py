@@ -43,7 +43,7 @@ class EvaluationCache:
     def __call__(self, unit: np.ndarray) -> Evaluation:
         """Evaluate points of the unit cube, shape (N, D), or recall their evaluation."""
         unit = np.array(unit, float)
-        theta = self.evaluate.space.to_physical(unit)
+        theta = self.evaluate.box.to_physical(unit)
         path = self.folder / f"{self._key(theta)}.npz"
         evaluation = self._recalled(path, unit, theta)
         if evaluation is None:
@@ -54,7 +54,7 @@ class EvaluationCache:
 
     def _key(self, theta: np.ndarray) -> str:
         """Of physical points: another box of the search may hold the same ones."""
-        text = " ".join(self.evaluate.space.names).encode()
+        text = " ".join(self.evaluate.box.names).encode()
         return hashlib.sha256(text + theta.tobytes()).hexdigest()[:32]
 
     def _keep(self, path: Path, evaluation: Evaluation) -> None:

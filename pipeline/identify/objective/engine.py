@@ -1,8 +1,8 @@
 """Which engine simulates the rollouts of a search, as a method's key `engine` names it.
 
-Another engine than ours is a function `simulate(sling, *, episode, thetas, device) -> Rollouts` of
-whole batches: thetas have shape (N, 5); the rollouts (pipeline/simulator/interaction.py) stay on
-the host. It runs on one device, whichever it chooses.
+Another engine than ours is a function `simulate(band, *, episode, parameters, device) -> Rollouts`
+of whole batches: of a ClampedBand (pipeline/simulator/model.py) with N Parameters (parameters.py);
+the rollouts (interaction.py) stay on the host. It runs on one device, whichever it chooses.
 """
 
 from __future__ import annotations

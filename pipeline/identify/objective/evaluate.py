@@ -7,19 +7,16 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from pipeline.episode.episode import Episode
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.loss import TERMS, EpisodeLoss
-from pipeline.identify.objective.space import Space
-from pipeline.params.identification import LAWS
 from pipeline.simulator.interaction import Rollouts, interact
-from pipeline.simulator.material import THETA
 from pipeline.simulator.model import ClampedBand
-from pipeline.simulator.rubber import RUBBER
 
 NOT_FINITE = "the loss is not finite"  # the one failure that depends on the weights
 SLICE = {"cpu": 16, "cuda": 16384}  # rollouts a call: the lanes of a CPU vector; what memory holds
@@ -30,10 +27,10 @@ simulated: Simulate = partial(interact, fetch=False)  # the loss is computed whe
 
 @dataclass(frozen=True)
 class Evaluation:
-    """N evaluated parameter vectors of dimension D.
+    """N evaluated points of a box with D axes.
 
     Attributes:
-        unit, theta: In the unit cube and physical, shape (N, D).
+        unit, theta: In the unit cube, and physical values of the box's axes, shape (N, D).
         terms: Each loss term, shape (N,); NaN where the rollout failed.
         total: Weighted sum of the terms, shape (N,); +inf where the rollout failed.
         failure: None or the reason, length N.
@@ -58,9 +55,9 @@ class Evaluator:
     def __init__(
         self,
         episode: Episode,
-        sling: ClampedBand,
+        band: ClampedBand,
         loss: EpisodeLoss,
-        space: Space,
+        box: SearchBox,
         *,
         devices: Sequence[str] = ("cpu",),
         workers: int | None = None,
@@ -72,11 +69,11 @@ class Evaluator:
         Args:
             devices: Of one kind; they share each batch evenly, in their order.
             workers: Threads on the CPU (the kernels release the interpreter); None: all cores.
-            simulate: Called as `simulate(sling, episode=, thetas=, device=)`.
+            simulate: Called as `simulate(band, episode=, parameters=, device=)`.
             whole: One call a batch, on the first device.
         """
-        self.space, self.loss = space, loss
-        self._sling = sling
+        self.box, self.loss = box, loss
+        self._band = band
         self._simulate = partial(simulate, episode=episode)
         on_gpu = devices[0].startswith("cuda")
         self._slice = sys.maxsize if whole else SLICE["cuda" if on_gpu else "cpu"]
@@ -88,7 +85,7 @@ class Evaluator:
         """Evaluate points of the unit cube, shape (N, D)."""
         start = time.perf_counter()
         unit = np.array(unit, float)
-        theta = self.space.to_physical(unit)
+        theta = self.box.to_physical(unit)
         shares = np.array_split(theta, len(self._devices))
         begun = [  # on all of them, before any result is waited for
             pool.map(partial(self._evaluate, device), self._slices(share))
@@ -106,12 +103,8 @@ class Evaluator:
     def _evaluate(
         self, device: str, theta: np.ndarray
     ) -> tuple[dict[str, np.ndarray], list[str | None]]:
-        values = dict(zip(self.space.names, theta.T, strict=True))
-        extra = {name: values[name] for name in LAWS[RUBBER] if name in values}
-        if extra and self._sling.law != RUBBER:
-            raise ValueError(f"the sling is {self._sling.law}, which has no {', '.join(extra)}")
-        sling = replace(self._sling, **extra) if extra else self._sling
-        rollouts = self._simulate(sling, thetas=theta[:, : len(THETA)], device=device)
+        parameters = self.box.parameters(theta)
+        rollouts = self._simulate(self._band, parameters=parameters, device=device)
         with np.errstate(invalid="ignore", over="ignore"):  # failed rollouts may hold anything
             return self.loss.terms(rollouts), rollouts.failure
 

@@ -13,11 +13,11 @@ from pipeline.base.layout import Layout
 from pipeline.base.machine import devices, kind, workers
 from pipeline.base.progress import Progress
 from pipeline.episode.episode import Episode
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.cache import EvaluationCache
 from pipeline.identify.objective.engine import simulate_of, sources_of
 from pipeline.identify.objective.evaluate import Evaluation, Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.identify.results.mounting import sling_of_method
 from pipeline.params import Params
 from pipeline.params.identification import OUR_ENGINE, MethodParams
@@ -85,7 +85,7 @@ def evaluator(params: Params, band: str, method: str) -> Evaluator:
         episode,
         sling,
         EpisodeLoss.of(params, method, episode, sling),
-        Space.of_method(params, method),
+        SearchBox.of_method(params, method),
         devices=devices(),
         workers=workers(),
         simulate=simulate_of(engine),

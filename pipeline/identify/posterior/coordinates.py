@@ -16,11 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.identify.results.theta import EXTRA
 from pipeline.params import Params
 from pipeline.params.identification import LAWS, UNSEEN
-from pipeline.simulator.material import THETA
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import EXTRA, THETA, Parameters
 
 YOUNG, POISSON, DAMPING, FRICTION, SCALE = range(5)
 LOGS = "log_youngs_modulus", "log_loss_factor"  # of Pa
@@ -49,6 +48,7 @@ class Coordinates:
     """Of D free parameters.
 
     Attributes:
+        law: Whose parameters they stand for.
         names: Of the coordinates, length D.
         low, high: Their bounds, shape (D,).
         fixed: Values of UNSEEN by name.
@@ -56,6 +56,7 @@ class Coordinates:
         expected, precision: Of Gaussian priors, shape (D,); precision 0 where there is none.
     """
 
+    law: str
     names: tuple[str, ...]
     low: np.ndarray
     high: np.ndarray
@@ -82,27 +83,32 @@ class Coordinates:
         low, high = np.array(list(ends.values()), float).T
         expected, spread = np.array([PRIORS.get(name, (0.0, np.inf)) for name in ends]).T
         fixed = {name: about.fixed[name] for name in UNSEEN}
-        return cls(tuple(ends), low, high, fixed, float(wave), expected, spread**-2)
+        return cls(about.law, tuple(ends), low, high, fixed, float(wave), expected, spread**-2)
 
     @property
     def steps(self) -> np.ndarray:
         """Of finite differences, shape (D,)."""
         return np.array([STEPS[name] for name in self.names])
 
-    def points(self, phi: np.ndarray) -> np.ndarray:
-        """Points (N, P) as sling.theta.at_points takes them, of coordinates (N, D)."""
+    def parameters(self, phi: np.ndarray) -> Parameters:
+        """N parameters of coordinates (N, D)."""
         theta = np.empty((len(phi), len(THETA)))
         theta[:, YOUNG] = np.exp(phi[:, 0])
         for name in UNSEEN:
             theta[:, THETA.index(name)] = self.fixed[name]
         product = np.exp(phi[:, 1] - phi[:, 0] / 2) * self.wave
         theta[:, DAMPING] = product / self.fixed["damping_scale"]
-        return np.concatenate([theta, phi[:, 2:-1], np.exp(phi[:, -1:])], axis=1)
+        values = np.concatenate([theta, phi[:, 2:-1], np.exp(phi[:, -1:])], axis=1)
+        return Parameters(self.law, values)
 
-    def of(self, theta: np.ndarray) -> np.ndarray:
-        """Coordinates (D,) of θ and what its law adds, within the bounds; the rest as expected."""
+    def of(self, parameters: Parameters) -> np.ndarray:
+        """Coordinates (D,) of one sample of what is searched, within the bounds.
+
+        What is beside that (EXTRA) is as expected.
+        """
         phi, own = self.expected.copy(), len(self.names) - len(EXTRA)
+        theta = parameters.values[0]
         loss = theta[DAMPING] * self.fixed["damping_scale"] * np.sqrt(theta[YOUNG]) / self.wave
         phi[:2] = np.log(theta[YOUNG]), np.log(loss)
-        phi[2:own] = theta[len(THETA) :][: own - 2]
+        phi[2:own] = theta[len(THETA) : -len(EXTRA)]
         return np.clip(phi, self.low, self.high)

@@ -78,7 +78,7 @@ def fit(
     with ThreadPoolExecutor(workers) as pool:
         for steps in range(1, ITERATIONS + 1):
             bins = [one.residuals for one in best.expansions] if best and steps > BINNED else new
-            around = coordinates.points, phi, _steps(coordinates, phi)
+            around = coordinates.parameters, phi, _steps(coordinates, phi)
             try:
                 expansions = [
                     one.expand(*around, own, pool, kept)

@@ -20,13 +20,12 @@ from pipeline.identify.posterior.draws import truncated_gaussian
 from pipeline.identify.posterior.fit import Fit, fit
 from pipeline.identify.posterior.launches import Evidence, LaunchLikelihood
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
-from pipeline.identify.results.estimate import pull_of
-from pipeline.identify.results.theta import EXTRA
+from pipeline.identify.results.theta import content_of
 from pipeline.identify.results.units import SI_UNITS
-from pipeline.params import Parameters, Params
-from pipeline.params.identification import LAWS, UNSEEN
-from pipeline.simulator.material import THETA
+from pipeline.params import Params
+from pipeline.params.identification import UNSEEN, ParameterBoxes, parameter_names
 from pipeline.simulator.model import ClampedBand, LaunchHistory
+from pipeline.simulator.parameters import EXTRA, Parameters
 from pipeline.simulator.rubber import RUBBER
 
 LEVEL = 0.9
@@ -53,9 +52,14 @@ class Identified:
     launches: LaunchLikelihood | None
 
     @property
-    def points(self) -> np.ndarray:
-        """Samples as `sling.theta.at_points` takes them, shape (SAMPLES, P)."""
-        return self.coordinates.points(self.samples)
+    def mode(self) -> Parameters:
+        """θ*, one sample."""
+        return self.coordinates.parameters(self.fit.phi[None])
+
+    @property
+    def parameters(self) -> Parameters:
+        """Of the SAMPLES samples."""
+        return self.coordinates.parameters(self.samples)
 
     @property
     def rollouts(self) -> int:
@@ -63,19 +67,13 @@ class Identified:
         each = len(self.coordinates.names) + 1 + len(SIMULATED)
         return self.fit.steps * len(self.recordings) * each
 
-    @property
-    def names(self) -> list[str]:
-        """Of the columns of `points`."""
-        law = self.recordings[0].sling.law
-        return [*THETA, *LAWS[law], *EXTRA]
-
 
 def fit_posterior(
     params: Params,
     method: str,
     sling: ClampedBand,
     episodes: Sequence[Episode],
-    start: np.ndarray,
+    start: Parameters,
     *,
     evidence: Evidence | None = None,
     workers: int | None = None,
@@ -86,7 +84,7 @@ def fit_posterior(
     Args:
         method: Of params.yaml, one that searches by least squares.
         episodes: Of the band's recordings, at least one.
-        start: θ and what its law adds, (P,): the nearest that an exploration found.
+        start: One sample: the nearest that an exploration found.
         evidence: Launches, drawn as the first recording was.
 
     Raises:
@@ -135,30 +133,19 @@ def disagreement(found: Fit) -> float:
 
 def theta_entries(found: Identified) -> dict:
     """What a θ file holds of the mode."""
-    point = found.coordinates.points(found.fit.phi[None])[0]
-    values = dict(zip(found.names, point.tolist(), strict=True))
-    law, episode = found.recordings[0].sling.law, found.recordings[0].episode
-    return {
-        **pull_of(episode, law),
-        "theta": {name: values[name] for name in (*THETA, *LAWS[law])},
-        "nuisances": {"air_drag": values["air_drag"]},
-        "turn_damping": values["turn_damping"],
-        "returned_share": values["returned_share"],
-    }
+    recording = found.recordings[0]
+    return content_of(found.mode, recorded_history(recording.sling, recording.episode))
 
 
-def confidence(found: Identified, boxes: Parameters) -> dict:
+def confidence(found: Identified, boxes: ParameterBoxes) -> dict:
     """What a θ file says under `confidence`, ready for JSON.
 
     Args:
         boxes: params.yaml's `parameters`.
     """
-    points, names = found.points, found.names
-    columns = dict(zip(names, points.T, strict=True))
-    mode = found.coordinates.points(found.fit.phi[None])[0].tolist()
-    mode = dict(zip(names, mode, strict=True))
-    parameters = {}
-    for name in names[: -len(EXTRA)]:
+    samples, mode, parameters = found.parameters, found.mode.sample(), {}
+    columns = {name: samples.column(name) for name in samples.names}
+    for name in parameter_names(samples.law):
         low, high = interval(columns[name], mode[name])
         entry = {"low": low, "high": high, "identifiable": name not in UNSEEN}
         if name in UNSEEN:

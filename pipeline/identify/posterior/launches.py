@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.identify.results.theta import at_points
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
+from pipeline.simulator.parameters import Parameters
 
 TAPE = 0.01  # of a measured landing, standard deviation [m]
 NUDGE = 1e-3  # of a draw [m]
@@ -67,17 +67,18 @@ class LaunchLikelihood:
         self.left = np.full(len(self.draws), np.nan)
 
     def expand(
-        self, points: Callable, phi: np.ndarray, steps: np.ndarray
+        self, parameters_of: Callable[[np.ndarray], Parameters], phi: np.ndarray, steps: np.ndarray
     ) -> tuple[float, np.ndarray, np.ndarray]:
         """Misfit, Hessian (D, D) and gradient (D,) at coordinates (D,), as of an `Expansion`."""
-        around = points(phi + np.vstack([0 * steps, np.diag(steps)]))
+        around = parameters_of(phi + np.vstack([0 * steps, np.diag(steps)]))
         cross = (self.draws[:, None] + CROSS).reshape(-1, 2)
-        near = self._simulated(np.repeat(around[:1], len(cross), axis=0), cross)
+        near = self._simulated(around[:1], cross)
         near = near.reshape(len(self.draws), len(CROSS))
         slope = np.linalg.norm((near[:, 1::2] - near[:, 2::2]) / (2 * NUDGE), axis=1)
         count = len(steps)
         moved = self._simulated(
-            np.repeat(around[1:], len(self.draws), axis=0), np.tile(self.draws, (count, 1))
+            around[np.repeat(1 + np.arange(count), len(self.draws))],
+            np.tile(self.draws, (count, 1)),
         ).reshape(count, -1)
         here = near[:, 0]
         self.left = np.log(self.landings / here)
@@ -88,9 +89,8 @@ class LaunchLikelihood:
         gap = self.left[good] / spread[good]
         return float(gap @ gap), design @ design.T, design @ gap
 
-    def _simulated(self, points: np.ndarray, draws: np.ndarray) -> np.ndarray:
-        """Landings [m] of points (N, P) from draws (N, 2), NaN where a launch fails."""
-        sling, theta = at_points(self.sling, points)
-        done = launch(sling, self.setup, theta, draws, workers=2)
+    def _simulated(self, parameters: Parameters, draws: np.ndarray) -> np.ndarray:
+        """Landings [m] of N parameters from draws (N, 2), NaN where a launch fails."""
+        done = launch(self.sling, self.setup, parameters, draws, workers=2)
         failed = np.array([why is not None for why in done.failure])
         return np.where(failed, np.nan, done.landing_y)

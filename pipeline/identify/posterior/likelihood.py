@@ -18,9 +18,9 @@ import numpy as np
 
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.residuals import Residuals, Rule
-from pipeline.identify.results.theta import at_points
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 
 SIMULATED = "release", "camera", "hand"
 NUDGE = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
@@ -156,17 +156,16 @@ class Likelihood:
             position=self.episode.position + hand * self._away,
         )
 
-    def simulate(self, points: np.ndarray, nuisances: np.ndarray) -> Rollouts:
-        """Rollouts of points (N, P). Raises Failed."""
-        sling, theta = at_points(self.sling, points)
-        rollouts = interact(sling, self.shifted(nuisances), theta)
+    def simulate(self, parameters: Parameters, nuisances: np.ndarray) -> Rollouts:
+        """Rollouts of N parameters. Raises Failed."""
+        rollouts = interact(self.sling, self.shifted(nuisances), parameters)
         if why := next((one for one in rollouts.failure if one), None):
             raise Failed(why)
         return rollouts
 
     def expand(
         self,
-        points: Callable,
+        parameters_of: Callable[[np.ndarray], Parameters],
         phi: np.ndarray,
         steps: np.ndarray,
         nuisances: np.ndarray,
@@ -176,11 +175,11 @@ class Likelihood:
         """Expand around coordinates (D,) with finite differences `steps` (D,). Raises Failed.
 
         Args:
-            points: Of coordinates (N, D), as `Coordinates.points`.
+            parameters_of: Of coordinates (N, D), as `Coordinates.parameters`.
             pool: Maps over batches of rollouts.
             residuals: Whose bins are taken; None: bins of the rollout there.
         """
-        around = points(phi + np.vstack([0 * steps, np.diag(steps)]))
+        around = parameters_of(phi + np.vstack([0 * steps, np.diag(steps)]))
         jobs = [(around, nuisances)]
         jobs += [(around[:1], nuisances + nudge) for nudge in np.diag(NUDGE)]
         first, *others = pool.map(lambda job: self.simulate(*job), jobs)

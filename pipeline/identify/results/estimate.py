@@ -7,7 +7,6 @@ evaluations holds, such as its confidence.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.base.files import write_json
@@ -15,6 +14,7 @@ from pipeline.base.schema import read_json
 from pipeline.episode.episode import Episode
 from pipeline.episode.pull import launch_history
 from pipeline.identify.results.theta import PosteriorFile
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import RUBBER
 
 
@@ -27,11 +27,11 @@ def save_estimate(
     path: Path,
     band: str,
     estimate: dict,
-    names: Sequence[str] = (),
-    samples: Sequence[Sequence[float]] = (),
+    samples: Parameters | None = None,
 ) -> None:
     """Write an `EstimateFile`."""
-    content = {"band": band, "names": list(names), "samples": list(samples), "estimate": estimate}
+    names, values = ([], []) if samples is None else ([*samples.names], samples.values.tolist())
+    content = {"band": band, "names": names, "samples": values, "estimate": estimate}
     write_json(path, content)
 
 

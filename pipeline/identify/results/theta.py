@@ -13,7 +13,6 @@ What its confidence rests on, samples of θ, lies beside in data/confidence/.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -25,18 +24,16 @@ from pipeline.base.layout import NotMade, owner
 from pipeline.base.schema import JsonRecord, Name, Range, Section, read_json, refusal
 from pipeline.identify.results.confidence import Confidence, Count
 from pipeline.identify.results.mounting import load_sling
-from pipeline.params import Parameters, Params
-from pipeline.params.identification import LAWS
-from pipeline.simulator.material import THETA
+from pipeline.params import Params
+from pipeline.params.identification import LAWS, ParameterBoxes, parameter_names
 from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
+from pipeline.simulator.parameters import EXTRA, THETA, Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
-
-EXTRA = "air_drag", "turn_damping", "returned_share"  # of a point, after θ and what its law adds
 
 
 def _limits(name: str) -> Range:
     """How far params.yaml lets the box of the search reach."""
-    box = Parameters.model_fields[name].annotation
+    box = ParameterBoxes.model_fields[name].annotation
     return next(one for one in box.model_fields["low"].metadata if isinstance(one, Range))
 
 
@@ -111,24 +108,24 @@ def load_theta(path: Path, band: str) -> dict:
     return content.model_dump(exclude_unset=True)
 
 
-def load_samples(path: Path) -> np.ndarray | None:
-    """Samples of θ, what its law adds, and EXTRA, (M, P); None without any.
+def load_samples(path: Path, theta: Parameters) -> Parameters | None:
+    """Samples of what is known of `theta`, whose values they take where they have no column.
 
-    Raises NotMade where the file is damaged.
+    None without any. Raises NotMade where the file is damaged, or of another law.
     """
-    samples = read_json(path, PosteriorFile).samples if path.is_file() else []
-    return np.array(samples, float) if samples else None
+    file = read_json(path, PosteriorFile) if path.is_file() else PosteriorFile(samples=[])
+    if not file.samples:
+        return None
+    columns = dict(zip(file.names, np.array(file.samples, float).T, strict=True))
+    if {*columns} - {*EXTRA} != {*parameter_names(theta.law)}:
+        raise NotMade(path, f"names: must be those of the law {theta.law}, as its θ file is")
+    return Parameters.named(theta.law, columns, theta.sample())
 
 
 def calibrated(params: Params, band: str, content: dict, root: str | Path = ".") -> ClampedBand:
-    """The band with all that a θ file's content says beside the five of θ."""
-    law = content.get("law", NEO_HOOKEAN)
-    extra = {name: content["theta"][name] for name in LAWS[law]}
-    extra["air_drag"] = content.get("nuisances", {}).get("air_drag", 0.0)
-    extra["turn_damping"] = content.get("turn_damping", 0.0)
-    extra["returned_share"] = content.get("returned_share", 1.0)
-    sling = load_sling(params, band, root, law, mounted=content.get("mounted", True))
-    return replace(sling, **extra)
+    """The band that a θ file's content is of: of its law, with its clamps calibrated or not."""
+    law, mounted = content.get("law", NEO_HOOKEAN), content.get("mounted", True)
+    return load_sling(params, band, root, law, mounted=mounted)
 
 
 def launch_setup(params: Params, content: dict) -> LaunchSetup:
@@ -148,21 +145,30 @@ def history_of(params: Params, content: dict) -> LaunchHistory | None:
     return LaunchHistory(**content["history"] | told)
 
 
-def at_points(sling: ClampedBand, points: np.ndarray) -> tuple[ClampedBand, np.ndarray]:
-    """A sling and θ (N, 5) of points (N, P): θ, what the sling's law adds, perhaps EXTRA."""
-    if points.shape[-1] == len(THETA):
-        return sling, points
-    names = (*LAWS[sling.law], *EXTRA)
-    extra = dict(zip(names, points[:, len(THETA) :].T, strict=False))
-    return replace(sling, **extra), points[:, : len(THETA)]
+def parameters_of(content: dict) -> Parameters:
+    """One sample: what a θ file's content says of its material."""
+    return Parameters.named(
+        content.get("law", NEO_HOOKEAN),
+        {
+            **content["theta"],
+            "air_drag": content.get("nuisances", {}).get("air_drag") or 0.0,
+            "turn_damping": content.get("turn_damping", 0.0),
+            "returned_share": content.get("returned_share", 1.0),
+        },
+    )
 
 
-def point(content: dict) -> np.ndarray:
-    """θ and what its law adds, in the order of `at_points`, shape (5,) or (7,)."""
-    names = (*THETA, *LAWS[content.get("law", NEO_HOOKEAN)])
-    return np.array([content["theta"][name] for name in names], float)
+def content_of(parameters: Parameters, history: LaunchHistory | None = None) -> dict:
+    """What a θ file says of one sample; the inverse of `parameters_of`.
 
-
-def vector(content: dict) -> np.ndarray:
-    """θ in the simulator's order, physical units, shape (5,)."""
-    return np.array([content["theta"][name] for name in THETA], float)
+    Args:
+        history: Of the recording's hand, which a law with memory needs.
+    """
+    values, law = parameters.sample(), parameters.law
+    return {
+        **({"law": law, "history": history and vars(history)} if law == RUBBER else {}),
+        "theta": {name: values[name] for name in parameter_names(law)},
+        "nuisances": {"air_drag": values["air_drag"]},
+        "turn_damping": values["turn_damping"],
+        "returned_share": values["returned_share"],
+    }

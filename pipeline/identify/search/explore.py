@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluation
-from pipeline.identify.objective.space import Space
 from pipeline.identify.search.build import explorer
 from pipeline.identify.search.history import History
-from pipeline.identify.search.loop import Free, search
+from pipeline.identify.search.loop import search
 from pipeline.params import Params
 from pipeline.params.identification import LEAST_SQUARES
 
@@ -36,9 +36,9 @@ def explore(params: Params, method: str, evaluate: Callable[[np.ndarray], Evalua
     Raises:
         UserError: As `search` and `explorer`.
     """
-    method_params, space = params.methods[method], Space.of_method(params, method)
-    free, rollouts = Free.of(space, method_params.fixed), rollouts_of(params, method)
-    optimizer = explorer(method_params, params.optimizer, len(free.axes), rollouts)
-    history = History(method, space.names)
-    search(optimizer, evaluate, history, rollouts=rollouts, free=free)
+    method_params, box = params.methods[method], SearchBox.of_method(params, method)
+    rollouts = rollouts_of(params, method)
+    optimizer = explorer(method_params, params.optimizer, len(box.free), rollouts)
+    history = History(method, box.names)
+    search(optimizer, evaluate, history, rollouts=rollouts, box=box)
     return history

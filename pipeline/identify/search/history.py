@@ -20,6 +20,7 @@ from pipeline.base.files import replacing
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.objective.loss import TERMS
 from pipeline.params.identification import LEAST_SQUARES
+from pipeline.simulator.parameters import Parameters
 
 
 @dataclass
@@ -91,10 +92,10 @@ class History:
         chosen = pc.equal(self.table["phase"], phase)
         return History(self.method, self.names, [self.table.filter(chosen)])
 
-    def best_point(self) -> np.ndarray:
-        """Physical values of the best row, shape (D,), by `names`. Raises UserError as `best`."""
+    def best_parameters(self, law: str) -> Parameters:
+        """One sample, of the best row. Raises UserError as `best`."""
         best = self.best()
-        return np.array([best[name] for name in self.names])
+        return Parameters.named(law, {name: best[name] for name in self.names})
 
     def best(self) -> dict:
         """The row with the least total; among equals the first. Raises UserError if all failed."""

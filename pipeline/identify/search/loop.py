@@ -7,16 +7,15 @@ builds it by its name in params.yaml.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 from scipy.stats import qmc
 
 from pipeline.base.errors import UserError
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluation, Penalty
-from pipeline.identify.objective.space import Space
 from pipeline.identify.search.history import History
 
 
@@ -39,36 +38,6 @@ class Optimizer(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Free:
-    """The axes of a space that are searched; the others keep their place.
-
-    Attributes:
-        names: Of the free axes, length F.
-        axes: Their numbers in the space, shape (F,).
-        rest: A point of the whole unit cube that holds the fixed coordinates, shape (D,).
-    """
-
-    names: tuple[str, ...]
-    axes: np.ndarray
-    rest: np.ndarray
-
-    @classmethod
-    def of(cls, space: Space, fixed: Mapping[str, float]) -> Free:
-        """All axes of `space` but the `fixed` ones, which have physical values."""
-        axes = [axis for axis, name in enumerate(space.names) if name not in fixed]
-        middle = space.to_physical(np.full(len(space.names), 0.5))
-        values = [fixed.get(name, value) for name, value in zip(space.names, middle, strict=True)]
-        names = tuple(space.names[axis] for axis in axes)
-        return cls(names, np.array(axes), space.to_unit(np.array(values, float)))
-
-    def fill(self, unit: np.ndarray) -> np.ndarray:
-        """Points of the whole cube, shape (N, D), for points of the free one, shape (N, F)."""
-        whole = np.tile(self.rest, (len(unit), 1))
-        whole[:, self.axes] = unit
-        return whole
-
-
 def latin_hypercube(dimension: int, count: int, seed: int) -> np.ndarray:
     """Points of the unit cube, one in each of `count` strata of each axis, (count, dimension).
 
@@ -85,7 +54,7 @@ def search(
     history: History,
     *,
     rollouts: int,
-    free: Free | None = None,
+    box: SearchBox | None = None,
 ) -> None:
     """Run `optimizer` until exactly `rollouts` points are evaluated; all rows go to `history`.
 
@@ -94,12 +63,12 @@ def search(
 
     Args:
         evaluate: Losses of points of the whole unit cube, shape (N, D).
-        free: The axes that the optimiser knows; None: all of them.
+        box: Whose free axes the optimiser knows; None: all of the history's.
 
     Raises:
         UserError: The optimiser asked for something else than points of the unit cube.
     """
-    dimension = len(history.names if free is None else free.names)
+    dimension = len(history.names if box is None else box.free)
     penalty = Penalty()
     generation = 0
     while rollouts > 0:
@@ -107,7 +76,7 @@ def search(
         owner = _owner(optimizer, len(asked))
         unit = asked[:rollouts]
         rollouts -= len(unit)
-        evaluation = evaluate(unit if free is None else free.fill(unit))
+        evaluation = evaluate(unit if box is None else box.fill(unit))
         history.add(
             evaluation,
             phase=optimizer.phase,

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base.machine import cores
-from pipeline.identify.results.theta import at_points, calibrated, launch_setup, vector
+from pipeline.identify.results.theta import calibrated, launch_setup, parameters_of
 from pipeline.params import Params
 from pipeline.simulator.launch import Launches, launch
+from pipeline.simulator.parameters import Parameters
 
 
 def asked_of_the_hand(
@@ -26,7 +27,7 @@ def asked_of_the_hand(
     setup = launch_setup(params, content)
     if setup.history is None:
         return None
-    sling, theta = calibrated(params, band, content, root), vector(content)
+    sling, theta = calibrated(params, band, content, root), parameters_of(content)
     longer = replace(setup, history=replace(setup.history, pause=setup.history.pause + 1))
     landings = [launch(sling, one, theta, draw).landing_y[0] for one in (setup, longer)]
     moved = float(np.diff(landings)[0])
@@ -47,13 +48,13 @@ def simulator(
 ) -> Callable[..., Launches]:
     """Function that launches draws, shape (N, 2) [m], in the simulator calibrated by a θ file.
 
-    A second argument gives each launch a point of its own, shape (N, P), as `at_points` has them.
+    A second argument gives each launch parameters of its own.
     """
-    sling, best = calibrated(params, band, content, root), vector(content)[None]
+    sling, best = calibrated(params, band, content, root), parameters_of(content)
     setup, threads = launch_setup(params, content), cores()
 
-    def launcher(draws: np.ndarray, thetas: np.ndarray | None = None) -> Launches:
-        own, theta = (sling, best) if thetas is None else at_points(sling, thetas)
-        return launch(own, setup, theta, draws, max_force=max_force, device=device, workers=threads)
+    def launcher(draws: np.ndarray, parameters: Parameters = best) -> Launches:
+        options = {"max_force": max_force, "device": device, "workers": threads}
+        return launch(sling, setup, parameters, draws, **options)
 
     return launcher

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from pipeline.launching.surface.landing_map import Launched, Launcher
+from pipeline.simulator.parameters import Parameters
 
 LEVEL = 0.9
 MOST = 60  # samples of θ that are launched
@@ -17,7 +18,7 @@ ERRORS = ndtri((np.arange(401) + 0.5) / 401)  # equally likely; 41 end 6 % too s
 def landing_intervals(
     launcher: Launcher,
     draws: np.ndarray,
-    samples: np.ndarray | None,
+    samples: Parameters | None,
     error: float,
 ) -> np.ndarray:
     """Central 90 % of the landings of each draw [m], shape (N, 2); NaN where launches fail.
@@ -27,9 +28,10 @@ def landing_intervals(
     samples is a failure.
 
     Args:
-        launcher: `launcher(draws)` launches with the best θ; `launcher(draws, thetas)` with others.
+        launcher: `launcher(draws)` launches with the best θ; `launcher(draws, parameters)` with
+            others.
         draws: (y, z) [m], shape (N, 2).
-        samples: Of θ, shape (M, P); None leaves out that θ is not known exactly.
+        samples: M, of θ; None leaves out that θ is not known exactly.
         error: Standard deviation of the drawn position along each axis [m].
     """
     draws = np.atleast_2d(np.asarray(draws, float))
@@ -41,7 +43,9 @@ def landing_intervals(
     centres = landing[:, :1]
     if samples is not None:
         some = samples[np.linspace(0, len(samples) - 1, min(MOST, len(samples))).astype(int)]
-        launched = launcher(np.repeat(draws, len(some), axis=0), np.tile(some, (count, 1)))
+        launched = launcher(
+            np.repeat(draws, len(some), axis=0), some[np.tile(np.arange(len(some)), count)]
+        )
         centres = _landing(launched).reshape(count, len(some))
     result = np.full((count, 2), np.nan)
     for row, (centre, width) in enumerate(zip(centres, spread, strict=True)):

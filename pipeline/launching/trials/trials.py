@@ -23,6 +23,7 @@ from pipeline.launching.trials.measured import Measured
 from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params import Params
 from pipeline.simulator.launch import Launches
+from pipeline.simulator.parameters import Parameters
 
 SCHEMA = pa.schema(
     [
@@ -149,7 +150,7 @@ def launched(batch: Batch, launch: Callable) -> Batch:
 def predict(
     batches: list[Batch],
     launcher: Callable[..., Launches],
-    samples: np.ndarray | None,
+    samples: Parameters | None,
     params: Params,
 ) -> tuple[Launches, np.ndarray]:
     """What the calibrated simulator makes of the draws of all batches, N in all.

@@ -7,7 +7,7 @@ the covariance by plain algebra.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +38,7 @@ class LandingModel:
     half_width: np.ndarray
 
     @classmethod
-    def of(cls, names: list[str], samples: np.ndarray, aims) -> LandingModel | None:
+    def of(cls, names: Sequence[str], samples: np.ndarray, aims) -> LandingModel | None:
         """From samples (M, P) of θ and the landings of some of them; None where either lacks.
 
         Args:
@@ -109,7 +109,7 @@ class LandingModel:
         return precision
 
 
-def unknowns(names: list[str], samples: np.ndarray) -> dict[str, np.ndarray]:
+def unknowns(names: Sequence[str], samples: np.ndarray) -> dict[str, np.ndarray]:
     """Columns (M,) of samples (M, P) that vary, as they are Gaussian."""
     columns = {}
     for name, column in zip(names, samples.T, strict=True):

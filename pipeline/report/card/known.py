@@ -10,14 +10,15 @@ import numpy as np
 import pandas as pd
 
 from pipeline.base.layout import Layout, made
-from pipeline.base.schema import read_json
 from pipeline.episode.episode import Episode
-from pipeline.identify.results.theta import PosteriorFile, load_theta
+from pipeline.identify.results.theta import load_samples, load_theta, parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.spread import CROSS, MOST, STEP, landing_intervals
 from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
 from pipeline.launching.trials.trials import limited
+from pipeline.params import Params
+from pipeline.simulator.parameters import Parameters
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Known:
         episodes: Of all its pulls; pictures show the first.
         recordings: Names of the files that they are of.
         theta: The θ file; `confidence` of it is empty where the method tells none.
-        names, samples: Of θ, shape (M, P), M = 0 where the method tells none.
+        samples: Of θ; None where the method tells none.
         policy: Its card, as far as it is read.
         trials: One row a launch (pipeline/launching/trials/trials.py).
         recorded_stretch: The largest of all pulls.
@@ -70,8 +71,7 @@ class Known:
     root: Path
     episodes: list[Episode]
     theta: dict
-    names: list[str]
-    samples: np.ndarray
+    samples: Parameters | None
     policy: dict
     trials: pd.DataFrame
     aims: Aims
@@ -95,14 +95,12 @@ class Known:
         return self.trials[self.trials.landing_y.notna() & self.trials.predicted_y.notna()]
 
 
-def known(params, band: str, method: str, root: str | Path = ".") -> Known:
+def known(params: Params, band: str, method: str, root: str | Path = ".") -> Known:
     """Read and launch. Raises UserError where an input is missing."""
     layout, about = Layout(Path(root)), params.bands[band]
     theta = load_theta(layout.theta(band, method), band)
     path = layout.confidence(band, method)
-    posterior = read_json(path, PosteriorFile) if path.is_file() else PosteriorFile(samples=[])
-    samples = np.array(posterior.samples, float)
-    samples = samples.reshape(len(samples), len(posterior.names))
+    samples = load_samples(path, parameters_of(theta))
     stored = Stored(band, method, layout.root)
     episodes = Episode.load_all(layout.episodes(band))
     stretch = partial(stretch_of, fork_width=params.setup.fork_width, rest_length=about.rest_length)
@@ -115,7 +113,6 @@ def known(params, band: str, method: str, root: str | Path = ".") -> Known:
         root=layout.root,
         episodes=episodes,
         theta=theta,
-        names=posterior.names,
         samples=samples,
         policy=stored.card(),
         trials=pd.read_parquet(made(layout.trials(band, method))),
@@ -125,7 +122,7 @@ def known(params, band: str, method: str, root: str | Path = ".") -> Known:
 
 
 def aims(launcher, target, draw, samples, stretch, params) -> Aims:
-    """Launch draws (T, 2) at targets (T,), with the best θ and with samples (M, P) of it.
+    """Launch draws (T, 2) at targets (T,), with the best θ and with samples of it.
 
     Args:
         launcher: As `landing_intervals` takes it.
@@ -134,14 +131,14 @@ def aims(launcher, target, draw, samples, stretch, params) -> Aims:
     """
     error, count = params.trials.actuation_error, len(draw)
     launches = limited(launcher(draw), params.setup.max_force)
-    interval = landing_intervals(launcher, draw, samples if len(samples) else None, error)
+    interval = landing_intervals(launcher, draw, samples, error)
     interval[np.isnan(launches.landing_y)] = np.nan
     around = launcher((draw[:, None] + CROSS).reshape(-1, 2)).landing_y.reshape(count, -1)
     slope = error * np.linalg.norm((around[:, 1::2] - around[:, 2::2]) / (2 * STEP), axis=1)
-    some = samples[np.linspace(0, len(samples) - 1, min(MOST, len(samples))).astype(int)]
     landings = np.zeros((count, 0))
-    if len(some):
-        launched = launcher(np.repeat(draw, len(some), axis=0), np.tile(some, (count, 1)))
+    if samples is not None:
+        some = np.linspace(0, len(samples) - 1, min(MOST, len(samples))).astype(int)
+        launched = launcher(np.repeat(draw, len(some), axis=0), samples[np.tile(some, count)])
         landings = launched.landing_y.reshape(count, -1)
     return Aims(
         target=target,

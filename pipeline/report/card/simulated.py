@@ -10,7 +10,7 @@ from scipy.interpolate import Akima1DInterpolator
 from pipeline.base.layout import Layout, NotMade
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.likelihood import opening_time
-from pipeline.identify.results.theta import calibrated, vector
+from pipeline.identify.results.theta import calibrated, parameters_of
 from pipeline.params import Params
 from pipeline.simulator.replay import replay
 
@@ -84,7 +84,7 @@ def simulate(params: Params, band: str, method: str, episode: Episode, theta: di
     )
     stamps = stamps[np.append(True, np.diff(stamps) > 1e-6)]
     played = replace(episode, cloud_time=stamps, clouds=[])
-    done = replay(sling, played, vector(theta)[None], params.force)
+    done = replay(sling, played, parameters_of(theta), params.force)
     if failure := done.rollouts.failure[0]:
         raise NotMade(Layout().theta(band, method), failure)
     return Simulated(

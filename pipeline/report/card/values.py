@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.identify.posterior.coordinates import MOST_DRAG, MOST_LOST
-from pipeline.identify.results.theta import EXTRA
 from pipeline.report.quantities import QUANTITIES, rounded
+from pipeline.simulator.parameters import EXTRA
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.base.layout import Layout, NotMade
 from pipeline.episode.episode import Episode
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.results.theta import calibrated, vector
+from pipeline.identify.results.theta import calibrated, parameters_of
 from pipeline.params import Params
 from pipeline.simulator.replay import replay
 
@@ -39,7 +39,7 @@ def replay_method(
     """
     sling = calibrated(params, band, theta)
     loss = EpisodeLoss.of(params, method, episode, sling)
-    done = replay(sling, episode, vector(theta)[None], params.force)
+    done = replay(sling, episode, parameters_of(theta), params.force)
     if failure := done.rollouts.failure[0]:
         raise NotMade(Layout().theta(band, method), failure)
     return MethodReplay(

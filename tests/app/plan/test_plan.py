@@ -222,15 +222,17 @@ def test_a_held_string_pulls_as_its_formula() -> None:
 def test_the_force_by_theta(params, tmp_path) -> None:
     from pipeline.identify.results.mounting import load_sling
     from pipeline.simulator.launch import launch
-    from pipeline.simulator.material import THETA
     from pipeline.simulator.model import LaunchSetup
+    from pipeline.simulator.parameters import THETA, Parameters
 
     values = 3e5, 0.45, 5e-3, 0.5, 1.0
     path = tmp_path / "theta.json"
     theta = dict(zip(THETA, values, strict=True))
     path.write_text(json.dumps({"band": "band1", "theta": theta}))
     setup = LaunchSetup.of(params.setup, params.sling)
-    done = launch(load_sling(params, "band1"), setup, np.array(values), (-0.3, -0.2))
+    done = launch(
+        load_sling(params, "band1"), setup, Parameters.of("neo_hookean", values), (-0.3, -0.2)
+    )
     held = float(done.hold_force[0])
     planned = plan_recording(params, "band1", draw=(-0.3, -0.2), theta=path)
     assert planned.force.force == held

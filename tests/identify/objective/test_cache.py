@@ -17,6 +17,7 @@ from pipeline.identify.objective.cache import EvaluationCache
 from pipeline.identify.objective.evaluate import NOT_FINITE, Evaluation, Evaluator
 from pipeline.identify.objective.loss import TERMS
 from pipeline.identify.objective.session import SOURCES
+from pipeline.simulator.parameters import THETA
 from tests.forked import Forked
 from tests.identify.search import toy
 from tests.identify.search.functions import NAMES, Evaluate, quadratic
@@ -205,14 +206,14 @@ def test_a_loss_that_is_not_finite_is_so_by_the_weights(tmp_path: Path) -> None:
     """Whichever method came first, each finds what the evaluator itself says under its weights."""
     episode = toy.episode(frames=1)
 
-    def simulate(sling, episode, thetas, device):
-        return toy.rollouts(episode, len(thetas), force=(2.0, 0, 0))
+    def simulate(sling, episode, parameters, device):
+        return toy.rollouts(episode, len(parameters), force=(2.0, 0, 0))
 
     unit = np.linspace(0, 1, 4)[:, None] * np.ones(5)
-    space = Evaluate(np.sum).space
+    box = Evaluate(np.sum, names=THETA).box
     for folder, names in (("a", ("geom", "work", "geom")), ("b", ("work", "geom", "work"))):
         for name in names:
-            inner = Evaluator(episode, toy.SLING, Loss(**{name: 1.0}), space, simulate=simulate)
+            inner = Evaluator(episode, toy.SLING, Loss(**{name: 1.0}), box, simulate=simulate)
             expected, found = inner(unit), EvaluationCache(inner, tmp_path / folder, "x")(unit)
             assert found.failure == expected.failure
             assert (NOT_FINITE in found.failure) == (name == "work")

@@ -11,11 +11,13 @@ from pipeline.identify.clamps import calibrate_clamps, nominal_young, slack_part
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import Mounting
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 from tests.identify.objective.pulls import PARAMS, pulled, sling_of
 from validation.synthetic import own_law_episode
 
-THETA = np.array([3e5, 0.45, 4e-3, 1.0, 1.0])
-SOLID = THETA[0] * np.pi * 0.005**4 / 4
+YOUNG = 3e5
+THETA = Parameters.of("neo_hookean", [YOUNG, 0.45, 4e-3, 1.0, 1.0])
+SOLID = YOUNG * np.pi * 0.005**4 / 4
 ANGLE, RIGIDITY = np.deg2rad(15.0), 3.0
 
 
@@ -49,7 +51,7 @@ def test_the_slack_part_ends_before_the_band_is_taut(sling, episode):
     assert 1.6 < part.time[-1] < 4.0
     assert np.abs(part.force).max() < 0.1 * np.abs(episode.force).max()
     assert part.cloud_time[-1] <= part.time[-1] + 0.03
-    assert nominal_young(sling, episode) == pytest.approx(THETA[0], rel=0.05)
+    assert nominal_young(sling, episode) == pytest.approx(YOUNG, rel=0.05)
 
 
 def test_a_recording_without_slack_is_refused(episode):

@@ -10,12 +10,13 @@ import pytest
 
 from pipeline.base.machine import gpus
 from pipeline.base.native import start, wp
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.kernel import terms_kernel
 from pipeline.identify.objective.loss import TERMS, EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.params import load
 from pipeline.simulator.interaction import interact
+from pipeline.simulator.parameters import Parameters
 from tests.identify.search import toy
 from validation.synthetic import THETA, own_law_episode, recorded_yardstick
 
@@ -117,8 +118,8 @@ def test_terms_of_a_gpu_are_those_of_the_cpu(chamfer: str) -> None:
     """64 rollouts of the CPU, compared there and on the GPU with clouds of noise; to 1e-4."""
     params = load("params.yaml")
     sling, episode = recorded_yardstick(params)
-    episode = own_law_episode(sling, episode, np.array(THETA), cutoff=35.0)
-    space = Space.of(params.parameters)
+    episode = own_law_episode(sling, episode, Parameters.of(sling.law, THETA), cutoff=35.0)
+    space = SearchBox.of(params.parameters)
     unit = np.random.default_rng(6).random((64, space.dimension))
     loss = EpisodeLoss(
         episode,
@@ -128,7 +129,7 @@ def test_terms_of_a_gpu_are_those_of_the_cpu(chamfer: str) -> None:
         cutoff=35.0,
         chamfer=chamfer,
     )
-    rollouts = interact(sling, episode, space.to_physical(unit), workers=4)
+    rollouts = interact(sling, episode, space.parameters(space.to_physical(unit)), workers=4)
     assert rollouts.failure == [None] * 64
     moved = replace(
         rollouts,

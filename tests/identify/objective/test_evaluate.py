@@ -7,25 +7,31 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import TERMS, EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.params import load
+from pipeline.simulator.parameters import THETA
 from tests.identify.search import toy
 from validation.synthetic import recorded_yardstick
 
 PARAMS = load("params.yaml")
 EPISODE = toy.episode()
-SPACE = Space(
-    ("offset", "pull"), np.array([0.0, 0.1]), np.array([0.01, 10]), np.array([0, 1], bool)
+OFFSET, PULL = "poissons_ratio", "youngs_modulus"  # what the toy takes them for
+BOX = SearchBox(
+    (OFFSET, PULL),
+    np.array([0.0, 0.1]),
+    np.array([0.01, 10]),
+    np.array([0, 1], bool),
+    fixed=dict.fromkeys({*THETA} - {OFFSET, PULL}, 0.0),
 )
 
 
-def simulate(sling, episode, thetas, device):
+def simulate(sling, episode, parameters, device):
     """A band `offset` away and a force `pull`; beyond 8 mm it fails, beyond 9 N it is NaN."""
     assert (sling, episode, device) == (toy.SLING, EPISODE, "cpu")
-    offset, pull = thetas.T
-    result = toy.rollouts(episode, count=len(thetas))
+    offset, pull = parameters.column(OFFSET), parameters.column(PULL)
+    result = toy.rollouts(episode, count=len(parameters))
     result.center_line[..., 2] -= offset[:, None, None].astype(np.float32)
     result.force[..., 0] = np.where(pull > 9, np.nan, pull)[:, None]
     result.failure = ["too far" if far else None for far in offset > 0.008]
@@ -37,7 +43,7 @@ def evaluator(workers: int = 1, **options) -> Evaluator:
     sizes = {"radius": toy.RADIUS, "rest_length": toy.LENGTH}
     loss = EpisodeLoss(EPISODE, weights=weights, cutoff=toy.CUTOFF, **sizes)
     options = {"workers": workers, "simulate": simulate, **options}
-    return Evaluator(EPISODE, toy.SLING, loss, SPACE, **options)
+    return Evaluator(EPISODE, toy.SLING, loss, BOX, **options)
 
 
 def test_losses_of_a_batch() -> None:
@@ -69,17 +75,17 @@ def test_devices_share_a_batch_evenly_and_at_once() -> None:
     """Each of two waits for the other, and would do so forever if they took turns."""
     both, asked = Barrier(2, timeout=60), {}
 
-    def simulate_on(sling, episode, thetas, device):
-        asked[device] = len(thetas)
+    def simulate_on(sling, episode, parameters, device):
+        asked[device] = len(parameters)
         both.wait()
-        return simulate(sling, episode, thetas, "cpu")
+        return simulate(sling, episode, parameters, "cpu")
 
     found = evaluator(devices=("cpu", "cpu:1"), simulate=simulate_on)(np.full((11, 2), 0.5))
     assert asked == {"cpu": 6, "cpu:1": 5} and np.isfinite(found.total).all()
 
 
 def test_what_a_device_raises_is_raised() -> None:
-    def broken(sling, episode, thetas, device):
+    def broken(sling, episode, parameters, device):
         raise UserError(f"{device}: out of memory")
 
     with pytest.raises(UserError, match="out of memory"):
@@ -90,16 +96,16 @@ def test_nor_does_either_where_a_law_adds_its_own_axes() -> None:
     """Those of the law rubber, each of which changes the loss."""
     sling, recorded = recorded_yardstick(PARAMS)
     sling = replace(sling, law="rubber")
-    space = Space.of_method(PARAMS, "least_squares")
-    unit = np.random.default_rng(1).random((20, space.dimension))  # more than a slice
+    box = SearchBox.of_method(PARAMS, "least_squares")
+    unit = np.random.default_rng(1).random((20, box.dimension))  # more than a slice
     unit[1:3] = unit[0]
-    unit[1, space.names.index("mooney_share")] += 0.1
-    unit[2, space.names.index("relaxation")] += 0.1
+    unit[1, box.names.index("mooney_share")] += 0.1
+    unit[2, box.names.index("relaxation")] += 0.1
     unit[:3] %= 1
     found = []
     loss = EpisodeLoss.of(PARAMS, "least_squares", recorded, sling)
     for workers, devices in ((1, ["cpu"]), (2, ["cpu"]), (1, ["cpu", "cpu"])):
-        evaluate = Evaluator(recorded, sling, loss, space, workers=workers, devices=devices)
+        evaluate = Evaluator(recorded, sling, loss, box, workers=workers, devices=devices)
         found.append(evaluate(unit))
     assert found[0].failure == found[1].failure == found[2].failure
     assert np.isfinite(found[0].total[:3]).all() and len(set(found[0].total[:3])) == 3

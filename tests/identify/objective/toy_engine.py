@@ -1,13 +1,17 @@
 """An engine of a user's: ours, where every band is softer by half."""
 
-import numpy as np
+from pipeline.episode.episode import Episode
+from pipeline.simulator.interaction import Rollouts, interact
+from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 
-from pipeline.simulator.interaction import interact
-
-SOFTER = np.array([0.5, 1.0, 1.0, 1.0, 1.0])
+SOFTER = 0.5
 batches: list[int] = []
 
 
-def simulate(sling, *, episode, thetas, device):
-    batches.append(len(thetas))
-    return interact(sling, episode, thetas * SOFTER)
+def simulate(
+    band: ClampedBand, *, episode: Episode, parameters: Parameters, device: str
+) -> Rollouts:
+    batches.append(len(parameters))
+    softer = SOFTER * parameters.column("youngs_modulus")
+    return interact(band, episode, parameters.changed(youngs_modulus=softer))

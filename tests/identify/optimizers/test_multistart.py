@@ -46,7 +46,7 @@ def test_all_solvers_ask_as_one_batch_and_learn_their_own_losses() -> None:
 
 
 def searched(regions: list[Region], evaluate: Evaluate, rollouts: int, population: int) -> History:
-    history = History("toy", evaluate.space.names)
+    history = History("toy", evaluate.box.names)
     search(Multistart(regions, population=population, seed=1), evaluate, history, rollouts=rollouts)
     return history
 

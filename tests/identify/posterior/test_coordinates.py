@@ -8,15 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.identify.posterior.coordinates import MOST_DRAG, MOST_LOST, Coordinates
-from pipeline.identify.results.theta import EXTRA, at_points
-from pipeline.params.identification import LAWS, UNSEEN
-from pipeline.simulator.material import THETA
+from pipeline.params.identification import UNSEEN
+from pipeline.simulator.parameters import EXTRA, Parameters
 from tests.identify.objective.pulls import PARAMS, sling_of
 
 METHOD = "least_squares"
 SLING = replace(sling_of(0.03), law="rubber")
 OURS = Coordinates.of_method(PARAMS, METHOD, SLING)
-NAMES = (*THETA, *LAWS["rubber"], *EXTRA)
 
 
 def within(part: np.ndarray) -> np.ndarray:
@@ -30,17 +28,16 @@ UNIT = st.lists(st.floats(0.0, 1.0), min_size=len(OURS.names), max_size=len(OURS
 def test_there_and_back(part):
     """What a θ file's θ holds comes back; the rest is as expected."""
     phi = within(np.array(part))
-    point = OURS.points(phi[None])[0]
-    back = OURS.of(point[: -len(EXTRA)])
+    back = OURS.of(OURS.parameters(phi[None]))
     own = len(OURS.names) - len(EXTRA)
     np.testing.assert_allclose(back[:own], phi[:own], atol=1e-9)
     np.testing.assert_array_equal(back[own:], OURS.expected[own:])
 
 
 def test_the_loss_factor_is_what_a_wave_loses_along_the_band():
-    """s d c/L with c^2 = E A L/m, and each column is what at_points takes it for."""
+    """s d c/L with c^2 = E A L/m."""
     phi = within(np.linspace(0.2, 0.8, len(OURS.names)))
-    values = dict(zip(NAMES, OURS.points(phi[None])[0], strict=True))
+    values = OURS.parameters(phi[None]).sample()
     named = dict(zip(OURS.names, phi, strict=True))
     young = values["youngs_modulus"]
     speed = np.sqrt(young * SLING.area * SLING.rest_length / SLING.mass)
@@ -51,9 +48,6 @@ def test_the_loss_factor_is_what_a_wave_loses_along_the_band():
     same = "mooney_share", "relaxation", "air_drag", "turn_damping"
     assert [values[name] for name in same] == [named[name] for name in same]
     assert {name: values[name] for name in UNSEEN} == PARAMS.methods[METHOD].fixed
-    moved, theta = at_points(SLING, OURS.points(phi[None]))
-    assert theta[0].tolist() == [values[name] for name in THETA]
-    assert moved.air_drag == named["air_drag"] and moved.turn_damping == named["turn_damping"]
 
 
 def test_bounds_are_the_boxs_the_methods_and_what_is_possible():
@@ -66,13 +60,14 @@ def test_bounds_are_the_boxs_the_methods_and_what_is_possible():
     assert ends["log_returned_share"] == (-MOST_LOST, MOST_LOST)
     box = PARAMS.parameters
     for corner, side in ((OURS.low, "low"), (OURS.high, "high")):
-        values = dict(zip(NAMES, OURS.points(corner[None])[0], strict=True))
+        values = OURS.parameters(corner[None]).sample()
         for name in ("youngs_modulus", "elasticity_damping"):
             assert values[name] == pytest.approx(getattr(getattr(box, name), side))
 
 
 def test_a_start_outside_comes_to_the_bounds():
-    theta = np.array([1e9, 0.47, 1.0, 0.7, 0.6, -5.0, 1.0])
+    five = [1e9, 0.47, 1.0, 0.7, 0.6]
+    theta = Parameters.of("rubber", five, mooney_share=-5.0, relaxation=1.0)
     phi = OURS.of(theta)
     assert np.all(phi >= OURS.low) and np.all(phi <= OURS.high)
     assert phi[0] == OURS.high[0] and phi[2] == OURS.low[2]
@@ -87,5 +82,6 @@ def test_narrower_bounds_and_other_fixed_values_of_the_method_count():
     other = Coordinates.of_method(params, METHOD, SLING)
     assert (other.low[0], other.high[0]) == pytest.approx(tuple(np.log([2e5, 4e5])))
     phi = other.expected.copy()
-    twice = other.points(phi[None])[0, 2] / OURS.points(phi[None])[0, 2]
+    one, two = (each.parameters(phi[None]) for each in (OURS, other))
+    twice = two.column("elasticity_damping")[0] / one.column("elasticity_damping")[0]
     assert twice == pytest.approx(2.0)  # of the same product

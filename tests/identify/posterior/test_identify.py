@@ -11,7 +11,8 @@ from pipeline.identify.posterior import coordinates, identify
 from pipeline.identify.posterior.coordinates import Coordinates
 from pipeline.identify.posterior.likelihood import Likelihood
 from pipeline.identify.posterior.residuals import Residuals, Rule
-from pipeline.identify.results.theta import at_points, load_theta
+from pipeline.identify.results.theta import load_theta
+from pipeline.params.identification import parameter_names
 from pipeline.simulator.interaction import interact
 from tests import once
 from tests.identify.objective.pulls import PARAMS, pulled, sling_of
@@ -23,21 +24,20 @@ SPACE = Coordinates.of_method(PARAMS, METHOD, SLING)
 CUTOFF = cutoff_hz(PARAMS.force.cutoff, PARAMS.force.cutoff_unit)
 TRUE = np.array([np.log(3e5), np.log(0.07), 0.3, 0.01, 0.0, 0.4, 0.0])
 START = TRUE + [0.1, -0.3, -0.1, 0.005, 0.0, 0.0, 0.0]
-POINT, FROM = SPACE.points(np.stack([TRUE, START]))
+TRUTH, FROM = (SPACE.parameters(phi[None]) for phi in (TRUE, START))
 NOISE = 0.05, 0.0006  # N, m
 
 
 def recorded(phase: float, seed: int, noise=(0.0, 0.0)):
     """Hang, grasp at 0.6 s, lift by 1.2 s, pull to 0.4 m by 3 s, release at 3.8 s."""
     empty = pulled(160, 130, 0.6, (0.6, 1.2), (1.2, 3.0), 3.8, first_frame=phase)
-    world, theta = at_points(SLING, POINT[None])
     force, depth = noise
     about = {"force_noise": force, "depth_noise": depth, "seed": seed}
-    return own_law_episode(world, empty, theta[0], cutoff=CUTOFF, **about)
+    return own_law_episode(SLING, empty, TRUTH, cutoff=CUTOFF, **about)
 
 
 def found_of(*episodes, workers: int = WORKERS):
-    return identify.fit_posterior(PARAMS, METHOD, SLING, episodes, FROM[:7], workers=workers)
+    return identify.fit_posterior(PARAMS, METHOD, SLING, episodes, FROM, workers=workers)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,8 @@ def test_the_loss_factors_prior_pulls_towards_it_and_no_farther(first):
 
 def test_intervals_hold_the_truth_and_two_recordings_narrow_them(first, both):
     one, two = (told_of(found)["parameters"] for found in (first, both))
-    for name, value in zip(first.names[:7], POINT, strict=False):
+    for name in parameter_names(SLING.law):
+        value = TRUTH.sample()[name]
         for about in (one[name], two[name]):
             assert about["low"] <= value * (1 + 1e-9) and value * (1 - 1e-9) <= about["high"]
     widths = [about["youngs_modulus"] for about in (one, two)]
@@ -99,13 +100,14 @@ def test_what_is_written_is_a_theta_file(first, tmp_path):
     path.write_text(json.dumps(content, allow_nan=False))
     read = load_theta(path, "known")
     assert read["theta"] == content["theta"] and read["history"] == content["history"]
-    assert first.names == [*content["theta"], "air_drag", "turn_damping", "returned_share"]
-    assert first.points.shape == (identify.SAMPLES, len(first.names))
+    names = first.parameters.names
+    assert names == (*content["theta"], "air_drag", "turn_damping", "returned_share")
+    assert first.parameters.values.shape == (identify.SAMPLES, len(names))
 
 
 def test_workers_change_no_byte(exact, first):
     again = found_of(exact[0], workers=1)
-    np.testing.assert_array_equal(again.points, first.points)
+    np.testing.assert_array_equal(again.parameters.values, first.parameters.values)
     assert json.dumps(told_of(again)) == json.dumps(told_of(first))
 
 
@@ -113,7 +115,7 @@ def test_residuals_at_the_truth_are_of_the_size_of_the_noise():
     """Of the force what its low-pass leaves of white noise, and of a bin far below a point's."""
     episode = recorded(0.012, 5, NOISE)
     recording = Likelihood(episode, SLING, CUTOFF, 0.7)
-    rollouts = recording.simulate(POINT[None], np.zeros(3))
+    rollouts = recording.simulate(TRUTH, np.zeros(3))
     residuals = Residuals(episode, SLING, CUTOFF, rollouts.center_line[0])
     gap, count = residuals(rollouts)[0], 3 * len(residuals.samples)
     assert 0.1 * NOISE[0] < gap[:count].std() < 0.5 * NOISE[0]
@@ -122,8 +124,7 @@ def test_residuals_at_the_truth_are_of_the_size_of_the_noise():
 
 def test_bias_and_shift_move_the_residuals_by_their_columns(exact):
     episode = exact[0]
-    world, theta = at_points(SLING, POINT[None])
-    rollouts = interact(world, episode, theta)
+    rollouts = interact(SLING, episode, TRUTH)
     base = Residuals(episode, SLING, CUTOFF, rollouts.center_line[0])
     columns, bias, shift = base.columns(), np.array([0.02, -0.05, 0.1]), [3e-4, -2e-4, 4e-4]
     moved = replace(

@@ -22,7 +22,6 @@ def toy(sling, setup, theta: np.ndarray, draws: np.ndarray, workers: int) -> Sim
 @pytest.fixture(autouse=True)
 def closed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(launches, "launch", toy)
-    monkeypatch.setattr(launches, "at_points", lambda sling, points: (sling, points))
 
 
 def expanded(*observed: Observed, phi=(0.0, 0.0)):

@@ -6,13 +6,13 @@ import pytest
 from pipeline.identify.posterior.coordinates import Coordinates
 from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
 from pipeline.identify.results.mounting import load_sling
-from pipeline.identify.results.theta import at_points
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import LaunchHistory, LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from tests.project import with_
 from validation.projects import ROUGH
 
-THETA = np.array([5e5, 0.47, 5e-3, 0.7, 0.6, 0.0, 0.02])  # and Mooney's share, relaxation
+THETA = Parameters.of("rubber", [5e5, 0.47, 5e-3, 0.7, 0.6], relaxation=0.02)
 DRAW, FURTHER = (-0.30, -0.17), 1.04
 
 
@@ -24,14 +24,13 @@ def told(params):
     setup = LaunchSetup.of(rough.setup, rough.sling, LaunchHistory(1.0, 0.5))
     coordinates = Coordinates.of_method(rough, "least_squares", sling)
     phi = coordinates.of(THETA)
-    own, theta = at_points(sling, coordinates.points(phi[None]))
-    once = launch(own, setup, theta, np.array([DRAW]))
+    once = launch(sling, setup, coordinates.parameters(phi[None]), np.array([DRAW]))
     assert once.failure[0] is None
 
     def by(count: int):
         observed = [Observed(DRAW, 0.001, FURTHER * float(once.landing_y[0]))] * count
         _, hessian, gradient = LaunchLikelihood(observed, sling, setup).expand(
-            coordinates.points, phi, coordinates.steps
+            coordinates.parameters, phi, coordinates.steps
         )
         return known + hessian, gradient
 

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.objective.loss import TERMS
-from pipeline.identify.objective.space import Space
 from pipeline.identify.optimizers.cma.multistart import Multistart
 from pipeline.identify.search.build import build
 from pipeline.identify.search.history import History
@@ -43,7 +43,7 @@ class Evaluate:
         self.function, self.fails, self.count = function, fails, 0
         size = len(names)
         low, high, linear = np.zeros(size), np.full(size, 10.0), np.zeros(size, bool)
-        self.space = Space(names, low, high, linear)
+        self.box = SearchBox(names, low, high, linear)
         weights = dict.fromkeys(TERMS, 0.0) | (weights or {"geom": 1.0})
         weighed = [name for name in TERMS if weights[name]]
         total = lambda terms: sum(weights[name] * terms[name] for name in weighed)  # noqa: E731
@@ -56,7 +56,7 @@ class Evaluate:
         terms = {name: np.where(failed, np.nan, value) for name in TERMS}
         total = np.where(failed, np.inf, self.loss.total(terms))
         failure = ["no" if bad else None for bad in failed]
-        return Evaluation(unit, self.space.to_physical(unit), terms, total, failure, seconds=1.0)
+        return Evaluation(unit, self.box.to_physical(unit), terms, total, failure, seconds=1.0)
 
 
 def quadratic(centre: np.ndarray, matrix: np.ndarray, **more) -> Evaluate:

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.base.errors import UserError
-from pipeline.identify.objective.space import Space
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.search.build import build
 from pipeline.identify.search.explore import rollouts_of
 from pipeline.identify.search.history import History, theta_content
-from pipeline.identify.search.loop import Free, latin_hypercube, search
+from pipeline.identify.search.loop import latin_hypercube, search
 from pipeline.params import load
 from tests.identify.search import functions
 from tests.identify.search.functions import (
@@ -104,17 +104,17 @@ def test_failed_points_are_told_as_twice_the_worst_so_far() -> None:
 def test_fixed_axes_keep_their_physical_values() -> None:
     """The optimiser searches the other axes; the history has all of them."""
     parameters = load("params.yaml").parameters
-    space = Space.of(parameters)
-    free = Free.of(space, {"poissons_ratio": 0.45, "elasticity_damping": 5e-3})
-    assert free.names == ("youngs_modulus", "dynamic_friction", "damping_scale")
+    fixed = {"poissons_ratio": 0.45, "elasticity_damping": 5e-3}
+    box = SearchBox.of(parameters, fixed=fixed)
+    assert box.free == ("youngs_modulus", "dynamic_friction", "damping_scale")
     evaluate = quadratic(CENTRE, np.eye(5))
-    evaluate.space = space
-    history = History("toy", space.names)
+    evaluate.box = box
+    history = History("toy", box.names)
     one = build("de", 3, rollouts=600, seed=1, population=20)
-    search(one, evaluate, history, rollouts=600, free=free)
+    search(one, evaluate, history, rollouts=600, box=box)
     np.testing.assert_allclose(history.table["poissons_ratio"], 0.45, rtol=1e-12)
     np.testing.assert_allclose(history.table["elasticity_damping"], 5e-3, rtol=1e-12)
-    best = [history.best()[f"unit_{name}"] for name in free.names]
+    best = [history.best()[f"unit_{name}"] for name in box.free]
     np.testing.assert_allclose(best, CENTRE[[0, 3, 4]], atol=1e-3)
 
 

@@ -2,26 +2,26 @@
 
 import numpy as np
 
+from pipeline.identify.results.theta import parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.params import load
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 from tests.project import ROOT
 
 
 def test_the_simulator_launches_in_the_air_of_the_theta_file(tmp_path) -> None:
-    """Drag takes speed; a sixth column takes the place of the file's, launch by launch."""
+    """Drag takes speed; that of samples takes the place of the file's, launch by launch."""
     params = load(ROOT / "params.yaml")
     coarse = {"edges": 16, "launch_step": 1e-3}
     params = params.model_copy(update={"sling": params.sling.model_copy(update=coarse)})
     band, draw = next(iter(params.bands)), np.array([[-0.33, -0.15]])
     theta = dict(zip(THETA, (2.5e5, 0.47, 2e-3, 0.8, 0.6), strict=True))
-    point = np.array([*theta.values()])
     contents = [{"theta": theta, "nuisances": {"air_drag": drag}} for drag in (0.0, 6.0)]
     still, moving = (simulator(params, band, one, root=tmp_path) for one in contents)
     calm, windy = (one(draw).landing_y[0] for one in (still, moving))
     assert windy < 0.99 * calm
-    samples = np.array([[*point, 0.0], [*point, 6.0]])
+    samples = parameters_of(contents[0]).changed(air_drag=np.array([0.0, 6.0]))
     both = moving(np.repeat(draw, 2, axis=0), samples).landing_y
     np.testing.assert_allclose(both, [calm, windy], rtol=1e-5)
-    alone = moving(draw, point[None]).landing_y
+    alone = moving(draw, samples[1:]).landing_y
     np.testing.assert_allclose(alone, [windy], rtol=1e-5)

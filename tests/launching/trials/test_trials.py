@@ -8,6 +8,7 @@ from pipeline.launching.trials.trials import SCHEMA, Batch, launched, limited, t
 from pipeline.params import load
 from pipeline.simulator.launch import Launches, launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
+from pipeline.simulator.parameters import Parameters
 
 PREDICTED = Launches(
     landing_y=np.array([1.9, np.nan, 2.0]),
@@ -89,6 +90,7 @@ def test_the_limit_is_the_simulators_own() -> None:
     lab = params.setup, params.sling
     world = ClampedBand.of(params.bands["band1"], *lab), LaunchSetup.of(*lab)
     draws, theta = np.array([[-0.28, -0.1], [-0.44, -0.28]]), np.array([2e5, 0.45, 2e-3, 0.5, 0.5])
+    theta = Parameters.of(world[0].law, theta)
     free = launch(*world, theta, draws)
     limit = float(free.hold_force.mean())
     expected, found = launch(*world, theta, draws, max_force=limit), limited(free, limit)

@@ -10,10 +10,10 @@ import pytest
 from ruamel.yaml import YAML
 
 from pipeline.base.layout import Layout
-from pipeline.identify.results.theta import EXTRA
 from pipeline.params import Params, load
 from pipeline.recording.build import build_episodes
 from pipeline.report.card.known import Known, known
+from pipeline.simulator.parameters import EXTRA
 from tests import once
 from tests.policy.stored import write_stored
 from tests.project import ROOT, set_methods

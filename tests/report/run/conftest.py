@@ -14,7 +14,7 @@ from pipeline.identify.search.regions import Region, save_regions
 from pipeline.launching.trials.measured import save_scores
 from pipeline.params import load
 from pipeline.report.run.results import Result, Results, gather
-from pipeline.simulator.material import THETA as NAMES
+from pipeline.simulator.parameters import THETA as NAMES
 from tests.policy.stored import write_stored
 from tests.project import set_methods
 

@@ -11,8 +11,9 @@ from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.params import load
 from pipeline.report.run.replay import replay_method
 from pipeline.simulator.interaction import interact
-from pipeline.simulator.material import THETA as NAMES
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import THETA as NAMES
+from pipeline.simulator.parameters import Parameters
 from tests.project import ROOT
 
 pytestmark = pytest.mark.usefixtures("nowhere")
@@ -43,7 +44,7 @@ def recorded(sling):
         "band1", time, path(time), path(time, 1), nothing + [0, 2, 0], 0 * time, stamps, [],
         1.0, 4.0, np.array([1.5, 0, 0]),
     )  # fmt: skip
-    rollouts = interact(sling, episode, np.array([list(THETA.values())]))
+    rollouts = interact(sling, episode, Parameters.of(sling.law, [*THETA.values()]))
     clouds = [(line + SHIFT).astype(np.float32) for line in rollouts.center_line[0]]
     return replace(episode, clouds=clouds), rollouts
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
-from pipeline.identify.objective.space import Space
 from pipeline.identify.search.explore import rollouts_of
 from pipeline.params import load
 from tests.project import ROOT
@@ -21,7 +21,7 @@ EXPLORED = 18  # of them
 def test_the_recorded_theta_is_where_the_loss_is_least() -> None:
     """No sensor has noise: the force agrees to rounding, and every other theta is worse."""
     sling, episode = recorded_yardstick(PARAMS)
-    space = Space.of(PARAMS.parameters)
+    space = SearchBox.of(PARAMS.parameters)
     loss = EpisodeLoss.of(PARAMS, "sling2sim2real", episode, sling)
     evaluate = Evaluator(episode, sling, loss, space, workers=1)
     truth = space.to_unit(np.array([THETA]))
@@ -55,10 +55,10 @@ def test_a_search_is_timed_in_the_box_of_its_method() -> None:
     sling, episode = recorded_yardstick(PARAMS)
     for method in ("sling2sim2real", "least_squares"):
         evaluate = bench.evaluator(PARAMS, method, sling, episode, ["cpu"])
-        expected = Space.of_method(PARAMS, method)
-        assert evaluate.space.names == expected.names
-        np.testing.assert_array_equal(evaluate.space.low, expected.low)
-        np.testing.assert_array_equal(evaluate.space.high, expected.high)
+        expected = SearchBox.of_method(PARAMS, method)
+        assert evaluate.box.names == expected.names
+        np.testing.assert_array_equal(evaluate.box.low, expected.low)
+        np.testing.assert_array_equal(evaluate.box.high, expected.high)
 
 
 def test_the_large_budget_is_ten_times_the_laptops() -> None:

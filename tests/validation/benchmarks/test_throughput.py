@@ -10,6 +10,7 @@ from pipeline.base.native import start, wp
 from pipeline.params import load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.parameters import Parameters
 from tests.project import ROOT
 from validation import synthetic
 from validation.benchmarks import throughput as bench
@@ -20,7 +21,7 @@ PARAMS = load(ROOT / "params.yaml")
 def test_the_yardstick_is_held_drawn_and_let_go() -> None:
     sling = ClampedBand.of(PARAMS.bands["band1"], PARAMS.setup, PARAMS.sling)
     episode = synthetic.pull_and_release("band1", PARAMS.episode, sling)
-    rollouts = interact(sling, episode, np.array([[6e5, 0.45, 5e-3, 0.5, 1.0]]))
+    rollouts = interact(sling, episode, Parameters.of(sling.law, [6e5, 0.45, 5e-3, 0.5, 1.0]))
     assert rollouts.failure == [None]
     at = {t: int(np.argmin(np.abs(rollouts.cloud_time - t))) for t in (7.9, 8.5)}
     middle = rollouts.center_line[0, :, sling.middle, 1]

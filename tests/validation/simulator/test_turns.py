@@ -1,11 +1,10 @@
 """What turns a stressed band is braked by: nothing, or the rate of the nominal stress."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipeline.simulator.parameters import Parameters
 from validation.simulator.closed import String
 from validation.simulator.experiment import band_of
 from validation.simulator.reference import TURNS, ReferenceRod
@@ -15,12 +14,13 @@ THETA = (5e5, 0.42, 3e-3, 0.5, 0.6)
 
 def taut(bench, share: float, seed: int, stretch: float) -> tuple[ReferenceRod, np.ndarray]:
     """A band in uniaxial stress, turned at random, and its sections (L, 9)."""
-    sling = replace(band_of(bench), turn_damping=share)
+    sling = band_of(bench)
+    theta = Parameters.of(sling.law, THETA, turn_damping=share)
     thick = np.sqrt(String.of(sling, THETA).volume(stretch) / stretch)
     sections = np.zeros((sling.sections, 9))
     sections[:, 0], sections[:, 4], sections[:, 8] = stretch * sling.arc, thick, thick
     turn = Rotation.random(random_state=seed)
-    return ReferenceRod(sling, THETA), turn.apply(sections.reshape(-1, 3)).reshape(-1, 9)
+    return ReferenceRod(sling, theta), turn.apply(sections.reshape(-1, 3)).reshape(-1, 9)
 
 
 @pytest.mark.parametrize(("seed", "stretch"), [(0, 1.3), (1, 1.6), (2, 2.2)])

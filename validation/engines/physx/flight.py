@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.export.mesh import Tube
 from pipeline.simulator.launch import Launches, outcomes
 from pipeline.simulator.model import GRAVITY, ClampedBand, LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import LANE, Outcome
 from validation.engines.physx.law import energy, force_on
 from validation.engines.physx.rollouts import BURST, SPACE
@@ -48,6 +49,7 @@ class Flight:
     ) -> None:
         self.sling, self.setup, self.tube = sling, setup, tube
         self.draws, self.step = np.asarray(draws), 1 / rate
+        self.parameters = Parameters.of(sling.law, thetas)
         self.young, self.poisson, damping = np.asarray(thetas, float).T[:3]
         self.delay, size = damping * rate, len(draws)
         section = tube.mass.reshape(tube.rest.shape[:2])[tube.middle].sum()
@@ -88,7 +90,7 @@ class Flight:
 
     def outcome(self) -> Pushed:
         """What became of them."""
-        done = outcomes(self.sling, self.setup, self.lanes, self.draws, np.inf)
+        done = outcomes(self.sling, self.setup, self.parameters, self.lanes, self.draws, np.inf)
         failure = np.where(self.burst, BURST, np.array(done.failure, object)).tolist()
         return Pushed(replace(done, failure=failure), self.gained)
 

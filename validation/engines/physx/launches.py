@@ -24,6 +24,7 @@ from pipeline.identify.results.mounting import load_sling
 from pipeline.params import Params, load
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.engines.checks import SAME_MESH
 from validation.engines.physx.bands import Drive, Engine
@@ -104,7 +105,7 @@ def main() -> None:
     sling, setup = load_sling(params, asked.band), alike(params)
     draws = draws_of(params.setup)
     thetas = np.tile(theta_of(asked.theta), (len(draws), 1))
-    ours = launch(sling, setup, thetas, draws)
+    ours = launch(sling, setup, Parameters.of(sling.law, thetas), draws)
     with Engine() as engine:
         theirs = launch_in_physx(engine, sling, setup, thetas, draws, rate=asked.rate)
     print(*(f"{name:>9}" for name in COLUMNS), " PhysX: why not")

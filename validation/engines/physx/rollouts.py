@@ -12,9 +12,11 @@ from functools import cache
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.episode.episode import Episode
 from pipeline.export.mesh import Tube
 from pipeline.simulator.interaction import Rollouts
-from pipeline.simulator.model import GRAVITY
+from pipeline.simulator.model import GRAVITY, ClampedBand
+from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.engines.checks import SAME_MESH
 from validation.engines.physx.bands import Engine
@@ -33,14 +35,16 @@ def _engine() -> Engine:
     return engine
 
 
-def simulate(sling, *, episode, thetas: np.ndarray, device: str) -> Rollouts:
-    """Rollouts of thetas (N, 5) on PhysX's own device, whatever `device` says.
+def simulate(
+    sling: ClampedBand, *, episode: Episode, parameters: Parameters, device: str
+) -> Rollouts:
+    """Rollouts of N parameters on PhysX's own device, whatever `device` says.
 
     Raises UserError: as `Engine`, or for a law that PhysX does not have.
     """
     if sling.law != NEO_HOOKEAN:
         raise UserError(f"engine: physx has no law {sling.law}; set law: {NEO_HOOKEAN}")
-    tube = Tube.of(sling, **SAME_MESH)
+    tube, thetas = Tube.of(sling, **SAME_MESH), parameters.theta
     course = phases(tube, episode, RATE)
     courses = _engine().simulate(tube, thetas, course, rate=RATE, iterations=ITERATIONS)
     return rollouts(sling, tube, episode, thetas, courses)

@@ -24,9 +24,9 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.machine import devices
 from pipeline.identify.identify import evaluations_of
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.loss import TERMS
 from pipeline.identify.objective.session import service
-from pipeline.identify.objective.space import Space
 from pipeline.identify.results.mounting import sling_of_method
 from pipeline.identify.search.explore import rollouts_of
 from pipeline.identify.search.history import History
@@ -34,6 +34,7 @@ from pipeline.params import load
 from pipeline.params.identification import OUR_ENGINE
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import LaunchSetup
+from pipeline.simulator.parameters import Parameters
 from validation.benchmarks.timing import environment
 from validation.engines.physx.bands import Engine, release
 from validation.engines.physx.launches import FINE, alike, draws_of, launch_in_physx
@@ -58,7 +59,7 @@ class Comparison:
         self.params, self.band = with_engines(params), band
         self.sling = sling_of_method(self.params, band, OURS)
         self.setup = LaunchSetup.of(params.setup, params.sling)
-        self.space = Space.of_method(self.params, OURS)
+        self.box = SearchBox.of_method(self.params, OURS)
 
     def search(self, engine: str) -> tuple[History, float]:
         """Everything that was evaluated, and the seconds that it took (less what was recalled)."""
@@ -71,7 +72,7 @@ class Comparison:
 
     def losses(self, thetas: np.ndarray) -> dict[str, list[dict]]:
         """Terms of the loss of thetas (N, 5) by engine; None where one failed."""
-        unit, found = self.space.to_unit(thetas), {}
+        unit, found = self.box.to_unit(thetas), {}
         for engine in (OURS, PHYSX):
             done = service("losses", self.band, engine, self.params, len(unit))(unit)
             found[engine] = [
@@ -85,8 +86,8 @@ class Comparison:
         """Where our simulator lands the draws (L, 2) with each theta, and where they landed [m]."""
         landings = np.array(
             [
-                launch(self.sling, self.setup, np.tile(one, (len(draws), 1)), draws).landing_y
-                for one in thetas
+                launch(self.sling, self.setup, one, draws).landing_y
+                for one in (Parameters.of(self.sling.law, theta) for theta in thetas)
             ]
         )
         rows = []
@@ -106,7 +107,7 @@ class Comparison:
         each, every = np.repeat(thetas, len(draws), axis=0), np.tile(draws, (len(thetas), 1))
         gained = [None] * len(every)
         if where == OURS:
-            done = launch(*both, each, every)
+            done = launch(*both, Parameters.of(self.sling.law, each), every)
         else:
             with Engine() as engine:
                 pushed = launch_in_physx(engine, *both, each, every, rate=rate)
@@ -159,9 +160,9 @@ def main() -> None:
     for name in (OURS, PHYSX):
         history, seconds = comparison.search(name)
         best = history.best()
-        thetas.append([best[one] for one in comparison.space.names])
+        thetas.append([best[one] for one in comparison.box.names])
         content[name] = {
-            "theta": dict(zip(comparison.space.names, thetas[-1], strict=True)),
+            "theta": dict(zip(comparison.box.names, thetas[-1], strict=True)),
             "rollouts": len(history.total),
             "failed": int(np.isinf(history.total).sum()),
             "seconds": seconds,

@@ -128,7 +128,7 @@ def balance(tube: Tube, thetas: np.ndarray, courses: list[Course]) -> np.ndarray
 
 def ours(sling: ClampedBand, episode, thetas: np.ndarray) -> list[BandMotion]:
     """The same by our simulator."""
-    done = interact(sling, episode, thetas)
+    done = interact(sling, episode, checks.damped(thetas))
     marks = episode.cloud_time
     held = marks[marks < episode.release_time + 0.5 / MARK]
     return [
@@ -245,8 +245,9 @@ def speeds(bench: Bench, engine: Engine) -> list[dict]:
     for count in ENVIRONMENTS:
         thetas = np.tile(checks.THETA, (count, 1))
         _, held, free = engine.simulate(tube, thetas, course, rate=rate, iterations=iterations)
-        interact(sling, episode, thetas, device=bench.device)  # compiles
-        wall = timed(lambda n=thetas: interact(sling, episode, n, device=bench.device))[2]
+        parameters = checks.damped(thetas)
+        interact(sling, episode, parameters, device=bench.device)  # compiles
+        wall = timed(lambda n=parameters: interact(sling, episode, n, device=bench.device))[2]
         steps = len(course[1].targets) + len(course[2].targets)
         entries.append(
             {

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import qmc
 
-from pipeline.identify.objective.space import reflect
+from pipeline.identify.objective.box import reflect
 from pipeline.identify.search.loop import latin_hypercube
 
 if TYPE_CHECKING:

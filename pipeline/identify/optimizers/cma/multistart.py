@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.identify.objective.space import reflect
+from pipeline.identify.objective.box import reflect
 from pipeline.identify.search.regions import Region
 
 

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluation
-from pipeline.identify.objective.space import Space
 from pipeline.identify.optimizers.cma.multistart import Multistart
 from pipeline.identify.search.history import History
-from pipeline.identify.search.loop import Free, search
+from pipeline.identify.search.loop import search
 from pipeline.identify.search.regions import Region
 from pipeline.params import Params
 
@@ -27,13 +27,13 @@ def refine(
         regions: On the method's free axes.
         evaluate: Losses of points of the whole unit cube, shape (N, D).
     """
-    optimizer, space = params.optimizer, Space.of_method(params, method)
-    history = History(method, space.names)
+    optimizer, box = params.optimizer, SearchBox.of_method(params, method)
+    history = History(method, box.names)
     search(
         Multistart(list(regions), population=optimizer.cma_population, seed=optimizer.seed),
         evaluate,
         history,
         rollouts=optimizer.cma_rollouts,
-        free=Free.of(space, params.methods[method].fixed),
+        box=box,
     )
     return history

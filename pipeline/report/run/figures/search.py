@@ -16,7 +16,7 @@ from pipeline.report.quantities import QUANTITIES
 from pipeline.report.run.figures.panels import entitle, explain, panels
 from pipeline.report.run.figures.policy import DASHES
 from pipeline.report.run.results import Result, best_so_far, printed
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 
 PATH, STAR = "#e4003a", "#ffd23f"
 NEAR = 0.5  # above the least loss, up to which a picture reaches at least

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from pipeline.identify.objective.space import Space
+from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.results.units import SI_UNITS
 from pipeline.params.identification import LAWS
 from pipeline.report.drawing.styles import Styles
@@ -17,7 +17,7 @@ from pipeline.report.run import paper
 from pipeline.report.run.results import PRINTED, Result, Results
 from pipeline.report.run.tables.benchmark import PAPER, band_name, method_name, ordered
 from pipeline.report.run.tables.cells import NONE, Table, number
-from pipeline.simulator.material import THETA
+from pipeline.simulator.parameters import THETA
 from pipeline.simulator.rubber import RUBBER
 
 NAMES = (*THETA, *LAWS[RUBBER])
@@ -79,7 +79,7 @@ def _value(params, result: Result, name: str) -> Value:
     value = result.theta["theta"][name]
     if name in params.methods[result.method].fixed:
         return Value(value, "fixed")
-    box = Space.of_method(params, result.method)
+    box = SearchBox.of_method(params, result.method)
     edge = name in box.names and at_edge(value, name, box)
     about = result.confidence.get("parameters", {}).get(name)
     if about is None:
@@ -88,7 +88,7 @@ def _value(params, result: Result, name: str) -> Value:
     return Value(value, state, about["low"], about["high"], edge)
 
 
-def at_edge(value: float, name: str, box: Space) -> bool:
+def at_edge(value: float, name: str, box: SearchBox) -> bool:
     """Whether the search ended within 1 % of a side of its box: the optimum may lie outside."""
     axis = box.names.index(name)
     low, high = box.low[axis], box.high[axis]

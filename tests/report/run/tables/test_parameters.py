@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.identify.objective.space import Space
+from pipeline.identify.objective.box import SearchBox
 from pipeline.params import load
 from pipeline.report.drawing.styles import styles
 from pipeline.report.run.tables.parameters import as_table, at_edge, identified, records
@@ -26,7 +26,9 @@ def table_of(**more) -> list[list[str]]:
 
 
 def test_edge_of_the_box_on_both_scales() -> None:
-    box = Space(("d", "s"), np.array([1e-4, 0.0]), np.array([1e-2, 1.0]), np.array([True, False]))
+    box = SearchBox(
+        ("d", "s"), np.array([1e-4, 0.0]), np.array([1e-2, 1.0]), np.array([True, False])
+    )
     assert at_edge(1.01e-4, "d", box) and not at_edge(1.2e-4, "d", box) and at_edge(1e-2, "d", box)
     assert at_edge(0.995, "s", box) and not at_edge(0.98, "s", box)
 

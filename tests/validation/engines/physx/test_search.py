@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
+from pipeline.simulator.parameters import Parameters
 from tests.project import ROOT
 from validation.engines.physx import search
 from validation.engines.physx.search import OURS, PHYSX
@@ -20,7 +21,7 @@ def searched(tmp_path, monkeypatch):
     """search.main without the searches, whose best are THETAS; returns the file's path."""
 
     def found(self, engine):
-        best = dict(zip(self.space.names, THETAS[(OURS, PHYSX).index(engine)], strict=True))
+        best = dict(zip(self.box.names, THETAS[(OURS, PHYSX).index(engine)], strict=True))
         return SimpleNamespace(best=lambda: best, total=np.array([1.0, np.inf])), 2.0
 
     monkeypatch.setattr(search.Comparison, "search", found)
@@ -69,7 +70,7 @@ def test_what_physx_lands_stands_with_its_theta_and_draw(searched, monkeypatch):
 
     def thrown(engine, sling, setup, thetas, draws, *, rate):
         assert setup.arm_stiffness is None
-        done = search.launch(sling, setup, thetas, draws)
+        done = search.launch(sling, setup, Parameters.of(sling.law, thetas), draws)
         where = thetas[:, 0] + draws[:, 0] + rate
         fields = {**vars(done), "landing_y": where, "failure": [None] * len(where)}
         return SimpleNamespace(

@@ -36,8 +36,9 @@ def write(params: Params, band: str, method: str, root: str | Path = ".") -> dic
     found = findings(inputs)
     verdict, against = judge(found)
     reasons, shown = reasons_of(found, against), values(inputs.theta, about.fixed)
-    samples, aims, model = inputs.samples, inputs.aims, None
-    if samples:
+    aims = inputs.aims
+    model, samples = None, inputs.samples
+    if samples is not None:
         landings = aims.samples, aims.slope, aims.half_width
         model = LandingModel.of(samples.names, samples.values, *landings)
     launches = len(inputs.confidence.get("launches", []))

@@ -13,6 +13,7 @@ from pipeline.base.layout import Layout
 from pipeline.params import Params, load
 from pipeline.recording.build import build_episodes
 from pipeline.report.card.inputs import CardInputs, card_inputs
+from pipeline.simulator.parameters import EXTRA
 from tests import once
 from tests.policy.stored import write_stored
 from tests.project import ROOT, set_methods

@@ -69,8 +69,8 @@ def fork_in_base(params: Params, band: str, root: str | Path = ".") -> tuple[Tra
         if given is None:
             raise UserError(
                 f"setup.base_to_fork is null and no episode says where the fork stands ({error}):"
-                f" `dvc repro episode@{band}` makes them of a recording, or measure it"
-                " (docs/recording.md, Calibration)"
+                f" make one (`dvc repro episode@{band}`), or measure it (docs/recording.md,"
+                " Calibration)"
             ) from error
         return Transform.of(given), params.plan.frame
     fork = kept.base_to_fork if given is None else Transform.of(given)

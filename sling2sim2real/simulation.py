@@ -12,10 +12,9 @@ from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 from pipeline.episode.episode import Episode
 from pipeline.episode.planned import planned_pull
-from pipeline.episode.signal import as_recorded, cutoff_hz
 from pipeline.simulator.initial import hanging_guess
-from pipeline.simulator.interaction import interact
 from pipeline.simulator.parameters import Parameters
+from pipeline.simulator.replay import replay
 from sling2sim2real.model import Model, Theta
 
 LANES = 16  # rollouts that cost as much as one
@@ -88,25 +87,21 @@ def simulate_batch(model: Model, episode: Episode, thetas: Sequence[Theta]) -> l
     if not thetas or {one.law for one in thetas} != {model.theta.law}:
         raise UserError(f"thetas: give some, all of the model's law, {model.theta.law}")
     parameters = Parameters(model.theta.law, np.stack([one.point for one in thetas]))
-    cutoff = cutoff_hz(model.settings.force.cutoff, model.settings.force.cutoff_unit)
-    start = episode.time[0] - episode.sample_period / 2
 
     def part(some: Parameters) -> list[Simulation]:
-        done = interact(model.sling, episode, some)
-        steps = np.moveaxis(done.force, 0, 1)  # (S, N, 3)
-        sampling = start, episode.sample_period, len(episode.time)
-        force = np.moveaxis(as_recorded(done.times, steps, cutoff, *sampling), 0, 1)
+        done = replay(model.sling, episode, some, model.settings.force)
+        rollouts = done.rollouts
         return [
             Simulation(
                 time=episode.time,
-                force=force[i],
-                step_time=done.times,
-                step_force=done.force[i],
+                force=done.force[i],
+                step_time=rollouts.times,
+                step_force=rollouts.force[i],
                 cloud_time=episode.cloud_time,
-                center_line=done.center_line[i],
+                center_line=rollouts.center_line[i],
                 failure=why,
             )
-            for i, why in enumerate(done.failure)
+            for i, why in enumerate(rollouts.failure)
         ]
 
     with ThreadPoolExecutor(cores()) as pool:

@@ -8,6 +8,7 @@ from pathlib import Path
 from ruamel.yaml import YAML
 
 from pipeline.base.code import CODE, NESTED, ROOT, UNTRACKED, closure, concern, files_of, imports
+from tools import architecture
 from tools.closure import BY_NAME, folders, script_of
 
 STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
@@ -185,3 +186,8 @@ def test_closure_follows_every_form_of_import(tmp_path: Path) -> None:
         "pipeline/c",
         "stages/s.py",
     ]
+
+
+def test_the_drawing_of_the_imports_is_of_today() -> None:
+    page = architecture.PAGE.read_text(encoding="utf-8")
+    assert architecture.drawn(page) == page, "run `python tools/architecture.py --fix`"

@@ -63,7 +63,7 @@ class Countdown:
         number = names.index(self.now) + 1 if self.now in names else 0
         rest = sum(map(_seconds, names[max(number - 1, 0) :]))
         left = max(rest * self.pace - (time.monotonic() - self.begun), 1)
-        words = self.stages.get(self.now) or self.now
+        words = self.stages.get(self.now or "") or self.now
         text = f"[{number}/{len(names)}] {words}; about {_clock(left)} left"
         if self.bar:
             print(f"\r{text}  {facts}\x1b[K", end="", file=sys.stderr, flush=True)

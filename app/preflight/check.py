@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -181,7 +182,7 @@ def _add_roles(topics: list[Topic], recording: Recording) -> None:
         row.notes = list(stream.notes)
 
 
-def _signal_facts(done: Processed) -> dict[str, object]:
+def _signal_facts(done: Processed) -> dict[str, Any]:
     recording, signals, scene = done.pull.recording, done.signals, done.scene
     facts = signals.facts
     start = (signals.origin - recording.origin) * 1e-9

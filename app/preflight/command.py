@@ -6,6 +6,7 @@ from pathlib import Path
 
 from app.preflight.check import band_of, look_at
 from app.preflight.output import expect_writable, written
+from app.preflight.pictures import expect_new, write_pictures
 from pipeline.params import Params
 
 
@@ -47,8 +48,6 @@ def check(
     if rrd:
         expect_writable(rrd, ".rrd")
     if pictures:
-        from app.preflight.pictures import expect_new, write_pictures
-
         expect_new(pictures)
     about, source = band_of(params, band, diameter, rest_length)
     look = look_at(recording, params, about, source, pull)

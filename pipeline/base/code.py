@@ -97,7 +97,7 @@ def digests(*scripts: Path, root: Path = ROOT) -> dict[str, str]:
     files = {file for script in scripts for file in closure(script, root)}
     tracked = {concern(one) for one in files if one.startswith(CODE)}
     tracked -= {*UNCOUNTED, *(f"{top}__init__.py" for top in CODE)}
-    return {one: digest(root / one) for one in sorted(tracked)}
+    return {one: found for one in sorted(tracked) if (found := digest(root / one))}
 
 
 def digest(part: Path) -> str | None:

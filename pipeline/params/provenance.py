@@ -43,15 +43,15 @@ def settings_of(params: Params, band: str, method: str) -> dict[str, Any]:
     But for those of launches that are evidence: `evidence_settings_of`. Values are those of JSON:
     numbers, texts, lists, None.
     """
-    found = dict(_leaves(f"bands.{band}", params.bands[band]))
+    found = flat(f"bands.{band}", params.bands[band])
     for name in RECORDING:
-        found.update(_leaves(name, getattr(params, name)))
+        found.update(flat(name, getattr(params, name)))
     found.update(_part(params, "setup", *RECORDED_SETUP, *PULL_SETUP))
     found.update(_part(params, "sling", *MESH, *PULL_STEPS))
-    found.update(_leaves("loss", params.loss))
-    found.update(_leaves("parameters", params.parameters))
+    found.update(flat("loss", params.loss))
+    found.update(flat("parameters", params.parameters))
     for name in METHOD:
-        found.update(_leaves(f"methods.{method}.{name}", getattr(params.methods[method], name)))
+        found.update(flat(f"methods.{method}.{name}", getattr(params.methods[method], name)))
     return found
 
 
@@ -63,11 +63,11 @@ def evidence_settings_of(params: Params) -> dict[str, Any]:
 
 def policy_settings_of(params: Params, band: str) -> dict[str, Any]:
     """The settings that a policy rests on beside its θ, as `settings_of` gives them."""
-    found = dict(_leaves(f"bands.{band}", params.bands[band]))
+    found = flat(f"bands.{band}", params.bands[band])
     found.update(_launch_settings(params))
     found.update(_part(params, "setup", *PULL_SETUP, *POLICY_SETUP))
     found.update(_part(params, "sling", *MESH))
-    found.update(_leaves("policy", params.policy))
+    found.update(flat("policy", params.policy))
     return found
 
 
@@ -92,7 +92,7 @@ def changed_since(params: Params, content: Mapping[str, Any], method: str) -> li
 
 def _launch_settings(params: Params) -> dict[str, Any]:
     found = _part(params, "setup", *LAUNCH_SETUP) | _part(params, "sling", *LAUNCH_STEPS)
-    return found | dict(_leaves("launch", params.launch))
+    return found | flat("launch", params.launch)
 
 
 def _part(params: Params, section: str, *names: str) -> dict[str, Any]:
@@ -100,6 +100,11 @@ def _part(params: Params, section: str, *names: str) -> dict[str, Any]:
     return dict(
         leaf for name in names for leaf in _leaves(f"{section}.{name}", getattr(values, name))
     )
+
+
+def flat(key: str, value: Any) -> dict[str, Any]:
+    """All values below a section or mapping, by their keys."""
+    return dict(_leaves(key, value))
 
 
 def _leaves(key: str, value: Any) -> Iterator[tuple[str, Any]]:

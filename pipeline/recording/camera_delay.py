@@ -9,7 +9,7 @@ the pose says.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 from scipy.spatial.transform import Rotation
 
 from pipeline.recording.pulls import Pull
@@ -44,15 +44,15 @@ def camera_delay(pull: Pull) -> tuple[float, float] | None:
     rays, random = recording.depth_camera.rays().astype(np.float32), np.random.default_rng(0)
     times, pictures = [], []
     for k in used:
-        points = random.permutation(_hand(pull, rays, k, stamps[k]))
+        points = random.permutation(_hand(pull, rays, k, float(stamps[k])))
         if len(points) >= FEWEST:
-            times.append(stamps[k])
+            times.append(float(stamps[k]))
             pictures.append(points)
     if len(pictures) < 2 * BLOCKS:
         return None
     times = np.array(times)
     grid, _, velocity = motion.velocity()
-    delay = 0.0
+    delay, steps, errors = 0.0, np.zeros(2), np.full(2, np.inf)
     for _ in range(ROUNDS):
         at = times - delay
         turns, hands = motion.orientation(at), motion.position(at)
@@ -125,7 +125,7 @@ def _step(
     surface = _Surface(np.vstack([points[i] for i in slowest]))
     rows, wanted = [], []
     for i in range(len(points)):
-        if i in slowest or surface.empty:
+        if i in slowest:
             continue
         laid = surface.lay(points[i][:POINTS])
         if laid is None:
@@ -163,8 +163,8 @@ class _Surface:
     """Points of the resting hand with their normals."""
 
     def __init__(self, points: np.ndarray):
-        self.empty = len(points) < FEWEST
-        if self.empty:
+        self.tree: cKDTree | None = None
+        if len(points) < FEWEST:
             return
         points = np.random.default_rng(0).permutation(points)[: 8 * POINTS]
         _, index = cKDTree(points).query(points, k=NEIGHBOURS)
@@ -172,12 +172,17 @@ class _Surface:
         spread, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))
         flat = spread[:, 0] < FLAT * spread[:, 1]
         self.points, self.normals = points[flat], axes[flat, :, 0]
-        self.empty = len(self.points) < FEWEST
-        self.tree = cKDTree(self.points) if not self.empty else None
+        if len(self.points) >= FEWEST:
+            self.tree = cKDTree(self.points)
 
     def lay(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """By how much points (P, 3) are displaced, and the root of how surely, (3,) and (3, 3)."""
-        offset = np.zeros(3)
+        """By how much points (P, 3) are displaced, and the root of how surely, (3,) and (3, 3).
+
+        None where too little of the surface is seen.
+        """
+        if self.tree is None:
+            return None
+        offset, sure = np.zeros(3), np.zeros((3, 3))
         for most in NEAREST:
             distance, index = self.tree.query(points - offset, distance_upper_bound=most)
             near = np.isfinite(distance)

@@ -68,7 +68,8 @@ def find_releases(t: np.ndarray, force: np.ndarray, gripper: Opening | None) -> 
         return []
     for i, later in pairwise([*free, None]):
         if gripper is not None and i not in ends:
-            grasp, again = (_closed(*gripper, t[k]) for k in (i, i if later is None else later))
+            moments = (float(t[k]) for k in (i, i if later is None else later))
+            grasp, again = (_closed(*gripper, moment) for moment in moments)
             if grasp is None or (found and grasp < found[-1]):
                 continue
             if later is not None and (again is None or again < t[i]):
@@ -165,7 +166,7 @@ def _drops(
         )
     rest = force[t < t[0] + LEAD_IN].mean(axis=0)
     held, left = (np.linalg.norm(x[drops] - rest, axis=1) for x in (before, after))
-    opened = [i for i in drops[left < FREE * held] if gripper and _opens(*gripper, t[i])]
+    opened = [i for i in drops[left < FREE * held] if gripper and _opens(*gripper, float(t[i]))]
     large = drops[(left < FREE * held) & (size[drops] >= SUDDEN * largest)]
     free = sorted({*large.tolist(), *map(int, opened)})
     return drops, free, opened or free, size

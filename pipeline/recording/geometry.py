@@ -79,7 +79,7 @@ class KeptGeometry:
         if kept is None:
             raise UserError(
                 f"the episodes of {band} are of an older version, without the rig's geometry:"
-                f" `dvc repro --force episode@{band}` makes them anew"
+                f" `dvc repro episode@{band}` makes them anew"
             )
         camera = kept["camera"]
         arrays = {key: np.array(camera[key], float) for key in ("matrix", "distortion")}
@@ -127,7 +127,7 @@ def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
         sources["wrench"] = f"fixed frame {wrench_frame}"
     else:
         tool = _tool_frame(tree, wrench_frame, setup.tip_link)
-        sensor = tree.between(tool, wrench_frame)
+        sensor = tree.between(tool, wrench_frame) or Transform.identity()
         sources["wrench"] = f"{wrench_frame} on {tool}, which the pose topic is taken to move"
     return Geometry(base, color_to_fork @ color, color, sensor, fixed is not None, sources)
 

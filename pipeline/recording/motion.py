@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
@@ -22,7 +23,7 @@ DEGREE = 5  # of the splines that are differentiated twice
 KNOTS_APART, LEAST_BETWEEN, PHASES = 0.05, 2, 3  # s, in samples at least, and splines
 
 
-def expect_dense(stream: Stream) -> None:
+def expect_dense(stream: Stream[Any]) -> None:
     """Raises UserError where nearly all of a topic is missing: an even grid would not end."""
     span = (int(stream.stamp[-1]) - int(stream.stamp[0])) * 1e-9
     if span > SPARSE * len(stream.stamp) * stream.period:
@@ -49,19 +50,19 @@ class Motion:
     period: float
 
     @classmethod
-    def of(cls, pose: Stream, geometry: Geometry, origin: int) -> Motion:
+    def of(cls, pose: Stream[np.ndarray], geometry: Geometry, origin: int) -> Motion:
         """From the pose topic; seconds since `origin` [ns]. Raises UserError."""
         expect_dense(pose)
         turn = geometry.base.rotation * Rotation.from_quat(pose.values[:, 3:])
         path = geometry.base.apply(pose.values[:, :3])
         return cls(pose.seconds(origin), path, turn, pose.period)
 
-    def position(self, times: np.ndarray) -> np.ndarray:
+    def position(self, times: np.ndarray | float) -> np.ndarray:
         """Shape (..., 3), linear between samples, at rest beyond them."""
         axes = [np.interp(times, self.time, axis) for axis in self.path.T]
         return np.stack(axes, axis=-1)
 
-    def orientation(self, times: np.ndarray) -> Rotation:
+    def orientation(self, times: np.ndarray | float) -> Rotation:
         """The hand's frame into frame O."""
         return self._slerp(np.clip(times, self.time[0], self.time[-1]))
 
@@ -78,7 +79,8 @@ class Motion:
         size = max(5, 2 * round(VELOCITY_WINDOW / self.period / 2) + 1)
         if len(grid) <= size:
             raise UserError("the pose is too short to differentiate")
-        return grid, even, savgol_filter(even, size, 3, deriv=1, delta=self.period, axis=0)
+        velocity = savgol_filter(even, size, 3, deriv=1, delta=self.period, axis=0)
+        return grid, even, np.asarray(velocity)
 
     def acceleration(
         self, times: np.ndarray, point: np.ndarray, jump: float | None = None

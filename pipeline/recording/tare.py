@@ -74,7 +74,7 @@ def band_force(
             f"the band is grasped {grasp - t[0]:.2f} s after the start: record at least"
             f" {LEAD_IN + MARGIN:.2f} s of the empty hand before, to tare the force"
         )
-    usual = turn[lead_in].mean()
+    usual = turn[lead_in].mean()  # pyright: ignore[reportArgumentType]
 
     def tared(sign: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The force in frame O (S, 3), with the sensor's sign, and the bias and drift in it."""

@@ -43,7 +43,7 @@ class ToolInertia:
     mass_error: float
     delay: float
     delay_error: float
-    center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    center: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def force(
         self, motion: Motion, geometry: Geometry, times: np.ndarray, release: float
@@ -77,7 +77,7 @@ def estimate_tool_inertia(pull: Pull, tool: Tool | None) -> ToolInertia | None:
     grid = np.arange(motion.time[0], motion.time[-1], STEP)
     load = load_per_mass(motion, pull.geometry, grid, center)
     width = 2 * round(WINDOW / STEP / 2) + 1
-    change = savgol_filter(load, width, 3, deriv=1, delta=STEP, axis=0)
+    change = np.asarray(savgol_filter(load, width, 3, deriv=1, delta=STEP, axis=0))
     table = np.hstack([load, change])
     t, force, late = t[free], raw[free], t[free] > release
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import cast
 
 import cv2
 import numpy as np
@@ -32,8 +33,9 @@ def length(vectors: np.ndarray) -> np.ndarray:
 
 def onto_depth(picture: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """What a colour picture shows at `pixels` (H, W, 2), 0 where they are -1."""
+    nowhere = cast(np.ndarray, None)  # `pixels` holds both maps, of which OpenCV's stubs know not
     return cv2.remap(
-        picture, pixels, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0
+        picture, pixels, nowhere, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0
     )
 
 
@@ -125,7 +127,7 @@ class View:
         tolerance = PAIRING * recording.depth.period
         within = (times >= 0) & (times < duration)
         paired = np.abs(color_times[pairs] - times) < tolerance
-        self.index = [(k, pairs[k]) for k in np.flatnonzero(within & paired)]
+        self.index = [(k, pairs[k]) for k in np.flatnonzero(within & paired).tolist()]
         self.unpaired = int(np.sum(within & ~paired))
         self.times = np.array([times[k] for k, _ in self.index])
         self.damaged: set[int] = set()
@@ -223,7 +225,7 @@ class View:
         pixels[ahead] = self.recording.color_camera.project(in_color[ahead])
         height, width = color.shape[:2]
         cells = np.round(pixels).astype(np.int64)
-        inside = ((cells >= 0) & (cells < (width, height))).all(axis=1)
+        inside = np.asarray(np.all((cells >= 0) & (cells < (width, height)), axis=1))
         places = cells[inside, 1] * width + cells[inside, 0]
         depths = in_color[inside, 2]
         nearest = np.full(height * width, np.float32(UNKNOWN))

@@ -43,9 +43,7 @@ def bench_recording(path: Path, params: Params) -> dict:
     band = next(iter(params.bands.values()))
     with on_one_core() as how:
         recording, read, _ = timed(partial(read_recording, Path(path), params.setup))
-        view, signals, _ = timed(
-            lambda: Processed.of(Pull.of(recording, params.setup), band, params).view
-        )
+        view, signals, _ = timed(partial(_view_of, recording, band, params))
         spent, sizes = _steps(view, params.cloud)
     count = max(1, len(sizes))
     after = sum(spent.values()) - spent["decode"]

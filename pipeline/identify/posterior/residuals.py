@@ -17,9 +17,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.episode.episode import Episode
-from pipeline.episode.signal import as_recorded
 from pipeline.simulator.interaction import Rollouts
 from pipeline.simulator.model import ClampedBand
+from pipeline.simulator.replay import recorded_force
 
 BINS = 16  # along the band, equal at rest
 LEAST_POINTS = 4  # of a bin
@@ -148,7 +148,8 @@ class Residuals:
 
     def __call__(self, rollouts: Rollouts) -> np.ndarray:
         """Residual vectors of N rollouts, shape (N, R)."""
-        gap = (self.episode.force - self.force(rollouts))[:, self.samples]
+        force = recorded_force(rollouts, self.episode, self.cutoff)
+        gap = (self.episode.force - force)[:, self.samples]
         line = np.asarray(rollouts.center_line, np.float32)
         point = self.point.astype(np.float32)[:, None]
         start = line[:, self.frame[:, None], self._window]  # (N, M, W, 3)
@@ -160,14 +161,6 @@ class Residuals:
         offset = -np.take_along_axis(start, best[:, :, None, None], 2)[:, :, 0]  # (N, M, 3)
         cloud = [_dot(offset, self.depth) - self._bias[0], _dot(offset, self.side) - self._bias[1]]
         return np.concatenate([*gap.transpose(2, 0, 1), *cloud], axis=1).astype(float)
-
-    def force(self, rollouts: Rollouts) -> np.ndarray:
-        """Of N rollouts on the gripper, as the recorded one was filtered [N], shape (N, T, 3)."""
-        episode = self.episode
-        steps = np.moveaxis(np.asarray(rollouts.force, float), 0, 1)  # (S, N, 3)
-        sampling = episode.time[0] - episode.sample_period / 2, episode.sample_period
-        force = as_recorded(rollouts.times, steps, self.cutoff, *sampling, len(episode.time))
-        return np.moveaxis(force, 1, 0)
 
     def spread(self, force: float, cloud: float, way: float) -> np.ndarray:
         """Standard deviation of each residual, shape (R,).

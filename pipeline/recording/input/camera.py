@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Hashable
 from dataclasses import dataclass, replace
 
 import cv2
@@ -81,7 +82,7 @@ class Calibration:
     region: tuple[int, int, int, int]
 
     @property
-    def kind(self) -> tuple:
+    def kind(self) -> tuple[Hashable, ...]:
         """Everything: a calibration does not change."""
         camera = self.camera
         numbers = (*camera.matrix.flat, *camera.distortion, *self.rectified.flat)
@@ -96,12 +97,12 @@ def read_calibration(message: Message) -> Reading:
     distortion = np.array(first_of(message, "d", "D"), float).ravel()
     frame = frame_of(message)
     camera = Camera(int(message.width), int(message.height), matrix, distortion, frame)
-    binning = tuple(max(1, int(getattr(message, f"binning_{axis}", 1))) for axis in "xy")
+    across, down = (max(1, int(getattr(message, f"binning_{axis}", 1))) for axis in "xy")
     roi = getattr(message, "roi", None)
-    region = (roi.x_offset, roi.y_offset, roi.width, roi.height) if roi else (0, 0, 0, 0)
-    value = Calibration(
-        camera, str(message.distortion_model), rectified, binning, tuple(map(int, region))
-    )
+    sides = (roi.x_offset, roi.y_offset, roi.width, roi.height) if roi else (0, 0, 0, 0)
+    x, y, width, height = map(int, sides)
+    model = str(message.distortion_model)
+    value = Calibration(camera, model, rectified, (across, down), (x, y, width, height))
     return Reading(stamp_of(message), frame, value)
 
 

@@ -23,7 +23,7 @@ import re
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from mcap import records as kinds
@@ -39,6 +39,7 @@ OVERHEAD = 256  # bytes that a message costs beside its payload
 BULKY = re.compile("PointCloud|LaserScan|OccupancyGrid|CompressedVideo")  # counted, not kept
 LONGEST = 86_400 * 10**9  # ns that a recording lasts
 KEPT = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+NO_SCHEMA = kinds.Schema(id=0, data=b"", encoding="", name="")
 NAMED = 5  # places or topics named in one line
 
 
@@ -154,7 +155,7 @@ class _Contents:
     def _settle(self, record: Record) -> None:
         """A record that was put aside: believed only where nothing has a checksum."""
         start = record.at + of.HEAD.size
-        content = of.read(self.file, start, record.end - start)
+        content: Any = of.read(self.file, start, record.end - start)
         if record.opcode != Opcode.MESSAGE:
             content = of.parse(record.opcode, content)
         if not self.checked:
@@ -164,13 +165,15 @@ class _Contents:
         else:
             self.disbelieved += 1
 
-    def _use(self, opcode: int, content: bytes | kinds.McapRecord) -> None:
+    def _use(self, opcode: int, content: Any) -> None:
+        """`content` as in `Record`."""
         if opcode == Opcode.MESSAGE:
             self._message(content, 0, len(content))
         elif opcode == Opcode.SCHEMA:
             self._name(content)
         elif opcode == Opcode.CHANNEL:
-            known = self._name(content)
+            self._name(content)
+            known = self.definitions[content.id]
             if _meaning(known) != _meaning(replace(content, topic=printable(content.topic))):
                 self.ambiguous.setdefault(content.id, 0)
         elif opcode == Opcode.CHUNK:
@@ -179,11 +182,12 @@ class _Contents:
             except Damaged:
                 self.dropped.append((content.message_start_time, content.message_end_time))
 
-    def _name(self, one: kinds.Schema | kinds.Channel) -> kinds.Schema | kinds.Channel:
-        """The first schema or channel of its number, by a name that can be shown."""
+    def _name(self, one: kinds.Schema | kinds.Channel) -> None:
+        """The first schema or channel of its number counts, by a name that can be shown."""
         if isinstance(one, kinds.Schema):
-            return self.schemas.setdefault(one.id, replace(one, name=printable(one.name)))
-        return self.definitions.setdefault(one.id, replace(one, topic=printable(one.topic)))
+            self.schemas.setdefault(one.id, replace(one, name=printable(one.name)))
+        else:
+            self.definitions.setdefault(one.id, replace(one, topic=printable(one.topic)))
 
     def _open(self, data: bytes) -> None:
         """The records of a chunk. Raises Damaged."""
@@ -207,7 +211,7 @@ class _Contents:
         bulky = schema and BULKY.search(schema.name)
         payload = b"" if bulky else data[start + of.MESSAGE.size : end]
         self._hold(len(payload) + OVERHEAD)
-        channel = self.channels.setdefault(number, Channel("", None, ""))
+        channel = self.channels.setdefault(number, Channel("", NO_SCHEMA, ""))
         channel.log_times.append(log_time)
         channel.payloads.append(payload)
 
@@ -234,7 +238,7 @@ class _Contents:
             if schema is None and known.schema_id:
                 losses.append(f"{count} of {known.topic} dropped: its schema is missing")
                 continue
-            schema = schema or kinds.Schema(id=0, data=b"", encoding="", name="")
+            schema = schema or NO_SCHEMA
             key = (known.topic, schema.name, schema.encoding, schema.data, known.message_encoding)
             one = found.setdefault(key, Channel(known.topic, schema, known.message_encoding))
             one.log_times += channel.log_times
@@ -306,6 +310,7 @@ class _Contents:
 
     def _compared(self) -> list[str]:
         """Where the file's own end speaks of another length or of other numbers than were read."""
+        assert self.data_end and self.footer  # else there is no summary to believe
         start = self.footer.content.summary_start
         far = start and start - self.data_end.end
         what = "missing from" if far > 0 else "too many in"

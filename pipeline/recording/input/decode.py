@@ -110,7 +110,10 @@ def _ros(schema: Schema) -> Decoder:
 
 
 def _protobuf(schema: Schema) -> Decoder:
-    return DecoderFactory().decoder_for("protobuf", schema)
+    decode = DecoderFactory().decoder_for("protobuf", schema)
+    if decode is None:
+        raise ValueError("no schema of protobuf")
+    return decode
 
 
 def _json(schema: Schema) -> Decoder:

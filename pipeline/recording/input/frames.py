@@ -17,7 +17,7 @@ class Transform:
     translation: np.ndarray  # (3,) m
 
     @classmethod
-    def of(cls, pose: Sequence[float]) -> Transform:
+    def of(cls, pose: Sequence[float] | np.ndarray) -> Transform:
         """From [x, y, z, qx, qy, qz, qw], the pose of the source frame in the target frame."""
         return cls(Rotation.from_quat(pose[3:]), np.asarray(pose[:3], float))
 

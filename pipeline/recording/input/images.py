@@ -81,7 +81,7 @@ def depth(picture: Picture) -> np.ndarray:
         return _metres(_unpacked(picture.data, cv2.IMREAD_UNCHANGED, picture.format))
     if len(picture.data) <= DEPTH_HEADER.size:
         raise Undecodable("compressedDepth without a picture")
-    _, scale, offset = DEPTH_HEADER.unpack_from(picture.data)
+    _, scale, offset = DEPTH_HEADER.unpack_from(picture.data.data)
     body = picture.data[DEPTH_HEADER.size :]
     is_rvl = "rvl" in picture.format.lower()
     packed = rvl(body) if is_rvl else _unpacked(body, cv2.IMREAD_UNCHANGED, picture.format)
@@ -113,7 +113,7 @@ def size_of(picture: Picture) -> tuple[int, int] | None:
     if "compressedDepth" in picture.format:
         data = data[DEPTH_HEADER.size :]
         if "rvl" in picture.format.lower():
-            return RVL_SIZE.unpack_from(data) if len(data) >= RVL_SIZE.size else None
+            return RVL_SIZE.unpack_from(data.data) if len(data) >= RVL_SIZE.size else None
     try:
         return _header(data)[0]
     except Undecodable:
@@ -128,7 +128,7 @@ def rvl(data: np.ndarray) -> np.ndarray:
     """
     if len(data) < RVL_SIZE.size:
         raise Undecodable("RVL without a picture")
-    width, height = RVL_SIZE.unpack_from(data)
+    width, height = RVL_SIZE.unpack_from(data.data)
     pixels = width * height
     if not 0 < pixels <= LARGEST_RVL or len(data) > RVL_SIZE.size + 4 * pixels + 4:
         raise Undecodable(f"RVL of {len(data)} bytes, {width} x {height} pixels")
@@ -177,7 +177,7 @@ def _within(firsts: list[int], counts: list[int], size: int) -> np.ndarray:
 def _header(data: np.ndarray) -> tuple[tuple[int, int], str]:
     """Size and Pillow's mode of a JPEG or PNG, by its header alone. Raises Undecodable."""
     try:
-        with Image.open(io.BytesIO(data), formats=("JPEG", "PNG")) as image:
+        with Image.open(io.BytesIO(data.data), formats=("JPEG", "PNG")) as image:
             return image.size, image.mode
     except Exception as error:  # damaged bytes make Pillow raise anything
         kind = type(error).__name__  # its words hold addresses, which differ from run to run
@@ -207,10 +207,10 @@ def _chunks_fit(data: np.ndarray) -> bool:
     """Whether a PNG's chunks are whole: OpenCV checks no CRC and believes every length."""
     at = 8
     while at + PNG_CHUNK.size <= len(data):
-        length, kind = PNG_CHUNK.unpack_from(data, at)
+        length, kind = PNG_CHUNK.unpack_from(data.data, at)
         end = at + PNG_CHUNK.size + length
         said = int.from_bytes(data[end : end + 4].tobytes(), "big")
-        if end + 4 > len(data) or zlib.crc32(data[at + 4 : end]) != said:
+        if end + 4 > len(data) or zlib.crc32(data[at + 4 : end].data) != said:
             return False
         if kind == b"IEND":
             return True

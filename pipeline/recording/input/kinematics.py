@@ -142,13 +142,16 @@ def _joints(path: Path) -> list[Joint]:
         raise UserError(f"setup.urdf: {path}: no robot with joints in it")
     try:
         return [_joint(one) for one in joints]
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except (KeyError, ValueError) as error:
         raise UserError(f"setup.urdf: {path}: bad joint ({error})") from error
 
 
 def _joint(element: ElementTree.Element) -> Joint:
     name = element.attrib["name"]
     origin, mimic = element.find("origin"), element.find("mimic")
+    parent, child = element.find("parent"), element.find("child")
+    if parent is None or child is None:
+        raise ValueError(f"{name}: without a child or parent")
     axis = _numbers(element.find("axis"), "xyz", "1 0 0")
     length = np.linalg.norm(axis)
     if length < LEAST_AXIS:
@@ -156,8 +159,8 @@ def _joint(element: ElementTree.Element) -> Joint:
     return Joint(
         name,
         element.attrib["type"],
-        element.find("parent").attrib["link"],
-        element.find("child").attrib["link"],
+        parent.attrib["link"],
+        child.attrib["link"],
         Rotation.from_euler("xyz", _numbers(origin, "rpy", "0 0 0")),  # about fixed axes
         _numbers(origin, "xyz", "0 0 0"),
         axis / length,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from pipeline.recording.input import images
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.container import Container, read_container, sha256
 from pipeline.recording.input.frames import TransformTree
+from pipeline.recording.input.readings import Picture
 from pipeline.recording.input.streams import Stream, streams_of
 from pipeline.recording.input.topics import camera_of, choose
 from pipeline.recording.input.transforms import transforms_of
@@ -49,17 +51,17 @@ class Recording:
     """
 
     path: Path
-    wrench: Stream
-    pose: Stream
-    gripper: Stream | None
-    color: Stream
-    depth: Stream
+    wrench: Stream[np.ndarray]
+    pose: Stream[np.ndarray]
+    gripper: Stream[np.ndarray] | None
+    color: Stream[list[Picture]]
+    depth: Stream[list[Picture]]
     color_camera: Camera
     depth_camera: Camera
     transforms: TransformTree
     losses: list[str] = field(default_factory=list)
     sha256: str = ""
-    twist: Stream | None = None
+    twist: Stream[np.ndarray] | None = None
     notes: list[str] = field(default_factory=list)
     choices: dict[str, str] = field(default_factory=dict)
     start: int | None = None
@@ -70,7 +72,7 @@ class Recording:
         return int(self.wrench.stamp[0]) if self.start is None else self.start
 
     @property
-    def streams(self) -> dict[str, Stream]:
+    def streams(self) -> dict[str, Stream[Any]]:
         found = {role: getattr(self, role) for role in ROLES}
         return {role: stream for role, stream in found.items() if stream}
 
@@ -108,7 +110,7 @@ def recording_of(container: Container, setup: SetupParams) -> Recording:
     """As `read_recording`, from a file that was read already."""
     try:
         chosen = choose(container, setup)
-        cameras = {f"{role}_camera": camera_of(chosen, role) for role in CAMERAS}
+        color_camera, depth_camera = (camera_of(chosen, role) for role in CAMERAS)
         found = {role: chosen[role] for role in ROLES if role in chosen}
         streams, remarks = streams_of(found)
         transforms = transforms_of(container)
@@ -117,8 +119,14 @@ def recording_of(container: Container, setup: SetupParams) -> Recording:
     lost = [f"{stream.topic}: {note}" for stream in streams.values() for note in stream.notes]
     return Recording(
         path=container.path,
-        **{role: streams.get(role) for role in ROLES},
-        **cameras,
+        wrench=streams["wrench"],
+        pose=streams["pose"],
+        twist=streams.get("twist"),
+        gripper=streams.get("gripper"),
+        color=streams["color"],
+        depth=streams["depth"],
+        color_camera=color_camera,
+        depth_camera=depth_camera,
         transforms=transforms,
         losses=[*container.losses, *lost],
         notes=[*container.notes, *remarks],

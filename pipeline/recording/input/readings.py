@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -48,7 +48,7 @@ class Picture:
     stamp: int = 0
 
     @property
-    def kind(self) -> tuple:
+    def kind(self) -> tuple[Hashable, ...]:
         """What all pictures of a topic have in common."""
         return self.encoding, self.format, self.height, self.width, self.step
 
@@ -60,12 +60,12 @@ class Reading(NamedTuple):
         stamp: Of its header [ns]; None where the type has none.
         frame: frame_id, "" where there is none.
         value: wrench fx fy fz [N]; pose x y z [m] qx qy qz qw; twist vx vy vz [m/s] wx wy wz
-            [rad/s]; gripper: opening [m]; joints: positions [rad, m]; or the picture.
+            [rad/s]; gripper: opening [m]; joints: positions [rad, m]; a Picture; a Calibration.
     """
 
     stamp: int | None
     frame: str
-    value: tuple[float, ...] | Picture
+    value: Any
 
 
 def kind_of(schema: str) -> str:

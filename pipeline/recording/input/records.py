@@ -15,7 +15,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from io import BytesIO
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import lz4.frame
 import zstandard
@@ -56,7 +56,7 @@ class Record(NamedTuple):
     at: int
     end: int
     opcode: int
-    content: bytes | kinds.McapRecord | None = None
+    content: Any = None  # bytes or kinds.McapRecord, by the opcode
 
 
 class _Whole(ReadDataStream):
@@ -78,7 +78,7 @@ def parse(opcode: int, content: bytes) -> kinds.McapRecord:
     """What a record says. Raises Damaged."""
     stream = _Whole(BytesIO(content))
     try:
-        record = READERS[opcode](stream)
+        record = READERS[Opcode(opcode)](stream)
     except (McapError, struct.error, ValueError, MemoryError, OverflowError) as error:
         raise Damaged(f"a record of kind {opcode} that cannot be read") from error
     if stream.count != len(content):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -91,7 +91,7 @@ class Role:
     """
 
     what: str
-    readers: dict[str, Read | None]
+    readers: Mapping[str, Read | None]
     hints: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     rate: float = 0.0
@@ -99,11 +99,13 @@ class Role:
 
 
 STATES = ("FrankaRobotState", "FrankaState")
-JOINTS = dict.fromkeys(("JointState", "JointStates"))
-POSE = dict.fromkeys(("PoseStamped", "PoseInFrame", "PoseWithCovarianceStamped"), of.read_pose)
-TWIST = dict.fromkeys(("TwistStamped", "TwistWithCovarianceStamped"), of.read_twist)
-IMAGES = dict.fromkeys(("Image", "RawImage", "CompressedImage"), of.read_image)
-INFO = dict.fromkeys(("CameraInfo", "CameraCalibration"), read_calibration)
+JOINTS: dict[str, Read | None] = dict.fromkeys(("JointState", "JointStates"))
+POSES = ("PoseStamped", "PoseInFrame", "PoseWithCovarianceStamped")
+POSE: dict[str, Read] = dict.fromkeys(POSES, of.read_pose)
+TWISTS = ("TwistStamped", "TwistWithCovarianceStamped")
+TWIST: dict[str, Read] = dict.fromkeys(TWISTS, of.read_twist)
+IMAGES: dict[str, Read] = dict.fromkeys(("Image", "RawImage", "CompressedImage"), of.read_image)
+INFO: dict[str, Read] = dict.fromkeys(("CameraInfo", "CameraCalibration"), read_calibration)
 HAND = {
     "hints": ("current", "ee", "eef", "tcp", "end_effector", "measured"),
     "doubts": (*COMMANDS, *THINGS),
@@ -220,7 +222,8 @@ def source_of(
         return _arm(channel, decode, setup)
     if role == "pose" and kind in TWIST:
         return _motion(channel, decode, setup, TWIST[kind])
-    return ROLES[role].readers[kind], None
+    read = ROLES[role].readers[kind]
+    return read and (read, None)
 
 
 def _gripper(channel: Channel, decode: Decoder, named: bool) -> Source | None:

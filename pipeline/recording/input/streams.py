@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -35,8 +36,11 @@ REASON = 100  # characters of why a message is damaged
 CORRECTABLE = ("pose", "twist", "gripper")  # by log_time, if they have a clock of their own
 
 
+Values = TypeVar("Values", np.ndarray, list[Picture])
+
+
 @dataclass(frozen=True)
-class Stream:
+class Stream(Generic[Values]):
     """One topic, sorted by stamp.
 
     Attributes:
@@ -52,7 +56,7 @@ class Stream:
     topic: str
     frame: str
     stamp: np.ndarray
-    values: np.ndarray | list[Picture]
+    values: Values
     delay: float
     lost: int
     notes: list[str] = field(default_factory=list)
@@ -75,13 +79,13 @@ class Stream:
         gaps = np.diff(self.stamp) * 1e-9 / self.period
         return int(np.sum(np.maximum(np.round(gaps) - 1, 0)))
 
-    def between(self, first: int, last: int) -> Stream:
+    def between(self, first: int, last: int) -> Stream[Values]:
         """Messages stamped from `first` to `last` [ns]; the nearest two where there are fewer."""
         begin = min(int(np.searchsorted(self.stamp, first)), len(self.stamp) - 2)
         end = max(int(np.searchsorted(self.stamp, last, side="right")), begin + 2)
         return replace(self, stamp=self.stamp[begin:end], values=self.values[begin:end])
 
-    def shifted(self, seconds: float) -> Stream:
+    def shifted(self, seconds: float) -> Stream[Values]:
         """With `seconds` subtracted from every stamp."""
         return replace(self, stamp=self.stamp - round(seconds * 1e9)) if seconds else self
 
@@ -95,7 +99,7 @@ class Raw:
     frame: str
     stamp: np.ndarray
     log: np.ndarray
-    values: list
+    values: list[Any]
     lost: Counter[str]
     reason: str = ""  # why the first damaged message cannot be read
     notes: list[str] = field(default_factory=list)
@@ -117,7 +121,7 @@ class Raw:
             self.keep(~which)
 
 
-def streams_of(chosen: dict[str, Choice]) -> tuple[dict[str, Stream], list[str]]:
+def streams_of(chosen: dict[str, Choice]) -> tuple[dict[str, Stream[Any]], list[str]]:
     """All topics on the wrench's clock, and remarks on what costs nothing.
 
     Args:
@@ -275,14 +279,14 @@ def _on_one_clock(raw: dict[str, Raw]) -> None:
             )
 
 
-def _sorted(raw: Raw) -> Stream:
+def _sorted(raw: Raw) -> Stream[Any]:
     if raw.late > 0:
         raw.notes.append(f"{counted(raw.late)} out of order, sorted by stamp")
     raw.keep(np.argsort(raw.stamp, kind="stable"))
     raw.drop(np.diff(raw.stamp, prepend=raw.stamp[0] - 1) == 0, "with the stamp of another")
     if len(raw.stamp) < 2:
         raise UserError(f"topic {raw.topic} has fewer than two readable messages")
-    values = raw.values
+    values: Any = raw.values
     if not isinstance(values[0], Picture):
         values = np.array(values, float)
         if raw.role in LONE and raw.choice.convert is None:
@@ -314,7 +318,7 @@ def _words(raw: Raw) -> str:
     return f"{words}; the first damaged one: {raw.reason}" if raw.reason else words
 
 
-def _gaps(stream: Stream, origin: int, first: int, last: int) -> list[str]:
+def _gaps(stream: Stream[Any], origin: int, first: int, last: int) -> list[str]:
     """Long gaps, and ends that lack what the other topics have."""
     notes, ways = [], np.diff(stream.stamp) * 1e-9
     late, early = (stream.stamp[0] - first) * 1e-9, (last - stream.stamp[-1]) * 1e-9
@@ -331,7 +335,7 @@ def _gaps(stream: Stream, origin: int, first: int, last: int) -> list[str]:
     return notes
 
 
-def _frozen(streams: dict[str, Stream], origin: int) -> list[str]:
+def _frozen(streams: dict[str, Stream[Any]], origin: int) -> list[str]:
     """Sensors that repeat themselves, which those with noise do not."""
     remarks = []
     for role in ("wrench", "color", "depth"):

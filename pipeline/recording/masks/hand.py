@@ -66,7 +66,7 @@ class Shape:
 def _voxels(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Whether each point (S, 3) lies in the grid, (S,), and its cell, (S, 3)."""
     cells = np.floor(points / VOXEL).astype(np.int64) + HALF
-    return ((cells >= 0) & (cells < 2 * HALF)).all(axis=1), cells
+    return np.all((cells >= 0) & (cells < 2 * HALF), axis=1), cells
 
 
 class Colors:

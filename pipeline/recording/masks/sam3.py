@@ -46,12 +46,16 @@ class Sam3Mask:
     def _track(self, model: Any, tokenizer: Any, settings: Sam3) -> list[np.ndarray]:
         """Logits (h, w) of each picture."""
         import torch
-        from transformers.models.sam3_video.modeling_sam3_video import Sam3VideoInferenceSession
+        from transformers.models.sam3_video.modeling_sam3_video import (  # pyright: ignore[reportMissingImports]
+            Sam3VideoInferenceSession,
+        )
 
         size, kind = model.config.image_size, model.dtype
         video = torch.empty((len(self.numbers), 3, size, size), dtype=kind)
         for place, number in enumerate(self.numbers):
-            color = cv2.cvtColor(self.view.color(number), cv2.COLOR_BGR2RGB)
+            color = self.view.color(number)
+            assert color is not None  # `numbers` are those that can be read
+            color = cv2.cvtColor(color, cv2.COLOR_BGR2RGB)
             color = cv2.resize(color, (size, size), interpolation=cv2.INTER_LINEAR)
             video[place] = torch.from_numpy(color).permute(2, 0, 1).to(kind) / 127.5 - 1
         session = Sam3VideoInferenceSession(
@@ -90,8 +94,11 @@ def _load(folder: Path, device: str) -> tuple[Any, Any]:
     """Model and tokenizer. Raises UserError with one line about what is missing."""
     try:
         import torch
-        from transformers import AutoTokenizer, Sam3VideoModel
-        from transformers.utils import logging
+        from transformers import (  # pyright: ignore[reportMissingImports]
+            AutoTokenizer,
+            Sam3VideoModel,
+        )
+        from transformers.utils import logging  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise UserError(
             f"cloud.mask sam3: {error.name or 'transformers'} is not installed, run"

@@ -9,10 +9,10 @@ from scipy.interpolate import Akima1DInterpolator
 
 from pipeline.base.layout import Layout, NotMade
 from pipeline.episode.episode import Episode
-from pipeline.episode.signal import as_recorded, cutoff_hz
 from pipeline.identify.posterior.likelihood import opening_time
 from pipeline.identify.results.theta import calibrated, parameters_of
-from pipeline.simulator.interaction import interact
+from pipeline.params import Params
+from pipeline.simulator.replay import replay
 
 COARSE, FINE = 1 / 30, 1e-3  # s between states, around the release FINE
 AROUND = (-0.06, 0.2)  # of the release [s]
@@ -57,7 +57,7 @@ def smooth(place: np.ndarray, nodes: np.ndarray, points: int = POINTS) -> np.nda
     return Akima1DInterpolator(place, nodes, axis=0, method="makima")(along)
 
 
-def simulate(params, band: str, method: str, episode: Episode, theta: dict) -> Simulated:
+def simulate(params: Params, band: str, method: str, episode: Episode, theta: dict) -> Simulated:
     """Play the pull with a θ file's content, its release and its camera's clock as identified.
 
     Raises:
@@ -66,9 +66,7 @@ def simulate(params, band: str, method: str, episode: Episode, theta: dict) -> S
     sling = calibrated(params, band, theta)
     derived = (theta.get("confidence") or {}).get("derived", {})
     camera = 0.0
-    if (
-        "release_time" in derived
-    ):  # as the density has them (pipeline/identify/posterior/likelihood.py)
+    if "release_time" in derived:  # as the density has them (identify/posterior/likelihood.py)
         friction = theta["theta"]["dynamic_friction"]
         sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
         episode = replace(episode, release_time=derived["release_time"]["value"])
@@ -86,17 +84,14 @@ def simulate(params, band: str, method: str, episode: Episode, theta: dict) -> S
     )
     stamps = stamps[np.append(True, np.diff(stamps) > 1e-6)]
     played = replace(episode, cloud_time=stamps, clouds=[])
-    rollouts = interact(sling, played, parameters_of(theta))
-    if rollouts.failure[0]:
-        raise NotMade(Layout().theta(band, method), rollouts.failure[0])
-    cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
-    sampling = episode.time[0] - episode.sample_period / 2, episode.sample_period
-    force = as_recorded(rollouts.times, rollouts.force[0], cutoff, *sampling, len(episode.time))
+    done = replay(sling, played, parameters_of(theta), params.force)
+    if failure := done.rollouts.failure[0]:
+        raise NotMade(Layout().theta(band, method), failure)
     return Simulated(
         release=float(release),
         camera=float(camera),
         time=stamps,
-        nodes=np.asarray(rollouts.center_line[0], float),
+        nodes=np.asarray(done.rollouts.center_line[0], float),
         place=np.append(0.0, np.cumsum(sling.edge_lengths)),
-        force=force,
+        force=done.force[0],
     )

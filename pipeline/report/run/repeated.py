@@ -8,8 +8,11 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pipeline.base.errors import UserError
+from pipeline.params import Params
+from pipeline.params.provenance import Change, changes, flat
 
 FILE = Path("reports", "validation", "ablations.json")
 ALL = "all"  # the bands together
@@ -52,11 +55,13 @@ class Repeated:
         miss: Mean distance from the target [cm] by band (or ALL) and method.
         against: The same beside the paper's method.
         ranks: Rank correlation of loss and miss on one recording, over searches of one loss.
+        settings: What the campaign ran with, by its keys in params.yaml.
     """
 
     miss: dict[str, dict[str, MeanInterval]]
     against: dict[str, dict[str, Against]]
     ranks: MeanInterval
+    settings: dict[str, Any]
 
     @classmethod
     def load(cls, root: Path) -> Repeated | None:
@@ -71,6 +76,7 @@ class Repeated:
                 {band: _intervals(one["methods"]) for band, one in figures.items()},
                 {band: _differences(one[paper]) for band, one in figures.items()},
                 _interval(content["rank_correlation_of_loss_and_miss"]["over_recordings"]),
+                _settings(content["settings"]),
             )
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise UserError(
@@ -78,9 +84,30 @@ class Repeated:
                 " `git checkout` it"
             ) from error
 
+    def changed_settings(self, params: Params) -> list[Change]:
+        """Where a run has other settings than the campaign: its numbers are not of this run."""
+        now = {
+            "trials.targets": [*params.trials.targets],
+            **flat("optimizer", params.optimizer),
+            **{
+                key: value
+                for name, method in params.methods.items()
+                for key, value in flat(f"methods.{name}", method).items()
+            },
+        }
+        then = {key: value for key, value in self.settings.items() if key in now}
+        return changes(then, {key: now[key] for key in then})
+
     @property
     def bands(self) -> list[str]:
         return sorted(band for band in self.miss if band != ALL)
+
+
+def _settings(settings: dict) -> dict[str, Any]:
+    parts = {name: settings[name] for name in ("optimizer", "methods")}
+    return {"trials.targets": settings["targets_m"]} | {
+        key: value for name, part in parts.items() for key, value in flat(name, part).items()
+    }
 
 
 def _intervals(methods: dict) -> dict[str, MeanInterval]:

@@ -13,7 +13,7 @@ from pipeline.params import Params
 from pipeline.report.drawing.styles import Styles, drawn, styles
 from pipeline.report.run.paper import METHOD
 from pipeline.report.run.repeated import Repeated
-from pipeline.report.run.replay import Replay, replay
+from pipeline.report.run.replay import MethodReplay, replay_method
 from pipeline.report.run.results import Result, Results, gather
 
 
@@ -30,7 +30,7 @@ class Report:
 
     params: Params
     results: Results
-    replays: dict[str, dict[str, Replay]]
+    replays: dict[str, dict[str, MethodReplay]]
     styles: Styles
     repeated: Repeated | None
     root: Path
@@ -78,12 +78,12 @@ def references(params: Params) -> tuple[str, ...]:
     return tuple(dict.fromkeys([methods[0], *(m for m in methods if m == METHOD)]))
 
 
-def _replays(params: Params, results: Results, band: str) -> dict[str, Replay]:
+def _replays(params: Params, results: Results, band: str) -> dict[str, MethodReplay]:
     """Of the methods that are drawn; of all where held-out data are to be compared."""
     recorded, methods = results.episodes[band], results.methods[band]
     some = drawn(params.run.methods)
     return {
-        method: replay(params, band, method, recorded, methods[method].theta)
+        method: replay_method(params, band, method, recorded, methods[method].theta)
         for method in methods
         if method in some or params.loss.held_out.blocks
     }

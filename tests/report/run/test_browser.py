@@ -18,7 +18,7 @@ LOADED = """[...document.images].map(one => (one.loading = "eager", one.decode()
 @pytest.mark.parametrize("width", [DESKTOP, PHONE])
 def test_the_page_runs_alone(root, params, monkeypatch, width: int) -> None:
     """On a phone, tables are wider than the window, and scroll within themselves."""
-    monkeypatch.setattr(reporting, "replay", toy_replay)
+    monkeypatch.setattr(reporting, "replay_method", toy_replay)
     writing.write(params, root)
     with visited(root / "reports" / "index.html", width) as seen:
         sizes = seen.page.evaluate(LOADED)

@@ -20,7 +20,7 @@ FILES = {
 
 @pytest.mark.parametrize("name", FILES)
 def test_any_edit_is_one_line_or_a_report(name, template, root, params, monkeypatch) -> None:
-    monkeypatch.setattr(reporting, "replay", toy_replay)
+    monkeypatch.setattr(reporting, "replay_method", toy_replay)
     monkeypatch.setattr(reporting.Report, "picture", lambda _, name, *__: f"{name}.png")
     monkeypatch.setattr(writing, "write_page", lambda *_: None)
     path, refused, accepted = root / FILES[name], 0, 0

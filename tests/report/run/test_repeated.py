@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
+from pipeline.params import load
 from pipeline.report.run.chapters.repeated import claims
 from pipeline.report.run.repeated import FILE, Repeated
 from pipeline.report.run.tables.cells import markdown
 from pipeline.report.run.tables.repeated import as_table
-from tests.project import ROOT
+from tests.project import ROOT, with_
 from validation.campaigns.ablations import PAPER, rank_correlations, summary
 from validation.paired import mean_interval
 
+PARAMS = load(ROOT / "params.yaml")
 RNG = np.random.default_rng(1)
 MISS = {  # cm, of ten recordings
     PAPER: 10 + RNG.normal(0, 0.5, 10),
@@ -48,6 +50,11 @@ def written(root, some: list[dict]) -> Repeated:
     content = {
         "figures": summary(some, ["band1"], list(MISS)),
         "rank_correlation_of_loss_and_miss": {"over_recordings": ranks},
+        "settings": {
+            "optimizer": PARAMS.optimizer.model_dump(),
+            "methods": {name: PARAMS.methods[name].model_dump() for name in MISS},
+            "targets_m": PARAMS.trials.targets,
+        },
     }
     (root / FILE).parent.mkdir(parents=True)
     (root / FILE).write_text(json.dumps(content, default=list))
@@ -55,7 +62,7 @@ def written(root, some: list[dict]) -> Repeated:
 
 
 def test_findings_hold_do_not_hold_or_are_open(tmp_path) -> None:
-    ours, geometry, search, _, why = claims(written(tmp_path, results()))
+    ours, geometry, search, _, why = claims(written(tmp_path, results()), PARAMS)
     assert f"**ours** {MISS['least_squares'].mean():.1f} cm" in ours
     assert f"**Sling2Sim2Real** {MISS[PAPER].mean():.1f} cm" in ours
     farther = (MISS["real2sim2real"] - MISS[PAPER]).mean()
@@ -67,7 +74,7 @@ def test_findings_hold_do_not_hold_or_are_open(tmp_path) -> None:
 
 
 def test_where_a_lower_loss_lands_farther_it_is_said(tmp_path) -> None:
-    why = claims(written(tmp_path, results(slope=-1.0)))[-1]
+    why = claims(written(tmp_path, results(slope=-1.0)), PARAMS)[-1]
     assert "does not land nearer" in why and "−1.00" in why
 
 
@@ -82,6 +89,20 @@ def test_tables_have_the_rows_that_ran(tmp_path) -> None:
     assert f"{MISS['adam'].mean():.1f} (" in text
 
 
+def test_other_settings_of_the_campaign_are_named_beside_its_numbers(tmp_path) -> None:
+    """Only of methods that the campaign had, and of keys that change what it found."""
+    repeated = written(tmp_path, results())
+    assert repeated.changed_settings(PARAMS) == []
+    ours = with_(PARAMS, "optimizer", cma_rollouts=840)
+    methods = PARAMS.methods | {"bo": PARAMS.methods["de"]}
+    methods["adam"] = PARAMS.methods["adam"].model_copy(update={"mounting": False})
+    ours = with_(ours, "trials", targets=(1.9,)).model_copy(update={"methods": methods})
+    keys = ["methods.adam.mounting", "optimizer.cma_rollouts", "trials.targets"]
+    assert [one.key for one in repeated.changed_settings(ours)] == keys
+    said = claims(repeated, ours)
+    assert f"other settings than this run: {', '.join(keys)}." in " ".join(said)
+
+
 def test_a_file_of_something_else_is_one_line(tmp_path) -> None:
     assert Repeated.load(tmp_path) is None
     (tmp_path / FILE).parent.mkdir(parents=True)
@@ -93,4 +114,4 @@ def test_a_file_of_something_else_is_one_line(tmp_path) -> None:
 def test_the_committed_campaign_can_be_read() -> None:
     repeated = Repeated.load(ROOT)
     assert {"band1", "band2", "band3"} == set(repeated.bands)
-    assert len(claims(repeated)) >= 4
+    assert len(claims(repeated, PARAMS)) >= 4

@@ -21,7 +21,7 @@ THETA_FILE = f"data/theta/{BAND}/{METHOD}.json"
 
 @pytest.fixture(autouse=True)
 def no_simulation(monkeypatch) -> None:
-    monkeypatch.setattr(reporting, "replay", toy_replay)
+    monkeypatch.setattr(reporting, "replay_method", toy_replay)
 
 
 @pytest.fixture

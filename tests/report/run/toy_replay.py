@@ -2,15 +2,14 @@
 
 import numpy as np
 
-from pipeline.report.run.replay import Replay
+from pipeline.report.run.replay import MethodReplay
 
 NOTHING = {kind: {"fitted": 0.2, "held_out": np.nan} for kind in ("force", "cloud")}
 
 
-def toy_replay(params, band, method, episode, theta, residuals=NOTHING) -> Replay:
-    return Replay(
+def toy_replay(params, band, method, episode, theta, residuals=NOTHING) -> MethodReplay:
+    return MethodReplay(
         force=0.9 * episode.force,
-        center_line=np.stack([cloud + 0.01 for cloud in episode.clouds]),
         distance=np.full(len(episode.clouds), 0.01),
         residuals=residuals,
     )

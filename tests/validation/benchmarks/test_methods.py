@@ -7,6 +7,7 @@ from pipeline.base.errors import UserError
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.identify.search.explore import rollouts_of
 from pipeline.params import load
 from tests.project import ROOT
 from validation.benchmarks import methods as bench
@@ -62,8 +63,9 @@ def test_a_search_is_timed_in_the_box_of_its_method() -> None:
 
 def test_the_large_budget_is_ten_times_the_laptops() -> None:
     optimizer = PARAMS.optimizer.model_copy(update=bench.BUDGETS["large"])
-    assert bench.budget(optimizer, "multistart") == (2560, 3200)
-    assert bench.budget(optimizer, "bo") == (5760, 0)
+    params = PARAMS.model_copy(update={"optimizer": optimizer})
+    assert rollouts_of(params, "sling2sim2real") == 2560 and optimizer.cma_rollouts == 3200
+    assert rollouts_of(params, "bo") == 5760
 
 
 def test_a_device_that_is_not_there_is_refused() -> None:

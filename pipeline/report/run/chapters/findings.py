@@ -55,7 +55,7 @@ def findings(report: Report) -> list[str]:
     own = OWN * (repeated.OURS in references and bool(results.floors))
     caveat = [f"{CAVEAT}{own}."] if rows else []
     if report.repeated and paper.METHOD in references:
-        return [*said, *caveat, *repeated.claims(report.repeated)]
+        return [*said, *caveat, *repeated.claims(report.repeated, report.params)]
     return [*said, *claims, *caveat]
 
 

@@ -99,9 +99,21 @@ def paper_tables(report: Report) -> str:
         text += [_titled(count, name, folder), BEFORE[count], markdown(table, repeats=False)]
         text += [FLOOR] if count == 1 and results.floors else []
         if report.repeated and count in campaign.ROWS:
-            text += [REPEATED, markdown(campaign.as_table(report.repeated, count))]
+            text += [REPEATED, *_other_settings(report)]
+            text += [markdown(campaign.as_table(report.repeated, count))]
         text += _notes(results, found) if count == 2 else []
     return "\n".join(text)
+
+
+def _other_settings(report: Report) -> list[str]:
+    """A line where the campaign ran with other settings than this run."""
+    different = report.repeated.changed_settings(report.params) if report.repeated else []
+    if not different:
+        return []
+    listed = "; ".join(
+        str(one).replace(" was ", " ").replace(", is ", ", here ") for one in different
+    )
+    return [f"⚠ These recordings were searched with other settings than this run: {listed}.\n"]
 
 
 def _notes(results: Results, found: list[parameters.IdentifiedRow]) -> list[str]:

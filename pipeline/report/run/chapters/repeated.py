@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pipeline.params import Params
 from pipeline.report.run import paper
 from pipeline.report.run.repeated import ALL, FILE, MeanInterval, Repeated
 from pipeline.report.run.tables.repeated import PLAIN, ROWS, name_of
@@ -15,13 +16,16 @@ CLAIMS = {  # of the paper, by the number of the table that shows it
 }
 
 
-def claims(repeated: Repeated) -> list[str]:
+def claims(repeated: Repeated, params: Params) -> list[str]:
     """Ours beside the paper's method, then each finding of the paper's."""
     misses = repeated.miss[ALL]
     known = [f"**{name_of(m)}** {_mean(misses[m])}" for m in (OURS, paper.METHOD) if m in misses]
     said = [f"On {max(one.count for one in misses.values())} further recordings of the rig's bands,"
         f" which took part in no choice ([table 1](#table-1), [data](validation/{FILE.name})),"
         f" launches without errors miss by {', '.join(known)}."]  # fmt: skip
+    if changed := repeated.changed_settings(params):
+        keys = ", ".join(one.key for one in changed)
+        said.append(f"These recordings were searched with other settings than this run: {keys}.")
     said += [_claim(repeated, *claim) for claim in CLAIMS.items()]
     return said + _why(repeated.ranks)
 

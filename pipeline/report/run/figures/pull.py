@@ -10,14 +10,14 @@ from pipeline.report.drawing.canvas import mark, picture
 from pipeline.report.drawing.styles import INK, Styles
 from pipeline.report.run.figures.panels import entitle, explain
 from pipeline.report.run.figures.policy import DASHES
-from pipeline.report.run.replay import Replay
+from pipeline.report.run.replay import MethodReplay
 
 SLACK, MARGIN = 0.05, 0.04  # of the peak force, below which the band is slack; of its draw [m]
 
 
 @picture()
 def pull(
-    episodes: dict[str, Episode], replays: dict[str, dict[str, Replay]], styles: Styles
+    episodes: dict[str, Episode], replays: dict[str, dict[str, MethodReplay]], styles: Styles
 ) -> plt.Figure:
     """A column a band: force against draw, residual force, and how far the clouds are off.
 

@@ -10,7 +10,7 @@ from pipeline.params.identification import LEAST_SQUARES
 from pipeline.report.drawing.markdown import as_code, cell
 from pipeline.report.drawing.styles import Styles
 from pipeline.report.quantities import QUANTITIES, Quantity, coordinate
-from pipeline.report.run.replay import Replay
+from pipeline.report.run.replay import MethodReplay
 from pipeline.report.run.results import Results
 from pipeline.report.run.tables.cells import NONE, Table, number, percent
 from pipeline.report.run.tables.parameters import exactly, printed_loss
@@ -158,7 +158,7 @@ def losses(results: Results, params, styles: Styles) -> Table:
     return heads, rows
 
 
-def held_out(replays: dict[str, dict[str, Replay]], styles: Styles) -> Table:
+def held_out(replays: dict[str, dict[str, MethodReplay]], styles: Styles) -> Table:
     """Residuals of fitted and of held-out data of each band's pull, by band and method."""
     rows = []
     for band, of_band in replays.items():

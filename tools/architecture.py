@@ -1,0 +1,84 @@
+"""The diagram of docs/architecture.md: which folder imports which, without what follows from the rest.
+
+python tools/architecture.py          # exit status 1 if the page is out of date
+python tools/architecture.py --fix    # draw it anew
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import networkx
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from pipeline.base.code import CODE, concern, imports  # noqa: E402
+
+PAGE = ROOT / "docs" / "architecture.md"
+BEGIN, END = "<!-- imports: begin -->\n", "<!-- imports: end -->\n"
+WHOLE = (
+    "stages",
+    "app",
+    "sling2sim2real",
+    "validation",
+    "rig",
+)  # each a box; the library is several
+LEFT_OUT = ("pipeline/base", "pipeline/params")  # which all import
+DEVELOPERS = "app/developer.py"  # may import validation/
+
+
+def box(file: str) -> str:
+    """The box of a file: a top-level package, or a folder of the library."""
+    top = file.partition("/")[0]
+    if top in WHOLE:
+        return top
+    folder = concern(file)
+    return "/".join(folder.split("/")[:2]) if folder.count("/") > 1 else folder
+
+
+def arrows() -> list[tuple[str, str]]:
+    """Who imports whom, sorted: the transitive reduction of all imports."""
+    graph = networkx.DiGraph()
+    for file in sorted(file for top in CODE for file in (ROOT / top).rglob("*.py")):
+        if file == ROOT / DEVELOPERS:
+            continue
+        here = box(file.relative_to(ROOT).as_posix())
+        for other in imports(file):
+            there = box(other.relative_to(ROOT).as_posix())
+            if here != there and not there.endswith(".py") and there not in LEFT_OUT:
+                graph.add_edge(here, there)
+    graph.remove_nodes_from(LEFT_OUT)
+    return sorted(networkx.transitive_reduction(graph).edges)
+
+
+def diagram() -> str:
+    """The arrows as Mermaid draws them."""
+    lines = [f"  {name(a)}[{a}] --> {name(b)}[{b}]" for a, b in arrows()]
+    return "\n".join(["```mermaid", "flowchart TD", *lines, "```", ""])
+
+
+def name(folder: str) -> str:
+    return folder.replace("/", "_")
+
+
+def drawn(page: str) -> str:
+    """The page with today's diagram."""
+    head, _, rest = page.partition(BEGIN)
+    return head + BEGIN + diagram() + END + rest.partition(END)[2]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--fix", action="store_true", help="draw it anew")
+    page = PAGE.read_text(encoding="utf-8")
+    if parser.parse_args().fix:
+        PAGE.write_text(drawn(page), encoding="utf-8")
+        return 0
+    return int(drawn(page) != page)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

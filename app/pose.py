@@ -21,7 +21,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import read_metadata
 from pipeline.params import Params
-from pipeline.recording.geometry import KeptGeometry
+from pipeline.recording.geometry import EpisodeGeometry
 from pipeline.recording.input.frames import Transform
 
 
@@ -64,7 +64,7 @@ def fork_in_base(params: Params, band: str, root: str | Path = ".") -> tuple[Tra
     """
     given, folder = params.setup.base_to_fork, Layout(Path(root)).episode(band)
     try:
-        kept = KeptGeometry.of_episode(read_metadata(folder), band)
+        geometry = EpisodeGeometry.of_episode(read_metadata(folder), band)
     except UserError as error:
         if given is None:
             raise UserError(
@@ -73,5 +73,5 @@ def fork_in_base(params: Params, band: str, root: str | Path = ".") -> tuple[Tra
                 " Calibration)"
             ) from error
         return Transform.of(given), params.plan.frame
-    fork = kept.base_to_fork if given is None else Transform.of(given)
-    return fork, kept.base_frame or params.plan.frame
+    fork = geometry.base_to_fork if given is None else Transform.of(given)
+    return fork, geometry.base_frame or params.plan.frame

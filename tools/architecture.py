@@ -1,4 +1,4 @@
-"""The diagram of docs/architecture.md: which folder imports which, without what follows from the rest.
+"""The diagram of docs/architecture.md: who imports whom, without what follows from the rest.
 
 python tools/architecture.py          # exit status 1 if the page is out of date
 python tools/architecture.py --fix    # draw it anew

@@ -11,8 +11,8 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 
 from app.drift.change import ChangeOfBand
 from app.drift.recordings import COMPARED, IdentifiedRecording
-from app.labels import as_label
 from pipeline.report.drawing.canvas import key, mark, picture
+from pipeline.report.drawing.names import as_label
 from pipeline.report.drawing.styles import INK, KNOWN
 from pipeline.report.quantities import QUANTITIES
 

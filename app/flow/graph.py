@@ -38,8 +38,8 @@ class Stage:
     item: str
     producers: tuple[str, ...]
     gpu: bool
-    sources: tuple[str, ...]
-    travels: bool
+    sources: tuple[str, ...] = ()
+    travels: bool = True
     description: str = ""
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from app.labels import as_label
 from app.preflight.check import Look
 from app.preflight.output import expect_writable
 from pipeline.base.files import replacing
@@ -20,6 +19,7 @@ from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.masks import masker
 from pipeline.recording.view import Frame, Scene
+from pipeline.report.drawing.names import as_label
 from pipeline.report.drawing.styles import COLORS, INK, THEME
 
 MOMENTS = ("hanging", "grasp", "lift", "mid pull", "held", "recoil")

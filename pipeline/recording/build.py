@@ -14,7 +14,7 @@ from pipeline.params import Params, expect_known
 from pipeline.params.lab import BandParams
 from pipeline.recording.cloud import Clouds, clouds_of
 from pipeline.recording.delays import Delays, correct_delays
-from pipeline.recording.geometry import KeptGeometry
+from pipeline.recording.geometry import EpisodeGeometry
 from pipeline.recording.input.reader import explained, read_recording
 from pipeline.recording.pulls import Pull, pulls_of
 from pipeline.recording.signals import Signals, signals_of
@@ -138,7 +138,7 @@ def episode_of(done: Processed, band_name: str, params: Params) -> Episode:
             "losses": recording.losses,
             "notes": recording.notes,
         },
-        "geometry": KeptGeometry.of(recording, geometry).content(),
+        "geometry": EpisodeGeometry.of(recording, geometry).content(),
         "preprocessing": {
             **asdict(signals.facts),
             "delays": asdict(done.delays),

@@ -41,7 +41,7 @@ class Geometry:
 
 
 @dataclass(frozen=True)
-class KeptGeometry:
+class EpisodeGeometry:
     """What an episode keeps of its recording's geometry, for those who do not read the recording.
 
     Attributes:
@@ -57,7 +57,7 @@ class KeptGeometry:
     camera_to_fork: Transform
 
     @classmethod
-    def of(cls, recording: Recording, geometry: Geometry) -> KeptGeometry:
+    def of(cls, recording: Recording, geometry: Geometry) -> EpisodeGeometry:
         to_color = geometry.color @ geometry.camera.inverse()
         frame, camera = recording.pose.frame, recording.color_camera
         return cls(frame, geometry.base.inverse(), camera, to_color)
@@ -73,21 +73,21 @@ class KeptGeometry:
         }
 
     @classmethod
-    def of_episode(cls, metadata: Mapping[str, Any], band: str) -> KeptGeometry:
+    def of_episode(cls, metadata: Mapping[str, Any], band: str) -> EpisodeGeometry:
         """Of an episode's metadata. Raises UserError where an older version made the episode."""
-        kept = metadata.get("geometry")
-        if kept is None:
+        content = metadata.get("geometry")
+        if content is None:
             raise UserError(
                 f"the episodes of {band} are of an older version, without the rig's geometry:"
                 f" `dvc repro episode@{band}` makes them anew"
             )
-        camera = kept["camera"]
+        camera = content["camera"]
         arrays = {key: np.array(camera[key], float) for key in ("matrix", "distortion")}
         return cls(
-            kept["base_frame"],
-            Transform.of(kept["base_to_fork"]),
+            content["base_frame"],
+            Transform.of(content["base_to_fork"]),
             Camera(**{**camera, **arrays}),
-            Transform.of(kept["camera_to_fork"]),
+            Transform.of(content["camera_to_fork"]),
         )
 
 

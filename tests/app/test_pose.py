@@ -16,7 +16,7 @@ from app.pose import posed
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.params import load
-from pipeline.recording.geometry import KeptGeometry, geometry_of
+from pipeline.recording.geometry import EpisodeGeometry, geometry_of
 from pipeline.recording.input.reader import read_recording
 from tests.project import ROOT, with_
 from validation.recordings.bag import write_bag
@@ -105,7 +105,7 @@ def recorded(tmp_path_factory):
     path = root / RECORDING
     truth = write_bag(path, cameras=False, rate=200, pose_rate=100)
     recording = read_recording(path, PARAMS.setup)
-    kept = KeptGeometry.of(recording, geometry_of(recording, PARAMS.setup))
+    kept = EpisodeGeometry.of(recording, geometry_of(recording, PARAMS.setup))
     keep(root, {"geometry": kept.content()})
     return root, truth
 

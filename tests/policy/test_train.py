@@ -180,7 +180,7 @@ def test_a_finished_training_is_not_done_again(tmp_path) -> None:
     assert steps == [] and same(once, again)
 
 
-def test_another_training_or_a_damaged_file_starts_over(tmp_path, monkeypatch) -> None:
+def test_another_training_or_a_damaged_file_starts_over(tmp_path, monkeypatch, capsys) -> None:
     path = tmp_path / "kept.pt"
     killed.training(path)
     whole = path.read_bytes()
@@ -198,7 +198,9 @@ def test_another_training_or_a_damaged_file_starts_over(tmp_path, monkeypatch) -
     assert begins() == 0
     monkeypatch.undo()
     path.write_bytes(whole[: len(whole) // 2])
+    capsys.readouterr()
     assert Checkpoint(path, "any").load() is None
+    assert capsys.readouterr().err.startswith(f"note: {path}: damaged (")
     steps: list[int] = []
     killed.training(path, on_iteration=steps.append)
     assert steps[0] == 0

@@ -4,6 +4,7 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 
 from pipeline.base.errors import UserError
 from validation.campaigns.runner import (
@@ -51,6 +52,19 @@ def test_nothing_begins_when_the_time_is_over(tmp_path, capsys) -> None:
     lines = ResultLines(tmp_path / "results.jsonl")
     run(work_on, [Square(n) for n in range(50)], lines, 1, minutes=0.0)
     assert len(lines.lines) < 50 and "the time is over" in capsys.readouterr().out
+
+
+def broken(job: Square) -> dict:
+    if job.number == 1:
+        raise ValueError("a fault of ours")
+    return work_on(job)
+
+
+def test_an_error_ends_the_run_and_what_was_done_is_kept(tmp_path) -> None:
+    lines = ResultLines(tmp_path / "results.jsonl")
+    with pytest.raises(ValueError, match="a fault of ours"):
+        run(broken, [Square(n) for n in range(200)], lines, 1)
+    assert lines.where(number=0) and len(lines.lines) < 200
 
 
 def test_threads_are_as_before_after_the_block(monkeypatch) -> None:

@@ -91,6 +91,7 @@ def each(
                 yield waiting[done], done.result()
         except TimeoutError:
             print("the time is over; run it again to go on", flush=True)
+        finally:  # after an error too, nothing else begins
             pool.shutdown(wait=False, cancel_futures=True)
 
 

@@ -18,7 +18,7 @@ from pipeline.recording.input.container import Channel
 
 Message = Any  # it has the attributes that its schema says, and whoever reads it finds out
 Decoder = Callable[[bytes], Message]
-Read = TypeVar("Read")
+Value = TypeVar("Value")
 LONGEST = {"json": 2**25}  # bytes of one message: objects of JSON take fifty times as much
 USUAL = 2**27
 LONGEST_SCHEMA = 2**16  # characters of ROS, with all types within; those of robots have a tenth
@@ -67,10 +67,10 @@ def decoder(channel: Channel) -> Decoder:
     return bounded
 
 
-def reader(decode: Decoder, read: Callable[[Message], Read]) -> Callable[[bytes], Read]:
+def message_reader(decode: Decoder, read: Callable[[Message], Value]) -> Callable[[bytes], Value]:
     """From payload to what `read` takes of its message; it raises Unreadable."""
 
-    def decoded(payload: bytes) -> Read:
+    def decoded(payload: bytes) -> Value:
         message = decode(payload)
         try:
             return read(message)

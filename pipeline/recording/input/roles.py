@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
-from typing import TypeVar
 
 import numpy as np
 
@@ -17,7 +16,13 @@ from pipeline.params.lab import SetupParams
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import read_calibration
 from pipeline.recording.input.container import Channel
-from pipeline.recording.input.decode import Decoder, Message, Unreadable, reader
+from pipeline.recording.input.decode import (
+    Decoder,
+    Message,
+    Unreadable,
+    Value,
+    message_reader,
+)
 from pipeline.recording.input.kinematics import chain_of, integrated
 from pipeline.recording.input.readings import Reading
 
@@ -30,7 +35,6 @@ OPTIONAL = ("twist", "gripper")
 COMMANDS = ("goal", "desired", "command", "commanded", "cmd", "target", "reference", "setpoint")
 THINGS = ("camera", "object", "tag", "marker")
 
-Value = TypeVar("Value")
 Read = Callable[[Message], Reading]
 Convert = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Source = tuple[Read, Convert | None]
@@ -263,7 +267,7 @@ def _arm(channel: Channel, decode: Decoder, setup: SetupParams) -> Source | None
 
 def _motion(channel: Channel, decode: Decoder, setup: SetupParams, read: Read) -> Source:
     """A twist alone, integrated from params' start pose."""
-    frames, _ = readable(reader(decode, of.frame_of), channel.payloads[:JOINT_TRIES], None)
+    frames, _ = readable(message_reader(decode, of.frame_of), channel.payloads[:JOINT_TRIES], None)
     frame = Counter(frames).most_common(1)[0][0] if frames else ""
     if set(frame.lower().split("_")) & TOOLS:
         raise UserError(
@@ -280,7 +284,7 @@ def _motion(channel: Channel, decode: Decoder, setup: SetupParams, read: Read) -
 
 def _joint_names(channel: Channel, decode: Decoder) -> list[tuple[str, ...]]:
     """Names in the first messages, the most frequent first. Raises UserError if there are none."""
-    read = reader(decode, lambda message: tuple(of.joints_of(message)))
+    read = message_reader(decode, lambda message: tuple(of.joints_of(message)))
     found, _ = readable(read, channel.payloads[:JOINT_TRIES], None)
     names = [some for some, _ in Counter(found).most_common() if some]
     if not names:

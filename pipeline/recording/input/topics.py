@@ -12,7 +12,7 @@ from pipeline.recording.input import images
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import Camera, camera_from
 from pipeline.recording.input.container import Channel, Container
-from pipeline.recording.input.decode import decoder, reader
+from pipeline.recording.input.decode import decoder, message_reader
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.input.roles import OPTIONAL, ROLES, Candidate, Choice, readable, source_of
 from pipeline.recording.input.words import few
@@ -115,7 +115,7 @@ class _Chooser:
             if source is None:
                 return None
             read, convert = source
-            choice = Choice(channel, reader(decode, read), "", convert)
+            choice = Choice(channel, message_reader(decode, read), "", convert)
             return Candidate(ROLES[role], choice, choice.typical())
         except UserError as error:
             self.problems.append(str(error))

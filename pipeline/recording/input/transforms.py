@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.base.errors import UserError, printable
 from pipeline.recording.input.container import Container
-from pipeline.recording.input.decode import Message, decoder, reader
+from pipeline.recording.input.decode import Message, decoder, message_reader
 from pipeline.recording.input.frames import Transform, TransformTree
 from pipeline.recording.input.readings import kind_of, quaternion_of
 from pipeline.recording.input.roles import readable
@@ -35,7 +35,7 @@ def transforms_of(container: Container) -> TransformTree:
             decode = decoder(channel)
         except UserError:
             continue
-        found, _ = readable(reader(decode, _edges), channel.payloads, None)
+        found, _ = readable(message_reader(decode, _edges), channel.payloads, None)
         for edge, pose in chain.from_iterable(found):
             if not static and np.abs(poses.setdefault(edge, pose) - pose).max() > STILL:
                 moving.add(edge)

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.base.layout import NotMade
 from pipeline.episode.episode import Episode
 from pipeline.params.lab import SetupParams
-from pipeline.recording.geometry import KeptGeometry
+from pipeline.recording.geometry import EpisodeGeometry
 from pipeline.recording.input import images
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.frames import Transform
@@ -45,12 +45,12 @@ class Pictures:
         """
         if not path.is_file():
             raise NotMade(path)
-        kept = KeptGeometry.of_episode(episode.metadata, episode.band)
+        geometry = EpisodeGeometry.of_episode(episode.metadata, episode.band)
         delay = (episode.metadata["preprocessing"].get("delays") or {}).get("camera") or {}
         late = delay["value"] if delay.get("applied") else 0.0
         color = read_recording(path, setup).color.shifted(late)
         time = color.seconds(episode.metadata["input"]["start_ns"])
-        return cls(time, kept.camera, kept.camera_to_fork, color.values)
+        return cls(time, geometry.camera, geometry.camera_to_fork, color.values)
 
     def __getitem__(self, number: int) -> np.ndarray | None:
         """A picture, BGR, shape (H, W, 3); None where it is damaged."""

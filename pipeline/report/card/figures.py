@@ -8,9 +8,9 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.report.card.camera import Pictures
 from pipeline.report.card.camera_view import SIMULATED, CameraView
-from pipeline.report.card.known import Aims, Known
+from pipeline.report.card.inputs import Aims, CardInputs
 from pipeline.report.card.simulated import Simulated
-from pipeline.report.card.values import ShownValue
+from pipeline.report.card.values import SearchBox, ShownValue
 from pipeline.report.drawing.canvas import key, mark, picture
 from pipeline.report.drawing.styles import INK
 from pipeline.report.quantities import QUANTITIES, rounded
@@ -92,32 +92,22 @@ def force(episode: Episode, simulated: Simulated) -> plt.Figure:
 
 
 @picture(dpi=110)
-def values(shown: list[ShownValue], boxes: dict[str, tuple[float, float, str]]) -> plt.Figure:
-    """Each searched value's interval as a bar within its box.
-
-    Args:
-        boxes: Low and high end in SI, and scale (linear or log), by name.
-    """
+def values(shown: list[ShownValue], boxes: dict[str, SearchBox]) -> plt.Figure:
+    """Each searched value's interval as a bar within its box, which is given by name."""
     rows = [one for one in shown if one.name in boxes and one.low is not None]
     figure, ax = plt.subplots(figsize=(9.6, 0.5 * max(len(rows), 1) + 1.1))
     for row, one in enumerate(rows):
-        low, high, scale = boxes[one.name]
-        ends = QUANTITIES[one.name].factor * np.array([low, high])
-
-        def place(value: float, ends=ends, scale=scale) -> float:
-            if scale == "log":
-                value, ends = np.log(value), np.log(ends)
-            return float((value - ends[0]) / (ends[1] - ends[0]))
-
-        begin, end = place(one.low), place(one.high)
+        box, factor = boxes[one.name], QUANTITIES[one.name].factor
+        box = SearchBox(factor * box.low, factor * box.high, box.scale)
+        begin, end = box.place(one.low), box.place(one.high)
         ax.barh(row, 1, height=0.52, color="0.93", zorder=1)
         ax.barh(row, end - begin, left=begin, height=0.52, color=BARS, alpha=0.55, zorder=2)
-        ax.plot([place(one.value)] * 2, [row - 0.26, row + 0.26], color=INK, lw=2, zorder=3)
+        ax.plot([box.place(one.value)] * 2, [row - 0.26, row + 0.26], color=INK, lw=2, zorder=3)
         words = {"va": "center", "fontsize": 8, "color": "0.45"}
-        ax.text(-0.01, row, f"{rounded(ends[0]):.6g}", ha="right", **words)
-        ax.text(1.01, row, f"{rounded(ends[1]):.6g}", ha="left", **words)
-        told = f"{one.value:g}  ({one.low:g} to {one.high:g}) {one.unit}"
-        ax.text(1.12, row, told, va="center", fontsize=9)
+        ax.text(-0.01, row, f"{rounded(box.low):.6g}", ha="right", **words)
+        ax.text(1.01, row, f"{rounded(box.high):.6g}", ha="left", **words)
+        text = f"{one.value:g}  ({one.low:g} to {one.high:g}) {one.unit}"
+        ax.text(1.12, row, text, va="center", fontsize=9)
     ax.set_yticks(range(len(rows)), [one.label for one in rows])
     ax.tick_params(axis="y", length=0, pad=32)
     ax.set(xlim=(0, 1.55), xticks=[], ylim=(len(rows) - 0.4, -0.6))
@@ -130,9 +120,9 @@ def values(shown: list[ShownValue], boxes: dict[str, tuple[float, float, str]]) 
 
 
 @picture(dpi=110)
-def landings(known: Known) -> plt.Figure:
+def landings(inputs: CardInputs) -> plt.Figure:
     """Predicted landings with their intervals, and where launches landed."""
-    aims, launched = known.aims, known.launched
+    aims, launched = inputs.aims, inputs.launched
     figure, ax = plt.subplots(figsize=(9.6, 3.6))
     entries = {}
     for kind, (marker, name) in KINDS.items():

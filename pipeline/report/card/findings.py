@@ -4,48 +4,48 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.report.card.known import Known
+from pipeline.report.card.inputs import CardInputs
 from pipeline.report.card.values import boxes
 from pipeline.report.card.verdict import FURTHER, Findings
-from pipeline.report.drawing.markdown import as_code
+from pipeline.report.drawing.names import as_code
 from pipeline.report.quantities import QUANTITIES, rounded
 
 SIDE = 0.01  # of a box's width: as near is at its side
 
 
-def findings(known: Known) -> Findings:
+def findings(inputs: CardInputs) -> Findings:
     """Of a band, from files and launches."""
-    told, aims = known.confidence, known.aims
-    recordings = told.get("recordings", [])
+    confidence, aims = inputs.confidence, inputs.aims
+    recordings = confidence.get("recordings", [])
 
     def worst(name: str) -> float:
         return max((one[name] for one in recordings), default=0.0)
 
-    launched = known.launched
-    scored = launched[launched.stretch <= FURTHER * known.recorded_stretch]
+    launched = inputs.launched
+    scored = launched[launched.stretch <= FURTHER * inputs.recorded_stretch]
     scored = scored[scored.predicted_low.notna()]
     landing, low, high = (scored[n] for n in ("landing_y", "predicted_low", "predicted_high"))
-    left = [abs(one["left"]) for one in told.get("launches", []) if one["left"] is not None]
+    left = [abs(one["left"]) for one in confidence.get("launches", []) if one["left"] is not None]
     miss = np.abs(aims.landing - aims.target)
     return Findings(
-        settled=told.get("settled"),
+        settled=confidence.get("settled"),
         force=worst("force_rms"),
         held=worst("held_rms"),
         recoil=worst("recoil_rms"),
         recoil_seen=any(one["pictures"] for one in recordings) or not recordings,
-        disagreement=told.get("disagreement", 1.0),
+        disagreement=confidence.get("disagreement", 1.0),
         odd=_odd(recordings),
-        at_sides=_at_sides(known),
+        at_sides=_at_sides(inputs),
         stretch=float(aims.stretch.max()),
-        recorded_stretch=known.recorded_stretch,
+        recorded_stretch=inputs.recorded_stretch,
         hold_force=float(np.nanmax(aims.hold_force, initial=0.0)),
-        max_force=known.params.setup.max_force,
+        max_force=inputs.params.setup.max_force,
         failures=[
             f"The launch at {target:g} m fails in simulation: {failure}."
             for target, failure in zip(aims.target, aims.failure, strict=True)
             if failure
         ],
-        converged=known.policy["training"]["converged"],
+        converged=inputs.policy["training"]["converged"],
         miss=float(np.nanmax(miss, initial=0.0)),
         half_width=float(aims.half_width.max()),
         outside=int(((landing < low) | (landing > high)).sum()),
@@ -59,29 +59,26 @@ def findings(known: Known) -> Findings:
 
 def _odd(recordings: list[dict]) -> str:
     """File and pull that all others predict worst; "" of fewer than two."""
-    told = [one for one in recordings if "without_it" in one]
-    if not told:
+    predicted = [one for one in recordings if "without_it" in one]
+    if not predicted:
         return ""
-    source = max(told, key=lambda one: one["without_it"]["misfit"])["source"]
+    source = max(predicted, key=lambda one: one["without_it"]["misfit"])["source"]
     return f"pull {source.get('pull', 1)} of {as_code(source.get('file', '?'))}"
 
 
-def _at_sides(known: Known) -> list[tuple[str, str]]:
+def _at_sides(inputs: CardInputs) -> list[tuple[str, str]]:
     """Searched parameters at a side of their box that nature does not set: label and side."""
-    found, searched = [], boxes(known.params, known.method)
-    for name, value in known.theta["theta"].items():
+    found, searched = [], boxes(inputs.params, inputs.method)
+    for name, value in inputs.theta["theta"].items():
         if name not in searched:
             continue
-        low, high, scale = searched[name]
-        ends = np.array([value, low, high], float)
-        if scale == "log":
-            ends = np.log(ends)
-        place = (ends[0] - ends[1]) / (ends[2] - ends[1])
-        sides = {"lower": place < SIDE and low != 0, "upper": place > 1 - SIDE}
+        box = searched[name]
+        place = box.place(value)
+        sides = {"lower": place < SIDE and box.low != 0, "upper": place > 1 - SIDE}
         quantity = QUANTITIES[name]
-        box = " to ".join(f"{rounded(quantity.factor * end):.6g}" for end in (low, high))
+        ends = " to ".join(f"{rounded(quantity.factor * x):.6g}" for x in (box.low, box.high))
         found += [
-            (quantity.label, f"{side} side of its box, {f'{box} {quantity.unit}'.strip()}")
+            (quantity.label, f"{side} side of its box, {f'{ends} {quantity.unit}'.strip()}")
             for side, there in sides.items()
             if there
         ]

@@ -1,6 +1,6 @@
 """What would help most next: cures of what speaks against, then what narrows the interval.
 
-That of the middle target's landing, computed from the posterior (gain.py), the largest gain first.
+That of the middle target's landing, by pipeline/identify/posterior/gain.py, the largest gain first.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.episode.episode import Episode
+from pipeline.identify.posterior.gain import LandingModel
 from pipeline.identify.posterior.launches import TAPE
-from pipeline.report.card.gain import LandingModel
 from pipeline.report.card.verdict import Reason
 
 LEAST = 0.05  # share of an interval: less is no help
@@ -35,7 +35,7 @@ def next_steps(
     band: str,
     reasons: Sequence[Reason],
     model: LandingModel | None,
-    targets,
+    targets: np.ndarray,
     episodes: Sequence[Episode],
     launches: int = 0,
 ) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from pipeline.base.files import write_text
 from pipeline.episode.episode import Episode
+from pipeline.params.lab import SetupParams
 from pipeline.report.card.camera_view import SIMULATED
 from pipeline.report.card.simulated import Simulated, smooth
 from pipeline.report.drawing.page import page
@@ -23,7 +24,7 @@ MILLIMETRES = 1000
 
 
 def write_page(
-    folder: Path, text: str, title: str, episode: Episode, simulated: Simulated, setup
+    folder: Path, text: str, title: str, episode: Episode, simulated: Simulated, setup: SetupParams
 ) -> None:
     """Write index.html into `folder`, where the text's pictures lie. Raises UserError."""
     data = json.dumps(content(episode, simulated, setup), separators=(",", ":"))
@@ -36,7 +37,7 @@ def write_page(
     write_text(folder / "index.html", page(text, folder, title, section=section, links=links))
 
 
-def content(episode: Episode, simulated: Simulated, setup) -> dict:
+def content(episode: Episode, simulated: Simulated, setup: SetupParams) -> dict:
     """What replay.js reads. Times [s] from the release; places in whole millimetres, frame O.
 
     Arrays are little-endian int16 in base64: `line` (states, nodes, 3) at `times`, `cloud` (points

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.report.card.findings import Findings
-from pipeline.report.card.known import Known
+from pipeline.report.card.inputs import CardInputs
 from pipeline.report.card.values import ShownValue
 from pipeline.report.card.verdict import CARE, NO, TRUSTED, Reason
-from pipeline.report.drawing.markdown import as_code
+from pipeline.report.drawing.names import as_code
 
 SAID = {TRUSTED: "can be trusted", CARE: "use with care", NO: "do not use it"}
 
@@ -39,12 +39,12 @@ def _met(found: Findings) -> str:
     )
 
 
-def residuals(known: Known, found: Findings) -> str:
+def residuals(inputs: CardInputs, found: Findings) -> str:
     """How near the simulation comes, in plain words."""
-    peak = known.episode.metadata["preprocessing"]["peak_force"]
-    if not known.confidence:
+    peak = inputs.episode.metadata["preprocessing"]["peak_force"]
+    if not inputs.confidence:
         return "This method does not tell how near it comes; the report has its loss.\n"
-    pictures = known.confidence["recordings"][0]["pictures"]
+    pictures = inputs.confidence["recordings"][0]["pictures"]
     seen = " and ".join(f"{1000 * time:.0f} ms" for time in pictures)
     recoil = (
         f"- The **recoil** is met within {1000 * found.recoil:.1f} mm. It is seen {seen} after the"
@@ -62,7 +62,7 @@ open are taken out:
 
 
 def card_text(
-    known: Known,
+    inputs: CardInputs,
     found: Findings,
     verdict: str,
     reasons: list[str],
@@ -72,7 +72,7 @@ def card_text(
     animated: bool = True,
 ) -> str:
     """README.md of a card; without the animation where a replay takes its place."""
-    rig = known.params.bands[known.band].source == "rig"
+    rig = inputs.params.bands[inputs.band].source == "rig"
     note = "A band of the **virtual rig**: its recording and its landings are virtual.\n\n"
     animation = (
         "![The release, recorded and simulated, 50 times slower](animation.webp)\n\n"
@@ -80,7 +80,7 @@ def card_text(
         " Right: the camera's points and the simulated band.*\n"
     )
     return f"""\
-# {known.band}: {SAID[verdict]}
+# {inputs.band}: {SAID[verdict]}
 
 {_listed(reasons, "-")}
 {note if rig else ""}{animation if animated else ""}
@@ -91,12 +91,12 @@ def card_text(
 
 ## Where to draw
 
-{_draws(known)}
+{_draws(inputs)}
 ![Predicted landings](landings.png)
 
 ## How near the simulation comes
 
-{residuals(known, found)}
+{residuals(inputs, found)}
 ![The simulated band in the camera's pictures](camera.webp)
 
 ![Force, measured and simulated](force.png)
@@ -106,7 +106,7 @@ def card_text(
 {_listed(steps, "1.")}
 ## What it rests on
 
-{_rests(known)}"""
+{_rests(inputs)}"""
 
 
 def _listed(sentences: list[str], bullet: str) -> str:
@@ -123,12 +123,12 @@ def _values(shown: list[ShownValue]) -> str:
     return "\n".join(lines) + "\n" + told
 
 
-def _draws(known: Known) -> str:
+def _draws(inputs: CardInputs) -> str:
     lines = [
         "| target | draw y, z | lands at | 90 % interval | force to hold |",
         "| --- | --- | --- | --- | --- |",
     ]
-    aims = known.aims
+    aims = inputs.aims
     for row, target in enumerate(aims.target):
         y, z = aims.draw[row]
         low, high = aims.interval[row]
@@ -136,7 +136,7 @@ def _draws(known: Known) -> str:
         landing = aims.failure[row] or f"{aims.landing[row]:.3f} m"
         force = f"{aims.hold_force[row]:.1f} N" if np.isfinite(aims.hold_force[row]) else "–"
         lines.append(f"| {target:g} m | {y:.4f}, {z:.4f} m | {landing} | {interval} | {force} |")
-    history = known.theta.get("history")
+    history = inputs.theta.get("history")
     asked = ""
     if history:
         asked = (
@@ -146,16 +146,15 @@ def _draws(known: Known) -> str:
     return "\n".join(lines) + "\n" + asked
 
 
-def _rests(known: Known) -> str:
-    count, launches = len(known.episodes), len(known.confidence.get("launches", []))
-    pulls = (
-        f"{count} pull{'s' * (count != 1)} in {', '.join(as_code(one) for one in known.recordings)}"
-    )
-    told = f"{launches} launch{'es' * (launches != 1)}" if launches else "no launch"
-    launched = known.launched.kind.value_counts()
+def _rests(inputs: CardInputs) -> str:
+    count, launches = len(inputs.episodes), len(inputs.confidence.get("launches", []))
+    files = ", ".join(map(as_code, inputs.recordings))
+    pulls = f"{count} pull{'s' * (count != 1)} in {files}"
+    observed = f"{launches} launch{'es' * (launches != 1)}" if launches else "no launch"
+    launched = inputs.launched.kind.value_counts()
     tried = ", ".join(f"{n} {kind}" for kind, n in sorted(launched.items())) or "none"
     return f"""\
-- Evidence: {pulls}; {told}.
-- Method: `{known.method}`; values in `data/theta/{known.band}/{known.method}.json`.
+- Evidence: {pulls}; {observed}.
+- Method: `{inputs.method}`; values in `data/theta/{inputs.band}/{inputs.method}.json`.
 - Landings held against predictions: {tried}.
 """

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.identify.posterior.coordinates import MOST_DRAG, MOST_LOST
+from pipeline.params import Params
 from pipeline.report.quantities import QUANTITIES, rounded
 from pipeline.simulator.parameters import EXTRA
 
@@ -30,17 +32,17 @@ def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
     Args:
         fixed: Parameters that the method did not search.
     """
-    told = theta.get("confidence") or {}
-    intervals = {**told.get("derived", {}), **told.get("parameters", {})}
-    known = theta["theta"] | {"air_drag": theta.get("nuisances", {}).get("air_drag") or 0.0}
-    known |= {name: theta[name] for name in EXTRA if name in theta}
-    if not told:  # nothing was searched but θ
-        known = theta["theta"]
+    confidence = theta.get("confidence") or {}
+    intervals = {**confidence.get("derived", {}), **confidence.get("parameters", {})}
+    numbers_of = dict(theta["theta"])
+    if confidence:  # else nothing was searched but θ
+        numbers_of["air_drag"] = theta.get("nuisances", {}).get("air_drag") or 0.0
+        numbers_of |= {name: theta[name] for name in EXTRA if name in theta}
     found = []
     for name, quantity in QUANTITIES.items():
-        if name not in known:
+        if name not in numbers_of:
             continue
-        numbers = known[name], *(intervals.get(name, {}).get(end) for end in ("low", "high"))
+        numbers = numbers_of[name], *(intervals.get(name, {}).get(end) for end in ("low", "high"))
         shown = [None if x is None else rounded(quantity.factor * x) for x in numbers]
         still = name in fixed
         ends = (None, None) if still else shown[1:]
@@ -48,14 +50,29 @@ def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
     return found
 
 
-def boxes(params, method: str) -> dict[str, tuple[float, float, str]]:
-    """Low and high end in SI, and scale, of what a method searches, by name."""
-    about = params.methods[method]
-    known = {name: (box.low, box.high, box.scale) for name, box in params.parameters}
-    known |= {name: (*ends, "linear") for name, ends in about.bounds.items()}
-    known |= {
-        "air_drag": (0.0, MOST_DRAG, "linear"),
-        "turn_damping": (0.0, 1.0, "linear"),
-        "returned_share": (np.exp(-MOST_LOST), np.exp(MOST_LOST), "log"),
+class SearchBox(NamedTuple):
+    """Within which a method searches a parameter [SI]; `scale` is linear or log."""
+
+    low: float
+    high: float
+    scale: str = "linear"
+
+    def place(self, value: float) -> float:
+        """From 0 at the lower end to 1 at the upper one."""
+        ends = np.array([value, self.low, self.high], float)
+        if self.scale == "log":
+            ends = np.log(ends)
+        return float((ends[0] - ends[1]) / (ends[2] - ends[1]))
+
+
+def boxes(params: Params, method: str) -> dict[str, SearchBox]:
+    """Of what a method searches, by name."""
+    config = params.methods[method]
+    found = {name: SearchBox(box.low, box.high, box.scale) for name, box in params.parameters}
+    found |= {name: SearchBox(*ends) for name, ends in config.bounds.items()}
+    found |= {
+        "air_drag": SearchBox(0.0, MOST_DRAG),
+        "turn_damping": SearchBox(0.0, 1.0),
+        "returned_share": SearchBox(np.exp(-MOST_LOST), np.exp(MOST_LOST), "log"),
     }
-    return {name: box for name, box in known.items() if name not in about.fixed}
+    return {name: box for name, box in found.items() if name not in config.fixed}

@@ -9,12 +9,13 @@ import numpy as np
 
 from pipeline.base.files import replacing_folder, write_json, write_text
 from pipeline.base.layout import Layout
+from pipeline.identify.posterior.gain import LandingModel
+from pipeline.params import Params
 from pipeline.report.card import figures
 from pipeline.report.card.animation import animate
 from pipeline.report.card.camera import Pictures
 from pipeline.report.card.findings import findings
-from pipeline.report.card.gain import LandingModel
-from pipeline.report.card.known import Known, known
+from pipeline.report.card.inputs import CardInputs, card_inputs
 from pipeline.report.card.next_steps import next_steps
 from pipeline.report.card.page import write_page
 from pipeline.report.card.simulated import simulate
@@ -23,30 +24,33 @@ from pipeline.report.card.values import boxes, values
 from pipeline.report.card.verdict import judge
 
 
-def write(params, band: str, method: str, root: str | Path = ".") -> dict:
+def write(params: Params, band: str, method: str, root: str | Path = ".") -> dict:
     """Write a band's card; return what card.json says. Raises UserError: an input is missing."""
-    told = known(params, band, method, root)
-    episode, setup, about = told.episode, params.setup, params.methods[method]
+    inputs = card_inputs(params, band, method, root)
+    episode, setup, about = inputs.episode, params.setup, params.methods[method]
     layout = Layout(Path(root))
     recording = layout.raw(band) / episode.metadata["input"]["file"]
     pictures = Pictures.of(recording, episode, setup)
-    simulated = simulate(params, band, method, episode, told.theta)
+    simulated = simulate(params, band, method, episode, inputs.theta)
 
-    found = findings(told)
+    found = findings(inputs)
     verdict, against = judge(found)
-    reasons, shown = reasons_of(found, against), values(told.theta, about.fixed)
-    samples = told.samples
-    model = samples and LandingModel.of(samples.names, samples.values, told.aims)
-    launches = len(told.confidence.get("launches", []))
-    steps = next_steps(band, against, model, told.aims.target, told.episodes, launches)
-    card = content(told, verdict, reasons, shown, steps)
-    text = told, found, verdict, reasons, shown, steps
+    reasons, shown = reasons_of(found, against), values(inputs.theta, about.fixed)
+    aims = inputs.aims
+    model, samples = None, inputs.samples
+    if samples is not None:
+        landings = aims.samples, aims.slope, aims.half_width
+        model = LandingModel.of(samples.names, samples.values, *landings)
+    launches = len(inputs.confidence.get("launches", []))
+    steps = next_steps(band, against, model, aims.target, inputs.episodes, launches)
+    card = content(inputs, verdict, reasons, shown, steps)
+    text = inputs, found, verdict, reasons, shown, steps
 
     with replacing_folder(layout.card(band)) as folder:
         figures.camera(folder / "camera.webp", episode, simulated, pictures)
         figures.force(folder / "force.png", episode, simulated)
         figures.values(folder / "values.png", shown, boxes(params, method))
-        figures.landings(folder / "landings.png", told)
+        figures.landings(folder / "landings.png", inputs)
         animate(folder / "animation.webp", episode, simulated, pictures, setup.fork_width)
         write_text(folder / "README.md", card_text(*text))
         write_json(folder / "card.json", card)
@@ -55,9 +59,9 @@ def write(params, band: str, method: str, root: str | Path = ".") -> dict:
     return card
 
 
-def content(told: Known, verdict: str, reasons: list, shown: list, steps: list) -> dict:
+def content(inputs: CardInputs, verdict: str, reasons: list, shown: list, steps: list) -> dict:
     """What card.json says; numbers are rounded, so that kinds of CPU agree."""
-    aims = told.aims
+    aims = inputs.aims
     draws = [
         {
             "target_m": target,
@@ -73,17 +77,17 @@ def content(told: Known, verdict: str, reasons: list, shown: list, steps: list) 
         )
     ]  # fmt: skip
     return {
-        "band": told.band,
-        "method": told.method,
+        "band": inputs.band,
+        "method": inputs.method,
         "verdict": verdict,
         "reasons": reasons,
         "values": [asdict(one) for one in shown],
         "draws": draws,
         "next": steps,
-        "theta_file": Layout().theta(told.band, told.method).as_posix(),
-        "recordings": len(told.recordings),
-        "pulls": len(told.episodes),
-        "launches": len(told.confidence.get("launches", [])),
+        "theta_file": Layout().theta(inputs.band, inputs.method).as_posix(),
+        "recordings": len(inputs.recordings),
+        "pulls": len(inputs.episodes),
+        "launches": len(inputs.confidence.get("launches", [])),
     }
 
 

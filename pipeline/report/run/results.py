@@ -96,7 +96,7 @@ class Results:
             yield from methods.values()
 
 
-def gather(params, root: str | Path = ".") -> Results:
+def gather(params: Params, root: str | Path = ".") -> Results:
     """Read the outputs of every band and method of params.run. Raises UserError."""
     layout = Layout(Path(root))
     episodes = {band: Episode.load(layout.episode(band)) for band in params.run.bands}

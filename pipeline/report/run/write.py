@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.base.files import write_json, write_text
+from pipeline.params import Params
 from pipeline.report.run.chapters.appendix import appendix
 from pipeline.report.run.chapters.outcome import outcome
 from pipeline.report.run.chapters.paper_tables import paper_tables
@@ -18,7 +19,7 @@ from pipeline.report.run.run import write_run
 CHAPTERS = (outcome, paper_tables, appendix)
 
 
-def write(params, root: str | Path = ".") -> None:
+def write(params: Params, root: str | Path = ".") -> None:
     """Write the report of everything in params.run. Raises UserError where an input is missing."""
     report = Report.of(params, Path(root))
     markdown = "\n".join(chapter(report) for chapter in CHAPTERS)

@@ -116,11 +116,12 @@ def test_other_inputs_start_over_and_replace_the_old(remembered, tmp_path: Path)
     assert [folder.name for folder in (tmp_path / "memory").iterdir()] == ["y"]
 
 
-def test_a_truncated_batch_is_evaluated_again(remembered, tmp_path: Path) -> None:
+def test_a_truncated_batch_is_evaluated_again(remembered, tmp_path: Path, capsys) -> None:
     remembered(batches(0.1, 0.2))
     damaged = next((tmp_path / "memory" / "x").iterdir())
     damaged.write_bytes(damaged.read_bytes()[:200])
     assert [remembered(batches(0.1, 0.2))[0] for _ in range(2)] == [1, 0]
+    assert capsys.readouterr().err.startswith(f"note: {damaged}: damaged (")
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)

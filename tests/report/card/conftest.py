@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from pipeline.base.layout import Layout
 from pipeline.params import Params, load
 from pipeline.recording.build import build_episodes
-from pipeline.report.card.known import Known, known
+from pipeline.report.card.inputs import CardInputs, card_inputs
 from pipeline.simulator.parameters import EXTRA
 from tests import once
 from tests.policy.stored import write_stored
@@ -126,5 +126,5 @@ def card_params(project: Path) -> Params:
 
 
 @pytest.fixture(scope="session")
-def told(project: Path, card_params: Params) -> Known:
-    return known(card_params, BAND, METHOD, project)
+def told(project: Path, card_params: Params) -> CardInputs:
+    return card_inputs(card_params, BAND, METHOD, project)

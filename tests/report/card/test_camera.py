@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, NotMade
-from pipeline.recording.geometry import KeptGeometry, geometry_of
+from pipeline.recording.geometry import EpisodeGeometry, geometry_of
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.frames import Transform
 from pipeline.recording.input.reader import read_recording
@@ -104,7 +104,7 @@ def test_a_colour_camera_beside_the_depth_camera(told, project) -> None:
     recording = read_recording(path, setup)
     geometry = geometry_of(recording, setup)
     beside = Transform(Rotation.from_rotvec([0.02, -0.05, 0.01]), np.array([0.06, 0.01, -0.02]))
-    kept = KeptGeometry.of(recording, replace(geometry, color=beside)).content()
+    kept = EpisodeGeometry.of(recording, replace(geometry, color=beside)).content()
     metadata = told.episode.metadata | {"geometry": json.loads(json.dumps(kept))}
     pictures = Pictures.of(path, replace(told.episode, metadata=metadata), setup)
     before = np.array([[0.1, -0.05, 0.9], [-0.2, 0.1, 1.3]])  # the depth camera

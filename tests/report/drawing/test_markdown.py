@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.base.errors import printable
-from pipeline.report.drawing.markdown import as_code, cell
+from pipeline.report.drawing.names import as_code, cell
 from pipeline.report.drawing.page import page
 from tests.hostile import MARKUP
 

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from pipeline.params import Params
 from pipeline.params.identification import LEAST_SQUARES
-from pipeline.report.drawing.markdown import as_code, cell
+from pipeline.report.drawing.names import as_code, cell
 from pipeline.report.drawing.styles import Styles
 from pipeline.report.quantities import QUANTITIES, Quantity, coordinate
 from pipeline.report.run.replay import MethodReplay
@@ -25,7 +26,7 @@ SEARCHES = {
 TERMS = {"geom": "geom [cm]", "force": "force [N]", "work": "work [J]"}
 
 
-def methods(results: Results, params, styles: Styles) -> Table:
+def methods(results: Results, params: Params, styles: Styles) -> Table:
     """What each method searched, what it minimises, and what it holds fixed."""
     rows = []
     for method, style in styles.items():
@@ -135,7 +136,7 @@ def observed(results: Results, styles: Styles) -> Table | None:
     return (heads, rows) if rows else None
 
 
-def losses(results: Results, params, styles: Styles) -> Table:
+def losses(results: Results, params: Params, styles: Styles) -> Table:
     """Terms of the loss at θ, the share that each weighs, the printed total, and the budget."""
     found = {term for one in results for term in one.theta.get("loss", {}) if term != "total"}
     terms = TERMS | {term: term for term in sorted(found - TERMS.keys())}

@@ -10,6 +10,7 @@ import pandas as pd
 
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.results.units import SI_UNITS
+from pipeline.params import Params
 from pipeline.params.identification import LAWS
 from pipeline.report.drawing.styles import Styles
 from pipeline.report.quantities import QUANTITIES
@@ -53,7 +54,7 @@ class IdentifiedRow:
     loss: float
 
 
-def identified(results: Results, params) -> list[IdentifiedRow]:
+def identified(results: Results, params: Params) -> list[IdentifiedRow]:
     """Table 2: every method that ran, the paper's own numbers below those of its methods."""
     rows = []
     for band, ran in results.methods.items():
@@ -75,7 +76,7 @@ def printed_loss(result: Result) -> float:
     return float(sum(loss.get(term, math.nan) for term in PRINTED))
 
 
-def _value(params, result: Result, name: str) -> Value:
+def _value(params: Params, result: Result, name: str) -> Value:
     value = result.theta["theta"][name]
     if name in params.methods[result.method].fixed:
         return Value(value, "fixed")

@@ -1,4 +1,4 @@
-"""Names that others have given, such as those of files, in markdown."""
+"""Names that others have given, such as those of files, in markdown and in pictures."""
 
 from __future__ import annotations
 
@@ -17,3 +17,8 @@ def as_code(name: str) -> str:
 def cell(text: str) -> str:
     """In a table, where a bar would end the cell, in code too."""
     return text.replace("|", "\\|")
+
+
+def as_label(name: str) -> str:
+    """As matplotlib draws it letter by letter: between dollars it would read TeX."""
+    return printable(name).replace("$", r"\$")

@@ -3,7 +3,7 @@
 import matplotlib.pyplot as plt
 import pytest
 
-from app.labels import as_label
+from pipeline.report.drawing.names import as_label
 from tests.hostile import MARKUP
 
 TEX = "$\\frac{a$.mcap"

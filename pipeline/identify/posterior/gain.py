@@ -38,24 +38,30 @@ class LandingModel:
     half_width: np.ndarray
 
     @classmethod
-    def of(cls, names: Sequence[str], samples: np.ndarray, aims) -> LandingModel | None:
-        """From samples (M, P) of θ and the landings of some of them; None where either lacks.
+    def of(
+        cls,
+        names: Sequence[str],
+        samples: np.ndarray,
+        landings: np.ndarray,
+        draw: np.ndarray,
+        half_width: np.ndarray,
+    ) -> LandingModel | None:
+        """From samples (M, P) of θ and the landings (T, S) of some of them; None where any lacks.
 
         Args:
-            aims: pipeline.report.card.known.Aims.
+            names: Of the columns of `samples`.
+            draw, half_width: As the attributes.
         """
-        landings = aims.samples
         good = np.isfinite(landings).all(axis=0)
-        known = np.isfinite(aims.half_width).all()
         unknown = unknowns(names, samples)
-        if not unknown or not known or good.sum() < 2 * len(unknown):
+        if not unknown or not np.isfinite(half_width).all() or good.sum() < 2 * len(unknown):
             return None
         columns = np.stack(list(unknown.values()), axis=1)
         some = np.linspace(0, len(samples) - 1, landings.shape[1]).astype(int)[good]
         design = np.column_stack([np.ones(len(some)), columns[some] - columns.mean(axis=0)])
         gradient = np.linalg.lstsq(design, landings[:, good].T, rcond=None)[0][1:].T
         covariance = np.atleast_2d(np.cov(columns.T))
-        return cls(list(unknown), covariance, gradient, aims.slope, aims.half_width)
+        return cls(list(unknown), covariance, gradient, draw, half_width)
 
     def after(self, covariance: np.ndarray | None = None, draw: float = 1.0) -> np.ndarray:
         """Half widths [m], shape (T,), with another covariance and a share of the draw's error."""

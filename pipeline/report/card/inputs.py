@@ -1,7 +1,8 @@
-"""All that is known of a band when its card is written, read and launched once."""
+"""All that a band's card is made from, read and launched once."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,6 +19,7 @@ from pipeline.launching.trials.spread import CROSS, MOST, STEP, landing_interval
 from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
 from pipeline.launching.trials.trials import limited
 from pipeline.params import Params
+from pipeline.simulator.launch import Launches
 from pipeline.simulator.parameters import Parameters
 
 
@@ -52,7 +54,7 @@ class Aims:
 
 
 @dataclass(frozen=True)
-class Known:
+class CardInputs:
     """Of one band by one method.
 
     Attributes:
@@ -65,7 +67,7 @@ class Known:
         recorded_stretch: The largest of all pulls.
     """
 
-    params: object
+    params: Params
     band: str
     method: str
     root: Path
@@ -95,7 +97,7 @@ class Known:
         return self.trials[self.trials.landing_y.notna() & self.trials.predicted_y.notna()]
 
 
-def known(params: Params, band: str, method: str, root: str | Path = ".") -> Known:
+def card_inputs(params: Params, band: str, method: str, root: str | Path = ".") -> CardInputs:
     """Read and launch. Raises UserError where an input is missing."""
     layout, about = Layout(Path(root)), params.bands[band]
     theta = load_theta(layout.theta(band, method), band)
@@ -106,7 +108,7 @@ def known(params: Params, band: str, method: str, root: str | Path = ".") -> Kno
     stretch = partial(stretch_of, fork_width=params.setup.fork_width, rest_length=about.rest_length)
     launcher = simulator(params, band, theta, root=root)
     target = np.array(params.trials.targets, float)
-    return Known(
+    return CardInputs(
         params=params,
         band=band,
         method=method,
@@ -121,7 +123,14 @@ def known(params: Params, band: str, method: str, root: str | Path = ".") -> Kno
     )
 
 
-def aims(launcher, target, draw, samples, stretch, params) -> Aims:
+def aims(
+    launcher: Callable[..., Launches],
+    target: np.ndarray,
+    draw: np.ndarray,
+    samples: Parameters | None,
+    stretch: Callable[[np.ndarray], np.ndarray],
+    params: Params,
+) -> Aims:
     """Launch draws (T, 2) at targets (T,), with the best θ and with samples of it.
 
     Args:

@@ -1,27 +1,22 @@
 """Gains against brute force: joint Gaussians, and least squares over the evidence itself."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
+from pipeline.identify.posterior.gain import LandingModel, unknowns
 from pipeline.identify.posterior.launches import TAPE
-from pipeline.report.card.gain import LandingModel, unknowns
-from pipeline.report.card.next_steps import next_steps, relaxing
-from pipeline.report.card.verdict import Reason
-
-NAMES = ["youngs_modulus", "elasticity_damping", "returned_share", "air_drag"]
-RNG = np.random.default_rng(3)
-ROOT = RNG.normal(size=(4, 4)) * 0.05
-COVARIANCE = ROOT @ ROOT.T + np.diag([1e-4, 0.05, 2e-4, 0.1])
-GRADIENT = np.array([[0.8, -0.2, 1.5, -0.01], [0.9, -0.25, 1.7, -0.02]])
+from tests.identify.posterior.toy_landings import (
+    COVARIANCE,
+    GRADIENT,
+    NAMES,
+    RNG,
+    landing_model,
+)
 
 
 @pytest.fixture
 def model() -> LandingModel:
-    draw = np.array([0.02, 0.03])
-    spread = np.sqrt(np.einsum("td,de,te->t", GRADIENT, COVARIANCE, GRADIENT) + draw**2)
-    return LandingModel(NAMES, COVARIANCE, GRADIENT, draw, 1.645 * spread)
+    return landing_model()
 
 
 def conditioned(covariance, known: list[int], rest: list[int]) -> np.ndarray:
@@ -81,53 +76,11 @@ def test_a_model_is_read_off_samples() -> None:
     samples = np.column_stack([samples, np.full(500, 0.47)])
     some = np.linspace(0, 499, 60).astype(int)
     landings = 1.9 + GRADIENT @ phi[some].T
-    aims = SimpleNamespace(
-        samples=landings, slope=np.array([0.02, 0.03]), half_width=np.array([0.1, 0.11])
-    )
-    model = LandingModel.of([*NAMES, "poissons_ratio"], samples, aims)
-    assert model.names == NAMES and list(unknowns([*NAMES, "poissons_ratio"], samples)) == NAMES
+    draw, half_width = np.array([0.02, 0.03]), np.array([0.1, 0.11])
+    names = [*NAMES, "poissons_ratio"]
+    model = LandingModel.of(names, samples, landings, draw, half_width)
+    assert model.names == NAMES and list(unknowns(names, samples)) == NAMES
     np.testing.assert_allclose(model.gradient, GRADIENT, atol=1e-9)
     np.testing.assert_allclose(model.covariance, np.cov(phi.T), atol=1e-9)
-    aims.half_width = np.array([np.nan, 0.1])
-    assert LandingModel.of([*NAMES, "poissons_ratio"], samples, aims) is None
-    assert LandingModel.of([], np.zeros((0, 0)), aims) is None
-
-
-def still(fall: float) -> SimpleNamespace:
-    """A pull of 10 N whose force falls by so much in the last half second."""
-    time = np.arange(0, 4, 0.03)
-    force = np.zeros((len(time), 3))
-    force[:, 1] = 10 - fall * np.clip((time - 2.5) / 0.5, 0, 1)
-    return SimpleNamespace(time=time, force=force, release_time=3.0)
-
-
-def test_a_force_that_still_falls_is_seen() -> None:
-    assert relaxing(still(0.5)) and not relaxing(still(0.02))
-
-
-def test_steps_are_cures_and_then_gains_the_largest_first(model) -> None:
-    reasons = [Reason(False, "why", "Do this."), Reason(False, "too", "Do this.")]
-    steps = next_steps("toy", reasons, model, np.array([1.7, 1.9]), [still(0.0)])
-    assert steps[0] == "Do this." and steps.count("Do this.") == 1
-    after = [float(step.split("±")[2].split()[0]) for step in steps[1:]]
-    assert len(after) >= 2 and after == sorted(after)
-    assert "Measure a launch and tell it with `sling observe --band toy`" in " ".join(steps)
-    more = next_steps("toy", reasons, model, np.array([1.7, 1.9]), [still(0.0)], launches=2)
-    assert "Measure another launch" in " ".join(more)
-    assert "1.9 m" in steps[1]
-
-
-def test_what_speaks_against_any_use_is_mended_first(model) -> None:
-    reasons = [Reason(True, "why", "Do this."), Reason(False, "too", "And that.")]
-    asked = "toy", reasons, model, np.array([1.7, 1.9]), [still(0.0)]
-    assert next_steps(*asked) == ["Do this.", "And that."]
-
-
-def test_where_nothing_helps_it_says_so() -> None:
-    known = LandingModel(NAMES, 1e-12 * np.eye(4), GRADIENT, np.zeros(2), np.ones(2))
-    exact = LandingModel(NAMES, 1e-12 * np.eye(4), GRADIENT, np.full(2, 1e-9), np.ones(2))
-    assert next_steps("toy", [], None, np.array([1.7]), [still(0.0)]) == [
-        "Nothing more would narrow the landings by much: launch."
-    ]
-    assert known.after(draw=0.0)[0] == pytest.approx(1.0)
-    assert len(next_steps("toy", [], exact, np.array([1.7, 1.9]), [still(0.0)])) >= 1
+    assert LandingModel.of(names, samples, landings, draw, np.array([np.nan, 0.1])) is None
+    assert LandingModel.of([], np.zeros((0, 0)), landings, draw, half_width) is None

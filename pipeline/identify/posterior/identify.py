@@ -155,11 +155,11 @@ def confidence(found: Identified, boxes: ParameterBoxes) -> dict:
             ends = np.log(ends) if box.scale == "log" else ends
             entry["identifiable"] = bool(ends[1] - ends[0] < FILLS * LEVEL * (ends[3] - ends[2]))
         parameters[name] = entry
-    shown = {name: columns[name] for name in EXTRA}
-    for one, kept in ((columns, shown), (mode, mode)):
-        kept["damping_product"] = one["elasticity_damping"] * one["damping_scale"]
+    product = "damping_product"
+    columns[product] = columns["elasticity_damping"] * columns["damping_scale"]
+    mode[product] = mode["elasticity_damping"] * mode["damping_scale"]
     derived = {
-        name: _told(samples, mode[name], SI_UNITS.get(name, "")) for name, samples in shown.items()
+        name: _told(columns[name], mode[name], SI_UNITS.get(name, "")) for name in (*EXTRA, product)
     }
     derived |= _clocks(found)
     matrix = np.corrcoef(found.samples.T + 1e-12 * np.arange(SAMPLES))

@@ -10,7 +10,7 @@ from pipeline.report.card.camera import Pictures
 from pipeline.report.card.camera_view import SIMULATED, CameraView
 from pipeline.report.card.inputs import Aims, CardInputs
 from pipeline.report.card.simulated import Simulated
-from pipeline.report.card.values import SearchBox, ShownValue
+from pipeline.report.card.values import SearchedRange, ShownValue
 from pipeline.report.drawing.canvas import key, mark, picture
 from pipeline.report.drawing.styles import INK
 from pipeline.report.quantities import QUANTITIES, rounded
@@ -92,13 +92,13 @@ def force(episode: Episode, simulated: Simulated) -> plt.Figure:
 
 
 @picture(dpi=110)
-def values(shown: list[ShownValue], boxes: dict[str, SearchBox]) -> plt.Figure:
+def values(shown: list[ShownValue], boxes: dict[str, SearchedRange]) -> plt.Figure:
     """Each searched value's interval as a bar within its box, which is given by name."""
     rows = [one for one in shown if one.name in boxes and one.low is not None]
     figure, ax = plt.subplots(figsize=(9.6, 0.5 * max(len(rows), 1) + 1.1))
     for row, one in enumerate(rows):
         box, factor = boxes[one.name], QUANTITIES[one.name].factor
-        box = SearchBox(factor * box.low, factor * box.high, box.scale)
+        box = SearchedRange(factor * box.low, factor * box.high, box.scale)
         begin, end = box.place(one.low), box.place(one.high)
         ax.barh(row, 1, height=0.52, color="0.93", zorder=1)
         ax.barh(row, end - begin, left=begin, height=0.52, color=BARS, alpha=0.55, zorder=2)

@@ -50,7 +50,7 @@ def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
     return found
 
 
-class SearchBox(NamedTuple):
+class SearchedRange(NamedTuple):
     """Within which a method searches a parameter [SI]; `scale` is linear or log."""
 
     low: float
@@ -65,14 +65,14 @@ class SearchBox(NamedTuple):
         return float((ends[0] - ends[1]) / (ends[2] - ends[1]))
 
 
-def boxes(params: Params, method: str) -> dict[str, SearchBox]:
+def boxes(params: Params, method: str) -> dict[str, SearchedRange]:
     """Of what a method searches, by name."""
     config = params.methods[method]
-    found = {name: SearchBox(box.low, box.high, box.scale) for name, box in params.parameters}
-    found |= {name: SearchBox(*ends) for name, ends in config.bounds.items()}
+    found = {name: SearchedRange(box.low, box.high, box.scale) for name, box in params.parameters}
+    found |= {name: SearchedRange(*ends) for name, ends in config.bounds.items()}
     found |= {
-        "air_drag": SearchBox(0.0, MOST_DRAG),
-        "turn_damping": SearchBox(0.0, 1.0),
-        "returned_share": SearchBox(np.exp(-MOST_LOST), np.exp(MOST_LOST), "log"),
+        "air_drag": SearchedRange(0.0, MOST_DRAG),
+        "turn_damping": SearchedRange(0.0, 1.0),
+        "returned_share": SearchedRange(np.exp(-MOST_LOST), np.exp(MOST_LOST), "log"),
     }
     return {name: box for name, box in found.items() if name not in config.fixed}

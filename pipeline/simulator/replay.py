@@ -31,10 +31,11 @@ class Replay:
 def replay(
     band: ClampedBand, episode: Episode, parameters: Parameters, force: ForceParams
 ) -> Replay:
-    """Simulate an episode's pull with N θ; `failure` of the rollouts says which count for nothing.
+    """Simulate an episode's pull with N parameters.
+
+    `failure` of the rollouts says which count for nothing.
 
     Args:
-        parameters: N of them.
         force: The filter of params.yaml.
 
     Raises:

@@ -80,10 +80,10 @@ def test_nine_landings_of_ten_lie_in_the_interval(root) -> None:
 def test_what_is_known_of_theta_widens_the_interval(root) -> None:
     """Samples whose landings spread by a tenth: nine of ten of those lie inside."""
 
-    def launcher(draws, thetas=None):
+    def launcher(draws, parameters=None):
         launched = toy.launch(draws)
-        if thetas is not None:
-            launched.landing_y = launched.landing_y * thetas[:, 0]
+        if parameters is not None:
+            launched.landing_y = launched.landing_y * parameters.values[:, 0]
         return launched
 
     narrow = shoot(root, 1.925)["interval_90_m"]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout
 from pipeline.identify.results.theta import load_theta
 from pipeline.launching.surface.simulator import simulator
 from sling2sim2real import Band, LaunchHistory, Model, Mounting, Settings, Theta
@@ -24,7 +25,7 @@ def test_launches_are_those_of_a_run_with_the_same_theta_file(world, tmp_path, s
         history=HISTORY,
         mounting=Mounting(clamp_direction=(0.6, 0.0, -0.8), flexural_rigidity=2e-4),
     )
-    mounting = tmp_path / "data" / "mounting" / "band.json"
+    mounting = Layout(tmp_path).clamps("band")
     mounting.parent.mkdir(parents=True)
     mounting.write_text(model.mounting.model_dump_json())
     content = model.theta.content("band", HISTORY)

@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.base.environment import environment as environment
 from pipeline.base.machine import gpus
+from pipeline.simulator.parameters import Parameters
 
 REPEATS = 3  # the best of them counts: others may use the machine too
 
@@ -26,14 +27,15 @@ def seconds(run: Callable[[], object], repeats: int = REPEATS) -> float:
     return min(timed(run)[2] for _ in range(repeats))
 
 
-def shared(devices: Sequence[str], simulate: Callable, thetas: np.ndarray, **options) -> list:
-    """What `simulate` gives for each device's share of thetas (N, 5), all at once."""
+def shared(devices: Sequence[str], simulate: Callable, parameters: Parameters, **options) -> list:
+    """What `simulate` gives for each device's share of N parameters, all at once."""
+    shares = np.array_split(np.arange(len(parameters)), len(devices))
     with ThreadPoolExecutor(len(devices)) as pool:
         return list(
             pool.map(
-                lambda device, share: simulate(share, device=device, **options),
+                lambda device, share: simulate(parameters[share], device=device, **options),
                 devices,
-                np.array_split(thetas, len(devices)),
+                shares,
             )
         )
 

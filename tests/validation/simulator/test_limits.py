@@ -91,9 +91,9 @@ def test_samples_are_as_many_as_asked_for_and_lie_where_they_should(bench):
         theta, draws = launching.random_launches(count)
         assert theta.shape == (count, 5) and draws.shape == (count, 2)
     thetas = robustness.on_faces(bench, 20)
-    for number, name in enumerate(robustness.THETA):
+    for name in robustness.THETA:
         bounds = getattr(bench.params.parameters, name)
-        at = np.isclose(thetas[:, number, None], [bounds.low, bounds.high])
+        at = np.isclose(thetas.column(name)[:, None], [bounds.low, bounds.high])
         assert at.sum(0).tolist() == [2, 2]
 
 

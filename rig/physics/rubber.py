@@ -230,9 +230,8 @@ class Rubber:
             return flow.speed(stress, strain)
 
         start, span = [np.log(stretch[0])], (times[0], times[-1])
-        return solve_ivp(rate, span, start, "LSODA", times, max_step=step, rtol=1e-7, atol=1e-9).y[
-            0
-        ]
+        solved = solve_ivp(rate, span, start, "LSODA", times, max_step=step, rtol=1e-7, atol=1e-9)
+        return solved.y[0]
 
     def frozen(self, ratios: np.ndarray | None) -> tuple[Rubber, np.ndarray]:
         """This rubber while no memory changes, and the ratios of its own memories.

@@ -12,8 +12,7 @@ from pipeline.base.progress import parse
 SECONDS = {  # of a step, on two cores for a recording of 9 s
     "record": 45,
     "episode": 14,
-    "history": 6,
-    "theta": 8,
+    "density": 8,
     "policy": 13,
     "card": 11,
 }

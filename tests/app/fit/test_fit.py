@@ -165,8 +165,8 @@ def test_the_screen() -> None:
 def test_the_countdown_tells_each_stage_and_falls(capsys, monkeypatch) -> None:
     clock = [0.0]
     monkeypatch.setattr("app.fit.countdown.time.monotonic", lambda: clock[0])
-    worth = SECONDS | {"trials": OTHER}
-    chain = ["episode", "history", "theta", "policy", "trials", "card"]
+    chain = ["episode", "history", "density", "theta", "policy", "trials", "card"]
+    worth = {step: SECONDS.get(step, OTHER) for step in chain}
     stages = [Stage(f"{step}@mine", step, "mine", (), False, (), True, step) for step in chain]
     countdown = Countdown(stages)
     for step in chain:

@@ -42,7 +42,7 @@ def test_a_policy_says_its_draws_and_its_card(tmp_path) -> None:
     one = stored(tmp_path)
     write(one, (-0.3, -0.1))
     np.testing.assert_allclose(one.draws(TARGETS), [[-0.3, -0.1]] * 2)
-    assert one.card() == CARD | {"projectile": None}
+    assert one.card() == CARD | {"projectile": None, "made_with": None}
 
 
 def test_a_damaged_policy_is_one_line(tmp_path) -> None:

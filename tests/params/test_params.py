@@ -12,7 +12,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.schema import Section
 from pipeline.params import Params, check, load, parse
 from pipeline.simulator.parameters import THETA
-from tests.project import ROOT
+from tests.project import ROOT, set_methods
 
 TEXT = (ROOT / "params.yaml").read_text(encoding="utf-8")
 CONTENT = YAML(typ="safe").load(TEXT)
@@ -207,7 +207,7 @@ def test_what_is_refused_and_how_it_is_said() -> None:
 
 def test_what_a_method_leaves_out_is_as_the_defaults_say() -> None:
     weights = CONTENT["methods"]["de"]["weights"]
-    about = check(changed(("methods", "de"), {"weights": weights})).methods["de"]
+    about = check(stepped(changed(("methods", "de"), {"weights": weights}))).methods["de"]
     assert (about.search, about.k_top, about.covariance) == ("multistart", None, True)
     assert (about.settings, about.fixed, about.bounds) == ({}, {}, {})
     other = check(changed(("method_defaults", "bounds"), {"poissons_ratio": [0.4, 0.49]})).methods
@@ -221,6 +221,25 @@ def test_what_a_method_leaves_out_is_as_the_defaults_say() -> None:
     assert "methods.de: must be a mapping" in refusal(changed(("methods", "de"), 3))
 
 
+def stepped(content: dict) -> dict:
+    """The same with `run.steps` as its methods' searches have them."""
+    run = content["run"]
+    set_methods(content, run["methods"], run["ablations"]["methods"])
+    return content
+
+
+def test_the_steps_of_a_run_are_those_of_its_methods_searches() -> None:
+    assert stepped(changed(("trials", "repeats"), 3))["run"] == CONTENT["run"]
+    assert refusal(changed(("run", "steps", "clusters"), [])) == (
+        "params.yaml: run.steps.clusters: must list those of run.methods whose search has this"
+        " step: [sling2sim2real]"
+    )
+    said = refusal(changed(("methods", "de"), CONTENT["methods"]["bo"]))
+    assert "run.ablations.steps.de: must list those of run.ablations.methods" in said
+    said = refusal(changed(("run", "ablations", "rig"), []))
+    assert "run.ablations.rig: must list those of run.ablations.bands" in said
+
+
 def test_a_methods_regions_need_rollouts() -> None:
     content = changed(("optimizer", "cma_rollouts"), 100)
     content["methods"]["no_work"]["k_top"] = 13
@@ -230,7 +249,8 @@ def test_a_methods_regions_need_rollouts() -> None:
 def test_what_a_method_may_ask_for() -> None:
     base = CONTENT["methods"]["de"]
     own = {"search": "lab.search:Own", "settings": {"rate": 0.1, "steps": 3, "name": "x"}}
-    assert check(changed(("methods", "de"), base | own)).methods["de"].settings["rate"] == 0.1
+    whole = stepped(changed(("methods", "de"), base | own))
+    assert check(whole).methods["de"].settings["rate"] == 0.1
     rubber = {"law": "rubber", "bounds": CONTENT["methods"]["least_squares"]["bounds"]}
     rubber |= {"fixed": ALL_FIXED}  # what the law adds is left
     assert len(check(changed(("methods", "de"), base | rubber)).methods["de"].fixed) == 5

@@ -184,7 +184,7 @@ def test_theta_is_the_best_of_both_phases(tmp_path) -> None:
         (paths, "cma", NAMES[:3]),
     ):
         history = History.load("toy", names, *files)
-        content, best = theta_content(history, "band1"), history.best()
+        content, best = theta_content(history, "band1", {}), history.best()
         assert best["total"] == content["loss"]["total"] == history.total.min()
         assert content["theta"] == {name: best[name] for name in names}
         np.testing.assert_array_equal(

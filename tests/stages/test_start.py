@@ -22,8 +22,9 @@ from stages.start import remedy
 from tests.project import ROOT, alive, python, until
 from validation.projects import environment
 
-OF_A_BAND = ("record", "episode", "mounting")
-OF_A_METHOD = ("history", "theta", "policy", "trials", "card")
+OF_A_BAND = ("record", "episode", "clamps")
+OF_A_SEARCH = ("history", "clusters", "cma", "density", "search")
+OF_A_METHOD = (*OF_A_SEARCH, "theta", "policy", "launches", "trials", "card")
 
 
 @pytest.fixture
@@ -44,7 +45,8 @@ def stage(tmp_path: Path, monkeypatch, capsys) -> Callable[..., tuple[int, str]]
 
 
 def test_wrong_arguments_are_answered_by_the_usage(stage) -> None:
-    for words, names in ((" BAND", OF_A_BAND), (" BAND METHOD", OF_A_METHOD), ("", ["report"])):
+    of_a_band = (*OF_A_BAND, "evidence", "floor")
+    for words, names in ((" BAND", of_a_band), (" BAND METHOD", OF_A_METHOD), ("", ["report"])):
         for name in names:
             expected = (2, f"usage: python -m stages.{name}{words}")
             assert stage(name, "a", "b", "c") == expected
@@ -68,7 +70,7 @@ def test_a_history_that_failed_says_why(stage) -> None:
         Evaluation(unit, theta, nothing, np.full(30, np.inf), reasons), phase="de", generation=0
     )
     history.save(Path("data/history/band1/sling2sim2real.parquet"))
-    status, line = stage("theta", "band1", "sling2sim2real")
+    status, line = stage("clusters", "band1", "sling2sim2real")
     assert status == 1
     assert line.startswith(
         "error: sling2sim2real: each of 30 simulations failed (the band slipped)"
@@ -80,7 +82,7 @@ def test_a_hint_names_the_group_by_which_a_method_runs(stage) -> None:
     path = Path("params.yaml")
     run = load(path).run.ablations
     assert "band1" in run.bands and {"de", "adam"} <= set(run.methods)
-    for method, group in (("sling2sim2real", "history"), ("de", "ablation_history")):
+    for method, group in (("sling2sim2real", "cma"), ("de", "ablation_de")):
         _, line = stage("theta", "band1", method)
         assert line.endswith(f"missing; `dvc repro {group}@band1-{method}` makes it")
     _, line = stage("theta", "band2", "adam")

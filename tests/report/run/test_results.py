@@ -10,6 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.base.errors import UserError
+from pipeline.base.layout import Layout
+from pipeline.launching.trials.measured import Measured, save_scores
 from pipeline.report.run.results import PRINTED, best_so_far, gather, has_another_loss, printed
 from tests.report.run.conftest import BAND, METHOD
 
@@ -43,13 +45,10 @@ def test_a_band_of_the_rig_has_a_floor(root, params) -> None:
 
 
 def test_measured_launches_of_a_method_that_does_not_run_are_counted(root, params) -> None:
-    folder = root / "data" / "trials" / "measured"
-    folder.mkdir()
     assert gather(params, root).unused == {}
-    rows = [METHOD, "", "de", "de", "bo"]
-    lines = [f"-0.3,-0.2,1.9,1.9,{method}" for method in rows]
-    text = "\n".join(["draw_y_m,draw_z_m,landing_y_m,target_m,method", *lines])
-    (folder / f"{BAND}.csv").write_text(text + "\n")
+    methods = [METHOD, "", "de", "de", "bo"]
+    launches = [Measured((-0.3, -0.2), 1.9, 1.9, method) for method in methods]
+    save_scores(Layout(root).scores(BAND), launches)
     assert gather(params, root).unused == {BAND: 3}
 
 

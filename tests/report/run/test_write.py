@@ -41,7 +41,7 @@ from pathlib import Path
 from pipeline.params import load
 from pipeline.report.run import report, write
 from tests.report.run.toy_replay import toy_replay
-report.replay = toy_replay
+report.replay_method = toy_replay
 root = Path({root!r})
 write.write(load(root / "params.yaml"), root)
 """

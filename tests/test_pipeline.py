@@ -79,6 +79,9 @@ def test_a_run_leaves_only_its_lock_and_report_for_git(project: Copy) -> None:
     assert all(name == "dvc.lock" or name.startswith("reports/") for name in changed)
 
 
+OF_OTHER_RECORDINGS = {"setup.urdf", "setup.start_pose"}
+
+
 def covers(listed: str, read: str) -> bool:
     return f"{read}.".startswith(f"{listed}.")
 
@@ -109,7 +112,7 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
             for key in listed
             if not any(covers(key, one) for one in read)
         }
-        unread -= {"setup.clamp_direction"} if method else set()  # for methods without mounting
+        unread -= {"setup.clamp_direction"} if method else OF_OTHER_RECORDINGS  # without mounting
         if method not in ("de", "bo"):  # methods share a list: what none of them reads is idle
             idle_keys[step] = idle_keys.get(step, unread) & unread
         everything_read.update(read)
@@ -124,7 +127,7 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
     keys -= {key for key in keys if key.startswith("plan.")}  # read by `sling plan` alone
     keys -= {f"bands.{name}" for name in content["bands"]} - {"bands.band1"}  # those that run
     # read for other recordings, or with another mask: tests/recording shows what they do
-    keys -= {"setup.urdf", "setup.start_pose", "cloud.sam3"}
+    keys -= {*OF_OTHER_RECORDINGS, "cloud.sam3"}
     idle = {key for key in keys if not any(covers(key, read) for read in everything_read)}
     assert not idle, "parameters that do nothing"
 

@@ -264,7 +264,7 @@ CHANGES: dict[str, tuple[Callable[[Copy], None], set[str], set[str]]] = {
     "the Bayesian optimiser": (
         lambda copy: copy.append("pipeline/identify/optimizers/bo/bayes.py", "# edited\n"),
         {"ablation_bo@band1-bo"},
-        set(),
+        {*of_method("bo", first="theta"), "report"},
     ),
     "a chapter of the report": (
         lambda copy: copy.append("pipeline/report/run/chapters/appendix.py", "# edited\n"),

@@ -129,9 +129,3 @@ def unmounted(band: str, root: str | Path = ".") -> list[str]:
         f"{path} is missing, so the band hangs as `setup` says; `dvc repro clamps@{band}` fits it"
         " to a recording"
     ]
-
-
-def note_unmounted(band: str, root: str | Path = ".") -> None:
-    """The same on stderr."""
-    for warning in unmounted(band, root):
-        print(f"note: {warning}", file=sys.stderr)

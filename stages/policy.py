@@ -4,13 +4,11 @@
 
 Reads data/theta/<band>/<method>.json; writes data/policies/<band>/<method>/: policy.onnx and
 policy.pt (metres to metres), card.json, map.parquet (launches over the box) and training.parquet.
-A killed training goes on from .checkpoints/policy/.
+A killed training begins anew: it takes seconds.
 SLING_DEVICE says where launches are simulated; PPO runs on one thread of the CPU.
 """
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 
@@ -44,7 +42,6 @@ def main() -> None:
         max_force=params.setup.max_force,
         seed=params.policy.seed,
     )
-    kept = Path(".checkpoints/policy", f"{band}-{method}.pt")
     title = f"policy-{band}-{method}"
     progress = Progress(title, params.policy.iterations, "iterations", every=EVERY)
     surface, settings = landing_map.surface, params.policy
@@ -52,7 +49,7 @@ def main() -> None:
         surface = SimulatedLandings(launcher, surface)
     seen = settings.state == "projectile_target"
     start = projectile_start(params.setup, params.bands[band]) if seen else None
-    trained = train(surface, settings, kept, progress, projectile=start)
+    trained = train(surface, settings, progress, projectile=start)
     checked = check(trained.policy, launcher, params)
     training = figures(trained, checked, settings.landings)
 
@@ -72,7 +69,6 @@ def main() -> None:
         device=kind(),
     )
     print(f"{band} {method}: {verdict(training, checked.failures)}")
-    kept.unlink(missing_ok=True)
 
 
 if __name__ == "__main__":

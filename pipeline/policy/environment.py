@@ -98,14 +98,6 @@ class SlingshotEnv(VecEnv):
         self.failures.clear()
         return counted
 
-    def state(self) -> dict[str, torch.Tensor]:
-        """What the next steps hang on, after `take_failures`."""
-        return {"random": self._random.get_state(), "goal": self._goal}
-
-    def restore(self, state: dict[str, torch.Tensor]) -> None:
-        self._random.set_state(state["random"])
-        self._goal = state["goal"]
-
     def _new_goals(self) -> torch.Tensor:
         low, high = self.targets
         # A fresh tensor: rsl_rl keeps observations by reference until the step is stored.

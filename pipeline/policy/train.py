@@ -12,20 +12,15 @@ import copy
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib.metadata import version
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 from torch import nn
 
-from pipeline.base.fingerprint import fingerprint
 from pipeline.base.progress import Progress
-from pipeline.launching.surface import response_surface, simulated
 from pipeline.launching.surface.simulated import Source
 from pipeline.params.launches import PolicyParams, Reward
-from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.environment import SlingshotEnv, draw_box, rewarded
 from pipeline.policy.ppo import settings
 
@@ -33,13 +28,6 @@ if TYPE_CHECKING:
     from rsl_rl.runners import OnPolicyRunner
 
 CHECKED_TARGETS = 256
-KEPT_EVERY = 5  # iterations; a checkpoint takes some 10 ms
-SOURCES = [
-    *(Path(__file__).with_name(f"{name}.py") for name in ("environment", "ppo", "train")),
-    Path(response_surface.__file__),
-    Path(simulated.__file__),
-]
-PACKAGES = ("torch", "rsl-rl-lib", "tensordict", "numpy", "scipy")
 
 
 class Policy(nn.Module):
@@ -132,7 +120,6 @@ class Trained:
 def train(
     surface: Source,
     params: PolicyParams,
-    kept: Path | None = None,
     progress: Progress | None = None,
     *,
     projectile: tuple[float, float] | None = None,
@@ -141,12 +128,11 @@ def train(
 
     Args:
         surface: Says where draws land: read off a map, or simulated.
-        kept: File of the checkpoint, which the caller removes once it has written what it wants.
         progress: Is told of each iteration.
         projectile: Where it starts (y, z) [m], for a policy that sees it.
 
     Runs on one thread with seeded generators: the same input gives the same network, bit for bit,
-    on one machine, also where a training was killed and goes on from its checkpoint.
+    on one machine.
     """
     from rsl_rl.runners import OnPolicyRunner
 
@@ -163,12 +149,9 @@ def train(
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
             configured = settings(params, env.groups)
             runner = OnPolicyRunner(env, configured, log_dir=None, device="cpu")
-        checkpoint = kept and Checkpoint(kept, _stamp(surface, params, projectile))
-        training = _Training(runner, env, params, checkpoint, progress, projectile)
+        training = _Training(runner, env, params, progress, projectile)
         runner.logger = training  # pyright: ignore[reportAttributeAccessIssue]
-        training.resume()
-        # Once: a second call would start from stale observations.
-        runner.learn(params.iterations - len(training.rows))
+        runner.learn(params.iterations)  # once: another call would start from stale observations
     return training.result()
 
 
@@ -199,15 +182,9 @@ def told(error: float) -> str:
     return "every launch fails" if np.isnan(error) else f"mean error {100 * error:.2f} cm"
 
 
-def _stamp(surface: Source, params: PolicyParams, projectile: tuple[float, float] | None) -> str:
-    """Of everything that a training hangs on."""
-    versions = (f"{name} {version(name)}" for name in PACKAGES)
-    return fingerprint(*SOURCES, surface.fingerprint(), repr((params, projectile)), *versions)
-
-
 class _Training:
     """Stands where rsl_rl has its logger: after every iteration it checks the policy, keeps the
-    best, narrows the exploration, and now and then writes a checkpoint.
+    best, and narrows the exploration.
 
     rsl_rl's own mean reward covers the last 100 episodes only, and its log folder copies git diffs.
     A scheduled exploration narrows geometrically from init_std to final_std: left to itself PPO
@@ -222,11 +199,10 @@ class _Training:
         runner: OnPolicyRunner,
         env: SlingshotEnv,
         params: PolicyParams,
-        checkpoint: Checkpoint | None,
         progress: Progress | None,
         projectile: tuple[float, float] | None,
     ) -> None:
-        self.runner, self.env, self.checkpoint, self.progress = runner, env, checkpoint, progress
+        self.env, self.progress = env, progress
         self.log_std = None
         if params.exploration == "scheduled":
             start, end = np.log([params.init_std, params.final_std])
@@ -272,37 +248,12 @@ class _Training:
         if not self.best or worth > self.best["earned"]:
             weights = copy.deepcopy(self.policy.state_dict())
             self.best = {"earned": worth, "row": it, "weights": weights}
-        if self.checkpoint and len(self.rows) % KEPT_EVERY == 0:
-            self.checkpoint.save(self._state())
         if self.progress:
             self.progress.advance(1, told(error))
 
     def _check(self) -> tuple[float, float, int]:
         draws = self.policy.draws(self.checked)
         return earned(self.env.surface, draws, self.checked, self.env.reward)
-
-    def _state(self) -> dict:
-        return {
-            "algorithm": self.runner.alg.save(),
-            "random": torch.get_rng_state(),
-            "environment": self.env.state(),
-            "rows": self.rows,
-            "reasons": self.reasons,
-            "best": self.best,
-        }
-
-    def resume(self) -> None:
-        """Take up the checkpoint's state, if there is one."""
-        state = self.checkpoint.load() if self.checkpoint else None
-        if state is None:
-            return
-        self.runner.alg.load(state["algorithm"], None, strict=True)
-        self.runner.current_learning_iteration = len(state["rows"])
-        torch.set_rng_state(state["random"])
-        self.env.restore(state["environment"])
-        self.rows, self.reasons, self.best = (state[key] for key in ("rows", "reasons", "best"))
-        if self.progress:
-            self.progress.done = len(self.rows)
 
     def result(self) -> Trained:
         self.policy.load_state_dict(self.best["weights"])

@@ -92,13 +92,3 @@ def test_a_projectile_hangs_as_far_from_the_tips_as_half_the_band() -> None:
     setup, band = SimpleNamespace(fork_width=0.275), SimpleNamespace(rest_length=0.52)
     y, z = projectile_start(setup, band)
     assert y == 0 and z < 0 and np.hypot(z, 0.275 / 2) == pytest.approx(0.26)
-
-
-def test_it_goes_on_from_a_state(env, toy_map) -> None:
-    env.step(torch.zeros(400, 2))
-    state = env.state()
-    twin = make(toy_map.surface, seed=99)
-    twin.restore({name: value.clone() for name, value in state.items()})
-    for _ in range(2):
-        once, again = (one.step(torch.zeros(400, 2)) for one in (env, twin))
-        assert (once[0]["target"] == again[0]["target"]).all() and (once[1] == again[1]).all()

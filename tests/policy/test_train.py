@@ -1,6 +1,5 @@
 """Training on the toy slingshot, whose landing is known in closed form."""
 
-import signal
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,11 +10,8 @@ from pipeline.base.progress import Progress, parse
 from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.launching.surface.response_surface import TOO_MUCH_FORCE
 from pipeline.launching.surface.simulated import SimulatedLandings
-from pipeline.policy import train as module
-from pipeline.policy.checkpoint import Checkpoint
 from pipeline.policy.train import Trained, train
-from tests.policy import killed, toy
-from tests.project import python
+from tests.policy import toy
 
 CHANGES = {
     "seed": [2],
@@ -132,75 +128,11 @@ def test_without_a_launch_that_lands_it_says_so(settings) -> None:
     assert np.isfinite(trained.policy.draws(np.array([1.9]))).all()
 
 
-def test_each_iteration_is_told_and_those_of_an_earlier_run_are_counted(
-    toy_map, settings, tmp_path
-) -> None:
-    def train_and_tell(told: Progress) -> Trained:
-        some = short(settings, iterations=7)
-        return train(toy_map.surface, some, tmp_path / "kept.pt", told)
-
-    class Ended(Progress):
-        def advance(self, count: int, *facts: str, seconds: float | None = None) -> None:
-            super().advance(count, *facts, seconds=seconds)
-            if self.done == 6:  # the checkpoint is that of the fifth
-                raise InterruptedError
-
-    with pytest.raises(InterruptedError):
-        train_and_tell(Ended("x", 7, "iterations", tmp_path / "first.log"))
-    trained = train_and_tell(Progress("x", 7, "iterations", tmp_path / "second.log"))
-    first, second = (
-        [parse(f"x {line}") for line in (tmp_path / name).read_text().splitlines()[1:]]
-        for name in ("first.log", "second.log")
-    )
-    assert [step.done for step in first] == [1, 2, 3, 4, 5, 6]
-    assert [step.done for step in second] == [6, 7]
+def test_each_iteration_is_told(toy_map, settings, tmp_path) -> None:
+    log = tmp_path / "told.log"
+    some = short(settings, iterations=3)
+    trained = train(toy_map.surface, some, Progress("x", 3, "iterations", log))
+    steps = [parse(f"x {line}") for line in log.read_text().splitlines()[1:]]
+    assert [step.done for step in steps] == [1, 2, 3]
     errors = [f"mean error {100 * error:.2f} cm" for error in trained.curve["mean_error"]]
-    assert [step.facts[0] for step in [*first[:5], *second]] == errors
-
-
-def test_sigkill_and_on_to_the_same_training(tmp_path) -> None:
-    """Killed in the eighth iteration of twelve, it goes on after the fifth."""
-    run = python("-m", "tests.policy.killed", tmp_path / "kept.pt", "8")
-    assert run.returncode == -signal.SIGKILL, run.stderr
-    left = torch.load(tmp_path / "kept.pt", weights_only=True)
-    assert len(left["state"]["rows"]) == 5
-    steps: list[int] = []
-    went_on = killed.training(tmp_path / "kept.pt", on_iteration=steps.append)
-    assert steps == list(range(5, 12))
-    whole = killed.training(tmp_path / "other.pt")
-    assert same(went_on, whole)
-    assert went_on.iteration == whole.iteration and went_on.failures == whole.failures
-
-
-def test_a_finished_training_is_not_done_again(tmp_path) -> None:
-    """As where a stage is killed while it exports."""
-    once = killed.training(tmp_path / "kept.pt", iterations=10)
-    steps: list[int] = []
-    again = killed.training(tmp_path / "kept.pt", on_iteration=steps.append, iterations=10)
-    assert steps == [] and same(once, again)
-
-
-def test_another_training_or_a_damaged_file_starts_over(tmp_path, monkeypatch, capsys) -> None:
-    path = tmp_path / "kept.pt"
-    killed.training(path)
-    whole = path.read_bytes()
-
-    def begins(**changes) -> int:
-        steps: list[int] = []
-        killed.training(path, on_iteration=steps.append, **changes)
-        path.write_bytes(whole)
-        return steps[0]
-
-    assert begins() == 10
-    assert begins(learning_rate=2e-3) == 0
-    assert begins(error=0.001) == 0
-    monkeypatch.setattr(module, "PACKAGES", ())
-    assert begins() == 0
-    monkeypatch.undo()
-    path.write_bytes(whole[: len(whole) // 2])
-    capsys.readouterr()
-    assert Checkpoint(path, "any").load() is None
-    assert capsys.readouterr().err.startswith(f"note: {path}: damaged (")
-    steps: list[int] = []
-    killed.training(path, on_iteration=steps.append)
-    assert steps[0] == 0
+    assert [step.facts[0] for step in steps] == errors

@@ -5,7 +5,7 @@
 A policy of each band is trained in the simulator of one θ file (data/theta/<band>/<method>.json):
 with the settings of params.yaml, with each of the paper's alone, and with all of them. Its draws
 are launched in the same simulator, so nothing but the training differs. Results lie as lines of
-results.jsonl in --work: a run that was killed goes on from there, and a training within it too.
+results.jsonl in --work: a run that was killed goes on from there.
 """
 
 from __future__ import annotations
@@ -64,9 +64,7 @@ class Lesson:
         return params.policy.model_copy(update=changes)
 
 
-def taught(
-    lesson: Lesson, params: Params, theta: dict, kept: Path, progress: Progress | None
-) -> dict:
+def taught(lesson: Lesson, params: Params, theta: dict, progress: Progress | None) -> dict:
     """How a policy hits that is trained so, and what the training took."""
     settings, setup = lesson.settings(params), params.setup
     launcher = simulator(params, lesson.band, theta)
@@ -76,7 +74,7 @@ def taught(
         surface = SimulatedLandings(launcher, surface)
     seen = settings.state == "projectile_target"
     start = projectile_start(setup, params.bands[lesson.band]) if seen else None
-    trained, cpu, wall = timed(lambda: train(surface, settings, kept, progress, projectile=start))
+    trained, cpu, wall = timed(lambda: train(surface, settings, progress, projectile=start))
     checked = check(trained.policy, launcher, params)
     targets = np.array(params.trials.targets)
     launched = launcher(trained.policy.draws(targets))
@@ -106,12 +104,10 @@ def result(lesson: Lesson, params: Params, work: Path, method: str) -> dict:
     kept = lines.of(Lesson).get(lesson, {})
     if kept.get("stamp") != stamp:
         name = f"{lesson.band}-{lesson.switch}-{lesson.seed}"
-        checkpoint = work / f"{name}.pt"
         progress = Progress(name, params.policy.iterations, "iterations", every=10)
-        found = taught(lesson, params, theta, checkpoint, progress)
+        found = taught(lesson, params, theta, progress)
         kept = plain({"stamp": stamp, **vars(lesson), **found})
         lines.add(kept)
-        checkpoint.unlink(missing_ok=True)
     return {key: value for key, value in kept.items() if key != "stamp"}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,13 +62,6 @@ class ResponseSurface:
         code = np.vectorize(self.reasons.index, otypes=[int])(failure)
         self._cell = np.max([code[:-1, :-1], code[1:, :-1], code[:-1, 1:], code[1:, 1:]], axis=0)
         self._landing, self._force = self._spline(landing_y), self._spline(hold_force)
-
-    def fingerprint(self) -> str:
-        """Of all that landings hang on."""
-        digest = hashlib.sha256(repr((self.reasons, self.max_force)).encode())
-        for one in (*self.grid, self._cell, self._landing.c, self._force.c):
-            digest.update(np.ascontiguousarray(one).tobytes())
-        return digest.hexdigest()
 
     def __call__(self, draws: np.ndarray) -> Landings:
         """Landings of draws, shape (N, 2) [m]."""

@@ -26,16 +26,11 @@ class SimulatedLandings:
 
         Args:
             launcher: Simulates draws, shape (N, 2) [m], without a force limit of its own.
-            surface: Read between launches of the same simulator, which it is known by.
+            surface: Read between launches of the same simulator.
         """
         self.launcher, self.max_force = launcher, surface.max_force
         self.low, self.high = surface.low, surface.high
         self.reasons = [NO_FAILURE, TOO_MUCH_FORCE]
-        self._known = surface.fingerprint()
-
-    def fingerprint(self) -> str:
-        """Of all that landings hang on."""
-        return f"simulated {self._known}"
 
     def __call__(self, draws: np.ndarray) -> Landings:
         """Landings of draws, shape (N, 2) [m]."""

@@ -41,10 +41,3 @@ def test_failures_keep_their_reasons() -> None:
     names = [some.reasons[code] for code in failure]
     assert names == ["it fell"] * 2 + [TOO_MUCH_FORCE] * 197 + ["it broke"]
     assert (some(DRAWS).failure == failure).all()
-
-
-def test_its_fingerprint_is_that_of_the_simulator_and_no_maps() -> None:
-    one = source()
-    assert one.fingerprint() == source().fingerprint() != source(max_force=14.0).fingerprint()
-    chart = LandingMap.simulate(toy.launch, **BOX, max_force=15.0)
-    assert one.fingerprint() != chart.surface.fingerprint()

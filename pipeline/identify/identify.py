@@ -30,21 +30,14 @@ class IdentifiedBand:
     """What a method makes of a band's episodes.
 
     Attributes:
-        law: Of the method.
+        theta: θ*, one sample.
         evaluations: Everything that its search evaluated; None where it started from a point.
         density: Of a method that searches by least squares, else None.
     """
 
-    law: str
+    theta: Parameters
     evaluations: History | None
     density: Identified | None
-
-    @property
-    def theta(self) -> Parameters:
-        """θ*, one sample."""
-        if self.density is None:
-            return self.evaluations.best_parameters(self.law)
-        return self.density.mode
 
 
 def evaluations_of(
@@ -81,7 +74,7 @@ def identify(
 
     Args:
         sling: Of the band, with the method's law and clamps.
-        evaluate: Losses of points of the whole unit cube, shape (N, D), for the search.
+        evaluate: Losses of points of the whole unit cube, shape (N, D); a search needs it.
         start: One sample to fit the density from, without any search.
         evidence: Launches, of methods that search by least squares.
         workers: Threads of the fit; they change no result.
@@ -90,20 +83,23 @@ def identify(
     Raises:
         UserError: All simulations fail.
     """
-    evaluations, law = None, params.methods[method].law
+    evaluations = None
     if start is None:
+        if evaluate is None:
+            raise ValueError("either `evaluate` or `start` is needed")
         evaluations = evaluations_of(params, method, evaluate)
         progress(f"explored {len(evaluations.total)} points")
+        start = evaluations.best_parameters(params.methods[method].law)
     if params.methods[method].search != LEAST_SQUARES:
-        return IdentifiedBand(law, evaluations, None)
+        return IdentifiedBand(start, evaluations, None)
     density = fit_posterior(
         params,
         method,
         sling,
         episodes,
-        evaluations.best_parameters(law) if start is None else start,
+        start,
         evidence=evidence,
         workers=workers,
         progress=lambda fit: progress(f"expansion {fit.steps}: misfit {fit.misfit:.2f}"),
     )
-    return IdentifiedBand(law, evaluations, density)
+    return IdentifiedBand(density.mode, evaluations, density)

@@ -14,7 +14,8 @@ from pipeline.params.lab import StepParams
 Step = Annotated[float, Range(1e-5, 0.05)]
 Bound = TypeVar("Bound", bound=float)
 KTop = Annotated[int, Range(1, 50)]
-# Of the band's material: what each has beside the five, and how far its box may reach.
+Law = Literal["neo_hookean", "rubber"]  # of the band's material
+# What each has beside the five, and how far its box may reach.
 LAWS: dict[str, dict[str, tuple[float, float]]] = {
     "neo_hookean": {},
     "rubber": {"mooney_share": (-1.0, 1.0), "relaxation": (0.0, 0.2)},
@@ -68,12 +69,19 @@ class Box(Section, Generic[Bound]):
         return self
 
 
+YoungsModulus = Annotated[float, Range(1e3, 1e9)]
+PoissonsRatio = Annotated[float, Range(0, 0.495)]
+ElasticityDamping = Annotated[float, Range(1e-6, 1)]
+DynamicFriction = Annotated[float, Range(0, 5)]
+DampingScale = Annotated[float, Range(0, 1)]
+
+
 class ParameterBoxes(Section):
-    youngs_modulus: Box[Annotated[float, Range(1e3, 1e9)]]
-    poissons_ratio: Box[Annotated[float, Range(0, 0.495)]]
-    elasticity_damping: Box[Annotated[float, Range(1e-6, 1)]]
-    dynamic_friction: Box[Annotated[float, Range(0, 5)]]
-    damping_scale: Box[Annotated[float, Range(0, 1)]]
+    youngs_modulus: Box[YoungsModulus]
+    poissons_ratio: Box[PoissonsRatio]
+    elasticity_damping: Box[ElasticityDamping]
+    dynamic_friction: Box[DynamicFriction]
+    damping_scale: Box[DampingScale]
 
 
 class HeldOut(Section):
@@ -162,7 +170,7 @@ Bounds = Annotated[tuple[Value, Value], LIST]
 class MethodDefaults(Section):
     """Keys that a method may leave out; what they mean stands beside them in params.yaml."""
 
-    law: Literal["neo_hookean", "rubber"]  # of LAWS
+    law: Law
     search: Annotated[str, AfterValidator(_is_search)]
     engine: Annotated[str, AfterValidator(_is_engine)]
     settings: dict[str, Setting]

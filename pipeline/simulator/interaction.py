@@ -84,7 +84,7 @@ def schedule_of(sling: ClampedBand, episode: Episode, refine: int = 1) -> Schedu
             rows = np.concatenate([rows, steps(times, rows["h"][-1], grip=grip, order=2)])
             begin = until
     _lead(rows, hand, sling, episode)
-    return Schedule(rows, first_free=RELAX_STEPS + np.count_nonzero(rows["grip"]))
+    return Schedule(rows, first_free=RELAX_STEPS + int(np.count_nonzero(rows["grip"])))
 
 
 def _held_times(hand: CubicSpline, episode: Episode, size, refine: int) -> np.ndarray:
@@ -154,7 +154,7 @@ def interact(
         force=done.output[:, RELAX_STEPS - 1 :, :3],
         cloud_time=episode.cloud_time,
         center_line=done.frames,
-        failure=[FAILURES[int(round(code))] for code in done.lanes["outcome"]],
+        failure=[FAILURES[Outcome(round(code))] for code in done.lanes["outcome"]],
         iterations=done.lanes["iterations"].astype(int),
     )
 

@@ -3,6 +3,10 @@
 (Warp reads annotations: no postponed ones here.)
 """
 
+# Warp's annotations are values, and what its decorators give is no function any more:
+# pyright: reportInvalidTypeForm=false, reportGeneralTypeIssues=false, reportReturnType=false
+# pyright: reportArgumentType=false
+
 from pathlib import Path
 
 import warp as wp

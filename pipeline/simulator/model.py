@@ -155,7 +155,7 @@ class ClampedBand:
             mass=band.mass,
             half_width=setup.fork_width / 2,
             clamp_direction=direction / np.linalg.norm(direction),
-            flexural_rigidity=mounting and mounting.flexural_rigidity,
+            flexural_rigidity=None if mounting is None else mounting.flexural_rigidity,
             grip_force=setup.grip_force,
             finger_opening_time=setup.finger_opening_time,
             air_density=setup.air_density,

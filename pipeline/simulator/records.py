@@ -96,11 +96,11 @@ def records(rows: np.ndarray, record: np.dtype) -> np.ndarray:
     return np.ascontiguousarray(rows, float).view(record)[:, 0]
 
 
-def macros() -> dict[str, int]:
+def macros() -> dict[str, int | str]:
     """Places of the records' fields, their sizes, and the codes, for the native text."""
-    result = {f"{name}_SIZE": width(record) for name, record in _RECORDS.items()}
+    result: dict[str, int | str] = {f"{name}_SIZE": width(record) for name, record in _RECORDS.items()}
     for name, record in _RECORDS.items():
-        for field, (_, offset, *_) in record.fields.items():
+        for field, (_, offset, *_) in (record.fields or {}).items():
             result[f"{name}_{field.upper()}"] = offset // 8
     for codes in (Mode, Grip, Outcome):
         result |= {f"{codes.__name__.upper()}_{one.name}": f"({one:d})" for one in codes}

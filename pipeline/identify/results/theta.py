@@ -14,10 +14,10 @@ What its confidence rests on, samples of θ, lies beside in data/confidence/.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import create_model, model_validator
+from pydantic import model_validator
 
 from pipeline.base.errors import UserError, printable
 from pipeline.base.layout import NotMade, owner
@@ -25,24 +25,31 @@ from pipeline.base.schema import JsonRecord, Name, Range, Section, read_json, re
 from pipeline.identify.results.confidence import Confidence, Count
 from pipeline.identify.results.mounting import load_sling
 from pipeline.params import Params
-from pipeline.params.identification import LAWS, ParameterBoxes, parameter_names
+from pipeline.params.identification import (
+    LAWS,
+    DampingScale,
+    DynamicFriction,
+    ElasticityDamping,
+    Law,
+    PoissonsRatio,
+    YoungsModulus,
+    parameter_names,
+)
 from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
 from pipeline.simulator.parameters import EXTRA, THETA, Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 
 
-def _limits(name: str) -> Range:
-    """How far params.yaml lets the box of the search reach."""
-    box = ParameterBoxes.model_fields[name].annotation
-    return next(one for one in box.model_fields["low"].metadata if isinstance(one, Range))
+class ThetaValues(Section):
+    """The five, and what the law adds."""
 
-
-Theta = create_model(
-    "Theta",
-    __base__=Section,
-    **{name: (Annotated[float, _limits(name)], ...) for name in THETA},
-    **{name: (Annotated[float, Range(*ends)], None) for name, ends in LAWS[RUBBER].items()},
-)
+    youngs_modulus: YoungsModulus
+    poissons_ratio: PoissonsRatio
+    elasticity_damping: ElasticityDamping
+    dynamic_friction: DynamicFriction
+    damping_scale: DampingScale
+    mooney_share: Annotated[float, Range(*LAWS[RUBBER]["mooney_share"])] = 0.0
+    relaxation: Annotated[float, Range(*LAWS[RUBBER]["relaxation"])] = 0.0
 
 
 class Nuisances(Section):
@@ -56,8 +63,8 @@ class RecordedPull(Section):
 
 class ThetaFile(JsonRecord):
     band: str
-    law: Literal[NEO_HOOKEAN, RUBBER] = NEO_HOOKEAN
-    theta: Theta
+    law: Law = "neo_hookean"
+    theta: ThetaValues
     history: RecordedPull | None = None
     nuisances: Nuisances = Nuisances()
     turn_damping: Annotated[float, Range(0, 1)] = 0.0

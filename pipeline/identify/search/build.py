@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from typing import Any
 
 from pipeline.base.errors import UserError, one_line
 from pipeline.base.imported import imported
@@ -33,7 +34,7 @@ def explorer(
         UserError: As `build`.
     """
     name = {"multistart": "de", LEAST_SQUARES: "design"}.get(method.search, method.search)
-    settings = dict(method.settings.items())
+    settings: dict[str, Any] = dict(method.settings)
     if name == "de":
         moves = {"mutation": optimizer.mutation, "recombination": optimizer.recombination}
         settings = moves | settings

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from pipeline.base.errors import UserError
@@ -89,8 +88,9 @@ class History:
 
     def of_phase(self, phase: str) -> History:
         """The rows of one phase alone."""
-        chosen = pc.equal(self.table["phase"], phase)
-        return History(self.method, self.names, [self.table.filter(chosen)])
+        table = self.table
+        chosen = pa.array(table["phase"].to_numpy() == phase)
+        return History(self.method, self.names, [table.filter(chosen)])
 
     def best_parameters(self, law: str) -> Parameters:
         """One sample, of the best row. Raises UserError as `best`."""

@@ -95,19 +95,18 @@ def _owner(optimizer: Optimizer, count: int) -> np.ndarray | None:
         return None
     try:
         owner = np.asarray(said)
-        fine = owner.shape == (count,) and (owner == owner.astype(np.int32)).all()
+        if owner.shape == (count,) and (owner == owner.astype(np.int32)).all():
+            return owner.astype(np.int32)
     except (TypeError, ValueError):
-        fine = False
-    if not fine:
-        raise UserError(
-            f"{type(optimizer).__name__}: owner must say by a number for each of {count} points who"
-            f" asked, and is {said!r:.40}"
-        )
-    return owner.astype(np.int32)
+        pass  # it is no array of numbers
+    raise UserError(
+        f"{type(optimizer).__name__}: owner must say by a number for each of {count} points who"
+        f" asked, and is {said!r:.40}"
+    )
 
 
 def _checked(optimizer: Optimizer, dimension: int) -> np.ndarray:
-    asked, what = optimizer.ask(), ""
+    asked = optimizer.ask()
     try:
         unit = np.array(asked, float)
     except (TypeError, ValueError):
@@ -117,9 +116,9 @@ def _checked(optimizer: Optimizer, dimension: int) -> np.ndarray:
             what = f"shape {unit.shape}"
         elif not ((unit >= 0) & (unit <= 1)).all():
             what = "coordinates outside 0 to 1"
-    if what:
-        raise UserError(
-            f"{type(optimizer).__name__}: ask() must give points of the unit cube, shape"
-            f" (N, {dimension}), and gave {what}"
-        )
-    return unit
+        else:
+            return unit
+    raise UserError(
+        f"{type(optimizer).__name__}: ask() must give points of the unit cube, shape"
+        f" (N, {dimension}), and gave {what}"
+    )

@@ -52,9 +52,9 @@ def joined(
     """Rows of the band's table with launches below them, and how many are new. As `add`."""
     path = layout.evidence / f"{band}.csv"
     scores = table.scores(layout, band)
-    there = table.rows(path, *table.EVIDENCE) if path.is_file() else []
-    known = table.landed(path, *table.EVIDENCE) if there else []
-    rows: list[dict] = [row for _, row in there]
+    there = table.rows(path, "evidence") if path.is_file() else []
+    known = [(*row.draw, row.landing) for row in there if row.landing is not None]
+    rows: list[dict] = [row.cells for row in there]
     before = len(there)
     for y, z, error, landing in launches:
         launch = (y, z, landing)

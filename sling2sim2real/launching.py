@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.launching.surface.aim import landings_within, secants
 from pipeline.launching.trials.spread import landing_intervals
 from pipeline.launching.trials.stretch import stretch_of
 from pipeline.launching.trials.trials import limited
@@ -16,8 +17,6 @@ from pipeline.simulator.parameters import Parameters
 from sling2sim2real.model import Model
 
 FINE = 201  # nodes along y and z, between which a target is sought on the map
-INSET = 2e-3  # m from the edge of the box, which leaves room for those launches
-NEAR = 2e-4  # m of landing that count as a hit
 TRIES = 8  # launches at most to get there from the map
 ROUNDING = 1e-3  # of a stretch
 
@@ -156,12 +155,7 @@ def aim(model: Model, target: float) -> Aim:
 def _gentlest(model: Model, target: float) -> np.ndarray:
     """Of draws that the map lands on the target that of least force, (2,). Raises UserError."""
     surface = model.landing_map
-    axes = [
-        np.linspace(one[0] + INSET, one[-1] - INSET, FINE)
-        for one in (surface.draw_y, surface.draw_z)
-    ]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
-    landing = surface(grid.reshape(-1, 2)).landing_y.reshape(FINE, FINE)
+    grid, landing = landings_within(surface, FINE)
     off = landing - target
     here, next_ = off[:-1], off[1:]
     hit = np.nonzero((here * next_ <= 0) & (here != next_))
@@ -184,16 +178,8 @@ def _refined(model: Model, draw: np.ndarray, target: float) -> np.ndarray:
     def off(length: float) -> float:
         return float(model.launches(length * draw).landing_y[0]) - target
 
-    length, gap, slope = 1.0, off(1.0), 2 * target  # a landing grows about as the draw squared
-    for _ in range(TRIES):
-        if not abs(gap) > NEAR:
-            break
-        before, length = (length, gap), length - gap / slope
-        gap = off(length)
-        slope = (gap - before[1]) / (length - before[0])
-        if not slope > 0:  # a longer draw lands further
-            break
-    return length * draw
+    # a landing grows about as the draw squared
+    return secants(off, off(1.0), 2 * target, TRIES)[0] * draw
 
 
 def _warnings(

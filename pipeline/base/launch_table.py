@@ -7,21 +7,41 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 
 DRAW = ("draw_y_m", "draw_z_m")
-LANDING = "landing_y_m"
+LANDING, TARGET = "landing_y_m", "target_m"
 LIMITS = {  # m, and what lies on that side of the fork
     "draw_y_m": (-20, 0, "behind the fork"),
     "draw_z_m": (-20, 20, "above the tips"),
     LANDING: (0, 20, "beyond the fork; leave it empty where it did not land"),
+    TARGET: (0, 20, "beyond the fork"),
 }
+MORE = {"scores": (TARGET, "method"), "evidence": ("draw_error_m",)}  # columns that may be there
 SAME = 1e-6  # m
 Launch = tuple[float, float, float]  # draw (y, z), landing [m]
+
+
+@dataclass(frozen=True)
+class LaunchRow:
+    """One row of such a table.
+
+    Attributes:
+        where: File and line, for messages.
+        cells: By column, "" where empty.
+        draw: (y, z) [m].
+        landing: [m]; None: it did not land.
+    """
+
+    where: str
+    cells: dict[str, str]
+    draw: tuple[float, float]
+    landing: float | None
 
 
 def file_of(folder: Path, band: str, bands: Collection[str]) -> Path | None:
@@ -43,11 +63,10 @@ def file_of(folder: Path, band: str, bands: Collection[str]) -> Path | None:
     return path if path.is_file() else None
 
 
-def rows(
-    path: Path, required: Sequence[str], optional: Sequence[str]
-) -> list[tuple[int, dict[str, str]]]:
-    """Number of each line that is not empty, and its cells by column. Raises UserError."""
-    known = (*required, *optional)
+def rows(path: Path, kind: str) -> list[LaunchRow]:
+    """Lines that are not empty, of a CSV of scores or of evidence. Raises UserError."""
+    required = (*DRAW, LANDING)
+    known = (*required, *MORE[kind])
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file)
@@ -71,11 +90,15 @@ def rows(
             raise UserError(f"{path}, line {line}: more cells than the {len(names)} columns")
         row = {name: (cells.get(name) or "").strip() for name in known}
         if any(row.values()):
-            found.append((line, row))
+            where = f"{path}, line {line}"
+            y, z, landing = (metres(where, name, row[name]) for name in required)
+            if y is None or z is None:
+                raise UserError(f"{where}: a draw needs draw_y_m and draw_z_m")
+            found.append(LaunchRow(where, row, (y, z), landing))
     return found
 
 
-def metres(where: str, name: str, text: str, limits: dict = LIMITS) -> float | None:
+def metres(where: str, name: str, text: str) -> float | None:
     """A cell within its column's limits, both left out; None where it is empty.
 
     Raises UserError, which begins with `where`.
@@ -83,7 +106,7 @@ def metres(where: str, name: str, text: str, limits: dict = LIMITS) -> float | N
     if not text:
         return None
     value = number(where, name, text)
-    low, high, side = limits[name]
+    low, high, side = LIMITS[name]
     if not low < value < high:
         raise UserError(f"{where}: {name} must lie between {low} and {high} m ({side}), got {text}")
     return value
@@ -99,38 +122,20 @@ def number(where: str, name: str, text: str) -> float:
     return value
 
 
-def drawn(where: str, row: dict[str, str]) -> tuple[float, float]:
-    """The draw of a row. Raises UserError."""
-    y, z = (metres(where, name, row[name]) for name in DRAW)
-    if y is None or z is None:
-        raise UserError(f"{where}: a draw needs draw_y_m and draw_z_m")
-    return y, z
-
-
 def among(launch: Launch, launches: Collection[Launch]) -> bool:
     """Whether a launch is one of `launches`: draw and landing alike."""
     return any(math.dist(launch, one) < SAME for one in launches)
 
 
-def landed(path: Path, required: Sequence[str], optional: Sequence[str]) -> list[Launch]:
-    """Draws and landings of a CSV, but of launches that did not land. Raises UserError."""
-    found = []
-    for line, row in rows(path, required, optional):
-        where = f"{path}, line {line}"
-        landing = metres(where, LANDING, row[LANDING])
-        if landing is not None:
-            found.append((*drawn(where, row), landing))
-    return found
-
-
-SCORES = (*DRAW, LANDING), ("target_m", "method")  # columns that must be there, that may be
-EVIDENCE = (*DRAW, LANDING), ("draw_error_m",)
+def landed(path: Path, kind: str) -> list[Launch]:
+    """Launches of a CSV, but those that did not land. Raises UserError."""
+    return [(*row.draw, row.landing) for row in rows(path, kind) if row.landing is not None]
 
 
 def scores(layout: Layout, band: str) -> list[Launch]:
     """Launches that score the band's predictions. Raises UserError."""
     path = layout.measured / f"{band}.csv"
-    return landed(path, *SCORES) if path.is_file() else []
+    return landed(path, "scores") if path.is_file() else []
 
 
 def expect_apart(layout: Layout, band: str) -> None:
@@ -142,7 +147,7 @@ def expect_apart(layout: Layout, band: str) -> None:
     known = scores(layout, band)
     if not (known and path.is_file()):
         return
-    for launch in landed(path, *EVIDENCE):
+    for launch in landed(path, "evidence"):
         if among(launch, known):
             raise UserError(told_twice(launch, path, layout.measured / path.name))
 

@@ -98,7 +98,8 @@ def records(rows: np.ndarray, record: np.dtype) -> np.ndarray:
 
 def macros() -> dict[str, int | str]:
     """Places of the records' fields, their sizes, and the codes, for the native text."""
-    result: dict[str, int | str] = {f"{name}_SIZE": width(record) for name, record in _RECORDS.items()}
+    result: dict[str, int | str] = {}
+    result |= {f"{name}_SIZE": width(record) for name, record in _RECORDS.items()}
     for name, record in _RECORDS.items():
         for field, (_, offset, *_) in (record.fields or {}).items():
             result[f"{name}_{field.upper()}"] = offset // 8

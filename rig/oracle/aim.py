@@ -11,14 +11,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.launching.surface.aim import NEAR, landings_within, secants
 from pipeline.launching.surface.landing_map import LandingMap
 
 Land = Callable[[np.ndarray], float]
 """Landing [m] of a launch from the draw (2,) without errors; NaN where there is none."""
 
 FINE = 401  # nodes along y and z between which the map is searched
-INSET = 2e-3  # m from the edge of the box, which leaves room for the root search
-NEAR = 2e-4  # m of landing that count as a hit
 FIRST_STEP, LAUNCHES = 2e-3, 12  # of the root search: share of the draw's length, and how many
 
 
@@ -34,12 +33,8 @@ def least_sensitive_draw(landing_map: LandingMap, target: float) -> np.ndarray:
 
     NaN where the box, within the force limit, has none.
     """
-    axes = [
-        np.linspace(edges[0] + INSET, edges[-1] - INSET, FINE)
-        for edges in (landing_map.draw_y, landing_map.draw_z)
-    ]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
-    off = landing_map(grid.reshape(-1, 2)).landing_y.reshape(FINE, FINE) - target
+    grid, landing = landings_within(landing_map, FINE)
+    off = landing - target
     here = off[:-1, :-1]
     hits = grid[:-1, :-1][(here * off[1:, :-1] <= 0) | (here * off[:-1, 1:] <= 0)]
     found = sensitivity(landing_map, hits)
@@ -52,14 +47,10 @@ def hit(land: Land, target: float, start: np.ndarray) -> np.ndarray:
     Within NEAR, by secants. NaN where they do not come there.
     """
     start = np.asarray(start, float)
-    length, off = 1.0, land(start) - target
-    slope = abs(off) / FIRST_STEP
-    for _ in range(LAUNCHES):
-        if abs(off) <= NEAR:
-            return length * start
-        if not slope > 0:  # a longer draw lands further; NaN where one does not land
-            break
-        before, length = (length, off), length - off / slope
-        off = land(length * start) - target
-        slope = (off - before[1]) / (length - before[0])
-    return np.full(2, np.nan)
+
+    def off(length: float) -> float:
+        return land(length * start) - target
+
+    first = off(1.0)
+    length, left = secants(off, first, abs(first) / FIRST_STEP, LAUNCHES - 1)
+    return length * start if abs(left) <= NEAR else np.full(2, np.nan)

@@ -47,14 +47,12 @@ def read_launches(path: Path, error: float | None) -> list[Observed]:
         UserError: It cannot be read, or says what no launch can have done.
     """
     launches = []
-    for line, row in table.rows(path, *table.EVIDENCE):
-        where = f"{path}, line {line}"
-        landing = table.metres(where, table.LANDING, row[table.LANDING])
-        if landing is None:
+    for row in table.rows(path, "evidence"):
+        where, own = row.where, row.cells["draw_error_m"]
+        if row.landing is None:
             raise UserError(f"{where}: a launch that did not land is no evidence, leave it out")
-        own = row["draw_error_m"]
         own = expect_error(where, table.number(where, "draw_error_m", own)) if own else error
-        launches.append(Observed(table.drawn(where, row), own, landing))
+        launches.append(Observed(row.draw, own, row.landing))
     return launches
 
 

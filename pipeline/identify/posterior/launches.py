@@ -14,13 +14,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.simulator.launch import launch
+from pipeline.simulator.launch import landing_gradient, launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import Parameters
 
 TAPE = 0.01  # of a measured landing, standard deviation [m]
-NUDGE = 1e-3  # of a draw [m]
-CROSS = NUDGE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
 
 
 @dataclass(frozen=True)
@@ -71,16 +69,15 @@ class LaunchLikelihood:
     ) -> tuple[float, np.ndarray, np.ndarray]:
         """Misfit, Hessian (D, D) and gradient (D,) at coordinates (D,), as of an `Expansion`."""
         around = parameters_of(phi + np.vstack([0 * steps, np.diag(steps)]))
-        cross = (self.draws[:, None] + CROSS).reshape(-1, 2)
-        near = self._simulated(around[:1], cross)
-        near = near.reshape(len(self.draws), len(CROSS))
-        slope = np.linalg.norm((near[:, 1::2] - near[:, 2::2]) / (2 * NUDGE), axis=1)
+        here, gradient = landing_gradient(
+            lambda draws: self._simulated(around[:1], draws), self.draws
+        )
+        slope = np.linalg.norm(gradient, axis=1)
         count = len(steps)
         moved = self._simulated(
             around[np.repeat(1 + np.arange(count), len(self.draws))],
             np.tile(self.draws, (count, 1)),
         ).reshape(count, -1)
-        here = near[:, 0]
         self.left = np.log(self.landings / here)
         changes = (np.log(moved) - np.log(here)) / steps[:, None]  # (D, N)
         spread = np.hypot(slope * self.errors / here, TAPE / self.landings)

@@ -17,9 +17,6 @@ from pipeline.base.schema import LIST, JsonRecord, read_json
 from pipeline.base.target import TARGET_AREA
 from pipeline.params import Params
 
-REQUIRED, OPTIONAL = table.SCORES
-LIMITS = {**table.LIMITS, "target_m": (0, 20, "beyond the fork")}
-
 
 @dataclass(frozen=True)
 class Measured:
@@ -61,24 +58,21 @@ def read_measured(path: Path, methods: Collection[str]) -> list[Measured]:
         UserError: The file cannot be read, or a row says what no launch can have done.
     """
     launches = []
-    for line, row in table.rows(path, REQUIRED, OPTIONAL):
-        where, method = f"{path}, line {line}", row["method"]
+    for row in table.rows(path, "scores"):
+        where, method = row.where, row.cells["method"]
         if method and method not in methods:
             raise UserError(
                 f"{where}: method {method!r} is not in params.yaml, which has"
                 f" {', '.join(methods)}; leave it empty for a launch that no policy aimed"
             )
-        draw = table.drawn(where, row)
-        landing, target = (
-            table.metres(where, name, row[name], LIMITS) for name in (table.LANDING, "target_m")
-        )
+        target = table.metres(where, table.TARGET, row.cells[table.TARGET])
         target = target if method else None
         if target is not None and not TARGET_AREA[0] <= target <= TARGET_AREA[1]:
             raise UserError(
                 f"{where}: target_m {target} lies outside the target on the floor,"
                 f" {list(TARGET_AREA)}, where every landing counts as failed"
             )
-        launches.append(Measured(draw, landing, target, method))
+        launches.append(Measured(row.draw, row.landing, target, method))
     return launches
 
 

@@ -6,12 +6,11 @@ import numpy as np
 from scipy.special import ndtri
 
 from pipeline.launching.surface.landing_map import Launched, Launcher
+from pipeline.simulator.launch import landing_gradient
 from pipeline.simulator.parameters import Parameters
 
 LEVEL = 0.9
 MOST = 60  # samples of θ that are launched
-STEP = 1e-3  # m, small against the box of draws and large against the simulator's rounding
-CROSS = STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
 ERRORS = ndtri((np.arange(401) + 0.5) / 401)  # equally likely; 41 end 6 % too soon
 
 
@@ -36,11 +35,9 @@ def landing_intervals(
     """
     draws = np.atleast_2d(np.asarray(draws, float))
     count = len(draws)
-    around = launcher((draws[:, None] + CROSS).reshape(-1, 2))
-    landing = _landing(around).reshape(count, len(CROSS))
-    gradient = (landing[:, 1::2] - landing[:, 2::2]) / (2 * STEP)  # (N, 2)
+    landing, gradient = landing_gradient(lambda around: _landing(launcher(around)), draws)
     spread = error * np.linalg.norm(gradient, axis=1)
-    centres = landing[:, :1]
+    centres = landing[:, None]
     if samples is not None:
         some = samples[np.linspace(0, len(samples) - 1, min(MOST, len(samples))).astype(int)]
         launched = launcher(

@@ -15,11 +15,11 @@ from pipeline.episode.episode import Episode
 from pipeline.identify.results.theta import load_samples, load_theta, parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
-from pipeline.launching.trials.spread import CROSS, MOST, STEP, landing_intervals
+from pipeline.launching.trials.spread import MOST, landing_intervals
 from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
 from pipeline.launching.trials.trials import limited
 from pipeline.params import Params
-from pipeline.simulator.launch import Launches
+from pipeline.simulator.launch import Launches, landing_gradient
 from pipeline.simulator.parameters import Parameters
 
 
@@ -142,8 +142,8 @@ def aims(
     launches = limited(launcher(draw), params.setup.max_force)
     interval = landing_intervals(launcher, draw, samples, error)
     interval[np.isnan(launches.landing_y)] = np.nan
-    around = launcher((draw[:, None] + CROSS).reshape(-1, 2)).landing_y.reshape(count, -1)
-    slope = error * np.linalg.norm((around[:, 1::2] - around[:, 2::2]) / (2 * STEP), axis=1)
+    _, gradient = landing_gradient(lambda around: launcher(around).landing_y, draw)
+    slope = error * np.linalg.norm(gradient, axis=1)
     landings = np.zeros((count, 0))
     if samples is not None:
         some = np.linspace(0, len(samples) - 1, min(MOST, len(samples))).astype(int)

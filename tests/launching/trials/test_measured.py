@@ -5,10 +5,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.base.launch_table import file_of
+from pipeline.base.launch_table import DRAW, LANDING, MORE, file_of
 from pipeline.launching.trials.measured import (
-    OPTIONAL,
-    REQUIRED,
     Measured,
     load_scores,
     read_measured,
@@ -118,4 +116,4 @@ def test_a_file_of_no_band_is_refused(tmp_path) -> None:
 
 def test_the_format_is_documented() -> None:
     text = Path("data/trials/measured/README.md").read_text()
-    assert all(name in text for name in REQUIRED + OPTIONAL)
+    assert all(name in text for name in (*DRAW, LANDING, *MORE["scores"]))

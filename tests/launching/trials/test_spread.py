@@ -4,7 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from pipeline.launching.trials.spread import CROSS, MOST, landing_intervals
+from pipeline.launching.trials.spread import MOST, landing_intervals
+from pipeline.simulator.launch import CROSS
 from tests.policy import toy
 
 DRAWS = np.array([[-0.35, -0.2], [-0.3, -0.15]])

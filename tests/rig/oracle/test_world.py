@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
+from pipeline.launching.surface.aim import NEAR
 from pipeline.params import load
-from rig.oracle.aim import NEAR
 from rig.oracle.world import World
 from rig.physics.launch import launch
 from tests.project import ROOT

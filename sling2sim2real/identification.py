@@ -16,7 +16,7 @@ from pipeline.base.machine import cores, devices, workers
 from pipeline.base.schema import explained, read_json
 from pipeline.episode.episode import Episode
 from pipeline.episode.pull import launch_history
-from pipeline.identify.clamps import calibrate_clamps
+from pipeline.identify.clamps import ClampCalibration, calibrate_clamps
 from pipeline.identify.identify import identify as run_identification
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.objective.evaluate import Evaluator
@@ -199,8 +199,9 @@ def identify(
     if start is None:
         mounting = None
         if settings.methods[METHOD].mounting:
-            mounting = _mounting(episodes[0], band, settings)
-            progress(f"mounting: clamps at {mounting.clamp_angle_deg:.0f} degrees")
+            found = _clamps(episodes[0], band, settings)
+            mounting = Mounting.model_validate(vars(found))
+            progress(f"mounting: clamps at {found.clamp_angle_deg:.0f} degrees")
         sling = _sling(band, settings, mounting)
         evaluate = _evaluator(episodes[0], sling, settings)
     else:
@@ -241,15 +242,14 @@ def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> Clamped
     return ClampedBand.of(band, settings.setup, settings.sling, mounting, law=law)
 
 
-def _mounting(episode: Episode, band: Band, settings: Settings) -> Mounting:
+def _clamps(episode: Episode, band: Band, settings: Settings) -> ClampCalibration:
     sling = ClampedBand.of(band, settings.setup, settings.sling, as_rod=True)
-    found = calibrate_clamps(
+    return calibrate_clamps(
         sling,
         episode,
         lambda part: EpisodeLoss.plain(settings, part, sling),
         workers=cores(),
     )
-    return Mounting.model_validate(found)
 
 
 def _evaluator(episode: Episode, sling: ClampedBand, settings: Settings) -> Evaluator:

@@ -21,16 +21,16 @@ def main() -> None:
     params, band = started("band")
     # with the rod, whatever simulates afterwards: a solid mesh has no rigidity to fit
     sling = ClampedBand.of(params.bands[band], params.setup, params.sling, as_rod=True)
-    content = calibrate_clamps(
+    found = calibrate_clamps(
         sling,
         load_episode(band),
         lambda part: EpisodeLoss.plain(params, part, sling),
         workers=cores(),
     )
-    write_json(Layout().clamps(band), content)
+    write_json(Layout().clamps(band), vars(found))
     print(
-        f"{band}: clamps at {content['clamp_angle_deg']:.1f} deg, bending"
-        f" {content['relative_rigidity']:.2f} of a solid round band's"
+        f"{band}: clamps at {found.clamp_angle_deg:.1f} deg, bending"
+        f" {found.relative_rigidity:.2f} of a solid round band's"
     )
 
 

@@ -11,6 +11,7 @@ import tempfile
 from importlib.metadata import version
 from pathlib import Path
 
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
@@ -19,7 +20,6 @@ from pipeline.export.card import ASKED
 from pipeline.params import load
 from sling2sim2real.exporting import export
 from sling2sim2real.identification import Identification
-from validation.benchmarks.timing import environment
 
 REPORTS = Path("reports/validation")
 PACKAGES = {"mjcf": ("mujoco",), "newton": ("newton", "mujoco")}  # the match is MuJoCo's

@@ -1,6 +1,6 @@
 """`sling figures`: of which code each JSON under reports/ is, and whether it meets what it asks.
 
-A file with `code` (validation/benchmarks/timing.environment) is compared folder by folder. One
+A file with `code` (pipeline/base/environment.py) is compared folder by folder. One
 that a stage writes is compared by DVC. For the others the digest of the simulator and the commit
 decide, as far as they can: any change since then of what its command's script imports makes such a
 file older, and where the command names no script, any change under pipeline/ or validation/.

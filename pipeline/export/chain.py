@@ -16,6 +16,7 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.export.band import CalibratedBand
+from pipeline.simulator.initial import hanging_line
 from pipeline.simulator.model import GRAVITY
 from pipeline.simulator.rubber import uniaxial
 
@@ -159,12 +160,8 @@ class SpringChain:
 
     def hanging(self) -> np.ndarray:
         """Two legs and a half circle below the clamps, without stretch, shape (edges + 1, 3)."""
-        half, length = self.half_width, self.rest_length
-        leg = max((length - np.pi * half) / 2, 0.0)
-        arc = np.linspace(0, length, self.edges + 1)
-        turn = np.clip((arc - leg) / (length - 2 * leg), 0, 1) * np.pi
-        down = np.minimum(np.minimum(arc, length - arc), leg) + half * np.sin(turn)
-        return np.stack([-half * np.cos(turn), 0 * arc, -down], axis=1)
+        arc = np.linspace(0, self.rest_length, self.edges + 1)
+        return hanging_line(self.half_width, self.rest_length, arc)[0]
 
     def drawn(self, place: np.ndarray) -> np.ndarray:
         """Two straight halves from the clamps to a place (3,), shape (edges + 1, 3)."""

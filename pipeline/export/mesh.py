@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pipeline.simulator.cylinder import cylinder, volumes
-from pipeline.simulator.initial import fixed_frames
+from pipeline.simulator.initial import fixed_frames, hanging_line
 from pipeline.simulator.interaction import GRASP_BLEND
 from pipeline.simulator.model import ROD, ClampedBand
 
@@ -110,11 +110,6 @@ def hand_path(episode, times: np.ndarray, grasp: np.ndarray) -> np.ndarray:
 
 
 def _hanging(sling: ClampedBand, arc: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Two legs and a half circle, as in model.hanging_guess."""
-    half, length = sling.half_width, sling.rest_length
-    leg = max((length - np.pi * half) / 2, 0.0)
-    turn = np.clip((arc - leg) / (length - 2 * leg), 0, 1) * np.pi
-    down = np.minimum(np.minimum(arc, length - arc), leg) + half * np.sin(turn)
-    center = np.stack([-half * np.cos(turn), 0 * arc, -down], axis=1)
+    center, turn = hanging_line(sling.half_width, sling.rest_length, arc)
     inward = np.stack([np.cos(turn), 0 * arc, np.sin(turn)], axis=1)  # tangent x (0, 1, 0)
     return center[:, None] + rest[..., 1:2] * [0.0, 1.0, 0.0] + rest[..., 2:] * inward[:, None]

@@ -9,8 +9,9 @@ the clamps.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -18,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.episode.phases import taut_time
+from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
@@ -74,15 +76,42 @@ def nominal_young(sling: ClampedBand, episode: Episode) -> float:
     return float(3 * tension / (sling.area * (stretch - stretch**-2)))
 
 
-def calibrate_clamps(sling: ClampedBand, episode: Episode, make_loss, *, workers: int) -> dict:
+@dataclass(frozen=True)
+class ClampCalibration:
+    """How a slack band hangs, as data/clamps/ has it.
+
+    Attributes:
+        clamp_direction, flexural_rigidity: As of a `Mounting`.
+        clamp_angle_deg: From the setup's clamp direction.
+        relative_rigidity: To a solid round band of `nominal_youngs_modulus` [Pa].
+        slack_until: On the episode's clock [s].
+        loss: As `setup` says (`solid_and_vertical`; None where that fails), and `fitted`.
+    """
+
+    clamp_direction: list[float]
+    flexural_rigidity: float
+    clamp_angle_deg: float
+    relative_rigidity: float
+    nominal_youngs_modulus: float
+    slack_until: float
+    loss: dict[str, float | None]
+
+
+def calibrate_clamps(
+    sling: ClampedBand,
+    episode: Episode,
+    make_loss: Callable[[Episode], EpisodeLoss],
+    *,
+    workers: int,
+) -> ClampCalibration:
     """Fit the clamps' angle and the flexural rigidity to the slack part of an episode.
 
     Args:
         sling: With the setup's clamp direction, as where the angle is 0.
-        make_loss: Called with the slack episode; gives the object whose `terms(rollouts)` are used.
+        make_loss: The loss of the slack episode.
 
-    Returns:
-        `clamp_direction`, `flexural_rigidity` [N m^2], and what was found on the way.
+    Raises:
+        UserError: The band never hangs slack, or no simulation of its slack part converges.
     """
     young = nominal_young(sling, episode)
     solid = young * np.pi * sling.radius**4 / 4
@@ -125,12 +154,12 @@ def calibrate_clamps(sling: ClampedBand, episode: Episode, make_loss, *, workers
             f"episode of {episode.band}: no simulation of its slack part converges; check"
             f" bands.{episode.band} (mass, diameter, rest_length) and the extrinsics"
         )
-    return {
-        "clamp_direction": direction(angle).tolist(),
-        "flexural_rigidity": solid * rigidity,
-        "clamp_angle_deg": angle,
-        "relative_rigidity": rigidity,
-        "nominal_youngs_modulus": young,
-        "slack_until": float(part.time[-1]),
-        "loss": {"solid_and_vertical": start if np.isfinite(start) else None, "fitted": value},
-    }
+    return ClampCalibration(
+        clamp_direction=direction(angle).tolist(),
+        flexural_rigidity=solid * rigidity,
+        clamp_angle_deg=angle,
+        relative_rigidity=rigidity,
+        nominal_youngs_modulus=young,
+        slack_until=float(part.time[-1]),
+        loss={"solid_and_vertical": start if np.isfinite(start) else None, "fitted": value},
+    )

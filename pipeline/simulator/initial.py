@@ -77,17 +77,23 @@ def _meshed(sling: ClampedBand, rod: np.ndarray) -> np.ndarray:
     return tetrahedra.sections(rod[..., :3], directors, sling.radius)
 
 
+def hanging_line(
+    half_width: float, length: float, arc: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A U below the tips, two legs and a half circle, at places `arc` (L,) along it [m].
+
+    Returns:
+        Points (L, 3) [m], and how far the U has turned there [rad], shape (L,).
+    """
+    leg = max((length - np.pi * half_width) / 2, 0.0)
+    turn = np.clip((arc - leg) / (length - 2 * leg), 0, 1) * np.pi
+    down = np.minimum(np.minimum(arc, length - arc), leg) + half_width * np.sin(turn)
+    return np.stack([-half_width * np.cos(turn), 0 * arc, -down], axis=1), turn
+
+
 def hanging_guess(sling: ClampedBand) -> np.ndarray:
-    """A U below the tips: two legs and a half circle, shape (sections, dofs)."""
-    half, length = sling.half_width, sling.rest_length
-    leg = max((length - np.pi * half) / 2, 0.0)
-    arc = sling.arc
-    nodes = np.zeros((sling.sections, 3))
-    angle = np.clip((arc - leg) / (length - 2 * leg), 0, 1) * np.pi
-    nodes[:, 0] = -half * np.cos(angle)
-    nodes[:, 2] = -np.minimum(np.minimum(arc, length - arc), leg)
-    nodes[:, 2] -= half * np.sin(angle)
-    return sections_of(sling, nodes)
+    """A U below the tips, shape (sections, dofs)."""
+    return sections_of(sling, hanging_line(sling.half_width, sling.rest_length, sling.arc)[0])
 
 
 def drawn_guess(sling: ClampedBand, draws: np.ndarray) -> np.ndarray:

@@ -28,8 +28,8 @@ SCRIPTS = {  # in validation/benchmarks
 
 def bench(arguments: argparse.Namespace, what: str) -> str:
     """Measure `what`, a key of TAKES; a table, or with --json one object."""
+    from pipeline.base.environment import environment
     from pipeline.params import load
-    from validation.benchmarks import timing
 
     device, budget = arguments.device or "cpu", arguments.budget or "laptop"
     result, table, command = MEASURE[what](arguments, load(), device, budget)
@@ -37,8 +37,8 @@ def bench(arguments: argparse.Namespace, what: str) -> str:
         return table(result)
     device = "cpu" if what == "recording" else device
     command = f"sling bench {command} --json" if command else ""
-    script = Path(timing.__file__).with_name(f"{SCRIPTS[what]}.py")
-    return json.dumps(timing.environment(device, command, script) | result)
+    script = Path(__file__).with_name(f"{SCRIPTS[what]}.py")
+    return json.dumps(environment(device, command, script) | result)
 
 
 def asked(arguments: argparse.Namespace) -> str:

@@ -19,9 +19,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from pipeline.base import errors
+from pipeline.base.environment import environment
 from pipeline.base.files import write_json
 from pipeline.recording.masks.sam3 import Sam3Mask
-from validation.benchmarks.timing import environment, timed
+from validation.benchmarks.timing import timed
 from validation.recordings import looks
 from validation.recordings.tiny_sam3 import save_tiny_sam3, save_tokenizer
 

@@ -24,12 +24,12 @@ from pathlib import Path
 
 from pipeline.base import errors
 from pipeline.base.code import ROOT, digests
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json, write_text
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import commit
 from validation.benchmarks.command import disk, measured
-from validation.benchmarks.timing import environment
 from validation.marked import marks, with_block
 
 REPORT, PAGE = Path("reports/benchmarks/times.json"), Path("docs/times.md")

@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from pipeline.base.environment import environment as environment
 from pipeline.base.machine import gpus
 from pipeline.simulator.parameters import Parameters
 

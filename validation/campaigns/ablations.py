@@ -24,12 +24,12 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from pipeline.base import errors
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.machine import processor
 from pipeline.params import Params, expect_known, load
 from pipeline.params.identification import MethodParams
-from validation.benchmarks.timing import environment
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import aimed, errors_on_the_rig, identified, recorded
 from validation.campaigns.runner import PAPER, ResultLines, plain, result_of

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from pipeline.base.code import ROOT
+from pipeline.base.environment import environment
 from pipeline.base.files import write_json
 from pipeline.params import Params, load
-from validation.benchmarks.timing import environment
 from validation.campaigns.runner import plain
 
 

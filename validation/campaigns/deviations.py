@@ -20,13 +20,13 @@ from functools import partial
 from pathlib import Path
 
 from pipeline.base import errors
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json, write_text
 from pipeline.base.layout import made
 from pipeline.episode.episode import Episode
 from pipeline.params import load
 from validation import orange
-from validation.benchmarks.timing import environment
 from validation.campaigns import runner
 from validation.campaigns.deviation_scores import (
     MESH,

@@ -28,6 +28,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from pipeline.base import errors
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError, one_line
 from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
@@ -41,7 +42,6 @@ from pipeline.identify.results.mounting import sling_of_method
 from pipeline.params import Params, expect_known, load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
-from validation.benchmarks.timing import environment
 from validation.campaigns.runner import OURS, PAPER
 from validation.density import found
 

@@ -25,10 +25,10 @@ from pathlib import Path
 
 from pipeline.base import errors
 from pipeline.base.code import ROOT, digests
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_json
 from pipeline.base.fingerprint import fingerprint
-from validation.benchmarks.timing import environment
 from validation.campaigns import outcomes, runner
 from validation.campaigns.outcomes import FAULT, HANGS, MOST, name_of
 from validation.campaigns.runner import Result, ResultLines

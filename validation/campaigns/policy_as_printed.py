@@ -19,6 +19,7 @@ import numpy as np
 
 from pipeline.base import errors
 from pipeline.base.code import ROOT, digest
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
@@ -32,7 +33,7 @@ from pipeline.params.launches import PolicyParams
 from pipeline.policy.check import check
 from pipeline.policy.environment import projectile_start
 from pipeline.policy.train import train
-from validation.benchmarks.timing import environment, timed
+from validation.benchmarks.timing import timed
 from validation.campaigns import runner
 from validation.campaigns.runner import PAPER, ResultLines, plain
 from validation.paired import mean_interval

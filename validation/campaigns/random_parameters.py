@@ -16,13 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base import errors
+from pipeline.base.environment import environment
 from pipeline.base.files import write_json
 from pipeline.base.machine import cores
 from pipeline.params import load
 from pipeline.params.identification import LAWS
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
-from validation.benchmarks.timing import environment, timed
+from validation.benchmarks.timing import timed
 from validation.campaigns.runner import OURS
 from validation.simulator.agreement import random_thetas
 from validation.simulator.experiment import band_of

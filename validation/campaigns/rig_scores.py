@@ -58,7 +58,7 @@ def calibrated_clamps(params: Params, band: str, episode: Episode, folder: Path)
     clamps = calibrate_clamps(
         sling, episode, lambda part: EpisodeLoss.plain(params, part, sling), workers=1
     )
-    write_json(folder / "mounting.json", clamps)
+    write_json(folder / "mounting.json", vars(clamps))
 
 
 def sling_of(params: Params, band: str, method: str, folder: Path) -> ClampedBand:

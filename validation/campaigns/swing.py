@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.base import errors
+from pipeline.base.environment import environment
 from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.layout import Layout, made
@@ -38,7 +39,6 @@ from pipeline.simulator.launch import launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import THETA, Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
-from validation.benchmarks.timing import environment
 from validation.campaigns.runner import OURS, PAPER
 from validation.effects import AS_IS
 

@@ -14,9 +14,10 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_json, write_text
-from validation.benchmarks.timing import available, environment
+from validation.benchmarks.timing import available
 from validation.simulator import (
     agreement,
     at_rest,

@@ -22,10 +22,10 @@ from pathlib import Path
 
 from pipeline.base import errors
 from pipeline.base.code import ROOT, digests
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.fingerprint import fingerprint
-from validation.benchmarks.timing import environment
 from validation.campaigns.kills import compare, full_disk, strike
 from validation.campaigns.kills.commands import (
     BUDGET,

@@ -5,10 +5,10 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.params import load
-from validation.benchmarks.timing import environment
 from validation.engines.physx import bands, study
 from validation.simulator.finding import Bench, Finding, unmet
 

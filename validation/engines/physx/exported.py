@@ -20,13 +20,13 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from pipeline.base import errors
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.export.mesh import Tube
 from pipeline.params import load
 from pipeline.simulator.cylinder import volumes
 from pipeline.simulator.model import GRAVITY
-from validation.benchmarks.timing import environment
 from validation.engines.physx.bands import Engine, release
 from validation.engines.physx.law import force_on
 

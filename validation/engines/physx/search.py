@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.base import errors
+from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.machine import devices
@@ -35,7 +36,6 @@ from pipeline.params.identification import OUR_ENGINE
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import LaunchSetup
 from pipeline.simulator.parameters import Parameters
-from validation.benchmarks.timing import environment
 from validation.engines.physx.bands import Engine, release
 from validation.engines.physx.launches import FINE, alike, draws_of, launch_in_physx
 from validation.engines.physx.rollouts import ITERATIONS, RATE

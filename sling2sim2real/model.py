@@ -176,6 +176,11 @@ class Model:
     def __post_init__(self) -> None:
         known(self.settings, self.band)
 
+    @property
+    def parameters(self) -> Parameters:
+        """θ as the simulator takes it, one sample."""
+        return self.theta.parameters
+
     @cached_property
     def sling(self) -> ClampedBand:
         """The band as the simulator takes it."""

@@ -56,7 +56,7 @@ def content(model: CalibratedBand, done: Matched, target: str, files: dict[str, 
         "files": files,
         "frames": about.FRAMES,
         "sizes": about.sizes(model),
-        "law": model.theta.law,
+        "law": model.parameters.law,
         "history": about.history(model),
         "values": about.values(model),
         "matched": [

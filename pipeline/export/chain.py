@@ -62,9 +62,9 @@ class SpringChain:
 
         Its damping time is θ's, its time step the largest that is stable with that.
         """
-        setup, band, theta = model.settings.setup, model.band, model.theta
+        setup, band, theta = model.settings.setup, model.band, model.parameters.sample()
         tension, stretch = cls.tension(model, draws, hold_force)
-        share = theta.mooney_share or 0.0
+        share = theta.get("mooney_share", 0.0)
         chain = cls(
             edges=EDGES,
             rest_length=band.rest_length,
@@ -75,7 +75,7 @@ class SpringChain:
             arm_stiffness=setup.arm_stiffness,
             strength=float(np.mean(3 * tension / uniaxial(stretch, share))),
             mooney_share=share,
-            damping_time=theta.elasticity_damping,
+            damping_time=theta["elasticity_damping"],
             largest_strain=float(stretch.max() - 1),
             step=STEPS[-1],
         )

@@ -40,7 +40,7 @@ def compare_pull(
     model: CalibratedBand, episode: Episode, replay: MujocoBand | NewtonReplay
 ) -> PullCompared:
     """Pull as in `episode`, in both. Raises UserError where our simulation fails."""
-    ours, chain = interact(model.sling, episode, model.theta.parameters), replay.chain
+    ours, chain = interact(model.sling, episode, model.parameters), replay.chain
     if ours.failure[0]:
         raise UserError(f"the pull of {episode.band}: {ours.failure[0]}")
     count = int((episode.release_time - episode.grasp_time) / chain.step)

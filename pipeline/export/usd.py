@@ -35,13 +35,14 @@ def to_usd(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict
     """<band>.usda, and README.md: what it is, and what it is not."""
     draws = draws_of(model)
     tension, stretch = SpringChain.tension(model, draws, model.launches(draws).hold_force)
-    poisson = model.theta.poissons_ratio
+    theta = model.parameters.sample()
+    poisson = theta["poissons_ratio"]
     unit = np.pi * model.band.diameter**2 / 4 * nominal(stretch, poisson)
     young = float(np.sum(tension / unit) / len(draws))
-    damping = model.theta.elasticity_damping * model.theta.damping_scale
+    damping = theta["elasticity_damping"] * theta["damping_scale"]
     tube = Tube.of(model.sling, EDGES, GRADING)
     name = f"{model.band.name}.usda"
-    write_text(folder / name, text(tube, young, poisson, damping, model.theta.dynamic_friction))
+    write_text(folder / name, text(tube, young, poisson, damping, theta["dynamic_friction"]))
     left = young * unit / tension - 1
     content = {
         "band": model.band.name,
@@ -49,14 +50,14 @@ def to_usd(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict
         "files": {name: "the model", "README.md": "what it is, and what it is not"},
         "frames": about.FRAMES,
         "sizes": about.sizes(model),
-        "law": model.theta.law,
+        "law": model.parameters.law,
         "values": about.values(model),
         "replayed": False,
         "matched": [
             {"name": "youngs_modulus", "value": rounded(young, 6), "unit": "Pa"},
             {"name": "elasticity_damping", "value": rounded(damping, 6), "unit": "s"},
         ],
-        "factor_on_youngs_modulus": rounded(young / model.theta.youngs_modulus, 4),
+        "factor_on_youngs_modulus": rounded(young / theta["youngs_modulus"], 4),
         "tension_errors": [rounded(float(one)) for one in left],
         "stretches": [rounded(float(one), 4) for one in stretch],
         "time_step_s": 1 / RATE,

@@ -19,8 +19,9 @@ FRAMES = (
 def values(model: CalibratedBand) -> list[dict]:
     """Each parameter with its 90 % interval where one is known: name, value, unit, low, high."""
     intervals, found = getattr(model, "intervals", {}), []
+    theta = model.parameters.sample()
     for name in QUANTITIES:
-        value, known = getattr(model.theta, name, None), intervals.get(name)
+        value, known = theta.get(name), intervals.get(name)
         if value is None:
             continue
         sure = known is not None and known.low < known.high
@@ -61,31 +62,31 @@ def history(model: CalibratedBand) -> dict[str, float] | None:
 
 def without_slot(model: CalibratedBand) -> list[dict]:
     """What springs cannot express, its value, and what stands in for it."""
-    theta, setup, sling = model.theta, model.settings.setup, model.sling
+    theta, setup, sling = model.parameters.sample(), model.settings.setup, model.sling
     direction, rigidity = sling.clamp_direction, sling.flexural_rigidity
     angle = np.degrees(np.arctan2(np.hypot(direction[0], direction[1]), -direction[2]))
     bending = "a solid band's" if rigidity is None else f"{rigidity:.2g} N m²"
-    damping = f"{1e3 * theta.elasticity_damping:.2g} ms, {theta.damping_scale:.2g}"
+    damping = f"{1e3 * theta['elasticity_damping']:.2g} ms, {theta['damping_scale']:.2g}"
     rows = [
         (
             "elasticity_damping, damping_scale",
             damping,
             "One damping time, of lengthening alone.",
         ),
-        ("turn_damping", f"{theta.turn_damping:.2g}", "None: turns of a spring cost nothing."),
+        ("turn_damping", f"{theta['turn_damping']:.2g}", "None: turns of a spring cost nothing."),
         (
             "returned_share",
-            f"{100 * theta.returned_share:.3g} %",
+            f"{100 * theta['returned_share']:.3g} %",
             "The springs' damping, matched to landings.",
         ),
         (
             "poissons_ratio",
-            f"{theta.poissons_ratio:.2g}",
+            f"{theta['poissons_ratio']:.2g}",
             "None: springs have no section; they pull as a string of constant volume.",
         ),
         (
             "dynamic_friction",
-            f"{theta.dynamic_friction:.2g}",
+            f"{theta['dynamic_friction']:.2g}",
             "None: the hand is tied to the middle, and lets go at once.",
         ),
         (
@@ -99,26 +100,26 @@ def without_slot(model: CalibratedBand) -> list[dict]:
             "The springs' damping, matched to landings.",
         ),
     ]
-    if theta.law == RUBBER:
+    if model.parameters.law == RUBBER:
         rows = [*_of_rubber(model), *rows]
     return [dict(zip(("name", "value", "instead"), row, strict=True)) for row in rows]
 
 
 def _of_rubber(model: CalibratedBand) -> list[tuple[str, str, str]]:
-    theta, told = model.theta, history(model)
+    theta, told = model.parameters.sample(), history(model)
     after = "it has forgotten every pull"
     if told:
         after = f"a pull of {told['pull_time_s']:.1f} s and a pause of {told['pause_s']:.1f} s"
     return [
         (
             "relaxation",
-            f"{100 * theta.relaxation:.2g} % a half decade",
+            f"{100 * theta['relaxation']:.2g} % a half decade",
             f"None: the springs hold what the band holds after {after}. What relaxation takes from"
             " a launch is in their damping.",
         ),
         (
             "mooney_share",
-            f"{theta.mooney_share:.2g}",
+            f"{theta['mooney_share']:.2g}",
             "The shape of the springs' pull, with a share of its own.",
         ),
     ]

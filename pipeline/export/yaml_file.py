@@ -14,7 +14,7 @@ from pipeline.export import values as about
 from pipeline.export.band import CalibratedBand
 from pipeline.export.match import draws_of
 from pipeline.report.quantities import rounded
-from pipeline.simulator.rubber import TIMES, uniaxial
+from pipeline.simulator.rubber import RUBBER, TIMES, uniaxial
 
 STRETCHES = np.arange(1.0, 2.21, 0.1)
 
@@ -41,16 +41,17 @@ READ_ME = (
 
 def content_of(model: CalibratedBand) -> dict:
     """What the file holds."""
-    theta, draws = model.theta, draws_of(model)
-    share = theta.mooney_share or 0.0
-    strength = theta.youngs_modulus * np.pi * model.band.diameter**2 / 4
+    parameters, draws = model.parameters, draws_of(model)
+    theta = parameters.sample()
+    share = theta.get("mooney_share", 0.0)
+    strength = theta["youngs_modulus"] * np.pi * model.band.diameter**2 / 4
     done = model.launches(draws)
     return {
         "frames": about.FRAMES,
         "sizes": about.sizes(model),
-        "law": theta.law,
+        "law": parameters.law,
         "values": about.values(model),
-        "relaxation_times_s": TIMES.tolist() if theta.law == "rubber" else [],
+        "relaxation_times_s": TIMES.tolist() if parameters.law == RUBBER else [],
         "history": about.history(model),
         "curve": {
             "stretch": [rounded(one, 4) for one in STRETCHES.tolist()],
@@ -74,7 +75,7 @@ def content_of(model: CalibratedBand) -> dict:
 
 
 def _readme(model: CalibratedBand, name: str, content: dict) -> str:
-    kilo = f"{1e-3 * model.theta.youngs_modulus:.3g} kPa"
+    kilo = f"{1e-3 * model.parameters.sample()['youngs_modulus']:.3g} kPa"
     history, after = content["history"], ""
     if history:
         after = " after a pull of {pull_time_s:.1f} s and a pause of {pause_s:.1f} s".format(

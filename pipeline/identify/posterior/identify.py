@@ -1,4 +1,4 @@
-"""A band's parameters from its recordings and launches, as the theta stage writes them.
+"""A band's parameters from its recordings and launches, as the density stage writes them.
 
 One density: its mode is θ*, its samples the intervals. With several recordings the Gaussian is as
 wide as they differ (Birge's ratio, Phys. Rev. 40, 1932): their disagreement beyond what each leaves
@@ -7,6 +7,7 @@ open is the model's discrepancy, and no other is assumed but the returned share'
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -20,6 +21,7 @@ from pipeline.identify.posterior.draws import truncated_gaussian
 from pipeline.identify.posterior.fit import Fit, fit
 from pipeline.identify.posterior.launches import Evidence, LaunchLikelihood
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
+from pipeline.identify.posterior.residuals import BINS, LEAST_POINTS
 from pipeline.identify.results.theta import content_of
 from pipeline.identify.results.units import SI_UNITS
 from pipeline.params import Params
@@ -89,6 +91,7 @@ def fit_posterior(
 
     Raises:
         NoFit: Simulations fail at the start.
+        UserError: A recording shows no band.
     """
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
     friction = params.methods[method].fixed["dynamic_friction"]
@@ -100,6 +103,13 @@ def fit_posterior(
         launches = LaunchLikelihood(evidence.launches, sling, setup)
     known = {"launches": launches, "workers": workers, "progress": progress}
     found = fit(recordings, coordinates, coordinates.of(start), **known)
+    for one in found.expansions:
+        if not len(one.residuals.frame):
+            print(
+                f"note: {one.residuals.episode.band}: its pictures show fewer than {LEAST_POINTS}"
+                f" points in each of {BINS} parts of the band, so its force alone is fitted",
+                file=sys.stderr,
+            )
     birge = disagreement(found)
     precision = found.hessian / birge**2
     centre = found.phi + np.linalg.solve(found.hessian, found.gradient)

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.simulator.interaction import Rollouts
 from pipeline.simulator.model import ClampedBand
@@ -75,7 +76,8 @@ class Rule:
 class Residuals:
     """Residual vectors of rollouts, in the bins of a reference rollout.
 
-    R residuals: force x, y, z at S samples, then depth and side of M bins.
+    R residuals: force x, y, z at S samples, then depth and side of M bins. Raises UserError where
+    no picture shows the band.
 
     Attributes:
         cutoff: Of the low-pass that the recorded force went through [Hz].
@@ -138,6 +140,12 @@ class Residuals:
             bias = (mean - foot_of_mean) - seen
             frames = np.full(len(good), number)
             found.append((frames, good, edge_of_mean, mean, depth, np.cross(along, depth), bias))
+        if not found:
+            raise UserError(
+                f"episode of {episode.band}: no picture of the drawn band or of its recoil shows"
+                f" {LEAST_POINTS} points of it; look at `sling check --sheet`, and at the keys of"
+                " `cloud` in params.yaml"
+            )
         columns = zip(*found, strict=True)
         self.frame, self.bin, edge, self.point, self.depth, self.side, bias = (
             np.concatenate(column) for column in columns

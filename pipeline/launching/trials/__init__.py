@@ -1,1 +1,1 @@
-"""What is done with a policy: aiming, the robot's pose, trials, and where launches may land."""
+"""Trials: launches as measured and as predicted, and where they may land."""

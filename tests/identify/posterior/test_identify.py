@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.base.errors import UserError
 from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.posterior import coordinates, identify
 from pipeline.identify.posterior.coordinates import Coordinates
@@ -160,3 +161,21 @@ def test_pictures_count_by_time_and_by_the_measured_cloud(exact):
     short = Rule(held=(-0.2, -0.02), force_until=-0.3)
     assert len(short.frames(episode)) < len(count)
     assert len(short.samples(episode)) < len(Rule().samples(episode))
+
+
+def test_a_recording_that_never_shows_the_band_is_refused(exact):
+    empty = replace(exact[0], clouds=[cloud[:3] for cloud in exact[0].clouds])
+    with pytest.raises(UserError, match="no picture of the drawn band .* shows 4 points of it"):
+        found_of(empty)
+
+
+def test_pictures_with_too_few_points_along_the_band_are_said_to_count_for_nothing(exact, capsys):
+    def thinned(cloud: np.ndarray) -> np.ndarray:
+        chosen = np.linspace(0, len(cloud) - 1, 6).astype(int)  # from clamp to clamp
+        return cloud[np.argsort(cloud[:, 0])[chosen]] if len(cloud) else cloud
+
+    few = replace(exact[0], clouds=[thinned(cloud) for cloud in exact[0].clouds])
+    found = found_of(few)
+    assert told_of(found)["recordings"][0]["pictures"] == []
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "fewer than 4 points in each of 16 parts of the band, so its force alone" in line

@@ -11,8 +11,7 @@ from pipeline.base.errors import UserError
 from pipeline.launching.surface.aim import landings_within, secants
 from pipeline.launching.trials.spread import landing_intervals
 from pipeline.launching.trials.stretch import stretch_of
-from pipeline.launching.trials.trials import limited
-from pipeline.simulator.launch import Launches
+from pipeline.simulator.launch import Launches, limited
 from pipeline.simulator.parameters import Parameters
 from sling2sim2real.model import Model
 

@@ -11,6 +11,8 @@ import os
 import platform
 import re
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from pipeline.base.errors import UserError
@@ -105,3 +107,16 @@ def commit(folder: Path) -> str | None:
     except OSError:
         return None
     return git.stdout.strip() or None
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Torch without threads: how many there are would change in which order it sums."""
+    import torch
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)

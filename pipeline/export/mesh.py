@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.simulator.cylinder import cylinder, volumes
 from pipeline.simulator.initial import fixed_frames, hanging_line
-from pipeline.simulator.interaction import GRASP_BLEND
+from pipeline.simulator.interaction import blend
 from pipeline.simulator.model import ROD, ClampedBand
 
 CLAMPED = 0.015  # m of band in each clamp
@@ -105,8 +105,7 @@ def hand_path(episode, times: np.ndarray, grasp: np.ndarray) -> np.ndarray:
     """
     inside = np.clip(times, episode.time[0], episode.time[-1])
     path = CubicSpline(episode.time, episode.position, axis=0)(inside)
-    part = np.clip((times - episode.grasp_time) / GRASP_BLEND, 0, 1)[:, None]
-    return path + (1 - part**3 * (10 - 15 * part + 6 * part**2)) * (grasp - path[0])
+    return path + blend(times, episode)[:, None] * (grasp - path[0])
 
 
 def _hanging(sling: ClampedBand, arc: np.ndarray, rest: np.ndarray) -> np.ndarray:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import copy
 import io
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from pipeline.base.machine import one_thread
 from pipeline.base.progress import Progress
 from pipeline.launching.surface.simulated import Source
 from pipeline.params.launches import PolicyParams, Reward
@@ -153,17 +153,6 @@ def train(
         runner.logger = training  # pyright: ignore[reportAttributeAccessIssue]
         runner.learn(params.iterations)  # once: another call would start from stale observations
     return training.result()
-
-
-@contextlib.contextmanager
-def one_thread() -> Iterator[None]:
-    """Sums of several threads would hang on how many there are."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
 
 
 def earned(

@@ -116,8 +116,13 @@ def _lead(rows: np.ndarray, hand: CubicSpline, sling: ClampedBand, episode: Epis
     since = time[opening] - episode.release_time
     rows["grip_force"][opening] = sling.grip_force * since / sling.finger_opening_time
     rows["target"] = hand(_within(time, episode))
+    rows["blend"] = blend(time, episode)
+
+
+def blend(time: np.ndarray, episode: Episode) -> np.ndarray:
+    """What share is left, at times (T,), of the way from the grasp to the hand's path."""
     part = np.clip((time - episode.grasp_time) / GRASP_BLEND, 0, 1)
-    rows["blend"] = 1 - part**3 * (10 - 15 * part + 6 * part**2)
+    return 1 - part**3 * (10 - 15 * part + 6 * part**2)
 
 
 def interact(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -123,7 +123,23 @@ def launch(
     shares = np.array_split(np.arange(count), len(devices))
     with ThreadPoolExecutor(len(devices)) as pool:
         lanes = np.concatenate(list(pool.map(launched, devices, shares)))
-    return outcomes(band, setup, parameters, lanes, draws, max_force)
+    return limited(outcomes(band, setup, parameters, lanes, draws), max_force)
+
+
+def limited(launches: Launches, max_force: float) -> Launches:
+    """Launches by an arm that can hold no more than `max_force` [N]."""
+    force = launches.hold_force
+    over = force > max_force
+    failure = [
+        too_strong(force[i], max_force) if over[i] else reason
+        for i, reason in enumerate(launches.failure)
+    ]
+    unknown = {
+        field.name: np.where(over, np.nan, getattr(launches, field.name))
+        for field in fields(launches)
+        if field.name not in ("hold_force", "failure")
+    }
+    return replace(launches, **unknown, failure=failure)
 
 
 def landing_gradient(
@@ -146,7 +162,6 @@ def outcomes(
     parameters: Parameters,
     lanes: np.ndarray,
     draws: np.ndarray,
-    max_force: float,
 ) -> Launches:
     """Of launches from draws (N, 2), by the slings' records (N,) of records.LANE."""
     outcome = np.round(lanes["outcome"])
@@ -166,8 +181,6 @@ def outcomes(
     failure[(lanes["lowest"] <= floor) | ((outcome == Outcome.SEPARATED) & (z <= floor))] = DRAGGED
     half = np.hypot(band.half_width, np.linalg.norm(draws, axis=1))
     failure[half <= band.rest_length / 2] = SLACK
-    for i in np.flatnonzero(hold_force > max_force):
-        failure[i] = too_strong(hold_force[i], max_force)
     failure[~np.isfinite(hold_force)] = "the simulation did not converge"
     good = np.array([reason is None for reason in failure])
 

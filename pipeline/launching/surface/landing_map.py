@@ -108,11 +108,6 @@ class LandingMap:
             checks=np.column_stack([random, landing[count:], force[count:]]),
         )
 
-    @property
-    def reasons(self) -> list[str]:
-        """Names of the failure codes; code 0 is success."""
-        return self.surface.reasons
-
     def __call__(self, draws: np.ndarray) -> Landings:
         """Landings of draws, shape (N, 2) [m], read off the splines."""
         return self.surface(draws)

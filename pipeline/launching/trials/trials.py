@@ -7,14 +7,13 @@ the simulator's), "measured" (a user's CSV) or "predicted" (nothing but the cali
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.base.failures import too_strong
 from pipeline.base.files import replacing
 from pipeline.base.layout import made
 from pipeline.base.pool import Pool
@@ -22,7 +21,7 @@ from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.measured import Measured
 from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params import Params
-from pipeline.simulator.launch import Launches
+from pipeline.simulator.launch import Launches, limited
 from pipeline.simulator.parameters import Parameters
 
 SCHEMA = pa.schema(
@@ -170,22 +169,6 @@ def predict(
     intervals = landing_intervals(launcher, once, samples, error)[again]
     intervals[np.isnan(launches.landing_y)] = np.nan
     return launches, intervals
-
-
-def limited(launches: Launches, max_force: float) -> Launches:
-    """Launches of a simulator without a limit, by an arm that can hold no more than `max_force`."""
-    force = launches.hold_force
-    over = force > max_force
-    failure = [
-        too_strong(force[i], max_force) if over[i] else reason
-        for i, reason in enumerate(launches.failure)
-    ]
-    unknown = {
-        field.name: np.where(over, np.nan, getattr(launches, field.name))
-        for field in fields(launches)
-        if field.name not in ("hold_force", "failure")
-    }
-    return replace(launches, **unknown, failure=failure)
 
 
 def table(

@@ -17,9 +17,8 @@ from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.spread import MOST, landing_intervals
 from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
-from pipeline.launching.trials.trials import limited
 from pipeline.params import Params
-from pipeline.simulator.launch import Launches, landing_gradient
+from pipeline.simulator.launch import Launches, landing_gradient, limited
 from pipeline.simulator.parameters import Parameters
 
 

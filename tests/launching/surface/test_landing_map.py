@@ -50,7 +50,7 @@ def test_fails_exactly_the_draws_above_the_force_limit() -> None:
     clear = np.abs(force - limit) > 1e-3
     assert 50 < (force > limit).sum() < 450
     np.testing.assert_array_equal(landed.failure[clear] > 0, force[clear] > limit)
-    assert {chart.reasons[code] for code in landed.failure} == {"", TOO_MUCH_FORCE}
+    assert {chart.surface.reasons[code] for code in landed.failure} == {"", TOO_MUCH_FORCE}
     assert np.isnan(landed.landing_y[landed.failure > 0]).all()
 
 
@@ -64,7 +64,7 @@ def test_does_not_read_across_failed_launches() -> None:
     assert beyond.sum() > 20 and safe.sum() > 300
     assert (landed.failure[beyond] > 0).all() and np.isnan(landed.landing_y[beyond]).all()
     assert not landed.failure[safe].any()
-    assert chart.reasons[landed.failure[beyond][0]] == "it broke"
+    assert chart.surface.reasons[landed.failure[beyond][0]] == "it broke"
     error = np.abs(landed.landing_y - toy.launch(draws).landing_y)[safe]
     assert error.max() < 0.02 and np.median(error) < 1e-4
 
@@ -72,7 +72,7 @@ def test_does_not_read_across_failed_launches() -> None:
 def test_refuses_draws_outside_the_box() -> None:
     chart = simulate()
     landed = chart(np.array([[-0.46, -0.2], [-0.3, -0.05], [-0.45, -0.3]]))
-    assert [chart.reasons[code] for code in landed.failure] == [OUTSIDE, OUTSIDE, ""]
+    assert [chart.surface.reasons[code] for code in landed.failure] == [OUTSIDE, OUTSIDE, ""]
 
 
 def test_validation_sees_an_error_of_the_map() -> None:
@@ -99,6 +99,6 @@ def test_survives_the_file(tmp_path) -> None:
 def test_a_box_in_which_every_launch_fails() -> None:
     chart = simulate(broken_beyond(-np.inf))
     landed = chart(random_draws(20))
-    assert {chart.reasons[code] for code in landed.failure} == {"it broke"}
+    assert {chart.surface.reasons[code] for code in landed.failure} == {"it broke"}
     nothing = {"draws": 0, "mean_error_m": None, "max_error_m": None}
     assert validation(chart, (1.4, 2.4))["box"] == nothing

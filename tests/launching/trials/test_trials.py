@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from pipeline.launching.trials.trials import SCHEMA, Batch, launched, limited, table
+from pipeline.launching.trials.trials import SCHEMA, Batch, launched, table
 from pipeline.params import load
-from pipeline.simulator.launch import Launches, launch
+from pipeline.simulator.launch import Launches, launch, limited
 from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import Parameters
 

@@ -90,7 +90,7 @@ class Flight:
 
     def outcome(self) -> Pushed:
         """What became of them."""
-        done = outcomes(self.sling, self.setup, self.parameters, self.lanes, self.draws, np.inf)
+        done = outcomes(self.sling, self.setup, self.parameters, self.lanes, self.draws)
         failure = np.where(self.burst, BURST, np.array(done.failure, object)).tolist()
         return Pushed(replace(done, failure=failure), self.gained)
 

@@ -8,13 +8,12 @@ ask for other points.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import qmc
 
+from pipeline.base.machine import one_thread
 from pipeline.identify.objective.box import reflect
 from pipeline.identify.search.loop import latin_hypercube
 
@@ -65,7 +64,9 @@ class Bayes:
     def ask(self) -> np.ndarray:
         """The Latin hypercube, then the batch of a round, shape (population, D)."""
         if self._round:
-            with quiet_on_one_thread():
+            with one_thread(), warnings.catch_warnings(record=True):  # BoTorch turns some on itself
+                # It warns that an optimisation ends early, as ours mean to, and of close points.
+                warnings.simplefilter("ignore")
                 self._asked = self._batch()
         return self._asked
 
@@ -164,21 +165,3 @@ def greedy(samples: np.ndarray, best: float, count: int) -> list[int]:
         better = np.flatnonzero(gain[:, chosen[-1]])  # the others' gains stay what they are
         gain[better] = np.maximum(gain[better] - gain[better, chosen[-1:], None], 0)
     return chosen
-
-
-@contextmanager
-def quiet_on_one_thread() -> Iterator[None]:
-    """Torch without threads, which round sums in another order, and BoTorch without its warnings.
-
-    It warns that an optimisation ends early, as ours mean to, and that points lie close together.
-    """
-    import torch
-
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        with warnings.catch_warnings(record=True):  # it turns some of them on itself
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        torch.set_num_threads(threads)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.episode.episode import Episode
-from pipeline.identify.posterior.residuals import Residuals, Rule
+from pipeline.identify.posterior.residuals import Residuals
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
@@ -134,14 +134,11 @@ class Likelihood:
         sling: ClampedBand,
         cutoff: float,
         friction: float,
-        tolerances: Tolerances | None = None,
-        rule: Rule | None = None,
     ) -> None:
         """`friction` is what the method fixes, of the pads."""
         self.episode, self.cutoff = episode, cutoff
         self.sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
-        self.tolerances = tolerances or Tolerances.of(episode)
-        self.rule = rule or Rule()
+        self.tolerances = Tolerances.of(episode)
         end = np.searchsorted(episode.time, episode.release_time)
         place = episode.position[max(end - 5, 0) : end].mean(axis=0)
         self._away = place / np.linalg.norm(place)
@@ -184,7 +181,7 @@ class Likelihood:
         jobs += [(around[:1], nuisances + nudge) for nudge in np.diag(NUDGE)]
         first, *others = pool.map(lambda job: self.simulate(*job), jobs)
         residuals = residuals or Residuals(
-            self.episode, self.sling, self.cutoff, first.center_line[0], self.rule
+            self.episode, self.sling, self.cutoff, first.center_line[0]
         )
         vectors = residuals(first)
         moved = np.concatenate([residuals(one) for one in others])

@@ -16,7 +16,7 @@ from pipeline.simulator.parameters import Parameters
 
 
 def asked_of_the_hand(
-    params: Params, band: str, content: dict, draw: np.ndarray, root: str | Path = "."
+    params: Params, band: str, content: dict, draw: np.ndarray
 ) -> dict[str, float | None] | None:
     """How the hand must draw a band whose law remembers it, and what it costs not to.
 
@@ -27,7 +27,7 @@ def asked_of_the_hand(
     setup = launch_setup(params, content)
     if setup.history is None:
         return None
-    sling, theta = calibrated(params, band, content, root), parameters_of(content)
+    sling, theta = calibrated(params, band, content), parameters_of(content)
     longer = replace(setup, history=replace(setup.history, pause=setup.history.pause + 1))
     landings = [launch(sling, one, theta, draw).landing_y[0] for one in (setup, longer)]
     moved = float(np.diff(landings)[0])
@@ -42,7 +42,6 @@ def simulator(
     params: Params,
     band: str,
     content: dict,
-    max_force: float = np.inf,
     root: str | Path = ".",
     device: str | Sequence[str] = "cpu",
 ) -> Callable[..., Launches]:
@@ -54,7 +53,6 @@ def simulator(
     setup, threads = launch_setup(params, content), cores()
 
     def launcher(draws: np.ndarray, parameters: Parameters = best) -> Launches:
-        options = {"max_force": max_force, "device": device, "workers": threads}
-        return launch(sling, setup, parameters, draws, **options)
+        return launch(sling, setup, parameters, draws, device=device, workers=threads)
 
     return launcher

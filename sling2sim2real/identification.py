@@ -244,12 +244,7 @@ def _sling(band: Band, settings: Settings, mounting: Mounting | None) -> Clamped
 
 def _clamps(episode: Episode, band: Band, settings: Settings) -> ClampCalibration:
     sling = ClampedBand.of(band, settings.setup, settings.sling, as_rod=True)
-    return calibrate_clamps(
-        sling,
-        episode,
-        lambda part: EpisodeLoss.plain(settings, part, sling),
-        workers=cores(),
-    )
+    return calibrate_clamps(settings, sling, episode, workers=cores())
 
 
 def _evaluator(episode: Episode, sling: ClampedBand, settings: Settings) -> Evaluator:

@@ -11,7 +11,6 @@ from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
 from pipeline.base.machine import cores
 from pipeline.identify.clamps import calibrate_clamps
-from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.objective.session import load_episode
 from pipeline.simulator.model import ClampedBand
 from stages.start import run, started
@@ -21,12 +20,7 @@ def main() -> None:
     params, band = started("band")
     # with the rod, whatever simulates afterwards: a solid mesh has no rigidity to fit
     sling = ClampedBand.of(params.bands[band], params.setup, params.sling, as_rod=True)
-    found = calibrate_clamps(
-        sling,
-        load_episode(band),
-        lambda part: EpisodeLoss.plain(params, part, sling),
-        workers=cores(),
-    )
+    found = calibrate_clamps(params, sling, load_episode(band), workers=cores())
     write_json(Layout().clamps(band), vars(found))
     print(
         f"{band}: clamps at {found.clamp_angle_deg:.1f} deg, bending"

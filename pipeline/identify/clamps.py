@@ -9,7 +9,6 @@ the clamps.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -20,6 +19,7 @@ from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.episode.phases import taut_time
 from pipeline.identify.objective.loss import EpisodeLoss
+from pipeline.params import Params
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
@@ -98,17 +98,12 @@ class ClampCalibration:
 
 
 def calibrate_clamps(
-    sling: ClampedBand,
-    episode: Episode,
-    make_loss: Callable[[Episode], EpisodeLoss],
-    *,
-    workers: int,
+    params: Params, sling: ClampedBand, episode: Episode, *, workers: int
 ) -> ClampCalibration:
     """Fit the clamps' angle and the flexural rigidity to the slack part of an episode.
 
     Args:
         sling: With the setup's clamp direction, as where the angle is 0.
-        make_loss: The loss of the slack episode.
 
     Raises:
         UserError: The band never hangs slack, or no simulation of its slack part converges.
@@ -116,7 +111,7 @@ def calibrate_clamps(
     young = nominal_young(sling, episode)
     solid = young * np.pi * sling.radius**4 / 4
     part = slack_part(episode)
-    loss = make_loss(part)
+    loss = EpisodeLoss.plain(params, part, sling)
     one = Parameters.of(sling.law, np.array([young, POISSON, 5e-3, 1.0, 1.0]))
     held_fast = replace(sling, grip_force=1e6)
 

@@ -18,7 +18,6 @@ from pipeline.base.schema import read_json
 from pipeline.episode.episode import Episode
 from pipeline.identify.clamps import calibrate_clamps
 from pipeline.identify.objective.box import SearchBox
-from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.posterior.launches import Observed
 from pipeline.identify.results.mounting import Mounting
 from pipeline.launching.surface.landing_map import LandingMap
@@ -55,9 +54,7 @@ def calibrated_clamps(params: Params, band: str, episode: Episode, folder: Path)
     """Keep an episode in `folder`, with its clamps beside it."""
     episode.save(folder / "episode")
     sling = ClampedBand.of(params.bands[band], params.setup, params.sling, as_rod=True)
-    clamps = calibrate_clamps(
-        sling, episode, lambda part: EpisodeLoss.plain(params, part, sling), workers=1
-    )
+    clamps = calibrate_clamps(params, sling, episode, workers=1)
     write_json(folder / "mounting.json", vars(clamps))
 
 

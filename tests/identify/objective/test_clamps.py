@@ -8,7 +8,6 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.identify.clamps import calibrate_clamps, nominal_young, slack_part
-from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.results.mounting import Mounting
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
@@ -37,9 +36,7 @@ def episode(sling: ClampedBand) -> Episode:
 
 
 def test_angle_and_rigidity_are_found(sling, episode):
-    found = calibrate_clamps(
-        sling, episode, lambda part: EpisodeLoss.plain(PARAMS, part, sling), workers=2
-    )
+    found = calibrate_clamps(PARAMS, sling, episode, workers=2)
     assert found.clamp_angle_deg == pytest.approx(15.0, abs=5.0)
     assert found.flexural_rigidity == pytest.approx(RIGIDITY * SOLID, rel=0.25)
     assert found.loss["fitted"] < found.loss["solid_and_vertical"]

@@ -10,6 +10,7 @@ from pipeline.report.card.values import ShownValue
 from pipeline.report.card.verdict import CARE, NO, TRUSTED, Reason, inside, launches_of
 from pipeline.report.drawing.names import as_code
 
+# From the card's folder; its page stands alone.
 GLOSSARY = "../../../docs/glossary.md"
 SAID = {TRUSTED: "can be trusted", CARE: "use with care", NO: "do not use it"}
 
@@ -79,6 +80,7 @@ def card_text(
         "*The release, 50 times slower. Left: the camera's picture and the simulated band in it."
         " Right: the camera's points and the simulated band.*\n"
     )
+    meanings = f"\n[What each of them is]({GLOSSARY}).\n"
     return f"""\
 # {inputs.band}: {SAID[verdict]}
 
@@ -86,7 +88,7 @@ def card_text(
 {note if rig else ""}{animation if animated else ""}
 ## Values
 
-{_values(shown)}
+{_values(shown)}{meanings if animated else ""}
 ![Values with their intervals](values.png)
 
 ## Where to draw
@@ -120,7 +122,7 @@ def _values(shown: list[ShownValue]) -> str:
         lines.append(f"| {one.label} | {f'{one.value:g} {one.unit}'.strip()} | {interval} |")
     fixed = ", ".join(f"{one.label} {one.value:g}" for one in shown if one.fixed)
     told = f"\nFixed, for no pull shows them: {fixed}.\n" if fixed else ""
-    return "\n".join(lines) + "\n" + told + f"\n[What each of them is]({GLOSSARY}).\n"
+    return "\n".join(lines) + "\n" + told
 
 
 def _draws(inputs: CardInputs) -> str:

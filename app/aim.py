@@ -109,6 +109,6 @@ def aim(
 
 
 def why_refused(answer: Answer) -> str | None:
-    """Why no robot should carry an answer out: it misses by safety.MISS or more, or fails."""
-    wrong = [one.what for one in answer["warnings"] if one.about in ("miss", "failure")]
-    return wrong[0] if wrong else None
+    """Why no robot should carry an answer out: it misses, fails, or the arm may not hold it."""
+    found = {one.about: one.what for one in answer["warnings"]}
+    return next((found[about] for about in ("failure", "miss", "force") if about in found), None)

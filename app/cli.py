@@ -102,8 +102,8 @@ def add_recording(arguments: argparse.Namespace) -> Done:
 
 @command(
     "say whether a band changed: each recording identified alone, drawn over time",
-    "band1",
-    flag("band", metavar="BAND", help="of params.yaml, with two recordings or more"),
+    "--band band1",
+    BAND,
     JSON,
 )
 def drift(arguments: argparse.Namespace) -> Done:
@@ -182,17 +182,23 @@ def plan(arguments: argparse.Namespace) -> Done:
 
 @command(
     "simulate one launch with identified or hand-written parameters",
-    "--theta data/theta/band1/least_squares.json --band band1 --draw=-0.30,-0.17",
-    flag("--theta", type=Path, required=True, metavar="FILE", help="θ file, data/theta/...json"),
+    "--band band1 --draw=-0.30,-0.17",
     BAND,
     DRAW,
+    flag("--method", metavar="NAME", help=f"whose θ; default {DEFAULT_METHOD}"),
+    flag("--theta", type=Path, metavar="FILE", help="a θ file instead, such as of your own"),
     JSON,
 )
 def launch(arguments: argparse.Namespace) -> Done:
     from app import launch, safety
-    from pipeline.params import load
+    from pipeline.params import expect_known, load
 
-    answer = launch.launched(load(), arguments.band, arguments.theta, arguments.draw)
+    params, method = load(), arguments.method or DEFAULT_METHOD
+    if arguments.theta and arguments.method:
+        arguments.refuse("give --method or --theta, not both")
+    expect_known(params, "method", method, called="--method")
+    theta = arguments.theta or Layout().theta(arguments.band, method)
+    answer = launch.launched(params, arguments.band, theta, arguments.draw)
     return safety.shown(answer, arguments.json)
 
 
@@ -204,7 +210,7 @@ def launch(arguments: argparse.Namespace) -> Done:
     flag(
         "--target", type=kinds.target, required=True, metavar="M", help="along the floor, in metres"
     ),
-    flag("--force", action="store_true", help="answer even if the draw misses by over 5 cm"),
+    flag("--force", action="store_true", help="answer even if it misses, fails or pulls too hard"),
     JSON,
 )
 def aim(arguments: argparse.Namespace) -> Done:

@@ -20,7 +20,7 @@ EXITS = {
     0: "done",
     1: "bad input, a stage that failed, or a recording that cannot be used: one line says what",
     2: "a command line that cannot be understood",
-    3: "refused: a draw that misses its target, or fails, in simulation (`sling aim`)",
+    3: "refused: a draw that misses, fails or takes more force than the arm may hold (`sling aim`)",
     130: "interrupted",
 }
 REFUSED = 3

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from scipy.special import ndtri
 
 from app import evidence, safety
 from app.flow import child
@@ -21,8 +20,6 @@ from pipeline.launching.trials.spread import LEVEL, landing_intervals
 from pipeline.params import Params, expect_known
 from pipeline.params.identification import LEAST_SQUARES
 from stages.start import stage_of
-
-FAR = 3.0  # standard deviations of a predicted landing, from which a measured one is doubted
 
 
 def observe(
@@ -78,18 +75,15 @@ def observe(
 
 
 def doubted(before: dict | None, landing: float, file: str) -> Iterator[Hazard]:
-    """A measured landing [m] that is far from what `known` said before, by its own interval."""
+    """A measured landing [m] outside the interval that `known` gave before."""
     if before is None or before["interval_90_m"] is None:
         return
     low, high = before["interval_90_m"]
-    spread = max((high - low) / (2 * ndtri((1 + LEVEL) / 2)), 1e-6)
-    away = abs(landing - before["landing_m"]) / spread
-    if away > FAR:
+    if not low <= landing <= high:
         yield Hazard(
             "miss",
-            f"{landing:g} m is {away:.0f} standard deviations from the predicted"
-            f" {before['landing_m']:.3f} m: if draw or landing was mistaken, take its row out of"
-            f" {file}",
+            f"{landing:g} m lies outside the predicted interval, {low:.3f} to {high:.3f} m: if draw"
+            f" or landing was mistaken, take its row out of {file}",
         )
 
 

@@ -14,6 +14,8 @@ target, z up. Nothing is read from or written to disk but by functions that take
 is a `UserError` of one line.
 """
 
+from importlib.metadata import PackageNotFoundError, version
+
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.launches import Observed
@@ -57,3 +59,8 @@ __all__ = [
     "simulate",
     "simulate_batch",
 ]
+
+try:
+    __version__ = version("sling2sim2real")
+except PackageNotFoundError:  # run from a folder that was never installed
+    __version__ = "unknown"

@@ -26,6 +26,7 @@ from pipeline.identify.posterior.launches import Evidence, Observed
 from pipeline.identify.results.mounting import Mounting
 from pipeline.identify.results.theta import ThetaFile, load_samples, load_theta, parameters_of
 from pipeline.identify.results.units import SI_UNITS
+from pipeline.launching.surface.stored import Stored
 from pipeline.launching.trials.stretch import recorded_stretch
 from pipeline.params.identification import parameter_names
 from pipeline.params.provenance import changed_since
@@ -68,6 +69,7 @@ class Identification(Model):
             is extrapolated.
         changed: Settings of params.yaml that have changed since a run identified the band, in
             words.
+        policy: That the run trained; `aim` asks it. None where there is none.
     """
 
     intervals: dict[str, Interval] = field(default_factory=dict, repr=False)
@@ -75,6 +77,7 @@ class Identification(Model):
     settled: bool = False
     stretch: float | None = None
     changed: tuple[str, ...] = field(default=(), repr=False)
+    policy: Stored | None = field(default=None, repr=False, compare=False)
 
     def save(self, path: str | Path) -> None:
         """Write all of it as one JSON file, settings included."""
@@ -131,6 +134,7 @@ class Identification(Model):
         file = ThetaFile.model_validate(content)
         samples = load_samples(layout.confidence(band, method), parameters_of(content))
         path, told = layout.clamps(band), content.get("confidence")
+        policy = Stored(band, method, layout.root)
         there = layout.episode(band).is_dir()
         episodes = Episode.load_all(layout.episodes(band)) if there else []
         return cls(
@@ -144,6 +148,7 @@ class Identification(Model):
             settled=bool(told and told["settled"]),
             stretch=_stretch(episodes, settings, about),
             changed=tuple(map(str, changed_since(settings, content, method))),
+            policy=policy if policy.folder.is_dir() else None,
         )
 
 

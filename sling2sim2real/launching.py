@@ -13,9 +13,11 @@ from pipeline.launching.trials.spread import landing_intervals
 from pipeline.launching.trials.stretch import stretch_of
 from pipeline.simulator.launch import Launches, limited
 from pipeline.simulator.parameters import Parameters
+from sling2sim2real.arguments import drawn, number
 from sling2sim2real.model import Model
 
 FINE = 201  # nodes along y and z, between which a target is sought on the map
+TARGETS = 0.1, 20.0  # m
 TRIES = 8  # launches at most to get there from the map
 ROUNDING = 1e-3  # of a stretch
 
@@ -83,14 +85,10 @@ def launch(model: Model, draw: tuple[float, float]) -> Launch:
     Raises:
         UserError: No such draw can be. A launch that fails says so in `failure`.
     """
-    floor = -model.settings.setup.fork_height
-    if not (np.shape(draw) == (2,) and draw[0] < 0 and draw[1] > floor):
-        raise UserError(
-            f"draw: must be (y, z) with y < 0 and z > {floor:g} (the floor), got {draw}"
-        )
-    done = limited(model.launches(draw), model.settings.setup.max_force)
+    draw = drawn(draw, -model.settings.setup.fork_height)
+    done = limited(model.launches(np.array(draw)), model.settings.setup.max_force)
     return Launch(
-        draw=(float(draw[0]), float(draw[1])),
+        draw=draw,
         landing=float(done.landing_y[0]),
         speed=float(done.speed[0]),
         angle=float(done.angle[0]),
@@ -101,12 +99,12 @@ def launch(model: Model, draw: tuple[float, float]) -> Launch:
 
 
 def aim(model: Model, target: float) -> Aim:
-    """The gentlest draw that lands on a target: of all in the box that do, that of least force.
+    """The draw for a target: that of the run's policy, as `sling aim` has it, or the gentlest.
 
-    No policy is trained: launches over the box are simulated once a model
-    (`Model.landing_map`), the target's curve is read off them, and a few more launches along the
-    draw's own line bring it to the target. `sling aim` asks a trained policy instead; both are
-    judged by launches of the same simulator.
+    `Identification.of_run` knows the policy that the run trained. Other models have none: launches
+    over the box are simulated once a model (`Model.landing_map`), of all draws that land on the
+    target that of least force is read off them, and a few more launches along the draw's own line
+    bring it there.
 
     >>> from sling2sim2real import Band, Model, Settings, Theta, aim
     >>> band = Band(mass=0.023, diameter=0.010, rest_length=0.52)
@@ -127,8 +125,12 @@ def aim(model: Model, target: float) -> Aim:
     Raises:
         UserError: No draw in the box and within the arm's force lands there.
     """
-    start = _gentlest(model, target)
-    draw = _refined(model, start, target)
+    target = number("target", target, *TARGETS)
+    policy = getattr(model, "policy", None)
+    if policy is None:
+        draw = _refined(model, _gentlest(model, target), target)
+    else:
+        draw = policy.draws(np.array([target]))[0]
     found = launch(model, tuple(draw))
     if found.failure:
         raise UserError(f"target {target:g} m: the draw for it fails: {found.failure}")
@@ -201,5 +203,8 @@ def _warnings(
             f"the draw stretches the band by {100 * (asked - 1):.1f} %, its recordings by"
             f" {100 * (known - 1):.1f} % at most: force and landing are extrapolated"
         )
+    policy = getattr(model, "policy", None)
+    if policy is not None and policy.card()["theta"] != model.theta.content("")["theta"]:
+        yield "the policy was trained with another θ than there is now"
     for change in getattr(model, "changed", ()):
         yield f"params.yaml: {change}, since θ was identified"

@@ -17,6 +17,7 @@ from pipeline.identify.results.mounting import Mounting
 from pipeline.identify.results.theta import ThetaFile, parameters_of
 from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.params.identification import LAWS
+from pipeline.params.lab import BandParams
 from pipeline.simulator.launch import Launches
 from pipeline.simulator.launch import launch as launch_many
 from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
@@ -34,6 +35,10 @@ class Band:
     >>> from sling2sim2real import Band
     >>> Band(mass=0.023, diameter=0.010, rest_length=0.52).name
     'band'
+    >>> Band(mass=23, diameter=0.010, rest_length=0.52)
+    Traceback (most recent call last):
+    ...
+    pipeline.base.errors.UserError: Band: mass: must be between 0.0001 and 1, got 23 (kg, m)
 
     Attributes:
         mass: Between the clamps [kg].
@@ -46,6 +51,13 @@ class Band:
     diameter: float
     rest_length: float
     name: str = "band"
+
+    def __post_init__(self) -> None:
+        sizes = {name: _plain(getattr(self, name)) for name in ("mass", "diameter", "rest_length")}
+        try:
+            BandParams.model_validate({"source": "recording", **sizes})
+        except ValidationError as error:
+            raise UserError(f"Band: {explained(error, BandParams)} (kg, m)") from error
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ class Objective:
 
         Args:
             model: The band, its mounting and settings. Of its θ the paper's loss takes what has no
-                axis (drag, damping of turns), your own nothing.
+                axis (air drag, rotational damping share), your own nothing.
             episodes: At least one.
             method: Of `settings.methods`: its law, box, fixed parameters and weights.
             loss: Your own, of a simulation; None: the paper's, of geometry, force and work.

@@ -12,6 +12,8 @@ import pytest
 from ruamel.yaml import YAML
 
 from app.cli import parser
+from pipeline.report.card.text import GLOSSARY
+from pipeline.report.quantities import QUANTITIES
 from tests.project import ROOT
 from validation.marked import CODE_BLOCK
 
@@ -106,6 +108,14 @@ def test_links_paths_and_anchors_of_every_page_are_there() -> None:
                 wrong.append((str(page.relative_to(ROOT)), str(path), head))
     assert named > 100
     assert wrong == []
+
+
+def test_the_glossary_has_each_label_of_a_card() -> None:
+    rows = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8").splitlines()
+    for one in QUANTITIES.values():
+        row = re.compile(rf"\| {re.escape(one.label)}( \S+)? \|")
+        assert any(map(row.match, rows)), one.label
+    assert (ROOT / "reports/bands/band1" / GLOSSARY).resolve() == ROOT / "docs/glossary.md"
 
 
 def test_every_page_is_in_the_index() -> None:

@@ -178,5 +178,5 @@ def mujoco():
     try:
         import mujoco
     except ImportError as error:
-        raise UserError("mujoco is not installed: pip install -e '.[validation]'") from error
+        raise UserError("mujoco is not installed: make setup") from error
     return mujoco

@@ -79,5 +79,6 @@ def loader() -> ModuleType:
     try:
         from pipeline.export import newton_band
     except ImportError as error:
-        raise UserError("newton is not installed: pip install -e '.[validation]'") from error
+        cure = "pip install -e '.[export]' -c constraints.txt"
+        raise UserError(f"newton is not installed: {cure}") from error
     return newton_band

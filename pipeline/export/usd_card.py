@@ -40,8 +40,8 @@ two clamps, and the clamps' attachments. Hand, projectile and pouch are yours to
 **What the match leaves, by the law of both.** PhysX's law is stiffer than rubber the more it is
 stretched. With one modulus, a straight string of it pulls by {min(errors):+.0f} to
 {max(errors):+.0f} % off at stretches from {min(stretches):.2f} to {max(stretches):.2f}, where the
-launches around the targets are. Relaxation, Mooney's share, the damping scale, the damping of turns
-and the returned share have no slot, and nothing stands in for them.
+launches around the targets are. Relaxation, Mooney's share, the damping scale, the rotational
+damping share and the returned share have no slot, and nothing stands in for them.
 
 **Time step.** {1e3 * card["time_step_s"]:g} ms and {card["iterations"]} iterations are the paper's.
 Steps of this length lose launch speed.

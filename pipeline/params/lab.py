@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -86,6 +87,11 @@ class BandParams(Section):
     mass: Annotated[float, Range(1e-4, 1)]
     diameter: Annotated[float, Range(5e-4, 0.05)]
     rest_length: Annotated[float, Range(0.05, 3)]
+
+    @property
+    def density(self) -> float:
+        """Mean over a solid cylinder of this size [kg/m^3]."""
+        return self.mass / (math.pi / 4 * self.diameter**2 * self.rest_length)
 
 
 class Topics(Section):

@@ -114,10 +114,11 @@ def test_says_the_pull_and_pause_that_rubber_takes_for_granted(root) -> None:
     assert answer == plain | {"pull_and_pause_s": [4.0, 5.0]}
 
 
-def test_warns_outside_the_trained_range_and_above_the_force(root) -> None:
+def test_warns_outside_the_trained_range_and_refuses_above_the_force(root) -> None:
     assert "target" in abouts(shoot(root, 2.7)) and "target" not in abouts(shoot(root, 2.4))
     weak = SimpleNamespace(**{**vars(PARAMS.setup), "max_force": 1.0})
-    assert "force" in abouts(shoot(root, 1.925, setup=weak))
+    answer = shoot(root, 1.925, setup=weak)
+    assert "force" in abouts(answer) and "more than setup.max_force" in str(why_refused(answer))
 
 
 def test_a_draw_that_misses_by_more_than_5_cm_is_to_be_refused(root) -> None:

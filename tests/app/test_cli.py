@@ -74,6 +74,7 @@ def test_the_documented_commands_are_understood() -> None:
     assert (looked.band, looked.sheet, looked.rrd) == ("band1", Path("o.png"), Path("o.rrd"))
     launched = parse("launch --theta t.json --band band1 --draw=-0.30,-0.17".split())
     assert (launched.theta, launched.draw) == (Path("t.json"), (-0.30, -0.17))
+    assert parse("launch --band band1 --draw=-0.3,-0.1".split()).method is None
     aimed = parse("aim --band band1 --target 1.925".split())
     assert (aimed.method, aimed.target, aimed.json) == ("least_squares", 1.925, False)
     assert not aimed.force and parse("aim --band b --target 2 --force".split()).force
@@ -92,6 +93,7 @@ def test_a_command_line_that_makes_no_sense(refused) -> None:
         ("", "required: COMMAND"),
         ("lunch", "invalid choice: 'lunch'"),
         ("launch --theta t.json --band band1", "required: --draw"),
+        ("drift band1", "required: --band"),
         ("launch --theta t.json --band band1 --draw -0.30,-0.17", "joined by ="),
         ("launch --theta t.json --band band1 --draw=0.30,-0.17", "y must be below 0"),
         ("launch --theta t.json --band band1 --draw=-0.30", "must be Y,Z such as"),
@@ -123,6 +125,8 @@ def test_a_users_mistake(tmp_path: Path, refused) -> None:
     assert "params.yaml: no such file; run this in" in refused(1, *aim, folder=tmp_path)
     for arguments, expected in (
         ("launch --theta none.json --band band1 --draw=-0.30,-0.17", "none.json: no such file"),
+        ("launch --method no --band band1 --draw=-0.30,-0.17", "--method no: not in params.yaml"),
+        ("launch --band band1 --draw=-0.30,-0.60", "lies below the floor"),
         ("launch --theta none.json --band band9 --draw=-0.30,-0.17", "band band9: not in params"),
         ("launch --theta none.json --band band1 --draw=-0.30,-0.60", "lies below the floor"),
         ("aim --band band9 --target 1.925", "band band9: not in params.yaml"),

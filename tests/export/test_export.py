@@ -40,7 +40,7 @@ def test_what_it_refuses(model, tmp_path, monkeypatch) -> None:
     with pytest.raises(UserError, match="holds something else than an export"):
         export(model, "yaml", tmp_path / "mine")
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(UserError, match=r"mujoco is not installed: pip install -e '.\[valid"):
+    with pytest.raises(UserError, match=r"mujoco is not installed: make setup"):
         export(model, "mjcf", tmp_path / "toy")
     assert [one.name for one in tmp_path.rglob("*")] == ["mine", "thesis.tex"]
 

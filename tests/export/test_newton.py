@@ -16,8 +16,8 @@ from pipeline.simulator.launch import ballistic_landing
 from pipeline.simulator.model import GRAVITY
 from sling2sim2real import UserError, export
 
-pytest.importorskip("newton", reason="newton: pip install -e '.[validation]'")
-pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[validation]'")
+pytest.importorskip("newton", reason="newton: pip install -e '.[export]'")
+pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[export]'")
 
 
 @pytest.fixture(scope="module")
@@ -124,6 +124,6 @@ def test_without_newton_it_is_refused(model, tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "newton", None)
     monkeypatch.delitem(sys.modules, "pipeline.export.newton_band", raising=False)
     monkeypatch.delattr("pipeline.export.newton_band", raising=False)
-    with pytest.raises(UserError, match=r"newton is not installed: pip install -e '.\[valid"):
+    with pytest.raises(UserError, match=r"newton is not installed: pip install -e '.\[export"):
         export(model, "newton", tmp_path / "toy")
     assert list(tmp_path.iterdir()) == []

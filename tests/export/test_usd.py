@@ -29,8 +29,8 @@ def test_it_says_that_nobody_has_run_it(done) -> None:
 
 
 def test_usd_and_the_schemas_of_physx_know_all_that_is_in_it(done) -> None:
-    pytest.importorskip("pxr", reason="usd-core: pip install -e '.[validation]'")
-    pytest.importorskip("physx_usd_schemas", reason="pip install -e '.[validation]'")
+    pytest.importorskip("pxr", reason="usd-core: pip install -e '.[export]'")
+    pytest.importorskip("physx_usd_schemas", reason="pip install -e '.[export]'")
     import physx_usd_schemas
     from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
 

@@ -1,12 +1,15 @@
 """An aim lands on its target by the gentlest draw, and says what it does not know."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
+from pipeline.launching.surface.stored import Stored
 from sling2sim2real import Identification, LaunchHistory, Settings, Theta, aim, launch
+from tests.policy.linear import write_policy
 
 
 @pytest.fixture(scope="module")
@@ -51,8 +54,8 @@ def test_what_the_hand_must_do_is_told(world, aimed) -> None:
 
 
 def test_out_of_reach_is_said_with_what_is_in_reach(world) -> None:
-    with pytest.raises(UserError, match=r"target 30 m: no draw .* they land from \d"):
-        aim(world, 30.0)
+    with pytest.raises(UserError, match=r"target 19 m: no draw .* they land from \d"):
+        aim(world, 19.0)
     weak = replace(world, settings=Settings.coarse(setup={"max_force": 0.5}))
     with pytest.raises(UserError, match="none of them lands"):
         aim(weak, 2.0)
@@ -68,5 +71,41 @@ def test_a_launch_that_fails_says_why(world) -> None:
 
 @pytest.mark.parametrize("draw", [(0.3, -0.1), (-0.3, -0.6), (-0.3,), (float("nan"), -0.1)])
 def test_a_draw_that_cannot_be(world, draw) -> None:
+    with pytest.raises(UserError, match="draw: must be"):
+        launch(world, draw)
+
+
+def test_a_runs_policy_is_asked_as_the_command_asks_it(world, tmp_path) -> None:
+    """One that draws along a line: the same draw as `sling aim`, whatever else lands there."""
+    policy = Stored("toy", "none", tmp_path)
+    write_policy(policy.folder / "policy.onnx", (-0.05, 0.0), (-0.2, -0.15))
+    put_card(policy.folder, world.theta.content("toy")["theta"])
+    about = {name: getattr(world, name) for name in ("band", "theta", "settings")}
+    found = aim(Identification(**about, policy=policy), 2.0)
+    np.testing.assert_allclose(found.draw, policy.draws(np.array([2.0]))[0])
+    assert not any("another θ" in one for one in found.warnings)
+    put_card(policy.folder, {"youngs_modulus": 1.0})
+    told = aim(Identification(**about, policy=policy), 2.0).warnings
+    assert any("another θ" in one for one in told)
+
+
+def put_card(folder, theta: dict) -> None:
+    error = {"draws": 1, "mean_error_m": 0.0, "max_error_m": 0.0}
+    card = {
+        "training": {"converged": True, "mean_error_m": 0.0, "max_error_m": 0.0},
+        "landing_map": {"box": error, "target_range": error},
+        "theta": theta,
+    }
+    (folder / "card.json").write_text(json.dumps(card))
+
+
+@pytest.mark.parametrize("target", ["2", None, float("nan"), -1.0, 195, [2.0]])
+def test_a_target_that_is_none_is_refused_by_its_name(world, target) -> None:
+    with pytest.raises(UserError, match="target: must be a number from 0.1 to 20 m"):
+        aim(world, target)
+
+
+@pytest.mark.parametrize("draw", [("a", "b"), 3, (0.3, -0.1), (-0.3, -9.0), (-0.3, np.nan)])
+def test_a_draw_that_is_none_is_refused_by_its_name(world, draw) -> None:
     with pytest.raises(UserError, match="draw: must be"):
         launch(world, draw)

@@ -77,14 +77,24 @@ def test_a_theta_that_cannot_be(values: dict, said: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("sizes", "said"),
     [
-        (Band(23.0, 0.010, 0.52), "bands.band.mass: must be between"),
-        (Band("23 g", 0.010, 0.52), "bands.band.mass: must be a number"),
-        (Band(0.023, 0.010, 0.20), "rest_length"),
-        (Band(0.023, 0.010, 0.52, name="my band"), "a name has at most"),
+        ((23.0, 0.010, 0.52), "Band: mass: must be between 0.0001 and 1, got 23"),
+        (("23 g", 0.010, 0.52), "Band: mass: must be a number"),
+        ((0.023, 10, 0.52), "Band: diameter: must be between"),
+        ((0.023, 0.010, None), "Band: rest_length"),
     ],
 )
-def test_a_band_that_cannot_be(wrong: Band, said: str, world) -> None:
-    with pytest.raises(UserError, match=said):
-        Model(wrong, world.theta)
+def test_a_size_that_no_band_has_is_refused_at_once(sizes, said: str) -> None:
+    with pytest.raises(UserError, match=said) as refusal:
+        Band(*sizes)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_band_that_does_not_fit_the_lab(world) -> None:
+    for wrong, said in (
+        (Band(0.023, 0.010, 0.20), "rest_length"),
+        (Band(0.023, 0.010, 0.52, name="my band"), "a name has at most"),
+    ):
+        with pytest.raises(UserError, match=said):
+            Model(wrong, world.theta)

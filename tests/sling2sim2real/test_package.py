@@ -7,6 +7,8 @@ import zipfile
 
 import pytest
 
+import app
+import sling2sim2real
 from tests.project import ROOT
 from validation.projects import copy_project
 
@@ -56,3 +58,7 @@ def asked(place: str, folder) -> list[str]:
     done = subprocess.run([sys.executable, "-c", ASK], **about)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
+
+
+def test_it_says_its_version() -> None:
+    assert sling2sim2real.__version__ == app.__version__

@@ -220,5 +220,5 @@ def _mujoco():
     try:
         import mujoco
     except ImportError as error:
-        raise UserError("mujoco is not installed: pip install -e '.[validation]'") from error
+        raise UserError("mujoco is not installed: make setup") from error
     return mujoco

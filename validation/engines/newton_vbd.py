@@ -144,5 +144,6 @@ def _newton():
         import newton
         import newton.solvers
     except ImportError as error:
-        raise UserError("newton is not installed: pip install -e '.[validation]'") from error
+        cure = "pip install -e '.[export]' -c constraints.txt"
+        raise UserError(f"newton is not installed: {cure}") from error
     return newton

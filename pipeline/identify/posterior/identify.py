@@ -19,7 +19,7 @@ from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.posterior.coordinates import Coordinates
 from pipeline.identify.posterior.draws import truncated_gaussian
 from pipeline.identify.posterior.fit import Fit, fit
-from pipeline.identify.posterior.launches import Evidence, LaunchLikelihood
+from pipeline.identify.posterior.launches import Evidence, LaunchLikelihood, without_each
 from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
 from pipeline.identify.posterior.residuals import BINS, LEAST_POINTS
 from pipeline.identify.results.theta import content_of
@@ -180,7 +180,7 @@ def confidence(found: Identified, boxes: ParameterBoxes) -> dict:
         "correlation": {"names": list(found.coordinates.names), "matrix": matrix.tolist()},
         "recordings": [_left(found, number) for number in range(len(found.recordings))],
         "disagreement": found.birge,
-        "launches": _launched(found.launches),
+        "launches": _launched(found),
         "steps": found.fit.steps,
         "settled": found.fit.settled,
     }
@@ -248,14 +248,18 @@ def without(found: Identified, number: int) -> dict:
     }
 
 
-def _launched(launches: LaunchLikelihood | None) -> list[dict]:
+def _launched(found: Identified) -> list[dict]:
+    launches = found.launches
     if launches is None:
         return []
+    unlikely = without_each(launches, found.fit.hessian, found.fit.gradient, found.birge)
+    parts = launches.draws, launches.landings, launches.left, unlikely
     return [
         {
             "draw": draw.tolist(),
             "landing": float(landing),
             "left": None if gap != gap else float(gap),
+            "z_without_it": None if z != z else float(z),
         }
-        for draw, landing, gap in zip(launches.draws, launches.landings, launches.left, strict=True)
+        for draw, landing, gap, z in zip(*parts, strict=True)
     ]

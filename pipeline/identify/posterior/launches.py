@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pipeline.base.errors import UserError
+from pipeline.base.launch_table import LIMITS
 from pipeline.simulator.launch import landing_gradient, launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import Parameters
@@ -25,12 +27,24 @@ TAPE = 0.01  # of a measured landing, standard deviation [m]
 class Observed:
     """A launch: draw (y, z) and its standard deviation along each axis, landing [m].
 
-    The deviation is None where a table leaves it out.
+    The deviation is None where a table leaves it out. Raises UserError: a value that none has.
     """
 
     draw: tuple[float, float]
     error: float | None
     landing: float
+
+    def __post_init__(self) -> None:
+        y, z = self.draw
+        given = {"draw_y_m": y, "draw_z_m": z, "landing_y_m": self.landing}
+        for name, value in given.items():
+            low, high, where = LIMITS[name]
+            if not low <= value <= high:
+                raise UserError(
+                    f"{name}: must be from {low:g} to {high:g} m ({where}), got {value}"
+                )
+        if self.error is not None and not 0 <= self.error < 1:
+            raise UserError(f"error: must be from 0 to 1 m, got {self.error}")
 
 
 @dataclass(frozen=True)
@@ -53,6 +67,8 @@ class LaunchLikelihood:
         setup: With the history that the launches had.
         left: Of each, log of measured over simulated landing at the last expansion; NaN where the
             simulated launch fails, which then counts for nothing.
+        gap, design: Of each, `left` and its change with the D coordinates, shape (D, N), both in
+            standard deviations of the launch.
     """
 
     def __init__(
@@ -63,6 +79,7 @@ class LaunchLikelihood:
         self.errors = np.array([one.error for one in observed], float)
         self.landings = np.array([one.landing for one in observed], float)
         self.left = np.full(len(self.draws), np.nan)
+        self.gap, self.design = self.left, np.zeros((0, len(self.draws)))
 
     def expand(
         self, parameters_of: Callable[[np.ndarray], Parameters], phi: np.ndarray, steps: np.ndarray
@@ -81,9 +98,9 @@ class LaunchLikelihood:
         self.left = np.log(self.landings / here)
         changes = (np.log(moved) - np.log(here)) / steps[:, None]  # (D, N)
         spread = np.hypot(slope * self.errors / here, TAPE / self.landings)
-        good = np.isfinite(self.left + spread + changes.sum(axis=0))
-        design = changes[:, good] / spread[good]
-        gap = self.left[good] / spread[good]
+        self.gap, self.design = self.left / spread, changes / spread
+        good = np.isfinite(self.gap + self.design.sum(axis=0))
+        gap, design = self.gap[good], self.design[:, good]
         return float(gap @ gap), design @ design.T, design @ gap
 
     def _simulated(self, parameters: Parameters, draws: np.ndarray) -> np.ndarray:
@@ -91,3 +108,28 @@ class LaunchLikelihood:
         done = launch(self.sling, self.setup, parameters, draws, workers=2)
         failed = np.array([why is not None for why in done.failure])
         return np.where(failed, np.nan, done.landing_y)
+
+
+def without_each(
+    launches: LaunchLikelihood, hessian: np.ndarray, gradient: np.ndarray, widened: float = 1.0
+) -> np.ndarray:
+    """How unlikely each launch is by all other evidence, as a standard score (leave-one-out).
+
+    By the density's quadratic at its mode: without launch i the precision is H - d d' and the
+    gradient g - d gap, d its column of `design`.
+
+    Args:
+        hessian, gradient: Of the whole density at its mode, shapes (D, D) and (D,).
+        widened: By what the density's standard deviations are multiplied.
+
+    Returns:
+        Shape (N,); positive where it landed further than predicted, NaN for a launch that fails.
+    """
+    scores = np.full(len(launches.gap), np.nan)
+    for i, (gap, slope) in enumerate(zip(launches.gap, launches.design.T, strict=True)):
+        if np.isfinite(gap + slope.sum()):
+            rest = hessian - np.outer(slope, slope)
+            left = gap - slope @ np.linalg.solve(rest, gradient - slope * gap)
+            variance = 1 + widened**2 * slope @ np.linalg.solve(rest, slope)
+            scores[i] = left / np.sqrt(variance)
+    return scores

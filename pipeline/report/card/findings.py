@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import ndtri
 
+from pipeline.episode.episode import Episode
+from pipeline.launching.trials.spread import LEVEL
+from pipeline.params import Params
 from pipeline.report.card.inputs import CardInputs
 from pipeline.report.card.values import boxes
 from pipeline.report.card.verdict import FURTHER, Findings
 from pipeline.report.drawing.names import as_code
 from pipeline.report.quantities import QUANTITIES, rounded
 
+OUTSIDE = float(ndtri((1 + LEVEL) / 2))  # standard deviations: beyond the interval
+NEARLY = 0.02  # m below the highest that the hand goes: it no longer lifts
+SLACK = 0.3  # force along over force across the horizontal, below which the band only hangs
+FEWEST = 10  # samples
+LIGHTEST = 0.05  # N: a sensor's zero is no surer
 SIDE = 0.01  # of a box's width: as near is at its side
 
 
-def findings(inputs: CardInputs) -> Findings:
-    """Of a band, from files and launches."""
+def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
+    """Of a band, from files and launches.
+
+    Args:
+        force: Of the first pull, simulated, at its samples [N], shape (T, 3).
+    """
     confidence, aims = inputs.confidence, inputs.aims
     recordings = confidence.get("recordings", [])
 
@@ -25,7 +38,10 @@ def findings(inputs: CardInputs) -> Findings:
     scored = launched[launched.stretch <= FURTHER * inputs.recorded_stretch]
     scored = scored[scored.predicted_low.notna()]
     landing, low, high = (scored[n] for n in ("landing_y", "predicted_low", "predicted_high"))
-    left = [abs(one["left"]) for one in confidence.get("launches", []) if one["left"] is not None]
+    share = landing / scored.predicted_y - 1
+    evidence = confidence.get("launches", [])
+    unlikely = [one.get("z_without_it") for one in evidence]
+    left = [abs(one["left"]) for one in evidence if one["left"] is not None]
     miss = np.abs(aims.landing - aims.target)
     return Findings(
         settled=confidence.get("settled"),
@@ -51,10 +67,40 @@ def findings(inputs: CardInputs) -> Findings:
         outside=int(((landing < low) | (landing > high)).sum()),
         scores=len(scored),
         off=float((landing - scored.predicted_y).abs().mean()) if len(scored) else 0.0,
+        bias=float(share.mean()) if len(scored) else 0.0,
+        bias_error=float(share.sem()) if len(scored) > 1 else 0.0,
+        bias_of_half=float((2 * (landing - scored.predicted_y) / (high - low)).mean())
+        if len(scored)
+        else 0.0,
         kind=" and ".join(dict.fromkeys(scored.kind)),
         left=max(left, default=0.0),
         observed=len(left),
+        surprising=sum(abs(z) > OUTSIDE for z in unlikely if z is not None),
+        carried=None if force is None else carried(inputs.episode, force),
+        density=_density(inputs.params, inputs.band),
     )
+
+
+def carried(episode: Episode, force: np.ndarray) -> float | None:
+    """Measured over simulated vertical force on the hand that has lifted the slack band.
+
+    Args:
+        force: Simulated, at the episode's samples [N], shape (T, 3).
+    """
+    held = (episode.time > episode.grasp_time) & (episode.time < episode.release_time)
+    height = np.where(held, episode.position[:, 2], -np.inf)
+    lifted = held & (height > height.max() - NEARLY)
+    side = np.linalg.norm(force[:, :2], axis=1)
+    slack = lifted & (side < SLACK * np.abs(force[:, 2]))
+    if slack.sum() < FEWEST or abs(weight := force[slack, 2].mean()) < LIGHTEST:
+        return None
+    return float(episode.force[slack, 2].mean() / weight)
+
+
+def _density(params: Params, band: str) -> float | None:
+    """Of a band that somebody weighed [kg/m^3]."""
+    sizes = params.bands[band]
+    return None if sizes.source == "rig" else sizes.density
 
 
 def _odd(recordings: list[dict]) -> str:

@@ -38,14 +38,18 @@ def next_steps(
     targets: np.ndarray,
     episodes: Sequence[Episode],
     launches: int = 0,
+    question: str = "",
 ) -> list[str]:
     """Sentences, the most helpful first; one that says so where nothing helps.
 
     Args:
+        reasons: Causes first, as `judge` has them: their cures come in this order.
         targets: Of the landings [m], shape (T,).
         episodes, launches: Pulls, and the number of launches, that are evidence already.
+        question: About the band's mass and size; comes first.
     """
-    found = list(dict.fromkeys(reason.cure for reason in reasons if reason.cure))
+    cures = [question, *(reason.cure for reason in reasons)]
+    found = list(dict.fromkeys(filter(None, cures)))
     mended_first = any(reason.against and reason.cure for reason in reasons)
     if model is not None and not mended_first:
         aim = len(targets) // 2

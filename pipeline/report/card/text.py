@@ -7,16 +7,18 @@ import numpy as np
 from pipeline.report.card.findings import Findings
 from pipeline.report.card.inputs import CardInputs
 from pipeline.report.card.values import ShownValue
-from pipeline.report.card.verdict import CARE, NO, TRUSTED, Reason
+from pipeline.report.card.verdict import CARE, NO, TRUSTED, Reason, inside, launches_of
 from pipeline.report.drawing.names import as_code
 
+# From the card's folder; its page stands alone.
+GLOSSARY = "../../../docs/glossary.md"
 SAID = {TRUSTED: "can be trusted", CARE: "use with care", NO: "do not use it"}
 
 
 def reasons_of(found: Findings, reasons: list[Reason]) -> list[str]:
     """Sentences: what speaks against; of a trusted band, why it can be trusted."""
     if reasons:
-        return [reason.text for reason in reasons]
+        return [one.text for one in sorted(reasons, key=lambda one: not one.against)]
     told = [
         f"The fit settled, and the simulation meets the recording: {_met(found)}.",
         f"Launches stretch the band to {found.stretch:.2f} times its length, within the recorded"
@@ -24,10 +26,9 @@ def reasons_of(found: Findings, reasons: list[Reason]) -> list[str]:
         f"Landings are known to ±{100 * found.half_width:.0f} cm or better.",
     ]
     if found.scores:
-        told.append(
-            f"{found.scores - found.outside} of {found.scores} {found.kind} launches landed inside"
-            " their intervals."
-        )
+        told.append(inside(found))
+    if found.observed == 1:
+        told.append("One launch is part of the evidence; one is not many.")
     return told
 
 
@@ -79,6 +80,7 @@ def card_text(
         "*The release, 50 times slower. Left: the camera's picture and the simulated band in it."
         " Right: the camera's points and the simulated band.*\n"
     )
+    meanings = f"\n[What each of them is]({GLOSSARY}).\n"
     return f"""\
 # {inputs.band}: {SAID[verdict]}
 
@@ -86,7 +88,7 @@ def card_text(
 {note if rig else ""}{animation if animated else ""}
 ## Values
 
-{_values(shown)}
+{_values(shown)}{meanings if animated else ""}
 ![Values with their intervals](values.png)
 
 ## Where to draw
@@ -150,7 +152,7 @@ def _rests(inputs: CardInputs) -> str:
     count, launches = len(inputs.episodes), len(inputs.confidence.get("launches", []))
     files = ", ".join(map(as_code, inputs.recordings))
     pulls = f"{count} pull{'s' * (count != 1)} in {files}"
-    observed = f"{launches} launch{'es' * (launches != 1)}" if launches else "no launch"
+    observed = launches_of(launches) if launches else "no launch"
     launched = inputs.launched.kind.value_counts()
     tried = ", ".join(f"{n} {kind}" for kind, n in sorted(launched.items())) or "none"
     return f"""\

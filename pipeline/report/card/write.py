@@ -21,7 +21,7 @@ from pipeline.report.card.page import write_page
 from pipeline.report.card.simulated import simulate
 from pipeline.report.card.text import card_text, reasons_of
 from pipeline.report.card.values import boxes, values
-from pipeline.report.card.verdict import judge
+from pipeline.report.card.verdict import judge, question
 
 
 def write(params: Params, band: str, method: str, root: str | Path = ".") -> dict:
@@ -33,7 +33,7 @@ def write(params: Params, band: str, method: str, root: str | Path = ".") -> dic
     pictures = Pictures.of(recording, episode, setup)
     simulated = simulate(params, band, method, episode, inputs.theta)
 
-    found = findings(inputs)
+    found = findings(inputs, simulated.force)
     verdict, against = judge(found)
     reasons, shown = reasons_of(found, against), values(inputs.theta, about.fixed)
     aims = inputs.aims
@@ -42,7 +42,8 @@ def write(params: Params, band: str, method: str, root: str | Path = ".") -> dic
         landings = aims.samples, aims.slope, aims.half_width
         model = LandingModel.of(samples.names, samples.values, *landings)
     launches = len(inputs.confidence.get("launches", []))
-    steps = next_steps(band, against, model, aims.target, inputs.episodes, launches)
+    evidence = inputs.episodes, launches, question(found)
+    steps = next_steps(band, against, model, aims.target, *evidence)
     card = content(inputs, verdict, reasons, shown, steps)
     text = inputs, found, verdict, reasons, shown, steps
 

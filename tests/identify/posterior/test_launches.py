@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.base.errors import UserError
 from pipeline.identify.posterior import launches
-from pipeline.identify.posterior.launches import TAPE, LaunchLikelihood, Observed
+from pipeline.identify.posterior.launches import TAPE, LaunchLikelihood, Observed, without_each
 
 STEPS = np.array([1e-3, 1e-3])
 
@@ -70,3 +71,38 @@ def test_at_the_truth_nothing_pulls() -> None:
     _, misfit, _, gradient = expanded(Observed((-0.5, -0.2), 0.001, landing), phi=phi)
     assert misfit == pytest.approx(0, abs=1e-12)
     np.testing.assert_allclose(gradient, 0, atol=1e-6)
+
+
+def test_a_launch_is_held_against_what_all_else_predicts() -> None:
+    """As Gauss has it when the launch is really left out: here a, b have a prior and another."""
+    one, other = Observed((-0.5, -0.2), 0.001, 0.34), Observed((-0.6, -0.1), 0.0, 0.4)
+    prior = np.diag([40.0, 250.0])
+    both, _, hessian, gradient = expanded(one, other)
+    found = without_each(both, prior + hessian, gradient)
+    for index, (own, rest) in enumerate(((one, other), (other, one))):
+        _, _, known, pull = expanded(rest)
+        alone, *_ = expanded(own)
+        covariance = np.linalg.inv(prior + known)
+        slope = alone.design[:, 0]
+        predicted = alone.gap[0] - slope @ covariance @ pull
+        assert found[index] == pytest.approx(
+            predicted / np.sqrt(1 + slope @ covariance @ slope), rel=1e-6
+        )
+    wider = without_each(both, prior + hessian, gradient, widened=3.0)
+    assert np.all(np.abs(wider) < np.abs(found))
+    failed = expanded(one, Observed((-0.5, 0.2), 0.001, 0.31))
+    assert np.isnan(without_each(failed[0], prior + failed[2], failed[3])[1])
+
+
+@pytest.mark.parametrize(
+    ("draw", "error", "landing", "words"),
+    [
+        ((-0.3, -0.1), 0.001, 195, "landing_y_m: must be from 0 to 20 m"),
+        ((0.3, -0.1), 0.001, 1.9, "draw_y_m: must be from -20 to 0 m"),
+        ((-0.3, -0.1), -1.0, 1.9, "error: must be from 0 to 1 m"),
+        ((-0.3, float("nan")), 0.001, 1.9, "draw_z_m"),
+    ],
+)
+def test_no_launch_has_such_a_value(draw, error, landing, words) -> None:
+    with pytest.raises(UserError, match=words):
+        Observed(draw, error, landing)

@@ -5,16 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.report.card.findings import findings
-from pipeline.report.card.verdict import CARE, NO, TRUSTED, Findings, judge
+from pipeline.report.card.findings import carried, findings
+from pipeline.report.card.text import reasons_of
+from pipeline.report.card.verdict import CARE, NO, TRUSTED, Findings, judge, question
 from tests.report.card.conftest import trials
 
 GOOD = Findings(
     settled=True, force=0.05, held=8e-4, recoil=2e-3, recoil_seen=True, disagreement=1.1, odd="",
     at_sides=(),
     stretch=1.5, recorded_stretch=1.6, hold_force=9.0, max_force=30.0, failures=(), converged=True,
-    miss=0.004, half_width=0.1, outside=1, scores=15, off=0.03, kind="virtual", left=0.01,
-    observed=0,
+    miss=0.004, half_width=0.1, outside=1, scores=15, off=0.03, bias=-0.01, bias_error=0.01,
+    bias_of_half=-0.2, kind="virtual", left=0.01, observed=0, surprising=0,
+    carried=1.1, density=1e3,
 )  # fmt: skip
 CASES = [
     ({"settled": None}, CARE, "does not tell how sure"),
@@ -43,6 +45,18 @@ CASES = [
     ({"scores": 1, "outside": 1, "off": 1.2}, NO, "120 cm off"),
     ({"recoil": 0.0, "recoil_seen": False}, CARE, "No picture shows the recoil"),
     ({"outside": 0, "scores": 0}, CARE, "No launch was measured"),
+    ({"bias": -0.02, "bias_error": 0.004, "bias_of_half": -0.5}, CARE, "landed 2.0 % short"),
+    ({"bias": 0.03, "bias_error": 0.004, "bias_of_half": 0.6}, CARE, "landed 3.0 % long"),
+    ({"observed": 1, "surprising": 1}, CARE, "1 of 1 launch used as evidence landed outside"),
+    ({"carried": 0.1}, CARE, "weighed 0.1 times"),
+    ({"carried": 1.7}, CARE, "weighed 1.7 times"),
+]
+NO_REASON = [
+    {"bias": -0.02, "bias_error": 0.02, "bias_of_half": -0.5},  # chance
+    {"bias": -0.02, "bias_error": 0.004, "bias_of_half": -0.2},  # of no weight
+    {"scores": 4, "outside": 0, "bias": -0.02, "bias_error": 0.004, "bias_of_half": -0.5},  # few
+    {"observed": 5, "surprising": 1},  # of five, nine of ten inside
+    {"carried": None},
 ]
 
 
@@ -58,9 +72,50 @@ def test_one_thing_turns_the_verdict(change, verdict, words) -> None:
     assert reasons[0].against == (verdict == NO)
 
 
-def test_the_worst_comes_first() -> None:
-    verdict, reasons = judge(replace(GOOD, settled=False, miss=0.2, left=0.09))
-    assert verdict == NO and [reason.against for reason in reasons] == [True, False, False]
+@pytest.mark.parametrize("change", NO_REASON)
+def test_what_chance_explains_is_no_reason(change) -> None:
+    assert judge(replace(GOOD, **change)) == (TRUSTED, [])
+
+
+def test_causes_come_first_and_the_worst_is_said_first() -> None:
+    bad = replace(GOOD, settled=False, miss=0.2, left=0.09)
+    verdict, reasons = judge(bad)
+    assert verdict == NO and [reason.against for reason in reasons] == [False, True, False]
+    assert reasons_of(bad, reasons)[0] == reasons[1].text
+
+
+def test_several_misses_ask_for_mass_and_size_first() -> None:
+    _, reasons = judge(replace(GOOD, force=0.9, recoil=0.03, miss=0.2))
+    assert "Weigh and measure the band again" in reasons[0].cure
+    assert "clock" in reasons[1].cure and "box of draws" in reasons[2].cure
+
+
+@pytest.mark.parametrize(("density", "asked"), [(1000.0, False), (833.0, True), (1400.0, True)])
+def test_a_density_that_no_solid_rubber_has_is_asked_about(density, asked) -> None:
+    found = replace(GOOD, density=density)
+    assert bool(question(found)) is asked and judge(found) == (TRUSTED, [])
+    assert not asked or f"{density:.0f} kg/m³" in question(found)
+    assert question(replace(GOOD, density=None)) == ""
+
+
+def test_one_launch_is_called_one() -> None:
+    assert reasons_of(GOOD, [])[-1] == (
+        "14 of 15 virtual launches landed inside their 90 % intervals, -1.0 % from the prediction"
+        " in the mean."
+    )
+    one = replace(GOOD, scores=1, outside=0, kind="measured")
+    assert "The one measured launch landed inside" in reasons_of(one, [])[-1]
+    assert "One launch is part of the evidence" in reasons_of(replace(GOOD, observed=1), [])[-1]
+
+
+def test_the_weight_that_the_hand_carries(told) -> None:
+    episode = told.episode
+    weight = np.tile([0.0, 0.0, -0.2], (len(episode.time), 1))
+    same = replace(episode, force=0.7 * weight)
+    assert carried(same, weight) == pytest.approx(0.7)
+    assert carried(same, 0.1 * weight) is None  # less than a sensor's zero is known to
+    drawn = weight + [0.0, 0.5, 0.0]
+    assert carried(same, drawn) is None
 
 
 def test_findings_are_those_of_the_files(told) -> None:
@@ -77,7 +132,7 @@ def test_findings_are_those_of_the_files(told) -> None:
 def test_findings_see_a_bad_score_a_side_and_odd_evidence(told) -> None:
     rows = trials().assign(landing_y=[1.5, 2.1])
     theta = dict(told.theta, theta=told.theta["theta"] | {"relaxation": 0.0499})
-    launches = [{"left": None}, {"left": -0.07}]
+    launches = [{"left": None, "z_without_it": None}, {"left": -0.07, "z_without_it": -1.8}]
     recordings = [
         {"force_rms": force, "held_rms": 0, "recoil_rms": 0, "pictures": []}
         | {"source": {"file": f"{force}.mcap", "pull": 3}, "without_it": {"misfit": force}}
@@ -86,5 +141,11 @@ def test_findings_see_a_bad_score_a_side_and_odd_evidence(told) -> None:
     theta["confidence"] = theta["confidence"] | {"launches": launches, "recordings": recordings}
     found = findings(replace(told, trials=rows, theta=theta))
     assert (found.outside, found.left, found.force) == (1, 0.07, 0.3)
+    assert (found.observed, found.surprising) == (1, 1)
+    assert found.bias == pytest.approx(np.mean([1.5 / 1.92, 2.1 / 2.08]) - 1)
+    assert found.bias_of_half == pytest.approx(np.mean([-4.2, 0.2]))
+    assert found.density == pytest.approx(told.params.bands[told.band].density)
     assert found.odd == "pull 3 of `0.3.mcap`"
-    assert found.at_sides == [("relaxation a half decade", "upper side of its box, 0 to 5 %")]
+    assert found.at_sides == [
+        ("stress relaxation per half decade", "upper side of its box, 0 to 5 %")
+    ]

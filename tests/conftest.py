@@ -13,9 +13,21 @@ from hypothesis import settings
 
 from pipeline.params import Params, load
 from tests import once
-from tests.project import ROOT
+from tests.project import DEFAULTS, ROOT
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as stages have it; nothing has imported NumPy yet
+
+
+OF_A_USER = {f"{ROOT}/params.yaml", f"{ROOT}/sling2sim2real/params.yaml"}
+
+
+def leave_the_users_file(event: str, about: tuple) -> None:
+    """The project may be in use: no test may hang on what somebody sets in its params.yaml."""
+    if event == "open" and isinstance(about[0], str) and about[0].endswith("params.yaml"):
+        assert os.path.abspath(about[0]) not in OF_A_USER, "tests take DEFAULTS of tests/project.py"
+
+
+sys.addaudithook(leave_the_users_file)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -53,7 +65,18 @@ def nowhere(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def params() -> Params:
-    return load(ROOT / "params.yaml")
+    return load(DEFAULTS)
+
+
+@pytest.fixture(scope="session")
+def delivered():
+    """`Settings.default()` is as delivered: it has the project's params.yaml otherwise."""
+    from sling2sim2real import settings
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(settings, "files", lambda package: DEFAULTS.parent)
+        settings._defaults.cache_clear()
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -46,6 +46,11 @@ def until(happens: Callable[[], object], seconds: float = 90.0):
     return found
 
 
+def in_use() -> bool:
+    """Whether the project's params.yaml is another than the delivered one."""
+    return subprocess.run(["cmp", "-s", ROOT / "params.yaml", DEFAULTS]).returncode != 0
+
+
 def alive(pid: int) -> bool:
     """A zombie is not: it waits for a parent to look at it."""
     try:

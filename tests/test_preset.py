@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 
 from pipeline.base.errors import UserError
 from pipeline.params import load
-from tests.project import ROOT, until
+from tests.project import DEFAULTS, ROOT, until
 from tools.preset import KEPT, PRESETS, preset, timed, write_preset
 from validation.benchmarks.methods import LARGE
 
@@ -56,7 +56,7 @@ def leaves(node: dict, *path: str) -> dict[tuple, object]:
 
 @pytest.mark.parametrize("name", sorted(one.stem for one in PRESETS.glob("*.yaml")))
 def test_a_presets_keys_are_all_that_changes(name: str, tmp_path: Path) -> None:
-    before, path = (ROOT / "params.yaml").read_text(encoding="utf-8"), tmp_path / "params.yaml"
+    before, path = DEFAULTS.read_text(encoding="utf-8"), tmp_path / "params.yaml"
     path.write_text(before, encoding="utf-8")
     write_preset(path, preset(name))
     load(path)  # is valid
@@ -82,7 +82,7 @@ def test_the_large_preset_is_the_large_budget() -> None:
 
 def test_the_papers_preset_has_no_method_of_ours_and_searches_the_whole_box(tmp_path: Path) -> None:
     path = tmp_path / "params.yaml"
-    path.write_text((ROOT / "params.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    path.write_text(DEFAULTS.read_text(encoding="utf-8"), encoding="utf-8")
     write_preset(path, preset("paper"))
     params = load(path)
     run = [params.methods[name] for name in (*params.run.methods, *params.run.ablations.methods)]
@@ -94,7 +94,7 @@ def test_the_papers_preset_has_no_method_of_ours_and_searches_the_whole_box(tmp_
 def test_what_is_no_preset_or_spoils_params_is_refused_and_nothing_changes(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="^huge: no such preset; there are large, paper$"):
         preset("huge")
-    path, text = tmp_path / "params.yaml", (ROOT / "params.yaml").read_text(encoding="utf-8")
+    path, text = tmp_path / "params.yaml", DEFAULTS.read_text(encoding="utf-8")
     path.write_text(text, encoding="utf-8")
     for wrong, told in (
         ({"optimizer": {"populatoin": 64}}, "optimizer.populatoin"),

@@ -21,6 +21,7 @@ from pipeline.base.code import ROOT
 from pipeline.params import load
 from pipeline.params.identification import methods_by_step
 
+DEFAULTS = ROOT / "validation" / "params.yaml"  # as delivered, whatever a user sets in params.yaml
 CLI = ("-c", "from app.cli import main; main()")  # after `python`: this project's `sling`
 SLING = (sys.executable, *CLI)
 PROMPT = 10.0  # s after which no process of a command that has ended may live
@@ -56,7 +57,10 @@ Value = TypeVar("Value")
 
 
 def copy_project(folder: Path) -> None:
-    """Copy into `folder` what Git would commit, but for dvc.lock: every stage is stale there."""
+    """Copy into `folder` what Git would commit, with the parameters as they were delivered.
+
+    There is no dvc.lock: every stage is stale there.
+    """
     listed = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
         cwd=ROOT,
@@ -68,6 +72,7 @@ def copy_project(folder: Path) -> None:
         if (ROOT / name).is_file() and name != "dvc.lock":
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, folder / name, follow_symlinks=False)
+    shutil.copy(DEFAULTS, folder / "params.yaml")
 
 
 def set_params(folder: Path, values: Mapping[str, object]) -> None:
@@ -87,7 +92,7 @@ def run_of(
     bands: Sequence[str], methods: Sequence[str], ablations: Sequence[str] = ()
 ) -> dict[str, object]:
     """Keys of `run`: bands of the rig, methods, and further methods on the first band."""
-    known = load(ROOT / "params.yaml").methods
+    known = load(DEFAULTS).methods
     first = [*bands[:1]] if ablations else []
     further = {"bands": first, "rig": first, "methods": [*ablations]}
     return {

@@ -13,7 +13,7 @@ from app import __version__, cli
 from app.command_line import COMMANDS, EXITS
 from pipeline.simulator.parameters import THETA
 from tests.policy.linear import write_policy
-from tests.project import ROOT, python
+from tests.project import DEFAULTS, ROOT, python
 from validation.benchmarks import bench
 
 SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
@@ -23,7 +23,7 @@ SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
     """Runs a command in this process, and gives the one line with which it refuses."""
 
-    def run(status: int, *arguments: str, folder: Path = ROOT) -> str:
+    def run(status: int, *arguments: str, folder: Path = DEFAULTS.parent) -> str:
         monkeypatch.chdir(folder)
         monkeypatch.setattr(sys, "argv", ["sling", *arguments])
         with pytest.raises(SystemExit) as ended:
@@ -147,7 +147,7 @@ def test_a_users_mistake(tmp_path: Path, refused) -> None:
 
 
 def test_a_mistake_in_params_is_told_before_any_stage_runs(tmp_path: Path, refused) -> None:
-    text = (ROOT / "params.yaml").read_text()
+    text = DEFAULTS.read_text()
     (tmp_path / "params.yaml").write_text(
         text.replace("bands: [band1, band2, band3] ", "bands: [band9] ")
     )
@@ -176,7 +176,7 @@ def test_a_reader_that_has_seen_enough() -> None:
 
 def aimable(folder: Path) -> None:
     """A project with a policy of band1."""
-    shutil.copy(ROOT / "params.yaml", folder)
+    shutil.copy(DEFAULTS, folder)
     theta = folder / "data/theta/band1/least_squares.json"
     theta.parent.mkdir(parents=True)
     theta.write_text(json.dumps({"band": "band1", "theta": SOFT}))

@@ -13,6 +13,7 @@ from pipeline.base.layout import Layout
 from pipeline.export.export import replaceable
 from pipeline.params import load
 from tests.edited import edits
+from tests.project import DEFAULTS
 from tests.report.card.conftest import POINT, THETA, confidence, samples
 
 BAND, METHOD, DRAW = "band1", "least_squares", (-0.3, -0.15)
@@ -20,7 +21,7 @@ BAND, METHOD, DRAW = "band1", "least_squares", (-0.3, -0.15)
 
 @pytest.fixture(scope="module")
 def params():
-    return load(Path("params.yaml"))
+    return load(DEFAULTS)
 
 
 @pytest.fixture

@@ -18,12 +18,12 @@ from pipeline.episode.episode import Episode
 from pipeline.params import load
 from pipeline.recording.geometry import EpisodeGeometry, geometry_of
 from pipeline.recording.input.reader import read_recording
-from tests.project import ROOT, with_
+from tests.project import DEFAULTS, with_
 from validation.recordings.bag import write_bag
 
 pytestmark = pytest.mark.usefixtures("nowhere")
 
-PARAMS = load(ROOT / "params.yaml")
+PARAMS = load(DEFAULTS)
 RECORDING = "data/raw/band1/band1.mcap"
 FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target along the base's x
 TIPS = np.array([[-0.1375, 0, 0], [0.1375, 0, 0]])

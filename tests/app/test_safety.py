@@ -12,7 +12,7 @@ from pipeline.episode.episode import Episode
 from pipeline.params import load
 from pipeline.params.provenance import evidence_settings_of, policy_settings_of, settings_of
 from pipeline.simulator.parameters import THETA
-from tests.project import ROOT
+from tests.project import DEFAULTS
 
 VALUES = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 CONTENT = {"band": "band1", "theta": VALUES, "confidence": {"settled": True, "steps": 7}}
@@ -26,7 +26,7 @@ def abouts(hazards) -> list[str]:
 @pytest.fixture
 def project(tmp_path):
     """params.yaml, and a recording that draws band1 to y = -0.3."""
-    (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
+    (tmp_path / "params.yaml").write_text(DEFAULTS.read_text())
     time = np.arange(4.0)
     way = np.array([[0, 0, 0], [0, -0.1, 0], [0, -0.3, 0], [0, -0.9, 0]])
     nothing = np.zeros((4, 3))

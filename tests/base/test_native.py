@@ -38,10 +38,11 @@ from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import LaunchSetup
 from pipeline.simulator.parameters import Parameters
+from validation.projects import DEFAULTS
 from validation.synthetic import THETA, recorded_yardstick
 
 wp.config.cpu_compiler_flags = wp.config.cpu_compiler_flags.replace("-march=native", sys.argv[1])
-params = load()
+params = load(DEFAULTS)
 sling, episode = recorded_yardstick(params)
 thetas = Parameters.of(sling.law, np.array([THETA, THETA]) * [[0.8], [1.1]])
 rollouts = interact(sling, episode, thetas)

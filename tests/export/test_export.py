@@ -9,7 +9,7 @@ from ruamel.yaml import YAML
 
 from pipeline.simulator.parameters import THETA
 from sling2sim2real import UserError, export
-from tests.project import ROOT, python
+from tests.project import DEFAULTS, python
 from validation.projects import CLI
 
 
@@ -47,7 +47,7 @@ def test_what_it_refuses(model, tmp_path, monkeypatch) -> None:
 
 def test_the_command(tmp_path) -> None:
     """With a θ file written by hand; a second run replaces the first."""
-    shutil.copy(ROOT / "params.yaml", tmp_path)
+    shutil.copy(DEFAULTS, tmp_path)
     theta = tmp_path / "data/theta/band1/least_squares.json"
     theta.parent.mkdir(parents=True)
     soft = dict(zip(THETA, (2.2e5, 0.45, 2e-3, 0.5, 1.0), strict=True))

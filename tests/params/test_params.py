@@ -12,9 +12,9 @@ from pipeline.base.errors import UserError
 from pipeline.base.schema import Section
 from pipeline.params import Params, check, load, parse
 from pipeline.simulator.parameters import THETA
-from tests.project import ROOT, set_methods
+from tests.project import DEFAULTS, set_methods
 
-TEXT = (ROOT / "params.yaml").read_text(encoding="utf-8")
+TEXT = DEFAULTS.read_text(encoding="utf-8")
 CONTENT = YAML(typ="safe").load(TEXT)
 NOTHING = dict.fromkeys(("geom", "force", "work"), 0)
 ALL_FIXED = {name: CONTENT["parameters"][name]["low"] for name in THETA}
@@ -59,12 +59,12 @@ def test_attributes_are_the_keys_of_the_file() -> None:
         else:
             assert view == node
 
-    compare(CONTENT, load(ROOT / "params.yaml"))
+    compare(CONTENT, load(DEFAULTS))
 
 
 def test_the_view_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="frozen"):
-        load(ROOT / "params.yaml").optimizer.k_top = 2
+        load(DEFAULTS).optimizer.k_top = 2
 
 
 def test_every_number_has_a_range_and_a_type() -> None:

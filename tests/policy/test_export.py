@@ -19,7 +19,7 @@ from pipeline.policy.export import card, write_onnx, write_torchscript
 from pipeline.simulator.parameters import THETA
 from tests.policy import toy
 from tests.policy.card_schema import SCHEMA
-from tests.project import ROOT, python
+from tests.project import DEFAULTS, ROOT, python
 
 TARGETS = np.random.default_rng(0).uniform(1.425, 2.425, (1000, 1)).astype(np.float32)
 
@@ -171,7 +171,7 @@ MAP = {"box": {"draws": 0, "mean_error_m": None, "max_error_m": None}, "target_r
 
 def written(trained, training: dict, **theta) -> dict:
     """A card of band1 as a reader of the file finds it."""
-    params = load(ROOT / "params.yaml")
+    params = load(DEFAULTS)
     content = {"theta": dict.fromkeys(THETA, 0.4), **theta}
     made = card(
         trained.policy,

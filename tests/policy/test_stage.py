@@ -14,7 +14,7 @@ from pipeline.launching.surface.stored import Stored
 from pipeline.simulator.parameters import THETA
 from stages import policy
 from tests.policy import toy
-from tests.project import ROOT
+from tests.project import DEFAULTS
 
 POINT = (2e5, 0.47, 2e-3, 0.5, 0.6)
 STORED = Stored("band1", "least_squares")
@@ -27,7 +27,7 @@ def project(tmp_path, monkeypatch):
     """A folder with parameters for a short training and a θ file; it runs the stage there."""
     monkeypatch.chdir(tmp_path)
     yaml = YAML()
-    content = yaml.load(ROOT / "params.yaml")
+    content = yaml.load(DEFAULTS)
     content["policy"].update({"envs": 64, "iterations": 12, "map_size": [9, 7]})
     theta = {"band": "band1", "theta": dict(zip(THETA, POINT, strict=True))}
     write_json(Path("data/theta/band1/least_squares.json"), theta)

@@ -11,13 +11,14 @@ from pipeline.params import Params, load
 from pipeline.recording.build import process
 from pipeline.recording.masks.ridge import RidgeMask
 from tests import once
+from tests.project import DEFAULTS
 from validation.recordings.bag import Truth, write_bag
 
 
 @pytest.fixture(scope="session")
 def params() -> Params:
     """The project's parameters with a window that suits the small recordings."""
-    whole = load("params.yaml")
+    whole = load(DEFAULTS)
     episode = whole.episode.model_copy(update={"duration": 3.6, "samples": 120, "tail": 0.5})
     return whole.model_copy(update={"episode": episode})
 

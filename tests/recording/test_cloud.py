@@ -12,11 +12,12 @@ from pipeline.base.errors import UserError
 from pipeline.params import load
 from pipeline.recording import cloud
 from pipeline.recording.masks import masker
+from tests.project import DEFAULTS
 from validation.benchmarks import clouds as bench
 from validation.recordings import looks
 from validation.recordings.looks import BAND, LOOKS
 
-SETTINGS = load("params.yaml").cloud
+SETTINGS = load(DEFAULTS).cloud
 
 
 def tube(count: int, random: np.random.Generator) -> np.ndarray:

@@ -10,6 +10,7 @@ import pytest
 from app.preflight.check import coverage
 from pipeline.params import BandParams, load
 from pipeline.recording.build import episode_of, process
+from tests.project import DEFAULTS
 
 RECORDING = Path(__file__).parents[3] / "shared/recordings/orange.mcap"
 
@@ -20,7 +21,7 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def built():
-    params = load("params.yaml")
+    params = load(DEFAULTS)
     band = BandParams(source="recording", mass=0.0408, diameter=0.010, rest_length=0.52)
     params = params.model_copy(update={"bands": {**params.bands, "orange": band}})
     done = process(RECORDING, band, params)

@@ -14,6 +14,7 @@ from pipeline.params import load
 from pipeline.simulator import interact, launch
 from pipeline.simulator.model import LaunchHistory
 from pipeline.simulator.parameters import Parameters
+from tests.project import DEFAULTS
 from tests.simulator.bands import neo, random_draws, random_thetas
 
 pytestmark = pytest.mark.skipif(not gpus(), reason="no CUDA device on this machine")
@@ -77,7 +78,7 @@ def test_gpus_share_a_batch_and_change_nothing(
     weights = {"geom": 1.0, "force": 1.0, "work": 1.0}
     shape = {"radius": sling.radius, "rest_length": sling.edge_lengths}
     loss = EpisodeLoss(seen, **shape, weights=weights, cutoff=30.0)
-    space = SearchBox.of(load("params.yaml").parameters)
+    space = SearchBox.of(load(DEFAULTS).parameters)
     unit = np.random.default_rng(8).random((67, space.dimension))
     teams = ("cuda:0",), ("cuda:1",), ("cuda:0", "cuda:1")
     one, *others = (Evaluator(seen, strong_grip, loss, space, devices=team)(unit) for team in teams)

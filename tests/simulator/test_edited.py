@@ -10,6 +10,7 @@ from pipeline.identify.results.theta import load_samples
 from pipeline.params import load
 from pipeline.simulator.parameters import Parameters
 from tests.edited import edits
+from tests.project import DEFAULTS
 from tests.report.run.conftest import posterior
 
 
@@ -30,7 +31,7 @@ def read_or_refused(path: Path, content: dict, read) -> tuple[int, int]:
 
 
 def test_the_calibration_of_clamps(tmp_path: Path) -> None:
-    params, path = load(Path("params.yaml")), Layout(tmp_path).clamps("band1")
+    params, path = load(DEFAULTS), Layout(tmp_path).clamps("band1")
     content = {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}
     read, refused = read_or_refused(path, content, lambda: load_sling(params, "band1", tmp_path))
     assert refused > 20 and read == 1  # with a key that nobody knows

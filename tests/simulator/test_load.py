@@ -12,9 +12,9 @@ from pipeline.identify.results.theta import calibrated, launch_setup, load_theta
 from pipeline.params import load
 from pipeline.simulator import ClampedBand, interact, launch
 from pipeline.simulator.parameters import THETA, Parameters
-from tests.project import ROOT
+from tests.project import DEFAULTS
 
-PARAMS = load(ROOT / "params.yaml")
+PARAMS = load(DEFAULTS)
 SHOWN = {"clamp_direction": [0.6, 0.0, -0.8], "flexural_rigidity": 2e-3}
 VALUES = dict(zip(THETA, (2.5e5, 0.45, 3e-3, 0.7, 0.6), strict=True))
 

@@ -5,6 +5,11 @@ import pytest
 from sling2sim2real import Band, Model, Settings, Theta, episode_from_arrays, rehearse
 
 
+@pytest.fixture(scope="session", autouse=True)
+def as_delivered(delivered) -> None:
+    """What users set in params.yaml does not matter here."""
+
+
 @pytest.fixture(scope="session")
 def settings() -> Settings:
     return Settings.coarse()

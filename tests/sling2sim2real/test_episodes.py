@@ -7,6 +7,7 @@ from pipeline.base.errors import UserError
 from pipeline.params import load
 from pipeline.recording.build import build_episodes
 from sling2sim2real import Band, Episode, Settings, episode_from_arrays, read_mcap
+from tests.project import DEFAULTS
 from tests.recording.conftest import written
 from tests.sling2sim2real.toy import still
 
@@ -79,7 +80,7 @@ def test_wrong_arrays_are_refused_by_name(wrong: dict, said: str) -> None:
 def test_an_mcap_is_read_as_the_pipeline_reads_it(tmp_path_factory) -> None:
     path, _ = written(tmp_path_factory, "seen.mcap")
     window = {"duration": 3.6, "samples": 120, "tail": 0.5}
-    theirs = load("params.yaml")
+    theirs = load(DEFAULTS)
     theirs = theirs.model_copy(update={"episode": theirs.episode.model_copy(update=window)})
     about = theirs.bands["band1"]
     band = Band(about.mass, about.diameter, about.rest_length, name="mine")

@@ -14,7 +14,7 @@ from pipeline.params.provenance import settings_of
 from pipeline.simulator.parameters import THETA
 from sling2sim2real import Identification, Observed, Settings, aim, identify, launch
 from sling2sim2real.launching import _warnings
-from tests.project import ROOT
+from tests.project import DEFAULTS
 
 FITTED = "youngs_modulus", "elasticity_damping", "mooney_share", "relaxation"
 
@@ -74,7 +74,7 @@ def test_wrong_evidence_is_refused(band, settings, world, episode) -> None:
 
 def test_a_run_of_other_settings_says_what_has_changed(tmp_path) -> None:
     """And so does what is aimed by it."""
-    shutil.copy(ROOT / "params.yaml", tmp_path)
+    shutil.copy(DEFAULTS, tmp_path)
     params = Settings.load(tmp_path / "params.yaml")
     made = settings_of(params, "band1", "least_squares") | {"bands.band1.mass": 0.05}
     soft = dict(zip(THETA, (2.2e5, 0.45, 2e-3, 0.5, 1.0), strict=True))

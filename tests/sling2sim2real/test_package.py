@@ -9,7 +9,7 @@ import pytest
 
 import app
 import sling2sim2real
-from tests.project import ROOT
+from tests.project import DEFAULTS, ROOT
 from validation.projects import copy_project
 
 ASK = """
@@ -41,14 +41,14 @@ def test_a_wheel_has_all_that_it_needs(tmp_path) -> None:
     subprocess.run([sys.executable, "-m", *build], cwd=source, check=True, timeout=240)
     (wheel,) = wheels.glob("sling2sim2real-*.whl")
     with zipfile.ZipFile(wheel) as file:
-        assert file.read("sling2sim2real/params.yaml") == (ROOT / "params.yaml").read_bytes()
+        assert file.read("sling2sim2real/params.yaml") == DEFAULTS.read_bytes()
         assert "sling2sim2real/py.typed" in file.namelist()
         file.extractall(installed)
     work = tmp_path / "work"
     work.mkdir()
     where, landing = asked(str(installed), work)
     assert where.startswith(str(installed))
-    assert landing == asked(str(ROOT), work)[1]
+    assert landing == asked(str(source), work)[1]
 
 
 def asked(place: str, folder) -> list[str]:

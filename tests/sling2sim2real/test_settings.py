@@ -5,12 +5,12 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.params import load
 from sling2sim2real import Settings
-from tests.project import ROOT
+from tests.project import DEFAULTS
 
 
 def test_defaults_are_the_projects_own(nowhere) -> None:
     """No file lies in the working folder."""
-    ours, theirs = Settings.default().model_dump(), load(ROOT / "params.yaml").model_dump()
+    ours, theirs = Settings.default().model_dump(), load(DEFAULTS).model_dump()
     differ = {name for name in theirs if ours[name] != theirs[name]}
     assert differ == {"bands", "run"}
 
@@ -36,7 +36,7 @@ def test_coarse_settings_take_changes_too() -> None:
 
 
 def test_a_file_of_ones_own(tmp_path) -> None:
-    text = (ROOT / "params.yaml").read_text().replace("fork_width: 0.275", "fork_width: 0.25")
+    text = DEFAULTS.read_text().replace("fork_width: 0.275", "fork_width: 0.25")
     (tmp_path / "mine.yaml").write_text(text)
     mine = Settings.load(tmp_path / "mine.yaml")
     assert mine.setup == Settings.default(setup={"fork_width": 0.25}).setup

@@ -19,7 +19,7 @@ from pipeline.identify.objective.loss import TERMS
 from pipeline.identify.search.history import History
 from pipeline.params import load
 from stages.start import remedy
-from tests.project import ROOT, alive, python, until
+from tests.project import DEFAULTS, ROOT, alive, python, until
 from validation.projects import environment
 
 OF_A_BAND = ("record", "episode", "clamps")
@@ -30,7 +30,7 @@ OF_A_METHOD = (*OF_A_SEARCH, "theta", "policy", "launches", "trials", "card")
 @pytest.fixture
 def stage(tmp_path: Path, monkeypatch, capsys) -> Callable[..., tuple[int, str]]:
     """Run a script where nothing has run yet: its exit status and its one line on stderr."""
-    (tmp_path / "params.yaml").write_bytes((ROOT / "params.yaml").read_bytes())
+    (tmp_path / "params.yaml").write_bytes(DEFAULTS.read_bytes())
     monkeypatch.chdir(tmp_path)
 
     def run(name: str, *arguments: str) -> tuple[int, str]:
@@ -61,7 +61,7 @@ def test_unknown_names(stage) -> None:
 
 
 def test_a_history_that_failed_says_why(stage) -> None:
-    space = SearchBox.of(load(ROOT / "params.yaml").parameters)
+    space = SearchBox.of(load(DEFAULTS).parameters)
     unit = np.random.default_rng(1).random((30, 5))
     nothing = {term: np.full(30, np.nan) for term in TERMS}
     theta, reasons = space.to_physical(unit), ["the band slipped"] * 30

@@ -14,7 +14,7 @@ from pipeline.identify.results.theta import calibrated, load_theta
 from pipeline.params import load
 from pipeline.simulator.parameters import Parameters
 from sling2sim2real.identification import Identification
-from tests.project import ROOT
+from tests.project import DEFAULTS
 from validation.synthetic import own_law_episode, recorded_yardstick
 
 BUDGET = {"population": 5, "generations": 2, "k_top": 1, "k_nn": 6, "cma_population": 4}
@@ -27,7 +27,7 @@ def test_what_a_method_leaves_out_is_left_out_everywhere(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     yaml = YAML()
-    content = yaml.load(ROOT / "params.yaml")
+    content = yaml.load(DEFAULTS)
     content["optimizer"].update({**BUDGET, "cma_rollouts": 4})
     content["methods"]["sling2sim2real"]["mounting"] = mounting
     yaml.dump(content, tmp_path / "params.yaml")

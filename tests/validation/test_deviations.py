@@ -11,7 +11,7 @@ from ruamel.yaml import YAML
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json, write_text
 from pipeline.params import check, load
-from tests.project import ROOT
+from tests.project import DEFAULTS, ROOT
 from validation.campaigns import deviations
 from validation.campaigns.deviations import BLOCK, OURS, PAGE, PAPER, REPORT, SWITCHES, WORDS
 from validation.effects import AS_IS, effects
@@ -19,14 +19,15 @@ from validation.marked import marks
 
 
 @pytest.fixture(autouse=True)
-def in_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)
+def as_delivered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where there is a params.yaml that no user edits."""
+    monkeypatch.chdir(DEFAULTS.parent)
 
 
 @pytest.mark.parametrize("switch", [one for one in SWITCHES if one != AS_IS])
 def test_a_switch_is_the_key_that_it_is_called_by(switch: str) -> None:
     """As if it were written into params.yaml; tetrahedra want methods with rubber to go first."""
-    content = YAML(typ="safe").load(ROOT / "params.yaml")
+    content = YAML(typ="safe").load(DEFAULTS)
     key, value = switch.split(": ")
     section, name = ("method_defaults", key) if key == "mounting" else key.split(".")
     content[section][name] = {"false": False}.get(value, value)
@@ -42,7 +43,7 @@ def test_a_switch_is_the_key_that_it_is_called_by(switch: str) -> None:
     if section != "method_defaults":
         assert getattr(found, section) == getattr(expected, section)
     assert {n: found.methods[n] for n in expected.methods} == dict(expected.methods)
-    assert found != load()
+    assert found != load(DEFAULTS)
 
 
 def test_cases_are_distinct(tmp_path: Path) -> None:
@@ -81,7 +82,7 @@ def test_the_report_is_written_into_the_page(tmp_path: Path, monkeypatch) -> Non
         for switch, young, miss in ((AS_IS, 2e5, 0.1), ("mounting: false", 3e5, 0.08))
     ]
     monkeypatch.chdir(tmp_path)
-    shutil.copy(ROOT / "params.yaml", tmp_path)
+    shutil.copy(DEFAULTS, tmp_path)
     write_json(tmp_path / REPORT, report_of(results))
     begin, end = marks(BLOCK)
     write_text(tmp_path / PAGE, f"# Page\n{begin}old\n{end}more\n")

@@ -18,7 +18,7 @@ from pipeline.params import load
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import LaunchSetup
 from pipeline.simulator.parameters import Parameters
-from tests.project import ROOT
+from tests.project import DEFAULTS, ROOT
 from validation.campaigns import machines
 from validation.campaigns.machines import DRAWS, FOLDER, LIMIT, OURS, PAPER, MachineReport
 from validation.projects import ROUGH
@@ -33,7 +33,7 @@ BUDGET |= {"cma_population": 4, "cma_rollouts": 4}
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """params.yaml with a tiny budget, and what a run has left of a band of the simulator's law."""
     root, yaml = tmp_path_factory.mktemp("machines"), YAML()
-    content = yaml.load(ROOT / "params.yaml")
+    content = yaml.load(DEFAULTS)
     content["sling"].update(ROUGH)
     content["optimizer"].update(BUDGET)
     yaml.dump(content, root / "params.yaml")

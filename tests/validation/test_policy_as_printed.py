@@ -7,7 +7,7 @@ from pipeline.base.files import write_json
 from pipeline.params import load
 from pipeline.simulator.parameters import THETA
 from tests.policy import toy
-from tests.project import ROOT
+from tests.project import DEFAULTS
 from validation.campaigns import policy_as_printed as campaign
 from validation.campaigns.policy_as_printed import SWITCHES, Lesson, result, summary
 
@@ -21,7 +21,7 @@ def params(tmp_path, monkeypatch):
     monkeypatch.setattr(campaign, "simulator", lambda *args: toy.launch)
     content = {"band": "band1", "theta": dict(zip(THETA, POINT, strict=True))}
     write_json(tmp_path / "data/theta/band1/de.json", content)
-    params = load(ROOT / "params.yaml")
+    params = load(DEFAULTS)
     small = {"envs": 16, "iterations": 2, "map_size": (9, 7), "hidden": (16,)}
     return params.model_copy(update={"policy": params.policy.model_copy(update=small)})
 

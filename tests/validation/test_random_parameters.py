@@ -8,6 +8,7 @@ import pytest
 from pipeline.params import load
 from pipeline.params.identification import parameter_names
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
+from tests.project import DEFAULTS
 from validation.campaigns import random_parameters
 from validation.simulator import robustness
 from validation.simulator.finding import Bench
@@ -15,7 +16,7 @@ from validation.simulator.finding import Bench
 
 @pytest.fixture(scope="module")
 def bench() -> Bench:
-    return Bench(load())
+    return Bench(load(DEFAULTS))
 
 
 def test_the_sets_fill_the_box_of_each_law(bench) -> None:

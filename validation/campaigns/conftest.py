@@ -13,11 +13,12 @@ from pipeline.base.environment import environment
 from pipeline.base.files import write_json
 from pipeline.params import Params, load
 from validation.campaigns.runner import plain
+from validation.projects import DEFAULTS
 
 
 @pytest.fixture(scope="session")
 def params() -> Params:
-    return load(ROOT / "params.yaml")
+    return load(DEFAULTS)
 
 
 @pytest.fixture

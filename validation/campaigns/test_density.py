@@ -26,6 +26,7 @@ from validation.campaigns import rig_scores
 from validation.campaigns.rig_scores import calibrated_clamps, result, sling_of, summary
 from validation.campaigns.runner import OURS, PAPER, each, made_once
 from validation.orange import landings, with_orange
+from validation.projects import DEFAULTS
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
 pytestmark = pytest.mark.validation
@@ -34,7 +35,7 @@ METHODS = OURS, PAPER
 BANDS, FIVE = ("band1", "band2", "band3"), 5
 FOLDER = Path(os.environ.get("SLING_DENSITY", ROOT / ".checkpoints/density"))
 CODE = fingerprint(json.dumps(digests(Path(rig_scores.__file__))))[:12]  # of what scores hang on
-PARAMS, EPISODES = ROOT / "params.yaml", 240
+EPISODES = 240
 RECORDINGS_OF_ORANGE = ROOT.parent / "shared/recordings"
 
 
@@ -54,7 +55,7 @@ class Identifications(NamedTuple):
 
     def params(self, recording: int) -> Params:
         """params.yaml with the rubbers, of a recording."""
-        return with_rubbers(load(PARAMS), self.seed, recording)
+        return with_rubbers(load(DEFAULTS), self.seed, recording)
 
     def results(self, band: str) -> list[dict]:
         """What is not there yet is made."""
@@ -228,7 +229,7 @@ def orange_episode(params: Params, name: str) -> Episode:
 
 
 def own_law(number: int) -> dict:
-    return density.own_law(load(PARAMS), OURS, number)
+    return density.own_law(load(DEFAULTS), OURS, number)
 
 
 def test_episodes_of_its_own_law(progress, record) -> None:

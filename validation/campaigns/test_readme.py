@@ -8,7 +8,7 @@ import pytest
 from pipeline.base.code import ROOT
 from pipeline.params import load
 from validation.marked import CODE_BLOCK
-from validation.projects import ProjectCopy, copy_project
+from validation.projects import DEFAULTS, ProjectCopy, copy_project
 
 pytestmark = pytest.mark.validation
 
@@ -38,7 +38,7 @@ def section(title: str, language: str) -> str:
 
 def test_your_band_runs_as_it_is_written(project: ProjectCopy, progress) -> None:
     """Only the mass is that of the recording at hand."""
-    mass = load(ROOT / "params.yaml").bands["band1"].mass
+    mass = load(DEFAULTS).bands["band1"].mass
     lines = section("Your band", "bash").splitlines()
     assert len(lines) >= 5 and any(MASS in line for line in lines)
     for line in lines:

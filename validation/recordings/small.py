@@ -19,6 +19,7 @@ from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 
 from pipeline.params import Params, load
+from validation.projects import DEFAULTS
 from validation.recordings.bag import Lens, RosWriter, Truth, write_bag
 from validation.recordings.foxglove_bag import translate
 
@@ -54,7 +55,7 @@ def write_small(path: Path, family: str, container: str) -> None:
 
 def small_params() -> Params:
     """The project's, for a window, pictures and a band as small as the recordings'."""
-    whole = load("params.yaml")
+    whole = load(DEFAULTS)
     episode = {"duration": 2.0, "samples": 50, "tail": 0.3}
     cloud = {"points": 50, "statistical_neighbors": 5, "radius": 0.05, "radius_neighbors": 2}
     band = whole.bands["band1"].model_copy(update={"diameter": 2 * TRUTH.radius})

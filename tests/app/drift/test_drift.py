@@ -14,7 +14,7 @@ from app.drift.drift import BY_NAME, BY_TIME, SAME, anew, drift, shown
 from app.drift.recordings import IdentifiedRecording, in_time
 from pipeline.base.errors import UserError
 from sling2sim2real import Band, Model, Settings, Theta, episode_from_arrays, rehearse
-from tests.project import ROOT, python
+from tests.project import DEFAULTS, python
 from validation.projects import CLI
 
 BAND = Band(0.023, 0.010, 0.52, "mine")
@@ -23,7 +23,7 @@ MAY = 1_777_800_000 * SECOND  # 3 May 2026
 
 
 @pytest.fixture(scope="module")
-def settings() -> Settings:
+def settings(delivered) -> Settings:
     sizes = {"mass": BAND.mass, "diameter": BAND.diameter, "rest_length": BAND.rest_length}
     return Settings.coarse(bands={"mine": {"source": "recording", **sizes}})
 
@@ -151,7 +151,7 @@ def test_the_command_names_sizes_that_are_not_the_usual_ones() -> None:
 
 
 def test_a_mistake_is_one_line(tmp_path) -> None:
-    (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
+    (tmp_path / "params.yaml").write_text(DEFAULTS.read_text())
 
     def told(band: str) -> str:
         done = python(*CLI, "drift", band, folder=tmp_path)

@@ -15,7 +15,7 @@ from app.flow.graph import Stage
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.params import load
-from tests.project import ROOT
+from tests.project import DEFAULTS
 
 CARD = {
     "band": "mine",
@@ -41,7 +41,7 @@ LAUNCHES = "draw_y_m,draw_z_m,landing_y_m\n-0.3,-0.17,2.2\n-0.32,-0.2,3.0\n"
 @pytest.fixture
 def project(tmp_path, monkeypatch):
     """A project without bands of its own, whose recordings are all fine and whose DVC succeeds."""
-    shutil.copy(ROOT / "params.yaml", tmp_path)
+    shutil.copy(DEFAULTS, tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("app.preflight.recordings.checked", lambda *given: [])
     asked, layout = [], Layout(tmp_path)
@@ -132,7 +132,7 @@ def test_what_is_wrong_is_said_before_anything_changes(project, given, message) 
         given = given | {"launches": file.with_name(given["launches"])}
     with pytest.raises(UserError, match=message):
         project.run(file, **given)
-    assert (file.parent / "params.yaml").read_text() == (ROOT / "params.yaml").read_text()
+    assert (file.parent / "params.yaml").read_text() == DEFAULTS.read_text()
     assert project.asked == [] and not project.layout.data.exists()
 
 

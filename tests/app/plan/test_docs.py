@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from app.plan.plan import plan_recording
 from pipeline.params import load
-from tests.project import ROOT, python, with_
+from tests.project import DEFAULTS, ROOT, python, with_
 
 
 def test_two_touched_tips_give_the_fork_in_the_base() -> None:
@@ -23,7 +23,7 @@ def test_two_touched_tips_give_the_fork_in_the_base() -> None:
     turn = Rotation.from_quat(found["base_to_fork"][3:])
     assert (turn.inv() * stands[0]).magnitude() < 1e-4
 
-    params = load(ROOT / "params.yaml")
+    params = load(DEFAULTS)
     stood = with_(params, "setup", base_to_fork=tuple(found["base_to_fork"]))
     plan = plan_recording(stood, "band1")
     drawn = plan.base.apply(np.array([0.0, -0.4, 0.0]))
@@ -32,7 +32,7 @@ def test_two_touched_tips_give_the_fork_in_the_base() -> None:
 
 def test_the_table_of_phases_has_the_defaults() -> None:
     """What the page says of times and ways is what params.yaml gives."""
-    params = load(ROOT / "params.yaml")
+    params = load(DEFAULTS)
     plan = params.plan
     page = (ROOT / "docs/recording.md").read_text(encoding="utf-8")
     assert f"| lead-in | {plan.lead_in:g} s |" in page

@@ -12,7 +12,7 @@ from app.plan.trajectory import Trajectory
 from pipeline.base.errors import UserError
 from pipeline.params import load
 from pipeline.recording.input.reader import read_recording
-from tests.project import ROOT, with_
+from tests.project import DEFAULTS, with_
 from validation.recordings.bag import BASE, HAND, REST, Truth, write_bag
 
 
@@ -56,7 +56,7 @@ def recorded(tmp_path_factory):
     """(path, plan, params) of a recording by a robot that follows a plan, with pictures."""
     inverse = BASE[0].inv()
     fork_in_base = (*inverse.apply(-BASE[1]), *inverse.as_quat())
-    whole = load(ROOT / "params.yaml")
+    whole = load(DEFAULTS)
     placed = with_(whole, "setup", base_to_fork=tuple(map(float, fork_in_base)))
     params = with_(with_(placed, "plan", **FAST), "episode", duration=4.2, samples=140, tail=0.5)
     plan = plan_recording(params, "band1")

@@ -17,14 +17,14 @@ from app.plan.plan import plan_recording, with_band
 from app.plan.trajectory import Phase, Trajectory
 from pipeline.base.errors import UserError
 from pipeline.params import Params, load
-from tests.project import ROOT, with_
+from tests.project import DEFAULTS, with_
 
 FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target along the base's x
 
 
 @pytest.fixture(scope="module")
 def params() -> Params:
-    return with_(load(ROOT / "params.yaml"), "setup", base_to_fork=FORK_IN_BASE)
+    return with_(load(DEFAULTS), "setup", base_to_fork=FORK_IN_BASE)
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ from scipy.optimize import brentq
 from app.plan.pull import SPARE, TICK, catenary_sag, hanging_middle, trajectory_of
 from pipeline.params import PlanParams, load
 from pipeline.recording.pulls import CALM
-from tests.project import ROOT
+from tests.project import DEFAULTS
 
-PARAMS = load(ROOT / "params.yaml")
+PARAMS = load(DEFAULTS)
 AHEAD = np.array([0.0, 1.0, 0.0])
 
 

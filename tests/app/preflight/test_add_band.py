@@ -8,12 +8,13 @@ import pytest
 from app.preflight.add_band import add_band
 from pipeline.base.errors import UserError
 from pipeline.params import load
+from tests.project import DEFAULTS
 
 
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
     """A project's folder whose window suits the small recordings."""
-    text = Path("params.yaml").read_text()
+    text = DEFAULTS.read_text()
     for old, new in (
         ("duration: 9.0", "duration: 3.6"),
         ("samples: 300", "samples: 120"),

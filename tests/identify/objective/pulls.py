@@ -7,8 +7,9 @@ import numpy as np
 from pipeline.episode.episode import Episode
 from pipeline.params import load
 from pipeline.simulator.model import ClampedBand, ClampValues
+from tests.project import DEFAULTS
 
-PARAMS = load("params.yaml")
+PARAMS = load(DEFAULTS)
 PERIOD = 0.03
 
 

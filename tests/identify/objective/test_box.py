@@ -9,8 +9,9 @@ from hypothesis.extra.numpy import arrays
 from pipeline.identify.objective.box import SearchBox, reflect
 from pipeline.params import load
 from pipeline.simulator.parameters import THETA
+from tests.project import DEFAULTS
 
-BOX = SearchBox.of(load().parameters)
+BOX = SearchBox.of(load(DEFAULTS).parameters)
 CUBE = arrays(float, (3, 5), elements=st.floats(0, 1))
 
 
@@ -34,7 +35,7 @@ def test_scales() -> None:
 def test_what_a_law_adds_are_the_last_axes() -> None:
     """In one order, whatever that of the bounds; linear, between them."""
     bounds = {"relaxation": (0.0, 0.05), "mooney_share": (-0.3, 0.9)}
-    box = SearchBox.of(load().parameters, bounds, "rubber")
+    box = SearchBox.of(load(DEFAULTS).parameters, bounds, "rubber")
     assert box.names == (*THETA, "mooney_share", "relaxation")
     assert box.dimension == 7
     theta = box.to_physical(np.full(7, 0.5))
@@ -57,7 +58,7 @@ def test_reflection_is_a_mirror_at_the_faces() -> None:
 
 def test_there_and_back_as_parameters() -> None:
     """What has no axis is as fixed, or as usual."""
-    box = SearchBox.of(load().parameters, fixed={"poissons_ratio": 0.45, "air_drag": 0.7})
+    box = SearchBox.of(load(DEFAULTS).parameters, fixed={"poissons_ratio": 0.45, "air_drag": 0.7})
     assert box.free == tuple(name for name in THETA if name != "poissons_ratio")
     unit = box.fill(np.full((2, 4), [[0.25], [0.75]]))
     found = box.parameters(box.to_physical(unit))

@@ -18,6 +18,7 @@ from pipeline.params import load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.parameters import Parameters
 from tests.identify.search import toy
+from tests.project import DEFAULTS
 from validation.synthetic import THETA, own_law_episode, recorded_yardstick
 
 WEIGHTS = dict.fromkeys(TERMS, 1.0)
@@ -116,7 +117,7 @@ def test_the_text_compiles_for_a_gpu(tmp_path) -> None:
 @pytest.mark.parametrize("chamfer", ["symmetric", "measured", "clouds"])
 def test_terms_of_a_gpu_are_those_of_the_cpu(chamfer: str) -> None:
     """64 rollouts of the CPU, compared there and on the GPU with clouds of noise; to 1e-4."""
-    params = load("params.yaml")
+    params = load(DEFAULTS)
     sling, episode = recorded_yardstick(params)
     episode = own_law_episode(sling, episode, Parameters.of(sling.law, THETA), cutoff=35.0)
     space = SearchBox.of(params.parameters)

@@ -13,9 +13,10 @@ from pipeline.identify.objective.loss import TERMS, EpisodeLoss
 from pipeline.params import load
 from pipeline.simulator.parameters import THETA
 from tests.identify.search import toy
+from tests.project import DEFAULTS
 from validation.synthetic import recorded_yardstick
 
-PARAMS = load("params.yaml")
+PARAMS = load(DEFAULTS)
 EPISODE = toy.episode()
 OFFSET, PULL = "poissons_ratio", "youngs_modulus"  # what the toy takes them for
 BOX = SearchBox(

@@ -13,9 +13,9 @@ from pipeline.identify.objective import session
 from pipeline.params import load
 from tests.identify.search import toy
 from tests.identify.search.functions import Evaluate, rosenbrock
-from tests.project import ROOT
+from tests.project import DEFAULTS
 
-PARAMS = load(ROOT / "params.yaml")
+PARAMS = load(DEFAULTS)
 UNIT = np.random.default_rng(1).random((4, 5))
 
 

@@ -12,8 +12,9 @@ from pipeline.identify.search.build import build, explorer
 from pipeline.identify.search.loop import latin_hypercube
 from pipeline.params import parse
 from tests.identify.search.functions import Evaluate, alone, rosenbrock
+from tests.project import DEFAULTS
 
-TEXT = Path("params.yaml").read_text(encoding="utf-8")
+TEXT = DEFAULTS.read_text(encoding="utf-8")
 OWN = "tests.identify.search.own:RandomSearch"
 
 

@@ -25,6 +25,7 @@ from tests.identify.search.functions import (
     changed,
     quadratic,
 )
+from tests.project import DEFAULTS
 
 VALLEY = functions.correlated()
 
@@ -103,7 +104,7 @@ def test_failed_points_are_told_as_twice_the_worst_so_far() -> None:
 
 def test_fixed_axes_keep_their_physical_values() -> None:
     """The optimiser searches the other axes; the history has all of them."""
-    parameters = load("params.yaml").parameters
+    parameters = load(DEFAULTS).parameters
     fixed = {"poissons_ratio": 0.45, "elasticity_damping": 5e-3}
     box = SearchBox.of(parameters, fixed=fixed)
     assert box.free == ("youngs_modulus", "dynamic_friction", "damping_scale")
@@ -127,7 +128,7 @@ def test_one_free_axis_is_enough() -> None:
 
 
 def test_every_search_has_the_same_budget() -> None:
-    params = load("params.yaml")
+    params = load(DEFAULTS)
     optimizer, explore = params.optimizer, rollouts_of(params, "sling2sim2real")
     assert explore == optimizer.population * (optimizer.generations + 1)
     assert rollouts_of(params, "bo") == explore + optimizer.cma_rollouts == 600

@@ -6,12 +6,12 @@ from pipeline.identify.results.theta import parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.params import load
 from pipeline.simulator.parameters import THETA
-from tests.project import ROOT
+from tests.project import DEFAULTS
 
 
 def test_the_simulator_launches_in_the_air_of_the_theta_file(tmp_path) -> None:
     """Drag takes speed; that of samples takes the place of the file's, launch by launch."""
-    params = load(ROOT / "params.yaml")
+    params = load(DEFAULTS)
     coarse = {"edges": 16, "launch_step": 1e-3}
     params = params.model_copy(update={"sling": params.sling.model_copy(update=coarse)})
     band, draw = next(iter(params.bands)), np.array([[-0.33, -0.15]])

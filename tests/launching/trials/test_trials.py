@@ -9,6 +9,7 @@ from pipeline.params import load
 from pipeline.simulator.launch import Launches, launch, limited
 from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import Parameters
+from tests.project import DEFAULTS
 
 PREDICTED = Launches(
     landing_y=np.array([1.9, np.nan, 2.0]),
@@ -86,7 +87,7 @@ def test_the_limit_is_the_simulators_own() -> None:
     weak = limited(PREDICTED, 30.0).failure
     assert weak == [None, "it broke", "holding takes 31.0 N, more than 30 N"]
     assert limited(PREDICTED, 31.0).failure == PREDICTED.failure
-    params = load()
+    params = load(DEFAULTS)
     lab = params.setup, params.sling
     world = ClampedBand.of(params.bands["band1"], *lab), LaunchSetup.of(*lab)
     draws, theta = np.array([[-0.28, -0.1], [-0.44, -0.28]]), np.array([2e5, 0.45, 2e-3, 0.5, 0.5])

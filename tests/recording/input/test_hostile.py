@@ -9,6 +9,7 @@ from pipeline.base.errors import UserError, printable
 from pipeline.params import load
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.input.words import shortened
+from tests.project import DEFAULTS
 from validation.recordings.bag import blind_bag
 
 EVIL = "/../../x\x1b[2J\n\r\u202e<script>alert(1)</script>|`$(touch pwned)`"
@@ -16,7 +17,7 @@ EVIL = "/../../x\x1b[2J\n\r\u202e<script>alert(1)</script>|`$(touch pwned)`"
 
 @pytest.fixture
 def setup():
-    return load("params.yaml").setup
+    return load(DEFAULTS).setup
 
 
 def test_names_are_shown_without_what_a_terminal_obeys() -> None:

@@ -15,6 +15,7 @@ from pipeline.recording.input.frames import Transform
 from pipeline.recording.masks.hand import Colors, Shape
 from pipeline.recording.masks.ridge import RidgeMask
 from pipeline.recording.view import View
+from tests.project import DEFAULTS
 from validation.recordings import looks, strand
 from validation.recordings.looks import LOOKS
 from validation.recordings.scores import PHASES, figures
@@ -33,7 +34,7 @@ QUICK = (
 
 @pytest.fixture(scope="module")
 def cloud():
-    return load("params.yaml").cloud
+    return load(DEFAULTS).cloud
 
 
 @pytest.mark.parametrize("name", QUICK)

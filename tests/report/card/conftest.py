@@ -16,7 +16,7 @@ from pipeline.report.card.inputs import CardInputs, card_inputs
 from pipeline.simulator.parameters import EXTRA
 from tests import once
 from tests.policy.stored import write_stored
-from tests.project import ROOT, set_methods
+from tests.project import DEFAULTS, set_methods
 from validation.projects import ROUGH
 from validation.recordings.bag import Truth, write_bag
 
@@ -78,7 +78,7 @@ def trials() -> pd.DataFrame:
 
 def make(root: Path) -> None:
     yaml = YAML()
-    content = yaml.load(ROOT / "params.yaml")
+    content = yaml.load(DEFAULTS)
     content["run"].update(bands=[BAND], rig=[])
     content["run"]["ablations"].update(bands=[], rig=[])
     set_methods(content, [METHOD])

@@ -6,16 +6,17 @@ from hypothesis import strategies as st
 from pipeline.params import load
 from pipeline.report.drawing.styles import FEW, KNOWN, drawn, styles
 from pipeline.report.run import paper
+from tests.project import DEFAULTS
 
 METHODS = st.lists(st.sampled_from([*KNOWN, "mine", "yours", "theirs"]), unique=True, min_size=1)
 
 
 def test_every_method_of_the_project_has_its_own_name_and_colour() -> None:
-    named = styles(load().methods).values()
+    named = styles(load(DEFAULTS).methods).values()
     assert (
         len({style.name for style in named}) == len({style.color for style in named}) == len(named)
     )
-    assert set(KNOWN) == set(load().methods)
+    assert set(KNOWN) == set(load(DEFAULTS).methods)
     assert {method for _, method in paper.LANDING} <= set(KNOWN)
 
 

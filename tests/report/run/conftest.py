@@ -16,7 +16,7 @@ from pipeline.params import load
 from pipeline.report.run.results import Result, Results, gather
 from pipeline.simulator.parameters import THETA as NAMES
 from tests.policy.stored import write_stored
-from tests.project import set_methods
+from tests.project import DEFAULTS, set_methods
 
 BAND, METHOD = "toy", "sling2sim2real"
 THETA = {
@@ -42,7 +42,7 @@ def episode() -> Episode:
 
 def history(phase: str, totals: list[float], solver: int | None = None) -> pd.DataFrame:
     """Rows on the diagonal of the unit cube, one generation each; its box is params.yaml's."""
-    boxes = load(Path("params.yaml")).parameters
+    boxes = load(DEFAULTS).parameters
     place = (np.arange(len(totals)) + 0.5) / len(totals)
     rows = pd.DataFrame({"method": METHOD, "phase": phase, "total": totals})
     rows["generation"], rows["solver"] = np.arange(len(totals)), solver
@@ -121,7 +121,7 @@ def posterior() -> dict:
 def template(tmp_path_factory) -> Path:
     """A project folder with params.yaml and everything that the report reads."""
     root, yaml = tmp_path_factory.mktemp("report"), YAML()
-    content = yaml.load(Path("params.yaml"))
+    content = yaml.load(DEFAULTS)
     content["run"].update(bands=[BAND], rig=[])
     content["run"]["ablations"].update(bands=[], rig=[])
     set_methods(content, [METHOD])

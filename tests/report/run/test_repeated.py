@@ -11,11 +11,11 @@ from pipeline.report.run.chapters.repeated import claims
 from pipeline.report.run.repeated import FILE, Repeated
 from pipeline.report.run.tables.cells import markdown
 from pipeline.report.run.tables.repeated import as_table
-from tests.project import ROOT, with_
+from tests.project import DEFAULTS, ROOT, with_
 from validation.campaigns.ablations import PAPER, rank_correlations, summary
 from validation.paired import mean_interval
 
-PARAMS = load(ROOT / "params.yaml")
+PARAMS = load(DEFAULTS)
 RNG = np.random.default_rng(1)
 MISS = {  # cm, of ten recordings
     PAPER: 10 + RNG.normal(0, 0.5, 10),

@@ -14,7 +14,7 @@ from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import THETA as NAMES
 from pipeline.simulator.parameters import Parameters
-from tests.project import ROOT
+from tests.project import DEFAULTS
 
 pytestmark = pytest.mark.usefixtures("nowhere")
 
@@ -25,7 +25,7 @@ SHIFT = np.array([0, 0.05, 0])  # of the clouds from where the band is
 
 @pytest.fixture(scope="module")
 def params():
-    return load(ROOT / "params.yaml")
+    return load(DEFAULTS)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from ruamel.yaml import YAML
 
 from pipeline.report.run.results import load_floor
 from stages import floor
-from tests.project import ROOT
+from tests.project import DEFAULTS
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def run(tmp_path: Path, monkeypatch):
 
     def floor_of(**setup) -> dict:
         yaml = YAML()
-        content = yaml.load(ROOT / "params.yaml")
+        content = yaml.load(DEFAULTS)
         content["rig"].update({"edges": 24, "tolerance": 1e-3})
         content["floor"].update({"map_size": [4, 4], "launches": 0})
         content["trials"].update({"targets": [1.6, 2.3], "repeats": 2})

@@ -8,7 +8,7 @@ from pipeline.launching.surface.aim import NEAR
 from pipeline.params import load
 from rig.oracle.world import World
 from rig.physics.launch import launch
-from tests.project import ROOT
+from tests.project import DEFAULTS
 
 DRAW = np.array([-0.30, -0.15])
 
@@ -19,7 +19,7 @@ def written(tmp_path: Path):
 
     def write(**changes: dict) -> Path:
         yaml, path = YAML(), tmp_path / "params.yaml"
-        content = yaml.load(ROOT / "params.yaml")
+        content = yaml.load(DEFAULTS)
         content["rig"].update({"edges": 24, "tolerance": 1e-4})
         for section, values in changes.items():
             content[section].update(values)

@@ -6,6 +6,7 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.params import load
+from tests.project import DEFAULTS
 from validation.benchmarks import engines as bench
 
 
@@ -13,7 +14,7 @@ def test_a_missing_peer_is_an_entry_that_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     monkeypatch.setitem(sys.modules, "newton", None)
     monkeypatch.setattr(bench, "ENVIRONMENTS", {"cpu": (2, 1)})
-    ours, *peers = bench.bench_peers(load())
+    ours, *peers = bench.bench_peers(load(DEFAULTS))
     assert ours["cpu_s_per_rollout"] > 0
     assert ours["ratio"] == 1.0
     assert abs(ours["force_error"]) < 0.02
@@ -26,14 +27,14 @@ def test_a_missing_peer_is_an_entry_that_says_so(monkeypatch):
 
 def test_a_device_that_is_not_there_is_refused():
     with pytest.raises(UserError, match="device tpu"):
-        bench.bench_peers(load(), "tpu")
+        bench.bench_peers(load(DEFAULTS), "tpu")
 
 
 @pytest.mark.validation
 def test_both_peers_are_slower():
     pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[validation]'")
     pytest.importorskip("newton", reason="newton: pip install -e '.[validation]'")
-    _, mujoco, newton = bench.bench_peers(load())
+    _, mujoco, newton = bench.bench_peers(load(DEFAULTS))
     assert mujoco["ratio"] > 50
     assert newton["ratio"] > 100
     assert abs(mujoco["force_error"]) < 0.02

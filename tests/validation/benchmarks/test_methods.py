@@ -9,11 +9,11 @@ from pipeline.identify.objective.evaluate import Evaluator
 from pipeline.identify.objective.loss import EpisodeLoss
 from pipeline.identify.search.explore import rollouts_of
 from pipeline.params import load
-from tests.project import ROOT
+from tests.project import DEFAULTS
 from validation.benchmarks import methods as bench
 from validation.synthetic import THETA, recorded_yardstick
 
-PARAMS = load(ROOT / "params.yaml")
+PARAMS = load(DEFAULTS)
 SMALL = {"population": 6, "generations": 2, "cma_population": 4, "cma_rollouts": 16, "k_top": 2}
 EXPLORED = 18  # of them
 

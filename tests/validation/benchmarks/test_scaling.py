@@ -5,10 +5,10 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.params import load
-from tests.project import ROOT
+from tests.project import DEFAULTS
 from validation.benchmarks import scaling as bench
 
-PARAMS = load(ROOT / "params.yaml")
+PARAMS = load(DEFAULTS)
 SMALL = {"population": 6, "generations": 1, "cma_population": 4, "cma_rollouts": 4, "k_top": 1}
 
 

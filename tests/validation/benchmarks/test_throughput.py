@@ -11,11 +11,11 @@ from pipeline.params import load
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
-from tests.project import ROOT
+from tests.project import DEFAULTS
 from validation import synthetic
 from validation.benchmarks import throughput as bench
 
-PARAMS = load(ROOT / "params.yaml")
+PARAMS = load(DEFAULTS)
 
 
 def test_the_yardstick_is_held_drawn_and_let_go() -> None:

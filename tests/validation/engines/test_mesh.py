@@ -9,6 +9,7 @@ from pipeline.base.errors import UserError
 from pipeline.export.mesh import CLAMPED, Tube
 from pipeline.params import load
 from pipeline.simulator.model import ClampedBand
+from tests.project import DEFAULTS
 from validation.engines import checks
 from validation.simulator.closed import String
 from validation.simulator.finding import Bench
@@ -18,7 +19,7 @@ THETA = np.array([2.2e5, 0.45, 3e-3, 1.0, 1.0])
 
 @pytest.fixture(scope="module")
 def sling():
-    params = load()
+    params = load(DEFAULTS)
     return ClampedBand.of(params.bands["band1"], params.setup, params.sling)
 
 
@@ -53,9 +54,9 @@ def test_its_force_is_the_closed_form_of_a_straight_string(sling, rings):
 def test_without_mujoco_the_section_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(UserError, match="pip install"):
-        checks.section(Bench(load()))
+        checks.section(Bench(load(DEFAULTS)))
 
 
 def test_our_tetrahedra_are_compared_on_the_cpu_whatever_the_device():
-    same = checks.solid(Bench(load(), device="cuda:0"))
+    same = checks.solid(Bench(load(DEFAULTS), device="cuda:0"))
     assert same.device == "cpu" and same.params.sling.mesh == "tetrahedra"

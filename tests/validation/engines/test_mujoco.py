@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.export.mesh import Tube
 from pipeline.params import load
+from tests.project import DEFAULTS
 from validation.engines import checks
 from validation.engines.mujoco_flex import FlexBand
 from validation.simulator.finding import Bench, unmet
@@ -16,7 +17,7 @@ mujoco = pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[validat
 
 @pytest.fixture(scope="module")
 def bench():
-    return Bench(load())
+    return Bench(load(DEFAULTS))
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ import numpy as np
 from pipeline.params import load
 from pipeline.report.drawing.styles import styles
 from pipeline.report.run.chapters.findings import CAVEAT, CLAIMS, OWN, doubts, findings
+from tests.project import DEFAULTS
 from tests.report.run.conftest import confidence
 from tests.report.run.tables.toy_results import floor, launches, result, results
 
@@ -20,7 +21,7 @@ def run(*some, floors=None, unused=None) -> SimpleNamespace:
     found = results(*some, floors=floors)
     found.unused.update(unused or {})
     named = styles(dict.fromkeys(one.method for one in some))
-    params = SimpleNamespace(trials=load().trials)
+    params = SimpleNamespace(trials=load(DEFAULTS).trials)
     return SimpleNamespace(
         results=found,
         styles=named,

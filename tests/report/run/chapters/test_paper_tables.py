@@ -10,9 +10,10 @@ import pytest
 from pipeline.params import load
 from pipeline.report.drawing.styles import styles
 from pipeline.report.run.chapters.paper_tables import paper_tables
+from tests.project import DEFAULTS
 from tests.report.run.tables.toy_results import floor, launches, result, results
 
-PARAMS = load()
+PARAMS = load(DEFAULTS)
 NOISE = np.random.default_rng(0).normal(0, 0.01, (3, 5))
 NAMED = styles(["least_squares", "package_si", "de", "no_work"])
 

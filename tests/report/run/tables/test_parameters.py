@@ -11,10 +11,11 @@ from pipeline.identify.objective.box import SearchBox
 from pipeline.params import load
 from pipeline.report.drawing.styles import styles
 from pipeline.report.run.tables.parameters import as_table, at_edge, identified, records
+from tests.project import DEFAULTS
 from tests.report.run.conftest import THETA, confidence
 from tests.report.run.tables.toy_results import launches, result, results
 
-PARAMS, NAMED = load(), styles(["sling2sim2real", "package_si", "adam"])
+PARAMS, NAMED = load(DEFAULTS), styles(["sling2sim2real", "package_si", "adam"])
 TRIALS = launches([[0.0]] * 3)
 
 

@@ -9,6 +9,7 @@ from pipeline.export.mesh import Tube
 from pipeline.params import load
 from pipeline.simulator.cylinder import volumes
 from pipeline.simulator.model import GRAVITY
+from tests.project import DEFAULTS
 from validation.engines import checks
 from validation.engines.physx import law
 from validation.engines.physx.exported import LIMIT, SLIP, ExportedBand, compared, met, yielded
@@ -20,7 +21,7 @@ STRETCH, ACROSS = 1.6, 0.8
 
 @pytest.fixture(scope="module")
 def tube():
-    sling = checks.sling_of(checks.solid(Bench(load())))
+    sling = checks.sling_of(checks.solid(Bench(load(DEFAULTS))))
     return Tube.of(sling, usd.EDGES, usd.GRADING)
 
 

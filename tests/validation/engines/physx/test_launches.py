@@ -13,6 +13,7 @@ from pipeline.export.mesh import Tube
 from pipeline.identify.results.mounting import load_sling
 from pipeline.params import load
 from pipeline.simulator.model import GRAVITY
+from tests.project import DEFAULTS
 from validation.engines.checks import SAME_MESH
 from validation.engines.physx import bands, flight, launches, worker
 from validation.engines.physx.rollouts import BURST
@@ -49,12 +50,12 @@ worker.main()
 
 @pytest.fixture(scope="module")
 def sling():
-    return load_sling(load(), "band1")
+    return load_sling(load(DEFAULTS), "band1")
 
 
 @pytest.fixture(scope="module")
 def launch_setup():
-    return launches.alike(load())
+    return launches.alike(load(DEFAULTS))
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 from pipeline.export.mesh import Tube
 from pipeline.params import load
 from pipeline.simulator.model import ClampedBand
-from tests.project import ROOT
+from tests.project import DEFAULTS, ROOT
 from validation.engines.physx import law
 
 YOUNG, POISSON = 2.2e5, 0.45
@@ -16,7 +16,7 @@ YOUNG, POISSON = 2.2e5, 0.45
 
 @pytest.fixture(scope="module")
 def sling():
-    params = load()
+    params = load(DEFAULTS)
     return ClampedBand.of(params.bands["band1"], params.setup, params.sling)
 
 

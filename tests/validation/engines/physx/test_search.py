@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.base.errors import UserError
 from pipeline.simulator.parameters import Parameters
-from tests.project import ROOT
+from tests.project import DEFAULTS
 from validation.engines.physx import search
 from validation.engines.physx.search import OURS, PHYSX
 
@@ -29,7 +29,7 @@ def searched(tmp_path, monkeypatch):
     monkeypatch.setattr(search, "release", lambda: "0")
     about = {"versions": {}}
     monkeypatch.setattr(search, "environment", lambda _, command: about | {"command": command})
-    monkeypatch.setattr(sys, "argv", ["search", "band1", "--params", str(ROOT / "params.yaml")])
+    monkeypatch.setattr(sys, "argv", ["search", "band1", "--params", str(DEFAULTS)])
     monkeypatch.chdir(tmp_path)
     return tmp_path / "reports/validation/physx-band1.json"
 

@@ -11,7 +11,7 @@ from pipeline.base.code import ROOT
 from pipeline.params import Params
 from pipeline.params.identification import steps_of
 from pipeline.params.lab import StepParams
-from validation.projects import environment, wait
+from validation.projects import DEFAULTS, environment, wait
 
 
 def python(*arguments: str | Path, folder: Path = ROOT, **more: str) -> subprocess.CompletedProcess:

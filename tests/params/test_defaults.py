@@ -1,4 +1,4 @@
-"""Tests take the parameters as delivered, whatever the project in which they run has been set to."""
+"""Tests take the parameters as delivered, whatever a user has set."""
 
 import subprocess
 
@@ -24,11 +24,10 @@ def test_they_are_the_defaults_of_the_project() -> None:
     A project whose bands are its users' has a params.yaml of its own.
     """
     commit = git("log", "-1", "--format=%H", "--", *CODE).strip()
-    own, text = DEFAULTS.read_text(), git("show", f"{commit}:params.yaml")
+    text = git("show", f"{commit}:params.yaml")
     if YAML(typ="safe").load(text)["bands"].keys() != load(DEFAULTS).bands.keys():
         pytest.skip("params.yaml is a user's")
     assert git("show", f"{commit}:validation/params.yaml") == text, "cp params.yaml validation/"
-    assert own == text or git("status", "--porcelain", "--", "validation/params.yaml")
 
 
 @pytest.mark.parametrize("name", ["params.yaml", "sling2sim2real/params.yaml"])

@@ -1,21 +1,37 @@
 """The scripts of examples/ run as their first lines say, and come to what they promise."""
 
 import re
+from pathlib import Path
 
 import pytest
 
 from tests.project import ROOT, python
+from validation.projects import copy_project
 
 RUN_HERE = {"identify_from_arrays", "own_optimizer", "robot_loop", "simulate_pull"}
 RUN_ELSEWHERE = {"policy_elsewhere"}  # tests/policy/test_export.py
 
 
-def said(name: str, folder) -> str:
-    """What a script prints, run in an empty folder, where it leaves nothing."""
-    done = python(ROOT / "examples" / f"{name}.py", folder=folder)
-    assert done.returncode == 0, done.stderr
-    assert list(folder.iterdir()) == []
-    return done.stdout
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory) -> Path:
+    """The project as delivered: the scripts take its settings."""
+    folder = tmp_path_factory.mktemp("examples") / "copy"
+    copy_project(folder)
+    return folder
+
+
+@pytest.fixture
+def said(copy: Path, tmp_path: Path):
+    """Gives what a script prints, run in an empty folder, where it leaves nothing."""
+
+    def run(name: str) -> str:
+        script = copy / "examples" / f"{name}.py"
+        done = python(script, folder=tmp_path, PYTHONPATH=str(copy))
+        assert done.returncode == 0, done.stderr
+        assert list(tmp_path.iterdir()) == []
+        return done.stdout
+
+    return run
 
 
 def numbers(pattern: str, text: str) -> list[float]:
@@ -30,16 +46,16 @@ def test_every_script_is_run_and_short() -> None:
         assert f"examples/{name}.py" in text.split('"""')[1] or name in RUN_ELSEWHERE
 
 
-def test_simulate_pull(tmp_path) -> None:
-    table = said("simulate_pull", tmp_path)
+def test_simulate_pull(said) -> None:
+    table = said("simulate_pull")
     peaks, recoils = numbers(r"([\d.]+) N +[\d.]+ N", table), numbers(r"(\d+) ms", table)
     assert peaks[1] / peaks[0] == pytest.approx(1.1, abs=0.01)  # 10 % stiffer
     assert peaks[2] > peaks[0] and recoils[3] > recoils[0]
 
 
 @pytest.mark.slow
-def test_identify_from_arrays(tmp_path) -> None:
-    text = said("identify_from_arrays", tmp_path)
+def test_identify_from_arrays(said) -> None:
+    text = said("identify_from_arrays")
     assert "\nsettled\n" in text
     found = r"mooney_share: ([-\d.]+)  \[[-\d.]+, [-\d.]+\], truth 0.3"
     assert numbers(found, text)[0] == pytest.approx(0.3, abs=0.1)
@@ -47,15 +63,15 @@ def test_identify_from_arrays(tmp_path) -> None:
 
 
 @pytest.mark.slow
-def test_own_optimizer(tmp_path) -> None:
-    text = said("own_optimizer", tmp_path)
+def test_own_optimizer(said) -> None:
+    text = said("own_optimizer")
     stiffness = numbers(r"youngs_modulus +([\d.e+]+)", text)
     assert len(stiffness) == 2 and all(abs(one / 2.2e5 - 1) < 0.15 for one in stiffness)
 
 
 @pytest.mark.slow
-def test_robot_loop(tmp_path) -> None:
-    text = said("robot_loop", tmp_path)
+def test_robot_loop(said) -> None:
+    text = said("robot_loop")
     low, high = numbers(r"expected ([\d.]+) to", text), numbers(r"to ([\d.]+) m, landed", text)
     landings = numbers(r"landed at ([\d.]+)", text)
     assert len(landings) == 3

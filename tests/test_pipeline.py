@@ -2,12 +2,15 @@
 
 import json
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from ruamel.yaml import YAML
 
+from app.flow.graph import stages_of
 from tests.project import ROOT
 from validation.projects import TINY, ProjectCopy, copy_project, run_of
 
@@ -61,8 +64,36 @@ class Copy(ProjectCopy):
     def write(self, name: str, text: str) -> None:
         (self.folder / name).write_text(text, encoding="utf-8")
 
-    def append(self, name: str, text: str) -> None:
-        self.write(name, (self.folder / name).read_text(encoding="utf-8") + text)
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """What is written in the block is gone after it."""
+        before = {name: file.read_bytes() for name, file in self._edited() if file.exists()}
+        try:
+            yield
+        finally:
+            for name, file in self._edited():
+                if name in before:
+                    file.write_bytes(before[name])
+                else:
+                    file.unlink(missing_ok=True)
+
+    def _edited(self) -> Iterator[tuple[str, Path]]:
+        """Files that a change of CHANGES edits."""
+        for change in CHANGES.values():
+            name = "params.yaml" if isinstance(change.edit, dict) else change.edit[0]
+            yield name, self.folder / name
+
+    def stale(self) -> set[str]:
+        """Stages whose own inputs have changed since they ran."""
+        return set(json.loads(self("dvc", "status", "--json")))
+
+    def after(self, names: Collection[str]) -> set[str]:
+        """Stages that read what these make, and so on."""
+        found: set[str] = set()
+        for stage in stages_of(self.folder).values():  # producers first
+            if {*stage.producers} & {*names, *found}:
+                found.add(stage.name)
+        return found
 
 
 @pytest.fixture(scope="module")
@@ -181,41 +212,54 @@ def test_the_same_inputs_give_the_same_bytes(project: Copy) -> None:
         assert file.read_bytes() == content, file
 
 
-def test_a_variation_of_k_top_keeps_the_history(project: Copy) -> None:
-    project.commit()
-    theta = "theta@band1-sling2sim2real"
-    ran = project.dvc("exp", "run", "-S", "optimizer.k_top=1", theta)
-    assert ran == {"clusters@band1-sling2sim2real", "cma@band1-sling2sim2real", theta}
-    content = YAML(typ="safe").load(project.folder / "params.yaml")
-    assert content["optimizer"]["k_top"] == 1
-    project.dvc("repro")
-
-
 PAPER, OURS = "sling2sim2real", "least_squares"
 AFTER_A_LAUNCH = {  # whatever launches, or predicts a launch
     *(stage for method in (*METHODS, "de", "bo") for stage in of_method(method, first="policy")),
     *of_bands("floor", "card"),
     "report",
 }
-# What is changed; the stages that must run; those that may besides, as far as outputs change.
-CHANGES: dict[str, tuple[Callable[[Copy], None], set[str], set[str]]] = {
-    "optimizer.k_top": (
-        lambda copy: copy.set({"optimizer.k_top": 2}),
+
+
+class Change(NamedTuple):
+    """An edit of one file, or of keys of params.yaml.
+
+    Attributes:
+        must: Stages that run after it.
+        may: Those that may besides, as far as outputs change.
+    """
+
+    edit: dict[str, object] | tuple[str, str]
+    must: set[str]
+    may: set[str]
+
+    def make(self, copy: Copy) -> None:
+        """In a copy of the project; a pair is a file and what is appended to it."""
+        if isinstance(self.edit, dict):
+            copy.set(self.edit)
+        else:
+            name, text = self.edit
+            file = copy.folder / name
+            copy.write(name, (file.read_text("utf-8") if file.exists() else "") + text)
+
+
+CHANGES = {
+    "optimizer.k_top": Change(
+        {"optimizer.k_top": 1},
         of_method(PAPER, first="clusters") - of_method(PAPER, first="theta"),
         {*of_method(PAPER, first="theta"), "report"},
     ),
-    "optimizer.k_nn": (
-        lambda copy: copy.set({"optimizer.k_nn": 7}),
+    "optimizer.k_nn": Change(
+        {"optimizer.k_nn": 7},
         of_method(PAPER, first="clusters") - of_method(PAPER, first="cma"),
         {*of_method(PAPER, first="cma"), "report"},
     ),
-    "optimizer.delta": (
-        lambda copy: copy.set({"optimizer.delta": 0.11}),
+    "optimizer.delta": Change(
+        {"optimizer.delta": 0.11},
         of_method(PAPER, first="clusters") - of_method(PAPER, first="cma"),
         {*of_method(PAPER, first="cma"), "report"},
     ),
-    "optimizer.cma_population": (
-        lambda copy: copy.set({"optimizer.cma_population": 5, "optimizer.cma_rollouts": 10}),
+    "optimizer.cma_population": Change(
+        {"optimizer.cma_population": 5, "optimizer.cma_rollouts": 10},
         {
             *(of_method(PAPER, first="cma") - of_method(PAPER, first="theta")),
             "ablation_de@band1-de",
@@ -224,13 +268,13 @@ CHANGES: dict[str, tuple[Callable[[Copy], None], set[str], set[str]]] = {
         },
         {stage for one in (PAPER, "de", "bo") for stage in of_method(one, first="theta")},
     ),
-    "setup.projectile_mass": (
-        lambda copy: copy.set({"setup.projectile_mass": 0.040}),
+    "setup.projectile_mass": Change(
+        {"setup.projectile_mass": 0.040},
         {*AFTER_A_LAUNCH, *of_bands("evidence"), "density@band1-least_squares"},
         of_method(OURS, ["band1"], first="theta"),
     ),
-    "setup.arm_stiffness": (
-        lambda copy: copy.set({"setup.arm_stiffness": 11000.0}),
+    "setup.arm_stiffness": Change(
+        {"setup.arm_stiffness": 11000.0},
         {
             *(AFTER_A_LAUNCH - of_bands("floor")),
             *of_bands("evidence"),
@@ -238,13 +282,13 @@ CHANGES: dict[str, tuple[Callable[[Copy], None], set[str], set[str]]] = {
         },
         of_method(OURS, ["band1"], first="theta"),
     ),
-    "evidence of band1": (
-        lambda copy: copy.write("data/evidence/band1.csv", LAUNCH.replace("2.0", "2.01")),
+    "evidence of band1": Change(
+        ("data/evidence/band1.csv", LAUNCH.splitlines()[1].replace("2.0", "2.01") + "\n"),
         {*of_bands("evidence"), "density@band1-least_squares"},
         {*of_method(OURS, ["band1"], first="theta"), "card@band1", "report"},
     ),
-    "measured landings of band2": (
-        lambda copy: copy.write("data/trials/measured/band2.csv", LAUNCH),
+    "measured landings of band2": Change(
+        ("data/trials/measured/band2.csv", LAUNCH),
         {
             *of_bands("evidence"),
             *(f"trials@band2-{method}" for method in METHODS),
@@ -253,30 +297,82 @@ CHANGES: dict[str, tuple[Callable[[Copy], None], set[str], set[str]]] = {
         },
         set(),
     ),
-    "rig.bands.band2": (
-        lambda copy: copy.set({"rig.bands.band2.viscosity": 0.0013}),
+    "rig.bands.band2": Change(
+        {"rig.bands.band2.viscosity": 0.0013},
         {
             *(EVERYTHING & {f"{step}@band2" for step in ("record", "episode", "floor")}),
             "report",
         },
         {stage for stage in EVERYTHING if "@band2" in stage},
     ),
-    "the Bayesian optimiser": (
-        lambda copy: copy.append("pipeline/identify/optimizers/bo/bayes.py", "# edited\n"),
+    "the Bayesian optimiser": Change(
+        ("pipeline/identify/optimizers/bo/bayes.py", "# edited\n"),
         {"ablation_bo@band1-bo"},
         {*of_method("bo", first="theta"), "report"},
     ),
-    "a chapter of the report": (
-        lambda copy: copy.append("pipeline/report/run/chapters/appendix.py", "# edited\n"),
+    "a chapter of the report": Change(
+        ("pipeline/report/run/chapters/appendix.py", "# edited\n"),
         {"report"},
         set(),
     ),
 }
+# Stages that read what a folder has for every band, and write the same for another band.
+OF_OTHER_BANDS = {
+    "evidence of band1": {"evidence@band2"},
+    "measured landings of band2": {"evidence@band1"},
+    "setup.projectile_mass": {"evidence@band2"},  # without launches
+    "setup.arm_stiffness": {"evidence@band2"},
+}
 
 
-@pytest.mark.parametrize("change", CHANGES)
-def test_a_change_runs_what_depends_on_it(project: Copy, change: str) -> None:
-    make, must, may = CHANGES[change]
-    make(project)
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_change_makes_stale_what_depends_on_it(project: Copy, name: str) -> None:
+    """At once what reads what has changed, then what may run after that, by DVC's graph."""
+    change = CHANGES[name]
+    with project.kept():
+        change.make(project)
+        stale = project.stale()
+    after = stale | project.after(stale)
+    allowed = change.must | change.may | OF_OTHER_BANDS.get(name, set())
+    assert change.must <= after, sorted(change.must - after)
+    assert stale <= allowed, sorted(stale - allowed)
+    if name not in OF_OTHER_BANDS:
+        assert after <= allowed, sorted(after - allowed)
+
+
+def test_a_variation_of_k_top_keeps_the_history(project: Copy) -> None:
+    project.commit()
+    theta = "theta@band1-sling2sim2real"
+    ran = project.dvc("exp", "run", "-S", "optimizer.k_top=1", theta)
+    assert ran == {"clusters@band1-sling2sim2real", "cma@band1-sling2sim2real", theta}
+    content = YAML(typ="safe").load(project.folder / "params.yaml")
+    assert content["optimizer"]["k_top"] == 1
+
+
+# Changes that one run may show together: where one must not run a stage, none of the others may.
+TOGETHER = (
+    ("optimizer.k_top", "optimizer.k_nn", "optimizer.delta", "optimizer.cma_population",
+     "setup.projectile_mass", "setup.arm_stiffness"),
+    ("evidence of band1", "measured landings of band2", "the Bayesian optimiser",
+     "a chapter of the report"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("names", TOGETHER, ids=lambda names: names[0])
+def test_changes_run_what_depends_on_them(project: Copy, names: tuple[str, ...]) -> None:
+    changes = [CHANGES[name] for name in names]
+    for change in changes:
+        change.make(project)
+    must, may = (set().union(*sets) for sets in zip(*(one[1:] for one in changes), strict=True))
     ran = project.dvc("repro", "--no-run-cache")  # a value of before is run, not recalled
     assert must <= ran <= must | may, (sorted(must - ran), sorted(ran - must - may))
+
+
+def test_a_band_of_the_rig_is_recorded_anew(project: Copy) -> None:
+    """What follows depends on its episode."""
+    CHANGES["rig.bands.band2"].make(project)
+    ran = project.dvc("repro", "--no-run-cache", "episode@band2")
+    assert ran == {"record@band2", "episode@band2"}
+    stale = project.stale()
+    assert {f"{step}@band2" for step in ("clamps", "floor")} <= stale
+    assert not any("@band1" in stage for stage in stale), sorted(stale)

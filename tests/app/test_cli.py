@@ -243,19 +243,23 @@ def test_launch_prints_one_json_object(tmp_path: Path) -> None:
     theta = tmp_path / "theta.json"
     theta.write_text(json.dumps({"band": "band1", "theta": SOFT}))
     arguments = ("launch", "--theta", str(theta), "--band", "band1", "--json")
-    done = python("-m", "app.cli", *arguments, "--draw=-0.30,-0.17")
+    folder = DEFAULTS.parent
+    done = python("-m", "app.cli", *arguments, "--draw=-0.30,-0.17", folder=folder)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert [*result] == ["landing_y_m", "speed_m_s", "hold_force_n", "failure", "warnings"]
     assert result["failure"] is None
     assert 0.5 < result["landing_y_m"] < 6.0
     assert 1.0 < result["hold_force_n"] < 30.0
-    broken = json.loads(python("-m", "app.cli", *arguments, "--draw=-0.45,-0.30").stdout)
+    broken = json.loads(
+        python("-m", "app.cli", *arguments, "--draw=-0.45,-0.30", folder=folder).stdout
+    )
     assert broken["landing_y_m"] is None
     assert "N, more than" in broken["failure"]
     more = {"mooney_share": 0.3, "relaxation": 0.02}
     history = {"pull_time": 3.5, "pause": 2.0}
     rubber = {"band": "band1", "law": "rubber", "theta": SOFT | more, "history": history}
     theta.write_text(json.dumps(rubber))
-    lines = python("-m", "app.cli", *arguments[:-1], "--draw=-0.30,-0.17").stdout.splitlines()
+    done = python("-m", "app.cli", *arguments[:-1], "--draw=-0.30,-0.17", folder=folder)
+    lines = done.stdout.splitlines()
     assert ["pull_and_pause_s", "3.5", "2"] in [line.split() for line in lines]

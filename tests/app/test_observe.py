@@ -9,6 +9,7 @@ from app import cli, observe
 from app.flow import child
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
+from tests.project import DEFAULTS
 
 DRAW, LANDING = (-0.3, -0.17), 2.2
 
@@ -128,5 +129,6 @@ def test_the_command(put, monkeypatch, capsys) -> None:
     given = "observe --band band1 --draw=-0.3,-0.17 --landing 2.2 --no-run --json".split()
     arguments = cli.parser().parse_args(given)
     monkeypatch.setattr(observe, "Layout", lambda root: put.layout)
+    monkeypatch.chdir(DEFAULTS.parent)
     assert cli.execute(arguments) == 0
     assert json.loads(capsys.readouterr().out)["launches"] == 1

@@ -83,7 +83,7 @@ def test_a_band_is_added_and_nothing_else_changes(project, seen, blind) -> None:
         ({"diameter": 0.0}, "diameter"),
         ({"rest_length": float("nan")}, "rest_length"),
         ({"recording": Path("missing.mcap")}, "no such file"),
-        ({"recording": Path("params.yaml")}, "not an MCAP"),
+        ({"recording": DEFAULTS}, "not an MCAP"),
         ({"recording": Path("tests")}, "tests: is a folder"),
         ({"recording": Path("/dev/null")}, "is not a file"),
         ({"name": "measured"}, "bands.measured: data/trials/measured"),

@@ -2,12 +2,16 @@
 
 import ast
 import re
+from collections.abc import Iterator
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import pytest
 from ruamel.yaml import YAML
 
-from pipeline.base.code import CODE, NESTED, ROOT, UNTRACKED, closure, concern, files_of, imports
+from pipeline.base import code as of_project
+from pipeline.base.code import CODE, NESTED, ROOT, UNTRACKED, closure, concern, files_of
 from tools import architecture
 from tools.closure import BY_NAME, folders, script_of
 
@@ -29,6 +33,23 @@ PROOF = "validation/campaigns/"  # which holds what was identified against the t
 MAY_ASK_THE_ORACLE = ("stages/floor.py", ORACLE, PROOF)
 
 
+imports = cache(of_project.imports)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def each_file_is_read_once() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (of_project, architecture):
+            patch.setattr(module, "imports", imports, raising=False)
+        yield
+
+
+@cache
+def tree(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+@cache
 def code() -> list[Path]:
     return sorted(file for top in CODE for file in (ROOT / top).rglob("*.py"))
 
@@ -97,7 +118,7 @@ def test_packages_import_each_other_in_one_direction() -> None:
         allowed = {own} | ARROWS[own] | ({"validation"} if name == DEVELOPERS else set())
         seen = {relative(other).partition("/")[0] for other in imports(file)}
         assert seen <= allowed, f"{name} imports {min(seen - allowed)}"
-    at_once = ast.parse((ROOT / DEVELOPERS).read_text()).body
+    at_once = tree(ROOT / DEVELOPERS).body
     modules = [node.module for node in at_once if isinstance(node, ast.ImportFrom)]
     assert not any(module.startswith("validation") for module in modules)
 
@@ -135,10 +156,11 @@ def test_nothing_imports_the_tests() -> None:
         assert not any(name.split(".")[0] == "tests" for name in names), relative(file)
 
 
+@cache
 def imported(file: Path) -> set[str]:
     """Dotted names that `file` imports."""
     names: set[str] = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(file)):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -147,6 +169,7 @@ def imported(file: Path) -> set[str]:
     return names
 
 
+@cache
 def leaf(name: str) -> str:
     """The project's file that a dotted name lies in; the name itself where it is none of ours."""
     for module in (name, name.rpartition(".")[0]):
@@ -158,7 +181,7 @@ def leaf(name: str) -> str:
 def test_no_class_name_stands_twice() -> None:
     seen: dict[str, str] = {}
     for file in code():
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree(file)):
             if isinstance(node, ast.ClassDef):
                 assert node.name not in seen, f"{node.name}: {seen[node.name]}, {relative(file)}"
                 seen[node.name] = relative(file)
@@ -167,8 +190,8 @@ def test_no_class_name_stands_twice() -> None:
 def test_a_folder_of_folders_holds_no_code() -> None:
     """It is no dependency of a stage, so nothing may hang on it."""
     for name in ("pipeline/__init__.py", *(f"{folder}__init__.py" for folder in NESTED)):
-        tree = ast.parse((ROOT / name).read_text())
-        assert len(tree.body) == 1 and ast.get_docstring(tree), name
+        module = tree(ROOT / name)
+        assert len(module.body) == 1 and ast.get_docstring(module), name
 
 
 def test_closure_follows_every_form_of_import(tmp_path: Path) -> None:

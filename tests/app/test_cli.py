@@ -251,9 +251,8 @@ def test_launch_prints_one_json_object(tmp_path: Path) -> None:
     assert result["failure"] is None
     assert 0.5 < result["landing_y_m"] < 6.0
     assert 1.0 < result["hold_force_n"] < 30.0
-    broken = json.loads(
-        python("-m", "app.cli", *arguments, "--draw=-0.45,-0.30", folder=folder).stdout
-    )
+    done = python("-m", "app.cli", *arguments, "--draw=-0.45,-0.30", folder=folder)
+    broken = json.loads(done.stdout)
     assert broken["landing_y_m"] is None
     assert "N, more than" in broken["failure"]
     more = {"mooney_share": 0.3, "relaxation": 0.02}

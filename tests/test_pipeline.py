@@ -4,13 +4,14 @@ import json
 import shutil
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 from ruamel.yaml import YAML
 
-from app.flow.graph import stages_of
+from app.flow.graph import Stage, stages_of
 from tests.project import ROOT
 from validation.projects import TINY, ProjectCopy, copy_project, run_of
 
@@ -58,39 +59,22 @@ class Copy(ProjectCopy):
         (folder.parent / "audit").mkdir()
         copy_project(folder)
         self.set(TINY | run_of(BANDS, METHODS, ("de", "bo")))
-        self.write("data/evidence/band1.csv", LAUNCH)
+        (folder / "data/evidence/band1.csv").write_text(LAUNCH, "utf-8")
         self.commit()
-
-    def write(self, name: str, text: str) -> None:
-        (self.folder / name).write_text(text, encoding="utf-8")
-
-    @contextmanager
-    def kept(self) -> Iterator[None]:
-        """What is written in the block is gone after it."""
-        before = {name: file.read_bytes() for name, file in self._edited() if file.exists()}
-        try:
-            yield
-        finally:
-            for name, file in self._edited():
-                if name in before:
-                    file.write_bytes(before[name])
-                else:
-                    file.unlink(missing_ok=True)
-
-    def _edited(self) -> Iterator[tuple[str, Path]]:
-        """Files that a change of CHANGES edits."""
-        for change in CHANGES.values():
-            name = "params.yaml" if isinstance(change.edit, dict) else change.edit[0]
-            yield name, self.folder / name
 
     def stale(self) -> set[str]:
         """Stages whose own inputs have changed since they ran."""
         return set(json.loads(self("dvc", "status", "--json")))
 
+    @cached_property
+    def stages(self) -> list[Stage]:
+        """Producers first."""
+        return [*stages_of(self.folder).values()]
+
     def after(self, names: Collection[str]) -> set[str]:
         """Stages that read what these make, and so on."""
         found: set[str] = set()
-        for stage in stages_of(self.folder).values():  # producers first
+        for stage in self.stages:
             if {*stage.producers} & {*names, *found}:
                 found.add(stage.name)
         return found
@@ -232,14 +216,26 @@ class Change(NamedTuple):
     must: set[str]
     may: set[str]
 
+    def file(self, copy: Copy) -> Path:
+        return copy.folder / ("params.yaml" if isinstance(self.edit, dict) else self.edit[0])
+
     def make(self, copy: Copy) -> None:
         """In a copy of the project; a pair is a file and what is appended to it."""
         if isinstance(self.edit, dict):
             copy.set(self.edit)
         else:
-            name, text = self.edit
-            file = copy.folder / name
-            copy.write(name, (file.read_text("utf-8") if file.exists() else "") + text)
+            file = self.file(copy)
+            text = file.read_text("utf-8") if file.exists() else ""
+            file.write_text(text + self.edit[1], "utf-8")
+
+    @contextmanager
+    def made(self, copy: Copy) -> Iterator[None]:
+        """For the block alone."""
+        file = self.file(copy)
+        before = file.read_bytes() if file.exists() else None
+        self.make(copy)
+        yield
+        file.unlink() if before is None else file.write_bytes(before)
 
 
 CHANGES = {
@@ -329,8 +325,7 @@ OF_OTHER_BANDS = {
 def test_a_change_makes_stale_what_depends_on_it(project: Copy, name: str) -> None:
     """At once what reads what has changed, then what may run after that, by DVC's graph."""
     change = CHANGES[name]
-    with project.kept():
-        change.make(project)
+    with change.made(project):
         stale = project.stale()
     after = stale | project.after(stale)
     allowed = change.must | change.may | OF_OTHER_BANDS.get(name, set())

@@ -22,6 +22,7 @@ def split(file: Path, folder: Path, cuts: tuple[float, ...], stem: str = "my") -
             writer, channels = Writer(stream), {}
             writer.start("ros2")
             for schema, channel, message in messages:
+                assert schema
                 if not low <= (message.log_time - start) * 1e-9 < high:
                     continue
                 if channel.topic not in channels:

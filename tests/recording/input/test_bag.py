@@ -64,10 +64,14 @@ def test_the_bag_that_a_library_of_others_writes(whole, tmp_path, params) -> Non
     plugin = StoragePlugin.MCAP
     with BagWriter(folder, version=9, storage_plugin=plugin) as bag:
         for schema, channel, message in messages:
+            assert schema
             if channel.topic not in known:
-                text = schema.data.decode()
-                kind = {"msgdef": text, "rihs01": "RIHS01_" + 64 * "0"}
-                known[channel.topic] = bag.add_connection(channel.topic, schema.name, **kind)
+                known[channel.topic] = bag.add_connection(
+                    channel.topic,
+                    schema.name,
+                    msgdef=schema.data.decode(),
+                    rihs01="RIHS01_" + 64 * "0",
+                )
             bag.write(known[channel.topic], message.log_time, message.data)
     assert [part.name for part in parts_of(folder)] == ["other.mcap"]
     same(read_recording(folder, params.setup), read_recording(whole, params.setup))

@@ -6,6 +6,7 @@ Run `sling --help`, or `sling launch --help`. How the table becomes a command li
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from app import arguments as kinds
@@ -145,6 +146,28 @@ def check(arguments: argparse.Namespace) -> Done:
         pictures=arguments.pictures,
         pull=arguments.pull,
     )
+
+
+@command(
+    "write what you measured of your lab into params.yaml: tips, camera, floor, limits",
+    "--left-tip=0.7,0.1375,0.42 --right-tip=0.7,-0.1375,0.42 --floor=-0.1",
+    *(
+        flag(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=about)
+        for name, (kind, metavar, about) in kinds.MEASURED.items()
+    ),
+    JSON,
+)
+def setup(arguments: argparse.Namespace) -> Done:
+    """Asks at a terminal where nothing is given."""
+    from app import setup
+
+    told = {name: getattr(arguments, name) for name in kinds.MEASURED}
+    measured = setup.Measured(**told)
+    if measured.nothing and sys.stdin.isatty():
+        done = setup.set_up(setup.asked(), agreed=setup.confirmed)
+    else:
+        done = setup.set_up(measured)
+    return kinds.shown(done, True) if arguments.json else setup.shown(done)
 
 
 @command(

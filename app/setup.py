@@ -37,7 +37,7 @@ Numbers = tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class Measured:
+class LabMeasures:
     """What was measured; None: not.
 
     Attributes:
@@ -77,7 +77,7 @@ QUESTIONS = {
 }
 
 
-def asked(answer: Callable[[str], str] = input) -> Measured:
+def asked(answer: Callable[[str], str] = input) -> LabMeasures:
     """What a user says at a terminal; an empty answer leaves what is there.
 
     Args:
@@ -92,7 +92,7 @@ def asked(answer: Callable[[str], str] = input) -> Measured:
                 break
             except ArgumentTypeError as error:
                 say(f"  {error}")
-    return Measured(**told)
+    return LabMeasures(**told)
 
 
 def confirmed(said: str, answer: Callable[[str], str] = input) -> bool:
@@ -107,7 +107,7 @@ def say(text: str) -> None:
 
 
 def set_up(
-    measured: Measured,
+    measured: LabMeasures,
     path: Path | str = "params.yaml",
     agreed: Callable[[str], bool] = lambda said: True,
 ) -> dict:
@@ -157,7 +157,7 @@ def shown(content: dict) -> str:
     return "\n".join([*lines, *(f"  {line}" for line in content["checked"])])
 
 
-def found(measured: Measured, setup: SetupParams) -> tuple[dict[str, Any], list[str]]:
+def found(measured: LabMeasures, setup: SetupParams) -> tuple[dict[str, Any], list[str]]:
     """New values of `setup`, by key, and what agrees, in words. Raises UserError."""
     new: dict[str, Any] = {}
     checked: list[str] = []
@@ -229,7 +229,7 @@ def fork_of(left: np.ndarray, right: np.ndarray) -> Transform:
     return Transform(Rotation.from_matrix(axes), (left + right) / 2)
 
 
-def _agreed_width(apart: float, measured: Measured, width: float) -> str:
+def _agreed_width(apart: float, measured: LabMeasures, width: float) -> str:
     most = SURE * math.sqrt(2) * TOUCH
     if abs(apart - width) > most:
         told = "--fork-width" if measured.fork_width is not None else "setup.fork_width"

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
-from app.setup import Measured, asked, confirmed, fork_of, set_up, shown
+from app.setup import LabMeasures, asked, confirmed, fork_of, set_up, shown
 from pipeline.base.errors import UserError
 from pipeline.params import load
 from tests.project import ROOT, python
@@ -50,7 +50,7 @@ def test_the_fork_is_where_its_tips_are(x, y, z, width, yaw) -> None:
 
 def test_everything_is_written_and_nothing_else_changes(path) -> None:
     before = path.read_text().splitlines()
-    measured = Measured(
+    measured = LabMeasures(
         left_tip=LEFT,
         right_tip=RIGHT,
         base_to_camera=LOOKING_DOWN,
@@ -86,19 +86,19 @@ def test_everything_is_written_and_nothing_else_changes(path) -> None:
 def test_two_of_three_poses_give_the_fork_in_the_base(path) -> None:
     """By way of the camera alone: no tip was touched."""
     seen = (0.0, 0.0, 0.98, 0.5**0.5, 0.5**0.5, 0.0, 0.0)
-    set_up(Measured(base_to_camera=LOOKING_DOWN, camera_to_fork=seen, floor=-0.1), path)
+    set_up(LabMeasures(base_to_camera=LOOKING_DOWN, camera_to_fork=seen, floor=-0.1), path)
     setup = load(path).setup
     assert setup.base_to_fork == pytest.approx(
         (0.7, 0, 0.42, 0, 0, -(0.5**0.5), 0.5**0.5), abs=1e-5
     )
     assert setup.fork_height == pytest.approx(0.52)
     touched = {"left_tip": LEFT, "right_tip": RIGHT, "base_to_camera": LOOKING_DOWN}
-    done = set_up(Measured(**touched, camera_to_fork=(0.005, *seen[1:])), path)
+    done = set_up(LabMeasures(**touched, camera_to_fork=(0.005, *seen[1:])), path)
     assert any(
         "agree: the fork as seen by way of the camera lies 5.0 mm" in x for x in done["checked"]
     )
     with pytest.raises(UserError, match=r"lies 50.0 mm and 0.00 degrees off .*measure the tips or"):
-        set_up(Measured(**touched, camera_to_fork=(0.05, *seen[1:])), path)
+        set_up(LabMeasures(**touched, camera_to_fork=(0.05, *seen[1:])), path)
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_two_of_three_poses_give_the_fork_in_the_base(path) -> None:
 def test_what_contradicts_is_one_line_and_nothing_is_written(path, measured, words) -> None:
     before = path.read_bytes()
     with pytest.raises(UserError) as caught:
-        set_up(Measured(**measured), path)
+        set_up(LabMeasures(**measured), path)
     assert words in str(caught.value) and "\n" not in str(caught.value)
     assert path.read_bytes() == before
 
@@ -151,7 +151,7 @@ def test_what_contradicts_is_one_line_and_nothing_is_written(path, measured, wor
 def test_a_user_is_asked_and_may_say_no(path, capsys) -> None:
     lines = iter(["0.7,0.1375,0.42", "mm", "700,-137.5,420", "0.7,-0.1375,0.42", *6 * [""]])
     measured = asked(lambda question: next(lines))
-    assert measured == Measured(left_tip=LEFT, right_tip=RIGHT)
+    assert measured == LabMeasures(left_tip=LEFT, right_tip=RIGHT)
     told = capsys.readouterr().err
     assert "must be X,Y,Z, got 'mm'" in told and "which looks like millimetres (0.7)" in told
     before = path.read_bytes()

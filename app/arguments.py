@@ -98,6 +98,55 @@ def draw(text: str) -> tuple[float, float]:
     return y, z
 
 
+def numbers(what: str, *quantities: Callable[[str], float]) -> Callable[[str], tuple[float, ...]]:
+    """A type: numbers joined by commas, each of its own type; `what` names them, such as X,Y,Z."""
+
+    def read(text: str) -> tuple[float, ...]:
+        parts = text.replace(" ", "").strip("[]").split(",")
+        if len(parts) != len(quantities):
+            raise argparse.ArgumentTypeError(f"must be {what}, got {text!r}")
+        return tuple(quantity(part) for quantity, part in zip(quantities, parts, strict=True))
+
+    return read
+
+
+def coordinate(text: str) -> float:
+    """One of a place in a lab [m]."""
+    value = number(text)
+    if abs(value) > 10:
+        hint = likely({"millimetres": abs(value) / 1e3}, 0.5)
+        raise argparse.ArgumentTypeError(f"must be in metres, from -10 to 10, got {text}{hint}")
+    return value
+
+
+def pose(text: str) -> tuple[float, ...]:
+    """X,Y,Z,QX,QY,QZ,QW: metres, and a quaternion of length 1."""
+    read = numbers("X,Y,Z,QX,QY,QZ,QW", *3 * [coordinate], *4 * [number])(text)
+    size = math.hypot(*read[3:])
+    if abs(size - 1) > 1e-3:
+        raise argparse.ArgumentTypeError(f"its quaternion must have length 1, not {size:.4g}")
+    return read
+
+
+point = numbers("X,Y,Z", *3 * [coordinate])
+span = numbers("LOW,HIGH", coordinate, coordinate)
+width = quantity("metres", 0.02, 2.0, METRES, 0.275)
+force = quantity("newtons", 0.1, 1000.0, {}, 30.0)
+
+
+MEASURED = {  # of `sling setup`: type, what stands for a value, help
+    "left_tip": (point, "X,Y,Z", "of the fork, in the robot's base, as seen from the hand"),
+    "right_tip": (point, "X,Y,Z", "the other one; x to the right, y towards the target"),
+    "fork_width": (width, "M", "between the tips, by a ruler; default setup.fork_width"),
+    "base_to_camera": (pose, "POSE", "X,Y,Z,QX,QY,QZ,QW of the colour camera's optical frame"),
+    "camera_to_fork": (pose, "POSE", "of the fork's frame O in that frame, if measured there"),
+    "floor": (coordinate, "M", "height of the floor in the robot's base"),
+    "max_force": (force, "N", "that the arm may hold"),
+    "draw_y": (span, "LOW,HIGH", "draws that the arm reaches, frame O, such as -0.45,-0.25"),
+    "draw_z": (span, "LOW,HIGH", "the same upwards, such as -0.30,-0.10"),
+}
+
+
 def shown(content: dict, as_json: bool) -> str:
     """A flat result as one JSON object, or one line an entry."""
     if as_json:

@@ -6,6 +6,7 @@ Run `sling --help`, or `sling launch --help`. How the table becomes a command li
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from app import arguments as kinds
@@ -48,7 +49,13 @@ LONG["help"] = f"of the band between the clamps, in metres; default {REST_LENGTH
 @command(
     "identify a band from its recordings, train its policy, write its card",
     "my.mcap --mass 0.0408 --name orange",
-    flag("recordings", type=Path, nargs="*", metavar="FILE.mcap", help="recordings of one band"),
+    flag(
+        "recordings",
+        type=Path,
+        nargs="*",
+        metavar="FILE.mcap",
+        help="of one band; or bags' folders",
+    ),
     flag("--mass", **MASS),
     flag("--name", metavar="NAME", help="what to call the band; default: as the first file"),
     flag("--diameter", **THICK),
@@ -91,7 +98,7 @@ def add_band(arguments: argparse.Namespace) -> Done:
     "check further recordings of a band and add them to it",
     "--band orange more.mcap",
     BAND,
-    flag("recordings", type=Path, nargs="+", metavar="FILE.mcap"),
+    flag("recordings", type=Path, nargs="+", metavar="FILE.mcap", help="or bags' folders"),
 )
 def add_recording(arguments: argparse.Namespace) -> Done:
     from app.preflight.recordings import add_recording
@@ -117,7 +124,7 @@ def drift(arguments: argparse.Namespace) -> Done:
 @command(
     "say whether a recording can be used, what is missing and what costs accuracy",
     "my.mcap --rest-length 0.52 --sheet my.png",
-    flag("recording", type=Path, metavar="FILE.mcap"),
+    flag("recording", type=Path, metavar="FILE.mcap", help="or a bag's folder"),
     flag("--band", metavar="NAME", help="band of params.yaml, for its diameter and rest length"),
     flag("--diameter", **THICK),
     flag("--rest-length", **LONG),
@@ -148,6 +155,28 @@ def check(arguments: argparse.Namespace) -> Done:
 
 
 @command(
+    "write what you measured of your lab into params.yaml: tips, camera, floor, limits",
+    "--left-tip=0.7,0.1375,0.42 --right-tip=0.7,-0.1375,0.42 --floor=-0.1",
+    *(
+        flag(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=about)
+        for name, (kind, metavar, about) in kinds.MEASURED.items()
+    ),
+    JSON,
+)
+def setup(arguments: argparse.Namespace) -> Done:
+    """Asks at a terminal where nothing is given."""
+    from app import setup
+
+    told = {name: getattr(arguments, name) for name in kinds.MEASURED}
+    measured = setup.LabMeasures(**told)
+    if measured.nothing and sys.stdin.isatty():
+        done = setup.set_up(setup.asked(), agreed=setup.confirmed)
+    else:
+        done = setup.set_up(measured)
+    return kinds.shown(done, True) if arguments.json else setup.shown(done)
+
+
+@command(
     "plan the pull that a robot is to record, and check it against limits",
     "--mass 0.0408 --diameter 0.010 --rest-length 0.52 --recording earlier.mcap",
     flag("--band", metavar="NAME", help="of params.yaml; or with --mass: a new name"),
@@ -156,7 +185,9 @@ def check(arguments: argparse.Namespace) -> Done:
     flag("--rest-length", **LONG),
     flag("--draw", type=kinds.draw, metavar="Y,Z", help="in metres, frame O; default plan.draw"),
     flag("--theta", type=Path, metavar="FILE", help="θ file that tells the force to hold"),
-    flag("--recording", type=Path, metavar="FILE.mcap", help="earlier one, for base and force"),
+    flag(
+        "--recording", type=Path, metavar="FILE.mcap", help="for base and force; default: its own"
+    ),
     flag("--pulls", type=kinds.count, default=1, metavar="N", help="in one recording; default 1"),
     flag("--out", type=Path, metavar="FOLDER", help="default data/plans/<band>"),
     flag("--rate", type=kinds.rate, default=100.0, metavar="HZ", help="of the CSV; default 100"),

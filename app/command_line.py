@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -74,6 +75,8 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         if "--draw: expected one argument" in message:
             message += ", joined by = because it begins with -: --draw=-0.30,-0.17"
+        elif found := re.search(r"(--\S+): expected one argument$", message):
+            message += f"; one that begins with - is joined by =: {found[1]}=-..."
         self.exit(2, f"error: {printable(message)} (see `{self.prog} --help`)\n")
 
 

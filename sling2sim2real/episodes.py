@@ -32,7 +32,7 @@ def read_mcap(path: str | Path, band: Band, *, settings: Settings | None = None)
     pipeline.base.errors.UserError: nowhere.mcap: ...
 
     Args:
-        path: A ROS 2 or Foxglove MCAP; docs/recording.md says what it must hold.
+        path: A ROS 2 or Foxglove MCAP, or a bag's folder; docs/recording.md says what it must hold.
         band: That was recorded.
         settings: The lab, its topics, the episode's length; None: `Settings.default()`.
 

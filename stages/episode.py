@@ -2,9 +2,10 @@
 
     python -m stages.episode band1
 
-Reads data/raw/<band>/*.mcap; writes data/episodes/<band>/<n>/ for each pull that they hold, n = 1,
-2, ... by the file's name, then by time: signals.parquet and clouds.parquet. A pull that cannot be
-used is left out, with a warning; a file without any that can be used is an error.
+Reads the recordings in data/raw/<band>/; writes data/episodes/<band>/<n>/ for each pull that they
+hold, n = 1, 2, ... by the recording's name, then by time: signals.parquet and clouds.parquet. A
+pull that cannot be used is left out, with a warning; a recording without any that can be used is an
+error.
 """
 
 from __future__ import annotations
@@ -15,13 +16,14 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder
 from pipeline.base.layout import Layout, NotMade
 from pipeline.recording.build import build_episodes
+from pipeline.recording.input.bag import once
 from stages.start import run, started
 
 
 def main() -> None:
     params, band = started("band")
     layout, number = Layout(), 0
-    recordings = layout.recordings(band)
+    recordings = once(layout.recordings(band))
     if not recordings and params.bands[band].source == "rig":
         raise NotMade(layout.recording(band))
     if not recordings:

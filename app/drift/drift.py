@@ -16,6 +16,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.base.layout import Layout
 from pipeline.params import expect_known
+from pipeline.recording.input.bag import once
 from pipeline.report.quantities import QUANTITIES
 from sling2sim2real.identification import METHOD
 from sling2sim2real.model import Band
@@ -43,7 +44,8 @@ def drift(settings: Settings, band: str, root: Path | str = ".") -> dict:
     """
     expect_known(settings, "band", band)
     layout = Layout(Path(root))
-    files, written = layout.recordings(band), layout.root / "reports" / "drift" / f"{band}.json"
+    files = once(layout.recordings(band))
+    written = layout.root / "reports" / "drift" / f"{band}.json"
     if len(files) < 2:
         raise UserError(
             f"{layout.raw(band)}: holds {'one recording' if files else 'no recording'}, two or more"

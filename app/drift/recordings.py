@@ -14,7 +14,7 @@ from app.drift.change import ValueOfRecording
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.layout import NotMade
 from pipeline.base.schema import JsonRecord, read_json
-from pipeline.recording.input.container import sha256
+from pipeline.recording.input.bag import sha256
 from sling2sim2real.episodes import read_mcap
 from sling2sim2real.identification import Identification, identify
 from sling2sim2real.model import Band

@@ -20,7 +20,8 @@ from pipeline.base.launch_table import expect_apart, file_of
 from pipeline.base.layout import Layout
 from pipeline.identify.posterior.evidence import read_evidence
 from pipeline.params import Params, load
-from pipeline.recording.input.container import expect_file
+from pipeline.recording.input.bag import name_of as name_of_file
+from pipeline.recording.input.bag import once
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,7 @@ def fit(
     layout, params = Layout(root), load(root / "params.yaml")
     name = name or name_of(recordings)
     told = [] if launches is None else evidence.read(launches)
-    for file in recordings:
-        expect_file(file)
+    recordings = once(recordings)
     file_of(layout.evidence, name, [*params.bands, name])
     expect_apart(layout, name)
     evidence.joined(layout, name, told, again=True)  # what is wrong is said before any change
@@ -94,7 +94,7 @@ def name_of(recordings: Sequence[Path]) -> str:
     """A band's name from its first file's. Raises UserError where that makes none."""
     if not recordings:
         raise UserError("give a recording (FILE.mcap), or with --name a band of params.yaml")
-    name = re.sub(r"[^a-z0-9]+", "_", recordings[0].stem.lower()).strip("_")
+    name = re.sub(r"[^a-z0-9]+", "_", name_of_file(recordings[0]).lower()).strip("_")
     if not NAME.fullmatch(name):
         raise UserError(
             f"{recordings[0]}: this file name makes no band name; give one: --name NAME"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -74,10 +75,14 @@ def trajectory_message(
     }
 
 
-def gripper_commands(trajectory: Trajectory, force: float) -> list[dict]:
+def gripper_commands(
+    trajectory: Trajectory, position: Callable[[float], float], force: float
+) -> list[dict]:
     """control_msgs/GripperCommand with the time of each: open, close, open.
 
-    `position` is the distance between the fingers [m], `max_effort` the force of each [N].
+    Args:
+        position: What the gripper takes as `position` for a distance between the fingers [m].
+        force: Of each finger [N], as `max_effort`.
     """
     moments = [(0.0, trajectory.openings[0])]
     for phase, start in zip(trajectory.phases, trajectory.times, strict=False):
@@ -86,7 +91,7 @@ def gripper_commands(trajectory: Trajectory, force: float) -> list[dict]:
     return [
         {
             "time_from_start": _duration(time),
-            "command": {"position": float(opening), "max_effort": float(force)},
+            "command": {"position": position(float(opening)), "max_effort": float(force)},
         }
         for time, opening in moments
     ]

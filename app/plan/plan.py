@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,18 +12,26 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from app.plan import limits, messages
-from app.plan.force import Held, Prediction, predict, read_earlier
+from app.plan.force import Earlier, Held, Prediction, predict, read_earlier
 from app.plan.hand import along_pull, quaternion
 from app.plan.pull import hanging_middle, trajectory_of
 from app.plan.trajectory import Trajectory
+from app.pose import fork_in_base
 from app.sizes import band_to_come
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_json, write_text
+from pipeline.base.layout import Layout
 from pipeline.params import Params, expect_known
+from pipeline.params.lab import Gripper
+from pipeline.recording.geometry import FORK
 from pipeline.recording.input.frames import Transform
 
 RATES = (1.0, 10_000.0)  # Hz of the CSV
 MOST_PULLS = 10  # a file of them is half a gigabyte
+NO_BASE = (
+    "nothing says where it stands in the robot's base, so all is in frame O, which no robot knows:"
+    " `sling setup` asks for it, or give a --recording whose /tf_static has it"
+)
 
 
 @dataclass(frozen=True)
@@ -32,10 +41,11 @@ class Plan:
     Attributes:
         band: Its name.
         trajectory: Of the tool centre point, frame O.
-        base: Frame O to the robot's base.
-        base_source: Where that came from, in words.
-        frame: Name of the base.
-        hand: Orientation of the hand in the base, quaternion x, y, z, w.
+        base: Frame O to the robot's base; the identity where nothing tells it.
+        base_source: Where that came from, in words; None: from nowhere, all is in frame O.
+        frame: Name of the base, or of frame O.
+        hand: Orientation of the hand there, quaternion x, y, z, w.
+        gripper: Its settings.
         stretch: Of the drawn band.
         force: Predicted, to hold it.
         max_force: That the arm may hold [N].
@@ -47,9 +57,10 @@ class Plan:
     band: str
     trajectory: Trajectory
     base: Transform
-    base_source: str
+    base_source: str | None
     frame: str
     hand: np.ndarray
+    gripper: Gripper
     stretch: float
     force: Prediction
     max_force: float
@@ -81,7 +92,7 @@ class Plan:
         return {
             "band": self.band,
             "frame": self.frame,
-            "base_to_fork": [*_plain(self.base.translation), *_plain(self._fork_in_base)],
+            "base_to_fork": self._fork_in_base,
             "base_to_fork_source": self.base_source,
             "orientation": _plain(self.hand),
             "hanging_source": self.hanging_source,
@@ -99,8 +110,10 @@ class Plan:
         }
 
     @property
-    def _fork_in_base(self) -> np.ndarray:
-        return quaternion(self.base.rotation)
+    def _fork_in_base(self) -> list[float] | None:
+        if self.base_source is None:
+            return None
+        return [*_plain(self.base.translation), *_plain(quaternion(self.base.rotation))]
 
     def to_json(self, files: list[Path]) -> str:
         written = [str(path) for path in files]
@@ -126,7 +139,7 @@ class Plan:
             known = f"{force.force:.1f} N of {self.max_force:g} N ({force.source})"
         facts = {
             "hand": f"{' '.join(f'{v:+.4f}' for v in self.hand)} (x y z w in {self.frame})",
-            "fork": f"in {self.frame} by {self.base_source}",
+            "fork": f"in {self.frame} by {self.base_source}" if self.base_source else NO_BASE,
             "middle": self.hanging_source,
             "window": f"grasp to release {self.held_time:.2f} s of {self.most_time:.2f} s",
             "stretch": f"{self.stretch:.2f} of the rest length",
@@ -147,7 +160,7 @@ class Plan:
         pose = self.trajectory, self.base, self.hand
         table = messages.csv_text(*pose, rate)
         waypoints = messages.trajectory_message(*pose, self.frame)
-        gripper = messages.gripper_commands(self.trajectory, self.grip_force)
+        gripper = messages.gripper_commands(self.trajectory, self.gripper.command, self.grip_force)
         picture = io.BytesIO()
         messages.draw_picture(self.trajectory, picture)
         names = ("trajectory.csv", "waypoints.json", "gripper.json", "plan.png")
@@ -194,15 +207,20 @@ def plan_recording(
     theta: Path | None = None,
     recording: Path | None = None,
     pulls: int = 1,
+    root: str | Path = ".",
 ) -> Plan:
     """Plan the recording of a band of params.yaml and check it against every limit.
+
+    Where the fork stands in the robot's base is taken from setup.base_to_fork, else from
+    `recording`, else from the band's recordings and episodes; else all is in frame O.
 
     Args:
         draw: Drawn position (y, z), frame O [m]; plan.draw if None.
         theta: θ file that says what holding the draw takes.
-        recording: Earlier one of this rig, whose /tf_static says where the fork stands in the
-            robot's base where setup.base_to_fork does not; and of this band, for the force.
+        recording: Earlier one of this rig and of this band, which also tells the force; None: the
+            first of the band's in the project that can be read.
         pulls: How many in one recording; between two the hand returns and grasps again.
+        root: Folder of the project.
 
     Raises:
         UserError: in one line, where a limit is broken or something is not known.
@@ -212,18 +230,10 @@ def plan_recording(
         raise UserError(f"--pulls: at most {MOST_PULLS} in one recording, got {pulls}")
     setup, about = params.setup, params.bands[band]
     settings = params.plan if draw is None else params.plan.model_copy(update={"draw": draw})
-    earlier = None if recording is None else read_earlier(recording, params)
-    if earlier is not None:
-        base, source, frame = earlier.base.inverse(), earlier.base_source, earlier.frame
-    elif setup.base_to_fork is not None:
-        base, source = Transform.of(setup.base_to_fork), "setup.base_to_fork"
-        frame = settings.frame
-    else:
-        raise UserError(
-            "setup.base_to_fork is null, so nothing says where the fork stands in the robot's base:"
-            " measure it (docs/recording.md, Calibration), or give an earlier recording whose"
-            " /tf_static has it: --recording FILE.mcap"
-        )
+    earlier = recorded(params, band, recording, root)
+    base, source, frame = _standing(params, band, earlier, root)
+    if source is None and settings.orientation is not None:
+        raise UserError(f"plan.orientation is the hand's in the robot's base: {NO_BASE}")
     drawn = np.array([0.0, *settings.draw])
     held = Held.of(about, setup)
     limits.check_draw(setup, held, drawn)
@@ -245,6 +255,7 @@ def plan_recording(
         base_source=source,
         frame=frame,
         hand=quaternion(hand),
+        gripper=settings.gripper,
         stretch=held.stretch(drawn),
         force=prediction,
         max_force=setup.max_force,
@@ -253,6 +264,38 @@ def plan_recording(
         most_time=most_time,
         hanging_source=f"hangs {below:.3f} m below the tips ({by})",
     )
+
+
+def recorded(
+    params: Params, band: str, recording: Path | None, root: str | Path = "."
+) -> Earlier | None:
+    """What the recording tells, or else the first of the band's in the project that can be read.
+
+    Raises UserError where the one that is given cannot be.
+    """
+    if recording is not None:
+        return read_earlier(recording, params)
+    for path in Layout(Path(root)).recordings(band):
+        with suppress(UserError):
+            return read_earlier(path, params)
+    return None
+
+
+def _standing(
+    params: Params, band: str, earlier: Earlier | None, root: str | Path
+) -> tuple[Transform, str | None, str]:
+    """Frame O to the robot's base, where that came from (None: from nowhere), the base's name."""
+    if earlier is not None:
+        source = earlier.base_source
+        if not source.startswith("setup"):
+            source = f"{source} of {earlier.path}"
+        return earlier.base.inverse(), source, earlier.frame or params.plan.frame
+    try:
+        fork, frame = fork_in_base(params, band, root)
+    except UserError:
+        return Transform.identity(), None, FORK
+    given = params.setup.base_to_fork is not None
+    return fork, "setup.base_to_fork" if given else "the band's first episode", frame
 
 
 def _orientation(given: tuple[float, ...] | None, base: Transform, drawn: np.ndarray) -> Rotation:

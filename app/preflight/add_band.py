@@ -14,6 +14,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
 from pipeline.base.layout import Layout
 from pipeline.params import load, parse
+from pipeline.recording.input.bag import once
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -34,7 +35,7 @@ def add_band(
 
     Args:
         name: Of the band: small letters, digits and _.
-        recordings: MCAP files.
+        recordings: MCAP files, or bags' folders.
         mass: Of the band [kg].
         diameter: Of its section [m].
         rest_length: Between the clamps [m].
@@ -50,6 +51,7 @@ def add_band(
     if not NAME.fullmatch(name):
         raise UserError(f"band name {name!r}: use small letters, digits and _, a letter first")
     params_path, layout = Path(params_path), Layout(Path(root))
+    recordings = once(recordings)
     before = load(params_path)
     band = {
         "source": "recording",

@@ -19,7 +19,8 @@ from pipeline.params import Params, expect_known
 from pipeline.params.lab import BandParams
 from pipeline.recording.build import Processed
 from pipeline.recording.delays import Delays
-from pipeline.recording.input.container import Container, read_container, sha256
+from pipeline.recording.input.bag import sha256
+from pipeline.recording.input.container import Container, read_container
 from pipeline.recording.input.frames import Transform
 from pipeline.recording.input.reader import Recording, recording_of
 from pipeline.recording.pulls import Pull, pulls_of

@@ -13,7 +13,8 @@ from pipeline.base.errors import UserError, printable
 from pipeline.base.files import replacing, replacing_folder
 from pipeline.base.layout import Layout
 from pipeline.params import Params, expect_known, load
-from pipeline.recording.input.container import expect_file, sha256
+from pipeline.recording.input import bag
+from pipeline.recording.input.bag import sha256
 from pipeline.recording.masks.folder import MASK_NAME, masks_beside
 
 
@@ -32,7 +33,7 @@ def add_recording(
         UserError: in one line, where the band is not known or a recording cannot be used or is
             there already, by its name or its content. Nothing is copied then.
     """
-    params = load(params_path)
+    params, recordings = load(params_path), bag.once(recordings)
     expect_known(params, "band", band, called="--band")
     layout = Layout(Path(root))
     there = digests(layout.recordings(band))
@@ -48,11 +49,15 @@ def add_recording(
 
 
 def targets(recordings: Sequence[Path], folder: Path) -> dict[Path, Path]:
-    """Where each goes: its own name in the band's folder. Raises UserError where two are one."""
+    """Where each goes: its own name in the band's folder, of a split bag as a folder.
+
+    Raises UserError where two are one.
+    """
     found: dict[Path, Path] = {}
     for file in recordings:
-        expect_file(file)
-        target = folder / file.with_suffix(".mcap").name
+        name = bag.name_of(file)
+        split = len(bag.parts_of(file)) > 1
+        target = folder / (name.replace(".", "_") if split else f"{name}.mcap")
         if target in found.values():
             raise UserError(f"{file}: two of the recordings have this name, rename one")
         found[file] = target
@@ -79,7 +84,13 @@ def copy(files: dict[Path, Path]) -> None:
     """All files to their targets, with the masks beside them, or none."""
     with ExitStack() as stack:
         for file, target in files.items():
-            shutil.copyfile(file, stack.enter_context(replacing(target)))
+            parts = bag.parts_of(file)
+            if len(parts) == 1:
+                shutil.copyfile(parts[0], stack.enter_context(replacing(target)))
+            else:
+                into = stack.enter_context(replacing_folder(target))
+                for part in [*parts, *bag.metadata_of(file)]:
+                    shutil.copyfile(part, into / part.name)
             _copy_masks(file, target, stack)  # they get their names before the recording does
 
 

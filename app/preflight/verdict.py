@@ -49,6 +49,7 @@ def cautions_of(report: CheckReport, done: Processed) -> list[Caution]:
         *_of_rest(report, done),
         *_of_pictures(report),
         *_of_sensor(done),
+        *_of_loop(done),
         *_of_frames(report),
     ]
 
@@ -226,6 +227,22 @@ def _of_sensor(done: Processed) -> Iterator[Caution]:
             f"/tf_static does not know the force's frame {frame!r}, so it is taken as the hand's",
             "publish how the sensor is turned relative to the tool centre point",
         )
+
+
+def _of_loop(done: Processed) -> Iterator[Caution]:
+    loop = done.pull.geometry.loop
+    if loop and not loop.closed:
+        told = [name for name in ("base_to_fork", "camera_to_fork") if _given(done, name)]
+        yield Caution(
+            "loop",
+            str(loop),
+            f"setup.{' or setup.'.join(told)} contradicts /tf_static: touch the tips or calibrate"
+            " the camera again (docs/recording.md, Calibration)",
+        )
+
+
+def _given(done: Processed, name: str) -> bool:
+    return done.pull.geometry.sources[name].startswith("setup")
 
 
 def _of_frames(report: CheckReport) -> Iterator[Caution]:

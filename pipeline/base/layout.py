@@ -50,9 +50,13 @@ class Layout:
         return self.raw(band) / f"{band}.mcap"
 
     def recordings(self, band: str) -> list[Path]:
-        """All recordings of a band, by name. Raises UserError where they lie as they once did."""
+        """All recordings of a band, by name: files, and folders of split bags.
+
+        Raises UserError where they lie as they once did.
+        """
         folder = self.raw(band)
-        found, old = sorted(folder.glob("*.mcap")), folder.parent / f"{band}.mcap"
+        split = {part.parent for part in folder.glob("*/*.mcap") if part.parent.name[0] != "."}
+        found, old = sorted({*folder.glob("*.mcap"), *split}), folder.parent / f"{band}.mcap"
         if not found and old.is_file():
             raise UserError(
                 f"{old}: the recordings of a band lie in a folder now:"

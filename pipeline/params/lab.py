@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, model_validator
 
 from pipeline.base.schema import (
     ASCENDING,
@@ -144,9 +144,33 @@ Opening = Annotated[float, Range(0, 0.5)]
 Quaternion = Annotated[tuple[Component, Component, Component, Component], LIST, UNIT]
 
 
+def _is_position(value: object) -> object:
+    if value in ("finger", "gap"):
+        return value
+    pair = value if isinstance(value, list | tuple) else ()
+    numbers = [n for n in pair if isinstance(n, int | float) and math.isfinite(n)]
+    if len(pair) != 2 or len(numbers) != 2 or numbers[0] == numbers[1]:
+        raise refusal(f"must be finger, gap, or its numbers [open, closed], got {value!r:.60}")
+    return float(numbers[0]), float(numbers[1])
+
+
 class Gripper(Section):
+    """Gaps between the fingers, and what GripperCommand's `position` is for them.
+
+    `position`: finger, the travel of each (Franka's own action server); gap; or the two numbers
+    themselves, for open and for closed.
+    """
+
     open: Opening
     closed: Opening
+    position: Annotated[str | tuple[float, float], BeforeValidator(_is_position)]
+
+    def command(self, gap: float) -> float:
+        """The position that commands a gap [m] between open and closed."""
+        if isinstance(self.position, str):
+            return gap / 2 if self.position == "finger" else gap
+        first, last = self.position
+        return last + (first - last) * (gap - self.closed) / (self.open - self.closed)
 
     @model_validator(mode="after")
     def _closed_is_narrower(self) -> Gripper:

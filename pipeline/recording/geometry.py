@@ -14,6 +14,7 @@ from pipeline.params.lab import SetupParams
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.frames import Transform, TransformTree
 from pipeline.recording.input.reader import Recording
+from pipeline.recording.loop import Loop, third
 
 FORK = "fork"
 TOOLS = ("tcp", "ee", "end_effector")  # words in the name of the frame that a pose is given for
@@ -30,6 +31,7 @@ class Geometry:
         sensor: The wrench's frame to the end effector, or to frame O where `sensor_is_fixed`.
         sensor_is_fixed: The wrench is given in a frame that does not move with the hand.
         sources: Where each came from, in words.
+        loop: How base, camera and fork agree, where params and /tf_static tell all three poses.
     """
 
     base: Transform
@@ -38,6 +40,7 @@ class Geometry:
     sensor: Transform
     sensor_is_fixed: bool
     sources: dict[str, str]
+    loop: Loop | None = None
 
 
 @dataclass(frozen=True)
@@ -92,33 +95,44 @@ class EpisodeGeometry:
 
 
 def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
-    """Resolve the frames; params come before /tf_static. Raises UserError where one is missing."""
+    """Resolve the frames; params come before /tf_static, and what both tell before what follows.
+
+    Raises UserError where two of base, camera and fork are joined by nothing.
+    """
     tree, sources = recording.transforms, {}
     pose_frame, wrench_frame = recording.pose.frame, recording.wrench.frame
     color_frame = recording.color.frame or recording.color_camera.frame
     depth_frame = recording.depth.frame or recording.depth_camera.frame
 
-    def to_fork(name: str, frame: str, given: tuple[float, ...] | None) -> Transform:
+    def to_fork(name: str, frame: str, given: tuple[float, ...] | None) -> Transform | None:
         if given is not None:
             sources[name] = f"setup.{name}"
             return Transform.of(given).inverse()
         found = tree.between(FORK, frame)
-        if found is None:
-            has = ", ".join(tree.frames) or "nothing"
-            if not frame:
-                raise UserError(
-                    f"{recording.path}: messages name no frame that /tf_static could join to"
-                    f" {FORK!r}: set their frame_id, or setup.{name} in params.yaml"
-                )
-            raise UserError(
-                f"{recording.path}: /tf_static does not join {frame!r} to {FORK!r} (it has {has}):"
-                f" publish it, or set setup.{name} in params.yaml"
-            )
-        sources[name] = f"/tf_static {FORK} <- {frame}"
+        if found is not None:
+            sources[name] = f"/tf_static {FORK} <- {frame}"
         return found
 
-    base = to_fork("base_to_fork", pose_frame, setup.base_to_fork)
-    color_to_fork = to_fork("camera_to_fork", color_frame, setup.camera_to_fork)
+    known = (
+        to_fork("base_to_fork", pose_frame, setup.base_to_fork),
+        to_fork("camera_to_fork", color_frame, setup.camera_to_fork),
+    )
+    named = pose_frame and color_frame
+    between = tree.between(pose_frame, color_frame) if named else None
+    base, color_to_fork = third(*known, between)
+    if base is None:
+        raise _missing(recording, "base_to_fork", pose_frame, color_frame)
+    if color_to_fork is None:
+        raise _missing(recording, "camera_to_fork", color_frame, pose_frame)
+    join, loop = f"/tf_static {pose_frame} <- {color_frame}", None
+    if known[0] is None:
+        sources["base_to_fork"] = f"{sources['camera_to_fork']}, and {join}"
+    elif known[1] is None:
+        sources["camera_to_fork"] = f"{sources['base_to_fork']}, and {join}"
+    elif between is not None and any(one.startswith("setup") for one in sources.values()):
+        poses = base.inverse(), color_to_fork.inverse(), between
+        loop = Loop.of(*poses, setup.fork_width)
+        sources["loop"] = str(loop)
     color = _between_cameras(recording, color_frame, depth_frame)
 
     fixed = tree.between(pose_frame, wrench_frame) if wrench_frame else None
@@ -129,7 +143,22 @@ def geometry_of(recording: Recording, setup: SetupParams) -> Geometry:
         tool = _tool_frame(tree, wrench_frame, setup.tip_link)
         sensor = tree.between(tool, wrench_frame) or Transform.identity()
         sources["wrench"] = f"{wrench_frame} on {tool}, which the pose topic is taken to move"
-    return Geometry(base, color_to_fork @ color, color, sensor, fixed is not None, sources)
+    return Geometry(base, color_to_fork @ color, color, sensor, fixed is not None, sources, loop)
+
+
+def _missing(recording: Recording, name: str, frame: str, other: str) -> UserError:
+    """Neither params nor /tf_static say where the fork stands in a frame, nor by way of another."""
+    has = ", ".join(recording.transforms.frames) or "nothing"
+    if not frame:
+        return UserError(
+            f"{recording.path}: messages name no frame that /tf_static could join to"
+            f" {FORK!r}: set their frame_id, or setup.{name} in params.yaml"
+        )
+    return UserError(
+        f"{recording.path}: /tf_static does not join {frame!r} to {FORK!r} (it has {has}):"
+        f" publish it, or its pose in {other!r} if the fork's is known there, or set setup.{name}"
+        " in params.yaml"
+    )
 
 
 def _between_cameras(recording: Recording, color_frame: str, depth_frame: str) -> Transform:

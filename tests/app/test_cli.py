@@ -134,7 +134,6 @@ def test_a_users_mistake(tmp_path: Path, refused) -> None:
         ("check none.mcap", "none.mcap"),
         ("check none.mcap --band band9", "band9"),
         ("check none.mcap --sheet none/out.png", "none"),
-        ("plan --band band1", "setup.base_to_fork is null"),
         ("plan", "give --band, or --diameter and --rest-length"),
         ("plan --band band1 --rest-length 0.5", "--band band1 brings its sizes from params.yaml"),
         ("plan --rest-length 0.2", "--rest-length 0.2: must be longer than setup.fork_width"),

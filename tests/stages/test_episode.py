@@ -3,6 +3,7 @@
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
@@ -11,6 +12,7 @@ from pipeline.identify.objective.session import load_episodes
 from stages import episode
 from tests.recording.conftest import blind, params, seen
 from tests.recording.joined import joined
+from tests.recording.split import split
 
 __all__ = ["blind", "params", "seen"]
 
@@ -37,6 +39,19 @@ def test_each_pull_of_each_file_becomes_an_episode_in_order(folder, seen, blind,
     said = capsys.readouterr()
     assert said.err.startswith("warning: left out: data/raw/band1/a.mcap: pull 2 of 3: empty mask")
     assert said.err.count("\n") == 1 and said.out.count("peak force") == 3
+
+
+def test_a_split_bag_becomes_one_episode(folder, seen) -> None:
+    """As the whole file does: kept as its folder, or put there part by part."""
+    split(seen[0], folder / "b", (1.0, 2.0), "b")
+    split(seen[0], folder, (1.5,), "c")
+    shutil.copy(seen[0], folder / "a.mcap")
+    episode.main()
+    whole, *found = load_episodes("band1")
+    assert [one.metadata["input"]["file"] for one in found] == ["b", "c_0.mcap"]
+    for one in found:
+        np.testing.assert_array_equal(one.force, whole.force)
+        assert len(one.clouds) == len(whole.clouds) and one.release_time == whole.release_time
 
 
 def test_a_file_without_a_pull_that_can_be_used_leaves_the_episodes_alone(

@@ -18,7 +18,6 @@ No index is needed, and a damaged one costs nothing. https://mcap.dev/spec
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections import Counter
 from dataclasses import dataclass, field, replace
@@ -30,6 +29,7 @@ from mcap import records as kinds
 from mcap.opcode import Opcode
 
 from pipeline.base.errors import UserError, printable
+from pipeline.recording.input import bag
 from pipeline.recording.input import records as of
 from pipeline.recording.input.records import Damaged, Record
 from pipeline.recording.input.words import counted, few
@@ -64,34 +64,53 @@ class Container:
     notes: list[str] = field(default_factory=list)
 
 
-def expect_file(path: Path) -> None:
-    """Raises UserError where `path` is no file with something in it."""
-    if path.is_dir():
-        raise UserError(f"{path}: is a folder, name the .mcap file in it")
-    if not path.exists():
-        raise UserError(f"{path}: no such file")
-    if not path.is_file():
-        raise UserError(f"{path}: is not a file")
-    if not path.stat().st_size:
-        raise UserError(f"{path}: is empty, record it again")
-
-
 def read_container(path: Path) -> Container:
-    """Read every intact message. Raises UserError where there is nothing to read."""
+    """Read every intact message, of all parts of a bag. Raises UserError: nothing is to be read."""
     path = Path(path)
+    parts, held = bag.parts_of(path), 0
+    if len(parts) == 1:
+        one = _read(path, parts[0], held)[0]
+        return replace(one, losses=[*bag.missing_parts(path), *one.losses])
+    read = []
+    for part in parts:
+        one, held = _read(path, part, held)
+        read.append(one)
+    return _one_of(path, read)
+
+
+def _read(path: Path, part: Path, held: int) -> tuple[Container, int]:
+    """A file of the recording at `path`, and how many bytes are held with it, `held` before."""
     try:
-        expect_file(path)
-        with path.open("rb") as file:
+        with part.open("rb") as file:
             if file.read(len(of.MAGIC)) != of.MAGIC:
-                raise UserError(f"{path}: not an MCAP file (ros2 bag record -s mcap writes one)")
-            return _Contents(path, file, path.stat().st_size).container()
+                raise UserError(f"{part}: not an MCAP file (ros2 bag record -s mcap writes one)")
+            contents = _Contents(path, file, part.stat().st_size, held=held)
+            return contents.container(), contents.held
     except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror})") from error
+        raise UserError(f"{part}: cannot be read ({error.strerror})") from error
 
 
-def sha256(path: Path) -> str:
-    with Path(path).open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def _one_of(path: Path, read: list[Container]) -> Container:
+    """The parts of a bag as one recording; what is said of a part names it."""
+    parts = bag.parts_of(path)
+    found: dict[tuple, Channel] = {}
+    for container in read:
+        for channel in container.channels:
+            one = found.setdefault(_kind(channel), replace(channel, log_times=[], payloads=[]))
+            one.log_times += channel.log_times
+            one.payloads += channel.payloads
+    named = list(zip(parts, read, strict=True))
+    losses = [f"{part.name}: {loss}" for part, one in named for loss in one.losses]
+    whole = f"all {len(parts)} parts of the bag were read, from {parts[0].name} on"
+    notes = [] if path.is_dir() else [whole]
+    notes += dict.fromkeys(note for one in read for note in one.notes)
+    return Container(path, list(found.values()), [*bag.missing_parts(path), *losses], notes)
+
+
+def _kind(channel: Channel) -> tuple:
+    """What is equal in channels of one topic."""
+    schema = channel.schema
+    return channel.topic, schema.name, schema.encoding, schema.data, channel.encoding
 
 
 @dataclass

@@ -15,8 +15,9 @@ import numpy as np
 from pipeline.base.errors import UserError, printable
 from pipeline.params.lab import SetupParams
 from pipeline.recording.input import images
+from pipeline.recording.input.bag import sha256
 from pipeline.recording.input.camera import Camera
-from pipeline.recording.input.container import Container, read_container, sha256
+from pipeline.recording.input.container import Container, read_container
 from pipeline.recording.input.frames import TransformTree
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.input.streams import Stream, streams_of

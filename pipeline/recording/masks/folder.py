@@ -15,7 +15,9 @@ MASK_NAME = re.compile(r"[0-9]+\.png")
 
 
 def masks_beside(recording: Path) -> Path:
-    """Where the masks of a recording lie: my.masks beside my.mcap."""
+    """Where the masks of a recording lie: my.masks beside my.mcap, or beside a bag's folder my/."""
+    if recording.is_dir():
+        return recording.with_name(f"{recording.name}.masks")
     return recording.with_suffix(".masks")
 
 

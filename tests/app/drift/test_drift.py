@@ -162,7 +162,7 @@ def test_a_mistake_is_one_line(tmp_path) -> None:
     assert told("none").startswith("error: band none: not in params.yaml")
     assert "holds no recording, two or more are needed" in told("band1")
     (tmp_path / "data/raw/band1").mkdir(parents=True)
-    (tmp_path / "data/raw/band1/band1.mcap").write_bytes(b"")
+    (tmp_path / "data/raw/band1/band1.mcap").write_bytes(b"x")
     assert "holds one recording" in told("band1")
     assert not (tmp_path / "reports").exists()
     (tmp_path / "data/raw/band1/band1_2.mcap").write_bytes(b"no recording")

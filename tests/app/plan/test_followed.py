@@ -1,5 +1,6 @@
 """A robot that follows a plan makes a good recording, which tells the next plan its force."""
 
+import shutil
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,6 +47,8 @@ class Repeated(Followed):
     def center_line(self, t: float) -> np.ndarray:
         return self.at(t).center_line(t)
 
+
+pytestmark = pytest.mark.usefixtures("nowhere")
 
 FAST = {"max_speed": 0.8, "pull_speed": 0.5, "max_acceleration": 5.0, "hanging": 0.195}
 FAST |= {"lead_in": 0.6, "finger_time": 0.3, "pause": 0.8, "wait": 0.5}
@@ -109,7 +112,7 @@ def test_an_earlier_recording_gives_base_frame_and_force(recorded) -> None:
     again = plan_recording(unknown, "band1", recording=path)
     np.testing.assert_allclose(again.base.translation, plan.base.translation, atol=1e-6)
     np.testing.assert_allclose(again.hand, plan.hand, atol=1e-6)
-    assert again.base_source == "/tf_static fork <- base"
+    assert again.base_source == f"/tf_static fork <- base of {path}"
     force = float(np.linalg.norm(truth.force(truth.release - 0.1)))
     assert again.force.force == pytest.approx(force, rel=0.01)
     deeper = plan_recording(unknown, "band1", recording=path, draw=(-0.44, 0.0)).force
@@ -124,6 +127,23 @@ def test_an_earlier_recording_gives_base_frame_and_force(recorded) -> None:
     weak = with_(unknown, "setup", max_force=force - 2)
     with pytest.raises(UserError, match=r"N more than setup.max_force .*--draw=-0\.\d\d,0\.00"):
         plan_recording(weak, "band1", recording=path)
+
+
+def test_the_bands_own_recording_tells_it_unasked(recorded, tmp_path) -> None:
+    """As `aim` takes the fork from there; one that cannot be read is passed over."""
+    path, plan, params, _ = recorded
+    unknown, raw = with_(params, "setup", base_to_fork=None), tmp_path / "data/raw/band1"
+    raw.mkdir(parents=True)
+    (raw / "a.mcap").write_bytes(b"no recording")
+    assert plan_recording(unknown, "band1", root=tmp_path).base_source is None
+    shutil.copy(path, raw / "b.mcap")
+    again = plan_recording(unknown, "band1", root=tmp_path)
+    asked = plan_recording(unknown, "band1", recording=path)
+    np.testing.assert_allclose(again.base.translation, plan.base.translation, atol=1e-6)
+    assert (again.frame, again.force.force) == (asked.frame, asked.force.force)
+    assert again.base_source == f"/tf_static fork <- base of {raw / 'b.mcap'}"
+    with pytest.raises(UserError, match="a.mcap: not an MCAP file"):
+        plan_recording(unknown, "band1", recording=raw / "a.mcap", root=tmp_path)
 
 
 def test_of_several_pulls_the_first_that_can_be_used_tells(recorded, monkeypatch) -> None:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,11 @@ from app.plan.messages import COLUMNS
 from app.plan.plan import plan_recording, with_band
 from app.plan.trajectory import Phase, Trajectory
 from pipeline.base.errors import UserError
-from pipeline.params import Params, load
+from pipeline.params import Params, load, parse
+from pipeline.params.lab import Gripper
 from tests.project import DEFAULTS, with_
+
+pytestmark = pytest.mark.usefixtures("nowhere")
 
 FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target along the base's x
 
@@ -121,12 +125,70 @@ def test_the_gripper_opens_closes_and_opens(plan, tmp_path) -> None:
     for one in commands:
         message = build(store, kind, one["command"])
         assert store.deserialize_cdr(store.serialize_cdr(message, kind), kind) == message
-    assert [one["command"]["position"] for one in commands] == [0.08, 0.0, 0.08]
+    positions = [one["command"]["position"] for one in commands]
+    assert positions == [0.04, 0.0, 0.04]  # of each finger of a Franka's hand, which goes 0.04 m
     assert {one["command"]["max_effort"] for one in commands} == {40.0}
     stamps = [one["time_from_start"] for one in commands]
     times = [stamp["sec"] + stamp["nanosec"] * 1e-9 for stamp in stamps]
     content = json.loads(plan.to_json(files))
     assert times == pytest.approx([0.0, content["grasp_s"], content["release_s"]])
+
+
+def franka_moves_to(command: dict, width: float) -> float:
+    """What Franka's own action server makes of a command, given the gap as it is.
+
+    gripper_action_server.cpp of franka_ros2, onGripperCommand; RuntimeError where it aborts.
+    """
+    target, most = 2 * command["position"], 0.08
+    if target > most or target < 0:
+        raise RuntimeError(f"Commanding out of range width! max_width = {most} command = {target}")
+    return max(target, 0.006) if target < width else target  # a band of 6 mm between the fingers
+
+
+def test_a_frankas_own_server_opens_closes_and_opens(params, tmp_path) -> None:
+    plan, width, gaps = plan_recording(params, "band1", pulls=2), 0.02, []
+    for one in json.loads(plan.write(tmp_path, 10.0)[2].read_text()):
+        width = franka_moves_to(one["command"], width)
+        gaps.append(width)
+    assert gaps == [0.08, 0.006, 0.08, 0.006, 0.08]
+
+
+@pytest.mark.parametrize(
+    ("position", "wanted"),
+    [("finger", (0.04, 0.0)), ("gap", (0.08, 0.0)), ([0.0, 0.8], (0.0, 0.8)), ([85, 0], (85, 0))],
+)
+def test_other_grippers_take_other_numbers(position, wanted) -> None:
+    """Robotiq's angle of the knuckle grows while it closes."""
+    gripper = Gripper(open=0.08, closed=0.0, position=position)
+    assert (gripper.command(0.08), gripper.command(0.0)) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("position", ["width", [0.1], [0.1, 0.1], [0.1, "x"], None, [0, math.nan]])
+def test_a_position_that_is_none_is_refused(position) -> None:
+    text = DEFAULTS.read_text()
+    wrong = text.replace("position: finger}", f"position: {json.dumps(position)}}}")
+    with pytest.raises(UserError, match=r"plan.gripper.position: must be finger, gap, or its numb"):
+        parse(wrong)
+
+
+def test_without_a_base_the_plan_is_in_frame_o_and_says_so(params, tmp_path) -> None:
+    unknown = with_(params, "setup", base_to_fork=None)
+    plan = plan_recording(unknown, "band1", draw=(-0.35, -0.1))
+    files = plan.write(tmp_path, 10.0)
+    columns, _ = table(files[0])
+    times = columns["t"]
+    np.testing.assert_allclose(
+        vectors(columns, "x y z"), plan.trajectory.position(times), atol=1e-9
+    )
+    assert json.loads(files[1].read_text())["header"]["frame_id"] == "fork"
+    content = json.loads(plan.to_json(files))
+    assert (content["frame"], content["base_to_fork"]) == ("fork", None)
+    assert content["base_to_fork_source"] is None
+    said = next(line for line in plan.to_text(files).splitlines() if line.startswith("fork  "))
+    assert "nothing says where it stands in the robot's base, so all is in frame O" in said
+    turned = with_(unknown, "plan", orientation=(0.0, 0.0, 0.0, 1.0))
+    with pytest.raises(UserError, match="plan.orientation is the hand's in the robot's base"):
+        plan_recording(turned, "band1")
 
 
 def test_what_is_printed(plan, tmp_path) -> None:
@@ -154,7 +216,6 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("section", "values", "expected"),
     [
-        ("setup", {"base_to_fork": None}, "setup.base_to_fork is null"),
         (
             "plan",
             {"draw": (-0.6, 0.0)},

@@ -73,7 +73,7 @@ PLANS = st.fixed_dictionaries(
         "retreat": number(0, 0.5),
         "floor_clearance": number(0, 0.5),
         "hanging": st.none() | number(0, 3),
-        "gripper": st.just({"open": 0.08, "closed": 0.0}),
+        "gripper": st.just({"open": 0.08, "closed": 0.0, "position": "finger"}),
         "orientation": st.none(),
         "frame": st.just("base"),
     }

@@ -15,6 +15,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from tests.app.preflight.test_add_band import add, content, project
 from tests.recording.joined import joined
+from tests.recording.split import metadata, split
 
 __all__ = ["project"]
 
@@ -68,6 +69,32 @@ def test_recordings_are_added_to_a_band(project, seen, three) -> None:
     assert names == ["seen.mcap", "three.mcap"]
     assert (project / "data/raw/red/three.mcap").read_bytes() == three[0].read_bytes()
     assert (project / "params.yaml").read_bytes() == before
+
+
+def test_a_split_bag_is_checked_and_kept_as_its_folder(project, seen, params, tmp_path) -> None:
+    """By its folder or by a part; a bag of one part is kept as a file."""
+    parts = split(seen[0], tmp_path / "given" / "july.1", (1.0, 2.0), "july")
+    metadata(parts[0].parent, *(part.name for part in parts))
+    whole = json.loads(check(seen[0], params, as_json=True)[0])
+    found = json.loads(check(parts[0].parent, params, as_json=True)[0])
+    assert (found["usable"], found["losses"]) == (True, []) and found["signals"] == whole["signals"]
+    assert found["cloud"] == whole["cloud"]
+
+    (parts[0].parent.parent / "july.1.masks").mkdir()
+    (parts[0].parent.parent / "july.1.masks" / "17.png").write_bytes(b"mask")
+    add(project, parts[0].parent)
+    kept = project / "data/raw/red/july_1"
+    assert Layout(project).recordings("red") == [kept]
+    assert {one.name for one in kept.iterdir()} == {*(p.name for p in parts), "metadata.yaml"}
+    assert (kept.with_name("july_1.masks") / "17.png").read_bytes() == b"mask"
+    for again in (kept, parts[1]):
+        with pytest.raises(UserError, match="is there already, as .*july_1"):
+            more(project, again)
+    one = tmp_path / "one"
+    one.mkdir()
+    shutil.copy(seen[0], one / "one_0.mcap")
+    more(project, one)
+    assert [file.name for file in Layout(project).recordings("red")] == ["july_1", "one.mcap"]
 
 
 def test_a_band_of_several_recordings(project, seen, three) -> None:

@@ -1,0 +1,187 @@
+"""A recording on disk: an MCAP file, or the folder of a ROS 2 bag whose parts are one recording.
+
+`ros2 bag record -o my` makes the folder my/ with metadata.yaml and my_0.mcap; where it splits the
+bag, with my_1.mcap and so on. /tf_static is in the first part alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
+
+from mcap.opcode import Opcode
+from ruamel.yaml import YAML, YAMLError
+
+from pipeline.base.errors import UserError, printable
+from pipeline.recording.input import records as of
+
+METADATA, SUFFIX = "metadata.yaml", ".mcap"
+NUMBERED = re.compile(r"(.*)_(\d{1,6})")
+GAP = 1.0  # s: a recorder that splits its bag pauses for less, people who record anew for more
+NAMED = 5  # files named in an error
+
+
+def parts_of(path: Path) -> list[Path]:
+    """The MCAP files that are one recording, in order.
+
+    Of a folder those that its metadata.yaml lists and that are there; without it all, by number.
+    A file that is one of a split bag's parts stands for all of them.
+
+    Raises:
+        UserError: There is no recording, or a folder holds several.
+    """
+    path = Path(path)
+    try:
+        if path.is_dir():
+            return _in_folder(path)
+        _expect_file(path)
+        found = NUMBERED.fullmatch(path.stem)
+        return (found and _beside(path, found[1])) or [path]
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def metadata_of(path: Path) -> list[Path]:
+    """The file that lists a bag's parts, where there is one."""
+    parts = parts_of(path)
+    file = parts[0].with_name(METADATA)
+    return [file] if file.is_file() and parts[0].name in _listed(parts[0].parent) else []
+
+
+def missing_parts(path: Path) -> list[str]:
+    """In words, the parts of a bag that are not there. As `parts_of`."""
+    parts = parts_of(path)
+    if metadata_of(path):
+        folder = parts[0].parent
+        gone = [name for name in _listed(folder) if not (folder / name).is_file()]
+        return [f"{name}, which {METADATA} lists, is missing" for name in gone]
+    numbers = [_number(one) for one in parts]
+    if len(parts) < 2:
+        return []
+    gone = sorted({*range(max(numbers) + 1)} - {*numbers})
+    return [f"part {number} of the bag is missing" for number in gone]
+
+
+def once(paths: Iterable[Path]) -> list[Path]:
+    """Each recording once, where some of the files are parts of one: the first that names it."""
+    found: list[Path] = []
+    seen: set[Path] = set()
+    for path in paths:
+        parts = parts_of(path)
+        if len(parts) == 1 or parts[0] not in seen:
+            found.append(path)
+        seen.update(parts)
+    return found
+
+
+def name_of(path: Path) -> str:
+    """What a recording is called: a bag by its folder, or by what its parts have in common."""
+    path = Path(path)
+    if path.is_dir():
+        return path.resolve().name.removesuffix(SUFFIX)
+    found = NUMBERED.fullmatch(path.stem)
+    return found[1] if found and len(parts_of(path)) > 1 else path.stem
+
+
+def sha256(path: Path) -> str:
+    """Of the file, also where it is a bag's only one; of several parts, of their hashes."""
+    found = []
+    for part in parts_of(path):
+        with part.open("rb") as file:
+            found.append(hashlib.file_digest(file, "sha256").hexdigest())
+    return found[0] if len(found) == 1 else hashlib.sha256("\n".join(found).encode()).hexdigest()
+
+
+def _expect_file(path: Path) -> None:
+    if not path.exists():
+        raise UserError(f"{path}: no such file")
+    if not path.is_file():
+        raise UserError(f"{path}: is not a file")
+    if not path.stat().st_size:
+        raise UserError(f"{path}: is empty, record it again")
+
+
+def _in_folder(folder: Path) -> list[Path]:
+    files = [file for file in folder.glob(f"*{SUFFIX}") if file.is_file() and file.stat().st_size]
+    if (folder / METADATA).is_file():
+        listed = [folder / name for name in _listed(folder)]
+        parts = [file for file in listed if file in files]
+        if not parts:
+            names = ", ".join(file.name for file in listed[:NAMED]) or "no file"
+            raise UserError(
+                f"{folder}: {METADATA} lists {names}, of which no {SUFFIX} file is there"
+                " (ros2 bag record -s mcap writes one)"
+            )
+        return parts
+    if not files:
+        raise UserError(
+            f"{folder}: is a folder without an MCAP file (ros2 bag record -s mcap writes one)"
+        )
+    if len(files) == 1:
+        return files
+    stems = {found[1] for file in files if (found := NUMBERED.fullmatch(file.stem))}
+    parts = sorted(files, key=_number)
+    if len(stems) == 1 and min(map(_number, files)) >= 0 and _follow(parts):
+        return parts
+    names = ", ".join(sorted(file.name for file in files)[:NAMED])
+    raise UserError(f"{folder}: holds several recordings, name one of them: {names}")
+
+
+def _beside(path: Path, stem: str) -> list[Path] | None:
+    """All parts of the split bag that this file is of; None where it is of none."""
+    parts = [file for file in path.parent.glob(f"*{SUFFIX}") if file.is_file()]
+    parts = [one for one in parts if (m := NUMBERED.fullmatch(one.stem)) and m[1] == stem]
+    if len(parts) < 2:
+        return None
+    if (path.parent / METADATA).is_file() and path.name in _listed(path.parent):
+        return _in_folder(path.parent)
+    parts.sort(key=_number)
+    first = path.with_name(f"{stem}_0{SUFFIX}")
+    return parts if first in parts and _follow(parts) else None
+
+
+def _number(file: Path) -> int:
+    found = NUMBERED.fullmatch(file.stem)
+    return int(found[2]) if found else -1
+
+
+def _listed(folder: Path) -> list[str]:
+    """Names of the files in a bag's metadata, by number. Raises UserError."""
+    path = folder / METADATA
+    try:
+        content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+        names = content["rosbag2_bagfile_information"]["relative_file_paths"]
+        found = [printable(Path(str(name)).name) for name in names]
+    except (YAMLError, ValueError, RecursionError, KeyError, TypeError) as error:
+        raise UserError(
+            f"{path}: is no metadata of a ROS 2 bag; without it the {SUFFIX} files are taken by"
+            " number: remove it, or `ros2 bag reindex` the bag"
+        ) from error
+    return sorted(dict.fromkeys(found), key=lambda name: _number(Path(name)))
+
+
+def _follow(parts: list[Path]) -> bool:
+    """Whether each part begins where the one before it ends."""
+    spans = [_span(part, part.stat().st_mtime_ns) for part in parts]
+    for before, after in zip(spans, spans[1:], strict=False):
+        if before is None or after is None or abs(after[0] - before[1]) > GAP * 1e9:
+            return False
+    return True
+
+
+@lru_cache(maxsize=64)
+def _span(part: Path, _written: int) -> tuple[int, int] | None:
+    """Log times of the first and of the last message [ns], as its chunks say; None: no MCAP."""
+    times: list[int] = []
+    with part.open("rb") as file:
+        if file.read(len(of.MAGIC)) != of.MAGIC:
+            return None
+        for record in of.walk(file, part.stat().st_size):
+            if record.opcode == Opcode.CHUNK and record.content.message_end_time:
+                times += (record.content.message_start_time, record.content.message_end_time)
+            elif record.opcode == Opcode.MESSAGE:
+                times.append(of.MESSAGE.unpack_from(record.content)[2])
+    return (min(times), max(times)) if times else None

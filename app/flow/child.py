@@ -11,14 +11,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Event, Thread
 
-from app.flow import guard
+from app.flow import dvc_process, guard
 from app.flow.disk import with_disk
 from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 from stages import dvc_files
 
-# It reads and writes all of dvc.lock; to look for garbage meanwhile takes a seventh of its time.
-DVC = "import gc, sys; gc.disable(); from dvc.cli import main; sys.exit(main())"
 # How the lines begin that DVC itself says around a stage's own.
 DVCS = (
     "Running stage '", "> ", "Updating lock file", "Generating lock file", "Use `dvc push`",
@@ -143,7 +141,7 @@ def dvc(
     Raises:
         Cancelled: All its processes have ended.
     """
-    command = [sys.executable, "-P", "-c", DVC, "--wait-for-lock", *arguments]
+    command = [sys.executable, "-P", dvc_process.__file__, "--wait-for-lock", *arguments]
     said: list[str] = []
     if cancelled():
         raise Cancelled

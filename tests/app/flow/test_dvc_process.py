@@ -10,7 +10,13 @@ from app.flow.dvc_process import LOCK, LockYAML
 from tests.project import ROOT
 
 NAMES = st.text("abcdefgh@-_01", min_size=1, max_size=12).filter(lambda name: name.strip("-@_"))
-LEAF = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=90)
+LEAF = (
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats(-1e4, 1e4).map(lambda x: round(x, 6))
+    | st.text(max_size=90)
+)
 VALUES = st.recursive(
     LEAF, lambda of: st.lists(of, max_size=3) | st.dictionaries(NAMES, of, max_size=3), max_leaves=5
 )

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
+from matplotlib.figure import Figure
 
 from app.drift.change import ChangeOfBand
 from app.drift.recordings import COMPARED, IdentifiedRecording
@@ -29,7 +30,7 @@ def over_time(
     changed: Sequence[ChangeOfBand],
     new: int,
     title: str,
-) -> plt.Figure:
+) -> Figure:
     """A panel for each quantity, with 90 % intervals.
 
     Args:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 
 from pipeline.report.drawing.canvas import picture
 from pipeline.report.drawing.styles import INK
@@ -12,7 +12,7 @@ from pipeline.report.run.figures.panels import panels
 
 
 @picture({"axes.grid": False})
-def correlation(confidences: dict[str, dict]) -> plt.Figure:
+def correlation(confidences: dict[str, dict]) -> Figure:
     """Correlations of the density's coordinates, a panel a band.
 
     Args:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from pipeline.report.drawing.canvas import mark, patch, picture
 from pipeline.report.drawing.styles import INK, Styles
@@ -22,7 +23,7 @@ SHADE = "0.88"
 
 
 @picture()
-def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> plt.Figure:
+def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> Figure:
     """How far from its target each launch landed, a panel a band and a row a method.
 
     Args:
@@ -66,7 +67,7 @@ def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> pl
 
 
 @picture()
-def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> plt.Figure:
+def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> Figure:
     """How far each predicted landing is from the actual one, with its interval.
 
     Args:
@@ -120,8 +121,8 @@ def _rows(trials: pd.DataFrame, styles: Styles, title: str, off: pd.Series):
         ax.set_ylim(len(styles) - 0.5, -0.6)
         ax.set_xscale("symlog", linthresh=LINEAR)
         ax.set_xlim(-most, most)
-        ax.xaxis.set_major_locator(plt.FixedLocator(TICKS))
-        ax.xaxis.set_minor_locator(plt.NullLocator())
+        ax.xaxis.set_major_locator(FixedLocator(TICKS))
+        ax.xaxis.set_minor_locator(NullLocator())
         ax.xaxis.set_major_formatter("{x:g}")
         for label, style in zip(ax.get_yticklabels(), styles.values(), strict=False):
             label.set_color(style.color)  # those of the first panel: others share them

@@ -7,8 +7,11 @@ from itertools import cycle
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
+from matplotlib.ticker import MaxNLocator
 
 from pipeline.report.drawing.canvas import few_ticks, key, log_y, mark, picture
 from pipeline.report.drawing.styles import INK, Styles
@@ -27,7 +30,7 @@ SHOWN = 0.9  # share of the evaluated points that the colour scale tells apart
 
 
 @picture()
-def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> plt.Figure:
+def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> Figure:
     """The printed loss of every method's best so far, against rollouts.
 
     Args:
@@ -68,7 +71,7 @@ def rollouts(result: Result) -> np.ndarray:
 
 
 @picture(BOXED, dpi=100)
-def corner(result: Result, boxes, title: str) -> plt.Figure:
+def corner(result: Result, boxes, title: str) -> Figure:
     """Every evaluated point in the unit cube, each pair of free parameters against each other.
 
     Args:
@@ -132,7 +135,7 @@ def corner(result: Result, boxes, title: str) -> plt.Figure:
     return figure
 
 
-def _regions(ax: plt.Axes, result: Result, x: str, y: str) -> None:
+def _regions(ax: Axes, result: Result, x: str, y: str) -> None:
     """Centres of the regions, their covariances at one deviation, and the paths of CMA-ES."""
     refined = result.history[result.history.phase == "cma"]
     searched = {x, y} <= set(result.axes)
@@ -151,7 +154,7 @@ def _regions(ax: plt.Axes, result: Result, x: str, y: str) -> None:
         ax.text(*centre, str(number + 1), zorder=5.5, **text)
 
 
-def _key(figure: plt.Figure, result: Result, failures: bool) -> None:
+def _key(figure: Figure, result: Result, failures: bool) -> None:
     """Legend in the empty corner."""
     entries = [("evaluated by the exploration", mark(ls="", marker="o", ms=4, color="0.4"))]
     if (result.history.phase == "cma").any():
@@ -181,7 +184,7 @@ def _ticks(name: str, boxes, history: pd.DataFrame) -> tuple[list[float], list[s
     if log:
         marks = np.arange(np.ceil(low), high)
     else:
-        marks = plt.MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+        marks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
     place = (marks - low) / (slope or 1.0)
     seen = (place > EDGE) & (place < 1 - EDGE)  # those at an edge would meet the neighbours'
     words = [f"{10**mark if log else mark:g}" for mark in marks[seen]]

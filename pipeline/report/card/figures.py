@@ -99,6 +99,7 @@ def values(shown: list[ShownValue], boxes: dict[str, SearchedRange]) -> Figure:
     rows = [one for one in shown if one.name in boxes and one.low is not None]
     figure, ax = plt.subplots(figsize=(9.6, 0.5 * max(len(rows), 1) + 1.1))
     for row, one in enumerate(rows):
+        assert one.low is not None and one.high is not None  # both are known, or neither is
         box, factor = boxes[one.name], QUANTITIES[one.name].factor
         box = SearchedRange(factor * box.low, factor * box.high, box.scale)
         begin, end = box.place(one.low), box.place(one.high)
@@ -128,7 +129,7 @@ def landings(inputs: CardInputs) -> Figure:
     figure, ax = plt.subplots(figsize=(9.6, 3.6))
     entries = {}
     for kind, (marker, name) in KINDS.items():
-        rows = launched[launched.kind == kind]
+        rows = launched.loc[launched.kind == kind]
         if not len(rows):
             continue
         x, off = rows.predicted_y.to_numpy(), (rows.landing_y - rows.predicted_y).to_numpy()

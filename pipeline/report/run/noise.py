@@ -82,9 +82,8 @@ def difference(first: pd.DataFrame, second: pd.DataFrame, seed: int) -> Differen
         return None
     rng = np.random.default_rng(seed)
     mean = np.mean([sum(part.mean() for part in parts) for parts in change])
-    resampled = np.mean(
-        [np.sum([_resampled(part, rng) for part in parts], 0) for parts in change], 0
-    )
+    means = [[_resampled(part, rng) for part in parts] for parts in change]
+    resampled = np.mean(np.sum(means, axis=1), axis=0)
     tail = ndtr(stdtrit(_freedom(change), (1 - LEVEL) / 2))
     low, high = np.quantile(resampled, [tail, 1 - tail])
     launches = len(first), len(second)

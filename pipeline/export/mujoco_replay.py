@@ -78,7 +78,7 @@ class MujocoBand:
         return MujocoBand(replace(self.chain, step=self.chain.step / 2))
 
     def launches(self, draws: np.ndarray, *, fly: bool = False) -> list[Shot]:
-        """As Replay.launches."""
+        """As ChainReplay.launches."""
         return [self.launch(draw, fly=fly) for draw in draws]
 
     def launch(self, draw, *, fly: bool = False) -> Shot:
@@ -119,7 +119,7 @@ class MujocoBand:
         return before[1] + part * (after[1] - before[1])
 
     def pull(self, path: HandPath, times: np.ndarray, stamps: np.ndarray) -> Pulled:
-        """As Replay.pull."""
+        """As ChainReplay.pull."""
         self.hang()
         gain, brake = STIFF, 2 * np.sqrt(STIFF * HAND_MASS)
         before = self.model.actuator_gainprm.copy(), self.model.actuator_biasprm.copy()

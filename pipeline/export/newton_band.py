@@ -21,7 +21,7 @@ import newton.solvers  # pyright: ignore[reportMissingImports]
 import numpy as np
 import warp as wp
 
-# What a kernel's arguments are called is a value to Warp, and no type.
+# The annotations of kernels are values to Warp, and no types.
 # pyright: reportInvalidTypeForm=false, reportGeneralTypeIssues=false
 
 GRAVITY = 9.81  # m/s^2

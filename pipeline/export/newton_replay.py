@@ -47,7 +47,7 @@ class NewtonReplay:
         return NewtonReplay(replace(self.chain, step=self.chain.step / 2))
 
     def launches(self, draws: np.ndarray, *, fly: bool = True) -> list[Shot]:
-        """All at once, as Replay.launches; Newton always flies them."""
+        """All at once, as ChainReplay.launches; Newton always flies them."""
         bands = self._module.SpringBands(self._numbers, len(draws))
         hold_force = bands.draw(draws)
         landing, left = bands.launch()
@@ -56,7 +56,7 @@ class NewtonReplay:
         return [Shot(*row) for row in columns.tolist()]
 
     def pull(self, path: HandPath, times: np.ndarray, stamps: np.ndarray) -> Pulled:
-        """As Replay.pull."""
+        """As ChainReplay.pull."""
         bands, middle = self._module.SpringBands(self._numbers), self.chain.edges // 2
         bands.put([self.chain.hanging()], held=False)
         bands.settle(HANG)

@@ -12,7 +12,7 @@ from pipeline.export.band import CalibratedBand, pull_to
 from pipeline.export.chain import SpringChain
 from pipeline.export.match import HOLD, LANDING, DrawCompared, compared, draws_of
 from pipeline.export.pull import PullCompared, compare_pull
-from pipeline.export.replay import Replay
+from pipeline.export.replay import ChainReplay
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Matched:
 
 
 def proven(
-    model: CalibratedBand, replay: Replay, proof: np.ndarray, episode: Episode | None
+    model: CalibratedBand, replay: ChainReplay, proof: np.ndarray, episode: Episode | None
 ) -> Matched:
     """Launch the match's draws and those of `proof` (N, 2), and pull as in the episode.
 

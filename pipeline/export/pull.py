@@ -10,7 +10,7 @@ from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.export.band import CalibratedBand
 from pipeline.export.mesh import hand_path
-from pipeline.export.replay import Replay
+from pipeline.export.replay import ChainReplay
 from pipeline.simulator.interaction import interact
 
 
@@ -35,7 +35,7 @@ class PullCompared:
     taut_rms: float | None
 
 
-def compare_pull(model: CalibratedBand, episode: Episode, replay: Replay) -> PullCompared:
+def compare_pull(model: CalibratedBand, episode: Episode, replay: ChainReplay) -> PullCompared:
     """Pull as in `episode`, in both. Raises UserError where our simulation fails."""
     ours, chain = interact(model.sling, episode, model.parameters), replay.chain
     if ours.failure[0]:

@@ -34,14 +34,14 @@ class Pulled:
     line: np.ndarray
 
 
-class Replay(Protocol):
+class ChainReplay(Protocol):
     """A chain in an engine; `engine` is its name and version."""
 
     chain: SpringChain
     engine: str
 
     @property
-    def finer(self) -> Replay:
+    def finer(self) -> ChainReplay:
         """With half the time step."""
         ...
 

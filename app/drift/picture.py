@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
+from matplotlib.figure import Figure
 
 from app.drift.change import ChangeOfBand
 from app.drift.recordings import COMPARED, IdentifiedRecording
@@ -29,7 +30,7 @@ def over_time(
     changed: Sequence[ChangeOfBand],
     new: int,
     title: str,
-) -> plt.Figure:
+) -> Figure:
     """A panel for each quantity, with 90 % intervals.
 
     Args:
@@ -58,17 +59,18 @@ def over_time(
             ax.annotate(said, middle, weight="bold", **about)
         ax.set_ylabel(QUANTITIES[name].heading)
         ax.margins(x=0.08, y=0.15)
+    last = axes[-1]
     if true_times:
         locator = AutoDateLocator(maxticks=NAMED)
-        ax.xaxis.set_major_locator(locator)
-        ax.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+        last.xaxis.set_major_locator(locator)
+        last.xaxis.set_major_formatter(ConciseDateFormatter(locator))
     else:
         shown = range(0, len(found), -(-len(found) // NAMED))
         names = [found[i].date.removesuffix(" UTC") if dated else found[i].file for i in shown]
-        ax.set_xticks([places[i] for i in shown], map(as_label, names))
+        last.set_xticks([places[i] for i in shown], map(as_label, names))
         if sum(map(len, names)) > LINE:
-            ax.tick_params(axis="x", rotation=30)
-    ax.set_xlabel("time of the recording (UTC)" if dated else "recording, by its file's name")
+            last.tick_params(axis="x", rotation=30)
+    last.set_xlabel("time of the recording (UTC)" if dated else "recording, by its file's name")
     figure.suptitle(title, fontsize=11, fontweight="bold")
     style = {"marker": "o", "ls": "-", "lw": 1.6, "ms": 5}
     entries = [("one recording alone, 90 % interval", mark(color=INK, **style))]

@@ -101,6 +101,7 @@ def _alone(file: Path, key: str, band: Band, settings: Settings) -> IdentifiedRe
 
 def values_of(found: Identification) -> dict[str, ValueOfRecording]:
     """Of COMPARED, by name."""
+    assert found.samples is not None  # a fit draws them
     columns = dict(zip(found.theta.names, found.samples.T, strict=True))
     columns["damping_product"] = columns["elasticity_damping"] * columns["damping_scale"]
     return {

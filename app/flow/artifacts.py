@@ -119,8 +119,8 @@ def _errors(trials) -> tuple[list[str], list[list[str]]]:
     rows = []
     for target, one in landing_errors(trials).items():
         where = "all" if target == "all" else f"{target:.3f}"
-        counts = str(one["launches"]), str(one["failed"])
-        figures = (centimetres(one[name]) for name in ("mean", "std", "bias"))
+        counts = str(one.launches), str(one.failed)
+        figures = (centimetres(value) for value in (one.mean, one.std, one.bias))
         rows.append([where, *counts, *figures])
     return heads, rows
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 
 from pipeline.export import values as about
 from pipeline.export.band import CalibratedBand
-from pipeline.export.chain import MATCHED, SpringChain
+from pipeline.export.chain import MATCHED
 from pipeline.export.match import HOLD, LANDING, DrawCompared
-from pipeline.export.pull import PullCompared
+from pipeline.export.proof import Matched
 from pipeline.report.quantities import QUANTITIES, rounded
 
 UNITS = {"hold_force": "n", "speed": "m_s", "landing": "m"}  # in names of keys
@@ -17,34 +16,6 @@ ASKED = (
     f"On three draws that took no part in the match: hold force within {100 * HOLD:g} %, landing"
     f" within {100 * LANDING:g} % of the calibrated simulation."
 )
-
-
-@dataclass(frozen=True)
-class Matched:
-    """What the match and the proof came to.
-
-    Attributes:
-        chain: Matched.
-        match: Draws that it was matched to.
-        proof: Draws that it was not, flown to the floor.
-        pull: The same pull in both.
-        finer: Largest relative change of the proof's landings with half the time step.
-        engine: Name and version.
-    """
-
-    chain: SpringChain
-    match: Sequence[DrawCompared]
-    proof: Sequence[DrawCompared]
-    pull: PullCompared
-    finer: float
-    engine: str
-
-    @property
-    def met(self) -> bool:
-        return all(
-            abs(one.errors["hold_force"]) <= HOLD and abs(one.errors["landing"]) <= LANDING
-            for one in self.proof
-        )
 
 
 def content(model: CalibratedBand, done: Matched, target: str, files: dict[str, str]) -> dict:

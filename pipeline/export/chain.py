@@ -116,7 +116,7 @@ class SpringChain:
         """Of a spring [N s/m]."""
         return self.strength * self.damping_time / self.spring_length
 
-    def pull(self, strain: np.ndarray) -> np.ndarray:
+    def pull(self, strain: np.ndarray | float) -> np.ndarray:
         """Of a spring at rest [N], like `strain`."""
         return self.strength / 3 * uniaxial(1 + np.maximum(strain, 0.0), self.mooney_share)
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
+
+import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder, write_json, write_text
 from pipeline.episode.episode import Episode
 from pipeline.export import ENGINES, card, mjcf, mjcf_card, newton_file, usd, yaml_file
-from pipeline.export.band import CalibratedBand, pull_to
-from pipeline.export.match import compared, draws_of, matched, proof_draws
-from pipeline.export.mujoco_replay import MujocoBand, mujoco
-from pipeline.export.pull import compare_pull
+from pipeline.export.band import CalibratedBand
+from pipeline.export.chain import SpringChain
+from pipeline.export.match import matched, proof_draws
+from pipeline.export.mujoco_replay import MujocoBand
+from pipeline.export.proof import proven
 
 
 def write(model: CalibratedBand, to: str, folder: Path, episode: Episode | None = None) -> dict:
@@ -49,28 +50,10 @@ def replaceable(folder: Path) -> bool:
 
 def to_mjcf(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
     """The chain of mjcf.py, proven by a replay of the written file."""
-    engine = f"MuJoCo {version(mujoco().__name__)}"
     name, chain = model.band.name, matched(model)
     path, proof = folder / f"{name}.xml", proof_draws(model)
-    write_text(path, mjcf.text(name, chain, _keys(name, chain, proof)))
-
-    replay = MujocoBand(path, chain)
-    draws = draws_of(model)
-    shots = [replay.launch(draw, fly=True) for draw in proof]
-    half = replace(chain, step=chain.step / 2)
-    finer = MujocoBand(mjcf.text(name, half), half)
-    moved = [
-        finer.launch(draw).landing / shot.landing - 1
-        for draw, shot in zip(proof, shots, strict=True)
-    ]
-    done = card.Matched(
-        chain=chain,
-        match=compared(model, draws, [replay.launch(draw) for draw in draws]),
-        proof=compared(model, proof, shots),
-        pull=compare_pull(model, episode or pull_to(model, tuple(proof[-1])), replay),
-        finer=max(map(abs, moved)),
-        engine=engine,
-    )
+    write_text(path, mjcf.text(name, chain, _keys(chain, proof)))
+    done = proven(model, MujocoBand(chain, path), proof, episode)
     files = {path.name: "the model", "README.md": "how to use it, and what came out"}
     content = card.content(model, done, "mjcf", files)
     springs = content["springs_error"]
@@ -79,11 +62,11 @@ def to_mjcf(model: CalibratedBand, folder: Path, episode: Episode | None) -> dic
     return content
 
 
-def _keys(name: str, chain, proof) -> dict[str, dict]:
+def _keys(chain: SpringChain, proof: np.ndarray) -> dict[str, dict[str, np.ndarray]]:
     """Keyframes: hanging, and drawn for each draw of the proof."""
-    replay, keys = MujocoBand(mjcf.text(name, chain), chain), {}
+    replay = MujocoBand(chain)
     replay.hang()
-    keys["hanging"] = replay.key()
+    keys = {"hanging": replay.key()}
     for i, draw in enumerate(proof, 1):
         replay.draw(draw)
         keys[f"draw{i}"] = replay.key()

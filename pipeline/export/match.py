@@ -8,10 +8,10 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from pipeline.base.errors import UserError
-from pipeline.export import mjcf
 from pipeline.export.band import CalibratedBand
 from pipeline.export.chain import MATCHED, SpringChain
-from pipeline.export.mujoco_replay import MujocoBand, Shot
+from pipeline.export.mujoco_replay import MujocoBand
+from pipeline.export.replay import Shot
 from pipeline.simulator.launch import Launches
 
 GRID = 5  # draws along y and z over the box
@@ -66,7 +66,7 @@ def compared(model: CalibratedBand, draws: np.ndarray, shots: list[Shot]) -> lis
     done = model.launches(draws)
     return [
         DrawCompared(
-            draw=tuple(map(float, draw)),
+            draw=(float(draw[0]), float(draw[1])),
             hold_force=(float(done.hold_force[i]), shot.hold_force),
             speed=(float(done.speed[i]), shot.speed),
             landing=(float(done.landing_y[i]), shot.landing),
@@ -103,8 +103,7 @@ def _fitted(start: SpringChain, draws: np.ndarray, ours: Launches) -> SpringChai
 
     def errors(point: np.ndarray) -> np.ndarray:
         chain = chain_at(point)
-        replay = MujocoBand(mjcf.text("band", chain), chain)
-        shots = [replay.launch(draw) for draw in draws]
+        shots = MujocoBand(chain).launches(draws)
         both = [
             [(shot.hold_force / hold - 1) / HOLD, (shot.landing / landing - 1) / LANDING]
             for shot, hold, landing in zip(shots, ours.hold_force, ours.landing_y, strict=True)
@@ -128,7 +127,8 @@ def proof_draws(model: CalibratedBand) -> np.ndarray:
     setup, targets = model.settings.setup, model.settings.trials.targets
     wanted = np.linspace(min(targets), max(targets), len(DEPTHS))
     far, near = sorted(setup.draw_y)
-    across = np.linspace(*sorted(setup.draw_z), FINE)
+    low, high = sorted(setup.draw_z)
+    across = np.linspace(low, high, FINE)
     found = []
     for target, depth in zip(wanted, DEPTHS, strict=True):
         draws = np.column_stack([np.full(FINE, near + depth * (far - near)), across])

@@ -25,10 +25,8 @@ def text(name: str, chain: SpringChain, keys: Mapping[str, Mapping] | None = Non
         keys: Keyframes: by name, `qpos` (3 (edges + 1),) and `ctrl` (3,).
     """
     root = xml.Element("mujoco", model=name)
-    xml.SubElement(
-        root, "option",
-        timestep=_shown(chain.step), integrator="Euler", gravity=_shown([0, 0, -GRAVITY]),
-    )  # fmt: skip
+    gravity = _shown([0, 0, -GRAVITY])
+    xml.SubElement(root, "option", timestep=_shown(chain.step), integrator="Euler", gravity=gravity)
     _defaults(root, chain)
     _bodies(xml.SubElement(root, "worldbody"), chain)
     tendons = xml.SubElement(root, "tendon")
@@ -52,7 +50,7 @@ def text(name: str, chain: SpringChain, keys: Mapping[str, Mapping] | None = Non
         frames = xml.SubElement(root, "keyframe")
         for label, key in keys.items():
             shown = {part: _shown(values) for part, values in key.items()}
-            xml.SubElement(frames, "key", name=label, **shown)
+            xml.SubElement(frames, "key", {"name": label, **shown})
     xml.indent(root)
     return xml.tostring(root, encoding="unicode") + "\n"
 
@@ -72,12 +70,13 @@ def _defaults(root: xml.Element, chain: SpringChain) -> None:
         springs = xml.SubElement(defaults, "default", {"class": kind})
         slack = _shown([0, chain.spring_length * (1 + strain)])
         numbers = {"stiffness": _shown(stiffness), "damping": _shown(damping)}
-        xml.SubElement(springs, "tendon", springlength=slack, **numbers, **look)
+        xml.SubElement(springs, "tendon", {"springlength": slack, **numbers, **look})
 
 
 def _bodies(world: xml.Element, chain: SpringChain) -> None:
     floor = {"type": "plane", "size": "5 5 0.1", "rgba": "0.8 0.8 0.8 1"}
-    xml.SubElement(world, "geom", name="floor", pos=_shown([0, 0, chain.floor]), **floor)
+    place = {"name": "floor", "pos": _shown([0, 0, chain.floor])}
+    xml.SubElement(world, "geom", place | floor)
     xml.SubElement(world, "light", pos="0 0 3")
     places = chain.hanging()
     for node in (0, chain.edges):
@@ -91,12 +90,12 @@ def _bodies(world: xml.Element, chain: SpringChain) -> None:
     xml.SubElement(hand, "inertial", mass=_shown(HAND_MASS), pos="0 0 0", diaginertia="1 1 1")
     ball = _moving(world, "projectile", middle)
     look = {"size": _shown(BALL), "rgba": "0.2 0.4 0.8 1"}
-    xml.SubElement(ball, "geom", mass=_shown(chain.projectile_mass), **look)
+    xml.SubElement(ball, "geom", {"mass": _shown(chain.projectile_mass), **look})
 
 
 def _moving(world: xml.Element, name: str, place, **options: str) -> xml.Element:
     """A body that moves along the axes, with a site to tie it by."""
-    body = xml.SubElement(world, "body", name=name, pos=_shown(place), **options)
+    body = xml.SubElement(world, "body", {"name": name, "pos": _shown(place), **options})
     for axis, direction in AXES.items():
         xml.SubElement(body, "joint", name=f"{name}_{axis}", type="slide", axis=direction)
     xml.SubElement(body, "site", name=name, size="0.003")

@@ -2,53 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.export import mjcf
 from pipeline.export.chain import SpringChain
 from pipeline.export.mjcf import HAND_MASS, STIFF
+from pipeline.export.replay import HANG, HandPath, Pulled, Shot
 from pipeline.simulator.launch import ballistic_landing
 
 SETTLE, BRAKE = 0.25, 250.0  # s and 1/s: how long and how a drawn band is brought to rest
 LONGEST = 0.5  # s from a release until nothing has left the pouch
-HANG = 3.0  # s for the slack band
-
-
-@dataclass(frozen=True)
-class Shot:
-    """A launch in MuJoCo, frame O, SI units; NaN where nothing left the pouch."""
-
-    landing: float
-    speed: float
-    angle: float
-    hold_force: float
-
-
-@dataclass(frozen=True)
-class Pulled:
-    """A pull while the hand holds: ends of steps (S,), force (S, 3), nodes (K, L, 3) at stamps."""
-
-    time: np.ndarray
-    force: np.ndarray
-    line_time: np.ndarray
-    line: np.ndarray
 
 
 class MujocoBand:
-    """One model in MuJoCo.
+    """A chain in MuJoCo.
 
     Args:
-        source: Path of the XML file, or its text.
-        chain: Whose model it is.
+        path: Its XML file; None makes its text.
     """
 
-    def __init__(self, source: Path | str, chain: SpringChain):
+    def __init__(self, chain: SpringChain, path: Path | None = None):
         mj = mujoco()
-        load = mj.MjModel.from_xml_path if isinstance(source, Path) else mj.MjModel.from_xml_string
-        self.chain, self.model = chain, load(str(source))
+        self.chain, self.engine = chain, f"MuJoCo {version(mj.__name__)}"
+        load = mj.MjModel.from_xml_path if path else mj.MjModel.from_xml_string
+        self.model = load(str(path or mjcf.text("band", chain)))
         self.data, self._step = mj.MjData(self.model), mj.mj_step
         nodes = range(1, chain.edges)
         self._nodes = np.concatenate([self._dofs(f"node{i}") for i in nodes])
@@ -89,6 +72,15 @@ class MujocoBand:
         self._settle(SETTLE)
         return float(np.linalg.norm(self.force))
 
+    @property
+    def finer(self) -> MujocoBand:
+        """With half the time step."""
+        return MujocoBand(replace(self.chain, step=self.chain.step / 2))
+
+    def launches(self, draws: np.ndarray, *, fly: bool = False) -> list[Shot]:
+        """As ChainReplay.launches."""
+        return [self.launch(draw, fly=fly) for draw in draws]
+
     def launch(self, draw, *, fly: bool = False) -> Shot:
         """Draw and let go.
 
@@ -118,7 +110,7 @@ class MujocoBand:
 
     def _fly(self) -> float:
         """Where the projectile meets the floor, along y [m]."""
-        after = self._flying()[0]
+        before = after = self._flying()[0]
         while after[2] > self.chain.floor:
             before = after
             self._step(self.model, self.data)
@@ -126,16 +118,8 @@ class MujocoBand:
         part = (before[2] - self.chain.floor) / (before[2] - after[2])
         return before[1] + part * (after[1] - before[1])
 
-    def pull(self, path, times: np.ndarray, stamps: np.ndarray) -> Pulled:
-        """Take the hanging band and lead it without the projectile.
-
-        The recorded hand is where it is, so that the arm does not give way here.
-
-        Args:
-            path: Where the held node is at `times` given where it hung: (3,) -> (S, 3).
-            times: Ends of the steps, at the time step's distance, shape (S,).
-            stamps: When to look at the nodes, between `times`' ends, shape (K,).
-        """
+    def pull(self, path: HandPath, times: np.ndarray, stamps: np.ndarray) -> Pulled:
+        """As ChainReplay.pull."""
         self.hang()
         gain, brake = STIFF, 2 * np.sqrt(STIFF * HAND_MASS)
         before = self.model.actuator_gainprm.copy(), self.model.actuator_biasprm.copy()
@@ -173,7 +157,7 @@ class MujocoBand:
         self._step(self.model, self.data)
 
 
-def mujoco():
+def mujoco() -> ModuleType:
     """The module. Raises UserError where it is not installed."""
     try:
         import mujoco

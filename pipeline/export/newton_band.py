@@ -17,10 +17,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import newton
-import newton.solvers
+import newton.solvers  # pyright: ignore[reportMissingImports]
 import numpy as np
 import warp as wp
+
+# The annotations of kernels are values to Warp, and no types.
+# pyright: reportInvalidTypeForm=false, reportGeneralTypeIssues=false
 
 GRAVITY = 9.81  # m/s^2
 HAND_MASS = 1.0  # kg
@@ -82,8 +84,8 @@ def forces(
     node = i % (n.edges + 2)
     total = wp.vec3(0.0)
     if node > 0 and node < n.edges:
-        total = spring(q[i], q[i - 1], qd[i], qd[i - 1], n)
-        total += spring(q[i], q[i + 1], qd[i], qd[i + 1], n)
+        total = spring(q[i], q[i - 1], qd[i], qd[i - 1], n)  # pyright: ignore[reportOperatorIssue]
+        total += spring(q[i], q[i + 1], qd[i], qd[i + 1], n)  # pyright: ignore[reportOperatorIssue]
         mass = n.node_mass
         if node == n.edges // 2:
             mass += float(loaded[band]) * n.projectile_mass
@@ -136,19 +138,20 @@ class SpringBands:
     """
 
     def __init__(self, numbers: Path | str | dict, count: int = 1, device: str = "cpu"):
-        if not isinstance(numbers, dict):
-            numbers = json.loads(Path(numbers).read_text("utf-8"))
-        self.numbers, self.count, self.step_size = numbers, count, numbers["time_step_s"]
+        known = (
+            numbers if isinstance(numbers, dict) else json.loads(Path(numbers).read_text("utf-8"))
+        )
+        self.numbers, self.count, self.step_size = known, count, known["time_step_s"]
         n = self._n = Numbers()
-        n.edges, n.floor = numbers["edges"], numbers["floor_m"]
-        n.rest = numbers["rest_length_m"] / n.edges
-        n.node_mass = numbers["mass_kg"] / n.edges
-        n.projectile_mass = numbers["projectile_mass_kg"]
-        n.strength, n.share = numbers["strength_n"], numbers["mooney_share"]
-        n.damping = numbers["damping_time_s"]
-        self.arm_stiffness = numbers["arm_stiffness_n_per_m"] or STIFF
+        n.edges, n.floor = known["edges"], known["floor_m"]
+        n.rest = known["rest_length_m"] / n.edges
+        n.node_mass = known["mass_kg"] / n.edges
+        n.projectile_mass = known["projectile_mass_kg"]
+        n.strength, n.share = known["strength_n"], known["mooney_share"]
+        n.damping = known["damping_time_s"]
+        self.arm_stiffness = known["arm_stiffness_n_per_m"] or STIFF
         n.hand_mass, n.gravity = HAND_MASS, GRAVITY
-        half = numbers["half_width_m"]
+        half = known["half_width_m"]
         self.tips = np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
 
         builder = newton.ModelBuilder(gravity=(0.0, 0.0, -GRAVITY))

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
+from inspect import getfile
 from pathlib import Path
 
 from pipeline.base.files import write_json, write_text
 from pipeline.episode.episode import Episode
 from pipeline.export import card, newton_card
-from pipeline.export.band import CalibratedBand, pull_to
-from pipeline.export.match import compared, draws_of, matched, proof_draws
+from pipeline.export.band import CalibratedBand
+from pipeline.export.match import matched, proof_draws
 from pipeline.export.newton_replay import NewtonReplay, loader, numbers
-from pipeline.export.pull import compare_pull
+from pipeline.export.proof import proven
 
 
 def to_newton(model: CalibratedBand, folder: Path, episode: Episode | None) -> dict:
@@ -20,26 +20,13 @@ def to_newton(model: CalibratedBand, folder: Path, episode: Episode | None) -> d
     The chain is matched in MuJoCo, which steps the same springs the same way. All that is said
     about it is measured in Newton.
     """
-    source = Path(loader().__file__)
+    source = Path(getfile(loader()))
     name, chain = model.band.name, matched(model)
-    replay, proof, draws = NewtonReplay(chain), proof_draws(model), draws_of(model)
+    proof = proof_draws(model)
     path = folder / f"{name}.json"
     write_json(path, numbers(name, chain, proof))
     write_text(folder / source.name, source.read_text("utf-8"))
-
-    shots = replay.launches(proof)
-    moved = [
-        finer.landing / shot.landing - 1
-        for finer, shot in zip(replay.finer.launches(proof), shots, strict=True)
-    ]
-    done = card.Matched(
-        chain=chain,
-        match=compared(model, draws, replay.launches(draws)),
-        proof=compared(model, proof, shots),
-        pull=compare_pull(model, episode or pull_to(model, tuple(proof[-1])), replay),
-        finer=max(map(abs, moved)),
-        engine=f"Newton {version('newton')}, Warp {version('warp-lang')}, CPU",
-    )
+    done = proven(model, NewtonReplay(chain), proof, episode)
     files = {
         path.name: "the numbers",
         source.name: "builds and launches the band",

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.metadata import version
 from types import ModuleType
 
 import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.export.chain import SpringChain
-from pipeline.export.mujoco_replay import HANG, Pulled, Shot
+from pipeline.export.replay import HANG, HandPath, Pulled, Shot
 
 
 def numbers(name: str, chain: SpringChain, draws: np.ndarray) -> dict:
@@ -37,6 +38,7 @@ class NewtonReplay:
 
     def __init__(self, chain: SpringChain):
         self.chain, self._module = chain, loader()
+        self.engine = f"Newton {version('newton')}, Warp {version('warp-lang')}, CPU"
         self._numbers = numbers("band", chain, np.empty((0, 2)))
 
     @property
@@ -44,8 +46,8 @@ class NewtonReplay:
         """With half the time step."""
         return NewtonReplay(replace(self.chain, step=self.chain.step / 2))
 
-    def launches(self, draws: np.ndarray) -> list[Shot]:
-        """Draw all (N, 2), let go, and fly to the floor."""
+    def launches(self, draws: np.ndarray, *, fly: bool = True) -> list[Shot]:
+        """All at once, as ChainReplay.launches; Newton always flies them."""
         bands = self._module.SpringBands(self._numbers, len(draws))
         hold_force = bands.draw(draws)
         landing, left = bands.launch()
@@ -53,8 +55,8 @@ class NewtonReplay:
         columns = np.stack([landing, speed, angle, hold_force], axis=1)
         return [Shot(*row) for row in columns.tolist()]
 
-    def pull(self, path, times: np.ndarray, stamps: np.ndarray) -> Pulled:
-        """As MujocoBand.pull: take the hanging band and lead it without the projectile."""
+    def pull(self, path: HandPath, times: np.ndarray, stamps: np.ndarray) -> Pulled:
+        """As ChainReplay.pull."""
         bands, middle = self._module.SpringBands(self._numbers), self.chain.edges // 2
         bands.put([self.chain.hanging()], held=False)
         bands.settle(HANG)

@@ -10,8 +10,7 @@ from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.export.band import CalibratedBand
 from pipeline.export.mesh import hand_path
-from pipeline.export.mujoco_replay import MujocoBand
-from pipeline.export.newton_replay import NewtonReplay
+from pipeline.export.replay import ChainReplay
 from pipeline.simulator.interaction import interact
 
 
@@ -36,9 +35,7 @@ class PullCompared:
     taut_rms: float | None
 
 
-def compare_pull(
-    model: CalibratedBand, episode: Episode, replay: MujocoBand | NewtonReplay
-) -> PullCompared:
+def compare_pull(model: CalibratedBand, episode: Episode, replay: ChainReplay) -> PullCompared:
     """Pull as in `episode`, in both. Raises UserError where our simulation fails."""
     ours, chain = interact(model.sling, episode, model.parameters), replay.chain
     if ours.failure[0]:

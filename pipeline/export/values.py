@@ -24,15 +24,15 @@ def values(model: CalibratedBand) -> list[dict]:
         value, known = theta.get(name), intervals.get(name)
         if value is None:
             continue
-        sure = known is not None and known.low < known.high
+        sure = known if known is not None and known.low < known.high else None
         found.append(
             {
                 "name": name,
                 "value": rounded(value, 6),
                 "unit": SI_UNITS.get(name, ""),
-                "low": rounded(known.low, 6) if sure else None,
-                "high": rounded(known.high, 6) if sure else None,
-                "identified": bool(sure and known.identifiable),
+                "low": sure and rounded(sure.low, 6),
+                "high": sure and rounded(sure.high, 6),
+                "identified": bool(sure and sure.identifiable),
             }
         )
     return found

@@ -24,7 +24,8 @@ def to_yaml(model: CalibratedBand, folder: Path, episode: Episode | None) -> dic
     name = f"{model.band.name}.yaml"
     content = content_of(model)
     yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style, yaml.sort_base_mapping_type_on_output = None, False
+    yaml.default_flow_style = None
+    yaml.sort_base_mapping_type_on_output = False  # pyright: ignore[reportAttributeAccessIssue]
     yaml.width = 100
     stream = io.StringIO()
     yaml.dump(content, stream)

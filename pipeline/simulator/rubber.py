@@ -30,7 +30,7 @@ def update(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.exp(-part), -np.expm1(-part) / part
 
 
-def uniaxial(stretch: np.ndarray, share: np.ndarray) -> np.ndarray:
+def uniaxial(stretch: np.ndarray, share: np.ndarray | float) -> np.ndarray:
     """Relaxed nominal stress over the shear modulus (Mooney 1940, Rivlin 1948), stretches >= 1."""
     return (stretch - stretch**-2) * (1 - share + share / stretch)
 

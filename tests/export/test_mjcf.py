@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.export import mjcf
-from pipeline.export.card import HOLD, LANDING, Matched
+from pipeline.export.card import HOLD, LANDING
 from pipeline.export.chain import SpringChain
 from pipeline.export.match import compared, draws_of, proof_draws
 from pipeline.export.mujoco_replay import MujocoBand
+from pipeline.export.proof import Matched
 from sling2sim2real import UserError, export
 
 mujoco = pytest.importorskip("mujoco", reason="mujoco: pip install -e '.[validation]'")
@@ -60,8 +60,7 @@ def test_another_band_would_be_noticed(model, chain) -> None:
     draws = proof_draws(model)
 
     def met(chain: SpringChain) -> bool:
-        replay = MujocoBand(mjcf.text("toy", chain), chain)
-        proof = compared(model, draws, [replay.launch(draw) for draw in draws])
+        proof = compared(model, draws, MujocoBand(chain).launches(draws))
         return Matched(chain, [], proof, None, 0.0, "").met
 
     assert met(chain)
@@ -82,7 +81,7 @@ def test_the_file_has_the_band_of_the_card(done, chain) -> None:
 
 
 def test_drawn_it_pulls_as_its_springs_and_hanging_it_is_slack(chain) -> None:
-    replay = MujocoBand(mjcf.text("toy", chain), chain)
+    replay = MujocoBand(chain)
     draw = np.array([-0.35, -0.15])
     replay.draw(draw)
     middle = replay.line[chain.edges // 2]

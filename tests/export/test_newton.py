@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from pipeline.export import mjcf, mujoco_replay
-from pipeline.export.card import HOLD, LANDING, Matched
+from pipeline.export.card import HOLD, LANDING
 from pipeline.export.chain import SpringChain
 from pipeline.export.match import compared, draws_of, proof_draws
 from pipeline.export.newton_replay import NewtonReplay, loader, numbers
+from pipeline.export.proof import Matched
 from pipeline.simulator.launch import ballistic_landing
 from pipeline.simulator.model import GRAVITY
 from sling2sim2real import UserError, export

@@ -19,7 +19,8 @@ WIDTH, GLOW, LIGHT = 2, 2, 0.5  # pixels; of a light line, wider by GLOW, that s
 
 def bgr(color: str) -> tuple[int, int, int]:
     """Of #rrggbb."""
-    return tuple(int(color[place : place + 2], 16) for place in (5, 3, 1))
+    blue, green, red = (int(color[place : place + 2], 16) for place in (5, 3, 1))
+    return blue, green, red
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from pipeline.episode.episode import Episode
 from pipeline.report.card.camera import Pictures
@@ -39,7 +41,7 @@ def moments(episode: Episode, simulated: Simulated, pictures: Pictures) -> dict[
 
 
 @picture(dpi=110)
-def camera(episode: Episode, simulated: Simulated, pictures: Pictures) -> plt.Figure:
+def camera(episode: Episode, simulated: Simulated, pictures: Pictures) -> Figure:
     """Three camera pictures with the simulated band drawn in."""
     view = CameraView.of(pictures, simulated, CUT, begin=0.0)
     chosen = moments(episode, simulated, pictures)
@@ -57,7 +59,7 @@ def camera(episode: Episode, simulated: Simulated, pictures: Pictures) -> plt.Fi
 
 
 @picture(dpi=110)
-def force(episode: Episode, simulated: Simulated) -> plt.Figure:
+def force(episode: Episode, simulated: Simulated) -> Figure:
     """Force on the gripper and what is left of it, over time, the release magnified."""
     figure, axes = plt.subplots(
         2, 2, figsize=(9.6, 4.6), width_ratios=(1.9, 1), height_ratios=(2, 1), sharex="col",
@@ -92,11 +94,12 @@ def force(episode: Episode, simulated: Simulated) -> plt.Figure:
 
 
 @picture(dpi=110)
-def values(shown: list[ShownValue], boxes: dict[str, SearchedRange]) -> plt.Figure:
+def values(shown: list[ShownValue], boxes: dict[str, SearchedRange]) -> Figure:
     """Each searched value's interval as a bar within its box, which is given by name."""
     rows = [one for one in shown if one.name in boxes and one.low is not None]
     figure, ax = plt.subplots(figsize=(9.6, 0.5 * max(len(rows), 1) + 1.1))
     for row, one in enumerate(rows):
+        assert one.low is not None and one.high is not None  # both are known, or neither is
         box, factor = boxes[one.name], QUANTITIES[one.name].factor
         box = SearchedRange(factor * box.low, factor * box.high, box.scale)
         begin, end = box.place(one.low), box.place(one.high)
@@ -120,13 +123,13 @@ def values(shown: list[ShownValue], boxes: dict[str, SearchedRange]) -> plt.Figu
 
 
 @picture(dpi=110)
-def landings(inputs: CardInputs) -> plt.Figure:
+def landings(inputs: CardInputs) -> Figure:
     """Predicted landings with their intervals, and where launches landed."""
     aims, launched = inputs.aims, inputs.launched
     figure, ax = plt.subplots(figsize=(9.6, 3.6))
     entries = {}
     for kind, (marker, name) in KINDS.items():
-        rows = launched[launched.kind == kind]
+        rows = launched.loc[launched.kind == kind]
         if not len(rows):
             continue
         x, off = rows.predicted_y.to_numpy(), (rows.landing_y - rows.predicted_y).to_numpy()
@@ -147,7 +150,7 @@ def landings(inputs: CardInputs) -> plt.Figure:
     return figure
 
 
-def _aimed(ax: plt.Axes, aims: Aims) -> None:
+def _aimed(ax: Axes, aims: Aims) -> None:
     bars = (aims.interval.T - aims.landing) * 100
     _bars(ax, aims.landing, bars, color=SIMULATED, lw=6, alpha=0.35)
     ax.plot(aims.landing, 0 * aims.landing, "o", color=SIMULATED, ms=5, zorder=3)
@@ -162,7 +165,7 @@ def _aimed(ax: plt.Axes, aims: Aims) -> None:
             )  # fmt: skip
 
 
-def _bars(ax: plt.Axes, x: np.ndarray, ends: np.ndarray, **style) -> None:
+def _bars(ax: Axes, x: np.ndarray, ends: np.ndarray, **style) -> None:
     """Vertical bars at x (N,) from and to ends (2, N)."""
     good = np.isfinite(ends).all(axis=0)
     ax.vlines(x[good], *ends[:, good], zorder=2, **style)

@@ -35,8 +35,8 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
         return max((one[name] for one in recordings), default=0.0)
 
     launched = inputs.launched
-    scored = launched[launched.stretch <= FURTHER * inputs.recorded_stretch]
-    scored = scored[scored.predicted_low.notna()]
+    scored = launched.loc[launched.stretch <= FURTHER * inputs.recorded_stretch]
+    scored = scored.loc[scored.predicted_low.notna()]
     landing, low, high = (scored[n] for n in ("landing_y", "predicted_low", "predicted_high"))
     share = landing / scored.predicted_y - 1
     evidence = confidence.get("launches", [])

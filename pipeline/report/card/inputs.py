@@ -93,7 +93,7 @@ class CardInputs:
     @property
     def launched(self) -> pd.DataFrame:
         """Launches that landed somewhere, measured or virtual, beside what was predicted."""
-        return self.trials[self.trials.landing_y.notna() & self.trials.predicted_y.notna()]
+        return self.trials.loc[self.trials.landing_y.notna() & self.trials.predicted_y.notna()]
 
 
 def card_inputs(params: Params, band: str, method: str, root: str | Path = ".") -> CardInputs:

@@ -42,11 +42,11 @@ def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
     for name, quantity in QUANTITIES.items():
         if name not in numbers_of:
             continue
-        numbers = numbers_of[name], *(intervals.get(name, {}).get(end) for end in ("low", "high"))
-        shown = [None if x is None else rounded(quantity.factor * x) for x in numbers]
+        value, known = rounded(quantity.factor * numbers_of[name]), intervals.get(name, {})
         still = name in fixed
-        ends = (None, None) if still else shown[1:]
-        found.append(ShownValue(name, quantity.label, quantity.unit, shown[0], *ends, still))
+        ends = (None if still else known.get(end) for end in ("low", "high"))
+        low, high = (None if x is None else rounded(quantity.factor * x) for x in ends)
+        found.append(ShownValue(name, quantity.label, quantity.unit, value, low, high, still))
     return found
 
 

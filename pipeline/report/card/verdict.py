@@ -112,7 +112,7 @@ class Findings:
         """Whether the scores miss to one side, by more than chance and by a share that matters."""
         if self.scores < SHARED or abs(self.bias_of_half) < SHARE:
             return False
-        return abs(self.bias) > t.isf(SURE / 2, self.scores - 1) * self.bias_error
+        return bool(abs(self.bias) > t.isf(SURE / 2, self.scores - 1) * self.bias_error)
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,7 @@ def content(inputs: CardInputs, verdict: str, reasons: list, shown: list, steps:
 
 
 def _ends(interval: np.ndarray) -> list[float] | None:
-    return [_rounded(end, 3) for end in interval] if np.isfinite(interval).all() else None
+    return [round(end, 3) for end in interval.tolist()] if np.isfinite(interval).all() else None
 
 
 def _rounded(value: float, digits: int) -> float | None:

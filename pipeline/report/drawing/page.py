@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import re
+from itertools import pairwise
 from pathlib import Path
 from string import Template
 
@@ -55,13 +56,13 @@ def _rendered(markdown: str, folder: Path) -> tuple[str, list[tuple[str, str]]]:
 
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
     tokens, chapters = parser.parse(markdown), []
-    for token, inline in zip(tokens, [*tokens[1:], None], strict=True):
+    for token, inline in pairwise(tokens):
         if token.type == "heading_open" and token.tag == "h2":
-            title = parser.renderer.render(inline.children, parser.options, {})
+            title = parser.renderer.render(inline.children or [], parser.options, {})
             slug = re.sub(r"[^a-z0-9]+", "-", inline.content.lower()).strip("-")
             token.attrSet("id", f"chapter-{len(chapters) + 1}-{slug}")
             chapters.append((token.attrGet("id"), title))
-        for child in token.children or []:
+        for child in inline.children or []:
             if child.type == "image":
                 child.attrSet("src", _inside(folder / str(child.attrGet("src"))))
                 child.attrSet("loading", "lazy")

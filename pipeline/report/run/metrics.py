@@ -14,6 +14,7 @@ from pipeline.report.run.tables.landings import (
     LAUNCHED,
     intervals,
     landing_errors,
+    of_kind,
     prediction_error,
 )
 
@@ -44,12 +45,12 @@ def summary(results: Results, main: str, theirs: str | None) -> dict[str, float]
             beside.append(_error(methods[theirs]))
     some = [methods[main].trials for methods in results.methods.values()]
     trials = pd.concat(some, ignore_index=True)
-    trials = trials[trials.kind.isin(LAUNCHED)]
+    trials = of_kind(trials, *LAUNCHED)
     found["floors"] = _mean(ratios)
     found["paper_cm"] = _mean([100 * one for one in beside if one is not None])
     if len(trials):
-        aimed = trials[trials.target.notna()]
-        found["failed"] = landing_errors(aimed)["all"]["failed"] if len(aimed) else None
+        aimed = landing_errors(trials)["all"]
+        found["failed"] = aimed.failed if aimed.launches else None
         found["bias_%"] = 100 * prediction_error(trials)["all"].bias
         coverage = (intervals(trials) or {}).get("all")
         if coverage and coverage.launches:
@@ -64,8 +65,7 @@ def summary(results: Results, main: str, theirs: str | None) -> dict[str, float]
 
 def _error(result: Result) -> float | None:
     """Mean error of the launches that had a target [m]; None without one that counts."""
-    aimed = result.trials[result.trials.kind.isin(LAUNCHED) & result.trials.target.notna()]
-    mean = landing_errors(aimed)["all"]["mean"] if len(aimed) else np.nan
+    mean = landing_errors(of_kind(result.trials, *LAUNCHED))["all"].mean
     return mean if np.isfinite(mean) else None
 
 

@@ -65,10 +65,10 @@ def difference(first: pd.DataFrame, second: pd.DataFrame, seed: int) -> Differen
     Returns:
         None where nothing is left to compare.
     """
-    first, second = (t[t.target.notna()] for t in (first, second))
+    first, second = (t.loc[t.target.notna()] for t in (first, second))
     tried = len(first) + len(second)
-    failed = tuple(float((~landed(t)).mean()) for t in (first, second))
-    first, second = first[landed(first)], second[landed(second)]
+    failed = float((~landed(first)).mean()), float((~landed(second)).mean())
+    first, second = (t.loc[landed(t)] for t in (first, second))
     if {*first.kind, *second.kind} == {"virtual"}:
         keys = ["target", "trial"]
         common = first[keys].merge(second[keys])
@@ -76,13 +76,14 @@ def difference(first: pd.DataFrame, second: pd.DataFrame, seed: int) -> Differen
         change = [(b - a,) for a, b in zip(_misses(first), _misses(second), strict=True)]
     else:
         common = set(first.target) & set(second.target)
-        first, second = (t[t.target.isin(common)] for t in (first, second))
+        first, second = (t.loc[t.target.isin(common)] for t in (first, second))
         change = [(b, -a) for a, b in zip(_misses(first), _misses(second), strict=True)]
     if not change:
         return None
     rng = np.random.default_rng(seed)
     mean = np.mean([sum(part.mean() for part in parts) for parts in change])
-    resampled = np.mean([sum(_resampled(part, rng) for part in parts) for parts in change], axis=0)
+    means = [[_resampled(part, rng) for part in parts] for parts in change]
+    resampled = np.mean(np.sum(means, axis=1), axis=0)
     tail = ndtr(stdtrit(_freedom(change), (1 - LEVEL) / 2))
     low, high = np.quantile(resampled, [tail, 1 - tail])
     launches = len(first), len(second)

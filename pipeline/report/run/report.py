@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from pipeline.launching.surface.stored import Stored
 from pipeline.params import Params
+from pipeline.report.drawing.canvas import P, Saving
 from pipeline.report.drawing.styles import Styles, drawn, styles
 from pipeline.report.run.paper import METHOD
 from pipeline.report.run.repeated import Repeated
@@ -62,9 +62,11 @@ class Report:
         """The styles of methods, in the order of the run."""
         return {method: style for method, style in self.styles.items() if method in methods}
 
-    def picture(self, name: str, alt: str, draw: Callable[..., None], *arguments) -> str:
+    def picture(
+        self, name: str, alt: str, draw: Saving[P], *arguments: P.args, **named: P.kwargs
+    ) -> str:
         """Have `draw` write reports/figures/<name>.png; return the line that shows it."""
-        draw(self.folder / "figures" / f"{name}.png", *arguments)
+        draw(self.folder / "figures" / f"{name}.png", *arguments, **named)
         return f"![{alt}](figures/{name}.png)\n"
 
     def draws(self, result: Result, targets: np.ndarray) -> np.ndarray:

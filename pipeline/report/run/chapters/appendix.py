@@ -12,7 +12,12 @@ from pipeline.report.run.report import Report
 from pipeline.report.run.results import has_another_loss
 from pipeline.report.run.tables import differences, identified
 from pipeline.report.run.tables.cells import markdown, percent
-from pipeline.report.run.tables.landings import LAUNCHED, prediction_summary, predictions
+from pipeline.report.run.tables.landings import (
+    LAUNCHED,
+    of_kind,
+    prediction_summary,
+    predictions,
+)
 from pipeline.report.run.tables.policies import policies
 
 NOISE = f"""\
@@ -84,11 +89,10 @@ def _predicted(report: Report) -> list[str]:
         trusted = {(one.band, one.method) for one in results if one.confidence}
         shown = report.shown(report.params.run.methods)
         alt = "predicted beside actual landings"
-        drawing = landings.predictions, trials[trials.kind.isin(LAUNCHED)], trusted, shown
+        drawing = landings.predictions, of_kind(trials, *LAUNCHED), trusted, shown
         text.append(report.picture("predictions", alt, *drawing))
     for band, methods in results.methods.items():
-        launches = methods[report.main].trials
-        launches = launches[launches.kind == "measured"]
+        launches = of_kind(methods[report.main].trials, "measured")
         if not launches.empty:
             words = f"{band}, {styles[report.main].name}, measured launches:\n"
             text += [words, markdown(predictions(launches))]

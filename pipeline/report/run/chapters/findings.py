@@ -13,6 +13,7 @@ from pipeline.report.run.tables.landings import (
     LAUNCHED,
     intervals,
     landing_errors,
+    of_kind,
     prediction_error,
 )
 
@@ -65,9 +66,7 @@ def _errors(report: Report, kind: str) -> list[str]:
     for method in report.references:
         means = {}
         for band, methods in report.results.methods.items():
-            trials = methods[method].trials
-            trials = trials[(trials.kind == kind) & trials.target.notna()]
-            mean = landing_errors(trials)["all"]["mean"] if len(trials) else np.nan
+            mean = landing_errors(of_kind(methods[method].trials, kind))["all"].mean
             if np.isfinite(mean):
                 means[band] = mean
         if not means:
@@ -87,8 +86,7 @@ def _predictions(report: Report, kind: str) -> list[str]:
     """How well the main method predicts where its launches land."""
     errors, biases, held, count, widths, off = [], [], 0, 0, [], []
     for methods in report.results.methods.values():
-        trials = methods[report.main].trials
-        trials = trials[trials.kind == kind]
+        trials = of_kind(methods[report.main].trials, kind)
         about = prediction_error(trials)["all"]
         if not about.launches:
             continue
@@ -177,9 +175,8 @@ def _verdict(report: Report, row: Compared) -> str:
     methods = report.results.methods[row.band]
     lost = []
     for method in (row.method, paper.METHOD):
-        trials = methods[method].trials
-        errors = landing_errors(trials[(trials.kind == row.kind) & trials.target.notna()])["all"]
-        lost.append(errors["failed"] == errors["launches"])
+        errors = landing_errors(of_kind(methods[method].trials, row.kind))["all"]
+        lost.append(errors.failed == errors.launches)
     if lost[0] != lost[1]:
         return WORSE if lost[0] else BETTER
     one = row.found[paper.METHOD]

@@ -7,7 +7,7 @@ from pipeline.report.run.figures.landings import misses
 from pipeline.report.run.report import Report
 from pipeline.report.run.tables import outcome as tables
 from pipeline.report.run.tables.cells import markdown
-from pipeline.report.run.tables.landings import LAUNCHED
+from pipeline.report.run.tables.landings import LAUNCHED, of_kind
 
 INTRODUCTION = """\
 # Report
@@ -54,8 +54,8 @@ def outcome(report: Report) -> str:
 
 
 def _picture(report: Report) -> list[str]:
-    trials = report.results.trials
-    trials = trials[trials.kind.isin(LAUNCHED) & trials.target.notna()]
+    trials = of_kind(report.results.trials, *LAUNCHED)
+    trials = trials.loc[trials.target.notna()]
     if trials.empty:
         return []
     shown = report.shown([m for m in report.params.run.methods if m in set(trials.method)])

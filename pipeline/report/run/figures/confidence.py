@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 
 from pipeline.report.drawing.canvas import picture
 from pipeline.report.drawing.styles import INK
@@ -12,7 +14,7 @@ from pipeline.report.run.figures.panels import panels
 
 
 @picture({"axes.grid": False})
-def correlation(confidences: dict[str, dict]) -> plt.Figure:
+def correlation(confidences: dict[str, dict]) -> Figure:
     """Correlations of the density's coordinates, a panel a band.
 
     Args:
@@ -20,11 +22,13 @@ def correlation(confidences: dict[str, dict]) -> plt.Figure:
     """
     title = "Red or blue: the recording tells the two together better than each alone"
     figure, found = panels(confidences, title, 4.0, 3.3)
+    norm = Normalize(-1, 1)
+    shades = ScalarMappable(norm, "RdBu_r")
     for band, ax in found.items():
         about = confidences[band]["correlation"]
         matrix = np.array(about["matrix"], float)
         names = [coordinate(name) for name in about["names"]]
-        image = ax.imshow(matrix, cmap="RdBu_r", vmin=-1, vmax=1)
+        ax.imshow(matrix, cmap=shades.cmap, norm=norm)
         for (row, column), value in np.ndenumerate(matrix):
             if column < row and abs(value) >= 0.05:
                 ink = {"color": "w" if abs(value) > 0.6 else INK, "fontsize": 7}
@@ -34,5 +38,5 @@ def correlation(confidences: dict[str, dict]) -> plt.Figure:
         ax.set_yticks(range(len(names)), names)
         ax.tick_params(length=0, labelsize=7)
         ax.spines[:].set_visible(False)
-    figure.colorbar(image, ax=list(found.values()), label="correlation", shrink=0.8)
+    figure.colorbar(shades, ax=list(found.values()), label="correlation", shrink=0.8)
     return figure

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from pipeline.report.drawing.canvas import mark, patch, picture
 from pipeline.report.drawing.styles import INK, Styles
@@ -22,7 +24,7 @@ SHADE = "0.88"
 
 
 @picture()
-def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> plt.Figure:
+def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> Figure:
     """How far from its target each launch landed, a panel a band and a row a method.
 
     Args:
@@ -39,11 +41,11 @@ def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> pl
         floor = 100 * floors.get(band, 0)
         ax.axvspan(-floor, floor, color=SHADE, lw=0)
         for row, method in enumerate(styles):
-            mine = trials[(trials.band == band) & (trials.method == method)]
+            mine = trials.loc[(trials.band == band) & (trials.method == method)]
             color = styles[method].color
             for number, (target, sign) in enumerate(targets.items()):
                 height = row + _spread(len(targets))[number]
-                some = mine[mine.target == target].dropna(subset="off")
+                some = mine.loc[(mine.target == target) & mine.off.notna()]
                 for kind, dots in some.groupby("kind"):
                     face = "none" if kind == "measured" else color
                     style = {"marker": sign, "s": 18, "facecolors": face, "edgecolors": color}
@@ -56,7 +58,9 @@ def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> pl
                 ax.text(0.01 if left else 0.99, row, text, **words, **where)
         ax.set_xlabel(f"landing − target [cm]{beyond}")
     dot = {"ls": "", "color": "0.4"}
-    entries = [(f"aimed at {t:g} m", mark(**dot, marker=m)) for t, m in targets.items()]
+    entries: list[tuple[str, Artist]] = [
+        (f"aimed at {t:g} m", mark(**dot, marker=m)) for t, m in targets.items()
+    ]
     if floors:
         entries.append(("actuation floor: errors of draw and release alone", patch(SHADE)))
     if "measured" in set(trials.kind):
@@ -66,7 +70,7 @@ def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> pl
 
 
 @picture()
-def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> plt.Figure:
+def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> Figure:
     """How far each predicted landing is from the actual one, with its interval.
 
     Args:
@@ -75,7 +79,7 @@ def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> pl
             hold the draw's error alone.
         styles: Of the methods to be shown.
     """
-    trials = trials[trials.landing_y.notna() & trials.predicted_y.notna()]
+    trials = trials.loc[trials.landing_y.notna() & trials.predicted_y.notna()]
     off, low, high = (
         100 * (trials[f"predicted_{name}"] / trials.landing_y - 1) for name in ("y", "low", "high")
     )
@@ -87,7 +91,7 @@ def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> pl
     for band, ax in found.items():
         ax.axvspan(-FAIR, FAIR, color=SHADE, lw=0)
         for row, method in enumerate(styles):
-            mine = trials[(trials.band == band) & (trials.method == method)]
+            mine = trials.loc[(trials.band == band) & (trials.method == method)]
             height, color = row + _spread(len(mine)), styles[method].color
             line = "-" if (band, method) in trusted else (0, (1, 1))
             ax.hlines(height, mine.low, mine.high, color=color, lw=0.9, ls=line, zorder=2)
@@ -98,7 +102,7 @@ def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> pl
     entries = [("a launch", mark(**dot))]
     if not inside.all():
         entries.append(("stretched beyond the recording", mark(**dot, mfc="none")))
-    ranged = trials[trials.predicted_low.notna()]
+    ranged = trials.loc[trials.predicted_low.notna()]
     pairs = set(zip(ranged.band, ranged.method, strict=True))
     if pairs & {*trusted}:
         entries.append(("90 % interval", mark(color="0.4", lw=1)))
@@ -120,8 +124,8 @@ def _rows(trials: pd.DataFrame, styles: Styles, title: str, off: pd.Series):
         ax.set_ylim(len(styles) - 0.5, -0.6)
         ax.set_xscale("symlog", linthresh=LINEAR)
         ax.set_xlim(-most, most)
-        ax.xaxis.set_major_locator(plt.FixedLocator(TICKS))
-        ax.xaxis.set_minor_locator(plt.NullLocator())
+        ax.xaxis.set_major_locator(FixedLocator(TICKS))
+        ax.xaxis.set_minor_locator(NullLocator())
         ax.xaxis.set_major_formatter("{x:g}")
         for label, style in zip(ax.get_yticklabels(), styles.values(), strict=False):
             label.set_color(style.color)  # those of the first panel: others share them

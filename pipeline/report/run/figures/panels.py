@@ -7,6 +7,8 @@ from textwrap import fill
 
 import matplotlib.pyplot as plt
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from pipeline.report.drawing.canvas import key
 
@@ -17,7 +19,7 @@ LETTERS = 11.5  # of a title, an inch
 
 def panels(
     bands: Iterable[str], title: str, wide: float, tall: float, **more
-) -> tuple[plt.Figure, dict[str, plt.Axes]]:
+) -> tuple[Figure, dict[str, Axes]]:
     """A figure with a panel a band, three in a row.
 
     Args:
@@ -41,13 +43,13 @@ def panels(
     return figure, found
 
 
-def explain(figure: plt.Figure, entries: Iterable[tuple[str, Artist]]) -> None:
+def explain(figure: Figure, entries: Iterable[tuple[str, Artist]]) -> None:
     """What is what, below the picture, in as many columns as it has room for."""
     entries = list(entries)
     key(figure, entries, min(len(entries), max(int(figure.get_figwidth() / ENTRY), 1)))
 
 
-def entitle(figure: plt.Figure, title: str) -> None:
+def entitle(figure: Figure, title: str) -> None:
     """What to see, above the picture."""
     lines = fill(title, int(LETTERS * figure.get_figwidth()))
     figure.suptitle(lines, x=0.01, ha="left", fontsize=10, fontweight="bold")

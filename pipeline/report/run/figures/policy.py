@@ -8,6 +8,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.colors import BoundaryNorm
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.launching.trials.stretch import stretch_of
@@ -20,7 +22,7 @@ DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
 
 
 @picture()
-def training(curves: dict[str, dict[str, pd.DataFrame]], styles: Styles) -> plt.Figure:
+def training(curves: dict[str, dict[str, pd.DataFrame]], styles: Styles) -> Figure:
     """Error of the deterministic policy by iteration of PPO, in its own simulator.
 
     Args:
@@ -50,7 +52,7 @@ def landing_maps(
     recorded: dict[str, float],
     fork_width: float,
     rest_lengths: dict[str, float],
-) -> plt.Figure:
+) -> Figure:
     """Where draws about its policy's path land by one method's simulator.
 
     Args:
@@ -66,7 +68,7 @@ def landing_maps(
     high = np.max([path.max(0) for path in draws.values()], axis=0) + AROUND
     charts = {band: _fine(one, low, high) for band, one in maps.items()}
     known = np.concatenate([landing[np.isfinite(landing)] for *_, landing in charts.values()])
-    levels = plt.MaxNLocator(16).tick_values(known.min(), known.max()) if len(known) else [0, 1]
+    levels = MaxNLocator(16).tick_values(known.min(), known.max()) if len(known) else [0, 1]
     shades = plt.cm.ScalarMappable(BoundaryNorm(levels, 256), "cividis")
     beyond = False
     for band, ax in found.items():

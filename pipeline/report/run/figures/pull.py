@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 
 from pipeline.episode.episode import Episode
 from pipeline.report.drawing.canvas import mark, picture
@@ -18,7 +19,7 @@ SLACK, MARGIN = 0.05, 0.04  # of the peak force, below which the band is slack; 
 @picture()
 def pull(
     episodes: dict[str, Episode], replays: dict[str, dict[str, MethodReplay]], styles: Styles
-) -> plt.Figure:
+) -> Figure:
     """A column a band: force against draw, residual force, and how far the clouds are off.
 
     Args:

@@ -7,9 +7,14 @@ from itertools import cycle
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
+from matplotlib.ticker import MaxNLocator
 
+from pipeline.params.identification import ParameterBoxes
 from pipeline.report.drawing.canvas import few_ticks, key, log_y, mark, picture
 from pipeline.report.drawing.styles import INK, Styles
 from pipeline.report.quantities import QUANTITIES
@@ -27,7 +32,7 @@ SHOWN = 0.9  # share of the evaluated points that the colour scale tells apart
 
 
 @picture()
-def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> plt.Figure:
+def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> Figure:
     """The printed loss of every method's best so far, against rollouts.
 
     Args:
@@ -68,7 +73,7 @@ def rollouts(result: Result) -> np.ndarray:
 
 
 @picture(BOXED, dpi=100)
-def corner(result: Result, boxes, title: str) -> plt.Figure:
+def corner(result: Result, boxes: ParameterBoxes, title: str) -> Figure:
     """Every evaluated point in the unit cube, each pair of free parameters against each other.
 
     Args:
@@ -85,7 +90,8 @@ def corner(result: Result, boxes, title: str) -> plt.Figure:
     failed = ~np.isfinite(total)
     best = int(np.argmin(np.where(failed, np.inf, total)))
     worst = max(np.quantile(total[good], SHOWN), 1.001 * total[best])
-    color = {"c": total[good], "cmap": "viridis", "norm": LogNorm(total[best], worst)}
+    shades = ScalarMappable(LogNorm(total[best], worst), "viridis")
+    color = {"c": total[good], "cmap": shades.cmap, "norm": shades.norm}
     sizes = np.where(history.phase.to_numpy()[good] == "cma", 5, 14)
     star = {"color": STAR, "mec": INK}
     inches = 1.4 + 1.55 * max(size, 3)
@@ -98,7 +104,7 @@ def corner(result: Result, boxes, title: str) -> plt.Figure:
             continue
         x = free[column]
         if row == column:
-            points = ax.scatter(unit[x][good], total[good], s=sizes, lw=0, **color)
+            ax.scatter(unit[x][good], total[good], s=sizes, lw=0, **color)
             ax.axvline(unit[x][best], color=PATH, lw=0.8)
             ax.set(yscale="log", ylim=(0.98 * total[best], 1.3 * worst), ylabel="loss")
             few_ticks(ax.yaxis)
@@ -124,7 +130,7 @@ def corner(result: Result, boxes, title: str) -> plt.Figure:
         elif row != column:
             ax.tick_params(labelleft=False)
     side = figure.add_axes((0.62, 0.9, 0.31, 0.016))
-    bar = figure.colorbar(points, cax=side, orientation="horizontal", extend="max")
+    bar = figure.colorbar(shades, cax=side, orientation="horizontal", extend="max")
     bar.set_label(f"loss of {title}")
     few_ticks(bar.ax.xaxis)
     bar.ax.tick_params(which="both", labelsize=7)
@@ -132,26 +138,27 @@ def corner(result: Result, boxes, title: str) -> plt.Figure:
     return figure
 
 
-def _regions(ax: plt.Axes, result: Result, x: str, y: str) -> None:
+def _regions(ax: Axes, result: Result, x: str, y: str) -> None:
     """Centres of the regions, their covariances at one deviation, and the paths of CMA-ES."""
-    refined = result.history[result.history.phase == "cma"]
+    refined = result.history.loc[result.history.phase == "cma"]
     searched = {x, y} <= set(result.axes)
     for number, region in enumerate(result.regions if searched else ()):
         index = [result.axes.index(x), result.axes.index(y)]
-        centre, sigma = region.mu[index], region.sigma[np.ix_(index, index)]
-        spread, turn = np.linalg.eigh(sigma)
+        across, up = centre = region.mu[index]
+        spread, turn = np.linalg.eigh(region.sigma[np.ix_(index, index)])
         angle = np.degrees(np.arctan2(turn[1, 1], turn[0, 1]))
         tall, wide = 2 * np.sqrt(spread)
-        ax.add_patch(Ellipse(centre, wide, tall, angle=angle, fill=False, ec=INK, lw=0.7, zorder=4))
-        mine = refined[refined.solver == number]
+        line = {"fill": False, "ec": INK, "lw": 0.7, "zorder": 4}
+        ax.add_patch(Ellipse((across, up), wide, tall, angle=angle, **line))
+        mine = refined.loc[refined.solver == number]
         way = mine.groupby("generation")[[f"unit_{x}", f"unit_{y}"]].mean().to_numpy()
         ax.plot(*np.vstack([centre, way]).T, color=PATH, lw=0.9, zorder=5)
-        ax.plot(*centre, "o", ms=7.5, color="w", mec=INK, mew=0.7, zorder=5)
+        ax.plot(across, up, "o", ms=7.5, color="w", mec=INK, mew=0.7, zorder=5)
         text = {"ha": "center", "va": "center_baseline", "fontsize": 6}
-        ax.text(*centre, str(number + 1), zorder=5.5, **text)
+        ax.text(across, up, str(number + 1), zorder=5.5, **text)
 
 
-def _key(figure: plt.Figure, result: Result, failures: bool) -> None:
+def _key(figure: Figure, result: Result, failures: bool) -> None:
     """Legend in the empty corner."""
     entries = [("evaluated by the exploration", mark(ls="", marker="o", ms=4, color="0.4"))]
     if (result.history.phase == "cma").any():
@@ -169,9 +176,12 @@ def _key(figure: plt.Figure, result: Result, failures: bool) -> None:
     key(figure, entries, 1, loc="upper right", bbox_to_anchor=(0.95, 0.84), fontsize=8)
 
 
-def _ticks(name: str, boxes, history: pd.DataFrame) -> tuple[list[float], list[str]]:
+def _ticks(
+    name: str, boxes: ParameterBoxes, history: pd.DataFrame
+) -> tuple[list[float], list[str]]:
     """Places in the unit cube of round physical values, and those values in words."""
-    unit, value = history[f"unit_{name}"], history[name] * QUANTITIES[name].factor
+    unit, value = (history[column].to_numpy(float) for column in (f"unit_{name}", name))
+    value = value * QUANTITIES[name].factor
     log = name in THETA and getattr(boxes, name).scale == "log"
     scaled = np.log10(value) if log else value
     first, last = int(unit.argmin()), int(unit.argmax())
@@ -181,7 +191,7 @@ def _ticks(name: str, boxes, history: pd.DataFrame) -> tuple[list[float], list[s
     if log:
         marks = np.arange(np.ceil(low), high)
     else:
-        marks = plt.MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+        marks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
     place = (marks - low) / (slope or 1.0)
     seen = (place > EDGE) & (place < 1 - EDGE)  # those at an edge would meet the neighbours'
     words = [f"{10**mark if log else mark:g}" for mark in marks[seen]]

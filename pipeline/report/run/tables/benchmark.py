@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -13,7 +13,13 @@ from pipeline.report.drawing.styles import Styles
 from pipeline.report.run import paper
 from pipeline.report.run.results import Results
 from pipeline.report.run.tables.cells import NONE, Table, number
-from pipeline.report.run.tables.landings import LAUNCHED, landing_errors, pooled_std
+from pipeline.report.run.tables.landings import (
+    LAUNCHED,
+    LandingErrors,
+    landing_errors,
+    of_kind,
+    within,
+)
 
 PAPER = "paper, real robot"
 FLOOR, ORACLE = "actuation floor", "virtual, oracle"
@@ -28,13 +34,13 @@ class Row:
         band: As in params.yaml.
         method: As in params.yaml, or FLOOR.
         source: "virtual", "measured", PAPER or ORACLE.
-        errors: As `landing_errors` gives them.
+        errors: By target, and of "all".
     """
 
     band: str
     method: str
     source: str
-    errors: dict
+    errors: dict[float | str, LandingErrors]
 
 
 def ordered(methods: Iterable[str]) -> list[str]:
@@ -71,33 +77,32 @@ def _rows(results: Results, band: str, methods: Iterable[str]) -> list[Row]:
     return rows
 
 
-def _launched(trials: pd.DataFrame) -> list[tuple[str, dict]]:
-    aimed = trials[trials.target.notna()]
-    by_kind = {kind: aimed[aimed.kind == kind] for kind in LAUNCHED}
-    return [(kind, landing_errors(some)) for kind, some in by_kind.items() if len(some)]
+def _launched(trials: pd.DataFrame) -> list[tuple[str, dict[float | str, LandingErrors]]]:
+    by_kind = {kind: landing_errors(of_kind(trials, kind)) for kind in LAUNCHED}
+    return [(kind, errors) for kind, errors in by_kind.items() if errors["all"].launches]
 
 
-def _papers(cells: tuple) -> dict:
-    """The paper's cells, as `landing_errors` would give them; its total's ± is what it prints."""
+def _papers(cells: tuple) -> dict[float | str, LandingErrors]:
+    """The paper's cells; its total's ± is what it prints."""
     result = {}
     for key, cell in zip((*paper.TARGETS, "all"), cells, strict=True):
         mean, std = (math.nan, math.nan) if cell is None else (c / 100 for c in cell)
-        result[key] = {"launches": paper.REPEATS, "failed": None, "mean": mean, "std": std}
-    launches, total = paper.REPEATS * len(paper.TARGETS), result["all"]
-    result["all"] = total | {"launches": launches, "pooled_std": total["std"], "std": math.nan}
+        result[key] = LandingErrors(paper.REPEATS, None, mean, std, within=std)
+    launches = paper.REPEATS * len(paper.TARGETS)
+    result["all"] = replace(result["all"], launches=launches, std=math.nan)
     return result
 
 
-def _floor(floor: dict) -> dict:
-    """The oracle's launches (rig/oracle/floor.py), as `landing_errors` would give them."""
+def _floor(floor: dict) -> dict[float | str, LandingErrors]:
+    """The oracle's launches (rig/oracle/floor.py)."""
 
-    def errors(one: dict) -> dict:
-        known = {"mean": one["mean_error_m"], "std": one.get("std_m"), "bias": one.get("bias_m")}
-        known = {name: math.nan if value is None else value for name, value in known.items()}
-        return known | {"launches": one["launches"], "failed": one.get("failed", 0)}
+    def errors(one: dict) -> LandingErrors:
+        known = (one.get(name) for name in ("mean_error_m", "std_m", "bias_m"))
+        mean, std, bias = (math.nan if value is None else value for value in known)
+        return LandingErrors(one["launches"], one.get("failed", 0), mean, std, std, bias)
 
     result = {float(g): errors(one) for g, one in floor["targets"].items()}
-    return result | {"all": errors(floor) | {"pooled_std": pooled_std(result.values())}}
+    return {**result, "all": replace(errors(floor), within=within(result.values()))}
 
 
 def as_table(rows: list[Row], targets: Iterable[float], styles: Styles) -> Table:
@@ -112,12 +117,12 @@ def as_table(rows: list[Row], targets: Iterable[float], styles: Styles) -> Table
         for key in keys:
             one = row.errors.get(key)
             least = lowest[key].get((row.band, row.source))
-            bold = "**" if one and not one["failed"] and one["mean"] == least else ""
+            bold = "**" if one and not one.failed and one.mean == least else ""
             cells.append(bold + spread(one) + bold)
         total = row.errors["all"]
-        failed = NONE if total["failed"] is None else f"{total['failed']} of {total['launches']}"
+        failed = NONE if total.failed is None else f"{total.failed} of {total.launches}"
         names = band_name(row.band), method_name(row.method, styles), row.source
-        lines.append([*names, *cells, number(100 * total["std"], ".2f"), failed])
+        lines.append([*names, *cells, number(100 * total.std, ".2f"), failed])
     heads = [f"g = {100 * key:.1f}" for key in keys[:-1]]
     return ["band", "method", "source", *heads, "all targets", "± over all", "failed"], lines
 
@@ -127,20 +132,20 @@ def _lowest(rows: list[Row], key: float | str) -> dict[tuple[str, str], float]:
     means: dict[tuple[str, str], list[float]] = {}
     for row in rows:
         one = row.errors.get(key)
-        if one and not one["failed"] and np.isfinite(one["mean"]):
-            means.setdefault((row.band, row.source), []).append(one["mean"])
+        if one and not one.failed and np.isfinite(one.mean):
+            means.setdefault((row.band, row.source), []).append(one.mean)
     return {group: min(some) for group, some in means.items() if len(some) > 1}
 
 
-def spread(one: dict | None) -> str:
+def spread(one: LandingErrors | None) -> str:
     """Mean ± deviation [cm]; N/A where no launch counts; partial failures are counted."""
     if one is None:
         return NONE
-    if not np.isfinite(one["mean"]):
+    if not np.isfinite(one.mean):
         return "N/A"
-    around = number(100 * one.get("pooled_std", one["std"]), ".2f", "")
-    failed = f", {one['failed']} failed" if one["failed"] else ""
-    return f"{100 * one['mean']:.2f}{' ± ' * bool(around)}{around}{failed}"
+    around = number(100 * one.within, ".2f", "")
+    failed = f", {one.failed} failed" if one.failed else ""
+    return f"{100 * one.mean:.2f}{' ± ' * bool(around)}{around}{failed}"
 
 
 def band_name(band: str) -> str:
@@ -161,12 +166,12 @@ def records(rows: list[Row]) -> pd.DataFrame:
             "method": row.method,
             "source": row.source,
             "target_m": key,
-            "launches": one["launches"],
-            "failed": one["failed"],
-            "mean_error_cm": number(100 * one["mean"], ".4g", "N/A"),
-            "std_cm": 100 * one["std"],
-            "std_within_targets_cm": 100 * one.get("pooled_std", one["std"]),
-            "bias_cm": 100 * one.get("bias", math.nan),
+            "launches": one.launches,
+            "failed": one.failed,
+            "mean_error_cm": number(100 * one.mean, ".4g", "N/A"),
+            "std_cm": 100 * one.std,
+            "std_within_targets_cm": 100 * one.within,
+            "bias_cm": 100 * one.bias,
         }
         for row in rows
         for key, one in row.errors.items()

@@ -13,7 +13,7 @@ from pipeline.report.run.noise import Difference, difference
 from pipeline.report.run.results import Results
 from pipeline.report.run.tables.benchmark import band_name
 from pipeline.report.run.tables.cells import NONE, Table
-from pipeline.report.run.tables.landings import LAUNCHED
+from pipeline.report.run.tables.landings import LAUNCHED, of_kind
 
 
 class Compared(NamedTuple):
@@ -30,17 +30,14 @@ def compared(results: Results, references: Iterable[str], seed: int) -> list[Com
     rows = []
     for band, of_band in results.methods.items():
         for kind in LAUNCHED:
-            aimed = {method: _aimed(one.trials, kind) for method, one in of_band.items()}
+            some = {method: of_kind(one.trials, kind) for method, one in of_band.items()}
+            aimed = {method: one.loc[one.target.notna()] for method, one in some.items()}
             for method, trials in aimed.items():
                 others = [m for m in references if m != method and len(aimed.get(m, ()))]
                 found = {other: difference(aimed[other], trials, seed) for other in others}
                 if found and len(trials):
                     rows.append(Compared(band, method, kind, found))
     return rows
-
-
-def _aimed(trials: pd.DataFrame, kind: str) -> pd.DataFrame:
-    return trials[(trials.kind == kind) & trials.target.notna()]
 
 
 def as_table(rows: list[Compared], styles: Styles) -> Table:

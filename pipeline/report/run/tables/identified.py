@@ -87,10 +87,10 @@ def ranged(about: dict | None, factor: float) -> str:
     return f"{value:.{digits}f} ({low:.{digits}f} – {high:.{digits}f})"
 
 
-def recordings(results: Results, styles: Styles) -> Table | None:
+def recordings(results: Results, styles: Styles) -> Table:
     """What of each recording the simulation leaves, and how the others alone would have it.
 
-    None without a density. The last two columns are for bands with several recordings.
+    The last two columns are for bands with several recordings.
     """
     rows = []
     for result in results:
@@ -111,8 +111,7 @@ def recordings(results: Results, styles: Styles) -> Table | None:
                 ]
             )
     heads = ["band", "method", "recording", "force [mN]", "held band [mm]", "recoil [mm]"]
-    heads += ["recoil seen after [ms]", "misfit without it", "which moves"]
-    return (heads, rows) if rows else None
+    return [*heads, "recoil seen after [ms]", "misfit without it", "which moves"], rows
 
 
 def _scaled(value: float, factor: float, form: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -17,37 +17,58 @@ from pipeline.report.run.tables.cells import NONE, Table, number, percent
 LAUNCHED = ("virtual", "measured")  # kinds of launches that landed, or failed to
 
 
-def landing_errors(trials: pd.DataFrame) -> dict:
-    """Statistics of launches that had targets: by target, and under "all" over every target.
+def of_kind(trials: pd.DataFrame, *kinds: str) -> pd.DataFrame:
+    """Launches of some kinds."""
+    return trials.loc[trials.kind.isin(kinds)]
 
-    A launch fails that has a failure or lands outside the fixed target area. Returns for each key
-    launches, failed, and over the rest mean and std of |y - g|, and bias, the mean of y - g [m].
-    "all" has two deviations, because the paper's mixes them: `pooled_std` (within targets) and
-    `std` (over all launches). Deviations are those of a sample, NaN for fewer than two.
+
+@dataclass(frozen=True)
+class LandingErrors:
+    """Launches at one target or at several, [m]; NaN where not known.
+
+    Attributes:
+        launches: All; `failed` of them have a failure or land outside the fixed target area; None
+            where nobody says.
+        mean, std: Of |y - g| over the rest. Deviations are those of a sample, NaN for fewer than
+            two.
+        within: Deviation within targets. The paper's "±" mixes the two.
+        bias: The mean of y - g.
     """
-    trials = trials[trials.target.notna()]
+
+    launches: int
+    failed: int | None
+    mean: float
+    std: float
+    within: float
+    bias: float = math.nan
+
+
+def landing_errors(trials: pd.DataFrame) -> dict[float | str, LandingErrors]:
+    """Of launches that had targets: by target, and under "all" over every target."""
+    trials = trials.loc[trials.target.notna()]
     good = landed(trials)
 
-    def statistics(chosen: pd.Series) -> dict:
-        rows = trials[chosen & good]
+    def statistics(chosen: pd.Series) -> LandingErrors:
+        rows = trials.loc[chosen & good]
         miss = rows.landing_y - rows.target
-        return {
-            "launches": int(chosen.sum()),
-            "failed": int((chosen & ~good).sum()),
-            "mean": float(miss.abs().mean()),
-            "std": float(miss.abs().std(ddof=1)),
-            "bias": float(miss.mean()),
-        }
+        std = float(miss.abs().std(ddof=1))
+        return LandingErrors(
+            launches=int(chosen.sum()),
+            failed=int((chosen & ~good).sum()),
+            mean=float(miss.abs().mean()),
+            std=std,
+            within=std,
+            bias=float(miss.mean()),
+        )
 
     result = {target: statistics(trials.target == target) for target in sorted(set(trials.target))}
     everything = statistics(pd.Series(True, index=trials.index))
-    everything["pooled_std"] = pooled_std(result.values())
-    return {**result, "all": everything}
+    return {**result, "all": replace(everything, within=within(result.values()))}
 
 
-def pooled_std(parts: Iterable[dict]) -> float:
+def within(parts: Iterable[LandingErrors]) -> float:
     """Deviation within targets, each weighed by its launches less one [m]; NaN of none."""
-    known = [(n["launches"] - n["failed"] - 1, n["std"]) for n in parts if np.isfinite(n["std"])]
+    known = [(n.launches - (n.failed or 0) - 1, n.std) for n in parts if np.isfinite(n.std)]
     freedom = sum(count for count, _ in known)
     return math.sqrt(sum(n * std**2 for n, std in known) / freedom) if freedom else math.nan
 
@@ -60,19 +81,20 @@ def predictions(trials: pd.DataFrame) -> Table:
     heads += ["90 % interval"] if ranged else []
     heads += ["measured [m]", "error"] if measured else ["target [m]"]
     rows = []
-    for trial in trials.itertuples():
-        beyond = "" if trial.stretch <= trial.recorded_stretch else " (beyond)"
-        row = [f"{trial.draw_y:.3f}, {trial.draw_z:.3f}", f"{trial.stretch:.2f}{beyond}"]
-        row.append(number(trial.hold_force, ".1f"))
-        row.append(number(trial.predicted_y, ".3f", trial.predicted_failure))
+    for trial in trials.to_dict("records"):
+        stretch, predicted, landing = (trial[n] for n in ("stretch", "predicted_y", "landing_y"))
+        beyond = "" if stretch <= trial["recorded_stretch"] else " (beyond)"
+        row = [f"{trial['draw_y']:.3f}, {trial['draw_z']:.3f}", f"{stretch:.2f}{beyond}"]
+        row.append(number(trial["hold_force"], ".1f"))
+        row.append(number(predicted, ".3f", trial["predicted_failure"]))
         if ranged:
-            low, high = number(trial.predicted_low, ".3f"), number(trial.predicted_high, ".3f")
-            row.append(f"{low} – {high}")
+            ends = (number(trial[f"predicted_{end}"], ".3f") for end in ("low", "high"))
+            row.append(" – ".join(ends))
         if measured:
-            error = trial.predicted_y / trial.landing_y - 1
-            row += [number(trial.landing_y, ".3f", trial.failure), number(error, "+.1%")]
+            error = predicted / landing - 1
+            row += [number(landing, ".3f", trial["failure"]), number(error, "+.1%")]
         else:
-            row.append(number(trial.target, ".3f", ""))
+            row.append(number(trial["target"], ".3f", ""))
         rows.append(row)
     return heads, rows
 
@@ -154,7 +176,7 @@ def prediction_summary(results: Results, styles: Styles) -> Table | None:
     rows, beyond = [], False
     for result in results:
         for kind in LAUNCHED:
-            trials = result.trials[result.trials.kind == kind]
+            trials = of_kind(result.trials, kind)
             if trials.empty:
                 continue
             parts, ranges = prediction_error(trials), intervals(trials) or {}

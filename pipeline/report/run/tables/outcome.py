@@ -6,14 +6,16 @@ import pandas as pd
 
 from pipeline.report.drawing.styles import Styles
 from pipeline.report.quantities import QUANTITIES
-from pipeline.report.run.results import Result, Results
+from pipeline.report.run.results import Results
 from pipeline.report.run.tables.cells import NONE, Table, number, without_empty
 from pipeline.report.run.tables.identified import ranged
 from pipeline.report.run.tables.landings import (
     LAUNCHED,
+    LandingErrors,
     coverage,
     intervals,
     landing_errors,
+    of_kind,
     prediction_error,
 )
 
@@ -33,16 +35,16 @@ def outcome(results: Results, references: tuple[str, ...], styles: Styles) -> Ta
     for band, methods in results.methods.items():
         for kind in LAUNCHED:
             floor = results.least.get(band) if kind == "virtual" else None
-            trials = [_of(methods[method], kind) for method in references]
+            trials = [of_kind(methods[method].trials, kind) for method in references]
             if trials[0].empty:
                 continue
             found = [_errors(some) for some in trials]
             parts, ranges = prediction_error(trials[0])["all"], intervals(trials[0]) or {}
-            cells = [number(100 * one["mean"], ".1f", "N/A") if one else NONE for one in found]
-            own = found[0]["mean"] if found[0] else None
+            cells = [number(100 * one.mean, ".1f", "N/A") if one else NONE for one in found]
+            own = found[0].mean if found[0] else None
             cells += [number(floor and 100 * floor, ".1f")]
             cells += [number(own and floor and own / floor, ".1f")]
-            failed = [str(one["failed"]) for one in found if one]
+            failed = [str(one.failed) for one in found if one]
             cells += [" · ".join(failed) or NONE]
             cells += [number(100 * parts.mean, ".1f"), number(100 * parts.bias, "+.1f")]
             rows.append([band, f"{len(trials[0])} {kind}", *cells, coverage(ranges.get("all"))])
@@ -53,11 +55,7 @@ def outcome(results: Results, references: tuple[str, ...], styles: Styles) -> Ta
     return without_empty((heads, rows)) if rows else None
 
 
-def _of(result: Result, kind: str) -> pd.DataFrame:
-    return result.trials[result.trials.kind == kind]
-
-
-def _errors(trials: pd.DataFrame) -> dict | None:
+def _errors(trials: pd.DataFrame) -> LandingErrors | None:
     """Over all targets; None without one."""
     return landing_errors(trials)["all"] if trials.target.notna().any() else None
 

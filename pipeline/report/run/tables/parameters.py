@@ -65,8 +65,8 @@ def identified(results: Results, params: Params) -> list[IdentifiedRow]:
             rows.append(IdentifiedRow(band, method, source, values, printed_loss(result)))
             if cells := paper.THETA.get((band, method)):
                 *numbers, loss = cells
-                values = dict(zip(THETA, map(Value, numbers), strict=True))
-                rows.append(IdentifiedRow(band, method, PAPER, values, loss))
+                theirs = {str(n): Value(one) for n, one in zip(THETA, numbers, strict=True)}
+                rows.append(IdentifiedRow(band, method, PAPER, theirs, loss))
     return rows
 
 
@@ -157,6 +157,7 @@ def records(rows: list[IdentifiedRow]) -> pd.DataFrame:
     """The same for machines: a line a row; empty: not known."""
     lines = []
     for row in rows:
+        line: dict[str, str | float | None]
         line = {"band": row.band, "method": row.method, "source": row.source}
         for name in _shown(rows):
             one = row.values.get(name, Value(math.nan))

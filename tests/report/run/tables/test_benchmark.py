@@ -9,6 +9,7 @@ import pytest
 from pipeline.report.drawing.styles import styles
 from pipeline.report.run import paper
 from pipeline.report.run.tables.benchmark import ablation, as_table, benchmark, records, spread
+from pipeline.report.run.tables.landings import LandingErrors
 from tests.report.run.tables.toy_results import TARGETS, floor, launches, ran
 
 NAMED = styles(["sling2sim2real", "package_si", "real2sim2real", "mine", "de", "no_work"])
@@ -59,7 +60,7 @@ def test_partial_failures_are_counted_and_total_ones_are_not_available() -> None
     assert ours[2:4] == ["10.00 ± 0.00, 2 failed"] * 2 and ours[4:] == ["0.00", "2 of 15"]
     for method in ("Package SI", "Real2Sim2Real"):
         assert found["Band 1 (soft)", method, "virtual"] == [*["N/A"] * 4, "–", "15 of 15"]
-    assert spread({"launches": 1, "failed": 0, "mean": 0.05, "std": math.nan}) == "5.00"
+    assert spread(LandingErrors(1, 0, 0.05, math.nan, math.nan)) == "5.00"
 
 
 def test_bold_is_the_lowest_of_equals_that_all_landed() -> None:

@@ -38,22 +38,22 @@ def test_landing_errors_by_hand() -> None:
     )
     errors = landing_errors(launched)
     near, far, total = errors[1.9], errors[2.1], errors["all"]
-    assert (near["launches"], near["failed"]) == (2, 0)
-    assert near["mean"] == pytest.approx(0.02) and near["bias"] == pytest.approx(-0.01)
-    assert near["std"] == pytest.approx(0.02 / math.sqrt(2))
-    assert (far["launches"], far["failed"]) == (4, 2)
-    assert far["mean"] == pytest.approx(0.12)
-    assert far["std"] == pytest.approx(0.04 / math.sqrt(2))
-    assert (total["launches"], total["failed"]) == (6, 2)
-    assert total["mean"] == pytest.approx(0.07) and total["bias"] == pytest.approx(0.055)
-    assert total["pooled_std"] == pytest.approx(math.sqrt((0.02**2 / 2 + 0.04**2 / 2) / 2))
+    assert (near.launches, near.failed) == (2, 0)
+    assert near.mean == pytest.approx(0.02) and near.bias == pytest.approx(-0.01)
+    assert near.std == pytest.approx(0.02 / math.sqrt(2))
+    assert (far.launches, far.failed) == (4, 2)
+    assert far.mean == pytest.approx(0.12)
+    assert far.std == pytest.approx(0.04 / math.sqrt(2))
+    assert (total.launches, total.failed) == (6, 2)
+    assert total.mean == pytest.approx(0.07) and total.bias == pytest.approx(0.055)
+    assert total.within == pytest.approx(math.sqrt((0.02**2 / 2 + 0.04**2 / 2) / 2))
     deviations = [0.01 - 0.07, 0.03 - 0.07, 0.10 - 0.07, 0.14 - 0.07]
-    assert total["std"] == pytest.approx(math.sqrt(sum(d**2 for d in deviations) / 3))
+    assert total.std == pytest.approx(math.sqrt(sum(d**2 for d in deviations) / 3))
 
 
 def test_all_failed_has_no_mean() -> None:
     errors = landing_errors(trials([(1.9, math.nan, "fell", 1.9, 1.4)] * 3))
-    assert errors["all"]["failed"] == 3 and math.isnan(errors["all"]["mean"])
+    assert errors["all"].failed == 3 and math.isnan(errors["all"].mean)
 
 
 def test_prediction_error_inside_and_beyond() -> None:
@@ -86,7 +86,7 @@ def test_predictions_are_held_against_landings_outside_the_area_too() -> None:
         assert error.launches == 2 and error.max == pytest.approx(0.25)
         assert (inside.launches, inside.covered) == (2, 1)
         total = landing_errors(launched)["all"]
-        assert total["failed"] == 1 and total["mean"] == pytest.approx(0.1)
+        assert total.failed == 1 and total.mean == pytest.approx(0.1)
 
 
 def test_coverage_of_the_predicted_intervals() -> None:

@@ -55,6 +55,6 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """`function` as machine code, for each kind of arguments at the first call with them."""
     before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, FOLDER
     try:
-        return numba.njit(cache=True, error_model="numpy")(function)
+        return numba.njit(cache=True, error_model="numpy", forceinline=True)(function)
     finally:
         numba.config.CACHE_DIR = before

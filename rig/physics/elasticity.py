@@ -35,7 +35,8 @@ def ogden(stretch: float, constants: Sequence[float]) -> Point:
     log = np.log(stretch)
     for i in range(0, len(constants), 2):
         mu, a = constants[i], constants[i + 1]
-        along, across = np.exp(a * log), np.exp(-a / 2 * log)
+        along = np.exp(a * log)
+        across = 1 / np.sqrt(along)
         energy += mu * (along - 1 + 2 * (across - 1)) / a
         stress += mu * (along - across)
         slope += mu * ((a - 1) * along + (a / 2 + 1) * across)
@@ -161,9 +162,10 @@ class Law:
         return self._points(stretch)[0]
 
 
-def law_of(name: str, constants: tuple[float, ...] = ()) -> Law:
+def law_of(name: str, constants: Sequence[float] = ()) -> Law:
     """A law with constants of its own as far as they are given, and ours beyond."""
-    return Law(name, constants + (LAWS[name][len(constants) :] if name != "ogden" or not constants else ()))
+    ours = () if name == "ogden" and constants else LAWS[name][len(constants) :]
+    return Law(name, (*constants, *ours))
 
 
 TRELOAR = law_of("ogden")

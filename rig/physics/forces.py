@@ -62,7 +62,7 @@ def forces(y: np.ndarray, force: np.ndarray, forgetting: np.ndarray, band: Band)
     along, bent = np.empty((edges, 3)), np.empty((edges + 2, 3))
     stretch, tension, moment = np.empty(edges), np.empty(edges), np.empty((edges + 1, 3))
     bent[0], bent[edges + 1] = band.clamp, -band.clamp
-    turning = np.empty(3)
+    turning, memory = np.empty(3), y[:, 6:]
     for e in range(edges):
         square = rate = 0.0
         for c in range(3):
@@ -74,7 +74,7 @@ def forces(y: np.ndarray, force: np.ndarray, forgetting: np.ndarray, band: Band)
             along[e, c] /= stretch[e]
             turning[c] = (y[e + 1, 3 + c] - y[e, 3 + c]) / band.sizes[e]
             rate += along[e, c] * turning[c]
-        stress, tangent = respond(stretch[e], y[e, 6:], forgetting[e], band.material)
+        stress, tangent = respond(e, stretch[e], memory, forgetting, band.material)
         tension[e] = band.stiffness * (stress + band.viscosity * tangent * rate)
         for c in range(3):
             swing = (turning[c] - rate * along[e, c]) / stretch[e]  # of the tangent

@@ -58,7 +58,10 @@ def place(time: float, path: Path) -> np.ndarray:
         found[1, c], found[2, c] = way * shape[1] / duration, way * shape[2] / duration**2
         for tone in range(len(path.frequency)):
             rate, size = 2 * np.pi * path.frequency[tone, 0], path.amplitude[tone, c]
-            sine, cosine = np.sin(rate * time + path.phase[tone, c]), np.cos(rate * time + path.phase[tone, c])
+            sine, cosine = (
+                np.sin(rate * time + path.phase[tone, c]),
+                np.cos(rate * time + path.phase[tone, c]),
+            )
             found[0, c] += size * sine
             found[1, c] += size * rate * cosine
             found[2, c] -= size * rate**2 * sine

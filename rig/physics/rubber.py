@@ -131,31 +131,31 @@ class Material(NamedTuple):
 
 @compiled
 def respond(
-    stretch: float, memory: np.ndarray, rates: np.ndarray, material: Material
+    i: int, stretch: float, memory: np.ndarray, rates: np.ndarray, material: Material
 ) -> tuple[float, float]:
-    """Stress without viscosity [MPa] and the slope Q' of its elastic part at one place.
+    """Stress without viscosity [MPa] and the slope Q' of its elastic part at a stretch.
 
-    Writes the rates of the memories (M,).
+    Reads row i of the memories (N, M) and writes that of their rates.
     """
     branches = len(material.times)
     energy, stress, slope = elasticity.at(material.law, stretch, material.constants)
     if len(material.softening):
-        worst = memory[-1]
+        worst = memory[i, -1]
         part = kept(energy, worst, material.modulus, material.softening)
         stress, slope = part * stress, part * slope
-        rates[-1] = max(energy - worst, 0.0) / material.softening[3]
+        rates[i, -1] = max(energy - worst, 0.0) / material.softening[3]
     total = stress
     for k in range(branches):
-        owed = stress - memory[k]
+        owed = stress - memory[i, k]
         total += material.weights[k] * owed
-        rates[k] = owed / material.times[k]
+        rates[i, k] = owed / material.times[k]
     if len(material.flow):
-        strain = memory[branches]
+        strain = memory[i, branches]
         f = np.exp(strain)
         flowing = elasticity.at(material.law, stretch / f, material.constants)[1]
         total += material.flow[0] * flowing / f
         true = flowing * stretch / f / material.modulus
-        rates[branches] = flow_speed(true, strain, material.flow)
+        rates[i, branches] = flow_speed(true, strain, material.flow)
     return total, slope
 
 
@@ -166,7 +166,7 @@ def _responses(
     """`respond` at N places."""
     total, slope, rates = np.empty(len(stretch)), np.empty(len(stretch)), np.empty(memory.shape)
     for i in range(len(stretch)):
-        total[i], slope[i] = respond(stretch[i], memory[i], rates[i], material)
+        total[i], slope[i] = respond(i, stretch[i], memory, rates, material)
     return total, slope, rates
 
 

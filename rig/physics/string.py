@@ -190,7 +190,7 @@ class ElasticString:
         shape, newton = y.shape, Elimination(*y.shape)
 
         def value(time: float, flat: np.ndarray, out: np.ndarray, data: object) -> None:
-            out[0] = event(time, flat.reshape(shape))
+            out[0] = event(time, flat.reshape(shape))  # pyright: ignore[reportOptionalCall]
 
         found, states = integrated(
             forces.rates,

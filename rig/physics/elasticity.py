@@ -1,5 +1,8 @@
 """Elastic laws of incompressible rubber in uniaxial tension: nominal stress by stretch, MPa.
 
+Each is one function of a stretch l and the law's constants: energy [MJ/m3] (the work of the nominal
+stress from 1 to l), nominal stress P and dP/dl [MPa]. A new one also stands in LAWS and `at`.
+
 Of a law only the shape matters: a band's own factor (`Rubber.scale`) multiplies it. The constants
 of Gent's law, of the eight chains and of the tubes are fitted as Ogden's are, to Treloar's points;
 they are not those of the papers that are named, none of which we could open.
@@ -7,200 +10,162 @@ they are not those of the papers that are named, none of which we could open.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
+from rig.physics.compiled import compiled
 
-class Law(Protocol):
-    """An elastic law."""
-
-    @cached_property
-    def modulus(self) -> float:
-        """Young's modulus, dP/dl at l = 1 [MPa]."""
-        ...
-
-    def stress(self, stretch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Nominal stress P [MPa] and its derivative by stretch, shapes as given."""
-        ...
-
-    def energy(self, stretch: np.ndarray) -> np.ndarray:
-        """Work of the nominal stress from 1 to `stretch` [MJ/m3]."""
-        ...
+Point = tuple[float, float, float]
+"""Energy, stress and its slope."""
 
 
-@dataclass(frozen=True)
-class Ogden:
+@compiled
+def ogden(stretch: float, constants: Sequence[float]) -> Point:
     """P(l) = sum_i mu_i (l^(a_i - 1) - l^(-a_i/2 - 1)): Ogden, Proc. R. Soc. A 326 (1972) 565.
 
-    The terms here are fitted to the uniaxial points of Treloar, Trans. Faraday Soc. 40 (1944) 59
-    (relative errors, RMS 1.7 %), with his equibiaxial points, read as uniaxial compression, at a
-    tenth of the weight: the tests of this folder repeat the fit. mu_i a_i > 0 makes P grow with l
-    everywhere.
-
-    Attributes:
-        terms: Pairs of mu_i [MPa] and a_i.
+    Constants: mu_i [MPa] and a_i, one after the other. Those of LAWS are fitted to the uniaxial
+    points of Treloar, Trans. Faraday Soc. 40 (1944) 59 (relative errors, RMS 1.7 %), with his
+    equibiaxial points, read as uniaxial compression, at a tenth of the weight: the tests of this
+    folder repeat the fit. mu_i a_i > 0 makes P grow with l everywhere.
     """
-
-    terms: tuple[tuple[float, float], ...] = (
-        (4.38677e-02, 3.153406),
-        (1.91199e-10, 12.467417),
-        (-5.25868, -0.134005),
-    )
-
-    @cached_property
-    def _powers(self) -> np.ndarray:
-        exponents = np.array([exponent for _, exponent in self.terms])
-        return np.concatenate([exponents - 1, -exponents / 2 - 1])
-
-    @cached_property
-    def _table(self) -> np.ndarray:
-        """Of P and of l dP/dl, shape (2, 2 terms)."""
-        moduli = np.array([modulus for modulus, _ in self.terms])
-        factors = np.concatenate([moduli, -moduli])
-        return np.stack([factors, factors * self._powers])
-
-    @cached_property
-    def modulus(self) -> float:
-        return float(self._table[1].sum())
-
-    def stress(self, stretch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        powers = np.exp(np.multiply.outer(self._powers, np.log(stretch)))
-        stress, slope = np.tensordot(self._table, powers, axes=1)
-        return stress, slope / stretch
-
-    def energy(self, stretch: np.ndarray) -> np.ndarray:
-        mode = lambda a: (stretch**a - 1) / a + 2 * (stretch ** (-a / 2) - 1) / a  # noqa: E731
-        return sum((m * mode(a) for m, a in self.terms), np.zeros(()))
+    energy = stress = slope = 0.0
+    log = np.log(stretch)
+    for i in range(0, len(constants), 2):
+        mu, a = constants[i], constants[i + 1]
+        along = np.exp(a * log)
+        across = 1 / np.sqrt(along)
+        energy += mu * (along - 1 + 2 * (across - 1)) / a
+        stress += mu * (along - across)
+        slope += mu * ((a - 1) * along + (a / 2 + 1) * across)
+    return energy, stress / stretch, slope / stretch**2
 
 
-class _OfInvariant:
-    """A law whose energy depends on D = l^2 + 2/l - 3 alone: P = 2 W'(D) (l - l^-2)."""
+@compiled
+def of_invariant(stretch: float, energy: float, factor: float, change: float) -> Point:
+    """A law whose energy W depends on D = l^2 + 2/l - 3 alone: P = 2 W'(D) (l - l^-2).
 
-    def _factor(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """2 W'(D) and 2 W''(D)."""
-        raise NotImplementedError
-
-    def _density(self, d: np.ndarray) -> np.ndarray:
-        """W(D)."""
-        raise NotImplementedError
-
-    @cached_property
-    def modulus(self) -> float:
-        return float(self.stress(np.ones(()))[1])
-
-    def stress(self, stretch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        inverse = 1 / stretch
-        shear = stretch - inverse**2
-        factor, change = self._factor(stretch**2 + 2 * inverse - 3)
-        return factor * shear, factor * (1 + 2 * inverse**3) + 2 * change * shear**2
-
-    def energy(self, stretch: np.ndarray) -> np.ndarray:
-        return self._density(stretch**2 + 2 / stretch - 3)
+    Args:
+        factor, change: 2 W'(D) and 2 W''(D).
+    """
+    inverse = 1 / stretch
+    shear = stretch - inverse**2
+    return energy, factor * shear, factor * (1 + 2 * inverse**3) + 2 * change * shear**2
 
 
-@dataclass(frozen=True)
-class Gent(_OfInvariant):
+@compiled
+def gent(stretch: float, constants: Sequence[float]) -> Point:
     """W = -(G J/2) ln(1 - D/J): Gent, Rubber Chem. Technol. 69 (1996) 59.
 
-    Attributes:
-        limit: J, where D locks.
-        shear: G [MPa].
+    Constants: J, where D locks, and G [MPa].
     """
-
-    limit: float = 94.1
-    shear: float = 0.301
-
-    def _factor(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        left = self.shear * self.limit / (self.limit - d)
-        return left, left / (self.limit - d)
-
-    def _density(self, d: np.ndarray) -> np.ndarray:
-        return -self.shear * self.limit / 2 * np.log1p(-d / self.limit)
+    limit, shear = constants[0], constants[1]
+    d = stretch**2 + 2 / stretch - 3
+    factor = shear * limit / (limit - d)
+    energy = -shear * limit / 2 * np.log1p(-d / limit)
+    return of_invariant(stretch, energy, factor, factor / (limit - d))
 
 
-@dataclass(frozen=True)
-class EightChain(_OfInvariant):
+@compiled
+def eight_chain(stretch: float, constants: Sequence[float]) -> Point:
     """2 W'(D) = G/3 sqrt(N)/c L^-1(c/sqrt(N)), c^2 = D/3 + 1: Arruda, Boyce, JMPS 41 (1993) 389.
 
     The inverse Langevin function is Cohen's fraction, L^-1(y) = y (3 - y^2)/(1 - y^2) (Rheol. Acta
     30 (1991) 270), at most 5 % off, and the energy is the integral of that: G N (q/2 - ln(1 - q)),
-    q = c^2/N.
-
-    Attributes:
-        segments: N, of each chain: it locks where q is 1.
-        shear: G [MPa].
+    q = c^2/N. Constants: N, the segments of a chain, which locks where q is 1, and G [MPa].
     """
-
-    segments: float = 27.6
-    shear: float = 0.298
-
-    def _factor(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        q = (d / 3 + 1) / self.segments
-        left = 1 - q
-        return self.shear / 3 * (1 + 2 / left), self.shear / (4.5 * self.segments) / left**2
-
-    def _density(self, d: np.ndarray) -> np.ndarray:
-        start, more = 1 / self.segments, d / (3 * self.segments)
-        bent = more / 2 - np.log1p(-more / (1 - start))
-        return self.shear * self.segments * bent
+    segments, shear = constants[0], constants[1]
+    d = stretch**2 + 2 / stretch - 3
+    left = 1 - (d / 3 + 1) / segments
+    more = d / (3 * segments)
+    energy = shear * segments * (more / 2 - np.log1p(-more / (1 - 1 / segments)))
+    factor, change = shear / 3 * (1 + 2 / left), shear / (4.5 * segments) / left**2
+    return of_invariant(stretch, energy, factor, change)
 
 
-@dataclass(frozen=True)
-class ExtendedTube(_OfInvariant):
+@compiled
+def extended_tube(stretch: float, constants: Sequence[float]) -> Point:
     """Chains of finite length in tubes: Kaliske, Heinrich, Rubber Chem. Technol. 72 (1999) 602.
 
     W = Gc/2 [(1 - e^2) D/(1 - e^2 D) + ln(1 - e^2 D)] + 2 Ge/b^2 sum_i (l_i^-b - 1)
 
     as the library FElupe has it, which names that paper; the tubes' part is a term of Ogden's.
-
-    Attributes:
-        extensibility: e; D locks at 1/e^2.
-        release: b, how much of the tubes gives way.
-        tubes: Ge / Gc.
-        shear: Gc [MPa].
+    Constants: e (D locks at 1/e^2), b (how much of the tubes gives way), Ge/Gc, and Gc [MPa].
     """
+    e2, release, tubes, shear = constants[0] ** 2, constants[1], constants[2], constants[3]
+    d = stretch**2 + 2 / stretch - 3
+    left = 1 - e2 * d
+    factor = shear * ((1 - e2) / left**2 - e2 / left)
+    change = shear * (2 * e2 * (1 - e2) / left**3 - (e2 / left) ** 2)
+    energy = shear / 2 * ((1 - e2) * d / left + np.log1p(-e2 * d))
+    chains = of_invariant(stretch, energy, factor, change)
+    tube = ogden(stretch, (-2 * tubes * shear / release, -release))
+    return chains[0] + tube[0], chains[1] + tube[1], chains[2] + tube[2]
 
-    extensibility: float = 0.0954
-    release: float = 0.331
-    tubes: float = 1.111
-    shear: float = 0.195
+
+LAWS = {  # and their constants by Treloar's points
+    "ogden": (4.38677e-02, 3.153406, 1.91199e-10, 12.467417, -5.25868, -0.134005),
+    "gent": (94.1, 0.301),
+    "arruda_boyce": (27.6, 0.298),
+    "extended_tube": (0.0954, 0.331, 1.111, 0.195),
+}
+NUMBERS = {name: number for number, name in enumerate(LAWS)}
+
+
+@compiled
+def at(number: int, stretch: float, constants: Sequence[float]) -> Point:
+    """The law of that number in LAWS."""
+    if number == 0:
+        return ogden(stretch, constants)
+    if number == 1:
+        return gent(stretch, constants)
+    if number == 2:
+        return eight_chain(stretch, constants)
+    return extended_tube(stretch, constants)
+
+
+@compiled
+def _over(number: int, stretches: np.ndarray, constants: np.ndarray) -> np.ndarray:
+    """`at` of each stretch (N,), shape (3, N)."""
+    found = np.empty((3, len(stretches)))
+    for i in range(len(stretches)):
+        found[0, i], found[1, i], found[2, i] = at(number, stretches[i], constants)
+    return found
+
+
+@dataclass(frozen=True)
+class Law:
+    """An elastic law by its name in LAWS, with all its constants."""
+
+    name: str
+    constants: tuple[float, ...]
 
     @cached_property
-    def _constraint(self) -> Ogden:
-        return Ogden(((-2 * self.tubes * self.shear / self.release, -self.release),))
+    def modulus(self) -> float:
+        """Young's modulus, dP/dl at l = 1 [MPa]."""
+        return float(self.stress(np.ones(()))[1])
 
-    def _factor(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        e2 = self.extensibility**2
-        left = 1 - e2 * d
-        factor = (1 - e2) / left**2 - e2 / left
-        change = 2 * e2 * (1 - e2) / left**3 - (e2 / left) ** 2
-        return self.shear * factor, self.shear * change
-
-    def _density(self, d: np.ndarray) -> np.ndarray:
-        e2 = self.extensibility**2
-        return self.shear / 2 * ((1 - e2) * d / (1 - e2 * d) + np.log1p(-e2 * d))
+    def _points(self, stretch: np.ndarray) -> np.ndarray:
+        flat = np.ascontiguousarray(stretch, float).ravel()
+        found = _over(NUMBERS[self.name], flat, np.array(self.constants))
+        return found.reshape(3, *np.shape(stretch))
 
     def stress(self, stretch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        stress, slope = super().stress(stretch)
-        more, steeper = self._constraint.stress(stretch)
-        return stress + more, slope + steeper
+        """Nominal stress P [MPa] and its derivative by stretch, shapes as given."""
+        _, stress, slope = self._points(stretch)
+        return stress, slope
 
     def energy(self, stretch: np.ndarray) -> np.ndarray:
-        return super().energy(stretch) + self._constraint.energy(stretch)
+        """Work of the nominal stress from 1 to `stretch` [MJ/m3]."""
+        return self._points(stretch)[0]
 
 
-TRELOAR = Ogden()
-LAWS = {"ogden": Ogden, "gent": Gent, "arruda_boyce": EightChain, "extended_tube": ExtendedTube}
+def law_of(name: str, constants: Sequence[float] = ()) -> Law:
+    """A law with constants of its own as far as they are given, and ours beyond."""
+    ours = () if name == "ogden" and constants else LAWS[name][len(constants) :]
+    return Law(name, (*constants, *ours))
 
 
-def law_of(name: str, constants: tuple[float, ...]) -> Law:
-    """A law with constants of its own, in the order of its class, or with ours where none are.
-
-    Those of Ogden's are its terms one after the other.
-    """
-    if name == "ogden" and constants:
-        return Ogden(tuple(zip(constants[::2], constants[1::2], strict=True)))
-    return LAWS[name](*constants)
+TRELOAR = law_of("ogden")

@@ -7,12 +7,13 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from pipeline.base.failures import DRAGGED, FOOT, NEVER_LEFT, SHORT, SLACK, too_strong
 from pipeline.base.target import TARGET_AREA
+from rig.physics.compiled import compiled
+from rig.physics.integration import integrated
 from rig.physics.scene import ROD
-from rig.physics.string import GRAVITY, ElasticString, Falling
+from rig.physics.string import GRAVITY, ElasticString
 from rig.physics.world import bent_at, pulled, string_of
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def launch_from(
 
     def push(time: float, y: np.ndarray) -> float:
         """Force of the pouch on the projectile along the launch [N]."""
-        acceleration = loaded.forces(y)[0][loaded.middle] / loaded.masses[loaded.middle]
+        acceleration = loaded.at_middle(y) / loaded.masses[loaded.middle]
         return float(mass * (acceleration - GRAVITY) @ heading)
 
     times, states = loaded.integrate(y, np.linspace(0.0, PATIENCE, SEEN), tolerance, event=push)
@@ -130,18 +131,23 @@ def flight(position: np.ndarray, velocity: np.ndarray, floor: float, drag: float
     if position[1] <= floor:
         return position[None]
 
-    def rates(time: float, state: np.ndarray) -> np.ndarray:
-        speed = np.hypot(state[2], state[3])
-        return np.concatenate([state[2:], GRAVITY[1:] - drag * speed * state[2:]])
+    state, data = np.concatenate([position, velocity]), (drag, GRAVITY[2], floor)
+    common = {"data": data, "rtol": 1e-9, "atol": 1e-9, "event": _height, "method": "Adams"}
+    times, _ = integrated(_flying, state, np.linspace(0, FLIGHT, 3), **common)
+    return integrated(_flying, state, np.linspace(0, times[-1], POINTS), **common)[1][:, :2]
 
-    def height(time: float, state: np.ndarray) -> float:
-        return state[1] - floor
 
-    state = np.concatenate([position, velocity])
-    path = solve_ivp(
-        rates, (0, FLIGHT), state, events=Falling(height), rtol=1e-9, atol=1e-9, dense_output=True
-    )
-    end = path.t_events[0][0]
-    way = path.sol(np.linspace(0, end, POINTS))[:2].T
-    way[-1] = path.y_events[0][0][:2]
-    return way
+@compiled
+def _flying(
+    time: float, state: np.ndarray, out: np.ndarray, data: tuple[float, float, float]
+) -> None:
+    speed = np.hypot(state[2], state[3])
+    out[:2] = state[2:]
+    out[2], out[3] = -data[0] * speed * state[2], data[1] - data[0] * speed * state[3]
+
+
+@compiled
+def _height(
+    time: float, state: np.ndarray, out: np.ndarray, data: tuple[float, float, float]
+) -> None:
+    out[0] = state[1] - data[2]

@@ -7,9 +7,11 @@ with rest at both ends; smooth wander is added to what is commanded. An arm with
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
+
+from rig.physics.compiled import compiled
 
 # Seconds from the start of the recording.
 START = 0.4  # the hand leaves its place
@@ -26,21 +28,66 @@ WANDER_TONES = 6
 WANDER_BAND = 0.1, 1.5  # Hz
 
 
+class Path(NamedTuple):
+    """Legs from point to point with rest at both ends, and wander.
+
+    Attributes:
+        times, points: Of the legs' ends, shapes (P,) [s] and (P, 3) [m].
+        amplitude, frequency, phase: Of the wander, shapes (tones, 3), (tones, 1), (tones, 3).
+    """
+
+    times: np.ndarray
+    points: np.ndarray
+    amplitude: np.ndarray
+    frequency: np.ndarray
+    phase: np.ndarray
+
+
+@compiled
+def place(time: float, path: Path) -> np.ndarray:
+    """Position, velocity and acceleration, shape (3, 3)."""
+    legs = len(path.times) - 1
+    leg = min(max(np.searchsorted(path.times, time) - 1, 0), legs - 1)
+    duration = path.times[leg + 1] - path.times[leg]
+    part = (time - path.times[leg]) / duration
+    shape = part**2 * (3 - 2 * part), 6 * part * (1 - part), 6 - 12 * part
+    found = np.empty((3, 3))
+    for c in range(3):
+        way = path.points[leg + 1, c] - path.points[leg, c]
+        found[0, c] = path.points[leg, c] + way * shape[0]
+        found[1, c], found[2, c] = way * shape[1] / duration, way * shape[2] / duration**2
+        for tone in range(len(path.frequency)):
+            rate, size = 2 * np.pi * path.frequency[tone, 0], path.amplitude[tone, c]
+            sine, cosine = (
+                np.sin(rate * time + path.phase[tone, c]),
+                np.cos(rate * time + path.phase[tone, c]),
+            )
+            found[0, c] += size * sine
+            found[1, c] += size * rate * cosine
+            found[2, c] -= size * rate**2 * sine
+    return found
+
+
+@compiled
+def places(times: np.ndarray, path: Path) -> np.ndarray:
+    """`place` at times (T,), shape (T, 3, 3)."""
+    found = np.empty((len(times), 3, 3))
+    for i in range(len(times)):
+        found[i] = place(times[i], path)
+    return found
+
+
 @dataclass(frozen=True)
 class HandMotion:
     """Path of the tool centre point and state of the fingers.
 
     Attributes:
-        path: Commanded position, a piecewise polynomial.
-        amplitude, frequency, phase: Of the wander, shapes (tones, 3), (tones, 1), (tones, 3).
+        path: Of the tool centre point.
         opening: From the first motion of the fingers until they press no more [s], and the power of
             the part of it that is left by which the pads' force falls.
     """
 
-    path: CubicHermiteSpline
-    amplitude: np.ndarray
-    frequency: np.ndarray
-    phase: np.ndarray
+    path: Path
     opening: tuple[float, float]
 
     @classmethod
@@ -60,24 +107,18 @@ class HandMotion:
         drawn = PULL_LENGTH * back
         start = hanging + APPROACH_LENGTH * back
         end = drawn + RETREAT_LENGTH * back
-        times = [0.0, START, REACHED, GRASP, PULL, PULLED, RETREAT, RETREATED, END]
+        times = np.array([0.0, START, REACHED, GRASP, PULL, PULLED, RETREAT, RETREATED, END])
         points = np.array([start, start, hanging, hanging, 0 * back, drawn, drawn, end, end])
         amplitude = rng.normal(size=(WANDER_TONES, 3))
         amplitude *= tracking_error * np.sqrt(2 / np.sum(amplitude**2, axis=0))
-        return cls(
-            path=CubicHermiteSpline(times, points, np.zeros_like(points)),
-            amplitude=amplitude,
-            frequency=rng.uniform(*WANDER_BAND, (WANDER_TONES, 1)),
-            phase=rng.uniform(0, 2 * np.pi, (WANDER_TONES, 3)),
-            opening=opening,
-        )
+        frequency = rng.uniform(*WANDER_BAND, (WANDER_TONES, 1))
+        phase = rng.uniform(0, 2 * np.pi, (WANDER_TONES, 3))
+        return cls(Path(times, points, amplitude, frequency, phase), opening)
 
     def position(self, time: np.ndarray | float, derivative: int = 0) -> np.ndarray:
         """Position, or a derivative of it by time, at times (...) [s], shape (..., 3)."""
-        rate = 2 * np.pi * self.frequency
-        angle = rate * np.asarray(time)[..., None, None] + self.phase + derivative * np.pi / 2
-        wander = np.sum(self.amplitude * rate**derivative * np.sin(angle), axis=-2)
-        return self.path(time, derivative) + wander
+        flat = np.ravel(np.asarray(time, float))
+        return places(flat, self.path)[:, derivative].reshape(*np.shape(time), 3)
 
     def grip(self, time: np.ndarray | float) -> np.ndarray:
         """How firmly the closed pads press, from 1 to 0 as the fingers begin to open."""

@@ -15,14 +15,19 @@ Memories are the w_k, then e, then W_max, as far as the rubber has them: M of ea
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import astuple, dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 from scipy.special import erf
 
+from rig.physics import elasticity
+from rig.physics.compiled import compiled
 from rig.physics.elasticity import TRELOAR, Law
+from rig.physics.integration import integrated
 
 FOREVER = 1e9  # s
 
@@ -66,11 +71,14 @@ class Flow:
     chain: float
     offset: float
 
-    def speed(self, stress: np.ndarray, strain: np.ndarray) -> np.ndarray:
-        """e' [1/s] of true stresses a share, over E, and flowed strains e."""
-        f = np.exp(strain)
-        eased = np.sqrt((f**2 + 2 / f) / 3) - 1 + self.offset
-        return self.rate * eased**self.chain * np.sign(stress) * np.abs(stress) ** self.power
+
+@compiled
+def flow_speed(stress: float, strain: float, flow: np.ndarray) -> float:
+    """e' [1/s] of a true stress a share, over E, and flowed strain e; `flow` as in `Flow`."""
+    rate, power, chain, offset = flow[1], flow[2], flow[3], flow[4]
+    f = np.exp(strain)
+    eased = np.sqrt((f**2 + 2 / f) / 3) - 1 + offset
+    return rate * eased**chain * np.sign(stress) * np.abs(stress) ** power
 
 
 @dataclass(frozen=True)
@@ -93,11 +101,6 @@ class Softening:
     growth: float
     lag: float = 1e-3
 
-    def kept(self, energy: np.ndarray, worst: np.ndarray, modulus: float) -> np.ndarray:
-        """h of energies and the largest so far, over the law's `modulus` E; all [MJ/m3]."""
-        width = self.energy * modulus + self.growth * worst
-        return 1 - erf(np.maximum(worst - energy, 0) / width) / self.damage
-
     def stored(self, energy: np.ndarray, worst: np.ndarray, modulus: float) -> np.ndarray:
         """The integral of h from 0 to `energy` [MJ/m3]: what an unloading gives back."""
         width = self.energy * modulus + self.growth * worst
@@ -105,6 +108,79 @@ class Softening:
         below = np.minimum(energy, worst)
         lost = width * (part(worst / width) - part((worst - below) / width)) / self.damage
         return energy - lost
+
+
+@compiled
+def kept(energy: float, worst: float, modulus: float, softening: np.ndarray) -> float:
+    """h of an energy and the largest so far [MJ/m3]; `softening` as in `Softening`."""
+    width = softening[1] * modulus + softening[2] * worst
+    return 1 - math.erf(max(worst - energy, 0.0) / width) / softening[0]
+
+
+class Material(NamedTuple):
+    """What compiled code reads of a `Rubber`; arrays are empty where it has no such part."""
+
+    law: int
+    constants: np.ndarray
+    modulus: float
+    weights: np.ndarray
+    times: np.ndarray
+    flow: np.ndarray
+    softening: np.ndarray
+
+
+@compiled
+def respond(
+    i: int, stretch: float, memory: np.ndarray, rates: np.ndarray, material: Material
+) -> tuple[float, float]:
+    """Stress without viscosity [MPa] and the slope Q' of its elastic part at a stretch.
+
+    Reads row i of the memories (N, M) and writes that of their rates.
+    """
+    branches = len(material.times)
+    energy, stress, slope = elasticity.at(material.law, stretch, material.constants)
+    if len(material.softening):
+        worst = memory[i, -1]
+        part = kept(energy, worst, material.modulus, material.softening)
+        stress, slope = part * stress, part * slope
+        rates[i, -1] = max(energy - worst, 0.0) / material.softening[3]
+    total = stress
+    for k in range(branches):
+        owed = stress - memory[i, k]
+        total += material.weights[k] * owed
+        rates[i, k] = owed / material.times[k]
+    if len(material.flow):
+        strain = memory[i, branches]
+        f = np.exp(strain)
+        flowing = elasticity.at(material.law, stretch / f, material.constants)[1]
+        total += material.flow[0] * flowing / f
+        true = flowing * stretch / f / material.modulus
+        rates[i, branches] = flow_speed(true, strain, material.flow)
+    return total, slope
+
+
+@compiled
+def _responses(
+    stretch: np.ndarray, memory: np.ndarray, material: Material
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`respond` at N places."""
+    total, slope, rates = np.empty(len(stretch)), np.empty(len(stretch)), np.empty(memory.shape)
+    for i in range(len(stretch)):
+        total[i], slope[i] = respond(i, stretch[i], memory, rates, material)
+    return total, slope, rates
+
+
+@compiled
+def _flowing(time: float, strain: np.ndarray, rate: np.ndarray, data: tuple) -> None:
+    """e' where the stretch is the cubic of coefficients (4, T - 1) between equal steps."""
+    coefficients, step, material = data
+    leg = min(int(time / step), coefficients.shape[1] - 1)
+    since, stretch = time - leg * step, 0.0
+    for one in coefficients[:, leg]:
+        stretch = stretch * since + one
+    elastic = stretch / np.exp(strain[0])
+    stress = elasticity.at(material.law, elastic, material.constants)[1]
+    rate[0] = flow_speed(stress * elastic / material.modulus, strain[0], material.flow)
 
 
 @dataclass(frozen=True)
@@ -139,37 +215,36 @@ class Rubber:
         """M."""
         return len(self.times) + (self.flow is not None) + (self.softening is not None)
 
+    @cached_property
+    def material(self) -> Material:
+        part = lambda one: np.empty(0) if one is None else np.array(astuple(one), float)  # noqa: E731
+        return Material(
+            elasticity.NUMBERS[self.law.name],
+            np.array(self.law.constants, float),
+            self.law.modulus,
+            np.array(self.weights, float),
+            np.array(self.times, float),
+            part(self.flow),
+            part(self.softening),
+        )
+
     def response(
         self, stretch: np.ndarray, memory: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Stress without viscosity [MPa], the slope Q' of its elastic part, rates of the memories.
 
         Args:
-            stretch, memory: Shapes (N, ...) and (N, M, ...).
+            stretch, memory: Shapes (N,) and (N, M).
         """
-        stress, slope = self.law.stress(stretch)
-        more = []
-        if self.softening is not None:
-            energy, worst = self.law.energy(stretch), memory[:, -1]
-            kept = self.softening.kept(energy, worst, self.law.modulus)
-            stress, slope = kept * stress, kept * slope
-            more.append(np.maximum(energy - worst, 0) / self.softening.lag)
-        branches = len(self.times)
-        owed = stress[:, None] - memory[:, :branches]
-        total = stress + np.einsum("k,ik...->i...", self.weights, owed)
-        rates = owed / self.times.reshape(-1, *(1,) * (stretch.ndim - 1))
-        if self.flow is not None:
-            strain = memory[:, branches]
-            f = np.exp(strain)
-            flowing = self.law.stress(stretch / f)[0]
-            total = total + self.flow.share * flowing / f
-            more.insert(0, self.flow.speed(flowing * stretch / f / self.law.modulus, strain))
-        if more:
-            rates = np.concatenate([rates, np.stack(more, axis=1)], axis=1)
-        return total, slope, rates
+        return _responses(np.asarray(stretch, float), np.asarray(memory, float), self.material)
+
+    def _kept(self, energy: np.ndarray, worst: np.ndarray) -> np.ndarray:
+        """h of energies and the largest so far (N,)."""
+        numbers, modulus = self.material.softening, self.law.modulus
+        return np.array([kept(e, w, modulus, numbers) for e, w in zip(energy, worst, strict=True)])
 
     def remembering(self, stretch: np.ndarray, ratios: np.ndarray) -> np.ndarray:
-        """Memories (N, M, ...) at stretches (N, ...).
+        """Memories (N, M) at stretches (N,).
 
         Args:
             ratios: To those of rubber that was held there for ever, w_k / Q, e / ln(l) and
@@ -180,7 +255,7 @@ class Rubber:
         if self.softening is not None:
             energy = self.law.energy(stretch)
             worst = ratios[-1] * energy
-            stress = stress * self.softening.kept(energy, worst, self.law.modulus)
+            stress = stress * self._kept(energy, worst)
             more.append(worst)
         return np.stack([*(ratio * stress for ratio in ratios[:branches]), *more], axis=1)
 
@@ -201,12 +276,12 @@ class Rubber:
         held, found = [], []
         if self.flow is not None:
             held.append(np.log(stretch))
-            found.append(self._flowed(self.flow, stretch, step))
+            found.append(self._flowed(stretch, step))
         if self.softening is not None:
             energy = self.law.energy(stretch)
             before = self.law.energy(worst)  # pyright: ignore[reportArgumentType]
             most = np.maximum.accumulate(np.maximum(energy, before))
-            stress = stress * self.softening.kept(energy, most, self.law.modulus)
+            stress = stress * self._kept(energy, most)
             held.append(energy)
             found.append(most)
         decay = np.exp(-step / self.times)
@@ -219,19 +294,12 @@ class Rubber:
         relaxed = np.repeat(stress[:, None], len(self.times), axis=1)
         return np.column_stack([relaxed, *held]), np.column_stack([memory, *found])
 
-    def _flowed(self, flow: Flow, stretch: np.ndarray, step: float) -> np.ndarray:
+    def _flowed(self, stretch: np.ndarray, step: float) -> np.ndarray:
         """e along a history (T,) of equal steps [s]."""
         times = step * np.arange(len(stretch))
-        path = PchipInterpolator(times, stretch)
-
-        def rate(time: float, strain: np.ndarray) -> np.ndarray:
-            elastic = path(time) / np.exp(strain)
-            stress = self.law.stress(elastic)[0] * elastic / self.law.modulus
-            return flow.speed(stress, strain)
-
-        start, span = [np.log(stretch[0])], (times[0], times[-1])
-        solved = solve_ivp(rate, span, start, "LSODA", times, max_step=step, rtol=1e-7, atol=1e-9)
-        return solved.y[0]
+        path = np.ascontiguousarray(PchipInterpolator(times, stretch).c)
+        data, start = (path, step, self.material), np.log(stretch[:1])
+        return integrated(_flowing, start, times, data, 1e-7, 1e-9, max_step=step)[1][:, 0]
 
     def frozen(self, ratios: np.ndarray | None) -> tuple[Rubber, np.ndarray]:
         """This rubber while no memory changes, and the ratios of its own memories.

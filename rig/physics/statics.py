@@ -18,7 +18,7 @@ def balanced(
     """Nodes (nodes, 3) that no force moves, those that are held as they are.
 
     Args:
-        forces: Of nodes at several places (nodes, 3, M) [N], of the same shape.
+        forces: Of nodes (nodes, 3) [N], of the same shape.
         x: Places near there, shape (nodes, 3).
         held: Numbers of the nodes that stay.
         tolerance: Of the nodes [m].
@@ -26,27 +26,28 @@ def balanced(
     Returns:
         None where Newton's method does not come there, as for a slack band.
     """
-    size = x.size
-    fixed = np.zeros((len(x), 3, 1), bool)
+    size, colours = x.size, 2 * REACH + 1  # columns of one colour share no row
+    fixed = np.zeros(x.shape, bool)
     fixed[held] = True
     columns = np.arange(size)
-    colours = columns % (2 * REACH + 1)  # columns of one colour share no row
-    tint = np.equal.outer(colours, np.arange(2 * REACH + 1)).reshape(len(x), 3, -1)
     rows = columns + np.arange(-REACH, REACH + 1)[:, None]
     inside = (rows >= 0) & (rows < size)
 
     def pull(x: np.ndarray) -> np.ndarray:
-        return np.where(fixed, 0.0, forces(x))
+        return np.where(fixed, 0.0, forces(x)).ravel()
 
-    x = x[..., None]
     force = pull(x)
     for _ in range(STEPS):
-        change = ((pull(x + NUDGE * tint) - force) / NUDGE).reshape(size, -1)
-        jacobian = np.where(inside, change[rows.clip(0, size - 1), colours], 0.0)
+        change = np.empty((size, colours))
+        for colour in range(colours):
+            moved = x.copy()
+            moved.reshape(-1)[colour::colours] += NUDGE
+            change[:, colour] = (pull(moved) - force) / NUDGE
+        jacobian = np.where(inside, change[rows.clip(0, size - 1), columns % colours], 0.0)
         jacobian[REACH, fixed.ravel()] = 1.0
-        step = -solve_banded((REACH, REACH), jacobian, force.ravel()).reshape(x.shape)
+        step = -solve_banded((REACH, REACH), jacobian, force).reshape(x.shape)
         if np.abs(step).max() < tolerance:
-            return (x + step)[..., 0]
+            return x + step
         part = 1.0
         while not np.abs(trial := pull(x + part * step)).max() < np.abs(force).max():
             part /= 2

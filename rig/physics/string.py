@@ -5,7 +5,7 @@
 with s the reference length, t = x_s / |x_s| the tangent, P what lies across it, m the mass per s
 and sigma from rubber.py. Bending acts on tangents, so that it does not feel how stretch changes.
 Lumped masses on edges that are short near the clamps and the middle, where the band turns: second
-order in space. Time is left to SciPy's LSODA (adaptive step and order).
+order in space. Forces are in forces.py, time is left to SUNDIALS (integration.py).
 """
 
 from __future__ import annotations
@@ -15,38 +15,20 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from sksundae.cvode import CVODEPrecond
 
+from rig.physics import forces
+from rig.physics.forces import Band
+from rig.physics.integration import integrated
+from rig.physics.linear import Elimination
 from rig.physics.rubber import Rubber
+from rig.physics.servo import ABSENT, STILL, Servo
 from rig.physics.statics import balanced
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 AIR_DENSITY = 1.2  # kg/m3
 CYLINDER_DRAG = 1.1  # coefficient of a cylinder across the wind
-NUDGE = 1e-7  # of the difference quotients, in m, m/s, and MPa of the law
 SETTLING_TIME = 4.0
-
-Hand = Callable[[float, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-"""Acceleration (3, ...) of the hand by time, and its place, velocity and the band's force on it."""
-
-
-def still(time: float, x: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """A hand that does not move, whatever pulls."""
-    return np.zeros_like(x)
-
-
-class Falling:
-    """Ends SciPy's integration where a value by time and state falls through zero."""
-
-    terminal, direction = True, -1
-
-    def __init__(self, value: Callable[[float, np.ndarray], float]) -> None:
-        self.value = value
-
-    def __call__(self, time: float, state: np.ndarray) -> float:
-        return self.value(time, state)
-
-
 TURN = 1.0  # diameters, in which clamps and hand turn the band
 GRADING = 0.75  # edges are 1 - GRADING to 1 + GRADING of their mean
 
@@ -56,7 +38,7 @@ class ElasticString:
     """A band between two clamps.
 
     A state Y has a row a node: x (3), v (3) and the rubber's memories (M) of the edge that follows
-    it (those of the last row mean nothing). Arrays of states have trailing axes "...".
+    it (those of the last row mean nothing).
 
     Attributes:
         edges: Even, so that the middle is a node.
@@ -127,76 +109,63 @@ class ElasticString:
         masses[self.middle] += self.payload
         return masses
 
+    @cached_property
+    def band(self) -> Band:
+        """What compiled code reads."""
+        return Band(
+            sizes=self.sizes,
+            masses=self.masses,
+            bending=self.bending / self.turns,
+            clamp=np.array(self.clamp_direction, float),
+            stiffness=float(self.stiffness),
+            viscosity=float(self.rubber.viscosity),
+            damping=float(self.damping),
+            drag=AIR_DENSITY * CYLINDER_DRAG / 16 * self.diameter,
+            gravity=GRAVITY,
+            material=self.rubber.material,
+        )
+
+    @cached_property
+    def _near_middle(self) -> tuple[slice, Band]:
+        """The nodes that the middle feels, and the band of these alone."""
+        first, last = self.middle - forces.NEAR, self.middle + forces.NEAR
+        nodes, band = slice(first, last + 1), self.band
+        parts = {"masses": band.masses[nodes], "bending": band.bending[nodes]}
+        return nodes, band._replace(sizes=band.sizes[first:last], **parts)
+
     def state(self, x: np.ndarray, memory: np.ndarray | None = None) -> np.ndarray:
-        """At rest at the nodes x (nodes, 3, ...).
+        """At rest at the nodes x (nodes, 3).
 
         Args:
             memory: Ratios (M,), see `Rubber.remembering`; None: as if held there for ever.
         """
         ratios = np.ones(self.rubber.memories) if memory is None else memory
-        y = np.zeros((self.nodes, 6 + len(ratios), *x.shape[2:]))
+        y = np.zeros((self.nodes, 6 + len(ratios)))
         y[:, :3] = x
         if len(ratios):
             y[:-1, 6:] = self.rubber.remembering(self.stretch(x), ratios)
         return y
 
     def stretch(self, x: np.ndarray) -> np.ndarray:
-        """Of each edge, shape (edges, ...)."""
-        return np.linalg.norm(x[1:] - x[:-1], axis=1) / self.sizes.reshape(-1, *(1,) * (x.ndim - 2))
+        """Of each edge, shape (edges,)."""
+        return np.linalg.norm(x[1:] - x[:-1], axis=1) / self.sizes
 
-    def forces(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of states (nodes, 6 + M, ...): node forces (nodes, 3, ...) [N], rates of the memories."""
-        rubber, ones = self.rubber, (1,) * (y.ndim - 2)
-        sizes, weight = self.sizes.reshape(-1, *ones), self.bending / self.turns
-        x, v = y[:, :3], y[:, 3:6]
-        slope = (x[1:] - x[:-1]) / sizes[:, None]  # x_s
-        turning = (v[1:] - v[:-1]) / sizes[:, None]
-        stretch = np.sqrt(np.einsum("ij...,ij...->i...", slope, slope))
-        along = slope / stretch[:, None]
-        stress, tangent, forgetting = rubber.response(stretch, y[:-1, 6:])
-        rate = np.einsum("ij...,ij...->i...", along, turning)
-        tension = self.stiffness * (stress + rubber.viscosity * tangent * rate)
-
-        clamp = np.broadcast_to(self.clamp_direction.reshape(1, 3, *ones), (1, *slope.shape[1:]))
-        swing = (turning - rate[:, None] * along) / stretch[:, None]  # of the tangents
-        bent = np.concatenate([clamp, along + rubber.viscosity * swing, -clamp])
-        moment = weight.reshape(-1, 1, *ones) * (bent[1:] - bent[:-1])
-        lever = (moment[1:] - moment[:-1]) / (sizes * stretch)[:, None]
-        across = lever - np.einsum("ij...,ij...->i...", along, lever)[:, None] * along
-        pull = tension[:, None] * along - across
-
-        wind = v[1:] + v[:-1]
-        wind -= np.einsum("ij...,ij...->i...", along, wind)[:, None] * along  # twice the air across
-        speed = np.sqrt(np.einsum("ij...,ij...->i...", wind, wind))
-        side = self.diameter * sizes * np.sqrt(stretch)  # volume is kept: d ~ stretch^-1/2
-        wind *= (AIR_DENSITY * CYLINDER_DRAG / 16 * side * speed)[:, None]  # on each end
-
-        force = np.empty_like(bent, shape=x.shape)
-        force[1:-1] = pull[1:] - pull[:-1] - wind[1:] - wind[:-1]
-        force[0], force[-1] = pull[0] - wind[0], -pull[-1] - wind[-1]
-        masses = self.masses.reshape(-1, 1, *ones)
-        force += masses * (GRAVITY.reshape(3, *ones) - self.damping * v)
-        return force, forgetting
-
-    def rates(self, y: np.ndarray, time: float = 0.0, hand: Hand | None = None) -> np.ndarray:
-        """dY/dt of states (nodes, 6 + M, ...); `hand` holds the middle node."""
-        force, forgetting = self.forces(y)
-        rates = np.zeros_like(y)
-        rates[1:-1, :3] = y[1:-1, 3:6]
-        rates[1:-1, 3:6] = force[1:-1] / self.masses[1:-1].reshape(-1, 1, *(1,) * (y.ndim - 2))
-        rates[:-1, 6:] = forgetting
-        if hand is not None:
-            place, velocity = y[self.middle, :3], y[self.middle, 3:6]
-            rates[self.middle, 3:6] = hand(time, place, velocity, force[self.middle])
-        return rates
+    def forces(self, y: np.ndarray) -> np.ndarray:
+        """Of a state (nodes, 6 + M) on the nodes, shape (nodes, 3) [N]."""
+        force, forgetting = np.empty((self.nodes, 3)), np.empty((self.edges, y.shape[1] - 6))
+        forces.forces(y, force, forgetting, self.band)
+        return force
 
     def at_middle(self, y: np.ndarray) -> np.ndarray:
         """Force of the band on what holds its middle, shape (..., 3) [N].
 
         The middle node's inertia is not in it: it moves with the hand. States (..., nodes, 6 + M).
         """
-        force = np.moveaxis(self.forces(np.moveaxis(y, (-2, -1), (0, 1)))[0], (0, 1), (-2, -1))
-        return force[..., self.middle, :]
+        nodes, band = self._near_middle
+        near = np.array(y[..., nodes, :])
+        return forces.middle_forces(near.reshape(-1, *near.shape[-2:]), band).reshape(
+            *y.shape[:-2], 3
+        )
 
     def integrate(
         self,
@@ -204,59 +173,36 @@ class ElasticString:
         times: np.ndarray,
         tolerance: float,
         *,
-        hand: Hand | None = None,
+        hand: Servo = ABSENT,
         event: Callable[[float, np.ndarray], float] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Follow the state y (nodes, 6 + M) from times[0], where it holds.
 
         Args:
-            times: To report at, ascending, shape (S,).
+            times: To report at, ascending, shape (S,), three at least.
             tolerance: Relative; a hundredth of it in m, m/s, and MPa of the law.
-            hand: What holds the middle node, if anything.
+            hand: What holds the middle node.
             event: Ends the integration where it falls through zero.
 
         Returns:
             Times (R,) and states (R, nodes, 6 + M): those asked for, up to the event and with it.
         """
-        shape = y.shape
-        reach = 2 * shape[1] + 5  # two nodes on, from the first of x to the last of v
-        columns, width = np.arange(y.size), 2 * reach + 1
-        nudges = NUDGE * np.equal.outer(columns % width, np.arange(width))
-        rows = columns + np.arange(-reach, reach + 1)[:, None]  # (band, column)
-        outside = (rows < 0) | (rows >= y.size)
-        places = np.where(outside, 0, rows * width + columns % width)
+        shape, newton = y.shape, Elimination(*y.shape)
 
-        def rates(t: float, flat: np.ndarray) -> np.ndarray:
-            return self.rates(flat.reshape(shape), t, hand).ravel()
+        def value(time: float, flat: np.ndarray, out: np.ndarray, data: object) -> None:
+            out[0] = event(time, flat.reshape(shape))  # pyright: ignore[reportOptionalCall]
 
-        def jacobian(t: float, flat: np.ndarray) -> np.ndarray:
-            """Banded, by differences: columns of one colour share no row."""
-            moved = (flat[:, None] + nudges).reshape(*shape, -1)
-            change = self.rates(moved, t, hand).reshape(y.size, -1) - rates(t, flat)[:, None]
-            found = change.take(places)
-            found[outside] = 0.0
-            return found / NUDGE
-
-        stop = None if event is None else Falling(lambda t, flat: event(t, flat.reshape(shape)))
-        solution = solve_ivp(
-            rates,
-            (times[0], times[-1]),
+        found, states = integrated(
+            forces.rates,
             y.ravel(),
-            method="LSODA",
-            t_eval=times,
-            events=stop,
-            jac=jacobian,
-            lband=reach,
-            uband=reach,
-            rtol=tolerance,
-            atol=tolerance / 100,
+            times,
+            (self.band, hand),
+            tolerance,
+            tolerance / 100,
+            event=event and value,
+            linsolver="gmres",
+            precond=CVODEPrecond(newton.setup, newton.solve),
         )
-        if solution.status < 0:
-            raise RuntimeError(f"the band's integration failed: {solution.message}")
-        found, states = solution.t, solution.y.T
-        if solution.status == 1:
-            found = np.append(found, solution.t_events[0])
-            states = np.vstack([states, solution.y_events[0]])
         return found, states.reshape(-1, *shape)
 
     def at_rest(
@@ -279,8 +225,8 @@ class ElasticString:
         sticky = replace(self, rubber=frozen, damping=2 * np.sqrt(-GRAVITY[2] / (self.length / 2)))
         if held and (nodes := sticky.balanced(x, kept, tolerance / 100, give)) is not None:
             return self.state(nodes, memory)
-        start, hand = sticky.state(x, kept), still if held else None
-        end = sticky.integrate(start, np.array([0.0, SETTLING_TIME]), tolerance, hand=hand)[1][-1]
+        times, hand = np.array([0, 0.5, 1]) * SETTLING_TIME, STILL if held else ABSENT
+        end = sticky.integrate(sticky.state(x, kept), times, tolerance, hand=hand)[1][-1]
         return self.state(end[:, :3], memory)
 
     def balanced(
@@ -292,9 +238,9 @@ class ElasticString:
         """
 
         def forces(x: np.ndarray) -> np.ndarray:
-            force = self.forces(self.state(x, memory))[0]
+            force = self.forces(self.state(x, memory))
             if give:
-                force[self.middle] -= (x[self.middle] - start[self.middle, :, None]) / give
+                force[self.middle] -= (x[self.middle] - start[self.middle]) / give
             return force
 
         held = [0, -1] if give else [0, self.middle, -1]

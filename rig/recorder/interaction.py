@@ -10,14 +10,12 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from rig.physics.motion import END, GRASP, OPEN, HandMotion
+from rig.physics.servo import Servo
 from rig.physics.string import ElasticString
 from rig.physics.world import bent_at
-from rig.recorder.servo import Servo
 
 if TYPE_CHECKING:
     from pipeline.params import Params
-
-CHUNK = 500  # states at a time, for memory
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,7 @@ def pull_and_release(
     """
     rig = params.rig
     holding = 2 * rig.pads.friction * rig.pads.force  # two pads
-    follow = Servo.of(rig.arm, motion)
+    follow = Servo.of(rig.arm, motion.path)
 
     def margin(time: float, y: np.ndarray) -> float:
         grip = holding * float(motion.grip(time))
@@ -96,24 +94,20 @@ def pull_and_release(
     hand = follow.alone(held[-1, string.middle, :6], np.concatenate([[slip], after]), rig.tolerance)
     hand = hand[1:]  # (x, v) after the slip
 
-    force, place = np.zeros((len(sensor_times), 3)), motion.position(sensor_times)
-    speed = motion.position(sensor_times, 1)
+    force = np.zeros((len(sensor_times), 3))
+    moving = np.hstack([motion.position(sensor_times, derivative) for derivative in (0, 1)])
     while_held, sensed = np.isin(sensor_times, held_times), np.isin(held_times, sensor_times)
-    force[while_held] = np.concatenate(
-        [string.at_middle(held[i : i + CHUNK]) for i in range(0, len(held), CHUNK)]
-    )[sensed]
-    place[while_held] = held[sensed, string.middle, :3]
-    speed[while_held] = held[sensed, string.middle, 3:6]
-    then = np.isin(after, sensor_times)
-    place[sensor_times > slip], speed[sensor_times > slip] = hand[then, :3], hand[then, 3:]
+    force[while_held] = string.at_middle(held[sensed])
+    moving[while_held] = held[sensed, string.middle, :6]
+    moving[sensor_times > slip] = hand[np.isin(after, sensor_times)]
 
     lines = np.repeat(hanging[None], len(camera_times), axis=0)
     lines[np.isin(camera_times, held_times)] = held[np.isin(held_times, camera_times), :, :3]
     lines[camera_times > slip] = free[1:-1][np.isin(after, camera_times), :, :3]
     return Interaction(
         force=force,
-        hand=place,
-        acceleration=follow(sensor_times, place.T, speed.T, force.T).T,
+        hand=moving[:, :3],
+        acceleration=follow.acceleration(sensor_times, moving, force),
         seen=camera_times,
         lines=lines,
         slip_time=slip,

@@ -8,25 +8,11 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq, least_squares
 
-from rig.physics.elasticity import (
-    LAWS,
-    TRELOAR,
-    EightChain,
-    ExtendedTube,
-    Gent,
-    Law,
-    Ogden,
-    law_of,
-)
+from rig.physics.elasticity import LAWS, TRELOAR, Law, law_of
 
 JONES = (0.69, 1.3, 0.01, 4.0, -0.0122, -2.0)
-ALL = [*(law_of(name, ()) for name in LAWS), law_of("ogden", JONES)]
-FREE = {  # constants that are fitted, and where from
-    Gent: ("limit", "shear"),
-    EightChain: ("segments", "shear"),
-    ExtendedTube: ("extensibility", "release", "tubes", "shear"),
-}
-every_law = pytest.mark.parametrize("law", ALL, ids=lambda law: type(law).__name__)
+ALL = [*map(law_of, LAWS), law_of("ogden", JONES)]
+every_law = pytest.mark.parametrize("law", ALL, ids=lambda law: law.name)
 
 
 def treloar(shared: Path, test: str) -> tuple[np.ndarray, np.ndarray]:
@@ -76,13 +62,13 @@ def test_refit_from_ogdens_own_numbers_gives_the_same_law(shared: Path) -> None:
     np.testing.assert_allclose(ogden(fit.x, at), TRELOAR.stress(at)[0], rtol=5e-3)
 
 
-@pytest.mark.parametrize("kind", FREE)
-def test_refit_of_the_others_gives_their_constants(shared: Path, kind: type) -> None:
+@pytest.mark.parametrize("name", sorted(LAWS.keys() - {"ogden"}))
+def test_refit_of_the_others_gives_their_constants(shared: Path, name: str) -> None:
     stretches, stresses, weights = weighted(shared)
-    ours = np.array([getattr(kind(), name) for name in FREE[kind]])
+    ours = np.array(law_of(name).constants)
 
     def error(numbers: np.ndarray) -> np.ndarray:
-        law = kind(**dict(zip(FREE[kind], numbers, strict=True)))
+        law = law_of(name, numbers.tolist())
         return weights * (law.stress(stretches)[0] / stresses - 1)
 
     fit = least_squares(error, 1.04 * ours, x_scale=ours, bounds=(0.9 * ours, 1.2 * ours))
@@ -106,62 +92,63 @@ def test_derivatives(law: Law) -> None:
 def test_moduli_are_the_textbooks() -> None:
     """3/2 sum mu a; 3 G; 3 G (1 + 3/(5 N) + 99/(175 N^2) + ...); 3 (Gc (1 - 2 e^2) + Ge)."""
     assert np.isclose(law_of("ogden", JONES).modulus, 1.5 * np.dot(JONES[::2], JONES[1::2]))
-    assert np.isclose(Gent(30.0, 0.4).modulus, 1.2)
-    chain, n = EightChain(50.0, 0.4), 50.0
+    assert np.isclose(law_of("gent", (30.0, 0.4)).modulus, 1.2)
+    chain, n = law_of("arruda_boyce", (50.0, 0.4)), 50.0
     series = 1 + 3 / 5 / n + 99 / 175 / n**2 + 513 / 875 / n**3  # exact inverse Langevin function
     assert np.isclose(chain.modulus, 1.2 * series, rtol=2e-3)
-    tube = ExtendedTube(0.1, 0.3, 0.8, 0.2)
+    tube = law_of("extended_tube", (0.1, 0.3, 0.8, 0.2))
     assert np.isclose(tube.modulus, 3 * (0.2 * (1 - 2 * 0.01) + 0.16))
 
 
 def test_gent_is_neo_hookean_far_from_its_limit_and_stiff_near_it() -> None:
     stretch = np.linspace(0.6, 3, 20)
-    soft = Gent(1e9, 0.4).stress(stretch)[0]
+    soft = law_of("gent", (1e9, 0.4)).stress(stretch)[0]
     np.testing.assert_allclose(soft, 0.4 * (stretch - stretch**-2), rtol=1e-6, atol=1e-9)
     at = np.array(4.0)  # D = 13.5: 0.4 * 15 / (15 - 13.5) of shear
-    assert np.isclose(float(Gent(15.0, 0.4).stress(at)[0]), 4.0 * (4 - 1 / 16))
+    assert np.isclose(float(law_of("gent", (15.0, 0.4)).stress(at)[0]), 4.0 * (4 - 1 / 16))
 
 
 @pytest.mark.parametrize(
     ("law", "lock"),
     [
-        (Gent(20.0), brentq(lambda l: l**2 + 2 / l - 3 - 20, 1, 9)),  # noqa: E741
-        (EightChain(8.0), brentq(lambda l: l**2 + 2 / l - 3 * 8, 1, 9)),  # noqa: E741
-        (ExtendedTube(0.2), brentq(lambda l: l**2 + 2 / l - 3 - 25, 1, 9)),  # noqa: E741
+        (law_of("gent", [20.0]), brentq(lambda l: l**2 + 2 / l - 3 - 20, 1, 9)),  # noqa: E741
+        (law_of("arruda_boyce", [8.0]), brentq(lambda l: l**2 + 2 / l - 3 * 8, 1, 9)),  # noqa: E741
+        (law_of("extended_tube", [0.2]), brentq(lambda l: l**2 + 2 / l - 3 - 25, 1, 9)),  # noqa: E741
     ],
 )
 def test_chains_lock(law: Law, lock: float) -> None:
     """At its locking stretch the stress has a pole, of the order of the distance from there."""
     near, nearer = (float(law.stress(np.array(lock - gap))[0]) for gap in (1e-3, 1e-4))
-    order = 2 if isinstance(law, ExtendedTube) else 1
+    order = 2 if law.name == "extended_tube" else 1
     assert np.isclose(nearer / near, 10**order, rtol=0.05)
 
 
 def test_eight_chains_by_the_exact_inverse_langevin_function() -> None:
     """Arruda and Boyce's own form, the root of coth b - 1/b = y: Cohen's fraction is within 5 %."""
-    law = EightChain(12.0, 0.3)
+    segments, shear = 12.0, 0.3
+    law = law_of("arruda_boyce", (segments, shear))
     for stretch in (1.2, 1.7, 2.5, 4.0, 5.0):
         chain = np.sqrt((stretch**2 + 2 / stretch) / 3)
-        y = chain / np.sqrt(law.segments)
+        y = chain / np.sqrt(segments)
         root = brentq(lambda b, y=y: 1 / np.tanh(b) - 1 / b - y, 1e-6, 1e4)
-        exact = law.shear / 3 * np.sqrt(law.segments) / chain * root * (stretch - stretch**-2)
+        exact = shear / 3 * np.sqrt(segments) / chain * root * (stretch - stretch**-2)
         assert np.isclose(float(law.stress(np.array(stretch))[0]), exact, rtol=0.05)
 
 
 def test_the_extended_tube_is_kaliskes_energy() -> None:
     """Written out by principal stretches, as the paper's formula stands in FElupe."""
-    law = ExtendedTube(0.09, 0.3, 0.9, 0.2)
+    e, b, share, shear = 0.09, 0.3, 0.9, 0.2
+    law = law_of("extended_tube", (e, b, share, shear))
     for stretch in (0.7, 1.3, 2.2):
         stretches = np.array([stretch, stretch**-0.5, stretch**-0.5])
-        d, e2, b = np.sum(stretches**2) - 3, law.extensibility**2, law.release
+        d, e2 = np.sum(stretches**2) - 3, e**2
         chains = (1 - e2) * d / (1 - e2 * d) + np.log(1 - e2 * d)
-        tubes = 2 * law.tubes * law.shear / b**2 * np.sum(stretches**-b - 1)
-        assert np.isclose(float(law.energy(np.array(stretch))), law.shear / 2 * chains + tubes)
+        tubes = 2 * share * shear / b**2 * np.sum(stretches**-b - 1)
+        assert np.isclose(float(law.energy(np.array(stretch))), shear / 2 * chains + tubes)
 
 
 def test_ogden_of_one_term_is_the_neo_hookean_law() -> None:
     stretch = np.linspace(0.5, 3, 20)
-    stress = Ogden(((0.4, 2.0),)).stress(stretch)[0]
+    stress = law_of("ogden", (0.4, 2.0)).stress(stretch)[0]
     np.testing.assert_allclose(stress, 0.4 * (stretch - stretch**-2), atol=1e-12)
-    assert law_of("ogden", (0.4, 2.0)) == Ogden(((0.4, 2.0),))
-    assert law_of("gent", (50.0,)) == Gent(50.0)
+    assert law_of("gent", (50.0,)) == law_of("gent", (50.0, law_of("gent").constants[1]))

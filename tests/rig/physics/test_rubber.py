@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid, quad, solve_ivp
 from scipy.special import exp1, gamma, gammaincc
 
-from rig.physics.elasticity import TRELOAR, Gent
+from rig.physics.elasticity import TRELOAR, law_of
 from rig.physics.rubber import Flow, Rubber, Softening, spectrum
 
 NONE = np.empty((0, 2))
@@ -172,7 +172,7 @@ KINDS = {
     "relaxing": Rubber(1.0, np.array([[0.3, 0.1], [0.2, 2.0]]), 0.0),
     "flowing": FLOWING,
     "softening": SOFT,
-    "all": Rubber(1.0, np.array([[0.3, 0.1]]), 0.0, Gent(30.0), FLOW, MULLINS),
+    "all": Rubber(1.0, np.array([[0.3, 0.1]]), 0.0, law_of("gent", [30.0]), FLOW, MULLINS),
 }
 
 

@@ -12,7 +12,7 @@ DRAW = np.array([0.0, -0.30, -0.15])
 
 @pytest.mark.parametrize("length", [0.24, 0.54])
 def test_a_held_band_rests_where_damped_motion_brings_it(coarse, monkeypatch, length) -> None:
-    """Barely taut, and at the corner of the box; LSODA is the reader from outside."""
+    """Barely taut, and at the corner of the box."""
     string = string_of(coarse, "band1")
     at = bent_at(string, length * DRAW / np.linalg.norm(DRAW))
     memory = np.array([0.9, 0.9, 0.9])
@@ -27,6 +27,6 @@ def test_nothing_moves_it_any_more(params: Params) -> None:
     elastic = replace(string, rubber=replace(string.rubber, relaxation=np.empty((0, 2))))
     nodes = elastic.balanced(bent_at(elastic, DRAW), np.empty(0), 1e-9)
     state = elastic.state(nodes)
-    force = elastic.forces(state)[0]
+    force = elastic.forces(state)
     force[[0, elastic.middle, -1]] = 0.0
     assert np.abs(force).max() < 1e-7 * np.linalg.norm(elastic.at_middle(state))

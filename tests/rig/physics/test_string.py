@@ -5,8 +5,10 @@ import pytest
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 from rig.physics import string as string_module
-from rig.physics.elasticity import TRELOAR, ExtendedTube
+from rig.physics.elasticity import TRELOAR, law_of
+from rig.physics.motion import Path
 from rig.physics.rubber import Flow, Rubber, Softening
+from rig.physics.servo import STILL, Servo
 from rig.physics.string import ElasticString
 from rig.physics.world import bent_at
 from rig.recorder.interaction import hang
@@ -58,7 +60,7 @@ def test_forces_are_the_energys_gradient(string: ElasticString) -> None:
     string = replace(string, rubber=replace(ELASTIC, viscosity=0.0))
     x = bent_at(string, DRAWN) + 1e-4 * rng.normal(size=(string.nodes, 3))
     y = string.state(x)
-    force = string.forces(y)[0]
+    force = string.forces(y)
     for node in (1, 2, 19, 20, 21, 38, 39):
         for axis in range(3):
             nudge = np.zeros_like(y)
@@ -99,7 +101,7 @@ def test_energy_is_balanced_by_what_the_rubber_loses(string, monkeypatch, kind) 
     monkeypatch.setattr(string_module, "AIR_DENSITY", 0.0)
     flow = Flow(share=0.5, rate=300.0, power=3.0, chain=-0.7, offset=0.05)
     memories = {"flow": flow} if kind == "flow" else {"softening": Softening(2.0, 0.1, 0.1)}
-    rubber = replace(ELASTIC, viscosity=0.0, law=ExtendedTube(), **memories)
+    rubber = replace(ELASTIC, viscosity=0.0, law=law_of("extended_tube"), **memories)
     ratios = np.array([0.6 if kind == "flow" else 1.3])
     band = replace(string, rubber=rubber)
     y = band.at_rest(bent_at(band, DRAWN), 1e-6, held=True, memory=ratios)
@@ -132,7 +134,7 @@ def test_a_held_band_of_any_memory_is_at_rest(string: ElasticString) -> None:
     ratios = np.array([0.8, 0.7, 1.2])
     band = replace(string, rubber=rubber)
     y = band.at_rest(bent_at(band, DRAWN), 1e-6, held=True, memory=ratios)
-    force = band.forces(y)[0]
+    force = band.forces(y)
     force[[0, band.middle, -1]] = 0.0
     assert np.abs(force).max() < 1e-6 * np.linalg.norm(band.at_middle(y))
     stretch = band.stretch(y[:, :3])
@@ -145,7 +147,7 @@ def test_relaxation_under_a_constant_hold(string: ElasticString) -> None:
     slow = replace(string, rubber=replace(ELASTIC, relaxation=np.array([[0.3, 0.5]])))
     y = slow.at_rest(bent_at(slow, DRAWN), 1e-6, held=True, memory=np.zeros(1))
     times = np.array([0.0, 0.25, 0.5, 1.0, 5.0])
-    states = slow.integrate(y, times, 1e-6, hand=string_module.still)[1]
+    states = slow.integrate(y, times, 1e-6, hand=STILL)[1]
     force = slow.at_middle(states)[:, 1]
     expected = (1 + 0.3 * np.exp(-times / 0.5)) / 1.3
     np.testing.assert_allclose(force / force[0], expected, rtol=8e-3)
@@ -160,10 +162,8 @@ def test_out_and_back_is_the_laws_loop(string: ElasticString) -> None:
     def draw(time: np.ndarray) -> np.ndarray:
         return 0.3 + 0.05 * (1 - np.cos(omega * time))
 
-    def hand(time: float, x: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
-        y = np.zeros_like(x)
-        y[1] = -0.05 * omega**2 * np.cos(omega * time)
-        return y
+    swing = np.array([[0.0, 0.05, 0.0]]), np.array([[2.0]]), np.full((1, 3), np.pi / 2)
+    hand = Servo(np.inf, 0.0, 0.0, Path(np.array([0.0, 1.0]), np.zeros((2, 3)), *swing))
 
     y = thin.at_rest(bent_at(thin, np.array([0.0, -0.3, 0.0])), 1e-6, held=True)
     times = np.linspace(0, 0.5, 51)
@@ -188,7 +188,7 @@ def test_out_and_back_is_the_laws_loop(string: ElasticString) -> None:
 def test_hanging_band(string: ElasticString) -> None:
     """It is at rest and symmetric, and hangs nearly as deep as two straight halves would."""
     nodes = hang(string, 1e-6)
-    force = string.forces(string.state(nodes))[0]
+    force = string.forces(string.state(nodes))
     assert np.abs(force[1:-1]).max() < 1e-5
     np.testing.assert_allclose(nodes[:, 0], -nodes[::-1, 0], atol=1e-7)
     assert -0.2207 < nodes[string.middle, 2] < -0.17
@@ -202,8 +202,8 @@ def test_drag_is_a_cylinders(string: ElasticString, stretch: float) -> None:
     x = (stretch * np.append(0, np.cumsum(straight.sizes)) - 0.1375)[:, None] * [1.0, 0.0, 0.0]
     still, moving, along = (straight.state(x) for _ in range(3))
     moving[:, 4], along[:, 3] = 7.0, 7.0
-    at_rest = straight.forces(still)[0]
+    at_rest = straight.forces(still)
     expected = -0.5 * 1.2 * 1.1 * 0.01 / np.sqrt(stretch) * 0.275 * 7**2
-    drag = (straight.forces(moving)[0] - at_rest).sum(axis=0)
+    drag = (straight.forces(moving) - at_rest).sum(axis=0)
     np.testing.assert_allclose(drag, [0, expected, 0], atol=1e-9)
-    np.testing.assert_allclose(straight.forces(along)[0], at_rest, atol=1e-9)
+    np.testing.assert_allclose(straight.forces(along), at_rest, atol=1e-9)

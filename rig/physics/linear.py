@@ -1,0 +1,132 @@
+"""Solves (1 - gamma J) z = r for a band's Jacobian J, as each step of CVODE asks for it.
+
+Places follow velocities, and an edge's memories its stretch alone. Both are taken out by hand; what
+is left is banded, of three velocities a node, a third as wide and long.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rig.physics.compiled import compiled
+from rig.physics.forces import NEAR, slopes
+
+REACH = 3 * NEAR + 2  # to each side of the diagonal
+
+
+class Elimination:
+    """`setup` and `solve` as scikit-sundae's preconditioner has them, of states (nodes, 6 + M)."""
+
+    def __init__(self, nodes: int, width: int) -> None:
+        self.jacobian = np.zeros((nodes, 2 * NEAR + 1, width, width))
+        self.memories = np.zeros((nodes, 2, width - 6, 3))
+        self.factors = np.empty((3 * nodes, 2 * REACH + 1))
+        self.gamma = 0.0
+
+    def setup(self, time, y, rates, kept, new, gamma, data) -> None:
+        """Factorise for this gamma; `kept`: with the Jacobian of before."""
+        if not kept:
+            slopes(time, y, self.jacobian, data)
+        new[0], self.gamma = not kept, gamma
+        _factorised(self.jacobian, gamma, self.memories, self.factors)
+
+    def solve(self, time, y, rates, r, z, gamma, delta, side, data) -> None:
+        """Write z."""
+        _solved(self.jacobian, self.gamma, self.memories, self.factors, r, z)
+
+
+@compiled
+def _forgotten(jacobian: np.ndarray, e: int, gamma: float, w: np.ndarray) -> None:
+    """Solve for the memories of edge e in place: each hangs on itself and on later ones alone."""
+    size = len(w)
+    for k in range(size - 1, -1, -1):
+        for other in range(k + 1, size):
+            w[k] += gamma * jacobian[e, NEAR, 6 + k, 6 + other] * w[other]
+        w[k] /= 1 - gamma * jacobian[e, NEAR, 6 + k, 6 + k]
+
+
+@compiled
+def _factorised(
+    jacobian: np.ndarray, gamma: float, memories: np.ndarray, factors: np.ndarray
+) -> None:
+    """Write d(memory)/dx of each edge's two nodes, and the LU factors of what is left."""
+    nodes, width = len(jacobian), jacobian.shape[2]
+    w = np.empty(width - 6)
+    for e in range(nodes - 1):
+        for n in range(2):
+            for c in range(3):
+                w[:] = gamma * jacobian[e, NEAR + n, 6:, c]
+                _forgotten(jacobian, e, gamma, w)
+                memories[e, n, :, c] = w
+    factors[:] = 0.0
+    for i in range(nodes):
+        for a in range(3):
+            factors[3 * i + a, REACH] = 1.0
+        if i == 0 or i == nodes - 1:
+            continue
+        for j in range(max(i - NEAR, 1), min(i + NEAR + 1, nodes - 1)):
+            block = jacobian[i, j - i + NEAR]
+            for a in range(3):
+                for c in range(3):
+                    value = gamma * block[3 + a, c] + block[3 + a, 3 + c]
+                    for e in range(max(i - 1, j - 1), min(i, j) + 1):
+                        for k in range(width - 6):
+                            felt = jacobian[i, e - i + NEAR, 3 + a, 6 + k]
+                            value += gamma * felt * memories[e, j - e, k, c]
+                    factors[3 * i + a, REACH + 3 * (j - i) + c - a] -= gamma * value
+    for p in range(3 * nodes):
+        for q in range(p + 1, min(p + REACH + 1, 3 * nodes)):
+            factors[q, REACH + p - q] /= factors[p, REACH]
+            part = factors[q, REACH + p - q]
+            for c in range(1, REACH + 1):
+                factors[q, REACH + p - q + c] -= part * factors[p, REACH + c]
+
+
+@compiled
+def _solved(
+    jacobian: np.ndarray,
+    gamma: float,
+    memories: np.ndarray,
+    factors: np.ndarray,
+    r: np.ndarray,
+    z: np.ndarray,
+) -> None:
+    """Write z."""
+    nodes, width = len(jacobian), jacobian.shape[2]
+    size = 3 * nodes
+    right, given, found = np.empty(size), r.reshape((nodes, width)), z.reshape((nodes, width))
+    found[:] = given
+    for e in range(nodes - 1):  # the memories if no node had another velocity
+        for k in range(width - 6):
+            for n in range(2):
+                for c in range(3):
+                    found[e, 6 + k] += gamma * jacobian[e, NEAR + n, 6 + k, c] * given[e + n, c]
+        _forgotten(jacobian, e, gamma, found[e, 6:])
+    for i in range(nodes):
+        for a in range(3):
+            value = 0.0
+            if 0 < i < nodes - 1:
+                for j in range(max(i - NEAR, 0), min(i + NEAR + 1, nodes)):
+                    for c in range(3):
+                        value += jacobian[i, j - i + NEAR, 3 + a, c] * given[j, c]
+                for e in range(i - 1, i + 1):
+                    for k in range(width - 6):
+                        value += jacobian[i, e - i + NEAR, 3 + a, 6 + k] * found[e, 6 + k]
+            right[3 * i + a] = given[i, 3 + a] + gamma * value
+    for p in range(size):
+        for q in range(max(p - REACH, 0), p):
+            right[p] -= factors[p, REACH + q - p] * right[q]
+    for p in range(size - 1, -1, -1):
+        for q in range(p + 1, min(p + REACH + 1, size)):
+            right[p] -= factors[p, REACH + q - p] * right[q]
+        right[p] /= factors[p, REACH]
+    for i in range(1, nodes - 1):
+        for c in range(3):
+            found[i, 3 + c] = right[3 * i + c]
+            found[i, c] += gamma * right[3 * i + c]
+    for e in range(nodes - 1):
+        for n in range(2):
+            if 0 < e + n < nodes - 1:
+                for k in range(width - 6):
+                    for c in range(3):
+                        found[e, 6 + k] += gamma * memories[e, n, k, c] * right[3 * (e + n) + c]

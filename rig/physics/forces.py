@@ -14,7 +14,7 @@ NUDGE = 1e-7  # of the difference quotients, in m, m/s, and MPa of the law
 NEAR = 2  # nodes to each side that a node feels
 
 
-class Band(NamedTuple):
+class BandNumbers(NamedTuple):
     """What compiled code reads of an `ElasticString`.
 
     Attributes:
@@ -51,7 +51,7 @@ def across(vector: np.ndarray, along: np.ndarray) -> None:
 
 
 @compiled
-def forces(y: np.ndarray, force: np.ndarray, forgetting: np.ndarray, band: Band) -> None:
+def forces(y: np.ndarray, force: np.ndarray, forgetting: np.ndarray, band: BandNumbers) -> None:
     """Write node forces (nodes, 3) [N] and rates of the memories (edges, M) of a state."""
     edges = len(band.sizes)
     along, bent = np.empty((edges, 3)), np.empty((edges + 2, 3))
@@ -94,7 +94,7 @@ def forces(y: np.ndarray, force: np.ndarray, forgetting: np.ndarray, band: Band)
 
 
 @compiled
-def middle_forces(states: np.ndarray, band: Band) -> np.ndarray:
+def middle_forces(states: np.ndarray, band: BandNumbers) -> np.ndarray:
     """Of states (S, nodes, 6 + M) those on the middle node, shape (S, 3) [N]."""
     nodes = len(band.masses)
     force, forgetting = np.empty((nodes, 3)), np.empty((nodes, states.shape[2] - 6))
@@ -106,7 +106,7 @@ def middle_forces(states: np.ndarray, band: Band) -> np.ndarray:
 
 
 @compiled
-def change(time: float, y: np.ndarray, out: np.ndarray, band: Band, hand: Servo) -> None:
+def change(time: float, y: np.ndarray, out: np.ndarray, band: BandNumbers, hand: Servo) -> None:
     """Write dY/dt of a state (nodes, 6 + M)."""
     nodes = len(band.masses)
     middle, force = nodes // 2, np.empty((nodes, 3))
@@ -122,7 +122,7 @@ def change(time: float, y: np.ndarray, out: np.ndarray, band: Band, hand: Servo)
 
 
 @compiled
-def rates(time: float, y: np.ndarray, out: np.ndarray, data: tuple[Band, Servo]) -> None:
+def rates(time: float, y: np.ndarray, out: np.ndarray, data: tuple[BandNumbers, Servo]) -> None:
     """`change` of a flat state, as CVODE asks for it."""
     band, hand = data[0], data[1]
     shape = len(band.masses), len(y) // len(band.masses)
@@ -130,7 +130,9 @@ def rates(time: float, y: np.ndarray, out: np.ndarray, data: tuple[Band, Servo])
 
 
 @compiled
-def slopes(time: float, y: np.ndarray, jacobian: np.ndarray, data: tuple[Band, Servo]) -> None:
+def slopes(
+    time: float, y: np.ndarray, jacobian: np.ndarray, data: tuple[BandNumbers, Servo]
+) -> None:
     """Write the Jacobian of `rates` by differences: nodes of one colour share no neighbour.
 
     Shape (nodes, 2 NEAR + 1, 6 + M, 6 + M): of row r of node i by row c of node i + o - NEAR.

@@ -18,7 +18,7 @@ import numpy as np
 from sksundae.cvode import CVODEPrecond
 
 from rig.physics import forces
-from rig.physics.forces import Band
+from rig.physics.forces import BandNumbers
 from rig.physics.integration import integrated
 from rig.physics.linear import Elimination
 from rig.physics.rubber import Rubber
@@ -110,9 +110,9 @@ class ElasticString:
         return masses
 
     @cached_property
-    def band(self) -> Band:
+    def band(self) -> BandNumbers:
         """What compiled code reads."""
-        return Band(
+        return BandNumbers(
             sizes=self.sizes,
             masses=self.masses,
             bending=self.bending / self.turns,
@@ -126,7 +126,7 @@ class ElasticString:
         )
 
     @cached_property
-    def _near_middle(self) -> tuple[slice, Band]:
+    def _near_middle(self) -> tuple[slice, BandNumbers]:
         """The nodes that the middle feels, and the band of these alone."""
         first, last = self.middle - forces.NEAR, self.middle + forces.NEAR
         nodes, band = slice(first, last + 1), self.band

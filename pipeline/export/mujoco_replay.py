@@ -135,7 +135,7 @@ class MujocoBand:
             force[i] = self.force
             lines += [self.line] * int(np.count_nonzero(looks == i))
         self.model.actuator_gainprm[:], self.model.actuator_biasprm[:] = before
-        return Pulled(times, force, times[looks], np.array(lines))
+        return Pulled(times, force, np.array(lines))
 
     def _put(self, line: np.ndarray, held: bool, pouch: bool) -> None:
         """The band at rest through nodes (edges + 1, 3), hand and projectile at its middle."""

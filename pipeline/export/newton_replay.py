@@ -73,7 +73,7 @@ class NewtonReplay:
             seen = int(np.count_nonzero(looks == i))
             if seen:
                 lines += [now.particle_q.numpy()[:-1].astype(float)] * seen
-        return Pulled(times, force, times[looks], np.array(lines))
+        return Pulled(times, force, np.array(lines))
 
 
 def loader() -> ModuleType:

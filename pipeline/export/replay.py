@@ -26,11 +26,10 @@ class Shot:
 
 @dataclass(frozen=True)
 class Pulled:
-    """A pull while the hand holds: ends of steps (S,), force (S, 3), nodes (K, L, 3) at stamps."""
+    """A pull while the hand holds: ends of steps (S,), force (S, 3), nodes (K, L, 3) seen."""
 
     time: np.ndarray
     force: np.ndarray
-    line_time: np.ndarray
     line: np.ndarray
 
 

@@ -154,7 +154,7 @@ def test_a_mistake_is_one_line(tmp_path) -> None:
     (tmp_path / "params.yaml").write_text(DEFAULTS.read_text())
 
     def told(band: str) -> str:
-        done = python(*CLI, "drift", band, folder=tmp_path)
+        done = python(*CLI, "drift", "--band", band, folder=tmp_path)
         assert done.returncode == 1 and done.stdout == ""
         (line,) = (one for one in done.stderr.splitlines() if not one.endswith(" ..."))
         return line

@@ -102,9 +102,9 @@ def recordings(results: Results, styles: Styles) -> Table:
                     result.band,
                     styles[result.method].name,
                     cell(as_code(file)) if file else str(count),
-                    _scaled(about["force_rms"], 1e3, ".0f"),
-                    _scaled(about["held_rms"], 1e3, ".1f"),
-                    _scaled(about["recoil_rms"], 1e3, ".1f"),
+                    f"{1e3 * about['force_rms']:.0f}",
+                    f"{1e3 * about['held_rms']:.1f}",
+                    f"{1e3 * about['recoil_rms']:.1f}",
                     ", ".join(f"{1e3 * time:.0f}" for time in about["pictures"]) or NONE,
                     f"{without['misfit']:.1f}" if without else NONE,
                     f"{coordinate(moved[0])} {moved[1]:+.1f} sd" if moved else NONE,
@@ -112,10 +112,6 @@ def recordings(results: Results, styles: Styles) -> Table:
             )
     heads = ["band", "method", "recording", "force [mN]", "held band [mm]", "recoil [mm]"]
     return [*heads, "recoil seen after [ms]", "misfit without it", "which moves"], rows
-
-
-def _scaled(value: float, factor: float, form: str) -> str:
-    return f"{factor * value:{form}}"
 
 
 def observed(results: Results, styles: Styles) -> Table | None:

@@ -21,8 +21,7 @@ DEFAULT_METHOD = "least_squares"
 
 def main() -> None:
     """Entry point of the console script."""
-    arguments = parser().parse_args()
-    run(lambda: execute(arguments))
+    run(lambda: execute(parser().parse_args()))
 
 
 BAND = flag("--band", required=True, metavar="NAME", help="band of params.yaml")

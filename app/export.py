@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from app.flow.disk import expect_writable
 from pipeline.base.layout import Layout
 from pipeline.episode.episode import Episode
 from pipeline.export.card import HOLD, LANDING
@@ -22,9 +23,11 @@ def export_of_run(
     expect_known(params, "band", band)
     expect_known(params, "method", method)
     found, layout = Identification.of_run(band, method), Layout()
+    out = out or layout.data / "exports" / band / to
+    expect_writable(out)
     there = layout.episode(band).is_dir()
     episode = Episode.load_all(layout.episodes(band))[0] if there else None
-    done = export(found, to, out or layout.data / "exports" / band / to, episode=episode)
+    done = export(found, to, out, episode=episode)
     return done.folder, done.card
 
 

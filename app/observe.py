@@ -10,6 +10,7 @@ import numpy as np
 
 from app import evidence, safety
 from app.flow import child
+from app.flow.disk import expect_ready
 from app.launch import expect_above_floor
 from app.safety import Hazard
 from pipeline.base.errors import UserError
@@ -58,6 +59,8 @@ def observe(
     layout = Layout(Path(root))
     expect_above_floor(params, draw)
     stage = policy_stage(params, band, method) if run else None
+    if run:
+        expect_ready(layout.root)
     number = evidence.add(layout, band, [(*draw, error, landing)])
     answer = {"file": str(layout.evidence / f"{band}.csv"), "launches": number}
     answer["before"] = known(params, band, method, draw, layout.root, error)

@@ -6,4 +6,7 @@ cores. Our own threads, which change no bit, are as many as SLING_WORKERS says.
 
 import os
 
+from pipeline.base import home
+
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # NumPy's and SciPy's; read when they are imported
+home.settle()

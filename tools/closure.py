@@ -39,8 +39,8 @@ def folders(script: Path, root: Path = ROOT) -> list[str]:
 
 
 def script_of(stage: dict, root: Path = ROOT) -> Path:
-    """The script of `python -m stages.NAME ...`."""
-    return root / (stage["cmd"].split()[2].replace(".", "/") + ".py")
+    """The script of `sh stages/run.sh NAME ...`."""
+    return root / "stages" / f"{stage['cmd'].split()[2]}.py"
 
 
 def main() -> int:

@@ -10,6 +10,7 @@ from pathlib import Path
 from app.drift.change import FALSE_ALARM, ChangeOfBand, changes, newest
 from app.drift.picture import over_time
 from app.drift.recordings import COMPARED, IdentifiedRecording, identified, in_time
+from app.flow.disk import expect_writable
 from app.sizes import DIAMETER, REST_LENGTH
 from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
@@ -51,6 +52,7 @@ def drift(settings: Settings, band: str, root: Path | str = ".") -> dict:
             f"{layout.raw(band)}: holds {'one recording' if files else 'no recording'}, two or more"
             f" are needed; `sling add-recording --band {band} FILE.mcap` adds one"
         )
+    expect_writable(written, written.with_suffix(".png"))
     about, sizes = environment("cpu", f"sling drift {band}"), settings.bands[band]
     own = Band(sizes.mass, sizes.diameter, sizes.rest_length, band)
     found = identified(files, own, settings, about["code"], written)

@@ -12,6 +12,7 @@ from pathlib import Path
 from app import evidence
 from app.fit.countdown import Countdown
 from app.flow import child
+from app.flow.disk import expect_ready
 from app.flow.graph import leading_to, stages_of
 from app.preflight.add_band import NAME, add_band
 from app.preflight.recordings import add_recording, digests, renew_masks
@@ -68,6 +69,7 @@ def fit(
     file_of(layout.evidence, name, [*params.bands, name])
     expect_apart(layout, name)
     evidence.joined(layout, name, told, again=True)  # what is wrong is said before any change
+    expect_ready(root)
     if recordings:
         say(printable(f"checking {', '.join(map(str, recordings))}"))
         say(brought_in(params, layout, recordings, name, band))

@@ -1,21 +1,33 @@
-"""Whether a disk has room; for what fails without it rarely says so."""
+"""Whether a project can be written: asked before a command changes anything in it.
+
+What fails later without rarely says so.
+"""
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
-from errno import ENOSPC
 from pathlib import Path
 
-from pipeline.base.errors import UserError
+from pipeline.base.errors import UserError, refused
 
 ROOM = 1_000_000  # bytes at least, with which Prefect's server, DVC and their locks can write
+WRITTEN = (  # by stages and by DVC, `*` for a band; recordings lie where they lie
+    "dvc.lock",
+    ".dvc/tmp/*",
+    ".dvc/cache/files/md5",
+    "data/[!r]*/*",
+    "data/[!r]*",
+    "reports/bands/*",
+    "reports",
+)
 
 
 def expect_room(folder: Path) -> None:
     """Raises UserError where the disk of `folder` is full."""
     if shutil.disk_usage(folder).free < ROOM:
-        raise UserError(f"{folder}: cannot be written ({os.strerror(ENOSPC)})")
+        raise UserError(refused(OSError(errno.ENOSPC, "", str(folder))))
 
 
 def with_disk(reason: str, folder: Path) -> str:
@@ -23,5 +35,39 @@ def with_disk(reason: str, folder: Path) -> str:
     try:
         expect_room(folder)
     except UserError as full:
-        return reason if os.strerror(ENOSPC) in reason else f"{reason}; {full}"
+        return reason if os.strerror(errno.ENOSPC) in reason else f"{reason}; {full}"
     return reason
+
+
+def expect_writable(*paths: Path) -> None:
+    """Raises UserError where one of them, or the folder that is to hold it, cannot be written."""
+    for path in paths:
+        there = path
+        while not os.path.lexists(there) and there != there.parent:
+            there = there.parent
+        if not os.access(there, os.W_OK | os.X_OK if there.is_dir() else os.W_OK):
+            fixed = os.statvfs(there).f_flag & os.ST_RDONLY
+            what = errno.EROFS if fixed else errno.EACCES
+            raise UserError(refused(OSError(what, "", str(there))))
+
+
+def expect_ready(root: Path) -> None:
+    """Have DVC work in a project. Raises UserError where stages could not write what they make."""
+    found = [path for pattern in WRITTEN for path in sorted(root.glob(pattern))]
+    expect_writable(root, root / ".dvc" / "tmp", *found)
+    expect_room(root)
+    _without_git(root)
+
+
+def _without_git(root: Path) -> None:
+    """Tell DVC, for this copy alone, where a project has no Git: it was unpacked from a ZIP."""
+    from dvc.config import Config
+
+    folders = (root.resolve(), *root.resolve().parents)
+    dvc = root / ".dvc"
+    if any((one / ".git").exists() for one in folders) or not dvc.is_dir():
+        return
+    config = Config(str(dvc))
+    if not config["core"].get("no_scm"):
+        with config.edit("local") as local:
+            local.setdefault("core", {})["no_scm"] = True

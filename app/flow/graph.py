@@ -13,7 +13,7 @@ from operator import getitem
 from pathlib import Path
 from threading import Lock
 
-from pipeline.base.errors import UserError, one_line
+from pipeline.base.errors import UserError, one_line, refused
 
 
 @dataclass(frozen=True)
@@ -234,3 +234,7 @@ def _clear() -> Iterator[None]:
         ) from error
     except DvcException as error:
         raise UserError(f"DVC: {one_line(error)}") from error
+    except OSError as error:
+        if not (line := refused(error)):
+            raise
+        raise UserError(line) from error

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from app.flow import child, guard
+from app.flow.disk import expect_ready
 from app.flow.graph import Graph
 from app.flow.scheduler import Scheduler, width
 from app.flow.tasks import Place, Tasks, lasted, perform, say
@@ -100,6 +101,7 @@ def alone(root: Path) -> Iterator[None]:
     folder = root / ".dvc"
     if not (folder.is_dir() and (root / "dvc.yaml").is_file()):
         raise UserError(f"{root}: no dvc.yaml and .dvc/ here; run it in the project's folder")
+    expect_ready(root)
     (folder / "tmp").mkdir(exist_ok=True)
     with (folder / "tmp" / "flow.lock").open("w") as file:
         deadline = time.monotonic() + guard.GRACE + 4

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from app.flow import guard
-from app.flow.disk import expect_room
+from app.flow.disk import expect_room, expect_writable
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
 
@@ -56,17 +56,19 @@ def environment(root: Path) -> dict[str, str]:
         "PREFECT_INTERNAL_LOGGING_LEVEL": "CRITICAL",  # no words of a server that is gone
         "PREFECT_LOGGING_TO_API_BATCH_INTERVAL": "1",  # s, until lines show
         "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL": "CRITICAL",  # the flow prints for itself
-    } | {name: _not_by_proxy(name) for name in ("no_proxy", "NO_PROXY")}
-
-
-def _not_by_proxy(name: str) -> str:
-    others = [one for one in os.environ.get(name, "").split(",") if one and one != HOST]
-    return ",".join([*others, HOST])
+    }
 
 
 def clean(root: Path) -> dict[str, str]:
-    """This process's environment with the project's Prefect settings and nobody else's."""
-    kept = {name: text for name, text in os.environ.items() if not name.startswith("PREFECT_")}
+    """This process's environment with the project's Prefect settings and nobody else's.
+
+    Without proxies: the server is here, and Prefect's client refuses to start by those of SOCKS.
+    """
+    kept = {
+        name: text
+        for name, text in os.environ.items()
+        if not name.startswith("PREFECT_") and not name.lower().endswith("_proxy")
+    }
     return kept | environment(root)
 
 
@@ -104,6 +106,7 @@ def serve(root: Path, port: int | None = None) -> str:
         return f"the UI of this project runs already: {where}"
     port = PORT if port is None else port
     expect_free(port)
+    expect_writable(home(root), *home(root).glob("*"))
     note = home(root) / "port"
     with contextlib.suppress(KeyboardInterrupt), _server(root, port) as server:
         write_text(note, str(port))

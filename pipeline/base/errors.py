@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import sys
 from collections.abc import Callable
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # a disk that takes no more
+DENIED = (errno.EACCES, errno.EPERM, errno.EROFS)  # a file that is another user's, a fixed disk
 
 
 class UserError(Exception):
@@ -26,8 +28,40 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
+def refused(error: OSError) -> str | None:
+    """What a file system does not let us do, and how to mend it; None for any other error."""
+    if error.errno not in (*FULL, *DENIED):
+        return None
+    why, path = os.strerror(error.errno), error.filename
+    if path is None:  # pyarrow has it in its words
+        return f"a file cannot be written ({one_line(error.strerror or error)})"
+    path = os.fsdecode(path) if isinstance(path, str | bytes) else str(path)
+    if error.errno in FULL:
+        return f"{path}: cannot be written ({why})"
+    if error.errno == errno.EROFS:
+        return f"{path}: cannot be written ({why}): copy the project to a disk that can be written"
+    return f"{path}: may not be read or written here ({why}){_whose(path)}"
+
+
+def _whose(path: str) -> str:
+    """To whom the file belongs, or the folder that is to hold it, where that is another user."""
+    there = os.path.abspath(path)
+    while not os.path.lexists(there):
+        there = os.path.dirname(there)
+    owner, us = os.lstat(there).st_uid, os.geteuid()
+    if owner == us:
+        return ""
+    return f": {there} is user {owner}'s, you are {us}; have it yours (chown), or copy the project"
+
+
 def run(main: Callable[[], int | None]) -> None:
-    """Run a command: a UserError, or a full disk, becomes one line on stderr and exit status 1."""
+    """Run a command: a UserError, or what a disk refuses, is one line on stderr, exit status 1.
+
+    What a terminal's encoding has not is written as Python writes it, such as \\u03b8.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         status = main()
         sys.stdout.flush()
@@ -38,10 +72,9 @@ def run(main: Callable[[], int | None]) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except OSError as error:
-        if error.errno not in FULL:
+        if not (line := refused(error)):
             raise
-        what = f"{error.filename}:" if error.filename else "a file"
-        print(f"error: {what} cannot be written ({os.strerror(error.errno)})", file=sys.stderr)
+        print(f"error: {printable(line)}", file=sys.stderr)
         sys.exit(1)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)

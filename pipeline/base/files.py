@@ -14,14 +14,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
-from pipeline.base.errors import FULL, UserError
+from pipeline.base.errors import UserError, refused
 
 
 @contextmanager
 def replacing_folder(path: Path) -> Iterator[Path]:
     """Give an empty folder beside `path`, which takes its place on success, whatever was there.
 
-    What killed processes left of `path` is removed too. Raises UserError where the disk is full.
+    What killed processes left of `path` is removed too. Raises UserError where the disk is full, or refuses.
     """
     path = Path(path)
     with _temporary(path) as temporary:
@@ -38,7 +38,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
 def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary path beside `path`; rename it to `path` on success, remove it on failure.
 
-    What killed processes left of `path` is removed too. Raises UserError where the disk is full.
+    What killed processes left of `path` is removed too. Raises UserError where the disk is full, or refuses.
     """
     path = Path(path)
     with _temporary(path) as temporary:
@@ -57,11 +57,13 @@ def _temporary(path: Path) -> Iterator[Path]:
         _remove_abandoned(path)
         yield temporary
     except OSError as error:
-        if error.errno not in FULL:
+        said = OSError(error.errno, error.strerror, str(path))  # not by its temporary name
+        if not (line := refused(said)):
             raise
-        raise UserError(f"{path}: cannot be written ({os.strerror(error.errno)})") from error
+        raise UserError(line) from error
     finally:
-        shutil.rmtree(temporary, True) if temporary.is_dir() else temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # on a disk that is fixed
+            shutil.rmtree(temporary) if temporary.is_dir() else temporary.unlink(missing_ok=True)
 
 
 def _sync(path: Path) -> None:

@@ -15,6 +15,8 @@ from typing import Any, TypeVar
 
 import warp as wp
 
+from pipeline.base import home
+
 wp.config.log_level = wp.LOG_ERROR
 wp.config.enable_backward = False
 # The CPU's own vectors, but no fused multiply-add: with lanes of a fixed number and no function of
@@ -31,6 +33,7 @@ def start() -> None:
 
     Whoever asks for a GPU there is told by `machine.named`. The warning is a line of native code.
     """
+    home.settle()
     if any(map(_loads, DRIVERS)):
         wp.init()
         return

@@ -16,6 +16,9 @@ is a `UserError` of one line.
 
 from importlib.metadata import PackageNotFoundError, version
 
+from sling2sim2real import own  # noqa: F401 - before all that imports `pipeline`
+
+# isort: split
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.launches import Observed

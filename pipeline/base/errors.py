@@ -57,7 +57,7 @@ def _whose(path: str) -> str:
 def run(main: Callable[[], int | None]) -> None:
     """Run a command: a UserError, or what a disk refuses, is one line on stderr, exit status 1.
 
-    What a terminal's encoding has not is written as Python writes it, such as \\u03b8.
+    What a terminal's encoding has not is written as Python writes it, by an escape.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

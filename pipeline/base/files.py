@@ -21,7 +21,7 @@ from pipeline.base.errors import UserError, refused
 def replacing_folder(path: Path) -> Iterator[Path]:
     """Give an empty folder beside `path`, which takes its place on success, whatever was there.
 
-    What killed processes left of `path` is removed too. Raises UserError where the disk is full, or refuses.
+    What killed processes left of `path` is removed too. Raises UserError where the disk refuses.
     """
     path = Path(path)
     with _temporary(path) as temporary:
@@ -38,7 +38,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
 def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary path beside `path`; rename it to `path` on success, remove it on failure.
 
-    What killed processes left of `path` is removed too. Raises UserError where the disk is full, or refuses.
+    What killed processes left of `path` is removed too. Raises UserError where the disk refuses.
     """
     path = Path(path)
     with _temporary(path) as temporary:

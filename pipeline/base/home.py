@@ -1,4 +1,4 @@
-"""A home for the caches of libraries where the user has none: no HOME, no name, a fixed or full disk.
+"""A place for the caches of libraries where the user has none: no HOME, no name, a full disk.
 
 Containers start with a user's number alone, `docker -u 1234`. Warp, Matplotlib, DVC and others keep
 compiled kernels, fonts and states under HOME, or make a folder that is called `~`.

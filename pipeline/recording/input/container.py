@@ -37,6 +37,9 @@ from pipeline.recording.input.words import counted, few
 MOST = 2**30  # bytes of messages that are held at once
 OVERHEAD = 256  # bytes that a message costs beside its payload
 BULKY = re.compile("PointCloud|LaserScan|OccupancyGrid|CompressedVideo")  # counted, not kept
+IDLE = re.compile(
+    r"(?<![a-z])(infra|ir|fisheye|mask|debug)(?![a-z])"
+)  # of cameras that play no role
 LONGEST = 86_400 * 10**9  # ns that a recording lasts
 KEPT = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 NO_SCHEMA = kinds.Schema(id=0, data=b"", encoding="", name="")
@@ -125,6 +128,7 @@ class _Contents:
     channels: dict[int, Channel] = field(default_factory=dict)  # by number, not yet named
     ambiguous: Counter[int] = field(default_factory=Counter)  # dropped of numbers with two topics
     held: int = 0  # bytes of messages
+    shed: bool = False  # whether messages of IDLE topics are left empty, for want of room
     checked: int = 0  # chunks that have a checksum
     aside: list[Record] = field(default_factory=list)  # believed only where there are no checksums
     disbelieved: int = 0
@@ -228,14 +232,22 @@ class _Contents:
         known = self.definitions.get(number)
         schema = self.schemas.get(known.schema_id) if known else None
         bulky = schema and BULKY.search(schema.name)
+        bulky = bulky or (self.shed and known and IDLE.search(known.topic.lower()))
         payload = b"" if bulky else data[start + of.MESSAGE.size : end]
-        self._hold(len(payload) + OVERHEAD)
         channel = self.channels.setdefault(number, Channel("", NO_SCHEMA, ""))
         channel.log_times.append(log_time)
         channel.payloads.append(payload)
+        self._hold(len(payload) + OVERHEAD)
 
     def _hold(self, size: int) -> None:
         self.held += size
+        if self.held > MOST and not self.shed:
+            self.shed = True
+            for number, channel in self.channels.items():
+                known = self.definitions.get(number)
+                if known and IDLE.search(known.topic.lower()):
+                    self.held -= sum(map(len, channel.payloads))
+                    channel.payloads[:] = [b""] * len(channel.payloads)
         if self.held > MOST:
             raise UserError(
                 f"{self.path}: holds more than {MOST / 2**30:.0f} GiB of messages: record only the"
@@ -316,6 +328,14 @@ class _Contents:
     def _notes(self, trusted: bool) -> list[str]:
         """What costs none; `trusted`: whether the file's summary can be believed."""
         notes = []
+        if self.shed:
+            left = [
+                one.topic for one in self.definitions.values() if IDLE.search(one.topic.lower())
+            ]
+            notes.append(
+                f"more than {MOST / 2**30:.0f} GiB of messages: without those of"
+                f" {few(sorted(left), NAMED)}"
+            )
         crcs = self.checked or (self.data_end and self.data_end.content.data_section_crc)
         if not crcs:
             notes.append("no checksums in the file: damage to its messages would not be noticed")

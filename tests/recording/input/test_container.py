@@ -19,6 +19,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.writer import CompressionType, IndexType, Writer
 
 from pipeline.base.errors import UserError
+from pipeline.recording.input import container
 from pipeline.recording.input.container import read_container
 from pipeline.recording.input.records import MAGIC
 
@@ -212,6 +213,23 @@ def test_large_types_that_no_role_has_are_counted_only(tmp_path) -> None:
     cloud = kinds.Schema(id=1, data=b"", encoding="ros2msg", name="sensor_msgs/msg/PointCloud2")
     found = read(tmp_path, chunk([cloud, channel(), message(0)]))
     assert found.channels[0].payloads == [b""] and times(found) == [0]
+
+
+def test_cameras_that_play_no_role_give_way_where_a_file_is_too_large(
+    tmp_path, monkeypatch
+) -> None:
+    """What `ros2 bag record -a` takes of a RealSense: two infrared cameras beside what is used."""
+    monkeypatch.setattr(container, "MOST", 3000)
+    idle, used = bytes(1000), bytes(300)
+    topics = [SCHEMA, channel(), channel(2, "/camera/infra1/image_raw"), channel(3, "/airy")]
+    sent = [message(k, 1 + k % 2, (used, idle)[k % 2]) for k in range(6)]
+    found = read(tmp_path, *topics, *sent, message(6, 3))
+    kept = {one.topic: {*map(len, one.payloads)} for one in found.channels}
+    assert kept == {"/x": {300}, "/camera/infra1/image_raw": {0}, "/airy": {8}}
+    assert times(found, "/camera/infra1/image_raw") == [1, 3, 5]
+    assert any("without those of /camera/infra1/image_raw" in note for note in found.notes)
+    with pytest.raises(UserError, match="holds more than"):
+        read(tmp_path, *topics, *(message(k, 1, idle) for k in range(3)))
 
 
 BOMBS = """

@@ -1,0 +1,335 @@
+"""Every command where something is not as it should be: no traceback, and nothing half changed.
+
+    python -m validation.campaigns.conditions --workers 2
+
+Each cell is a copy of a small finished project, in which one command runs under one condition: on a
+read-only disk, as another user, without an active environment, and so on. It ends as is expected,
+says at most one line of error, and where it refuses, Git sees no change. It writes
+reports/validation/conditions.json; a run that was killed goes on where it was. Only root may mount
+disks and be other users, so only root can run it.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pipeline.base import errors
+from pipeline.base.code import ROOT, digests
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_json
+from validation.benchmarks.timing import environment
+from validation.campaigns import runner
+from validation.campaigns.runner import Result, ResultLines
+from validation.projects import SLING, TINY, ProjectCopy, copy_project, run_of
+
+WORK, REPORT = Path("build/conditions"), Path("reports/validation/conditions.json")
+LIMIT = 900.0  # s for a command
+TOLD = 600  # characters of what a command said
+USER = 1234  # who has no name and owns nothing
+# What only it may do is read: Python itself may lie where only root looks.
+AS_USER = (
+    *("setpriv", f"--reuid={USER}", f"--regid={USER}", "--clear-groups"),
+    *("--inh-caps=+dac_read_search", "--ambient-caps=+dac_read_search"),
+)
+DRAW = "--draw=-0.30,-0.15"
+COMMANDS = {
+    "fit": "fit mine.mcap --mass 0.023 --name new",
+    "add-band": "add-band new --recording more.mcap --mass 0.023",
+    "add-recording": "add-recording --band band1 more.mcap",
+    "drift": "drift mine",
+    "check": "check mine.mcap",
+    "plan": "plan --band band1 --recording mine.mcap",
+    "launch": f"launch --theta data/theta/band1/least_squares.json --band band1 {DRAW}",
+    "aim": "aim --band band1 --target 1.925 --force",
+    "observe": f"observe --band band1 {DRAW} --landing 1.85",
+    "export": "export --band band1 --to yaml",
+    "flow": "flow",
+    "ui": "ui --port {port}",
+    "verify": "verify --device cuda:9",  # refused anywhere: it takes too long for each cell
+    "bench": "bench --recording mine.mcap",
+    "figures": "figures",
+    "dvc repro": "repro --force --single-item theta@band1-least_squares",
+}
+SHOW = {"check", "launch", "aim", "bench", "figures"}  # they write nothing
+
+
+@dataclass(frozen=True)
+class Cell:
+    condition: str
+    command: str
+
+
+@dataclass
+class Place:
+    """Where a cell's command runs.
+
+    Attributes:
+        folder: Of the cell: the copy of the project, temporary files.
+        copy: The project.
+        environment: The whole of it.
+        prefix: What stands before the command.
+        port: For `sling ui`.
+    """
+
+    folder: Path
+    copy: Path
+    environment: dict[str, str]
+    port: int
+    prefix: list[str] = field(default_factory=list)
+    held: ExitStack = field(default_factory=ExitStack)
+
+
+CONDITIONS: dict[str, Callable[[Place], None]] = {}
+
+
+def condition(function: Callable[[Place], None]) -> Callable[[Place], None]:
+    """Put one into the table, under its own name."""
+    CONDITIONS[function.__name__.replace("_", " ")] = function
+    return function
+
+
+def mounted(place: Path, how: str) -> list[str]:
+    """A prefix that mounts something, for the command alone."""
+    return ["unshare", "-m", "sh", "-c", f'{how} && cd "$PWD" && exec "$@"', str(place)]
+
+
+@condition
+def read_only_project(at: Place) -> None:
+    how = 'mount --bind "$0" "$0" && mount -o remount,bind,ro "$0"'
+    at.prefix += mounted(at.copy, how)
+
+
+@condition
+def project_of_another_user(at: Place) -> None:
+    at.prefix += AS_USER
+    at.environment |= {"HOME": "/", "TMPDIR": "/tmp"}
+    del at.environment["DVC_SITE_CACHE_DIR"]
+
+
+@condition
+def no_active_environment(at: Place) -> None:
+    at.environment["PATH"] = "/usr/bin:/bin"
+
+
+@condition
+def temporary_folder_full_and_noexec(at: Place) -> None:
+    how = 'mount -t tmpfs -o noexec,size=64k tmpfs "$0" && { head -c 1M /dev/zero >"$0"/x'
+    at.prefix += mounted(at.folder / "tmp", f"{how} 2>/dev/null || true; }}")
+
+
+@condition
+def no_compiler(at: Place) -> None:
+    tools = at.folder / "tools"
+    tools.mkdir()
+    for name in ("sh", "git", "env", "uname", "dirname"):
+        (tools / name).symlink_to(shutil.which(name) or name)
+    at.environment["PATH"] = f"{Path(sys.executable).parent}:{tools}"
+    at.environment["XDG_CACHE_HOME"] = str(at.folder.parent / "kernels")  # none is compiled yet
+
+
+@condition
+def no_home_and_no_name(at: Place) -> None:
+    subprocess.run(["chown", "-R", f"{USER}:{USER}", at.folder], check=True)
+    at.prefix += AS_USER
+    del at.environment["HOME"]
+    for name in ("USER", "LOGNAME", "DVC_SITE_CACHE_DIR"):
+        at.environment.pop(name, None)
+
+
+@condition
+def locale_c(at: Place) -> None:
+    words = {"LC_ALL": "C", "LANG": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    at.environment |= words | {"PYTHONIOENCODING": "ascii:strict"}
+
+
+@condition
+def odd_path(at: Place) -> None:
+    at.copy = at.copy.rename(at.folder / "dürers α 50% #1's [x] $HOME")
+
+
+@condition
+def port_in_use(at: Place) -> None:
+    server = at.held.enter_context(socket.create_server(("127.0.0.1", 0)))
+    at.port = server.getsockname()[1]
+
+
+@condition
+def no_git(at: Place) -> None:
+    shutil.rmtree(at.copy / ".git")
+
+
+@condition
+def socks_proxy(at: Place) -> None:
+    names = ("ALL_PROXY", "all_proxy", "HTTP_PROXY", "http_proxy")
+    at.environment |= dict.fromkeys(names, "socks://127.0.0.1:1")
+
+
+def expected(cell: Cell) -> bool:
+    """Whether the command is to succeed."""
+    if cell.condition in ("read only project", "project of another user"):
+        return cell.command in SHOW
+    alone = {"port in use": "ui", "no git": "dvc repro"}  # DVC itself wants Git, or to be told
+    return cell.command not in ("verify", alone.get(cell.condition))
+
+
+def template(work: Path) -> Path:
+    """A finished project with the bands `band1`, of the rig, and `mine`, of two recordings."""
+    folder, temporary = work / "project", work / "project.tmp"
+    if folder.is_dir():
+        return folder
+    shutil.rmtree(temporary, ignore_errors=True)
+    temporary.mkdir(parents=True)
+    copy_project(temporary)
+    (temporary / ".venv").symlink_to(sys.prefix)
+    copy = ProjectCopy(temporary)
+    copy.set(TINY | run_of(["band1"], ["least_squares"]))
+    for seed, name in ((2, "more"), (1, "mine")):
+        copy.set({"rig.seed": seed})
+        copy(sys.executable, "-m", "stages.record", "band1")
+        shutil.copy(temporary / "data/raw/band1/band1.mcap", temporary / f"{name}.mcap")
+    copy.commit()
+    for words in (
+        "add-band mine --recording mine.mcap more.mcap --mass 0.023",
+        "drift mine",
+        "flow",
+    ):
+        print(f"project: {words}", flush=True)
+        copy(*SLING, *words.split())
+    copy.commit()
+    temporary.rename(folder)
+    return folder
+
+
+def words_of(cell: Cell, port: int) -> list[str]:
+    """The command line."""
+    words = COMMANDS[cell.command].format(port=port).split()
+    start = (sys.executable, "-m", "dvc") if cell.command == "dvc repro" else SLING
+    return [*start, *words]
+
+
+def run(cell: Cell, work: Path) -> Result:
+    """Run a cell; what was wrong is under `faults`."""
+    folder = work / f"{cell.condition} {cell.command}".replace(" ", "-")
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "tmp").mkdir(parents=True)
+    subprocess.run(["cp", "-a", work / "project", folder / "copy"], check=True)
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    own = ProjectCopy(folder / "copy", TMPDIR=str(folder / "tmp")).environment
+    own.pop("PYTHONPATH")
+    at, log = Place(folder, folder / "copy", own, port), work / f"{folder.name}.txt"
+    CONDITIONS[cell.condition](at)
+    start = time.monotonic()
+    with at.held, log.open("w") as said:
+        command = [*at.prefix, *words_of(cell, at.port)]
+        process = subprocess.Popen(
+            command, cwd=at.copy, env=at.environment | {"PWD": str(at.copy)},
+            stdin=subprocess.DEVNULL, stdout=said, stderr=subprocess.STDOUT, start_new_session=True,
+        )  # fmt: skip
+        status = ended(process, log)
+    text = log.read_text(encoding="utf-8", errors="replace")
+    faults = faults_of(cell, status, text)
+    if not expected(cell) and (changed := changes(at.copy)):
+        faults.append(f"Git sees {changed}")
+    if not faults:
+        shutil.rmtree(folder)
+    lines = [line for line in text.splitlines() if line.lower().startswith("error: ")]
+    seconds = round(time.monotonic() - start, 1)
+    told = [line.replace(str(folder), "...") for line in lines[-1:]]
+    return vars(cell) | {"status": status, "seconds": seconds, "said": told, "faults": faults}
+
+
+def ended(process: subprocess.Popen, log: Path) -> int | None:
+    """Its exit status; None where it takes too long. What serves is interrupted."""
+    latest = time.monotonic() + LIMIT
+    while process.poll() is None and time.monotonic() < latest:
+        time.sleep(0.2)
+        if "(Ctrl-C ends it)" in log.read_text(errors="replace"):
+            os.killpg(process.pid, signal.SIGINT)
+            return process.wait(60)
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        return None
+    return process.returncode
+
+
+def faults_of(cell: Cell, status: int | None, text: str) -> list[str]:
+    """What is wrong with how a command ended, and with what it said."""
+    lines = [line for line in text.splitlines() if line.lower().startswith("error: ")]
+    faults = []
+    if (status == 0) != expected(cell) or (status not in (0, 1) and cell.command != "dvc repro"):
+        faults.append(f"status {status}: {text[-TOLD:]}")
+    if "Traceback" in text:
+        faults.append(f"a traceback: {text[-TOLD:]}")
+    if expected(cell) and lines:
+        faults.append(f"an error, and status 0: {lines[0]}")
+    if not expected(cell) and len(lines) != 1 and cell.command != "dvc repro":
+        faults.append(f"{len(lines)} lines of error: {text[-TOLD:]}")
+    return faults
+
+
+def changes(copy: Path) -> str:
+    """What Git sees, in a line; nothing where there is no Git."""
+    if not (copy / ".git").is_dir():
+        return ""
+    asked = ["git", "-c", "safe.directory=*", "status", "--porcelain"]
+    return " ".join(subprocess.run(asked, cwd=copy, capture_output=True, text=True).stdout.split())
+
+
+def report(results: list[Result]) -> dict:
+    """What the JSON holds, but for what it belongs to."""
+    faults = [one for one in results if one["faults"]]
+    return {
+        "cells": len(results),
+        "conditions": dict(Counter(str(one["condition"]) for one in results)),
+        "refused": sum(one["status"] != 0 for one in results),
+        "met": not faults,
+        "results": results,
+    }
+
+
+def main() -> int:
+    options = runner.parser(__doc__ or "", REPORT, WORK)
+    options.add_argument("--only", metavar="WORD", default="", help="cells with it in their names")
+    given = options.parse_args()
+    if os.geteuid() != 0:
+        raise UserError("only root can mount disks and be other users: sudo")
+    work = given.work.resolve()
+    template(work)
+    lines = ResultLines(work / "results.jsonl")
+    cells = [Cell(condition, command) for condition in CONDITIONS for command in COMMANDS]
+    cells = [one for one in cells if given.only in f"{one.condition}: {one.command}"]
+    there = lines.of(Cell)
+
+    def one(cell: Cell) -> None:
+        if cell not in there or there[cell]["faults"]:
+            lines.add(result := run(cell, work))
+            print(
+                f"{cell.condition}: {cell.command}: {result['faults'] or 'as expected'}", flush=True
+            )
+
+    with ThreadPoolExecutor(given.workers) as pool:
+        [*pool.map(one, cells)]
+    found = [lines.of(Cell)[cell] for cell in cells]
+    if not given.only:
+        about = environment("cpu", "python -m validation.campaigns.conditions")
+        code = digests(Path(__file__), ROOT / "app/cli.py")
+        write_json(given.report, about | {"code": code} | report(found))
+    return int(any(one["faults"] for one in found))
+
+
+if __name__ == "__main__":
+    errors.run(main)

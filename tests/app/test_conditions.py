@@ -1,0 +1,118 @@
+"""Three commands where the project may not be written; the grid of all is a campaign."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from dvc.config import Config
+
+from app import cli, command_line  # noqa: F401 - which fills the table
+from app.flow.disk import expect_ready
+from pipeline.base.errors import UserError
+from tests.project import ROOT, python
+from validation.campaigns.conditions import COMMANDS, CONDITIONS, Cell, expected, faults_of
+from validation.projects import SLING, environment
+
+# Root writes what is marked read-only, but for this.
+WITHOUT_POWER = ("setpriv", "--bounding-set=-dac_override,-dac_read_search")
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """As much of a project as commands look at first."""
+    folder = tmp_path / "project"
+    for name in (".dvc/tmp", "data/evidence"):
+        (folder / name).mkdir(parents=True)
+    (folder / "params.yaml").write_bytes((ROOT / "params.yaml").read_bytes())
+    (folder / "mine.mcap").write_text("is looked at later")
+    subprocess.run(["git", "init", "-q"], cwd=folder, check=True)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "fit mine.mcap --mass 0.023",
+        "observe --band band1 --draw=-0.30,-0.15 --landing 1.85",
+        "ui --port 43217",
+    ],
+)
+def test_a_project_that_may_not_be_written_is_refused_in_one_line(
+    project: Path, words: str
+) -> None:
+    prefix = WITHOUT_POWER if os.geteuid() == 0 else ()
+    for one in (*project.rglob("*"), project):
+        one.chmod(one.stat().st_mode & ~0o222)
+    before = {one: one.stat().st_mtime_ns for one in project.rglob("*")}
+    known = environment(TMPDIR="/tmp", PYTHONDONTWRITEBYTECODE="1", HOME="/")
+    command, about = [*prefix, *SLING, *words.split()], {"capture_output": True, "text": True}
+    done = subprocess.run(command, cwd=project, env=known, timeout=240, **about)
+    assert (done.returncode, done.stdout) == (1, ""), done.stderr
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("error: ") and "may not be read or written here" in line
+    assert {one: one.stat().st_mtime_ns for one in project.rglob("*")} == before
+
+
+def test_a_project_without_git_is_told_to_dvc(project: Path) -> None:
+    """It was unpacked from a ZIP: DVC would refuse, once data are there."""
+    expect_ready(project)
+    assert not (project / ".dvc/config.local").exists()
+    subprocess.run(["rm", "-rf", project / ".git"], check=True)
+    expect_ready(project)
+    expect_ready(project)
+    assert Config(str(project / ".dvc"))["core"]["no_scm"] is True
+
+
+def test_a_full_disk_is_told_before_anything_changes(project: Path, monkeypatch) -> None:
+    monkeypatch.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=0))
+    with pytest.raises(UserError, match="cannot be written .No space left on device"):
+        expect_ready(project)
+
+
+def test_the_help_of_a_stream_that_has_no_theta() -> None:
+    done = python("-m", "app", "launch", "--help", PYTHONIOENCODING="ascii:strict")
+    assert (done.returncode, done.stderr) == (0, "") and "\\u03b8 file" in done.stdout
+
+
+def test_an_app_of_the_users_own_is_in_nobodys_way(tmp_path: Path) -> None:
+    """ROS puts the working folder on PYTHONPATH, where a user may have an app.py."""
+    for name in ("app", "pipeline", "stages"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('not this one')\n")
+    code = f"import sys; sys.path.append({str(ROOT)!r})\nfrom sling_command import main; main()"
+    known = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    command = [sys.executable, "-c", code, "--version"]
+    done = subprocess.run(command, cwd=tmp_path, env=known, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "") and done.stdout.startswith("sling2sim2real")
+
+
+def test_a_pipeline_of_the_users_own_is_passed_over_or_named(tmp_path: Path) -> None:
+    own = tmp_path / "pipeline.py"
+    own.write_text("")
+    code = f"import sys; sys.path.append({str(ROOT)!r})\nimport {{}}sling2sim2real as s2s"
+    for first, ends in (("", ""), ("pipeline, ", "or import sling2sim2real first")):
+        command = [sys.executable, "-c", code.format(first)]
+        known = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
+        done = subprocess.run(command, cwd=tmp_path, env=known, capture_output=True, text=True)
+        assert (done.returncode, done.stderr.strip()[-len(ends) or None :]) == (bool(first), ends)
+    assert str(own) in done.stderr
+
+
+def test_the_grid_has_every_command_and_can_fail() -> None:
+    assert {*COMMANDS} - {"dvc repro"} == {*command_line.COMMANDS}
+    assert len(CONDITIONS) >= 9
+    good, bad = Cell("locale c", "check"), Cell("read only project", "fit")
+    assert expected(good) and not expected(bad)
+    assert faults_of(good, 0, "can be used") == [] == faults_of(bad, 1, "error: it may not")
+    for cell, status, text in (
+        (good, 1, "error: it may not"),
+        (good, None, ""),
+        (good, 0, "error: all the same"),
+        (bad, 0, ""),
+        (bad, 2, "error: a word"),
+        (bad, 1, "error: one\nerror: two"),
+        (bad, 1, "Traceback (most recent call last):\nerror: one"),
+    ):
+        assert faults_of(cell, status, text)

@@ -1,0 +1,62 @@
+"""Where caches of libraries lie for a user who has no home, no name, or no room."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.project import python
+
+NAMES = ("HOME", "XDG_CACHE_HOME", "MPLCONFIGDIR", "DVC_SITE_CACHE_DIR", "USER", "LOGNAME")
+# The user's number is nobody's, and the project may not be written.
+ASK = f"""
+import json, os, pwd, sys
+from pathlib import Path
+from pipeline.base import home
+if "--no-name" in sys.argv:
+    def missing(number):
+        raise KeyError("getpwuid(): uid not found")
+    pwd.getpwuid = missing
+if "--no-project" in sys.argv:
+    home.PROJECT = Path("/proc/none")
+home.settle()
+print(json.dumps({{name: os.environ.get(name) for name in {NAMES}}}))
+"""
+
+
+def settled(tmp_path: Path, *how: str, **more: str) -> dict[str, str | None]:
+    clean = dict.fromkeys(NAMES, "") | {"TMPDIR": str(tmp_path)}
+    code = f"import os\nfor n in {NAMES}:\n    if not os.environ[n]: del os.environ[n]\n{ASK}"
+    done = python("-c", code, *how, folder=tmp_path, **(clean | more))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert not (tmp_path / "~").exists()
+    return json.loads(done.stdout)
+
+
+def test_who_has_a_home_keeps_it(tmp_path: Path) -> None:
+    found = settled(tmp_path, HOME=str(tmp_path), USER="me", DVC_SITE_CACHE_DIR=str(tmp_path))
+    assert found["HOME"] == found["DVC_SITE_CACHE_DIR"] == str(tmp_path)
+    assert (found["USER"], found["XDG_CACHE_HOME"], found["MPLCONFIGDIR"]) == ("me", None, None)
+
+
+@pytest.mark.parametrize("home", ["", "/proc", "/nonexistent/of/nobody"])
+def test_who_has_none_gets_a_folder_of_his_own(tmp_path: Path, home: str) -> None:
+    """Not in the project where that may not be written, and never one that is called `~`."""
+    if home == "/nonexistent/of/nobody" and Path("/").stat().st_uid == 0:
+        home = "/proc/nonexistent"  # root may write to /
+    found = settled(tmp_path, "--no-name", "--no-project", HOME=home)
+    (own,) = tmp_path.glob("sling2sim2real-*")
+    assert own.stat().st_mode & 0o777 == 0o700
+    assert found["USER"] and found["USER"].isdigit()
+    if home:
+        assert found["XDG_CACHE_HOME"] == str(own)
+        assert found["MPLCONFIGDIR"] == str(own / "matplotlib")
+    else:
+        assert found["HOME"] == str(own)
+
+
+def test_a_folder_of_that_name_that_others_may_read_is_not_taken(tmp_path: Path) -> None:
+    found = settled(tmp_path, "--no-name", "--no-project")
+    Path(found["HOME"]).chmod(0o777)
+    other = settled(tmp_path, "--no-name", "--no-project")
+    assert other["HOME"] != found["HOME"] and Path(other["HOME"]).parent == tmp_path

@@ -44,6 +44,7 @@ validate: setup       # slow campaigns, and tests by other engines and readers; 
 	.venv/bin/python -m validation.campaigns.mutations
 	.venv/bin/python -m pytest -m validation -n 0 validation/campaigns tests/validation tests/app/flow
 	.venv/bin/python -m validation.campaigns.kills
+	.venv/bin/python -m validation.campaigns.conditions
 
 clean:                # all but data, checkpoints and DVC's cache
 	rm -rf .venv build *.egg-info .hypothesis .pytest_cache .ruff_cache

@@ -70,4 +70,4 @@ def _without_git(root: Path) -> None:
     config = Config(str(dvc))
     if not config["core"].get("no_scm"):
         with config.edit("local") as local:
-            local.setdefault("core", {})["no_scm"] = True
+            local["core"] = {**local.get("core", {}), "no_scm": True}

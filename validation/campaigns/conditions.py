@@ -6,7 +6,7 @@ Each cell is a copy of a small finished project, in which one command runs under
 read-only disk, as another user, without an active environment, and so on. It ends as is expected,
 says at most one line of error, and where it refuses, Git sees no change. It writes
 reports/validation/conditions.json; a run that was killed goes on where it was. Only root may mount
-disks and be other users, so only root can run it.
+disks and be other users; for others these conditions are left out.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from pathlib import Path
 
 from pipeline.base import errors
 from pipeline.base.code import ROOT, digests
-from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from validation.benchmarks.timing import environment
 from validation.campaigns import runner
@@ -63,6 +62,12 @@ COMMANDS = {
     "dvc repro": "repro --force --single-item theta@band1-least_squares",
 }
 SHOW = {"check", "launch", "aim", "bench", "figures"}  # they write nothing
+ROOTS = (
+    "read only project",
+    "project of another user",
+    "temporary folder full and noexec",
+    "no home and no name",
+)
 
 
 @dataclass(frozen=True)
@@ -305,12 +310,14 @@ def main() -> int:
     options = runner.parser(__doc__ or "", REPORT, WORK)
     options.add_argument("--only", metavar="WORD", default="", help="cells with it in their names")
     given = options.parse_args()
-    if os.geteuid() != 0:
-        raise UserError("only root can mount disks and be other users: sudo")
     work = given.work.resolve()
     template(work)
     lines = ResultLines(work / "results.jsonl")
-    cells = [Cell(condition, command) for condition in CONDITIONS for command in COMMANDS]
+    conditions, left = [*CONDITIONS], [] if os.geteuid() == 0 else [*ROOTS]
+    if left:
+        print(f"left out, for only root can do so: {', '.join(left)}; no report is written")
+    conditions = [one for one in conditions if one not in left]
+    cells = [Cell(condition, command) for condition in conditions for command in COMMANDS]
     cells = [one for one in cells if given.only in f"{one.condition}: {one.command}"]
     there = lines.of(Cell)
 
@@ -322,9 +329,10 @@ def main() -> int:
             )
 
     with ThreadPoolExecutor(given.workers) as pool:
-        [*pool.map(one, cells)]
+        for _ in pool.map(one, cells):  # raises what a cell raises
+            pass
     found = [lines.of(Cell)[cell] for cell in cells]
-    if not given.only:
+    if not given.only and not left:
         about = environment("cpu", "python -m validation.campaigns.conditions")
         code = digests(Path(__file__), ROOT / "app/cli.py")
         write_json(given.report, about | {"code": code} | report(found))

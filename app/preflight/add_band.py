@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ruamel.yaml.comments import CommentedMap
 
+from app.flow.disk import expect_writable
 from app.params_file import append, edited
 from app.preflight import recordings as files
 from pipeline.base.errors import UserError
@@ -79,6 +80,7 @@ def add_band(
         files.renew_masks(recordings, there)
         return f"{name} is there already: nothing to do"
 
+    expect_writable(params_path.parent, layout.raw(name))
     reports = files.checked(recordings, after, name)
     if same:
         files.renew_masks(recordings, there)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
+from app.flow.disk import expect_writable
 from app.preflight.check import check_recording
 from app.preflight.report import CheckReport
 from pipeline.base.errors import UserError, printable
@@ -43,6 +44,7 @@ def add_recording(
             raise UserError(f"{file}: is there already, as {same}")
         if target.exists():
             raise UserError(f"{target} is there already: give {file} another name")
+    expect_writable(layout.raw(band))
     reports = checked(recordings, params, band)
     copy(files)
     return told(f"{band}: added to the {len(there)} that were there", reports)

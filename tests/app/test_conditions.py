@@ -13,7 +13,7 @@ from app import cli, command_line  # noqa: F401 - which fills the table
 from app.flow.disk import expect_ready
 from pipeline.base.errors import UserError
 from tests.project import ROOT, python
-from validation.campaigns.conditions import COMMANDS, CONDITIONS, Cell, expected, faults_of
+from validation.campaigns.conditions import COMMANDS, CONDITIONS, ROOTS, Cell, expected, faults_of
 from validation.projects import SLING, environment
 
 # Root writes what is marked read-only, but for this.
@@ -102,7 +102,7 @@ def test_a_pipeline_of_the_users_own_is_passed_over_or_named(tmp_path: Path) -> 
 
 def test_the_grid_has_every_command_and_can_fail() -> None:
     assert {*COMMANDS} - {"dvc repro"} == {*command_line.COMMANDS}
-    assert len(CONDITIONS) >= 9
+    assert len(CONDITIONS) >= 9 and {*ROOTS} < {*CONDITIONS}
     good, bad = Cell("locale c", "check"), Cell("read only project", "fit")
     assert expected(good) and not expected(bad)
     assert faults_of(good, 0, "can be used") == [] == faults_of(bad, 1, "error: it may not")

@@ -51,7 +51,8 @@ def _whose(path: str) -> str:
     owner, us = os.lstat(there).st_uid, os.geteuid()
     if owner == us:
         return ""
-    return f": {there} is user {owner}'s, you are {us}; have it yours (chown), or copy the project"
+    what = "it" if there == os.path.abspath(path) else there
+    return f": {what} is user {owner}'s, you are {us}; have it yours (chown), or copy the project"
 
 
 def run(main: Callable[[], int | None]) -> None:

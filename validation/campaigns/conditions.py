@@ -27,8 +27,8 @@ from pathlib import Path
 
 from pipeline.base import errors
 from pipeline.base.code import ROOT, digests
+from pipeline.base.environment import environment
 from pipeline.base.files import write_json
-from validation.benchmarks.timing import environment
 from validation.campaigns import runner
 from validation.campaigns.runner import Result, ResultLines
 from validation.projects import SLING, TINY, ProjectCopy, copy_project, run_of
@@ -47,7 +47,7 @@ COMMANDS = {
     "fit": "fit mine.mcap --mass 0.023 --name new",
     "add-band": "add-band new --recording more.mcap --mass 0.023",
     "add-recording": "add-recording --band band1 more.mcap",
-    "drift": "drift mine",
+    "drift": "drift --band mine",
     "check": "check mine.mcap",
     "plan": "plan --band band1 --recording mine.mcap",
     "launch": f"launch --theta data/theta/band1/least_squares.json --band band1 {DRAW}",
@@ -207,7 +207,7 @@ def template(work: Path) -> Path:
     copy.commit()
     for words in (
         "add-band mine --recording mine.mcap more.mcap --mass 0.023",
-        "drift mine",
+        "drift --band mine",
         "flow",
     ):
         print(f"project: {words}", flush=True)
@@ -230,6 +230,8 @@ def run(cell: Cell, work: Path) -> Result:
     shutil.rmtree(folder, ignore_errors=True)
     (folder / "tmp").mkdir(parents=True)
     subprocess.run(["cp", "-a", work / "project", folder / "copy"], check=True)
+    if cell.command == "flow":  # else all is fresh, and no server of Prefect's starts
+        (folder / "copy/data/floor/band1.json").unlink()
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     own = ProjectCopy(folder / "copy", TMPDIR=str(folder / "tmp")).environment

@@ -61,7 +61,7 @@ def expect_ready(root: Path) -> None:
 
 def _without_git(root: Path) -> None:
     """Tell DVC, for this copy alone, where a project has no Git: it was unpacked from a ZIP."""
-    from dvc.config import Config
+    from dvc.config import Config, merge
 
     folders = (root.resolve(), *root.resolve().parents)
     dvc = root / ".dvc"
@@ -70,4 +70,4 @@ def _without_git(root: Path) -> None:
     config = Config(str(dvc))
     if not config["core"].get("no_scm"):
         with config.edit("local") as local:
-            local["core"] = {**local.get("core", {}), "no_scm": True}
+            merge(local, {"core": {"no_scm": True}})

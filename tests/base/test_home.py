@@ -2,9 +2,11 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from pipeline.base import home
 from tests.project import python
 
 NAMES = ("HOME", "XDG_CACHE_HOME", "MPLCONFIGDIR", "DVC_SITE_CACHE_DIR", "USER", "LOGNAME")
@@ -53,6 +55,18 @@ def test_who_has_none_gets_a_folder_of_his_own(tmp_path: Path, home: str) -> Non
         assert found["MPLCONFIGDIR"] == str(own / "matplotlib")
     else:
         assert found["HOME"] == str(own)
+
+
+def test_a_full_disk_is_no_home_either(tmp_path: Path, monkeypatch) -> None:
+    """LLVM aborts where it cannot write a kernel."""
+    for name in NAMES:
+        monkeypatch.setenv(name, "")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr(home.tempfile, "gettempdir", lambda: str(tmp_path / "other"))
+    (tmp_path / "other").mkdir()
+    monkeypatch.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=home.ROOM))
+    home.settle()
+    assert Path(home.os.environ["XDG_CACHE_HOME"]).parent == tmp_path / "other"
 
 
 def test_a_folder_of_that_name_that_others_may_read_is_not_taken(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ def bench(arguments: argparse.Namespace) -> Done:
     try:
         what = asked(arguments)
     except argparse.ArgumentTypeError as error:
-        arguments.refuse(str(error))
+        return arguments.refuse(str(error))  # which exits
     return bench(arguments, what)
 
 

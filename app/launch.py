@@ -78,8 +78,10 @@ def _interval(
 ) -> dict:
     """`interval_90_m` of a landing by θ's samples, as `sling aim` has it; {} where θ has none."""
     at = owner(theta)
-    samples = at and load_samples(Layout(root).confidence(band, at[2]), parameters_of(content))
-    if failure or samples is None:
+    if failure or not (at and at[2]):
+        return {}
+    samples = load_samples(Layout(root).confidence(band, at[2]), parameters_of(content))
+    if samples is None:
         return {}
     launcher = simulator(params, band, content, root=root)
     error = params.trials.actuation_error

@@ -195,7 +195,7 @@ def _velocity(time: np.ndarray, path: np.ndarray) -> tuple[np.ndarray, np.ndarra
     period = float(np.median(np.diff(time)))
     grid, even = signal.uniform(time, path, 1 / period)
     size = max(5, 2 * round(VELOCITY_WINDOW / period / 2) + 1)
-    return grid, savgol_filter(even, size, 3, deriv=1, delta=period, axis=0)
+    return grid, np.asarray(savgol_filter(even, size, 3, deriv=1, delta=period, axis=0))
 
 
 def _expect_pull(force: np.ndarray, position: np.ndarray, time: np.ndarray, release: float) -> None:

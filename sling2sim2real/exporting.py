@@ -52,5 +52,5 @@ def export(model: Model, to: str, out: str | Path, *, episode: Episode | None = 
         UserError: No such target, what it needs is missing, the folder holds something else, or
             the band cannot be matched.
     """
-    card = write(model, to, Path(out), episode)
+    card = write(model, to, Path(out), episode)  # pyright: ignore[reportArgumentType]
     return Exported(Path(out), card.get("met"), card)

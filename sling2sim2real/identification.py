@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from pydantic import ValidationError
 
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
-from pipeline.base.layout import Layout
+from pipeline.base.layout import Layout, NotMade
 from pipeline.base.machine import cores, devices, workers
-from pipeline.base.schema import explained, read_json
+from pipeline.base.schema import read_json
 from pipeline.episode.episode import Episode
 from pipeline.episode.pull import launch_history
 from pipeline.identify.clamps import ClampCalibration, calibrate_clamps
@@ -54,6 +53,18 @@ class Interval:
     high: float
     identifiable: bool
     unit: str
+
+
+class _Saved(ThetaFile):
+    """What `Identification.save` writes."""
+
+    sizes: Band
+    mounting: Mounting | None
+    intervals: dict[str, Interval]
+    samples: list[list[float]] | None
+    settled: bool
+    stretch: float | None
+    settings: Settings
 
 
 @dataclass(frozen=True)
@@ -101,23 +112,24 @@ class Identification(Model):
         Raises:
             UserError: There is no such file, or it is damaged.
         """
-        file = read_json(Path(path), ThetaFile)
         try:
-            mounting, samples = file.mounting, file.samples
-            return cls(
-                band=Band(**file.sizes),
-                theta=Theta.of_file(file),
-                mounting=mounting and Mounting.model_validate(mounting),
-                history=file.history and LaunchHistory(**file.history.model_dump()),
-                settings=Settings.model_validate(file.settings),
-                intervals={name: Interval(**one) for name, one in file.intervals.items()},
-                samples=None if samples is None else np.array(samples, float),
-                settled=file.settled,
-                stretch=file.stretch,
-            )
-        except (AttributeError, TypeError, ValueError) as error:
-            said = explained(error, Settings) if isinstance(error, ValidationError) else error
-            raise UserError(f"{path}: was not written by Identification.save ({said})") from error
+            file = read_json(Path(path), _Saved)
+        except NotMade as error:
+            if not Path(path).is_file():
+                raise
+            said = f"was not written by Identification.save ({error.problem})"
+            raise UserError(f"{path}: {said}") from error
+        return cls(
+            band=file.sizes,
+            theta=Theta.of_file(file),
+            mounting=file.mounting,
+            history=file.history and LaunchHistory(**file.history.model_dump()),
+            settings=file.settings,
+            intervals=file.intervals,
+            samples=None if file.samples is None else np.array(file.samples, float),
+            settled=file.settled,
+            stretch=file.stretch,
+        )
 
     @classmethod
     def of_run(cls, band: str, method: str = METHOD, root: str | Path = ".") -> Identification:
@@ -144,7 +156,7 @@ class Identification(Model):
             history=file.history and LaunchHistory(**file.history.model_dump()),
             settings=settings,
             intervals=_intervals(content, told) if told else {},
-            samples=samples and samples.values,
+            samples=None if samples is None else samples.values,
             settled=bool(told and told["settled"]),
             stretch=_stretch(episodes, settings, about),
             changed=tuple(map(str, changed_since(settings, content, method))),
@@ -196,7 +208,8 @@ def identify(
     for episode in episodes:
         launch_history(episode)  # refuses one without a pull
     for launch in launches:
-        if not (launch.landing > 0 and launch.draw[0] < 0 and launch.error >= 0):
+        known_error = launch.error is not None and launch.error >= 0
+        if not (launch.landing > 0 and launch.draw[0] < 0 and known_error):
             raise UserError(
                 f"launches: {launch}: draw y < 0, error >= 0 and landing > 0 are needed"
             )
@@ -226,6 +239,7 @@ def identify(
         workers=workers() or cores(),
         progress=progress,
     ).density
+    assert density is not None  # of a search by least squares there is one
     content = {"band": band.name, **posterior.theta_entries(density)}
     told = posterior.confidence(density, settings.parameters)
     file = ThetaFile.model_validate(content)

@@ -191,7 +191,7 @@ def _warnings(
 ) -> Iterator[str]:
     if samples is None:
         yield "no samples of θ: the interval holds the error of the draw alone"
-    elif not model.settled:
+    elif not getattr(model, "settled", False):
         yield "the fit has not converged: do not trust the interval"
     if interval is None:
         yield "no interval: too many launches beside the predicted one fail"

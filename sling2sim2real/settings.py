@@ -94,7 +94,7 @@ class Settings(Params):
 
 @cache
 def _defaults() -> dict:
-    with as_file(files(__package__) / "params.yaml") as path:
+    with as_file(files("sling2sim2real") / "params.yaml") as path:
         content = load(path).model_dump()
     content["bands"] = {"band": NO_BAND}
     content["run"] |= {"bands": ["band"], "rig": []}

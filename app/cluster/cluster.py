@@ -101,7 +101,7 @@ class Cluster:
         if not all(self._shares[address] for address in workers):
             exchange.expect_remote(root)
             self._send(stage.producers, cancelled)
-        resources = {}
+        resources: dict[str, float] = {}
         if stage.gpu and any(one["resources"].get(GPU) for one in workers.values()):
             resources = {GPU: 1}
         elif stage.gpu:
@@ -276,7 +276,7 @@ def drained(said: queue.SimpleQueue, patience: float) -> Iterator[tuple[str, str
         return
 
 
-def waits(workers: Mapping[str, dict], on: str, resources: Mapping[str, int]) -> str:
+def waits(workers: Mapping[str, dict], on: str, resources: Mapping[str, float]) -> str:
     """What a stage waits for, in words; empty while it runs `on` a worker that is there."""
     if on in workers:
         return ""

@@ -9,9 +9,13 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 from app.flow.graph import Stage
 from pipeline.base.layout import Layout
+
+if TYPE_CHECKING:
+    from pipeline.report.run.results import Result, Results
 
 PICTURE = re.compile(r"!\[[^\]]*\]\([^)]*\)\n")
 LINK = re.compile(r"\[([^\]]*)\]\((?!https?:)[^)]*\)")  # to a file beside the report
@@ -58,16 +62,17 @@ def _theta(root: Path, band: str, method: str) -> Iterator[str]:
 
     layout, params, named = Layout(root), load(root / "params.yaml"), styles([method])
     theta = load_theta(layout.theta(band, method), band)
-    result = SimpleNamespace(  # as much of report.results.Result as is there by now
+    ready = SimpleNamespace(  # as much of report.results.Result as is there by now
         band=band,
         method=method,
         theta=theta,
         confidence=theta.get("confidence") or {},
         history=pd.read_parquet(layout.evaluations(band, method)),
     )
-    searches = {band: {method: result}}
+    searches = {band: {method: cast("Result", ready)}}
     yield _drawn("convergence", lambda path: search.convergence(path, searches, named))
-    table2 = parameters.identified(SimpleNamespace(methods=searches), params)
+    ran = cast("Results", SimpleNamespace(methods=searches))
+    table2 = parameters.identified(ran, params)
     heads, rows = parameters.as_table([row for row in table2 if row.source != PAPER], named)
     turned = [list(pair) for pair in zip(heads, *rows, strict=True)]
     yield markdown((["identified", "value (90 % interval)"], turned))
@@ -87,7 +92,7 @@ def _policy(root: Path, band: str, method: str) -> Iterator[str]:
     result = SimpleNamespace(band=band, method=method, card=stored.card())
     curves = {band: {method: pd.read_parquet(stored.folder / "training.parquet")}}
     yield _drawn("training", lambda path: policy.training(path, curves, named))
-    yield markdown(policies([result], named))
+    yield markdown(policies(cast("Results", [result]), named))
 
 
 def _trials(root: Path, band: str, method: str) -> Iterator[str]:
@@ -107,7 +112,7 @@ def _trials(root: Path, band: str, method: str) -> Iterator[str]:
         yield _drawn("landings", lambda path: landings.predictions(path, trials, trusted, named))
     for kind, launched in trials.groupby("kind", sort=True):
         table = predictions(launched) if kind == "predicted" else _errors(launched)
-        yield f"{kind.capitalize()} launches\n\n{markdown(table)}"
+        yield f"{str(kind).capitalize()} launches\n\n{markdown(table)}"
 
 
 def _errors(trials) -> tuple[list[str], list[list[str]]]:

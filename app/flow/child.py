@@ -146,7 +146,7 @@ def dvc(
     if cancelled():
         raise Cancelled
     with _guarded(command, root, environment, cancelled) as process:
-        for line in process.stdout:
+        for line in process.stdout or ():
             line = line.rstrip("\n")
             said.append(line)
             ending = cancelled() or (process.poll() or 0) < 0  # what an interrupt makes it say
@@ -164,18 +164,15 @@ def _guarded(
     command: list[str], root: Path, environment: Mapping[str, str], cancelled: Callable[[], bool]
 ) -> Iterator[subprocess.Popen]:
     """The command behind its guard, with its lines on stdout; nothing of it is left afterwards."""
-    process = subprocess.Popen(
-        # A bare interpreter: it starts in a hundredth of a second.
-        [sys.executable, "-I", "-S", guard.__file__, *command],
+    process = guard.start(
+        command,
         cwd=root,
         env=dict(environment),
-        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         encoding="utf-8",
         errors="replace",
-        start_new_session=True,  # a terminal's Ctrl-C is for us alone
         close_fds=False,  # the flow's lock is held until its stages have ended, see run.py
     )
     group, ended = 0, Event()
@@ -184,14 +181,15 @@ def _guarded(
         while not (ended.wait(0.1) or cancelled() or process.poll() is not None):
             pass
         with suppress(OSError):
-            process.stdin.close()
+            if process.stdin:
+                process.stdin.close()
         if process.poll() is not None and group:
             guard.end_group(group)  # nobody is left in it, but where the guard itself was killed
 
     watcher = Thread(target=watch, daemon=True)
     watcher.start()
     try:
-        for line in process.stdout:  # the loader's own come first, such as on LD_PRELOAD
+        for line in process.stdout or ():  # the loader's own come first, such as on LD_PRELOAD
             if line.strip().isdecimal():
                 group = int(line)
                 break
@@ -199,13 +197,7 @@ def _guarded(
     finally:
         ended.set()
         watcher.join()  # the guard's stdin is closed now
-        try:
-            process.wait(guard.GRACE + 5)
-        except subprocess.TimeoutExpired:
-            process.kill()
-        if process.wait() < 0 and group:
-            guard.end_group(group)
-        process.stdout.close()
+        guard.end(process, lambda: group)
 
 
 def _is_own(line: str) -> bool:

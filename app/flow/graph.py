@@ -73,13 +73,15 @@ class Graph:
         self._one_at_a_time = Lock()
         with _clear():
             from dvc.repo import Repo
+            from dvc.stage import PipelineStage
 
             # Its warnings, such as on empty files, come once more from each stage that runs.
             logging.getLogger("dvc").setLevel(logging.ERROR)
             repo = Repo(str(root))
             with repo.lock:  # dvc.lock is rewritten in place
                 self.stages = _stages(repo.index)
-            self._dvc = {one.name: one for one in repo.index.stages if one.cmd}
+            stages = [one for one in repo.index.stages if isinstance(one, PipelineStage)]
+            self._dvc = {one.name: one for one in stages if one.cmd}
 
     def stale(self) -> list[str]:
         """Stages that DVC would run as things are, and all their consumers, in order."""

@@ -18,6 +18,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 
 GRACE = 8.0  # s from the interrupt to the kill
@@ -45,6 +46,36 @@ def end_group(
             os.killpg(group, 0)  # asks only
             time.sleep(0.02)
         os.killpg(group, signal.SIGKILL)
+
+
+def start(command: list[str], **options) -> subprocess.Popen:
+    """Start a command behind a guard; `options` are of subprocess.Popen. `end` is to follow."""
+    return subprocess.Popen(
+        # A bare interpreter: it starts in a hundredth of a second.
+        [sys.executable, "-I", "-S", __file__, *command],
+        stdin=subprocess.PIPE,  # its end is ours: who is killed leaves no command
+        start_new_session=True,  # a terminal's Ctrl-C is for us alone
+        **options,
+    )
+
+
+def end(guard: subprocess.Popen, group: Callable[[], int]) -> None:
+    """End what `start` started; nothing of the command is left then.
+
+    Args:
+        group: The number that the guard said, 0 if none; asked where the guard was killed.
+    """
+    with suppress(OSError):
+        if guard.stdin:
+            guard.stdin.close()
+    try:
+        guard.wait(GRACE + 5)
+    except subprocess.TimeoutExpired:
+        guard.kill()
+    if guard.wait() < 0 and (number := group()):
+        end_group(number, GRACE)
+    if guard.stdout:
+        guard.stdout.close()
 
 
 def main(command: list[str]) -> int:

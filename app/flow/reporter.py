@@ -10,6 +10,8 @@ import time
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import cast
+from uuid import UUID
 
 from app.flow.artifacts import artifact
 from app.flow.graph import Stage
@@ -34,8 +36,8 @@ class Reporter:
         self._context = contextvars.copy_context()  # says whose artifacts they are
         self._thread = ThreadPoolExecutor(1, thread_name_prefix=f"reporter {stage.name}")
         self._moved: dict[str, float] = {}  # when, by title
-        self._bars: dict[str, object] = {}  # ids, by title
-        self._failed = self._logger is None
+        self._bars: dict[str, UUID] = {}  # ids, by title
+        self._failed = False
 
     def __call__(self, line: str) -> None:
         """Show a line of the stage's output."""
@@ -57,10 +59,12 @@ class Reporter:
                 self._failed = True
 
     def _post(self, work, *arguments):
-        return None if self._failed else self._thread.submit(self._try, work, *arguments)
+        if self._failed or not self._logger:
+            return None
+        return self._thread.submit(self._try, work, *arguments)
 
     def _try(self, work, *arguments) -> None:
-        if self._failed:
+        if self._failed or not self._logger:
             return
         try:
             self._context.run(work, *arguments)
@@ -77,7 +81,8 @@ class Reporter:
         if step.title in self._bars:
             update_progress_artifact(self._bars[step.title], share, words)
         else:
-            self._bars[step.title] = create_progress_artifact(share, key(step.title), words)
+            made = create_progress_artifact(share, key(step.title), words)
+            self._bars[step.title] = cast(UUID, made)  # in a thread it is no coroutine
 
     def _show(self) -> None:
         text = artifact(self.stage, self.root)

@@ -34,10 +34,10 @@ class Scheduler:
             return None
         open_ones = {one.name for one in self.waiting} | self.running.keys()
         for stage in self.waiting:
-            limited = stage.gpu and self.shares is not None
-            if open_ones.isdisjoint(stage.producers) and not (limited and not self.shares):
+            shares = self.shares if stage.gpu else None
+            if open_ones.isdisjoint(stage.producers) and shares != []:
                 self.waiting.remove(stage)
-                share = self.shares.pop(0) if limited else {}
+                share = shares.pop(0) if shares else {}
                 self.running[stage.name] = share
                 return stage, share
         return None

@@ -178,14 +178,17 @@ def _server(root: Path, port: int) -> Iterator[subprocess.Popen]:
     start = ["-P", "-m", "prefect", "server", "start", "--host", HOST, "--port", str(port)]
     home(root).mkdir(parents=True, exist_ok=True)
     with _log(root).open("w", encoding="utf-8") as said:
-        process = subprocess.Popen(
-            [sys.executable, "-I", "-S", guard.__file__, sys.executable, *start],
+        process = guard.start(
+            [sys.executable, *start],
             env=clean(root) | {"PREFECT_UI_API_URL": f"{_url(port)}/api"},
-            stdin=subprocess.PIPE,  # its end is ours: a killed flow leaves no server
             stdout=said,
             stderr=said,
-            start_new_session=True,  # Ctrl-C is ours: the flow's last words are to be kept
         )
+
+    def group() -> int:  # a server that just starts may be deaf
+        first = _log(root).read_text(encoding="utf-8", errors="replace").partition("\n")[0]
+        return int(first) if first.isdecimal() else 0
+
     try:
         deadline = time.monotonic() + STARTING
         while _home_at(port) != home(root):
@@ -199,12 +202,4 @@ def _server(root: Path, port: int) -> Iterator[subprocess.Popen]:
                 write_text(page, text.replace("<head>", f"<head>{POLICY}", 1))
         yield process
     finally:
-        process.stdin.close()
-        try:
-            process.wait(guard.GRACE + 5)
-        except subprocess.TimeoutExpired:
-            process.kill()
-        if process.wait() < 0:  # the guard was killed: a server that just starts may be deaf
-            first = _log(root).read_text(encoding="utf-8", errors="replace").partition("\n")[0]
-            if first.isdecimal():
-                guard.end_group(int(first), guard.GRACE)
+        guard.end(process, group)

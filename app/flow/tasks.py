@@ -137,9 +137,13 @@ class Run:
         import prefect
 
         name, tags = reporter.names(self.scheduler.waiting)
-        options = {"persist_result": False, "validate_parameters": False}
         with prefect.tags(*tags):
-            flow = prefect.flow(self._body, name="sling flow", flow_run_name=name, **options)
+            flow = prefect.flow(
+                name="sling flow",
+                flow_run_name=name,
+                persist_result=False,
+                validate_parameters=False,
+            )(self._body)
             return flow(return_state=True)
 
     def _body(self):
@@ -177,15 +181,16 @@ class Run:
         from prefect.cache_policies import NO_CACHE
 
         task = prefect.task(
-            self._task,
             name=stage.step,
             task_run_name=stage.name,
             tags=reporter.tags(stage),
             cache_policy=NO_CACHE,
             persist_result=False,
-        )
+        )(self._task)
         producers = [self._futures[name] for name in stage.producers if name in self._futures]
-        self._futures[stage.name] = future = task.submit(stage, share, wait_for=producers)
+        self._futures[stage.name] = future = task.submit(  # pyright: ignore[reportCallIssue]
+            stage, share, wait_for=producers
+        )
         future.add_done_callback(lambda _: self._ended.put(stage))
 
     def _task(self, stage: Stage, share: dict[str, str]):
@@ -238,9 +243,9 @@ def _prepare(scheduler: Scheduler) -> None:
 
     running, killed = {"state": {"type": {"any_": ["RUNNING"]}}}, Crashed(message="was killed")
     with get_client(sync_client=True) as client:
-        for run in client.read_task_runs(task_run_filter=TaskRunFilter(**running)):
+        for run in client.read_task_runs(task_run_filter=TaskRunFilter.model_validate(running)):
             client.set_task_run_state(run.id, killed, force=True)
-        for run in client.read_flow_runs(flow_run_filter=FlowRunFilter(**running)):
+        for run in client.read_flow_runs(flow_run_filter=FlowRunFilter.model_validate(running)):
             client.set_flow_run_state(run.id, killed, force=True)
         if scheduler.shares is None:
             return

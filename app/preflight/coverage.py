@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pipeline.recording.build import Processed
@@ -16,6 +18,36 @@ RECOIL = 0.15  # s after the release
 OFF_PLANE = 0.02
 LIFTED = 0.5  # of the way to the tips' height, from which the slack band may swing
 PHASES = ("hanging", "held", "drawn", "recoil", "swing")
+
+
+@dataclass(frozen=True)
+class PictureLine:
+    """How well one picture shows the band; `time` is since the file's first force [s].
+
+    Attributes:
+        points: Of the cloud.
+        coverage: As of `share_covered`.
+        off_plane: As of `share_off_plane`.
+    """
+
+    time: float
+    phase: str
+    points: int
+    coverage: float
+    off_plane: float | None
+
+
+@dataclass(frozen=True)
+class PhaseLine:
+    """The pictures of one phase: `empty` without a point, `points` the median."""
+
+    phase: str
+    start: float
+    end: float
+    pictures: int
+    empty: int
+    points: int
+    coverage: float
 
 
 def coverage(done: Processed) -> tuple[float | None, float | None]:
@@ -90,36 +122,36 @@ def phase(scene: Scene, time: float) -> str:
     return "recoil" if time < signals.release_time + RECOIL else "swing"
 
 
-def over_time(done: Processed, start: float) -> list[dict]:
+def over_time(done: Processed, start: float) -> list[PictureLine]:
     """A row a picture; times count from `start` seconds before the window."""
     return [
-        {
-            "time": round(start + float(time), 6),
-            "phase": phase(done.scene, time),
-            "points": len(points),
-            "coverage": round(share_covered(done.scene, time, points), 4),
-            "off_plane": share_off_plane(done.scene, time, points),
-        }
+        PictureLine(
+            time=round(start + float(time), 6),
+            phase=phase(done.scene, time),
+            points=len(points),
+            coverage=round(share_covered(done.scene, time, points), 4),
+            off_plane=share_off_plane(done.scene, time, points),
+        )
         for time, points in zip(done.clouds.time, done.clouds.points, strict=True)
     ]
 
 
-def by_phase(rows: list[dict]) -> list[dict]:
+def by_phase(rows: list[PictureLine]) -> list[PhaseLine]:
     """The rows of `over_time` gathered, phases without a picture left out."""
     table = []
     for name in PHASES:
-        part = [row for row in rows if row["phase"] == name]
+        part = [row for row in rows if row.phase == name]
         if part:
-            points = [row["points"] for row in part]
+            points = [row.points for row in part]
             table.append(
-                {
-                    "phase": name,
-                    "start": part[0]["time"],
-                    "end": part[-1]["time"],
-                    "pictures": len(part),
-                    "empty": points.count(0),
-                    "points": int(np.median(points)),
-                    "coverage": round(float(np.mean([row["coverage"] for row in part])), 4),
-                }
+                PhaseLine(
+                    phase=name,
+                    start=part[0].time,
+                    end=part[-1].time,
+                    pictures=len(part),
+                    empty=points.count(0),
+                    points=int(np.median(points)),
+                    coverage=round(float(np.mean([row.coverage for row in part])), 4),
+                )
             )
     return table

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 
+from app.preflight.coverage import PhaseLine, PictureLine
+from app.preflight.facts import BandFacts, CloudFacts, DelayFacts, ExtrinsicFacts, SignalFacts
 from pipeline.base.errors import printable
 
 
-@dataclass
+@dataclass(frozen=True)
 class Topic:
-    """One line of the table; times in seconds, None where the topic plays no role.
+    """One line of the table; times in seconds, None where the topic plays no role: see `Chosen`.
 
     Attributes:
         why: How it was chosen for its role.
@@ -33,6 +35,20 @@ class Topic:
     delay: float | None = None
     clock_offset: float | None = None
     notes: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Chosen(Topic):
+    """One that plays a role, or several: nothing of it is None."""
+
+    role: str = ""
+    why: str = ""
+    rate: float = 0.0
+    longest_gap: float = 0.0
+    missing: int = 0
+    lost: int = 0
+    delay: float = 0.0
+    clock_offset: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -82,14 +98,9 @@ class CheckReport:
         pulls: All of them.
         losses: What was lost of the file and its topics or mended in them, in words.
         notes: What else to know of it, which cost nothing.
-        band: Diameter and rest length [m] that it was read with, and where they come from.
         frames: Where each transform comes from.
-        signals: Events [s since the first force], force [N], frame O.
-        delays: Of pose and camera: seconds that their stamps are late, with standard error.
-        cloud: How well the band is seen, over the whole recording.
-        phases: The same for each phase.
-        coverage: The same for each picture: time [s], phase, points, coverage.
-        extrinsics: How far the fork tips are off in the clouds; empty where it cannot be told.
+        signals, delays, cloud, phases, coverage: None and empty where the pull is not understood.
+        extrinsics: None where it cannot be told.
         cautions: What costs accuracy, and what to do.
         written: Files that were drawn of it, in words.
     """
@@ -100,14 +111,14 @@ class CheckReport:
     losses: list[str]
     topics: list[Topic]
     notes: list[str] = field(default_factory=list)
-    band: dict[str, object] = field(default_factory=dict)
+    band: BandFacts = field(kw_only=True)
     frames: dict[str, str] = field(default_factory=dict)
-    signals: dict[str, object] = field(default_factory=dict)
-    delays: dict[str, dict] = field(default_factory=dict)
-    cloud: dict[str, object] = field(default_factory=dict)
-    phases: list[dict] = field(default_factory=list)
-    coverage: list[dict] = field(default_factory=list)
-    extrinsics: dict[str, object] = field(default_factory=dict)
+    signals: SignalFacts | None = None
+    delays: dict[str, DelayFacts] = field(default_factory=dict)
+    cloud: CloudFacts | None = None
+    phases: list[PhaseLine] = field(default_factory=list)
+    coverage: list[PictureLine] = field(default_factory=list)
+    extrinsics: ExtrinsicFacts | None = None
     cautions: list[Caution] = field(default_factory=list)
     written: list[str] = field(default_factory=list)
     pull: int = 1
@@ -116,8 +127,10 @@ class CheckReport:
     @property
     def row(self) -> PullLine:
         """This pull in a line."""
-        facts = (self.signals.get(name) for name in ("grasp_s", "release_s", "peak_force_n"))
-        return PullLine(self.pull, *facts, self.usable, self.verdict, len(self.cautions))
+        told, numbers = self.signals, (None, None, None)
+        if told:
+            numbers = told.grasp_s, told.release_s, told.peak_force_n
+        return PullLine(self.pull, *numbers, self.usable, self.verdict, len(self.cautions))
 
     @property
     def usable(self) -> bool:
@@ -132,6 +145,7 @@ class CheckReport:
     def to_json(self, frames: bool = False) -> str:
         """As one object; `frames` adds `coverage`, a row for each picture."""
         content = {**asdict(self), "usable": self.usable, "verdict": self.verdict}
+        content |= {name: content[name] or {} for name in ("signals", "cloud", "extrinsics")}
         if not frames:
             del content["coverage"]
         return json.dumps(content, indent=2, allow_nan=False)
@@ -144,9 +158,9 @@ class CheckReport:
         lines += [f"lost or mended: {loss}" for loss in self.losses]
         lines += [f"note: {note}" for note in self.notes]
         lines += _phases(self.phases) + _extrinsics(self.extrinsics) + _delays(self.delays)
+        content = asdict(self)
         for title in ("band", "signals", "cloud", "frames"):
-            facts = getattr(self, title)
-            if facts:
+            if facts := content[title]:
                 lines += ["", title, *(f"  {k:<22}{_shown(v)}" for k, v in facts.items())]
         return "\n".join(map(printable, [*lines, "", *_topics(self.topics)]))
 
@@ -155,18 +169,18 @@ class CheckReport:
         lines, told, seen = [], self.signals, self.cloud
         if told:
             lines += [
-                f"  force: at most {told['peak_force_n']:.1f} N, at {told['stretch']:.2f} times the"
-                f" rest length; release known to ± {1e3 * told['release_error_s']:.1f} ms"
+                f"  force: at most {told.peak_force_n:.1f} N, at {told.stretch:.2f} times the"
+                f" rest length; release known to ± {1e3 * told.release_error_s:.1f} ms"
             ]
         if seen:
-            shown = seen["frames"] - seen["empty"]
-            covered = seen["taut_coverage"]
+            shown = seen.frames - seen.empty
+            covered = seen.taut_coverage
             part = "" if covered is None else f", {100 * covered:.0f} % of it while it is drawn"
-            lines += [f"  pictures: the band is in {shown} of {seen['frames']}{part}"]
-        if "assumed" in str(self.band.get("source")):
+            lines += [f"  pictures: the band is in {shown} of {seen.frames}{part}"]
+        if "assumed" in self.band.source:
             lines += [
-                f"  the band: {self.band['diameter_m']:g} m thick and"
-                f" {self.band['rest_length_m']:g} m long, {self.band['source']}"
+                f"  the band: {self.band.diameter_m:g} m thick and"
+                f" {self.band.rest_length_m:g} m long, {self.band.source}"
             ]
         return ["", "it rests on", *lines] if lines else []
 
@@ -185,13 +199,13 @@ def _topics(topics: list[Topic]) -> list[str]:
     rows = [f"{'topic':<{width}}  {'role':<11}" + "".join(f"{name:>13}" for name in head)]
     for row in topics:
         cells = [str(row.messages)]
-        if row.rate is not None:
+        if isinstance(row, Chosen):
             cells += [f"{row.rate:.1f} Hz", f"{1e3 * row.longest_gap:.1f} ms", str(row.missing)]
             cells += [str(row.lost), f"{1e3 * row.delay:+.1f} ms"]
             cells += [f"{1e3 * row.clock_offset:+.1f} ms"]
         line = f"{row.topic:<{width}}  {row.role or '-':<11}"
         rows.append((line + "".join(f"{cell:>13}" for cell in cells)).rstrip())
-    chosen = [row for row in topics if row.why]
+    chosen = [row for row in topics if isinstance(row, Chosen)]
     wide = max([len(row.role) for row in chosen], default=0) + 2
     if chosen:
         rows += ["", "chosen"]
@@ -199,7 +213,7 @@ def _topics(topics: list[Topic]) -> list[str]:
     return rows
 
 
-def _phases(phases: list[dict]) -> list[str]:
+def _phases(phases: list[PhaseLine]) -> list[str]:
     if not phases:
         return []
     rows = [
@@ -207,28 +221,28 @@ def _phases(phases: list[dict]) -> list[str]:
         f"mask       {'seconds':>15}{'pictures':>10}{'empty':>7}{'points':>8}{'covered':>9}",
     ]
     for row in phases:
-        seconds = f"{row['start']:.2f} - {row['end']:.2f}"
+        seconds = f"{row.start:.2f} - {row.end:.2f}"
         rows.append(
-            f"  {row['phase']:<9}{seconds:>15}{row['pictures']:>10}{row['empty']:>7}"
-            f"{row['points']:>8}{100 * row['coverage']:>7.0f} %"
+            f"  {row.phase:<9}{seconds:>15}{row.pictures:>10}{row.empty:>7}"
+            f"{row.points:>8}{100 * row.coverage:>7.0f} %"
         )
     return rows
 
 
-def _delays(delays: dict[str, dict]) -> list[str]:
+def _delays(delays: dict[str, DelayFacts]) -> list[str]:
     if not delays:
         return []
     rows = ["", "delays against the force's stamps"]
     for role, delay in delays.items():
-        value, error = delay["value_s"], delay["error_s"]
+        value, error = delay.value_s, delay.error_s
         shown = "-" if value is None else f"{round(1e3 * value, 1) + 0.0:+.1f} ms"
         shown += "" if error is None else f" ± {1e3 * error:.1f} ms"
-        done = "taken out" if delay["applied"] else "left as it is"
-        rows.append(f"  {role:<10}{shown}  ({delay['source']}, {done})")
+        done = "taken out" if delay.applied else "left as it is"
+        rows.append(f"  {role:<10}{shown}  ({delay.source}, {done})")
     return rows
 
 
-def _extrinsics(facts: dict[str, object]) -> list[str]:
+def _extrinsics(facts: ExtrinsicFacts | None) -> list[str]:
     if not facts:
         return []
 
@@ -240,12 +254,12 @@ def _extrinsics(facts: dict[str, object]) -> list[str]:
 
     rows = [
         "",
-        f"extrinsics, by the drawn band in {facts['pictures']} pictures (frame O)",
-        f"  left tip off   {pair(facts['left_tip_m'], facts['left_tip_error_m'], 1e3)} mm",
-        f"  right tip off  {pair(facts['right_tip_m'], facts['right_tip_error_m'], 1e3)} mm",
-        f"  camera turned  {pair(facts['turn_deg'], facts['turn_error_deg'], 1, 2)} degrees",
-        f"  hand off       {pair(facts['hand_m'], facts['hand_error_m'], 1e3)} mm",
-        f"  what is left   {1e3 * facts['residual_m']:.1f} mm",
+        f"extrinsics, by the drawn band in {facts.pictures} pictures (frame O)",
+        f"  left tip off   {pair(facts.left_tip_m, facts.left_tip_error_m, 1e3)} mm",
+        f"  right tip off  {pair(facts.right_tip_m, facts.right_tip_error_m, 1e3)} mm",
+        f"  camera turned  {pair(facts.turn_deg, facts.turn_error_deg, 1, 2)} degrees",
+        f"  hand off       {pair(facts.hand_m, facts.hand_error_m, 1e3)} mm",
+        f"  what is left   {1e3 * facts.residual_m:.1f} mm",
     ]
     return rows
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
 from app.preflight.check import Look
+from app.preflight.coverage import PictureLine
+from app.preflight.facts import SignalFacts
 from app.preflight.output import expect_writable
 from pipeline.base.files import replacing
 from pipeline.params import Params
@@ -21,6 +24,10 @@ from pipeline.recording.masks import masker
 from pipeline.recording.view import Frame, Scene
 from pipeline.report.drawing.names import as_label
 from pipeline.report.drawing.styles import COLORS, INK, THEME
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MOMENTS = ("hanging", "grasp", "lift", "mid pull", "held", "recoil")
 SIZE, DPI = (16.0, 12.0), 100  # inches, dots an inch
@@ -50,15 +57,16 @@ def draw_sheet(look: Look, params: Params, path: Path) -> str:
         UserError: where `path` cannot be written.
     """
     import matplotlib.pyplot as plt
+    from matplotlib.style import context
 
     path = Path(path)
     expect_writable(path, ".png")
     if look.recording is None:
         return f"{path} was not drawn: nothing in the recording can be shown"
-    with plt.rc_context(THEME):
+    with context(THEME):
         figure = plt.figure(figsize=SIZE if look.done else (16, 6.5), dpi=DPI)
-        if look.done:
-            _whole(figure, look, params)
+        if look.done and look.report.signals:
+            _whole(figure, look.done, look.report.signals, look.report.coverage, params)
         else:
             _raw(figure, look.recording)
         verdict = look.report.verdict.removesuffix(", but:")
@@ -93,8 +101,8 @@ def moments(scene: Scene) -> dict[str, float]:
     return dict(zip(MOMENTS, when, strict=True))
 
 
-def _seen(look: Look, params: Params) -> list[Moment]:
-    done, when = look.done, moments(look.done.scene)
+def _seen(done: Processed, params: Params) -> list[Moment]:
+    when = moments(done.scene)
     times = done.clouds.time  # of the pictures that could be decoded
     which = [int(np.argmin(np.abs(times - time))) for time in when.values()]
     numbers = [int(np.argmin(np.abs(done.view.times - times[k]))) for k in which]
@@ -105,9 +113,10 @@ def _seen(look: Look, params: Params) -> list[Moment]:
     ]
 
 
-def _whole(figure: object, look: Look, params: Params) -> None:
-    done, seen = look.done, _seen(look, params)
-    start = look.report.signals["window_start_s"]
+def _whole(
+    figure: Figure, done: Processed, facts: SignalFacts, rows: list[PictureLine], params: Params
+) -> None:
+    seen, start = _seen(done, params), facts.window_start_s
     grid = figure.add_gridspec(5, len(seen), height_ratios=[0.88, 0.55, 0.92, 1.0, 0.55])
     for column, one in enumerate(seen):
         axes = figure.add_subplot(grid[0, column])
@@ -118,8 +127,10 @@ def _whole(figure: object, look: Look, params: Params) -> None:
             axes = figure.add_subplot(grid[row, column])
             _cloud(axes, done, one, a, b, labels=column == 0)
     force = figure.add_subplot(grid[3, :])
-    _force(force, look)
-    _coverage(figure.add_subplot(grid[4, :], sharex=force), look)
+    _force(force, done, facts)
+    covered = figure.add_subplot(grid[4, :], sharex=force)
+    _coverage(covered, rows)
+    _events(covered, done, facts)
 
 
 def _overlaid(color: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -131,7 +142,7 @@ def _overlaid(color: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return cv2.drawContours(large, outlines, -1, MASK, 1)
 
 
-def _cloud(axes: object, done: Processed, one: Moment, a: int, b: int, labels: bool) -> None:
+def _cloud(axes: Axes, done: Processed, one: Moment, a: int, b: int, labels: bool) -> None:
     scene, hand = done.scene, done.signals.hand(one.time)
     axes.scatter(one.points[:, a], one.points[:, b], s=1.5, color=COLORS[1], linewidths=0)
     for tip in scene.tips:
@@ -151,52 +162,48 @@ def _cloud(axes: object, done: Processed, one: Moment, a: int, b: int, labels: b
         axes.tick_params(labelbottom=False, labelleft=False)
 
 
-def _force(axes: object, look: Look) -> None:
+def _force(axes: Axes, done: Processed, facts: SignalFacts) -> None:
     """Each component and its size: seconds since the recording's first force."""
-    signals, facts = look.done.signals, look.report.signals
-    start = facts["window_start_s"]
+    signals, start = done.signals, facts.window_start_s
     time = start + signals.time
     for axis, values, color in zip("xyz", signals.force.T, COLORS, strict=False):
         axes.plot(time, values, color=color, lw=1.2, label=f"$F_{axis}$")
     size = np.linalg.norm(signals.force, axis=1)
     axes.plot(time, size, color=INK, lw=0.8, ls=":", label="size")
-    _events(axes, look, named=True)
+    _events(axes, done, facts, named=True)
     axes.set(ylabel="force on the hand [N]", xlim=(start, time[-1]))
     axes.legend(loc="upper left", bbox_to_anchor=(0.11, 0.95))
 
 
-def _coverage(axes: object, look: Look) -> None:
-    rows = look.report.coverage
-    time = [row["time"] for row in rows]
-    axes.plot(time, [row["coverage"] for row in rows], color=COLORS[1], lw=1.2)
+def _coverage(axes: Axes, rows: list[PictureLine]) -> None:
+    time = [row.time for row in rows]
+    axes.plot(time, [row.coverage for row in rows], color=COLORS[1], lw=1.2)
     axes.set(ylabel="band covered", ylim=(0, 1.05), xlabel="time since the first force [s]")
     other = axes.twinx()
-    other.plot(time, [row["points"] for row in rows], color=COLORS[4], lw=0.8)
+    other.plot(time, [row.points for row in rows], color=COLORS[4], lw=0.8)
     other.set(ylim=(0, None))
     other.set_ylabel("points", color=COLORS[4])
     other.grid(visible=False)
-    _events(axes, look)
 
 
-def _events(axes: object, look: Look, named: bool = False) -> None:
-    facts = look.report.signals
-    for name in ("grasp", "release"):
-        axes.axvline(facts[f"{name}_s"], color=INK, lw=0.8, ls="--")
+def _events(axes: Axes, done: Processed, facts: SignalFacts, named: bool = False) -> None:
+    for name, time in (("grasp", facts.grasp_s), ("release", facts.release_s)):
+        axes.axvline(time, color=INK, lw=0.8, ls="--")
         if not named:
             continue
         axes.annotate(
-            f"{name} {facts[f'{name}_s']:.3f} s",
-            (facts[f"{name}_s"], 1.01),
+            f"{name} {time:.3f} s",
+            (time, 1.01),
             xycoords=("data", "axes fraction"),
             va="bottom",
             ha="center",
         )
-    start = facts["window_start_s"]
-    for time in moments(look.done.scene).values():
+    start = facts.window_start_s
+    for time in moments(done.scene).values():
         axes.plot(start + time, 0, "|", color=INK, ms=8, transform=axes.get_xaxis_transform())
 
 
-def _raw(figure: object, recording: Recording) -> None:
+def _raw(figure: Figure, recording: Recording) -> None:
     """Six pictures and the raw force of a recording that cannot be used."""
     grid = figure.add_gridspec(2, len(MOMENTS), height_ratios=[1.0, 1.1])
     origin = recording.origin

@@ -3,6 +3,8 @@
 Seconds count from the first force, as in the report. Space is frame O. https://rerun.io
 """
 
+# Rerun is an extra.
+# pyright: reportMissingImports=false
 from __future__ import annotations
 
 from pathlib import Path
@@ -12,6 +14,7 @@ import cv2
 import numpy as np
 
 from app.preflight.check import Look
+from app.preflight.facts import SignalFacts
 from app.preflight.output import expect_writable
 from app.preflight.sheet import masked_frames
 from pipeline.base.errors import UserError
@@ -22,6 +25,7 @@ from pipeline.recording.input import images
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.frames import Transform
 from pipeline.recording.input.reader import Recording, Stream
+from pipeline.recording.signals import Signals
 
 if TYPE_CHECKING:
     import rerun
@@ -61,10 +65,12 @@ def write_timeline(look: Look, params: Params, path: Path) -> str:
         log.still("report", rerun.TextDocument(look.report.to_text()))
         _raw_force(log, look.recording.wrench)
         _pictures(log, look.recording)
-        if look.done:
+        if look.done and (facts := look.report.signals):
             _scene(log, look.done)
-            _motion(log, look)
-            _clouds(log, look, params)
+            _motion(log, look.done.signals, facts)
+            _clouds(log, look.done, facts.window_start_s, params)
+            time = np.array([row.time for row in look.report.coverage])
+            log.curve("coverage", time, np.array([row.coverage for row in look.report.coverage]))
         stream.send_blueprint(_layout())
         stream.flush()
         stream.disconnect()
@@ -163,12 +169,11 @@ def _camera(log: _Log, entity: str, camera: Camera, pose: Transform) -> None:
     log.still(entity, pinhole)
 
 
-def _motion(log: _Log, look: Look) -> None:
+def _motion(log: _Log, signals: Signals, facts: SignalFacts) -> None:
     """Hand and force sample by sample, as the episode has them."""
     import rerun
 
-    signals, facts = look.done.signals, look.report.signals
-    seconds = facts["window_start_s"] + signals.time
+    seconds = facts.window_start_s + signals.time
     arrows = ARROW * signals.force
     log.columns("fork/hand", seconds, rerun.Transform3D.columns(translation=signals.position))
     log.still("fork/hand", rerun.Points3D([[0, 0, 0]], colors=[237, 174, 73], radii=0.01))
@@ -180,14 +185,13 @@ def _motion(log: _Log, look: Look) -> None:
     log.curve("speed", seconds, np.linalg.norm(signals.velocity, axis=1))
     if np.isfinite(signals.opening).all():
         log.curve("opening", seconds, signals.opening)
-    for name in ("grasp", "release"):
-        log.at(facts[f"{name}_s"], "events", rerun.TextLog(name, level="INFO"))
+    for name, time in (("grasp", facts.grasp_s), ("release", facts.release_s)):
+        log.at(time, "events", rerun.TextLog(name, level="INFO"))
 
 
-def _clouds(log: _Log, look: Look, params: Params) -> None:
+def _clouds(log: _Log, done: Processed, start: float, params: Params) -> None:
     import rerun
 
-    done, start = look.done, look.report.signals["window_start_s"]
     depth, color = done.pull.recording.depth_camera, done.pull.recording.color_camera
     size = (depth.height, depth.width)
     one = depth.frame == color.frame and size == (color.height, color.width)
@@ -201,9 +205,6 @@ def _clouds(log: _Log, look: Look, params: Params) -> None:
         log.at(start + frame.time, entity, rerun.SegmentationImage(whole.copy()))
         cloud = rerun.Points3D(points, colors=[0, 121, 140], radii=0.0015)
         log.at(start + frame.time, "fork/cloud", cloud)
-    rows = look.report.coverage
-    seconds = np.array([row["time"] for row in rows])
-    log.curve("coverage", seconds, np.array([row["coverage"] for row in rows]))
 
 
 def _layout() -> object:

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from app.preflight.report import Caution, CheckReport, Topic
+from app.preflight.facts import CloudFacts, SignalFacts
+from app.preflight.report import Caution, CheckReport, Chosen
 from pipeline.params.lab import SetupParams
 from pipeline.recording.build import Processed
 from pipeline.recording.events import SETTLE
@@ -38,16 +39,21 @@ def cautions_of(report: CheckReport, done: Processed) -> list[Caution]:
     Args:
         report: With everything but its cautions.
         done: What it was told from.
+
+    Raises:
+        ValueError: about a report without signals or cloud.
     """
-    setup = done.params.setup
+    setup, facts, cloud = done.params.setup, report.signals, report.cloud
+    if facts is None or cloud is None:
+        raise ValueError("a pull that is not understood has a problem, no cautions")
     return [
         *_of_file(report),
         *_of_topics(report, done),
         *_of_clocks(report),
-        *_of_force(report, setup),
-        *_of_motion(report, done.signals, setup),
-        *_of_rest(report, done),
-        *_of_pictures(report),
+        *_of_force(facts, setup),
+        *_of_motion(facts, done.signals, setup),
+        *_of_rest(facts, done),
+        *_of_pictures(report, cloud),
         *_of_sensor(done),
         *_of_loop(done),
         *_of_frames(report),
@@ -67,9 +73,7 @@ def _of_file(report: CheckReport) -> Iterator[Caution]:
 
 def _of_topics(report: CheckReport, done: Processed) -> Iterator[Caution]:
     reliable = "record with reliable QoS to a local disk"
-    for row in report.topics:
-        if not row.role:
-            continue
+    for row in _chosen(report):
         roles = row.role.split(", ")
         if row.longest_gap > min([GAPS[role] for role in roles if role in GAPS], default=np.inf):
             yield Caution("gap", f"{row.topic} has a gap of {row.longest_gap:.3f} s", reliable)
@@ -81,7 +85,11 @@ def _of_topics(report: CheckReport, done: Processed) -> Iterator[Caution]:
         yield Caution("gripper", what, "record its joint states")
 
 
-def _of_rate(row: Topic, roles: list[str]) -> Iterator[Caution]:
+def _chosen(report: CheckReport) -> list[Chosen]:
+    return [row for row in report.topics if isinstance(row, Chosen)]
+
+
+def _of_rate(row: Chosen, roles: list[str]) -> Iterator[Caution]:
     if "wrench" in roles and row.rate < FORCE_RATE:
         what = f"the force comes at {row.rate:.0f} Hz, so the release is known only that coarsely"
         yield Caution("force_rate", what, "record it at 1 kHz")
@@ -91,9 +99,9 @@ def _of_rate(row: Topic, roles: list[str]) -> Iterator[Caution]:
 
 
 def _of_clocks(report: CheckReport) -> Iterator[Caution]:
-    for row in report.topics:
-        most = max(SLOW.get(role, BEHIND) for role in (row.role or "").split(", "))
-        if row.role and not -most <= row.clock_offset <= AHEAD:
+    for row in _chosen(report):
+        most = max(SLOW.get(role, BEHIND) for role in row.role.split(", "))
+        if not -most <= row.clock_offset <= AHEAD:
             yield Caution(
                 "clock",
                 f"the stamps of {row.topic} are {row.clock_offset:+.3f} s off the force's, judged"
@@ -102,9 +110,9 @@ def _of_clocks(report: CheckReport) -> Iterator[Caution]:
                 " moment of measuring",
             )
     for role, delay in report.delays.items():
-        value, error = delay["value_s"] or 0.0, delay["error_s"] or 0.0
-        if delay["source"] != "setup" and abs(value) > max(DELAY, SURE * error):
-            done = "taken out" if delay["applied"] else "not taken out"
+        value, error = delay.value_s or 0.0, delay.error_s or 0.0
+        if delay.source != "setup" and abs(value) > max(DELAY, SURE * error):
+            done = "taken out" if delay.applied else "not taken out"
             yield Caution(
                 "delay",
                 f"the stamps of the {role} are {1e3 * value:+.1f} ± {1e3 * error:.1f} ms late"
@@ -113,39 +121,37 @@ def _of_clocks(report: CheckReport) -> Iterator[Caution]:
             )
 
 
-def _of_force(report: CheckReport, setup: SetupParams) -> Iterator[Caution]:
-    facts = report.signals
-    hold = float(np.linalg.norm(facts["hold_force_n"]))
-    share = facts["noise_n"] / hold
+def _of_force(facts: SignalFacts, setup: SetupParams) -> Iterator[Caution]:
+    hold = float(np.linalg.norm(facts.hold_force_n))
+    share = facts.noise_n / hold
     if share > NOISE:
-        what = f"the force's noise is {facts['noise_n']:.2f} N, {100 * share:.0f} % of the hold"
+        what = f"the force's noise is {facts.noise_n:.2f} N, {100 * share:.0f} % of the hold"
         yield Caution("noise", what, "shield the sensor's cable, stop what shakes the arm")
-    pull = facts["release_s"] - facts["grasp_s"]
-    drifted = float(np.linalg.norm(facts["drift_n_s"])) * pull
+    pull = facts.release_s - facts.grasp_s
+    drifted = float(np.linalg.norm(facts.drift_n_s)) * pull
     if drifted > DRIFT * hold:
         what = f"the force drifts by {drifted:.2f} N from grasp to release"
         cure = "let the sensor warm up for half an hour (a steady drift is taken out)"
         yield Caution("drift", what, cure)
-    if facts["peak_force_n"] > setup.max_force:
+    if facts.peak_force_n > setup.max_force:
         yield Caution(
             "max_force",
-            f"the peak force of {facts['peak_force_n']:.1f} N is above setup.max_force"
+            f"the peak force of {facts.peak_force_n:.1f} N is above setup.max_force"
             f" {setup.max_force:g} N",
             "pull less far, or set in params.yaml what the arm may hold",
         )
-    if facts["release_error_s"] > RELEASE:
-        what = f"the release is known to ± {1e3 * facts['release_error_s']:.1f} ms"
+    if facts.release_error_s > RELEASE:
+        what = f"the release is known to ± {1e3 * facts.release_error_s:.1f} ms"
         cure = "record the force at 1 kHz, unfiltered: 1 ms is 3 to 4 % of a landing"
         yield Caution("release", what, cure)
-    for time in facts["slips_s"]:
+    for time in facts.slips_s:
         what = f"the force drops suddenly at {time:.2f} s, before the release"
         yield Caution("slip", what, "the band slipped in the pads: grip firmly and record again")
 
 
-def _of_motion(report: CheckReport, signals: Signals, setup: SetupParams) -> Iterator[Caution]:
-    facts = report.signals
-    if round(facts["grasp_s"], 2) < LEAD_IN:
-        what = f"only {facts['grasp_s']:.2f} s of the empty hand come before the grasp"
+def _of_motion(facts: SignalFacts, signals: Signals, setup: SetupParams) -> Iterator[Caution]:
+    if round(facts.grasp_s, 2) < LEAD_IN:
+        what = f"only {facts.grasp_s:.2f} s of the empty hand come before the grasp"
         yield Caution("lead_in", what, f"record {LEAD_IN} s or more, the force is tared there")
     still, change = pause(signals)
     if still < PAUSE or change > SETTLED:
@@ -153,14 +159,14 @@ def _of_motion(report: CheckReport, signals: Signals, setup: SetupParams) -> Ite
         if change > SETTLED:
             what += f", and in its last half second the force changes by {100 * change:.1f} %"
         yield Caution("pause", what, "pause for 1 to 2 s, until the force has settled")
-    if facts["turn_deg"] > TURN and setup.tool is None:
-        what = f"the hand turns by {facts['turn_deg']:.1f} degrees, and its weight with it"
+    if facts.turn_deg > TURN and setup.tool is None:
+        what = f"the hand turns by {facts.turn_deg:.1f} degrees, and its weight with it"
         yield Caution("turn", what, "keep its orientation, or give setup.tool in params.yaml")
 
 
-def _of_rest(report: CheckReport, done: Processed) -> Iterator[Caution]:
+def _of_rest(facts: SignalFacts, done: Processed) -> Iterator[Caution]:
     """Of the band before a pull that follows on another."""
-    since = report.signals["window_start_s"] - done.pull.force_time[0] + SETTLE
+    since = facts.window_start_s - done.pull.force_time[0] + SETTLE
     if done.pull.number > 1 and since < CALM:
         what = f"the pictures begin {since:.1f} s after the pull before, the band may still swing"
         yield Caution("rest", what, f"wait for {CALM - since:.1f} s longer between two pulls")
@@ -182,40 +188,40 @@ def pause(signals: Signals) -> tuple[float, float]:
     return still, float(abs(0.5 * slope) / max(force.mean(), 1e-9))
 
 
-def _of_pictures(report: CheckReport) -> Iterator[Caution]:
+def _of_pictures(report: CheckReport, facts: CloudFacts) -> Iterator[Caution]:
     look = "look at --sheet; nearer camera, more light, another background, or cloud.mask folder"
     for row in report.phases:
-        if row["coverage"] < COVERAGE.get(row["phase"], 0.0):
+        if row.coverage < COVERAGE.get(row.phase, 0.0):
             yield Caution(
                 "coverage",
-                f"{100 * row['coverage']:.0f} % of the band is covered while it"
-                f" {SEEN_AS[row['phase']]} ({row['start']:.2f} - {row['end']:.2f} s)",
+                f"{100 * row.coverage:.0f} % of the band is covered while it"
+                f" {SEEN_AS[row.phase]} ({row.start:.2f} - {row.end:.2f} s)",
                 look,
             )
-    shown = {row["phase"] for row in report.phases}
+    shown = {row.phase for row in report.phases}
     for phase in (phase for phase in SEEN_AS if phase not in shown):
         what = f"no picture shows how the band {SEEN_AS[phase]}"
         yield Caution("unseen", what, "record the camera from before the grasp until it has swung")
-    told = [row for row in report.coverage if row["off_plane"] is not None]
-    foreign = [row for row in told if row["off_plane"] > FOREIGN]
+    told = [(row.time, row.off_plane) for row in report.coverage if row.off_plane is not None]
+    foreign = [time for time, off_plane in told if off_plane > FOREIGN]
     if foreign:
-        times = f"{foreign[0]['time']:.2f} - {foreign[-1]['time']:.2f} s"
+        times = f"{foreign[0]:.2f} - {foreign[-1]:.2f} s"
         yield Caution(
             "off_plane",
             f"{len(foreign)} of {len(told)} pictures of the hanging band hold points off the plane"
             f" that it hangs in ({times}): the hand, the arm or the background",
             look,
         )
-    facts = report.cloud
-    if facts["empty"] > EMPTY * facts["frames"]:
-        what = f"{facts['empty']} of {facts['frames']} pictures show no band"
+    if facts.empty > EMPTY * facts.frames:
+        what = f"{facts.empty} of {facts.frames} pictures show no band"
         yield Caution("empty", what, look)
-    for name, what, cure in (
-        ("damaged", "cannot be decoded", "see whether the camera's driver sends empty ones"),
-        ("unpaired", "have no colour picture", "record both at one rate, with reliable QoS"),
+    driver, rates = "see whether the camera's driver sends empty ones", "record both at one rate"
+    for name, count, what, cure in (
+        ("damaged", facts.damaged, "cannot be decoded", driver),
+        ("unpaired", facts.unpaired, "have no colour picture", f"{rates}, with reliable QoS"),
     ):
-        if facts[name] > EMPTY * facts["frames"]:
-            yield Caution(name, f"{facts[name]} depth pictures {what}", cure)
+        if count > EMPTY * facts.frames:
+            yield Caution(name, f"{count} depth pictures {what}", cure)
 
 
 def _of_sensor(done: Processed) -> Iterator[Caution]:
@@ -251,15 +257,15 @@ def _of_frames(report: CheckReport) -> Iterator[Caution]:
         what = "too few pictures of the drawn band to tell how far the fork tips are off"
         yield Caution("extrinsics", what, "pull slowly, and further")
         return
-    off, error = facts["off_m"], facts["off_error_m"]
+    off, error = facts.off_m, facts.off_error_m
     if off > max(TIPS_OFF, SURE * error):
-        pose = ", ".join(f"{number:g}" for number in facts["camera_to_fork"])
+        pose = ", ".join(f"{number:g}" for number in facts.camera_to_fork)
         yield Caution(
             "extrinsics",
             f"the camera shows the fork tips {1e3 * off:.1f} ± {1e3 * error:.1f} mm off",
             f"calibrate it again, or set setup.camera_to_fork: [{pose}] in params.yaml",
         )
-    off, error = facts["hand_off_m"], facts["hand_off_error_m"]
+    off, error = facts.hand_off_m, facts.hand_off_error_m
     if off > max(HAND_OFF, SURE * error):
         yield Caution(
             "hand",

@@ -19,7 +19,8 @@ from pipeline.simulator.parameters import Parameters
 class NamedBand(BandSizes, Protocol):
     """A band's sizes, and what it is called."""
 
-    name: str
+    @property
+    def name(self) -> str: ...
 
 
 class CalibratedBand(Protocol):

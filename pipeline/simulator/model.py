@@ -20,9 +20,12 @@ ROD, TETRAHEDRA = "rod", "tetrahedra"  # meshes: rod.h, tetrahedra.h
 class BandSizes(Protocol):
     """What a scale and a ruler say of a band: mass between the clamps, diameter, length [kg, m]."""
 
-    mass: float
-    diameter: float
-    rest_length: float
+    @property
+    def mass(self) -> float: ...
+    @property
+    def diameter(self) -> float: ...
+    @property
+    def rest_length(self) -> float: ...
 
 
 class ClampValues(Protocol):

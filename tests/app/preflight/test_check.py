@@ -1,13 +1,14 @@
 """What `sling check` says of recordings whose truth is a formula."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from app.preflight.check import ASSUMED, band_of, check_recording
 from app.preflight.command import check
+from app.preflight.facts import BandFacts, DelayFacts
 from app.preflight.report import Caution, CheckReport
 from app.preflight.verdict import cautions_of, pause
 from pipeline.base.errors import UserError, printable
@@ -67,7 +68,8 @@ def test_the_verdict_and_its_cautions_come_first(looked) -> None:
 def test_json_has_a_row_for_each_picture_only_where_asked(looked) -> None:
     assert "coverage" not in json.loads(looked.report.to_json())
     rows = json.loads(looked.report.to_json(frames=True))["coverage"]
-    assert rows == looked.report.coverage and len(rows) == looked.report.cloud["frames"]
+    assert rows == [asdict(row) for row in looked.report.coverage]
+    assert len(rows) == looked.report.cloud.frames
 
 
 def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
@@ -93,18 +95,18 @@ def test_cautions_come_from_the_report_alone(looked, params) -> None:
         report,
         notes=["no checksums in the file: damage to its messages would not be noticed"],
         losses=["2 damaged chunks dropped"],
-        signals={
-            **report.signals,
-            "grasp_s": 0.3,
-            "drift_n_s": [0.0, 1.0, 0.0],
-            "turn_deg": 3.0,
-            "release_error_s": 0.004,
-            "slips_s": [1.5],
-        },
-        delays={"pose": {"value_s": 0.012, "error_s": 0.001, "source": "x", "applied": True}},
-        cloud={**report.cloud, "empty": 20, "damaged": 20, "unpaired": 20},
-        phases=[{**report.phases[2], "coverage": 0.5}],
-        extrinsics={**report.extrinsics, "off_m": 0.02, "hand_off_m": 0.05},
+        signals=replace(
+            report.signals,
+            grasp_s=0.3,
+            drift_n_s=[0.0, 1.0, 0.0],
+            turn_deg=3.0,
+            release_error_s=0.004,
+            slips_s=[1.5],
+        ),
+        delays={"pose": DelayFacts(0.012, 0.001, source="x", applied=True)},
+        cloud=replace(report.cloud, empty=20, damaged=20, unpaired=20),
+        phases=[replace(report.phases[2], coverage=0.5)],
+        extrinsics=replace(report.extrinsics, off_m=0.02, hand_off_m=0.05),
     )
     found = {caution.about for caution in cautions_of(bad, looked.done)}
     said = "checksums losses lead_in drift turn release slip delay empty damaged unpaired coverage"
@@ -142,7 +144,7 @@ def test_a_clock_ahead_is_shown_with_its_sign(tmp_path, params) -> None:
 
 
 def test_a_camera_that_stops_before_the_release_is_said(looked, params) -> None:
-    phases = [row for row in looked.report.phases if row["phase"] in ("hanging", "held", "drawn")]
+    phases = [row for row in looked.report.phases if row.phase in ("hanging", "held", "drawn")]
     found = cautions_of(replace(looked.report, phases=phases), looked.done)
     said = [caution.what for caution in found if caution.about == "unseen"]
     assert said == [f"no picture shows how the band {how}" for how in ("recoils", "swings")]
@@ -159,7 +161,7 @@ def test_a_sensor_that_tf_static_does_not_know_is_said(looked, params) -> None:
 
 def test_tips_are_off_from_three_standard_errors(looked, params) -> None:
     for off, error, said in ((0.0039, 0.0001, 0), (0.0045, 0.0016, 0), (0.0045, 0.0014, 1)):
-        facts = {**looked.report.extrinsics, "off_m": off, "off_error_m": error}
+        facts = replace(looked.report.extrinsics, off_m=off, off_error_m=error)
         found = cautions_of(replace(looked.report, extrinsics=facts), looked.done)
         assert sum(caution.about == "extrinsics" for caution in found) == said
 
@@ -204,7 +206,7 @@ def test_the_report_of_a_bad_recording(tmp_path, params) -> None:
 def test_a_report_without_pictures_of_the_band_has_its_signals(refused, blind) -> None:
     report, truth = refused.report, blind[1]
     assert not report.usable and not report.phases and not report.extrinsics
-    assert report.signals["release_s"] == pytest.approx(truth.release, abs=2e-3)
+    assert report.signals.release_s == pytest.approx(truth.release, abs=2e-3)
     assert "release_s" in report.to_text() and json.loads(report.to_json())["signals"]
 
 
@@ -253,7 +255,8 @@ def test_the_whole_command(seen, params, tmp_path) -> None:
 def test_a_name_of_any_letters_has_nothing_that_a_terminal_obeys(name: str) -> None:
     """Also where an error names what lies beside the recording."""
     problem, written = f"{name}.masks: there is no such folder", [f"{name}.png: six moments"]
-    lines = CheckReport(name, "", problem, [], [], written=written).to_text().split("\n")
+    band = BandFacts(0.01, 0.5, "given")
+    lines = CheckReport(name, "", problem, [], [], band=band, written=written).to_text().split("\n")
     assert all(line.isprintable() for line in lines)
     shown = printable(name)
     assert f"cannot be used: {shown}.masks: there is no such folder" in lines

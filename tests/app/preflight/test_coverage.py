@@ -19,11 +19,11 @@ def test_points_of_the_arm_in_the_hanging_band_are_said(looked, params) -> None:
     points[1] = np.vstack([points[1], arm])
     done = SimpleNamespace(scene=looked.done.scene, clouds=replace(clouds, points=points))
     rows = over_time(done, 0.0)
-    assert rows[1]["phase"] == "hanging" and rows[1]["off_plane"] == pytest.approx(0.05, abs=0.01)
-    assert all(row["off_plane"] in (None, 0.0) for row in (rows[0], *rows[2:]))
+    assert rows[1].phase == "hanging" and rows[1].off_plane == pytest.approx(0.05, abs=0.01)
+    assert all(row.off_plane in (None, 0.0) for row in (rows[0], *rows[2:]))
     found = cautions_of(replace(looked.report, coverage=rows), looked.done)
     (said,) = [caution.what for caution in found if caution.about == "off_plane"]
-    told = sum(row["off_plane"] is not None for row in rows)
+    told = sum(row.off_plane is not None for row in rows)
     assert said.startswith(f"1 of {told} pictures of the hanging band hold points off the plane")
 
 
@@ -41,15 +41,15 @@ def test_the_plane_is_that_of_the_tips_and_the_hand(looked) -> None:
 
 def test_coverage_over_time_follows_the_phases(looked, seen) -> None:
     rows, truth = looked.report.coverage, seen[1]
-    assert len(rows) == looked.report.cloud["frames"]
+    assert len(rows) == looked.report.cloud.frames
     for row in rows:
-        if truth.drawn < row["time"] < truth.release:
-            assert row["phase"] == "drawn" and row["coverage"] > 0.9
-        assert (row["phase"] == "hanging") == (row["time"] < looked.report.signals["grasp_s"])
-        assert (row["phase"] in ("recoil", "swing")) == (row["time"] >= truth.release)
+        if truth.drawn < row.time < truth.release:
+            assert row.phase == "drawn" and row.coverage > 0.9
+        assert (row.phase == "hanging") == (row.time < looked.report.signals.grasp_s)
+        assert (row.phase in ("recoil", "swing")) == (row.time >= truth.release)
     phases = looked.report.phases
-    assert [row["phase"] for row in phases] == ["hanging", "held", "drawn", "recoil", "swing"]
-    assert sum(row["pictures"] for row in phases) == len(rows)
+    assert [row.phase for row in phases] == ["hanging", "held", "drawn", "recoil", "swing"]
+    assert sum(row.pictures for row in phases) == len(rows)
 
 
 def test_a_cloud_without_one_side_covers_half(looked) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from app.preflight.check import Look
+from app.preflight.facts import BandFacts
 from app.preflight.report import CheckReport
 from app.preflight.sheet import MOMENTS, draw_sheet, masked_frames, moments
 from app.preflight.timeline import write_timeline
@@ -58,7 +59,7 @@ def test_a_refused_recording_shows_what_it_has(with_rerun, refused, params, tmp_
 
 
 def test_nothing_to_show_is_said(with_rerun, params, tmp_path) -> None:
-    look = Look(CheckReport("x.mcap", "", "no force", [], []))
+    look = Look(CheckReport("x.mcap", "", "no force", [], [], band=BandFacts(0.01, 0.5, "given")))
     for function, name in ((draw_sheet, "a.png"), (write_timeline, "a.rrd")):
         assert "nothing in the recording" in function(look, params, tmp_path / name)
     assert not list(tmp_path.iterdir())
@@ -92,8 +93,8 @@ def test_the_timeline_is_read_by_rerun(with_rerun, looked, params, tmp_path) -> 
     times = dict(re.findall(r"PT([0-9.]+)S.*\[(grasp|release)\]", events))
     times = {name: float(seconds) for seconds, name in times.items()}
     signals = looked.report.signals
-    assert times["release"] == pytest.approx(signals["release_s"], abs=1e-6)
-    assert times["grasp"] == pytest.approx(signals["grasp_s"], abs=1e-6)
+    assert times["release"] == pytest.approx(signals.release_s, abs=1e-6)
+    assert times["grasp"] == pytest.approx(signals.grasp_s, abs=1e-6)
     rows = rerun("print", "-vvv", "--entity", "/force/y", path)
     values = [float(x) for x in re.findall(r"PT[0-9.]+S.*\[(-?[0-9.e-]+)\]", rows)]
     np.testing.assert_allclose(values, looked.done.signals.force[:, 1], atol=1e-9)

@@ -181,6 +181,6 @@ def test_a_misplaced_tf_static_is_measured(looked, params, tmp_path) -> None:
     assert not [c for c in looked.report.cautions if c.about == "extrinsics"]
 
     # What the report proposes for params.yaml brings the clouds back.
-    pose = tuple(look.report.extrinsics["camera_to_fork"])
+    pose = tuple(look.report.extrinsics.camera_to_fork)
     again = look_at(path, with_(params, "setup", camera_to_fork=pose))
     assert np.abs(again.tips.offsets).max() < 0.0007

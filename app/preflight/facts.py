@@ -1,0 +1,172 @@
+"""What `sling check` tells of a pull in numbers: each class is an object of its JSON."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.preflight.coverage import coverage
+from app.preflight.tips import Tips, along
+from pipeline.recording.build import Processed
+from pipeline.recording.delays import Delays
+from pipeline.recording.input.frames import Transform
+
+
+@dataclass(frozen=True)
+class BandFacts:
+    """The band that a recording was read with, and where that comes from."""
+
+    diameter_m: float
+    rest_length_m: float
+    source: str
+
+
+@dataclass(frozen=True)
+class SignalFacts:
+    """Events [s since the file's first force], force [N], frame O."""
+
+    window_start_s: float
+    grasp_s: float
+    grasp_error_s: float
+    release_s: float
+    release_error_s: float
+    release_resolution_s: float
+    bias_n: list[float]
+    drift_n_s: list[float]
+    noise_n: float
+    slips_s: list[float]
+    peak_force_n: float
+    hold_force_n: list[float]
+    sign: str
+    turn_deg: float
+    draw_m: list[float]
+    stretch: float
+
+    @classmethod
+    def of(cls, done: Processed) -> SignalFacts:
+        """Raises UserError where the pull cannot be understood."""
+        recording, signals, scene = done.pull.recording, done.signals, done.scene
+        facts = signals.facts
+        start = (signals.origin - recording.origin) * 1e-9
+        return cls(
+            window_start_s=start,
+            grasp_s=start + signals.grasp_time,
+            grasp_error_s=(recording.gripper or recording.pose).period,
+            release_s=start + signals.release_time,
+            release_error_s=facts.release_error,
+            release_resolution_s=facts.release_resolution,
+            bias_n=facts.bias,
+            drift_n_s=facts.drift,
+            noise_n=facts.noise,
+            slips_s=[start + time for time in facts.slips],
+            peak_force_n=facts.peak_force,
+            hold_force_n=facts.hold_force,
+            sign="flipped" if facts.flipped else "as recorded",
+            turn_deg=float(np.degrees(facts.turn)),
+            draw_m=signals.hand(signals.release_time).tolist(),
+            stretch=scene.stretch(signals.release_time - 1e-3),
+        )
+
+
+@dataclass(frozen=True)
+class DelayFacts:
+    """How late a stream's stamps are against the force's, with its standard error."""
+
+    value_s: float | None
+    error_s: float | None
+    source: str
+    applied: bool
+
+    @classmethod
+    def of(cls, delays: Delays) -> dict[str, DelayFacts]:
+        """By what is late."""
+        return {
+            role: cls(None if one.error is None else one.value, one.error, one.source, one.applied)
+            for role, one in (("pose", delays.pose), ("camera", delays.camera))
+        }
+
+
+@dataclass(frozen=True)
+class CloudFacts:
+    """How well the band is seen, over the whole recording."""
+
+    frames: int
+    empty: int
+    damaged: int
+    unpaired: int
+    points_least: int
+    points_median: int
+    told_by_color: bool
+    taut_coverage: float | None
+    taut_offset_m: float | None
+
+    @classmethod
+    def of(cls, done: Processed) -> CloudFacts:
+        """Raises UserError where the pictures show no band."""
+        clouds = done.clouds
+        sizes = [len(points) for points in clouds.points]
+        covered, off = coverage(done)
+        return cls(
+            frames=len(sizes),
+            empty=clouds.empty,
+            damaged=clouds.damaged,
+            unpaired=clouds.unpaired,
+            points_least=int(np.min(sizes)),
+            points_median=int(np.median(sizes)),
+            told_by_color=clouds.color_counts,
+            taut_coverage=covered,
+            taut_offset_m=off,
+        )
+
+
+@dataclass(frozen=True)
+class ExtrinsicFacts:
+    """How far fork tips and hand are off in the clouds, frame O, with standard errors.
+
+    `camera_to_fork` is what would put the camera's clouds in their place, as setup has it.
+    """
+
+    pictures: int
+    off_m: float
+    off_error_m: float
+    left_tip_m: list[float]
+    left_tip_error_m: list[float]
+    right_tip_m: list[float]
+    right_tip_error_m: list[float]
+    turn_deg: list[float]
+    turn_error_deg: list[float]
+    hand_off_m: float
+    hand_off_error_m: float
+    hand_m: list[float]
+    hand_error_m: list[float]
+    residual_m: float
+    camera_to_fork: list[float]
+
+    @classmethod
+    def of(cls, tips: Tips, done: Processed) -> ExtrinsicFacts:
+        geometry, turn = done.pull.geometry, tips.correction.rotation.as_rotvec()
+        believed = geometry.camera @ geometry.color.inverse()
+        return cls(
+            pictures=tips.frames,
+            off_m=tips.off,
+            off_error_m=tips.off_error,
+            left_tip_m=tips.offsets[0].tolist(),
+            left_tip_error_m=tips.errors[0].tolist(),
+            right_tip_m=tips.offsets[1].tolist(),
+            right_tip_error_m=tips.errors[1].tolist(),
+            turn_deg=np.degrees(-turn).tolist(),
+            turn_error_deg=np.degrees(tips.rotation_error).tolist(),
+            hand_off_m=float(np.linalg.norm(tips.hand)),
+            hand_off_error_m=along(tips.hand, tips.hand_error),
+            hand_m=tips.hand.tolist(),
+            hand_error_m=tips.hand_error.tolist(),
+            residual_m=tips.residual,
+            camera_to_fork=_pose((tips.correction @ believed).inverse()),
+        )
+
+
+def _pose(transform: Transform) -> list[float]:
+    """As setup.camera_to_fork has it."""
+    parts = [*transform.translation, *transform.rotation.as_quat(canonical=True)]
+    return [round(float(number), 6) for number in parts]

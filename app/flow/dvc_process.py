@@ -39,7 +39,7 @@ class LockYAML(YAML):
 
     def dump(self, data, stream=None, **options):
         known = isinstance(data, dict) and [*data] == ["schema", "stages"] and self.entries
-        if not (known and data["stages"]):
+        if stream is None or not (known and data["stages"]):
             return super().dump(data, stream, **options)
         stream.write(LOCK)
         for name, entry in data["stages"].items():

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 from app.flow.graph import Stage
 from pipeline.base.layout import Layout
+from stages.start import ungrouped
 
 PICTURE = re.compile(r"!\[[^\]]*\]\([^)]*\)\n")
 LINK = re.compile(r"\[([^\]]*)\]\((?!https?:)[^)]*\)")  # to a file beside the report
@@ -24,7 +25,7 @@ def artifact(stage: Stage, root: Path) -> str:
 
     Pictures are in it as data URIs, for Prefect's server keeps no files.
     """
-    make = MAKERS.get(stage.step.removeprefix("ablation_"))
+    make = MAKERS.get(ungrouped(stage.step))
     band, _, method = stage.item.partition("-")
     return "\n".join(make(Path(root), band, method)) if make else ""
 

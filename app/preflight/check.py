@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from app.preflight.coverage import by_phase, over_time
-from app.preflight.facts import BandFacts, CloudFacts, DelayFacts, ExtrinsicFacts, SignalFacts
+from app.preflight.facts import BandFacts, CloudFacts, DelayFacts, ExtrinsicFacts, SignalSummary
 from app.preflight.report import CheckReport, Chosen, Topic
 from app.preflight.tips import Tips, measure_tips
 from app.preflight.verdict import cautions_of
@@ -129,7 +129,7 @@ def _look_at_pull(report: CheckReport, done: Processed) -> Look:
     report.pull, report.frames = done.pull.number, done.pull.geometry.sources
     report.delays = DelayFacts.of(done.delays)
     try:
-        report.signals = SignalFacts.of(done)
+        report.signals = SignalSummary.of(done)
         report.cloud = CloudFacts.of(done)
     except UserError as error:
         report.problem = _without(recording.path, error)

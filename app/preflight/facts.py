@@ -23,7 +23,7 @@ class BandFacts:
 
 
 @dataclass(frozen=True)
-class SignalFacts:
+class SignalSummary:
     """Events [s since the file's first force], force [N], frame O."""
 
     window_start_s: float
@@ -44,7 +44,7 @@ class SignalFacts:
     stretch: float
 
     @classmethod
-    def of(cls, done: Processed) -> SignalFacts:
+    def of(cls, done: Processed) -> SignalSummary:
         """Raises UserError where the pull cannot be understood."""
         recording, signals, scene = done.pull.recording, done.signals, done.scene
         facts = signals.facts

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict, dataclass, field
 
 from app.preflight.coverage import PhaseLine, PictureLine
-from app.preflight.facts import BandFacts, CloudFacts, DelayFacts, ExtrinsicFacts, SignalFacts
+from app.preflight.facts import BandFacts, CloudFacts, DelayFacts, ExtrinsicFacts, SignalSummary
 from pipeline.base.errors import printable
 
 
@@ -113,7 +113,7 @@ class CheckReport:
     notes: list[str] = field(default_factory=list)
     band: BandFacts = field(kw_only=True)
     frames: dict[str, str] = field(default_factory=dict)
-    signals: SignalFacts | None = None
+    signals: SignalSummary | None = None
     delays: dict[str, DelayFacts] = field(default_factory=dict)
     cloud: CloudFacts | None = None
     phases: list[PhaseLine] = field(default_factory=list)

@@ -12,7 +12,7 @@ import numpy as np
 
 from app.preflight.check import Look
 from app.preflight.coverage import PictureLine
-from app.preflight.facts import SignalFacts
+from app.preflight.facts import SignalSummary
 from app.preflight.output import expect_writable
 from pipeline.base.files import replacing
 from pipeline.params import Params
@@ -114,7 +114,7 @@ def _seen(done: Processed, params: Params) -> list[Moment]:
 
 
 def _whole(
-    figure: Figure, done: Processed, facts: SignalFacts, rows: list[PictureLine], params: Params
+    figure: Figure, done: Processed, facts: SignalSummary, rows: list[PictureLine], params: Params
 ) -> None:
     seen, start = _seen(done, params), facts.window_start_s
     grid = figure.add_gridspec(5, len(seen), height_ratios=[0.88, 0.55, 0.92, 1.0, 0.55])
@@ -162,7 +162,7 @@ def _cloud(axes: Axes, done: Processed, one: Moment, a: int, b: int, labels: boo
         axes.tick_params(labelbottom=False, labelleft=False)
 
 
-def _force(axes: Axes, done: Processed, facts: SignalFacts) -> None:
+def _force(axes: Axes, done: Processed, facts: SignalSummary) -> None:
     """Each component and its size: seconds since the recording's first force."""
     signals, start = done.signals, facts.window_start_s
     time = start + signals.time
@@ -186,7 +186,7 @@ def _coverage(axes: Axes, rows: list[PictureLine]) -> None:
     other.grid(visible=False)
 
 
-def _events(axes: Axes, done: Processed, facts: SignalFacts, named: bool = False) -> None:
+def _events(axes: Axes, done: Processed, facts: SignalSummary, named: bool = False) -> None:
     for name, time in (("grasp", facts.grasp_s), ("release", facts.release_s)):
         axes.axvline(time, color=INK, lw=0.8, ls="--")
         if not named:

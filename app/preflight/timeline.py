@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from app.preflight.check import Look
-from app.preflight.facts import SignalFacts
+from app.preflight.facts import SignalSummary
 from app.preflight.output import expect_writable
 from app.preflight.sheet import masked_frames
 from pipeline.base.errors import UserError
@@ -169,7 +169,7 @@ def _camera(log: _Log, entity: str, camera: Camera, pose: Transform) -> None:
     log.still(entity, pinhole)
 
 
-def _motion(log: _Log, signals: Signals, facts: SignalFacts) -> None:
+def _motion(log: _Log, signals: Signals, facts: SignalSummary) -> None:
     """Hand and force sample by sample, as the episode has them."""
     import rerun
 

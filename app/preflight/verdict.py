@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from app.preflight.facts import CloudFacts, SignalFacts
+from app.preflight.facts import CloudFacts, SignalSummary
 from app.preflight.report import Caution, CheckReport, Chosen
 from pipeline.params.lab import SetupParams
 from pipeline.recording.build import Processed
@@ -121,7 +121,7 @@ def _of_clocks(report: CheckReport) -> Iterator[Caution]:
             )
 
 
-def _of_force(facts: SignalFacts, setup: SetupParams) -> Iterator[Caution]:
+def _of_force(facts: SignalSummary, setup: SetupParams) -> Iterator[Caution]:
     hold = float(np.linalg.norm(facts.hold_force_n))
     share = facts.noise_n / hold
     if share > NOISE:
@@ -149,7 +149,7 @@ def _of_force(facts: SignalFacts, setup: SetupParams) -> Iterator[Caution]:
         yield Caution("slip", what, "the band slipped in the pads: grip firmly and record again")
 
 
-def _of_motion(facts: SignalFacts, signals: Signals, setup: SetupParams) -> Iterator[Caution]:
+def _of_motion(facts: SignalSummary, signals: Signals, setup: SetupParams) -> Iterator[Caution]:
     if round(facts.grasp_s, 2) < LEAD_IN:
         what = f"only {facts.grasp_s:.2f} s of the empty hand come before the grasp"
         yield Caution("lead_in", what, f"record {LEAD_IN} s or more, the force is tared there")
@@ -164,7 +164,7 @@ def _of_motion(facts: SignalFacts, signals: Signals, setup: SetupParams) -> Iter
         yield Caution("turn", what, "keep its orientation, or give setup.tool in params.yaml")
 
 
-def _of_rest(facts: SignalFacts, done: Processed) -> Iterator[Caution]:
+def _of_rest(facts: SignalSummary, done: Processed) -> Iterator[Caution]:
     """Of the band before a pull that follows on another."""
     since = facts.window_start_s - done.pull.force_time[0] + SETTLE
     if done.pull.number > 1 and since < CALM:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -58,9 +59,9 @@ class Interval:
 class _Saved(ThetaFile):
     """What `Identification.save` writes."""
 
-    sizes: Band
+    sizes: dict[str, Any]
     mounting: Mounting | None
-    intervals: dict[str, Interval]
+    intervals: dict[str, dict[str, Any]]
     samples: list[list[float]] | None
     settled: bool
     stretch: float | None
@@ -114,22 +115,22 @@ class Identification(Model):
         """
         try:
             file = read_json(Path(path), _Saved)
-        except NotMade as error:
+            return cls(
+                band=Band(**file.sizes),
+                theta=Theta.of_file(file),
+                mounting=file.mounting,
+                history=file.history and LaunchHistory(**file.history.model_dump()),
+                settings=file.settings,
+                intervals={name: Interval(**one) for name, one in file.intervals.items()},
+                samples=None if file.samples is None else np.array(file.samples, float),
+                settled=file.settled,
+                stretch=file.stretch,
+            )
+        except (NotMade, TypeError) as error:
             if not Path(path).is_file():
                 raise
-            said = f"was not written by Identification.save ({error.problem})"
-            raise UserError(f"{path}: {said}") from error
-        return cls(
-            band=file.sizes,
-            theta=Theta.of_file(file),
-            mounting=file.mounting,
-            history=file.history and LaunchHistory(**file.history.model_dump()),
-            settings=file.settings,
-            intervals=file.intervals,
-            samples=None if file.samples is None else np.array(file.samples, float),
-            settled=file.settled,
-            stretch=file.stretch,
-        )
+            said = getattr(error, "problem", error)
+            raise UserError(f"{path}: was not written by Identification.save ({said})") from error
 
     @classmethod
     def of_run(cls, band: str, method: str = METHOD, root: str | Path = ".") -> Identification:
@@ -208,11 +209,8 @@ def identify(
     for episode in episodes:
         launch_history(episode)  # refuses one without a pull
     for launch in launches:
-        known_error = launch.error is not None and launch.error >= 0
-        if not (launch.landing > 0 and launch.draw[0] < 0 and known_error):
-            raise UserError(
-                f"launches: {launch}: draw y < 0, error >= 0 and landing > 0 are needed"
-            )
+        if launch.error is None:
+            raise UserError(f"launches: {launch}: the draw's error is needed")
     evaluate = nearest = None
     if start is None:
         mounting = None

@@ -65,8 +65,10 @@ def test_what_is_saved_is_loaded(found, tmp_path) -> None:
 def test_wrong_evidence_is_refused(band, settings, world, episode) -> None:
     with pytest.raises(UserError, match="at least one episode"):
         identify([], band)
-    with pytest.raises(UserError, match="draw y < 0, error >= 0 and landing > 0"):
-        identify([episode], band, launches=[Observed((0.3, 0.0), 0.0, 2.0)])
+    with pytest.raises(UserError, match="draw_y_m: must be from -20 to 0 m"):
+        Observed((0.3, 0.0), 0.0, 2.0)
+    with pytest.raises(UserError, match="the draw's error is needed"):
+        identify([episode], band, launches=[Observed((-0.3, 0.0), None, 2.0)])
     still = replace(episode, position=np.zeros_like(episode.position))
     with pytest.raises(UserError, match="lets go at the fork"):
         identify([still], band, settings=settings, start=world)

@@ -76,6 +76,9 @@ class Cell:
     command: str
 
 
+NOT_OURS = (Cell("no home and no name", "dvc repro"),)  # DVC itself does not start without
+
+
 @dataclass
 class Place:
     """Where a cell's command runs.
@@ -320,6 +323,7 @@ def main() -> int:
         print(f"left out, for only root can do so: {', '.join(left)}; no report is written")
     conditions = [one for one in conditions if one not in left]
     cells = [Cell(condition, command) for condition in conditions for command in COMMANDS]
+    cells = [one for one in cells if one not in NOT_OURS]
     cells = [one for one in cells if given.only in f"{one.condition}: {one.command}"]
     there = lines.of(Cell)
 

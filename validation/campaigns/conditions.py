@@ -47,6 +47,7 @@ COMMANDS = {
     "fit": "fit mine.mcap --mass 0.023 --name new",
     "add-band": "add-band new --recording more.mcap --mass 0.023",
     "add-recording": "add-recording --band band1 more.mcap",
+    "setup": "setup --max-force 40",
     "drift": "drift --band mine",
     "check": "check mine.mcap",
     "plan": "plan --band band1 --recording mine.mcap",

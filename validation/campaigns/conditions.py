@@ -264,12 +264,12 @@ def run(cell: Cell, work: Path) -> Result:
 
 def ended(process: subprocess.Popen, log: Path) -> int | None:
     """Its exit status; None where it takes too long. What serves is interrupted."""
-    latest = time.monotonic() + LIMIT
+    latest, interrupted = time.monotonic() + LIMIT, False
     while process.poll() is None and time.monotonic() < latest:
         time.sleep(0.2)
-        if "(Ctrl-C ends it)" in log.read_text(errors="replace"):
+        if "(Ctrl-C ends it)" in log.read_text(errors="replace") and not interrupted:
             os.killpg(process.pid, signal.SIGINT)
-            return process.wait(60)
+            interrupted, latest = True, time.monotonic() + 60
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
@@ -316,6 +316,8 @@ def main() -> int:
     options = runner.parser(__doc__ or "", REPORT, WORK)
     options.add_argument("--only", metavar="WORD", default="", help="cells with it in their names")
     given = options.parse_args()
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a shell's background
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     work = given.work.resolve()
     template(work)
     lines = ResultLines(work / "results.jsonl")

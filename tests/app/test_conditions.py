@@ -1,4 +1,4 @@
-"""Three commands where the project may not be written; the grid of all is a campaign."""
+"""Some commands where the project may not be written; the grid of all is a campaign."""
 
 import os
 import subprocess
@@ -37,6 +37,7 @@ def project(tmp_path: Path) -> Path:
     [
         "fit mine.mcap --mass 0.023",
         "observe --band band1 --draw=-0.30,-0.15 --landing 1.85",
+        "setup --max-force 40",
         "ui --port 43217",
     ],
 )

@@ -1,4 +1,4 @@
-"""Three commands where the project may not be written; the grid of all is a campaign."""
+"""Some commands where the project may not be written; the grid of all is a campaign."""
 
 import os
 import subprocess
@@ -12,7 +12,7 @@ from dvc.config import Config
 from app import cli, command_line  # noqa: F401 - which fills the table
 from app.flow.disk import expect_ready
 from pipeline.base.errors import UserError
-from tests.project import ROOT, python
+from tests.project import DEFAULTS, ROOT, python
 from validation.campaigns.conditions import COMMANDS, CONDITIONS, ROOTS, Cell, expected, faults_of
 from validation.projects import SLING, environment
 
@@ -26,7 +26,7 @@ def project(tmp_path: Path) -> Path:
     folder = tmp_path / "project"
     for name in (".dvc/tmp", "data/evidence"):
         (folder / name).mkdir(parents=True)
-    (folder / "params.yaml").write_bytes((ROOT / "params.yaml").read_bytes())
+    (folder / "params.yaml").write_bytes(DEFAULTS.read_bytes())
     (folder / "mine.mcap").write_text("is looked at later")
     subprocess.run(["git", "init", "-q"], cwd=folder, check=True)
     return folder
@@ -37,6 +37,7 @@ def project(tmp_path: Path) -> Path:
     [
         "fit mine.mcap --mass 0.023",
         "observe --band band1 --draw=-0.30,-0.15 --landing 1.85",
+        "setup --max-force 40",
         "ui --port 43217",
     ],
 )

@@ -94,7 +94,7 @@ def aim(
     warnings += safety.of_draw(params, band, draw, layout.root)
     warnings += safety.of_confidence(content, file)
     warnings += safety.of_policy(params, band, method, content, layout.root)
-    warnings += safety.of_mounting(band, layout.root)
+    warnings += safety.of_mounting(params, band, layout.root)
     answer = {
         "draw_y_m": float(draw[0]),
         "draw_z_m": float(draw[1]),

@@ -62,7 +62,7 @@ def launched(
             *safety.of_draw(params, band, draw, root),
             *safety.of_confidence(content, theta),
             *safety.of_identification(params, content, theta),
-            *safety.of_mounting(band, root),
+            *safety.of_mounting(params, band, root),
         ],
     }
 

@@ -1,46 +1,62 @@
-"""params.yaml edited: what nobody touches stays as it stands, comments included."""
+"""params.yaml edited: what nobody touches stays as it stands, comments and blank lines included.
+
+The form is DVC's own, so that `dvc exp run -S` moves no line either: lists are blocks, lines are as
+wide as ruamel has them by default, an empty value is null.
+"""
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from difflib import SequenceMatcher
 
-from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
-from ruamel.yaml.error import CommentMark
-from ruamel.yaml.nodes import ScalarNode
-from ruamel.yaml.representer import RoundTripRepresenter
-from ruamel.yaml.tokens import CommentToken
 
 
-def edited(text: str, change: Callable[[CommentedMap], None]) -> str:
+def edited(text: str, change: Callable[[CommentedMap], object]) -> str:
     """The text of a params.yaml after `change` has changed its content in place."""
-    yaml = YAML()
-    yaml.preserve_quotes = True
-    yaml.width = 10_000
-    yaml.representer.add_representer(type(None), _null)
-    content = yaml.load(text)
+    from dvc.utils.serialize import dumps_yaml, loads_yaml, parse_yaml_for_update
+
+    lines = text.splitlines()
+    kept = [line for line in lines if not _is_aside(line)]
+    if loads_yaml("\n".join(kept)) != loads_yaml(text):  # a text over several lines has such lines
+        kept = lines
+    content = parse_yaml_for_update("\n".join(kept), "params.yaml")
     change(content)
-    stream = io.StringIO()
-    yaml.dump(content, stream)
-    return stream.getvalue()
+    _lists_as_dvc_has_them(content)
+    settled = dumps_yaml(parse_yaml_for_update(dumps_yaml(content), "params.yaml"))
+    if kept is lines:
+        return settled
+    return "".join(f"{line}\n" for line in _with_asides(lines, kept, settled.splitlines()))
 
 
-def append(entries: CommentedMap, name: str, value: object) -> None:
-    """Add an entry right below the last one, above the blank lines that follow it.
-
-    ruamel keeps these with the last entry's comment, and would write them before the new one.
-    """
-    last = next(reversed(entries), None)
-    comment = (entries.ca.items.get(last) or [None, None, None])[2]
-    entries[name] = value
-    if comment is not None:
-        own, _, blank = comment.value.partition("\n")
-        comment.value = f"{own}\n"
-        if blank:
-            entries.ca.items[name] = [None, None, CommentToken(f"\n{blank}", CommentMark(0)), None]
+def _is_aside(line: str) -> bool:
+    """A blank line or a comment's: ruamel keeps it with the entry before, which may go or grow."""
+    return not line.strip() or line.lstrip().startswith("#")
 
 
-def _null(representer: RoundTripRepresenter, _: None) -> ScalarNode:
-    """Written out as it stands in the file, where ruamel would leave it empty."""
-    return representer.represent_scalar("tag:yaml.org,2002:null", "null")
+def _with_asides(lines: list[str], kept: list[str], after: list[str]) -> Iterator[str]:
+    """`after`, which was made of `kept`, with the other lines of `lines` above what they were."""
+    above: list[list[str]] = [[]]
+    for line in lines:
+        if _is_aside(line):
+            above[-1].append(line)
+        else:
+            above.append([])
+    here = [[] for _ in after]
+    for _, was, end, now, last in SequenceMatcher(None, kept, after, False).get_opcodes():
+        for n in range(min(end - was, last - now)):
+            here[now + n] = above[was + n]
+    for asides, line in zip(here, after, strict=True):
+        yield from [*asides, line]
+    yield from above[-1]
+
+
+def _lists_as_dvc_has_them(node: CommentedMap) -> None:
+    """It writes a list that it reads anew: as a block, but where there is nothing in it."""
+    if node.fa.flow_style():
+        return
+    for value in node.values():
+        if isinstance(value, CommentedMap):
+            _lists_as_dvc_has_them(value)
+        elif hasattr(value, "fa"):
+            value.fa.set_block_style() if value else value.fa.set_flow_style()

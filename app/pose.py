@@ -23,6 +23,7 @@ from pipeline.episode.episode import read_metadata
 from pipeline.params import Params
 from pipeline.recording.geometry import EpisodeGeometry
 from pipeline.recording.input.frames import Transform
+from stages.start import stage_of
 
 
 class PosedAnswer(Answer):
@@ -67,10 +68,11 @@ def fork_in_base(params: Params, band: str, root: str | Path = ".") -> tuple[Tra
         geometry = EpisodeGeometry.of_episode(read_metadata(folder), band)
     except UserError as error:
         if given is None:
+            stage = stage_of(params, "episode", band) or f"episode@{band}"
             raise UserError(
                 f"setup.base_to_fork is null and no episode says where the fork stands ({error}):"
-                f" make one (`dvc repro episode@{band}`), or measure it (docs/recording.md,"
-                " Calibration)"
+                f" make one (`dvc repro {stage}`), or measure it"
+                " (docs/recording.md, Calibration)"
             ) from error
         return Transform.of(given), params.plan.frame
     fork = geometry.base_to_fork if given is None else Transform.of(given)

@@ -143,8 +143,8 @@ def of_policy(
         yield Hazard("params", what)
 
 
-def of_mounting(band: str, root: Path) -> list[Hazard]:
-    return [Hazard("mounting", what) for what in unmounted(band, root)]
+def of_mounting(params: Params, band: str, root: Path) -> list[Hazard]:
+    return [Hazard("mounting", what) for what in unmounted(params, band, root)]
 
 
 def _of_changes(changes: list[Change], done: str, mended: str) -> Iterator[Hazard]:

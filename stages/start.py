@@ -99,33 +99,39 @@ def remedy(error: NotMade) -> str:
         step = folder if folder in steps else steps[-1]
     elif error.path.name == "launches.parquet":
         step = "launches"
-    stage = f"{step}@{band}" if method is None else stage_of(params, step, band, method)
+    stage = stage_of(params, step, band, method)
     if stage is None:
-        return (
-            f"name {method} under run.methods or run.ablations in params.yaml,"
-            " then `dvc repro` makes it"
-        )
+        what = f"{method} under run.methods or run.ablations" if method else f"{band} under run.own"
+        return f"name {what} in params.yaml, then `dvc repro` makes it"
     if error.problem != "missing":
         return f"`dvc repro --force {stage}` makes it anew"
     return f"`dvc repro {stage}` makes it"
 
 
-def stage_of(params: Params, step: str, band: str, method: str) -> str | None:
-    """The stage of a step for a band and a method; None where `run` lets them not meet."""
+def stage_of(params: Params, step: str, band: str, method: str | None = None) -> str | None:
+    """The stage of a step for a band, and a method; None where `run` lets them not meet."""
     asked = params.run
-    if band in asked.bands and method in asked.methods:
-        return f"{step}@{band}-{method}"
-    if band in asked.ablations.bands and method in asked.ablations.methods:
-        return f"ablation_{step}@{band}-{method}"
+    item = band if method is None else f"{band}-{method}"
+    for group, bands, methods in (
+        ("", asked.bands, asked.methods),
+        ("own_", asked.own, asked.methods[:1]),
+        ("ablation_", asked.ablations.bands, asked.ablations.methods),
+    ):
+        if band in bands and method in (None, *methods):
+            return f"{group}{step}@{item}"
     return None
 
 
-def unmounted(band: str, root: str | Path = ".") -> list[str]:
+def ungrouped(step: str) -> str:
+    """The step of a stage's, without what stage_of puts before it."""
+    return step.removeprefix("ablation_").removeprefix("own_")
+
+
+def unmounted(params: Params, band: str, root: str | Path = ".") -> list[str]:
     """A warning where nothing is known of how a band hangs: simulations go on without."""
     path = Layout(Path(root)).clamps(band)
     if path.exists():
         return []
-    return [
-        f"{path} is missing, so the band hangs as `setup` says; `dvc repro clamps@{band}` fits it"
-        " to a recording"
-    ]
+    stage = stage_of(params, "clamps", band)
+    mended = f"; `dvc repro {stage}` fits it to a recording" if stage else ""
+    return [f"{path} is missing, so the band hangs as `setup` says{mended}"]

@@ -11,13 +11,14 @@ from __future__ import annotations
 import json
 import re
 import subprocess
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from pipeline.base.code import CODE, ROOT, digest, digests
 from pipeline.base.errors import UserError
 from pipeline.base.fingerprint import fingerprint
+from pipeline.params import load
 
 TODAY, OLDER = "today", "older code"
 UNKNOWN = "unknown: written before digests"
@@ -70,12 +71,14 @@ def listed(
     files = list(dict.fromkeys(one for kind in PATTERNS for one in sorted(reports.glob(kind))))
     if not files:
         raise UserError(f"{reports}: no figures; run this in the project's folder")
-    names = {stage for file in files if (stage := _stage(file, root))}
+    at = root / "params.yaml"
+    own = load(at).run.own if at.is_file() else ()
+    names = {stage for file in files if (stage := _stage(file, root, own))}
     states = {None: NOT_TOLD, True: OLDER, False: TODAY}
     stages = (
         {name: states[old] for name, old in outdated(root, names, CODE).items()} if names else {}
     )
-    return [_figures(file, root, code, stages.get(_stage(file, root))) for file in files]
+    return [_figures(file, root, code, stages.get(_stage(file, root, own))) for file in files]
 
 
 def shown(figures: list[CommittedFigures]) -> str:
@@ -160,9 +163,11 @@ def _parts(content: dict, code: Path) -> list[str]:
     return [*PARTS]
 
 
-def _stage(file: Path, root: Path) -> str | None:
-    """The stage that writes a file, if one does."""
+def _stage(file: Path, root: Path, own: Collection[str]) -> str | None:
+    """The stage that writes a file, if one does; `own` are the bands of run.own."""
     parts = file.relative_to(root / "reports").parts
     if parts == ("summary.json",):
         return "report"
-    return f"card@{parts[1]}" if parts[0] == "bands" else None
+    if parts[0] != "bands":
+        return None
+    return f"{'own_' if parts[1] in own else ''}card@{parts[1]}"

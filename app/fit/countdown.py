@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from app.flow.graph import Stage
 from pipeline.base.progress import parse
+from stages.start import ungrouped
 
 SECONDS = {  # of a step, on two cores for a recording of 9 s
     "record": 45,
@@ -75,7 +76,7 @@ class Countdown:
 
 
 def _seconds(stage: str) -> float:
-    return SECONDS.get(stage.partition("@")[0], OTHER)
+    return SECONDS.get(ungrouped(stage.partition("@")[0]), OTHER)
 
 
 def _clock(seconds: float) -> str:

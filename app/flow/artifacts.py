@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, cast
 
 from app.flow.graph import Stage
 from pipeline.base.layout import Layout
+from stages.start import ungrouped
 
 if TYPE_CHECKING:
     from pipeline.report.run.results import Result, Results
@@ -28,7 +29,7 @@ def artifact(stage: Stage, root: Path) -> str:
 
     Pictures are in it as data URIs, for Prefect's server keeps no files.
     """
-    make = MAKERS.get(stage.step.removeprefix("ablation_"))
+    make = MAKERS.get(ungrouped(stage.step))
     band, _, method = stage.item.partition("-")
     return "\n".join(make(Path(root), band, method)) if make else ""
 

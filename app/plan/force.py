@@ -157,7 +157,7 @@ def _simulated(params: Params, band: str, drawn: np.ndarray, path: Path) -> floa
     from pipeline.simulator.launch import launch
 
     content = load_theta(path, band)
-    tell(of_mounting(band, Path()))
+    tell(of_mounting(params, band, Path()))
     sling, setup = calibrated(params, band, content), launch_setup(params, content)
     force = float(launch(sling, setup, parameters_of(content), drawn[1:]).hold_force[0])
     if not np.isfinite(force):

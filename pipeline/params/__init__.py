@@ -71,6 +71,7 @@ class Params(Section):
     def _names_agree(self) -> Params:
         for key, names, known in (
             ("bands", self.run.bands, self.bands),
+            ("own", self.run.own, self.bands),
             ("methods", self.run.methods, self.methods),
             ("ablations.methods", self.run.ablations.methods, self.methods),
         ):
@@ -78,13 +79,27 @@ class Params(Section):
         for band in self.run.ablations.bands:
             if band not in self.run.bands:
                 raise refusal(f"run.ablations.bands: {band} is not one of run.bands")
-        for key, run in (("run", self.run), ("run.ablations", self.run.ablations)):
-            for step, names in methods_by_step(run.methods, self.methods).items():
-                if list(getattr(run.steps, step)) != names:
+        for band in self.run.own:
+            if self.bands[band].source == "rig":
+                raise refusal(f"run.own: {band} has source: rig, so it belongs under run.bands")
+        first = self.run.methods[:1]
+        for key, steps, whose, methods in (
+            ("run.steps", self.run.steps, "run.methods", self.run.methods),
+            ("run.own_steps", self.run.own_steps, "run.methods[0]", first),
+            (
+                "run.ablations.steps",
+                self.run.ablations.steps,
+                "run.ablations.methods",
+                self.run.ablations.methods,
+            ),
+        ):
+            for step, names in methods_by_step(methods, self.methods).items():
+                if list(getattr(steps, step)) != names:
                     raise refusal(
-                        f"{key}.steps.{step}: must list those of {key}.methods whose search has"
-                        f" this step: [{', '.join(names)}]"
+                        f"{key}.{step}: must list those of {whose} whose search has this step:"
+                        f" [{', '.join(names)}]"
                     )
+        for key, run in (("run", self.run), ("run.ablations", self.run.ablations)):
             rig = [name for name in run.bands if self.bands[name].source == "rig"]
             if list(run.rig) != rig:
                 raise refusal(

@@ -70,15 +70,30 @@ class Ablations(Section):
 class RunParams(Section):
     bands: Annotated[Names, FILLED]
     rig: Names
+    own: Names
     methods: Annotated[Names, FILLED]
     steps: StepParams
+    own_steps: StepParams
     ablations: Ablations
+
+    @model_validator(mode="before")
+    @classmethod
+    def _own_bands_have_their_list(cls, content: object) -> object:
+        if isinstance(content, dict) and not {"own", "own_steps"} <= content.keys():
+            raise refusal(
+                "lacks `own` and `own_steps`, as the params.yaml of today's version has them: bands"
+                " of your own go from run.bands to run.own"
+            )
+        return content
 
     @model_validator(mode="after")
     def _nothing_runs_twice(self) -> RunParams:
         for method in self.ablations.methods:
             if method in self.methods:
                 raise refusal(f"ablations.methods: {method} is one of run.methods already")
+        for band in self.own:
+            if band in self.bands:
+                raise refusal(f"own: {band} is one of run.bands already")
         return self
 
 

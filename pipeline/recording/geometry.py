@@ -82,7 +82,7 @@ class EpisodeGeometry:
         if content is None:
             raise UserError(
                 f"the episodes of {band} are of an older version, without the rig's geometry:"
-                f" `dvc repro episode@{band}` makes them anew"
+                " `dvc repro` makes them anew"
             )
         camera = content["camera"]
         arrays = {key: np.array(camera[key], float) for key in ("matrix", "distortion")}

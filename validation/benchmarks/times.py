@@ -37,7 +37,7 @@ BEGIN, END = marks("times")
 BAND = "timed"  # of the recording
 CHANGES = ("PYTHONPATH", "VIRTUAL_ENV", "UV_CACHE_DIR", "PIP_CACHE_DIR", "WARP_CACHE_PATH")
 STAGE = re.compile(r"^([a-z]+)(?:@[\w-]+)? \| done \((?:(\d+) min )?([\d.]+) s\)$", re.MULTILINE)
-ABLATION = re.compile("^ablation_", re.MULTILINE)
+GROUP = re.compile("^(ablation|own)_", re.MULTILINE)
 STAGES = "record episode mounting clamps evidence history clusters cma density de bo adam search"
 STAGES = (STAGES + " theta policy launches trials floor card report").split()  # order of columns
 
@@ -114,7 +114,7 @@ def surroundings(folder: Path) -> dict[str, str]:
 def seconds_of_stages(log: str) -> dict[str, dict]:
     """Seconds of the stages that a flow ran, by their script: how many, the median, the longest."""
     found: dict[str, list[float]] = {}
-    for step, minutes, seconds in STAGE.findall(ABLATION.sub("", log)):
+    for step, minutes, seconds in STAGE.findall(GROUP.sub("", log)):
         found.setdefault(step, []).append(60 * int(minutes or 0) + float(seconds))
     return {
         step: {"count": len(own), "median_s": statistics.median(own), "most_s": max(own)}

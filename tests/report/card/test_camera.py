@@ -116,5 +116,5 @@ def test_a_colour_camera_beside_the_depth_camera(told, project) -> None:
 def test_an_episode_of_an_older_version_is_named_with_its_remedy(told, project) -> None:
     path = Layout(project).raw(BAND) / "seen.mcap"
     old = {key: value for key, value in told.episode.metadata.items() if key != "geometry"}
-    with pytest.raises(UserError, match=f"older version.*dvc repro episode@{BAND}"):
+    with pytest.raises(UserError, match=f"of {BAND} are of an older version.*dvc repro"):
         Pictures.of(path, replace(told.episode, metadata=old), told.params.setup)

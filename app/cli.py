@@ -265,14 +265,8 @@ def aim(arguments: argparse.Namespace) -> Done:
     "learn from a launch that you measured: identify and train again with it",
     "--band band1 --draw=-0.30,-0.17 --landing 2.21",
     BAND,
-    DRAW,
-    flag(
-        "--landing",
-        type=kinds.landing,
-        required=True,
-        metavar="M",
-        help="along the floor, in metres",
-    ),
+    flag("--draw", **(DRAW[1] | {"required": False})),
+    flag("--landing", type=kinds.landing, metavar="M", help="along the floor, in metres"),
     flag(
         "--draw-error",
         type=kinds.draw_error,
@@ -280,23 +274,37 @@ def aim(arguments: argparse.Namespace) -> Done:
         help="standard deviation of the draw, in metres; default trials.actuation_error",
     ),
     METHOD,
-    flag("--no-run", action="store_true", help="only write the launch down"),
+    flag("--again", action="store_true", help="it equals one that is there, and is one more"),
+    flag("--undo", action="store_true", help="take the band's last launch out instead"),
+    flag("--no-run", action="store_true", help="only write the launch down, or take it out"),
     JSON,
 )
 def observe(arguments: argparse.Namespace) -> Done:
     from app import observe
     from pipeline.params import load
 
-    answer = observe.observe(
-        load(),
-        arguments.band,
-        arguments.method,
-        arguments.draw,
-        arguments.landing,
-        error=arguments.draw_error,
-        run=not arguments.no_run,
-    )
-    return kinds.shown(answer, True) if arguments.json else observe.shown(answer, arguments.landing)
+    of_launch = {"--draw": arguments.draw, "--landing": arguments.landing}
+    if arguments.undo:
+        of_launch |= {"--draw-error": arguments.draw_error, "--again": arguments.again or None}
+        if given := [name for name, value in of_launch.items() if value is not None]:
+            arguments.refuse(f"--undo takes the last launch out, so it takes no {given[0]}")
+    elif missing := [name for name, value in of_launch.items() if value is None]:
+        arguments.refuse(f"the following arguments are required: {', '.join(missing)}")
+    run = not arguments.no_run
+    if arguments.undo:
+        answer = observe.undo(load(), arguments.band, arguments.method, run=run)
+    else:
+        answer = observe.observe(
+            load(),
+            arguments.band,
+            arguments.method,
+            arguments.draw,
+            arguments.landing,
+            error=arguments.draw_error,
+            again=arguments.again,
+            run=run,
+        )
+    return kinds.shown(answer, True) if arguments.json else observe.shown(answer)
 
 
 @command(
@@ -322,7 +330,8 @@ def export(arguments: argparse.Namespace) -> Done:
     return kinds.shown(card, True) if arguments.json else shown(folder, card)
 
 
-from app import machine_commands  # noqa: E402, F401, I001 - they come last in the help
+from app import project_commands  # noqa: E402, F401, I001 - they come last in the help
+from app import machine_commands  # noqa: E402, F401
 from app import developer  # noqa: E402, F401 - and these below them
 
 if __name__ == "__main__":

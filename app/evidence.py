@@ -6,6 +6,7 @@ import csv
 import io
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 from pipeline.base import launch_table as table
 from pipeline.base.errors import UserError
@@ -14,6 +15,9 @@ from pipeline.base.layout import Layout
 from pipeline.identify.posterior.evidence import COLUMNS, read_launches
 
 Launch = tuple[float, float, float | None, float]  # draw (y, z), its error or None, landing [m]
+# What becomes of a launch that equals one which is there; "passed over": as many as there are, so
+# that a table may be added again.
+Equal = Literal["refused", "passed over", "added"]
 
 
 def read(path: Path) -> list[Launch]:
@@ -26,28 +30,46 @@ def read(path: Path) -> list[Launch]:
     return [(*one.draw, one.error, one.landing) for one in found]
 
 
-def add(layout: Layout, band: str, launches: Sequence[Launch], *, again: bool = False) -> int:
+def add(layout: Layout, band: str, launches: Sequence[Launch], equal: Equal = "refused") -> int:
     """Write launches below the band's others; how many there are then.
-
-    Args:
-        again: Whether as many equal launches as are there already are passed over, instead of
-            refused: so that a table may be added again.
 
     Raises:
         UserError: One of them is there already, or is a score; nothing is written.
     """
-    rows, new = joined(layout, band, launches, again=again)
+    rows, new = joined(layout, band, launches, equal)
     if new:
-        text = io.StringIO()
-        writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-        write_text(layout.evidence / f"{band}.csv", text.getvalue())
+        _write(layout.evidence / f"{band}.csv", rows)
     return len(rows)
 
 
+def without_last(layout: Layout, band: str) -> tuple[Launch, int]:
+    """Take the band's last launch out; it, and how many are left.
+
+    Raises:
+        UserError: There is none.
+    """
+    path = layout.evidence / f"{band}.csv"
+    there = table.rows(path, "evidence") if path.is_file() else []
+    if not there:
+        raise UserError(f"{path}: holds no launch of {band}, so there is none to take back")
+    last = read_launches(path, error=None)[-1]
+    if rows := [row.cells for row in there[:-1]]:
+        _write(path, rows)
+    else:
+        path.unlink()
+    return (*last.draw, last.error, last.landing), len(rows)
+
+
+def _write(path: Path, rows: Sequence[dict]) -> None:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(path, text.getvalue())
+
+
 def joined(
-    layout: Layout, band: str, launches: Sequence[Launch], *, again: bool = False
+    layout: Layout, band: str, launches: Sequence[Launch], equal: Equal = "refused"
 ) -> tuple[list[dict], int]:
     """Rows of the band's table with launches below them, and how many are new. As `add`."""
     path = layout.evidence / f"{band}.csv"
@@ -60,10 +82,11 @@ def joined(
         launch = (y, z, landing)
         if table.among(launch, scores):
             raise UserError(table.told_twice(launch, path, layout.measured / path.name))
-        if table.among(launch, known):
-            if not again:
+        if equal != "added" and table.among(launch, known):
+            if equal == "refused":
                 raise UserError(
-                    f"{path}: this launch is there already; `dvc repro` runs what is stale"
+                    f"{path}: this launch is there already; if you measured one more that is equal,"
+                    " add --again; else `dvc repro` runs what is stale"
                 )
             known.remove(next(one for one in known if table.among(launch, [one])))
             continue

@@ -31,6 +31,7 @@ def observe(
     landing: float,
     *,
     error: float | None = None,
+    again: bool = False,
     run: bool = True,
     root: Path | str = ".",
 ) -> dict:
@@ -41,40 +42,77 @@ def observe(
         method: That is identified anew, one that searches by least squares.
         draw, landing: As measured [m].
         error: Standard deviation of the draw along each axis [m]; None: of a commanded one.
+        again: Whether one that equals another is one more launch, instead of a mistake.
         run: Whether stages run; else the launch is noted, no more.
         root: Of the project.
 
     Returns:
-        `file`, `launches` in it, what `known` says `before` and `after`, and `warnings`, which are
+        `file`, `launches` in it, `measured_m` of this one, what `known` says `before` and `after`, and `warnings`, which are
         told on stderr before stages run.
 
     Raises:
         UserError: It can be no launch, or is known already, and nothing is written; or a stage
             fails, and the launch stays.
     """
-    expect_known(params, "band", band, called="--band")
-    expect_known(params, "method", method, called="--method")
-    if params.methods[method].search != LEAST_SQUARES:
-        raise UserError(f"--method {method}: takes no launches as evidence, least_squares does")
-    layout = Layout(Path(root))
+    layout, stage = _place_and_stage(params, band, method, run, root)
     expect_above_floor(params, draw)
-    stage = policy_stage(params, band, method) if run else None
-    if run:
-        expect_ready(layout.root)
-    number = evidence.add(layout, band, [(*draw, error, landing)])
+    equal = "added" if again else "refused"
+    number = evidence.add(layout, band, [(*draw, error, landing)], equal)
     answer = {"file": str(layout.evidence / f"{band}.csv"), "launches": number}
+    answer["measured_m"] = landing
     answer["before"] = known(params, band, method, draw, layout.root, error)
     doubts = list(doubted(answer["before"], landing, answer["file"]))
     safety.tell(doubts)
-    if stage:
-        child.repro(layout.root, stage, lambda line: print(line, file=sys.stderr, flush=True))
-    answer["after"] = known(params, band, method, draw, layout.root, error) if run else None
+    ran = _run(stage, layout)
+    answer["after"] = known(params, band, method, draw, layout.root, error) if ran else None
     if failure := (answer["after"] or {}).get("failure"):
         what = f"the launch fails in simulation, so it counts for nothing: {failure}"
         doubts.append(Hazard("failure", what))
         safety.tell(doubts[-1:])
     answer["warnings"] = safety.as_json(doubts)
     return answer
+
+
+def undo(
+    params: Params, band: str, method: str, *, run: bool = True, root: Path | str = "."
+) -> dict:
+    """Take the last launch out of data/evidence/<band>.csv, and run what that makes stale.
+
+    Returns:
+        As `observe` does, and `removed`: `draw` and `error` of the launch.
+
+    Raises:
+        UserError: There is none, and nothing has changed; or a stage fails, and it stays out.
+    """
+    layout, stage = _place_and_stage(params, band, method, run, root)
+    (y, z, error, landing), number = evidence.without_last(layout, band)
+    answer = {"file": str(layout.evidence / f"{band}.csv"), "launches": number}
+    answer |= {"measured_m": landing, "removed": {"draw": [y, z], "error": error}}
+    answer["before"] = known(params, band, method, (y, z), layout.root, error)
+    ran = _run(stage, layout)
+    answer["after"] = known(params, band, method, (y, z), layout.root, error) if ran else None
+    return answer | {"warnings": []}
+
+
+def _place_and_stage(
+    params: Params, band: str, method: str, run: bool, root: Path | str
+) -> tuple[Layout, str | None]:
+    """Where the band's files lie, and the stage that is to run. Raises UserError."""
+    expect_known(params, "band", band, called="--band")
+    expect_known(params, "method", method, called="--method")
+    if params.methods[method].search != LEAST_SQUARES:
+        raise UserError(f"--method {method}: takes no launches as evidence, least_squares does")
+    stage = policy_stage(params, band, method) if run else None
+    if run:
+        expect_ready(Path(root))
+    return Layout(Path(root)), stage
+
+
+def _run(stage: str | None, layout: Layout) -> bool:
+    """Have DVC run a stage; whether there was one. Raises UserError."""
+    if stage:
+        child.repro(layout.root, stage, lambda line: print(line, file=sys.stderr, flush=True))
+    return bool(stage)
 
 
 def doubted(before: dict | None, landing: float, file: str) -> Iterator[Hazard]:
@@ -132,17 +170,24 @@ def policy_stage(params: Params, band: str, method: str) -> str:
     raise UserError(f"{method} does not run on {band}: see `run:` in params.yaml, or --no-run")
 
 
-def shown(answer: dict, landing: float) -> str:
+def shown(answer: dict) -> str:
     """A few lines for people."""
     count = answer["launches"]
-    lines = [f"{answer['file']}: {count} launch{'es' if count > 1 else ''} as evidence"]
+    lines = [f"{answer['file']}: {count} launch{'' if count == 1 else 'es'} as evidence"]
+    if removed := answer.get("removed"):
+        y, z = removed["draw"]
+        lines.append(
+            f"taken out: the draw to {y:g}, {z:g} that landed at {answer['measured_m']:g} m"
+        )
     for when in ("before", "after"):
         if told := answer[when]:
             share = _with_ends(told["returned_share"], told["share_90"], "")
             landed = told["failure"] and f"fails in simulation: {told['failure']}"
             landed = landed or _with_ends(told["landing_m"], told["interval_90_m"], " m")
             lines.append(f"{when:6}  landing {landed}, returned share {share}")
-    lines.append(f"measured  {landing:.3f} m" + ("" if answer["after"] else "; nothing has run"))
+    lines.append(
+        f"measured  {answer['measured_m']:.3f} m" + ("" if answer["after"] else "; nothing has run")
+    )
     return "\n".join(lines)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,20 +15,23 @@ from app.fit.countdown import Countdown
 from app.flow import child
 from app.flow.disk import expect_ready
 from app.flow.graph import leading_to, stages_of
+from app.params_file import edited
 from app.preflight.add_band import NAME, add_band
 from app.preflight.recordings import add_recording, digests, renew_masks
 from pipeline.base.errors import UserError, printable
+from pipeline.base.files import write_text
 from pipeline.base.launch_table import expect_apart, file_of
 from pipeline.base.layout import Layout
 from pipeline.identify.posterior.evidence import read_evidence
-from pipeline.params import Params, load
+from pipeline.params import Params, load, parse
 from pipeline.recording.input.bag import name_of as name_of_file
 from pipeline.recording.input.bag import once
+from stages.start import stage_of
 
 
 @dataclass(frozen=True)
 class NewBand:
-    """What a scale, a ruler and a calliper say of a band that is new; None: not given."""
+    """What a scale, a ruler and a calliper say of a band; None: as it stands, or usual."""
 
     mass: float | None = None
     diameter: float | None = None
@@ -50,7 +54,8 @@ def fit(
     Args:
         recordings: MCAP files of one band; none for a band that is in params.yaml.
         name: Of the band; None: from the first file's name.
-        band: Of a new one, with `mass` [kg].
+        band: With `mass` [kg] for a new one; of one that is known, it takes the place of what
+            params.yaml has, and what depends on it runs again.
         launches: CSV of launches that are to be evidence.
         root: Of the project.
 
@@ -68,18 +73,18 @@ def fit(
     recordings = once(recordings)
     file_of(layout.evidence, name, [*params.bands, name])
     expect_apart(layout, name)
-    evidence.joined(layout, name, told, again=True)  # what is wrong is said before any change
+    evidence.joined(layout, name, told, "passed over")  # what is wrong is said before any change
     expect_ready(root)
-    if recordings:
-        say(printable(f"checking {', '.join(map(str, recordings))}"))
-        say(brought_in(params, layout, recordings, name, band))
-        params = load(root / "params.yaml")
-    expect_running(params, name)
+    with corrected(root / "params.yaml", name, band) as params:
+        if recordings:
+            say(printable(f"checking {', '.join(map(str, recordings))}"))
+            say(brought_in(params, layout, recordings, name, band))
+            params = load(root / "params.yaml")
+        card_stage = running(params, name)
     if told:
-        count = evidence.add(layout, name, told, again=True)
+        count = evidence.add(layout, name, told, "passed over")
         say(f"{layout.evidence / name}.csv: {count} launches as evidence")
     read_evidence(layout.evidence, name, params)
-    card_stage = f"card@{name}"
     countdown = Countdown(leading_to(stages_of(root), card_stage))
     child.repro(root, card_stage, countdown.line, countdown.begins)
     countdown.ends()
@@ -122,12 +127,6 @@ def brought_in(
         return add_band(name, recordings, **band.known, params_path=at, root=layout.root)
     if known.source != "recording":
         raise UserError(f"{name}: is a band of the virtual rig; choose another name: --name NAME")
-    for what, value in band.known.items():
-        if value != getattr(known, what):
-            raise UserError(
-                f"--{what.replace('_', '-')} {value:g}: bands.{name}.{what} in {at} is"
-                f" {getattr(known, what):g}; choose another name, or edit it there"
-            )
     there = digests(layout.recordings(name))
     given = digests(recordings)
     new = [file for digest, file in given.items() if digest not in there]
@@ -135,19 +134,56 @@ def brought_in(
         done = add_recording(name, new, params_path=at, root=layout.root)
         renew_masks(recordings, there)
         return done
-    if not new and name in params.run.bands:
+    if not new and name in (*params.run.bands, *params.run.own):
         renew_masks(recordings, there)
         return f"{name} is there already, with {len(there)} recordings: goes on"
     values = {what: getattr(known, what) for what in ("mass", "diameter", "rest_length")}
     return add_band(name, recordings, **values, params_path=at, root=layout.root)
 
 
-def expect_running(params: Params, name: str) -> None:
-    """Raises UserError where dvc.yaml has no card of this band."""
+@contextmanager
+def corrected(path: Path, name: str, band: NewBand) -> Iterator[Params]:
+    """params.yaml with the sizes of a band that it has; as it was, where what follows fails.
+
+    Says the old and the new ones. Raises UserError where they cannot be, and changes nothing.
+    """
+    params = load(path)
+    there = params.bands.get(name)
+    new = {what: one for what, one in band.known.items() if there and one != getattr(there, what)}
+    if not (there and new):
+        yield params
+        return
+    if there.source == "rig":
+        raise UserError(
+            f"{name}: is a band of the virtual rig, which pulls it as bands.{name} in {path} says:"
+            " choose another name (--name NAME), or edit it there"
+        )
+    before = path.read_text("utf-8")
+    text = edited(before, lambda content: content["bands"][name].update(new))
+    params = parse(text, str(path))
+    write_text(path, text)
+    try:
+        for what, value in new.items():
+            say(f"{path}: bands.{name}.{what} was {getattr(there, what):g}, is {value:g} now")
+        yield params
+    except BaseException:
+        write_text(path, before)
+        say(f"{path}: is as it was")
+        raise
+
+
+def running(params: Params, name: str) -> str:
+    """The stage of the band's card. Raises UserError where dvc.yaml has none."""
     if name not in params.bands:
         raise UserError(
             f"{name}: is no band of params.yaml, which has {', '.join(params.bands)};"
             " give its recording: sling fit FILE.mcap --mass KG"
         )
-    if name not in params.run.bands:
-        raise UserError(f"{name}: add it to run.bands in params.yaml, which names what runs")
+    if not (stage := stage_of(params, "card", name)):
+        raise UserError(f"{name}: add it to run.own in params.yaml, which names what runs")
+    if params.bands[name].source == "recording" and name in params.run.bands:
+        say(
+            f"{name}: stands under run.bands in params.yaml, so every method runs on it and the"
+            " report shows it; under run.own instead it gets its card alone"
+        )
+    return stage

@@ -9,7 +9,7 @@ from pathlib import Path
 from ruamel.yaml.comments import CommentedMap
 
 from app.flow.disk import expect_writable
-from app.params_file import append, edited
+from app.params_file import edited
 from app.preflight import recordings as files
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
@@ -29,7 +29,7 @@ def add_band(
     params_path: Path | str = "params.yaml",
     root: Path | str = ".",
 ) -> str:
-    """Check recordings, copy them to data/raw and add their band to params.yaml and to run.bands.
+    """Check recordings, copy them to data/raw and add their band to params.yaml and to run.own.
 
     Nothing is written unless everything is right; params.yaml comes last. Adding the same band
     with the same recordings again changes nothing.
@@ -64,7 +64,7 @@ def add_band(
     if known and before.bands[name].model_dump() != band:
         raise UserError(
             f"{params_path}: bands.{name} is there already with other values: choose another name,"
-            " or edit it"
+            f" or correct it (`sling fit --name {name} --mass ...`)"
         )
     text = _with_band(params_path, name, band)
     after = parse(text, str(params_path))
@@ -76,7 +76,7 @@ def add_band(
             f"{layout.raw(name)} holds other recordings already: choose another name, or"
             f" `sling add-recording --band {name}`"
         )
-    if same and known and name in before.run.bands:
+    if same and known and name in (*before.run.bands, *before.run.own):
         files.renew_masks(recordings, there)
         return f"{name} is there already: nothing to do"
 
@@ -91,14 +91,12 @@ def add_band(
 
 
 def _with_band(path: Path, name: str, band: dict[str, object]) -> str:
-    """The text of params.yaml with the band in `bands` and in `run.bands`, all else as it was."""
+    """The text of params.yaml with the band in `bands` and in `run.own`, all else as it was."""
 
     def add(content: CommentedMap) -> None:
         if name not in content["bands"]:
-            entry = CommentedMap(band)
-            entry.fa.set_flow_style()
-            append(content["bands"], name, entry)
-        if name not in content["run"]["bands"]:
-            content["run"]["bands"].append(name)
+            content["bands"][name] = band
+        if name not in (*content["run"]["bands"], *content["run"]["own"]):
+            content["run"]["own"].append(name)
 
     return edited(path.read_text(encoding="utf-8"), add)

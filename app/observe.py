@@ -47,8 +47,8 @@ def observe(
         root: Of the project.
 
     Returns:
-        `file`, `launches` in it, `measured_m` of this one, what `known` says `before` and `after`, and `warnings`, which are
-        told on stderr before stages run.
+        `file`, `launches` in it, `measured_m` of this one, what `known` says `before` and `after`,
+        and `warnings`, which are told on stderr before stages run.
 
     Raises:
         UserError: It can be no launch, or is known already, and nothing is written; or a stage
@@ -175,19 +175,15 @@ def shown(answer: dict) -> str:
     count = answer["launches"]
     lines = [f"{answer['file']}: {count} launch{'' if count == 1 else 'es'} as evidence"]
     if removed := answer.get("removed"):
-        y, z = removed["draw"]
-        lines.append(
-            f"taken out: the draw to {y:g}, {z:g} that landed at {answer['measured_m']:g} m"
-        )
+        lines.append("taken out: the draw to {:g}, {:g}".format(*removed["draw"]))
     for when in ("before", "after"):
         if told := answer[when]:
             share = _with_ends(told["returned_share"], told["share_90"], "")
             landed = told["failure"] and f"fails in simulation: {told['failure']}"
             landed = landed or _with_ends(told["landing_m"], told["interval_90_m"], " m")
             lines.append(f"{when:6}  landing {landed}, returned share {share}")
-    lines.append(
-        f"measured  {answer['measured_m']:.3f} m" + ("" if answer["after"] else "; nothing has run")
-    )
+    nothing = "" if answer["after"] else "; nothing has run"
+    lines.append(f"measured  {answer['measured_m']:.3f} m{nothing}")
     return "\n".join(lines)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from difflib import SequenceMatcher
+from typing import cast
 
 from ruamel.yaml.comments import CommentedMap
 
@@ -20,7 +21,7 @@ def edited(text: str, change: Callable[[CommentedMap], object]) -> str:
     kept = [line for line in lines if not _is_aside(line)]
     if loads_yaml("\n".join(kept)) != loads_yaml(text):  # a text over several lines has such lines
         kept = lines
-    content = parse_yaml_for_update("\n".join(kept), "params.yaml")
+    content = cast(CommentedMap, parse_yaml_for_update("\n".join(kept), "params.yaml"))
     change(content)
     _lists_as_dvc_has_them(content)
     settled = dumps_yaml(parse_yaml_for_update(dumps_yaml(content), "params.yaml"))

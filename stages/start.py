@@ -27,6 +27,7 @@ MAKERS = {  # steps that make a folder of another name
 OF_A_SEARCH = ("history", "clusters", "evaluations", "confidence")  # its last step writes the rest
 
 OF_DVC = "DVC_STAGE"  # in the environment of what DVC runs
+OF_EXPERIMENT = "DVC_EXP_NAME"  # the same, of `dvc exp run`
 GRACE = 5.0  # s from the interrupt to the end
 
 
@@ -41,9 +42,20 @@ def arguments(*names: str) -> list[str]:
 
 
 def started(*names: str) -> tuple[Params, *tuple[str, ...]]:
-    """params.yaml and the stage's arguments, each of which it must know. Raises UserError."""
+    """params.yaml and the stage's arguments, each of which it must know. Raises UserError.
+
+    Where `dvc exp run -S` has written what is refused, the error says how to take it back.
+    """
     given = arguments(*names)
-    params = load()
+    try:
+        params = load()
+    except UserError as error:
+        if OF_EXPERIMENT in os.environ and Path.cwd() == Path(os.environ["DVC_ROOT"]):
+            raise UserError(
+                f"{error}; DVC has written it there: `sling reset KEY` takes it back, and `dvc exp run"
+                " --temp` leaves params.yaml alone"
+            ) from error
+        raise
     for name, value in zip(names, given, strict=True):
         expect_known(params, name, value)
     return params, *given

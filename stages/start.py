@@ -52,8 +52,8 @@ def started(*names: str) -> tuple[Params, *tuple[str, ...]]:
     except UserError as error:
         if OF_EXPERIMENT in os.environ and Path.cwd() == Path(os.environ["DVC_ROOT"]):
             raise UserError(
-                f"{error}; DVC has written it there: `sling reset KEY` takes it back, and `dvc exp run"
-                " --temp` leaves params.yaml alone"
+                f"{error}; DVC wrote it there: `sling reset KEY` takes it back, and"
+                " `dvc exp run --temp` leaves params.yaml alone"
             ) from error
         raise
     for name, value in zip(names, given, strict=True):

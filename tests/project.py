@@ -23,12 +23,18 @@ def python(*arguments: str | Path, folder: Path = ROOT, **more: str) -> subproce
 def set_methods(content: dict, methods: list[str], ablations: list[str] | tuple = ()) -> None:
     """Write into the content of a params.yaml which methods run, and by which steps."""
     searches = content["methods"], content["method_defaults"]["search"]
-    for run, names in ((content["run"], methods), (content["run"]["ablations"], ablations)):
-        run["methods"], run["steps"] = list(names), {step: [] for step in StepParams.model_fields}
+    run, more = content["run"], content["run"]["ablations"]
+    run["methods"], more["methods"] = list(methods), list(ablations)
+    for place, key, names in (
+        (run, "steps", methods),
+        (run, "own_steps", methods[:1]),
+        (more, "steps", ablations),
+    ):
+        place[key] = {step: [] for step in StepParams.model_fields}
         for name in names:
             for step in steps_of(searches[0][name].get("search", searches[1])):
-                if step in run["steps"]:
-                    run["steps"][step].append(name)
+                if step in place[key]:
+                    place[key][step].append(name)
 
 
 def with_(params: Params, section: str, **values: object) -> Params:

@@ -12,6 +12,7 @@ from ruamel.yaml import YAML
 
 from pipeline.base import code as of_project
 from pipeline.base.code import CODE, NESTED, ROOT, UNTRACKED, closure, concern, files_of
+from stages.start import ungrouped
 from tools import architecture
 from tools.closure import BY_NAME, folders, script_of
 
@@ -61,9 +62,7 @@ def relative(file: Path) -> str:
 def test_stages_list_the_folders_that_they_run() -> None:
     for name, stage in STAGES.items():
         listed = [dep for dep in stage["deps"] if dep.startswith(CODE)]
-        optimizers = {
-            f"{BY_NAME}{kind}" for kind in OPTIMIZERS.get(name.rpartition("ablation_")[2], ())
-        }
+        optimizers = {f"{BY_NAME}{kind}" for kind in OPTIMIZERS.get(ungrouped(name), ())}
         code = sorted({*folders(script_of(stage)), *optimizers})
         assert listed == code, f"{name}: run `python tools/closure.py --fix`"
         assert len(listed) <= 12
@@ -76,7 +75,7 @@ def test_what_a_run_may_leave_empty_is_in_git() -> None:
         writers = [
             stage["matrix"]
             for name, stage in STAGES.items()
-            if not name.startswith("ablation_")
+            if ungrouped(name) == name
             and any(str(out).startswith(f"{dep}/") for out in stage["outs"])
         ]
         lists = {str(one.get("method", one["band"])) for one in writers}

@@ -41,7 +41,7 @@ def test_a_launch_is_written_below_the_others_and_the_policy_runs(put) -> None:
     )
     assert put.asked == [("repro", "policy@band1-least_squares")] * 2
     answer = {"file": str(file), "launches": 1, "before": None, "after": None, "warnings": []}
-    assert first == answer
+    assert first == answer | {"measured_m": LANDING}
     assert list(file.parent.iterdir()) == [file]
 
 
@@ -84,6 +84,37 @@ def test_refuses_a_launch_that_is_there_or_a_score(put) -> None:
     assert len((put.layout.evidence / "band1.csv").read_text().splitlines()) == 2
 
 
+def test_an_equal_launch_is_one_more_where_that_is_said(put) -> None:
+    put.run(run=False)
+    with pytest.raises(UserError, match="one more that is equal, add --again"):
+        put.run(run=False)
+    assert put.run(run=False, again=True)["launches"] == 2
+    assert (put.layout.evidence / "band1.csv").read_text().count("-0.3,-0.17,,2.2\n") == 2
+
+
+def test_undo_takes_the_last_launch_out_and_the_policy_runs(put, params) -> None:
+    def undo(**options) -> dict:
+        root = put.layout.root
+        return observe.undo(params, "band1", "least_squares", root=root, **options)
+
+    put.run(run=False)
+    before = (put.layout.evidence / "band1.csv").read_text()
+    put.run((-0.32, -0.2), 3.0, error=0.001, run=False)
+    answer = undo()
+    assert (put.layout.evidence / "band1.csv").read_text() == before
+    assert (answer["launches"], answer["measured_m"]) == (1, 3.0)
+    assert answer["removed"] == {"draw": [-0.32, -0.2], "error": 0.001}
+    assert put.asked == [("repro", "policy@band1-least_squares")]
+    lines = observe.shown(answer | {"after": None}).splitlines()
+    assert lines[0].endswith("1 launch as evidence")
+    assert lines[1:] == ["taken out: the draw to -0.32, -0.2", "measured  3.000 m; nothing has run"]
+    undo(run=False)
+    assert not (put.layout.evidence / "band1.csv").exists()
+    with pytest.raises(UserError, match=r"band1.csv: holds no launch of band1"):
+        undo(run=False)
+    assert len(put.asked) == 1
+
+
 def test_a_launch_outside_its_interval_is_doubted_before_stages_run(
     put, monkeypatch, capsys
 ) -> None:
@@ -114,7 +145,8 @@ def test_what_is_said_before_and_after() -> None:
         "share_90": [0.9, 1.1],
     }
     failed = {**told, "landing_m": None, "interval_90_m": None, "failure": "the band is slack"}
-    text = observe.shown({"file": "x.csv", "launches": 2, "before": told, "after": failed}, 2.2)
+    said = {"file": "x.csv", "launches": 2, "measured_m": 2.2, "before": told, "after": failed}
+    text = observe.shown(said)
     assert text.splitlines() == [
         "x.csv: 2 launches as evidence",
         "before  landing 2.000 m (90 %: 1.900 to 2.100 m), returned share 1.000"

@@ -74,7 +74,7 @@ def test_a_draw_outside_the_box(params, project) -> None:
 
 def test_a_draw_beyond_the_recorded_stretch_says_both_in_per_cent(params, project) -> None:
     """Two sides of a triangle: 0.1375 and 0.3 against 0.1375 and 0.4, rest length 0.52."""
-    edit(project, "draw_z: [-0.30, -0.10]", "draw_z: [-0.30, 0.0]")
+    edit(project, "  - -0.30\n  - -0.10\n", "  - -0.30\n  - 0.0\n")
     (found,) = safety.of_draw(params, "band1", (-0.4, -0.1), project)
     asked = 2 * np.hypot(0.1375, np.hypot(0.4, 0.1)) / 0.52 - 1
     recorded = 2 * np.hypot(0.1375, 0.3) / 0.52 - 1

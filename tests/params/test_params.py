@@ -257,9 +257,9 @@ def test_what_a_method_may_ask_for() -> None:
 
 
 def test_targets_beyond_the_paper_area_are_refused_though_trained() -> None:
-    text = TEXT.replace("targets: [1.425, 2.425]", "targets: [1.0, 3.0]")
+    text = TEXT.replace("  - 1.425\n  - 2.425\n", "  - 1.0\n  - 3.0\n")
     assert parse(text).policy.targets == (1.0, 3.0)
-    far = text.replace("targets: [1.725,", "targets: [2.8,")
+    far = text.replace("  - 1.725\n", "  - 2.8\n")
     assert "trials.targets: 2.8 lies outside the target on the floor" in refusal(far)
 
 

@@ -74,9 +74,9 @@ def test_a_new_band_is_added_and_its_card_made(project) -> None:
     assert card["band"] == "my_band_2" and card["card"].endswith("bands/my_band_2/README.md")
     about = load().bands["my_band_2"]
     assert (about.mass, about.rest_length, about.diameter) == (0.04, 0.5, 0.01)
-    assert project.asked == [("repro", "card@my_band_2")]
+    assert project.asked == [("repro", "own_card@my_band_2")]
     again = project.run(file, mass=0.04, rest_length=0.5)
-    assert again == card and load().run.bands[-1] == "my_band_2"
+    assert again == card and load().run.own[-1] == "my_band_2"
     assert project.run(name="my_band_2") == card
 
 
@@ -145,10 +145,50 @@ def test_a_band_must_be_known_or_recorded(project) -> None:
             project.run(**given)
     with pytest.raises(UserError, match="makes no band name; give one: --name NAME"):
         project.run(project.recording("2026.mcap", "a"), mass=0.04)
+
+
+def test_sizes_of_a_known_band_take_the_place_of_the_old_ones(project, capsys) -> None:
+    """Alone, and with its recordings; what says it is the line with both."""
+    file = project.recording("a.mcap", "a")
+    project.run(file, mass=0.4)
+    path = file.parent / "params.yaml"
+    first = path.read_text()
+    project.run(name="a", mass=0.04, rest_length=0.52)  # which is 0.52 already
+    assert f"{path}: bands.a.mass was 0.4, is 0.04 now\n" in capsys.readouterr().err
+    assert path.read_text() == first.replace("mass: 0.4\n", "mass: 0.04\n")
+    project.run(file, name="a", diameter=0.011, rest_length=0.5)
+    said = capsys.readouterr().err
+    assert "bands.a.diameter was 0.01, is 0.011 now" in said and "rest_length was 0.52" in said
+    band = load().bands["a"]
+    assert (band.mass, band.diameter, band.rest_length) == (0.04, 0.011, 0.5)
+    assert project.asked == [("repro", "own_card@a")] * 3
+
+
+def test_sizes_that_cannot_be_or_what_fails_with_them_change_nothing(project, capsys) -> None:
     file = project.recording("a.mcap", "a")
     project.run(file, mass=0.04)
-    with pytest.raises(UserError, match=r"--mass 0.05: bands.a.mass in .* is 0.04"):
-        project.run(file, mass=0.05)
+    path = file.parent / "params.yaml"
+    before = path.read_text()
+    for files, given, message in (
+        ((), {"name": "a", "rest_length": 0.2}, "bands.a.rest_length: 0.2 must be longer than"),
+        ((), {"name": "band1", "mass": 0.03}, "band1: is a band of the virtual rig"),
+        ((project.recording("c.mcap", "c"),), {"name": "a", "mass": 0.05}, "other recordings"),
+    ):
+        with pytest.raises(UserError, match=message):
+            project.run(*files, **given)
+        assert path.read_text() == before
+    assert "params.yaml: is as it was" in capsys.readouterr().err
+    assert len(project.asked) == 1
+
+
+def test_a_recorded_band_among_those_of_all_methods_is_told(project, capsys) -> None:
+    project.run(project.recording("a.mcap", "a"), mass=0.04)
+    path = project.layout.root / "params.yaml"
+    text = path.read_text().replace("  own:", "  own: []", 1).replace("  - a\n", "", 1)
+    path.write_text(text.replace("  - band3\n", "  - band3\n  - a\n", 1))
+    project.run(name="a")
+    assert project.asked[-1] == ("repro", "card@a")
+    assert "under run.own instead it gets its card alone" in capsys.readouterr().err
 
 
 def test_the_screen() -> None:

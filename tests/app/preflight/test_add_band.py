@@ -37,19 +37,25 @@ def add(project: Path, recording: Path, name: str = "red", **changes) -> str:
 
 def test_a_band_is_added_and_nothing_else_changes(project, seen, blind) -> None:
     before = (project / "params.yaml").read_text().splitlines()
-    bands = load(project / "params.yaml").run.bands
     said = add(project, seen[0]).splitlines()
     assert said[0] == "red added, 1 pull"
     assert said[1].startswith("  seen.mcap: peak force")
     assert any("pictures come at 15 Hz" in line for line in said[2:])  # what costs accuracy
     after = (project / "params.yaml").read_text().splitlines()
     lines = [x for x in difflib.ndiff(before, after) if x[0] in "+-"]
-    assert len([x for x in lines if x[0] == "-"]) == 1  # run.bands
-    assert len([x for x in lines if x[0] == "+"]) == 2
+    assert len([x for x in lines if x[0] == "-"]) == 1  # run.own
+    assert [x[2:] for x in lines if x[0] == "+"][1:] == [
+        "  - red",
+        "  red:",
+        "    source: recording",
+        "    mass: 0.0408",
+        "    diameter: 0.01",
+        "    rest_length: 0.52",
+    ]
     where = next(i for i, line in enumerate(after) if line.lstrip().startswith("red:"))
-    assert after[where - 1].lstrip().startswith(f"{bands[-1]}:") and after[where + 1] == ""
+    assert after[where - 1].lstrip().startswith("band3:") and after[where + 5] == ""
     params = load(project / "params.yaml")
-    assert params.run.bands == (*bands, "red")
+    assert params.run.own == ("red",)
     band = params.bands["red"]
     assert (band.source, band.mass, band.diameter, band.rest_length) == (
         "recording",

@@ -160,7 +160,7 @@ class FitCopy(StruckCopy):
 
     name = "sling fit"
     values = run_of(["band1"], ["least_squares"])
-    stages = (f"card@{NAME}",)
+    stages = (f"own_card@{NAME}",)
     words = (*SLING, "fit", RECORDING, "--mass", str(MASS), "--name", NAME)
 
     def begin(self) -> None:

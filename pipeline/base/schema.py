@@ -10,6 +10,7 @@ import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import UnionType
 from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import (
@@ -168,5 +169,7 @@ def _closest(path: Sequence[str | int], model: type[Section]) -> str:
     for part in path[:-1]:
         is_section = isinstance(kind, type) and issubclass(kind, BaseModel)
         kind = kind.model_fields[str(part)].annotation if is_section else get_args(kind)[-1]
+        if isinstance(kind, UnionType):  # a section, or null
+            kind = get_args(kind)[0]
     known = list(kind.model_fields)
     return difflib.get_close_matches(str(path[-1]), known, n=1, cutoff=0)[0]

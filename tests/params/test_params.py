@@ -175,6 +175,10 @@ REFUSED = [
     ("methods.de", CONTENT["methods"]["de"] | NARROW, "must be between 0.45 and 0.49, got 0.4"),
     ("methods.least_squares.fixed", {}, "wants `fixed` to name poissons_ratio, dynamic_friction"),
     ("methods.de.nuisances", {"air_drag": [0, 8]}, "methods.de.nuisances: unknown key"),
+    ("setup.tool", {"weight": 0.7}, "setup.tool.weight: unknown key, the closest known one is"),
+    ("run.own", ["band1"], "own: band1 is one of run.bands already"),
+    ("run.own", ["other"], "run.own: other is not one of band1"),
+    ("run.own_steps.density", [], "run.own_steps.density: must list those of run.methods[0]"),
     ("methods.de.weights.taut", 1.0, "methods.de.weights.taut: unknown key"),
     ("methods.de.fixed", {"air_drag": 1.0}, "air_drag is not one of youngs_modulus"),
     ("methods.de.bounds", {"air_drag": [0.0, 1.0]}, "air_drag is not one of youngs_modulus"),
@@ -203,6 +207,20 @@ def test_what_is_refused_and_how_it_is_said() -> None:
         message = refusal(changed(tuple(path.split(".")), value))
         assert message.startswith(f"params.yaml: {path.partition('.')[0]}"), message
         assert expected in message
+
+
+def test_bands_of_ones_own_are_recorded_and_have_a_list() -> None:
+    content = changed(("run", "own"), ["band3"])
+    for key in ("bands", "rig"):
+        content["run"][key] = ["band1", "band2"]
+    assert refusal(content) == (
+        "params.yaml: run.own: band3 has source: rig, so it belongs under run.bands"
+    )
+    content["bands"]["band3"]["source"] = "recording"
+    assert check(content).run.own == ("band3",)
+    del content["run"]["own"]
+    assert "run: lacks `own` and `own_steps`" in refusal(content)
+    assert "from run.bands to run.own" in refusal(content)
 
 
 def test_what_a_method_leaves_out_is_as_the_defaults_say() -> None:

@@ -1,0 +1,59 @@
+"""`dvc exp run -S` on a copy of the project, by DVC itself: what it leaves in params.yaml."""
+
+import pytest
+
+from app.preflight.add_band import _with_band
+from tests.project import python
+from validation.projects import ProjectCopy, copy_project
+
+BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
+RUN = ("dvc", "exp", "run")
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> ProjectCopy:
+    """A committed copy, to which a band was added since."""
+    copy = ProjectCopy(tmp_path_factory.mktemp("experiments") / "copy")
+    copy_project(copy.folder)
+    copy.commit()
+    path = copy.folder / "params.yaml"
+    path.write_text(_with_band(path, "orange", BAND), "utf-8")
+    return copy
+
+
+def params(project: ProjectCopy) -> bytes:
+    return (project.folder / "params.yaml").read_bytes()
+
+
+def test_a_value_as_it_is_leaves_every_byte(project: ProjectCopy) -> None:
+    before = params(project)
+    project(*RUN, "--dry", "-S", "policy.seed=1", "-S", "setup.urdf=null", "record@band1")
+    assert params(project) == before
+    project(*RUN, "--dry", "-S", "policy.seed=2", "record@band1")  # DVC has written it
+    lines = before.splitlines(), params(project).splitlines()
+    assert [(a, b) for a, b in zip(*lines, strict=True) if a != b] == [(b"  seed: 1", b"  seed: 2")]
+    project("git", "status")
+    (project.folder / "params.yaml").write_bytes(before)
+
+
+def test_a_refused_value_leaves_no_trace_of_a_run_aside(project: ProjectCopy) -> None:
+    """`--temp` runs in a folder of DVC's, which goes again."""
+    before = params(project)
+    with pytest.raises(AssertionError, match="k_top: must be a whole number.*got 'many'"):
+        project(*RUN, "--temp", "-S", "optimizer.k_top=many", "record@band1")
+    assert params(project) == before
+    changed = project("git", "status", "--porcelain", "-uall").splitlines()
+    assert changed == [" M params.yaml"]  # the band
+    assert not [*(project.folder / ".dvc/tmp/exps/standalone").glob("tmp*")]
+    assert "refs/exps" not in project("git", "for-each-ref").replace("refs/exps/exec/", "")
+
+
+def test_a_refused_value_in_the_folder_says_how_it_goes(project: ProjectCopy) -> None:
+    before = params(project)
+    with pytest.raises(AssertionError, match="many.*`sling reset KEY` takes it back, and") as said:
+        project(*RUN, "-S", "optimizer.k_top=many", "record@band1")
+    assert str(said.value).count("error: params.yaml: ") == 1
+    assert params(project) != before
+    done = python("-m", "app.cli", "reset", "optimizer.k_top", folder=project.folder)
+    assert done.stdout == "optimizer.k_top was many, is 5 again\n", done.stderr
+    assert params(project) == before  # the band is there still

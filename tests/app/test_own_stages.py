@@ -1,0 +1,89 @@
+"""Bands of one's own: a chain of stages each, and none of them the run's."""
+
+import pytest
+
+from app.flow.graph import leading_to, stages_of
+from app.preflight.add_band import _with_band
+from pipeline.params import load
+from stages.start import stage_of
+from validation.projects import ProjectCopy, copy_project, run_of
+
+BAND = {"source": "recording", "mass": 0.0408, "diameter": 0.01, "rest_length": 0.52}
+SEARCHES = {
+    "least_squares": ("history", "density"),
+    "sling2sim2real": ("history", "clusters", "cma"),
+    "real2sim2real": ("de",),
+    "package_si": ("bo",),
+}
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> ProjectCopy:
+    copy = ProjectCopy(tmp_path_factory.mktemp("own") / "copy")
+    copy_project(copy.folder)
+    copy("git", "init", "-q")
+    return copy
+
+
+def add(project: ProjectCopy, *names: str) -> None:
+    path = project.folder / "params.yaml"
+    for name in names:
+        path.write_text(_with_band(path, name, BAND), "utf-8")
+        recording = project.folder / "data" / "raw" / name / f"{name}.mcap"
+        recording.parent.mkdir(parents=True)
+        recording.write_bytes(b"")
+
+
+@pytest.mark.parametrize("first", SEARCHES)
+def test_ten_bands_make_ten_chains_of_the_first_method(project, first: str) -> None:
+    methods = [first, *(name for name in SEARCHES if name != first)]
+    project("git", "checkout", "-q", "--orphan", first)
+    project.set(run_of(["band1", "band2", "band3"], methods, ("de",)) | {"run.own": []})
+    before = {name: stage.producers for name, stage in stages_of(project.folder).items()}
+    names = [f"{first}_{n}" for n in range(10)]
+    add(project, *names)
+    stages = stages_of(project.folder)
+    mine = stages.keys() - before.keys()
+    steps = (*SEARCHES[first], "theta", "policy", "trials")
+    assert mine == {
+        *(
+            f"own_{step}@{name}"
+            for step in ("episode", "clamps", "evidence", "card")
+            for name in names
+        ),
+        *(f"own_{step}@{name}-{first}" for step in steps for name in names),
+    }
+    params = load(project.folder / "params.yaml")
+    for name in names:
+        card = stage_of(params, "card", name)
+        chain = {stage.name for stage in leading_to([*stages.values()] and stages, card)}
+        assert card == f"own_card@{name}" and chain == {one for one in mine if is_of(one, name)}
+        for step in steps:
+            assert stage_of(params, step, name, first) in chain
+        assert stage_of(params, "theta", name, methods[1]) is None
+    changed = {name for name in before if stages[name].producers != before[name]}
+    assert changed == {"report"}  # it reads the folders of all bands
+
+
+def is_of(stage: str, band: str) -> bool:
+    return stage.partition("@")[2].partition("-")[0] == band
+
+
+def test_an_own_stage_is_its_namesake_but_for_the_band(project: ProjectCopy) -> None:
+    """The same command, code and parameters; nothing of the rig."""
+    from dvc.repo import Repo
+
+    project.set(run_of(["band1"], ["least_squares"]) | {"run.own": []})
+    add(project, "mine")
+    with Repo(str(project.folder)) as repo:
+        known = {stage.name: stage for stage in repo.index.stages}
+    own = [name for name in known if name.startswith("own_")]
+    assert len(own) == 9
+
+    def read(name: str, band: str) -> set[str]:
+        return {f"{dep}".replace(band, "BAND") for dep in known[name].deps}
+
+    for name in own:
+        rigs = name.removeprefix("own_").replace("@mine", "@band1")
+        assert read(name, "mine") == read(rigs, "band1")
+        assert known[name].cmd == known[rigs].cmd.replace("band1", "mine")

@@ -138,6 +138,8 @@ def check(arguments: argparse.Namespace) -> Done:
     from app.preflight.command import check
     from pipeline.params import load
 
+    if arguments.frames and not arguments.json:
+        arguments.refuse("argument --frames: used with --json alone")
     return check(
         arguments.recording,
         load(),

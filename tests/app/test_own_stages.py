@@ -44,19 +44,16 @@ def test_ten_bands_make_ten_chains_of_the_first_method(project, first: str) -> N
     add(project, *names)
     stages = stages_of(project.folder)
     mine = stages.keys() - before.keys()
+    alone = ("episode", "clamps", "evidence", "card")
     steps = (*SEARCHES[first], "theta", "policy", "trials")
     assert mine == {
-        *(
-            f"own_{step}@{name}"
-            for step in ("episode", "clamps", "evidence", "card")
-            for name in names
-        ),
+        *(f"own_{step}@{name}" for step in alone for name in names),
         *(f"own_{step}@{name}-{first}" for step in steps for name in names),
     }
     params = load(project.folder / "params.yaml")
     for name in names:
         card = stage_of(params, "card", name)
-        chain = {stage.name for stage in leading_to([*stages.values()] and stages, card)}
+        chain = {stage.name for stage in leading_to(stages, card)}
         assert card == f"own_card@{name}" and chain == {one for one in mine if is_of(one, name)}
         for step in steps:
             assert stage_of(params, step, name, first) in chain

@@ -51,11 +51,8 @@ def test_a_key_goes_back_and_others_stay(path: Path) -> None:
 
 def test_without_a_key_a_preset_goes_back_and_the_labs_own_stays(path: Path) -> None:
     path.write_text(_with_band(path, "orange", BAND), "utf-8")
-    change(
-        path,
-        setup__max_force=25.0,
-        methods__mine={"weights": {"geom": 1.0, "force": 1.0, "work": 1.0}},
-    )
+    mine = {"weights": {"geom": 1.0, "force": 1.0, "work": 1.0}}
+    change(path, setup__max_force=25.0, methods__mine=mine)
     before = path.read_text("utf-8")
     write_preset(path, preset("paper"))
     assert path.read_text("utf-8") != before

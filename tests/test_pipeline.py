@@ -365,6 +365,16 @@ def test_changes_run_what_depends_on_them(project: Copy, names: tuple[str, ...])
     assert must <= ran <= must | may, (sorted(must - ran), sorted(ran - must - may))
 
 
+def test_a_band_of_the_rig_is_recorded_anew(project: Copy) -> None:
+    """What follows depends on its episode."""
+    CHANGES["rig.bands.band2"].make(project)
+    ran = project.dvc("repro", "--no-run-cache", "episode@band2")
+    assert ran == {"record@band2", "episode@band2"}
+    stale = project.stale()
+    assert {f"{step}@band2" for step in ("clamps", "floor")} <= stale
+    assert not any("@band1" in stage for stage in stale), sorted(stale)
+
+
 def test_a_band_of_ones_own_has_a_chain_by_the_first_method(project: Copy) -> None:
     recording = project.folder / "data/raw/mine/mine.mcap"
     recording.parent.mkdir()
@@ -377,14 +387,3 @@ def test_a_band_of_ones_own_has_a_chain_by_the_first_method(project: Copy) -> No
     assert project.dvc("repro", "own_card@mine") == chain
     project.set({"bands.mine.mass": 0.024})
     assert project.dvc("repro", "own_card@mine") == chain - {"own_evidence@mine"}
-    project.set({"run.own": []})
-
-
-def test_a_band_of_the_rig_is_recorded_anew(project: Copy) -> None:
-    """What follows depends on its episode."""
-    CHANGES["rig.bands.band2"].make(project)
-    ran = project.dvc("repro", "--no-run-cache", "episode@band2")
-    assert ran == {"record@band2", "episode@band2"}
-    stale = project.stale()
-    assert {f"{step}@band2" for step in ("clamps", "floor")} <= stale
-    assert not any("@band1" in stage for stage in stale), sorted(stale)

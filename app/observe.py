@@ -56,8 +56,6 @@ def observe(
     """
     layout, stage = _place_and_stage(params, band, method, run, root)
     expect_above_floor(params, draw)
-    if run:
-        expect_ready(layout.root)
     equal = "added" if again else "refused"
     number = evidence.add(layout, band, [(*draw, error, landing)], equal)
     answer = {"file": str(layout.evidence / f"{band}.csv"), "launches": number}
@@ -104,7 +102,10 @@ def _place_and_stage(
     expect_known(params, "method", method, called="--method")
     if params.methods[method].search != LEAST_SQUARES:
         raise UserError(f"--method {method}: takes no launches as evidence, least_squares does")
-    return Layout(Path(root)), policy_stage(params, band, method) if run else None
+    stage = policy_stage(params, band, method) if run else None
+    if run:
+        expect_ready(Path(root))
+    return Layout(Path(root)), stage
 
 
 def _run(stage: str | None, layout: Layout) -> bool:

@@ -138,7 +138,9 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
         "methods.sling2sim2real",
         "methods.least_squares",
     }
-    keys -= {"run.rig", "run.steps", "run.ablations"}  # read by dvc.yaml itself
+    keys -= {
+        f"run.{key}" for key in ("rig", "own", "steps", "own_steps", "ablations")
+    }  # dvc.yaml's
     keys -= {key for key in keys if key.startswith("plan.")}  # read by `sling plan` alone
     keys -= {f"bands.{name}" for name in content["bands"]} - {"bands.band1"}  # those that run
     # read for other recordings, or with another mask: tests/recording shows what they do
@@ -371,3 +373,17 @@ def test_a_band_of_the_rig_is_recorded_anew(project: Copy) -> None:
     stale = project.stale()
     assert {f"{step}@band2" for step in ("clamps", "floor")} <= stale
     assert not any("@band1" in stage for stage in stale), sorted(stale)
+
+
+def test_a_band_of_ones_own_has_a_chain_by_the_first_method(project: Copy) -> None:
+    recording = project.folder / "data/raw/mine/mine.mcap"
+    recording.parent.mkdir()
+    shutil.copy(project.folder / "data/raw/band1/band1.mcap", recording)
+    band = {"source": "recording", "mass": 0.023, "diameter": 0.010, "rest_length": 0.52}
+    project.set({"run.own": ["mine"], "bands.mine": band})
+    alone = {f"own_{step}@mine" for step in ("episode", "clamps", "evidence", "card")}
+    by_method = (*SEARCH[METHODS[0]], "theta", "policy", "trials")
+    chain = alone | {f"own_{step}@mine-{METHODS[0]}" for step in by_method}
+    assert project.dvc("repro", "own_card@mine") == chain
+    project.set({"bands.mine.mass": 0.024})
+    assert project.dvc("repro", "own_card@mine") == chain - {"own_evidence@mine"}

@@ -2,9 +2,9 @@
 
     python tools/preset.py large    # as `make large`; further arguments go to `sling flow`
 
-The preset's keys are written into params.yaml, for `git diff` to show and
-`git checkout params.yaml reports dvc.lock` to take back; then `sling flow`. Killed, it goes on
-where it was, and `seconds` in reports/run.js adds up its stretches.
+The preset's keys are written into params.yaml, for `git diff` to show and `sling reset` to take
+back (`git checkout reports dvc.lock` for its results); then `sling flow`. Killed, it goes on where
+it was, and `seconds` in reports/run.js adds up its stretches.
 """
 
 from __future__ import annotations

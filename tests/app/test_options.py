@@ -174,7 +174,7 @@ def outcome(tmp_path_factory, monkeypatch, capsys):
         files = {
             one.relative_to(place): one.read_bytes() for one in place.rglob("*") if one.is_file()
         }
-        return ended.value.code, *said, files, [*asked]
+        return ended.value.code, *said, files, [str(one).replace(str(place), "") for one in asked]
 
     return run
 

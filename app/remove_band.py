@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ruamel.yaml.comments import CommentedMap
 
+from app.flow.disk import expect_writable
 from app.params_file import edited
 from pipeline.base.errors import UserError, printable
 from pipeline.base.files import write_text
@@ -46,6 +47,7 @@ def remove_band(name: str, agreed: Callable[[list[str]], bool], root: Path | str
     text = edited(path.read_text("utf-8"), lambda content: _forget(content, name))
     parse(text, str(path))
     files = files_of(layout, name)
+    expect_writable(path.parent, *files, *(file.parent for file in files))
     lines = [f"bands.{name} of {path}, and where run: names it", *map(str, files)]
     if not agreed(lines):
         raise UserError(f"{name}: is kept; with --yes nobody is asked")

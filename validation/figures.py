@@ -78,7 +78,7 @@ def listed(
     stages = (
         {name: states[old] for name, old in outdated(root, names, CODE).items()} if names else {}
     )
-    return [_figures(file, root, code, stages.get(_stage(file, root, own))) for file in files]
+    return [_figures(file, root, code, stages.get(_stage(file, root, own) or "")) for file in files]
 
 
 def shown(figures: list[CommittedFigures]) -> str:

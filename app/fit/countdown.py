@@ -29,6 +29,7 @@ class Countdown:
         self.start = self.begun = time.monotonic()
         self.worth = 0.0  # of the stages that have run, in seconds of SECONDS
         self.pace = 1.0
+        self.left = float("inf")  # what was said last [s]: never more is said after it
         self.now: str | None = None
         self.bar = sys.stderr.isatty()
 
@@ -62,9 +63,9 @@ class Countdown:
         names = [*self.stages]
         number = names.index(self.now) + 1 if self.now in names else 0
         rest = sum(map(_seconds, names[max(number - 1, 0) :]))
-        left = max(rest * self.pace - (time.monotonic() - self.begun), 1)
+        self.left = min(self.left, max(rest * self.pace - (time.monotonic() - self.begun), 1))
         words = self.stages.get(self.now or "") or self.now
-        text = f"[{number}/{len(names)}] {words}; about {_clock(left)} left"
+        text = f"[{number}/{len(names)}] {words}; about {_clock(self.left)} left"
         if self.bar:
             print(f"\r{text}  {facts}\x1b[K", end="", file=sys.stderr, flush=True)
         else:

@@ -40,7 +40,7 @@ def test_a_refused_value_leaves_no_trace_of_a_run_aside(project: ProjectCopy) ->
     """`--temp` runs in a folder of DVC's, which goes again."""
     before = params(project)
     with pytest.raises(AssertionError, match="k_top: must be a whole number.*got 'many'"):
-        project(*RUN, "--temp", "-S", "optimizer.k_top=many", "record@band1")
+        project(*RUN, "--temp", "-S", "optimizer.k_top=many", "evidence@band2")
     assert params(project) == before
     changed = project("git", "status", "--porcelain", "-uall").splitlines()
     assert changed == [" M params.yaml"]  # the band
@@ -51,7 +51,7 @@ def test_a_refused_value_leaves_no_trace_of_a_run_aside(project: ProjectCopy) ->
 def test_a_refused_value_in_the_folder_says_how_it_goes(project: ProjectCopy) -> None:
     before = params(project)
     with pytest.raises(AssertionError, match="many.*`sling reset KEY` takes it back, and") as said:
-        project(*RUN, "-S", "optimizer.k_top=many", "record@band1")
+        project(*RUN, "-S", "optimizer.k_top=many", "evidence@band2")
     assert str(said.value).count("error: params.yaml: ") == 1
     assert params(project) != before
     done = python("-m", "app.cli", "reset", "optimizer.k_top", folder=project.folder)

@@ -37,7 +37,7 @@ class Reporter:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix=f"reporter {stage.name}")
         self._moved: dict[str, float] = {}  # when, by title
         self._bars: dict[str, UUID] = {}  # ids, by title
-        self._failed = False
+        self._failed = self._logger is None
 
     def __call__(self, line: str) -> None:
         """Show a line of the stage's output."""
@@ -59,9 +59,7 @@ class Reporter:
                 self._failed = True
 
     def _post(self, work, *arguments):
-        if self._failed or not self._logger:
-            return None
-        return self._thread.submit(self._try, work, *arguments)
+        return None if self._failed else self._thread.submit(self._try, work, *arguments)
 
     def _try(self, work, *arguments) -> None:
         if self._failed or not self._logger:

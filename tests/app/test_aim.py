@@ -15,7 +15,12 @@ from tests.policy.linear import write_policy
 
 PARAMS = SimpleNamespace(
     bands={"toy": SimpleNamespace(rest_length=toy.REST_LENGTH)},
-    run=SimpleNamespace(bands=["toy"], methods=["none", "other"]),
+    run=SimpleNamespace(
+        bands=["toy"],
+        methods=["none", "other"],
+        own=[],
+        ablations=SimpleNamespace(bands=[], methods=[]),
+    ),
     methods={"none": None, "other": None},
     policy=SimpleNamespace(targets=(1.425, 2.425)),
     trials=SimpleNamespace(actuation_error=0.001),

@@ -14,7 +14,7 @@ target, z up. Nothing is read from or written to disk but by functions that take
 is a `UserError` of one line.
 """
 
-from importlib.metadata import PackageNotFoundError, version
+from importlib import metadata
 
 from sling2sim2real import own  # noqa: F401 - before all that imports `pipeline`
 
@@ -64,6 +64,6 @@ __all__ = [
 ]
 
 try:
-    __version__ = version("sling2sim2real")
-except PackageNotFoundError:  # run from a folder that was never installed
+    __version__ = metadata.version("sling2sim2real")
+except metadata.PackageNotFoundError:  # run from a folder that was never installed
     __version__ = "unknown"

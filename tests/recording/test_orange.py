@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.preflight.check import coverage
+from app.preflight.coverage import coverage
 from pipeline.params import BandParams, load
 from pipeline.recording.build import episode_of, process
 from tests.project import DEFAULTS

@@ -127,7 +127,8 @@ class Laboratory:
     def remembered(self, string, hanging, motion, sensor_times, camera_times, params, progress):
         """Integrate anew only where something that goes in is new."""
         world = {name: getattr(params.rig, name) for name in ("pads", "arm", "tolerance")}
-        arrays = hanging, motion.amplitude, motion.frequency, motion.phase, camera_times
+        path = motion.path
+        arrays = hanging, path.amplitude, path.frequency, path.phase, camera_times
         key = id(string), repr(world), *(array.tobytes() for array in arrays)
         if key not in self.done:
             seen = SimpleNamespace(rig=SimpleNamespace(**world), setup=params.setup)

@@ -21,6 +21,7 @@ RESULTS = {
     "Launch",
     "Simulation",
 }  # of functions
+INTERNAL = {"arguments", "own"}  # modules without a public name
 OTHERS = {"LaunchHistory", "Mounting", "Observed", "UserError"}  # the library's, passed on
 
 
@@ -28,7 +29,7 @@ OTHERS = {"LaunchHistory", "Mounting", "Observed", "UserError"}  # the library's
 def test_examples_are_so(name: str) -> None:
     module = importlib.import_module(f"sling2sim2real.{name}")
     done = doctest.testmod(module, optionflags=doctest.ELLIPSIS)
-    assert done.attempted > 3 and done.failed == 0
+    assert done.failed == 0 and (done.attempted > 3 or name in INTERNAL)
 
 
 def test_every_public_name_has_a_docstring_and_every_function_an_example() -> None:

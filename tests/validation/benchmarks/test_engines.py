@@ -21,7 +21,7 @@ def test_a_missing_peer_is_an_entry_that_says_so(monkeypatch):
     assert len(bench.table([ours, *peers]).splitlines()) == 3
     assert [(one["name"], one["note"]) for one in peers] == [
         ("mujoco", "mujoco is not installed: make setup"),
-        ("newton", "newton is not installed: pip install -e '.[validation]'"),
+        ("newton", "newton is not installed: pip install -e '.[export]' -c constraints.txt"),
     ]
 
 

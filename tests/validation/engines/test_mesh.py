@@ -53,7 +53,7 @@ def test_its_force_is_the_closed_form_of_a_straight_string(sling, rings):
 
 def test_without_mujoco_the_section_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(UserError, match="pip install"):
+    with pytest.raises(UserError, match="make setup"):
         checks.section(Bench(load(DEFAULTS)))
 
 

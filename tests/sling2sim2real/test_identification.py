@@ -65,7 +65,7 @@ def test_what_is_saved_is_loaded(found, tmp_path) -> None:
 def test_wrong_evidence_is_refused(band, settings, world, episode) -> None:
     with pytest.raises(UserError, match="at least one episode"):
         identify([], band)
-    with pytest.raises(UserError, match="draw_y_m: must be from -20 to 0 m"):
+    with pytest.raises(UserError, match="draw_y_m must lie between -20 and 0 m"):
         Observed((0.3, 0.0), 0.0, 2.0)
     with pytest.raises(UserError, match="the draw's error is needed"):
         identify([episode], band, launches=[Observed((-0.3, 0.0), None, 2.0)])

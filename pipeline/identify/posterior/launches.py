@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.base.errors import UserError
-from pipeline.base.launch_table import LIMITS
+from pipeline.base.launch_table import DRAW, LANDING, metres
 from pipeline.simulator.launch import landing_gradient, launch
 from pipeline.simulator.model import ClampedBand, LaunchSetup
 from pipeline.simulator.parameters import Parameters
@@ -35,14 +35,8 @@ class Observed:
     landing: float
 
     def __post_init__(self) -> None:
-        y, z = self.draw
-        given = {"draw_y_m": y, "draw_z_m": z, "landing_y_m": self.landing}
-        for name, value in given.items():
-            low, high, where = LIMITS[name]
-            if not low <= value <= high:
-                raise UserError(
-                    f"{name}: must be from {low:g} to {high:g} m ({where}), got {value}"
-                )
+        for name, value in zip((*DRAW, LANDING), (*self.draw, self.landing), strict=True):
+            metres("launch", name, str(value))
         if self.error is not None and not 0 <= self.error < 1:
             raise UserError(f"error: must be from 0 to 1 m, got {self.error}")
 

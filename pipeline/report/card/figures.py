@@ -86,8 +86,8 @@ def force(episode: Episode, simulated: Simulated) -> Figure:
     entries = {
         "measured": mark(color=INK, lw=2.4),
         "simulated": mark(color=SIMULATED),
-        "left along y": mark(color=INK, lw=1.1),
-        "left along z": mark(color=INK, lw=1.1, ls=":"),
+        "residual y": mark(color=INK, lw=1.1),
+        "residual z": mark(color=INK, lw=1.1, ls=":"),
     }
     key(figure, entries.items())
     return figure
@@ -156,13 +156,11 @@ def _aimed(ax: Axes, aims: Aims) -> None:
     ax.plot(aims.landing, 0 * aims.landing, "o", color=SIMULATED, ms=5, zorder=3)
     ax.margins(x=0.12, y=0.15)
     crowded = np.ptp(ax.get_xlim()) > MOST_SPAN
+    below = ax.get_xaxis_transform()  # along the axis, where no launch lies over the words
     for x, target, high in zip(aims.landing, aims.target, bars[1], strict=True):
         if np.isfinite(x + high) and not crowded:
-            place, offset = (x, high), (0, 4)
-            ax.annotate(
-                f"target {target:g} m", place, offset, textcoords="offset points", ha="center",
-                fontsize=8, color=SIMULATED,
-            )  # fmt: skip
+            words = {"ha": "center", "fontsize": 8, "color": SIMULATED}
+            ax.text(x, 0.02, f"target {target:g} m", transform=below, **words)
 
 
 def _bars(ax: Axes, x: np.ndarray, ends: np.ndarray, **style) -> None:

@@ -38,7 +38,7 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
     scored = launched.loc[launched.stretch <= FURTHER * inputs.recorded_stretch]
     scored = scored.loc[scored.predicted_low.notna()]
     landing, low, high = (scored[n] for n in ("landing_y", "predicted_low", "predicted_high"))
-    share = landing / scored.predicted_y - 1
+    off, share = landing - scored.predicted_y, landing / scored.predicted_y - 1
     evidence = confidence.get("launches", [])
     unlikely = [one.get("z_without_it") for one in evidence]
     left = [abs(one["left"]) for one in evidence if one["left"] is not None]
@@ -66,12 +66,10 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
         half_width=float(aims.half_width.max()),
         outside=int(((landing < low) | (landing > high)).sum()),
         scores=len(scored),
-        off=float((landing - scored.predicted_y).abs().mean()) if len(scored) else 0.0,
-        bias=float(share.mean()) if len(scored) else 0.0,
-        bias_error=float(share.sem()) if len(scored) > 1 else 0.0,
-        bias_of_half=float((2 * (landing - scored.predicted_y) / (high - low)).mean())
-        if len(scored)
-        else 0.0,
+        off=_known(off.abs().mean()),
+        bias=_known(share.mean()),
+        bias_error=_known(share.sem()),
+        bias_of_half=_known((2 * off / (high - low)).mean()),
         kind=" and ".join(dict.fromkeys(scored.kind)),
         left=max(left, default=0.0),
         observed=len(left),
@@ -95,6 +93,11 @@ def carried(episode: Episode, force: np.ndarray) -> float | None:
     if slack.sum() < FEWEST or abs(weight := force[slack, 2].mean()) < LIGHTEST:
         return None
     return float(episode.force[slack, 2].mean() / weight)
+
+
+def _known(value: float) -> float:
+    """0 of too few launches."""
+    return float(value) if np.isfinite(value) else 0.0
 
 
 def _density(params: Params, band: str) -> float | None:

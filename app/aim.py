@@ -8,13 +8,13 @@ from typing import NotRequired, TypedDict, cast
 import numpy as np
 
 from app import safety
+from app.launch import interval_90, pull_and_pause
 from app.safety import Hazard
 from pipeline.base.layout import Layout
-from pipeline.identify.results.theta import history_of, load_samples, load_theta, parameters_of
+from pipeline.identify.results.theta import load_samples, load_theta, parameters_of
 from pipeline.launching.surface.landing_map import Launcher
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
-from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params import Params, expect_known
 
 
@@ -34,12 +34,6 @@ class Answer(TypedDict):
     max_force_n: float  # the arm's limit
     pull_and_pause_s: NotRequired[list[float]]  # where the law remembers them
     warnings: list[Hazard]
-
-
-def pull_and_pause(params: Params, content: dict) -> dict[str, list[float]]:
-    """What a launch takes for granted of the hand, for a θ file whose law remembers it [s]."""
-    history = history_of(params, content)
-    return {} if history is None else {"pull_and_pause_s": [history.pull_time, history.pause]}
 
 
 def aim(
@@ -85,10 +79,8 @@ def aim(
             warnings.append(Hazard("miss", what))
         path = layout.confidence(band, method)
         samples = load_samples(path, parameters_of(content))
-        found = landing_intervals(launcher, draw, samples, params.trials.actuation_error)[0]
-        if np.isfinite(found).all():
-            interval = found.tolist()
-        else:
+        interval = interval_90(launcher, draw, samples, params.trials.actuation_error)
+        if interval is None:
             what = "no interval: too many launches beside the predicted one fail"
             warnings.append(Hazard("interval", what))
     warnings += safety.of_draw(params, band, draw, layout.root)

@@ -7,21 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from app import safety
-from app.aim import pull_and_pause
 from app.arguments import finite
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout, owner
-from pipeline.identify.results.theta import (
-    calibrated,
-    launch_setup,
-    load_samples,
-    load_theta,
-    parameters_of,
-)
+from pipeline.identify.results.theta import history_of, load_samples, load_theta, parameters_of
+from pipeline.launching.surface.landing_map import Launcher
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.trials.spread import landing_intervals
 from pipeline.params import Params, expect_known
-from pipeline.simulator.launch import launch
+from pipeline.simulator.launch import limited
+from pipeline.simulator.parameters import Parameters
 
 
 def expect_above_floor(params: Params, draw: tuple[float, float]) -> None:
@@ -45,14 +40,16 @@ def launched(
     expect_known(params, "band", band)
     expect_above_floor(params, draw)
     content, root = load_theta(theta, band), Path(root)
-    sling, setup = calibrated(params, band, content, root), launch_setup(params, content)
-    result = launch(
-        sling, setup, parameters_of(content), np.array(draw), max_force=params.setup.max_force
-    )
+    launcher, samples = simulator(params, band, content, root=root), _samples(theta, content, root)
+    result = limited(launcher(np.array([draw])), params.setup.max_force)
     force, failure = result.hold_force[0], result.failure[0]
+    interval = {}
+    if samples is not None and not failure:
+        error = params.trials.actuation_error
+        interval["interval_90_m"] = interval_90(launcher, draw, samples, error)
     return {
         "landing_y_m": finite(result.landing_y[0]),
-        **_interval(params, band, theta, content, draw, root, failure),
+        **interval,
         "speed_m_s": finite(result.speed[0]),
         "hold_force_n": finite(force),
         **pull_and_pause(params, content),
@@ -67,23 +64,30 @@ def launched(
     }
 
 
-def _interval(
-    params: Params,
-    band: str,
-    theta: Path,
-    content: dict,
-    draw: tuple[float, float],
-    root: Path,
-    failure: str | None,
-) -> dict:
-    """`interval_90_m` of a landing by θ's samples, as `sling aim` has it; {} where θ has none."""
+def pull_and_pause(params: Params, content: dict) -> dict[str, list[float]]:
+    """What a launch takes for granted of the hand, for a θ file whose law remembers it [s]."""
+    history = history_of(params, content)
+    return {} if history is None else {"pull_and_pause_s": [history.pull_time, history.pause]}
+
+
+def interval_90(
+    launcher: Launcher,
+    draw: tuple[float, float] | np.ndarray,
+    samples: Parameters | None,
+    error: float,
+) -> list[float] | None:
+    """Where 90 % of the launches from a draw (y, z) land [m]; None where too many of them fail.
+
+    Args:
+        launcher, samples, error: As `landing_intervals` takes them.
+    """
+    found = landing_intervals(launcher, np.array(draw), samples, error)[0]
+    return found.tolist() if np.isfinite(found).all() else None
+
+
+def _samples(theta: Path, content: dict, root: Path) -> Parameters | None:
+    """Of a run's θ file; None of any other, and where the method has none."""
     at = owner(theta)
-    if failure or not (at and at[2]):
-        return {}
-    samples = load_samples(Layout(root).confidence(band, at[2]), parameters_of(content))
-    if samples is None:
-        return {}
-    launcher = simulator(params, band, content, root=root)
-    error = params.trials.actuation_error
-    interval = landing_intervals(launcher, np.array(draw), samples, error)[0]
-    return {"interval_90_m": interval.tolist() if np.isfinite(interval).all() else None}
+    if not (at and at[2]):
+        return None
+    return load_samples(Layout(root).confidence(content["band"], at[2]), parameters_of(content))

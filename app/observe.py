@@ -11,13 +11,13 @@ import numpy as np
 from app import evidence, safety
 from app.flow import child
 from app.flow.disk import expect_ready
-from app.launch import expect_above_floor
+from app.launch import expect_above_floor, interval_90
 from app.safety import Hazard
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.identify.results.theta import load_samples, load_theta, parameters_of
 from pipeline.launching.surface.simulator import simulator
-from pipeline.launching.trials.spread import LEVEL, landing_intervals
+from pipeline.launching.trials.spread import LEVEL
 from pipeline.params import Params, expect_known
 from pipeline.params.identification import LEAST_SQUARES
 from stages.start import stage_of
@@ -153,8 +153,7 @@ def known(
     if once.failure[0] is None:
         told["landing_m"] = float(once.landing_y[0])
         spread = params.trials.actuation_error if error is None else error
-        found = landing_intervals(launcher, np.array(draw), samples, spread)[0]
-        told["interval_90_m"] = found.tolist() if np.isfinite(found).all() else None
+        told["interval_90_m"] = interval_90(launcher, draw, samples, spread)
     told["returned_share"] = content.get("returned_share", 1.0)
     ends = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
     told["share_90"] = (

@@ -105,6 +105,11 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+def say(text: str) -> None:
+    """On stderr: stdout is for the answer."""
+    print(text, file=sys.stderr, flush=True)
+
+
 def execute(arguments: argparse.Namespace) -> int:
     """Run a command and print its text; whatever a library prints goes to stderr.
 

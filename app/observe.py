@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from app import evidence, safety
+from app.command_line import say
 from app.flow import child
 from app.flow.disk import expect_ready
 from app.launch import expect_above_floor, interval_90
@@ -111,7 +111,7 @@ def _place_and_stage(
 def _run(stage: str | None, layout: Layout) -> bool:
     """Have DVC run a stage; whether there was one. Raises UserError."""
     if stage:
-        child.repro(layout.root, stage, lambda line: print(line, file=sys.stderr, flush=True))
+        child.repro(layout.root, stage, say)
     return bool(stage)
 
 

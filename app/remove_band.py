@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ruamel.yaml.comments import CommentedMap
 
+from app.command_line import say
 from app.flow.disk import expect_writable
 from app.params_file import edited
 from pipeline.base.errors import UserError, printable
@@ -76,7 +77,7 @@ def ask(lines: list[str]) -> bool:
     if not sys.stdin.isatty():
         return False
     for line in lines:
-        print(f"  {printable(line)}", file=sys.stderr)
+        say(f"  {printable(line)}")
     print("remove all this? [y/N] ", end="", file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 

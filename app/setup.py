@@ -7,7 +7,6 @@ base and in the camera, and its height above the floor. docs/recording.md, Calib
 from __future__ import annotations
 
 import math
-import sys
 from argparse import ArgumentTypeError
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from scipy.spatial.transform import Rotation
 
 from app.arguments import MEASURED
+from app.command_line import say
 from app.params_file import edited
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_text
@@ -99,11 +99,6 @@ def confirmed(said: str, answer: Callable[[str], str] = input) -> bool:
     """Whether a user wants this written; Enter alone does."""
     say(said)
     return answer("write this into params.yaml? [Y/n] ").strip().lower() in ("", "y", "yes")
-
-
-def say(text: str) -> None:
-    """On stderr: stdout is for the answer."""
-    print(text, file=sys.stderr, flush=True)
 
 
 def set_up(

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
+from app.command_line import say
 from app.drift.change import ValueOfRecording
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.layout import NotMade
@@ -78,7 +78,7 @@ def identified(
     for file in files:
         key = fingerprint(about, sha256(file))
         if not (one := known.get(key)):
-            print(f"{file}: identifying it alone ...", file=sys.stderr, flush=True)
+            say(f"{file}: identifying it alone ...")
             one = _alone(file, key, band, settings)
         found.append(one.model_copy(update={"file": file.name}))
     return found

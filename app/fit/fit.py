@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from app import evidence
+from app.command_line import say
 from app.fit.countdown import Countdown
 from app.flow import child
 from app.flow.disk import expect_ready
@@ -90,11 +90,6 @@ def fit(
     countdown.ends()
     card = layout.card(name)
     return json.loads((card / "card.json").read_text("utf-8")) | {"card": str(card / "README.md")}
-
-
-def say(text: str) -> None:
-    """On stderr: stdout is for the answer."""
-    print(text, file=sys.stderr, flush=True)
 
 
 def name_of(recordings: Sequence[Path]) -> str:

@@ -1,7 +1,15 @@
-"""Solves (1 - gamma J) z = r for a band's Jacobian J, as each step of CVODE asks for it.
+"""Solves (1 - gamma J) z = r for a band's Jacobian J: the preconditioner of CVODE's GMRES.
 
-Places follow velocities, and an edge's memories its stretch alone. Both are taken out by hand; what
-is left is banded, of three velocities a node, a third as wide and long.
+The solve is exact, so that GMRES needs about one iteration. With places x, velocities v and
+memories m the rates are x' = v, v' = A x + B v + C m and m' = D x + E m: block elimination leaves
+the velocities alone,
+
+    x = r_x + gamma v,   m = (1 - gamma E)^-1 (r_m + gamma D x),
+    (1 - gamma (B + gamma A + gamma C W)) v = r_v + gamma (A r_x + C m(v = 0)),
+    W = gamma (1 - gamma E)^-1 D.
+
+A memory belongs to an edge and follows its stretch, so E is triangular and D has two nodes to an
+edge. What is left is banded, of three velocities a node, and is factorised as L U without pivots.
 """
 
 from __future__ import annotations

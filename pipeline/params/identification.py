@@ -18,7 +18,12 @@ Law = Literal["neo_hookean", "rubber"]  # of the band's material
 # What each has beside the five, and how far its box may reach.
 LAWS: dict[str, dict[str, tuple[float, float]]] = {
     "neo_hookean": {},
-    "rubber": {"mooney_share": (-1.0, 1.0), "relaxation": (0.0, 0.2)},
+    "rubber": {
+        "mooney_share": (-1.0, 1.0),
+        "upturn": (0.0, 1.0),
+        "softening": (0.0, 0.9),
+        "relaxation": (0.0, 0.2),
+    },
 }
 LEAST_SQUARES = "least_squares"
 UNSEEN = "poissons_ratio", "dynamic_friction", "damping_scale"  # what a pull does not show

@@ -79,7 +79,8 @@ def unrelaxed(
     part = np.linspace(0, 1, HISTORY_STEPS + 1)
     drawn = np.linalg.norm(draws, axis=1)[:, None] * (part**2 * (3 - 2 * part))
     stretch = np.maximum(2 * np.hypot(band.half_width, drawn) / band.rest_length, 1.0)
-    stress = uniaxial(stretch, parameters.column("mooney_share")[:, None])
+    shape = (parameters.column(name)[:, None] for name in ("mooney_share", "upturn"))
+    stress = uniaxial(stretch, *shape)
     carried = overstress(stress, history.pull_time / HISTORY_STEPS)
     return carried * np.exp(-history.pause / TIMES) / np.maximum(stress[:, -1:], 1e-9)
 

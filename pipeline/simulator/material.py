@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import THETA, Parameters
 from pipeline.simulator.records import MATERIAL
-from pipeline.simulator.rubber import RUBBER
+from pipeline.simulator.rubber import RUBBER, relaxed
 
 LEAST_SCALE = 0.0075  # without any damping of shape waves ring on for ever, and no step holds them
 
@@ -37,6 +37,13 @@ def material(
         raise ValueError(f"parameters of the law {parameters.law} for a band of {band.law}")
     young, poisson, damping, friction, scale = map(parameters.column, THETA)
     result = np.zeros(len(parameters), MATERIAL)
+    if parameters.law == RUBBER:
+        after, weight = relaxed(parameters.column("relaxation"))
+        young = young * after
+        result["mooney"] = parameters.column("mooney_share")
+        result["upturn"] = parameters.column("upturn")
+        result["softening"] = parameters.column("softening")
+        result["relaxation"] = weight / after
     result["mu"] = mu = young / (2 * (1 + poisson))
     result["lam"] = young * poisson / ((1 + poisson) * (1 - 2 * poisson)) + mu
     result["damping"], result["scale"] = damping, np.maximum(scale, LEAST_SCALE)
@@ -48,7 +55,4 @@ def material(
         result["bending"] = rigidity / (mu * band.area)
     result["drag"] = parameters.column("air_drag")
     result["turning"] = parameters.column("turn_damping")
-    if parameters.law == RUBBER:
-        result["mooney"] = parameters.column("mooney_share")
-        result["relaxation"] = parameters.column("relaxation")
     return result

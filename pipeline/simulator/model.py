@@ -107,6 +107,7 @@ class ClampedBand:
         air_density: For the drag of a cylinder across the wind [kg/m^3], which tetrahedra do not
             feel.
         law: NEO_HOOKEAN, or RUBBER (rubber.h), which the rod alone knows.
+        stretched: Largest stretch that the band has seen before, which softened it.
         mesh: ROD, or TETRAHEDRA: a solid cylinder, whose edges are equally long. What of the band
             is inside the clamps does not deform there, so that the mesh ends at them.
     """
@@ -126,6 +127,7 @@ class ClampedBand:
     mesh: str = ROD
     air_density: float = 0.0
     law: str = NEO_HOOKEAN
+    stretched: float = 1.0
 
     @classmethod
     def of(

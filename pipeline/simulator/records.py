@@ -55,6 +55,8 @@ MATERIAL = _record(
     "bending",
     "drag",
     "mooney",
+    "upturn",
+    "softening",
     "relaxation",
     "turning",
 )
@@ -68,10 +70,11 @@ STEP = _record(
 )  # fmt: skip
 # of a sling on its way: direction of the launch, mass of the projectile, Outcome; time, y, z, vy,
 # vz at the separation; lowest z until then; force on the hand when it last held; Newton
-# iterations, its neighbours' too; what share of a stress at rest the branches carry besides
+# iterations, its neighbours' too; what share of a stress at rest the branches carry besides; the
+# work of the largest stretch before (rubber.h)
 LANE = _record(
     ("direction", 3), "payload", "outcome", ("separation", 5), "lowest", ("hold_force", 3),
-    "iterations", ("unrelaxed", BRANCHES),
+    "iterations", ("unrelaxed", BRANCHES), "worst",
 )  # fmt: skip
 # what is put out of a step
 OUTPUT = _record(("force", 3), "iterations")

@@ -1,10 +1,21 @@
-// What the law `rubber` adds along an edge to the neo-Hookean material: Mooney's share m and relaxation.
+// What the law `rubber` adds along an edge to the neo-Hookean material: shape of the curve, softening and relaxation.
 //
-// Of an edge at stretch l = |g|, incompressible and pulled along, the relaxed nominal stress is Mooney-Rivlin's
+// Of an edge at stretch l = |g|, incompressible and pulled along, the relaxed nominal stress is that of Biderman's first
+// three terms, Mooney's share m and the upturn c,
 //
-//   p(l) = mu (l - l^-2) (1 - m + m/l),   of which material.h gives mu (l - l^-2) and `extra` the rest
+//   p(l) = mu (l - l^-2) (1 - m + m/l + c (I1 - 3)),  I1 - 3 = l^2 + 2/l - 3,
 //
-// Below l = 0.7, where a thin band buckles, p goes on straight, so that it grows with l for every -1 <= m <= 1.
+// of which material.h gives mu (l - l^-2) and `extra` the rest. Below l = 0.7, where a thin band buckles, p goes on straight,
+// so that it grows with l for every -1 <= m <= 1 and c >= 0.
+//
+// A band that was stretched before is softer up to that stretch (Mullins): with the work W(l) of p from rest and the
+// largest W that an edge has seen, Wm, it pulls with eta p (Ogden, Roxburgh 1999, with a rational function for the erf that
+// joins the virgin curve without a kink, which Newton's method would not like),
+//
+//   eta = 1 - (2 + e) s x^2 / (x^2 + x + e),  x = max(1 - W/Wm, 0),  e = 0.05:  from 1 where it was stretched to, to 1 - s at
+// rest, in tension; in compression eta is 1.
+//
+// Its free energy at a given Wm is the integral of eta p, which grows with l; where Wm grows, a part of that is lost.
 //
 // Branch k adds w (p(l) - p(q)), q' p'(q) = (p(l) - p(q))/t: it forgets the stress over its time t. Its free energy is
 // w [W(l) - W(q) - p(q) (l - q)], p = W': never negative, as W is convex; and it loses w (l - q) (p(l) - p(q))/t of it,
@@ -17,33 +28,42 @@
 
 #if RUBBER
 const int BRANCHES = STEP_FOLLOW - STEP_FORGET;
-const real mooney = LAW[MATERIAL_MOONEY], weight = LAW[MATERIAL_RELAXATION];
+const real mooney = LAW[MATERIAL_MOONEY], upturn = LAW[MATERIAL_UPTURN], softening = LAW[MATERIAL_SOFTENING], weight = LAW[MATERIAL_RELAXATION];
 real following = zero;  // what a step adds of p's change: w times the sum of `follow`
 #define MEMORY(k, i) STATE[(9 * N + (k)) * L + (i)]  // overstress of the branches, then:
 #define STRESS_BEFORE BRANCHES
 #define CARRIED (BRANCHES + 1)                       // what a step adds whatever its end is
+#define WORST (BRANCHES + 2)                         // largest work, over mu
+#define JOIN 0.05                                    // e
 
-// p and `extra` at a stretch, with their slopes by it
-auto uniaxial = [&](real l, real &p, real &slope, real &extra, real &extra_slope) {
+// p and `extra` at a stretch, with their slopes by it, and the work of p over mu, 0 in compression
+auto uniaxial = [&](real l, real &p, real &slope, real &extra, real &extra_slope, real &work) {
   const real at = maximum(l, zero + (SC)0.7), i = one / at, i3 = i * i * i, beyond = l - at;
-  const real neo = at - i * i, neo_slope = one + (SC)2 * i3;
-  extra_slope = mu * mooney * ((SC)3 * i3 * i - neo_slope);
-  extra = mu * mooney * (i - one) * neo + extra_slope * beyond;
+  const real neo = at - i * i, neo_slope = one + (SC)2 * i3, first = at * at + (SC)2 * i - (SC)3;
+  extra_slope = mu * (mooney * ((SC)3 * i3 * i - neo_slope) + upturn * (first * neo_slope + (SC)2 * neo * neo));
+  extra = mu * (mooney * (i - one) + upturn * first) * neo + extra_slope * beyond;
   slope = mu * neo_slope + extra_slope;
   p = mu * (neo + neo_slope * beyond) + extra;
+  const real second = (SC)2 * at + i * i - (SC)3;  // I2 - 3
+  work = at > one ? (SC)0.5 * (first + mooney * (second - first)) + (SC)0.25 * upturn * first * first : zero;
 };
 // how much steeper p is than the neo-Hookean: damping follows the rate of the stress
 auto steeper = [&](const real* predicted) -> real {
-  const real i = one / maximum(SQRT(dot(predicted, predicted)), zero + (SC)0.7), i3 = i * i * i;
-  return one + mooney * ((SC)3 * i3 * i / (one + (SC)2 * i3) - one);
+  const real at = maximum(SQRT(dot(predicted, predicted)), zero + (SC)0.7), i = one / at, i3 = i * i * i;
+  const real neo = at - i * i, per = one / (one + (SC)2 * i3), first = at * at + (SC)2 * i - (SC)3;
+  return one + mooney * ((SC)3 * i3 * i * per - one) + upturn * (first + (SC)2 * neo * neo * per);
 };
 // to the stress of a stretch g and its derivative
 auto add_rubber = [&](int i, const real (&g)[3], real (&stress)[3], real (&K)[3][3]) {
   const real l = SQRT(dot(g, g) + (SC)1e-12);
-  real p, slope, extra, extra_slope;
-  uniaxial(l, p, slope, extra, extra_slope);
-  const real pull = extra + MEMORY(CARRIED, i) + following * p, across = pull / l;
-  const real along = (extra_slope + following * slope - across) / (l * l);
+  real p, slope, extra, extra_slope, work;
+  uniaxial(l, p, slope, extra, extra_slope, work);
+  const real worst = MEMORY(WORST, i), gap = maximum(worst - work, zero), join = (SC)JOIN * worst * worst;
+  const real per = one / maximum(gap * (gap + worst) + join, zero + (SC)1e-30), tension = work > zero ? one : zero;
+  const real soft = (SC)(2 + JOIN) * softening * tension * gap * per, lost = soft * gap;
+  const real regained = soft * (gap * worst + (SC)2 * join) * per / mu;  // of eta, by work
+  const real pull = extra + MEMORY(CARRIED, i) + (following - lost) * p, across = pull / l;
+  const real along = (extra_slope + (following - lost) * slope + regained * p * p - across) / (l * l);
   UNROLL for (int m = 0; m < 3; ++m) {
     stress[m] += across * g[m];
     if (fresh) UNROLL for (int n = 0; n < 3; ++n) K[m][n] += along * g[m] * g[n] + (m == n ? across : zero);
@@ -61,21 +81,25 @@ auto recall = [&](const SC* row, bool relax) {
     MEMORY(CARRIED, i) = weight * carried;
   }
 };
-auto stress_at = [&](int i) -> real {
+auto stress_at = [&](int i, real &work) -> real {
   real square = zero, p, slope, extra, extra_slope;
   UNROLL for (int c = 0; c < 3; ++c) { const real gap = X(c, i + 1) - X(c, i); square += gap * gap; }
-  uniaxial(SQRT(square) / edge[i], p, slope, extra, extra_slope);
+  uniaxial(SQRT(square) / edge[i], p, slope, extra, extra_slope, work);
   return p;
 };
 auto start_relaxed = [&]() {
   for (int i = member; i < L - 1; i += T) {
+    real work;
     UNROLL for (int k = 0; k < BRANCHES; ++k) MEMORY(k, i) = zero;
-    MEMORY(STRESS_BEFORE, i) = stress_at(i);
+    MEMORY(STRESS_BEFORE, i) = stress_at(i, work);
+    MEMORY(WORST, i) = LANE[LANE_WORST];
   }
 };
 auto remember = [&](const SC* row, bool relax) {
   for (int i = member; i < L - 1; i += T) {
-    const real p = stress_at(i), change = relax ? p : p - MEMORY(STRESS_BEFORE, i);
+    real work;
+    const real p = stress_at(i, work), change = relax ? p : p - MEMORY(STRESS_BEFORE, i);
+    MEMORY(WORST, i) = maximum(relax ? zero + LANE[LANE_WORST] : MEMORY(WORST, i), work);  // a guess stretches nothing
     UNROLL for (int k = 0; k < BRANCHES; ++k) {
       const real before = relax ? zero : row[STEP_FORGET + k] * MEMORY(k, i);
       MEMORY(k, i) = before + follow_of(row, relax, k) * change;

@@ -1,9 +1,13 @@
-"""The law `rubber` beside the neo-Hookean one: Mooney's share and relaxation, as in rubber.h.
+"""The law `rubber` beside the neo-Hookean one, as in rubber.h: what its parameters mean.
 
-Relaxation is one weight: eight branches at half decades from 3 ms to 10 s carry it evenly, because
-rubber relaxes about as much in every decade (Ferry, Viscoelastic Properties of Polymers, 1980, ch.
-1). Young's modulus is the relaxed one; at once a band is 1 + 8 `relaxation` times as stiff. What is
-faster than 3 ms is damping.
+`mooney_share` m and `upturn` c are the shape of the relaxed curve (Biderman 1958, to the second
+order: Mooney's two terms and the square of the first invariant), `softening` s what a band loses
+up to the largest stretch that it has seen (Mullins; Ogden and Roxburgh, 10.1098/rspa.1999.0431).
+
+`relaxation` is what rubber relaxes in each decade of time, about evenly (Ferry, Viscoelastic
+Properties of Polymers, 1980, ch. 1; latex over 24 h: docs/real.md). Eight branches carry it, evenly
+in log time from 3 ms to 10^4 s. What is faster is damping. Young's modulus is the one that is left
+after LATER: nobody waits for the slow branches, which in a rollout of some seconds are springs.
 """
 
 from __future__ import annotations
@@ -13,12 +17,21 @@ import numpy as np
 from pipeline.params.identification import LAWS
 
 NEO_HOOKEAN, RUBBER = LAWS
-TIMES = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0])  # of the branches [s]
+TIMES = np.geomspace(0.003, 1e4, 8)  # of the branches [s]
+DECADES = np.log10(TIMES[1] / TIMES[0])  # from one to the next
+LATER = 10.0  # s after a sudden stretch
+JOIN = 0.05  # as in rubber.h
 
 
 def memories(law: str) -> int:
-    """Numbers that each edge remembers: branches, and two that the steps keep beside them."""
-    return len(TIMES) + 2 if law == RUBBER else 0
+    """Numbers that each edge remembers: branches, and three that the steps keep beside them."""
+    return len(TIMES) + 3 if law == RUBBER else 0
+
+
+def relaxed(relaxation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of a relaxation (...) the share of Young's modulus that never relaxes, and a branch's."""
+    weight = DECADES * np.asarray(relaxation, float)
+    return 1 - weight * np.exp(-LATER / TIMES).sum(), weight
 
 
 def update(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -30,16 +43,33 @@ def update(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.exp(-part), -np.expm1(-part) / part
 
 
-def uniaxial(stretch: np.ndarray, share: np.ndarray | float) -> np.ndarray:
-    """Relaxed nominal stress over the shear modulus (Mooney 1940, Rivlin 1948), stretches >= 1."""
-    return (stretch - stretch**-2) * (1 - share + share / stretch)
+def uniaxial(
+    stretch: np.ndarray, share: np.ndarray | float, upturn: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Virgin nominal stress over the shear modulus, stretches >= 1."""
+    first = stretch**2 + 2 / stretch - 3
+    return (stretch - stretch**-2) * (1 - share + share / stretch + upturn * first)
+
+
+def work(
+    stretch: np.ndarray, share: np.ndarray | float, upturn: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Of `uniaxial` from rest, stretches >= 1."""
+    first, second = stretch**2 + 2 / stretch - 3, 2 * stretch + stretch**-2 - 3
+    return (first + share * (second - first)) / 2 + upturn * first**2 / 4
+
+
+def softened(work: np.ndarray, worst: np.ndarray, softening: np.ndarray | float) -> np.ndarray:
+    """Share of the virgin stress that is left at a work, after the largest `worst`, >= 0 both."""
+    gap = np.maximum(1 - work / np.maximum(worst, 1e-30), 0)
+    return 1 - (2 + JOIN) * softening * gap**2 / (gap**2 + gap + JOIN)
 
 
 def overstress(stress: np.ndarray, step: float) -> np.ndarray:
     """What the branches carry after a history of p (..., T) at equal steps that starts relaxed.
 
     Returns:
-        Shape (..., 8), in the unit of p; times `relaxation` it adds to the stress.
+        Shape (..., 8), in the unit of p; times a branch's share it adds to the stress.
     """
     forget, follow = update(np.array(step))
     result = np.zeros((*stress.shape[:-1], len(TIMES)))

@@ -14,7 +14,7 @@ from pipeline.simulator.material import material
 from pipeline.simulator.model import CYLINDER_DRAG, GRAVITY, TETRAHEDRA, ClampedBand
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import LANE, OUTPUT, SETTING, numbers, records, width
-from pipeline.simulator.rubber import RUBBER, memories
+from pipeline.simulator.rubber import RUBBER, memories, work
 from pipeline.simulator.schedule import Schedule
 
 LANES = 16  # slings in a CPU thread's SIMD lanes
@@ -50,6 +50,9 @@ class Slings:
         `rigidity` is as of `material`.
         """
         records = np.zeros(len(parameters), LANE)
+        if band.law == RUBBER:
+            shape = map(parameters.column, ("mooney_share", "upturn"))
+            records["worst"] = work(band.stretched, *shape)
         for name, values in lanes.items():
             records[name] = values
         shape = len(parameters), band.sections, band.dofs

@@ -33,6 +33,7 @@ class Balance:
         viscous: Lost to damping.
         branches: Free energy of the law `rubber`'s memory.
         relaxed: Lost as it forgets.
+        softened: Lost as the band is stretched further than ever.
         integrator: Lost to the steps: what inertia and elastic forces do in a step is not quite
             the change of their energies.
     """
@@ -46,6 +47,7 @@ class Balance:
     viscous: np.ndarray
     branches: np.ndarray
     relaxed: np.ndarray
+    softened: np.ndarray
     pads: np.ndarray
     integrator: np.ndarray
     release: float
@@ -59,7 +61,7 @@ class Balance:
     def miss(self) -> np.ndarray:
         """What the hand and the fingers put in, less what is stored and physically dissipated."""
         stored = self.elastic + self.branches + self.kinetic + self.gravity
-        lost = self.viscous + self.relaxed + self.pads
+        lost = self.viscous + self.relaxed + self.softened + self.pads
         return self.hand + self.turning - stored - lost
 
     def share(self, energy: np.ndarray) -> float:
@@ -73,12 +75,14 @@ class Remembered:
 
     Attributes:
         carried, following: As ReferenceRod has them, shape (S, E), (S, 1).
+        worst: As ReferenceRod has it, as the steps begin, and after the last, shape (S + 1, E).
         free: Free energy of the branches at the steps' ends [J], shape (S,).
         lost: What they lose in each step, from the power at its ends [J], shape (S,).
     """
 
     carried: np.ndarray
     following: np.ndarray
+    worst: np.ndarray
     free: np.ndarray
     lost: np.ndarray
 
@@ -88,10 +92,14 @@ def remembered(
 ) -> Remembered:
     """Of states (S, L, 9) after steps from `start`, relaxed; steps at rest forget all."""
     columns = rod.columns(np.concatenate([start[None], x]))
-    stress = rod.uniaxial(rod.stretch(columns))
-    weight, carried = rod.value("relaxation"), np.zeros((len(x), rod.sling.edges))
+    stress, done = rod.uniaxial(rod.stretch(columns)), rod.pulled(rod.stretch(columns))
+    weight, carried = rod.branch, np.zeros((len(x), rod.sling.edges))
     overstress = np.zeros((len(x) + 1, rod.sling.edges, table["forget"].shape[1]))
     moving = table["mode"] == Mode.MOVE
+    worst = np.empty((len(x) + 1, rod.sling.edges))
+    worst[0] = rod.worst
+    for k, goes_on in enumerate(moving):
+        worst[k + 1] = np.maximum(worst[k] if goes_on else rod.worst, done[k + 1])
     follow = np.where(moving[:, None], table["follow"], 0.0)
     for k in np.flatnonzero(moving):
         kept = table["forget"][k] * overstress[k]
@@ -99,7 +107,7 @@ def remembered(
         overstress[k + 1] = kept + np.outer(stress[k + 1] - stress[k], follow[k])
     free, power = rod.branches(overstress, columns)
     lost = np.where(moving, table["h"] * (power[1:] + power[:-1]) / 2, 0.0)
-    return Remembered(carried, weight * follow.sum(-1)[:, None], free[1:], lost)
+    return Remembered(carried, weight * follow.sum(-1)[:, None], worst, free[1:], lost)
 
 
 def balance(
@@ -125,6 +133,8 @@ def balance(
     memory = remembered(rod, table, motion.start[0], motion.x[0])
     carried, following = memory.carried[first + 1 :], memory.following[first + 1 :]
     free, lost = memory.free[first + 1 :], memory.lost[first + 1 :]
+    worst = memory.worst[first + 1 :]
+    softened = rod.lost_for_ever(np.diff(worst, axis=0))
 
     goes_on = np.diff(table["grip"][first:]) == 0  # else forces jump as the step begins
 
@@ -137,7 +147,13 @@ def balance(
     conservative, viscous = np.empty_like(x), np.empty_like(x)
     for gripped in (False, True):
         part = (rows["grip"] == Grip.HELD) == gripped
-        band = replace(rod, gripped=gripped, carried=carried[part], following=following[part])
+        band = replace(
+            rod,
+            gripped=gripped,
+            carried=carried[part],
+            following=following[part],
+            worst=worst[:-1][part],
+        )
         still = np.zeros_like(v[part])
         elastic[part], before[part] = band.elastic(x[part]), band.elastic(x1[part])
         conservative[part] = band.internal(x[part], still, at[part])
@@ -145,7 +161,7 @@ def balance(
     rate = (v - v1 - past * (v1 - v2)) / (beta * rows["h"][:, None, None])
     kinetic = np.append(0.0, rod.kinetic(v))
     integrator = work(rod.mass * rate + conservative) - np.diff(kinetic) - (elastic - before)
-    integrator -= np.diff(free, prepend=0.0) + lost
+    integrator -= np.diff(free, prepend=0.0) + lost + softened
     led = np.zeros_like(x)
     led[:, sling.middle, :3] = -motion.force[0, first + 1 :]
     hand = work(led)
@@ -161,6 +177,7 @@ def balance(
         viscous=np.cumsum(work(viscous)),
         branches=free,
         relaxed=np.cumsum(lost),
+        softened=np.cumsum(softened),
         pads=-np.cumsum(np.where(rows["grip"] == Grip.OPENING, hand, 0.0)),
         integrator=np.cumsum(integrator),
         release=episode.release_time,
@@ -173,13 +190,15 @@ def checks(done: Balance) -> list[Finding]:
     taut = (done.time > done.release) & (done.time < done.release + 0.1)
     parts = {
         name: getattr(done, name)[-1]
-        for name in ("elastic", "branches", "kinetic", "gravity", "viscous", "relaxed", "pads")
-    }
+        for name in (
+            "elastic", "branches", "kinetic", "gravity", "viscous", "relaxed", "softened", "pads",
+        )
+    }  # fmt: skip
     parts["steps"] = done.miss[-1]
     note = " + ".join(f"{name} {value:.4f}" for name, value in parts.items())
     against = (
         "hand + fingers' turning = elastic + branches + kinetic + gravity + dissipated (viscous,"
-        " relaxed, pads)"
+        " relaxed, softened, pads)"
     )
     return [
         Finding(

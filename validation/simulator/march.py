@@ -41,13 +41,14 @@ def march(
         direction: Of the pull that opening pads resist, until a held step says, shape (3,).
         unrelaxed: What share of a stress at rest the branches carry besides, shape (8,).
     """
-    middle, weight = rod.sling.middle, rod.value("relaxation")
+    middle, weight = rod.sling.middle, rod.branch
     x1 = x2 = np.array(start, float)
     v1 = v2 = np.zeros_like(x1)
     offset, pull, direction = None, 0.0, np.asarray(direction, float)
     xs, vs, forces, carried = [], [], [], []
     overstress = np.zeros((rod.sling.edges, len(TIMES)))
     stress = rod.uniaxial(rod.stretch(rod.columns(x1)))  # at the last step's end
+    worst = np.broadcast_to(rod.worst, rod.sling.edges)
     for step in steps:
         h, past, grip, target = (step[name] for name in ("h", "past", "grip", "target"))
         bh = step["beta"] * h
@@ -60,6 +61,7 @@ def march(
             gripped=grip == Grip.HELD,
             carried=weight * (forget * overstress - np.outer(stress, follow)).sum(-1),
             following=weight * np.sum(follow),
+            worst=worst,
         )
         free = _free(band)
         at = x1 + h * v1
@@ -94,8 +96,10 @@ def march(
             x1, x2, v1, v2 = x, x, 0 * v, 0 * v
         else:
             x1, x2, v1, v2 = x, x1, v, v1
-        before, stress = stress, rod.uniaxial(rod.stretch(rod.columns(x)))
-        overstress = forget * overstress + np.outer(stress - before, follow)
+        stretch = rod.stretch(rod.columns(x))
+        change, stress = -stress, rod.uniaxial(stretch)
+        overstress = forget * overstress + np.outer(stress + change, follow)
+        worst = np.maximum(rod.worst if step["mode"] == Mode.RELAX else worst, rod.pulled(stretch))
         xs.append(x), vs.append(v1), forces.append(force), carried.append(overstress)
     return March(*map(np.array, (xs, vs, forces, carried)))
 

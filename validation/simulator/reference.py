@@ -19,7 +19,7 @@ from pipeline.simulator.initial import fixed_frames
 from pipeline.simulator.material import material
 from pipeline.simulator.model import GRAVITY, ClampedBand
 from pipeline.simulator.parameters import Parameters
-from pipeline.simulator.rubber import RUBBER, TIMES
+from pipeline.simulator.rubber import JOIN, RUBBER, TIMES, relaxed
 
 TURNS = 1e-2  # of the modulus: keeps the spin of an unstressed edge regular
 HOLDS, TAUT = (
@@ -44,6 +44,14 @@ def _spin(pair: np.ndarray) -> np.ndarray:
     return np.stack([pair[..., 1, :], -pair[..., 0, :]], axis=-2)
 
 
+def _lost(gap: np.ndarray | float) -> np.ndarray:
+    """Integral from 0 of what softening takes away at a gap, of softening 1."""
+    root = np.sqrt(1 - 4 * JOIN)
+    a, b = (1 + root) / 2, (1 - root) / 2
+    logs = ((a - JOIN) * np.log1p(gap / a) - (b - JOIN) * np.log1p(gap / b)) / root
+    return (2 + JOIN) * (gap - logs)
+
+
 def _sum(product: np.ndarray) -> np.ndarray:
     return product.sum(axis=(-2, -1))
 
@@ -60,6 +68,7 @@ class ReferenceRod:
         share: Of the bending and twisting stiffness; guesses relax with less first.
         carried, following: Of the law `rubber` in a step: stress [Pa] that its branches add
             whatever the step's end is, shape (E,), and what they add of p there.
+        worst: Of the law `rubber`: largest work that an edge has seen [Pa], shape (E,).
     """
 
     sling: ClampedBand
@@ -70,6 +79,7 @@ class ReferenceRod:
     share: float = 1.0
     carried: np.ndarray | float = 0.0
     following: float = 0.0
+    worst: np.ndarray | float = 0.0
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -79,6 +89,12 @@ class ReferenceRod:
     def value(self, name: str) -> float:
         """Of a parameter; 0 where the law has none."""
         return self.theta.sample().get(name, 0.0)
+
+    @property
+    def branch(self) -> float:
+        """Weight of each, over what never relaxes."""
+        left, weight = relaxed(self.value("relaxation"))
+        return float(weight / left)
 
     # ---- edges
 
@@ -105,8 +121,9 @@ class ReferenceRod:
         stress = mu * f + p[..., None, None] * cof
         if self.sling.law == RUBBER:
             stretch = self.stretch(f)
-            pull = self.uniaxial(stretch) - self.uniaxial(stretch, share=0.0)
-            pull = pull + self.carried + self.following * self.uniaxial(stretch)
+            virgin = self.uniaxial(stretch)
+            pull = self.softened(stretch) * virgin - self.uniaxial(stretch, shape=(0.0, 0.0))
+            pull = pull + self.carried + self.following * virgin
             stress[..., 0, :] += (pull / stretch)[..., None] * f[..., 0, :]
         return self.sling.area * stress
 
@@ -115,19 +132,46 @@ class ReferenceRod:
     def stretch(self, columns: np.ndarray) -> np.ndarray:
         return np.sqrt((columns[..., 0, :] ** 2).sum(-1))
 
-    def uniaxial(self, stretch: np.ndarray, order: int = 0, share=None) -> np.ndarray:
-        """Relaxed nominal stress [Pa], its slope (order 1), or its work from rest (order -1).
+    def uniaxial(self, stretch: np.ndarray, order: int = 0, shape=None) -> np.ndarray:
+        """Virgin nominal stress [Pa], its slope (order 1), or its work from rest (order -1).
 
-        Mooney and Rivlin's; below STRAIGHT the stress goes on straight.
+        Biderman's of `shape`, Mooney's share and the upturn; below STRAIGHT it goes on straight.
         """
-        mu, share = self.parameters[0], self.value("mooney_share") if share is None else share
+        mu = self.parameters[0]
+        share, upturn = shape or (self.value("mooney_share"), self.value("upturn"))
         at = np.where(np.real(stretch) > STRAIGHT, stretch, STRAIGHT)
-        past = stretch - at
-        stress = (at - at**-2) * (1 - share + share / at)
-        slope = (1 + 2 * at**-3) * (1 - share + share / at) - (at - at**-2) * share / at**2
-        work = (1 - share) * (at**2 / 2 + 1 / at - 1.5) + share * (at + at**-2 / 2 - 1.5)
+        past, first = stretch - at, at**2 + 2 / at - 3
+        factor = 1 - share + share / at + upturn * first
+        stress = (at - at**-2) * factor
+        turn = -share / at**2 + 2 * upturn * (at - at**-2)
+        slope = (1 + 2 * at**-3) * factor + (at - at**-2) * turn
+        work = (1 - share) * first / 2 + share * (at + at**-2 / 2 - 1.5) + upturn * first**2 / 4
         both = work + stress * past + slope * past**2 / 2, stress + slope * past, slope
         return mu * both[order + 1]
+
+    def pulled(self, stretch: np.ndarray) -> np.ndarray:
+        """Work [Pa] by which softening goes: of a stretch from rest, 0 in compression."""
+        return np.where(np.real(stretch) > 1, self.uniaxial(stretch, -1), 0.0)
+
+    def softened(self, stretch: np.ndarray) -> np.ndarray:
+        """Share of the virgin stress that is left."""
+        done = self.pulled(stretch)
+        gap = 1 - done / np.where(self.worst > 0, self.worst, 1.0)
+        gap = np.where((np.real(gap) > 0) & (self.worst > 0) & (np.real(stretch) > 1), gap, 0.0)
+        return 1 - (2 + JOIN) * self.value("softening") * gap**2 / (gap**2 + gap + JOIN)
+
+    def stored(self, stretch: np.ndarray) -> np.ndarray:
+        """Free energy [Pa] of the softened stress: its integral at the largest work so far."""
+        done = self.pulled(stretch)
+        worst = np.maximum(self.worst, done)
+        gap = 1 - done / np.where(worst > 0, worst, 1.0)
+        lost = worst * (_lost(1.0) - _lost(gap))
+        return self.uniaxial(stretch, -1) - self.value("softening") * lost
+
+    def lost_for_ever(self, grown: np.ndarray) -> np.ndarray:
+        """Energy [J] lost where the largest work of edges grows by `grown` (..., E) [Pa]."""
+        volume = self.sling.area * self.sling.edge_lengths
+        return _lost(1.0) * self.value("softening") * (grown * volume).sum(-1)
 
     def stretch_at(self, stress: np.ndarray) -> np.ndarray:
         """Where the relaxed stress is `stress` [Pa], by bisection: it grows with the stretch."""
@@ -146,7 +190,7 @@ class ReferenceRod:
         q = self.stretch_at(kept)
         free = self.uniaxial(stretch, -1) - self.uniaxial(q, -1) - kept * (stretch - q)
         lost = overstress * (stretch - q) / TIMES
-        volume = self.value("relaxation") * self.sling.area * self.sling.edge_lengths
+        volume = self.branch * self.sling.area * self.sling.edge_lengths
         return tuple((one.sum(-1) * volume).sum(-1) for one in (free, lost))
 
     def viscous_stress(self, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -169,7 +213,7 @@ class ReferenceRod:
         braked = np.maximum(self.value("turn_damping"), np.where(j > 0, holds, 1))
         if self.sling.law == RUBBER:  # as the relaxed stress grows against the neo-Hookean
             stretch = np.maximum(self.stretch(f), STRAIGHT)
-            s = s * (self.uniaxial(stretch, 1) / self.uniaxial(stretch, 1, share=0.0))
+            s = s * (self.uniaxial(stretch, 1) / self.uniaxial(stretch, 1, shape=(0.0, 0.0)))
             s = s[..., None, None]
         p = p[..., None, None]
         stress = mu * f + p * cof
@@ -241,7 +285,7 @@ class ReferenceRod:
         density = mu / 2 * (_sum(f**2) - 3) - mu * (j - 1) + lam / 2 * (j - 1) ** 2
         if self.sling.law == RUBBER:
             stretch = self.stretch(f)
-            density += self.uniaxial(stretch, -1) - self.uniaxial(stretch, -1, share=0.0)
+            density += self.stored(stretch) - self.uniaxial(stretch, -1, shape=(0.0, 0.0))
         edges = (density * self.sling.area * self.sling.edge_lengths).sum(-1)
         bend, torsion = self._stiffness()
         frames = self._frames(x, 1)

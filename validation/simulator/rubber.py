@@ -210,7 +210,10 @@ def oscillator(bench: Bench, shape=SHAPE, stretch: float = 1.5) -> list[Finding]
     """A heavy middle, its memory relaxed where it is let go, by the matrix exponential."""
     left, weight = relaxed_share(RELAXATION)
     mass, theta = 0.5, [1e6, FULL, 1e-6, 0.5, 0.0]
-    sling, options = rubber_of(bench), {"mass": mass, "stretch": stretch, **own(shape, softening=0.0)}
+    sling, options = (
+        rubber_of(bench),
+        {"mass": mass, "stretch": stretch, **own(shape, softening=0.0)},
+    )
     time, place, _, _ = oscillate(bench, theta, sling=sling, **options)
     thin = replace(sling, radius=sling.radius / STRING, mass=sling.mass / 20)
     mu = left * theta[0] / (2 * (1 + FULL))

@@ -1,0 +1,1 @@
+"""The law `rubber` against measurements of real rubber that others made."""

@@ -1,0 +1,102 @@
+"""Fits of the law `rubber` to one specimen, and how far off it stays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from pipeline.params.identification import LAWS
+from pipeline.simulator.rubber import RUBBER, TIMES, relaxed, softened, uniaxial, update, work
+from validation.real.data import Curve
+
+REACH = LAWS[RUBBER]
+MOST_SLACK = 0.03  # of the crosshead's stretch
+NAMES = "mooney_share", "upturn", "softening", "relaxation"
+START = {"mooney_share": 0.2, "upturn": 0.05, "softening": 0.1, "relaxation": 0.03}
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Values by name; what is left of the stress over its peak, shape (n,)."""
+
+    values: dict[str, float]
+    left: np.ndarray
+
+    @property
+    def rms(self) -> float:
+        """In percent of the peak."""
+        return float(100 * np.sqrt(np.mean(self.left**2)))
+
+
+def history(stretch: np.ndarray, time: np.ndarray, values: dict[str, float]) -> np.ndarray:
+    """Nominal stress over the shear modulus along a history (n,) that starts virgin and relaxed."""
+    shape = values["mooney_share"], values["upturn"]
+    virgin, done = uniaxial(stretch, *shape), work(stretch, *shape)
+    eta = softened(done, np.maximum.accumulate(done), values["softening"])
+    left, weight = relaxed(values["relaxation"])
+    forget, follow = update(np.diff(time))
+    over, total = np.zeros(len(TIMES)), np.empty(len(stretch))
+    total[0] = left * virgin[0]
+    for k, change in enumerate(np.diff(virgin)):
+        over = forget[k] * over + follow[k] * change
+        total[k + 1] = left * eta[k + 1] * virgin[k + 1] + weight * over.sum()
+    return total
+
+
+def shape_of(curve: Curve, slack: float = 0.0) -> Fit:
+    """Modulus, share, upturn and up to `slack` of the stretch, of a pull without a history."""
+    peak = curve.stress.max()
+    low = [1e-6 * peak, REACH["mooney_share"][0], REACH["upturn"][0], 0.0]
+    high = [1e3 * peak, REACH["mooney_share"][1], REACH["upturn"][1], slack + 1e-9]
+
+    def left(x: np.ndarray) -> np.ndarray:
+        stretch = np.maximum(curve.stretch - x[3], 1.0)
+        return (x[0] * uniaxial(stretch, x[1], x[2]) - curve.stress) / peak
+
+    begin = [peak / 2, START["mooney_share"], START["upturn"], slack / 2]
+    found = least_squares(left, begin, bounds=(low, high), x_scale=[peak, 0.1, 0.05, 0.01])
+    names = "shear_modulus", "mooney_share", "upturn", "slack"
+    return Fit(dict(zip(names, map(float, found.x), strict=True)), found.fun)
+
+
+def noise_of(curve: Curve) -> float:
+    """Scatter of a pull about a smooth curve, in percent of its peak: by second differences."""
+    bent = np.diff(curve.stress, 2)  # white noise gives them the variance 6
+    return float(100 * np.sqrt(np.mean(bent**2) / 6) / curve.stress.max())
+
+
+def memory_of(curves: list[Curve], names: tuple[str, ...] = NAMES) -> list[Fit]:
+    """One modulus and one value of each of `names` for histories of one material."""
+    peak = max(curve.stress.max() for curve in curves)
+
+    def values(x: np.ndarray) -> dict[str, float]:
+        return dict.fromkeys(NAMES, 0.0) | dict(zip(names, x[1:], strict=True))
+
+    def left(x: np.ndarray) -> list[np.ndarray]:
+        return [
+            (x[0] * history(one.stretch, one.time, values(x)) - one.stress) / one.stress.max()
+            for one in curves
+        ]
+
+    low, high = np.array([REACH[name] for name in names]).T
+    begin = [peak / 2, *(START[name] for name in names)]
+    found = least_squares(
+        lambda x: np.concatenate(left(x)),
+        begin,
+        bounds=([1e-6 * peak, *low], [1e3 * peak, *high]),
+        x_scale=[peak, *(0.1 for _ in names)],
+    )
+    told = {"shear_modulus": float(found.x[0]), **{k: float(v) for k, v in values(found.x).items()}}
+    return [Fit(told, one) for one in left(found.x)]
+
+
+def biaxial(rows: np.ndarray, shape: tuple[float, float]) -> np.ndarray:
+    """Nominal stresses (n, 2) over the shear modulus at stretches (n, 3) of a thin sheet."""
+    share, upturn = shape
+    squares = rows[:, :3] ** 2
+    first = squares.sum(1) - 3
+    c1, c2 = (1 - share + upturn * first) / 2, share / 2
+    cauchy = 2 * (c1[:, None] * squares - c2 / squares)
+    return (cauchy[:, :2] - cauchy[:, 2:]) / rows[:, :2]

@@ -45,12 +45,14 @@ class Band:
         diameter: Unstretched [m].
         rest_length: Between the clamps, without force [m].
         name: Stands in messages and in episodes.
+        preconditioned: Its largest draw before it was recorded [m]; True: as far as the arm goes.
     """
 
     mass: float
     diameter: float
     rest_length: float
     name: str = "band"
+    preconditioned: float | bool = False
 
     def __post_init__(self) -> None:
         sizes = {name: _plain(getattr(self, name)) for name in ("mass", "diameter", "rest_length")}
@@ -64,8 +66,8 @@ class Band:
 class Theta:
     """The parameters θ of a band; the five are the paper's.
 
-    With `mooney_share` and `relaxation` the material is of the law rubber, without them it is
-    neo-Hookean. A value that no material has is a UserError.
+    With `mooney_share`, `upturn`, `softening` and `relaxation`, or some of them, the material is of
+    the law rubber, without them it is neo-Hookean. A value that no material has is a UserError.
 
     >>> from sling2sim2real import Theta
     >>> five = Theta(2.0e5, 0.47, 2.4e-3, 0.7, 0.6)
@@ -77,13 +79,15 @@ class Theta:
     pipeline.base.errors.UserError: theta.poissons_ratio: must be between 0 and 0.495, got 0.55
 
     Attributes:
-        youngs_modulus: For small strains, relaxed [Pa].
+        youngs_modulus: For small strains, of rubber ten seconds after a sudden stretch [Pa].
         poissons_ratio: As usual.
         elasticity_damping: Viscous stress over the rate of the elastic one [s].
         dynamic_friction: Between finger pads and band.
         damping_scale: Of the part of the damping that brakes changes of shape, 0 to 1.
         mooney_share: Of rubber, Mooney's second constant over the sum of both.
-        relaxation: Of rubber, weight of each relaxing branch.
+        upturn: Of rubber, how much steeper it pulls far out: over (I1 - 3).
+        softening: Of rubber, share of the stress that a first stretch takes away near rest.
+        relaxation: Of rubber, share of the stress that relaxes in each decade of time.
         air_drag: Beyond a cylinder's: force for mass and speed [1/s].
         turn_damping: Share of the damping that brakes turns without stretch.
         returned_share: Energy that a launch gets over what the law gives it.
@@ -95,6 +99,8 @@ class Theta:
     dynamic_friction: float
     damping_scale: float
     mooney_share: float | None = None
+    upturn: float | None = None
+    softening: float | None = None
     relaxation: float | None = None
     air_drag: float = 0.0
     turn_damping: float = 0.0
@@ -230,7 +236,8 @@ class Model:
     def _history(self) -> LaunchHistory | None:
         told = dict(vars(self.history)) if self.history else {}
         told |= {name: value for name, value in self.settings.launch if value is not None}
-        return LaunchHistory(**told) if self.theta.law == RUBBER and len(told) == 2 else None
+        complete = {"pull_time", "pause"} <= {*told}
+        return LaunchHistory(**told) if self.theta.law == RUBBER and complete else None
 
 
 def known(settings: Settings, band: Band) -> Settings:

@@ -13,7 +13,7 @@ LEAST = 1e-3  # m
 
 
 def launch_history(episode: Episode) -> dict[str, float]:
-    """`pull_time` and `pause` [s] of the pull to the place of the release.
+    """`pull_time` and `pause` [s] of the pull to the place of the release, and the `deepest` [m].
 
     As if the hand had gone there from the fork along a cubic in time, at rest at both ends: the one
     that passes 5 and 95 % of the way when the hand last did.
@@ -30,4 +30,5 @@ def launch_history(episode: Episode) -> dict[str, float]:
     first, last = (max([*time[way < edge], time[0]]) for edge in EDGES)
     pull_time = np.clip((last - first) / (PARTS[1] - PARTS[0]), 0.01, 1000)
     pause = np.clip(episode.release_time - last - (1 - PARTS[1]) * pull_time, 0, 1e5)
-    return {"pull_time": float(pull_time), "pause": float(pause)}
+    deepest = float(np.linalg.norm(place[time >= episode.grasp_time], axis=1).max())
+    return {"pull_time": float(pull_time), "pause": float(pause), "deepest": deepest}

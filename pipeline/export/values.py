@@ -113,13 +113,19 @@ def _of_rubber(model: CalibratedBand) -> list[tuple[str, str, str]]:
     return [
         (
             "relaxation",
-            f"{100 * theta['relaxation']:.2g} % a half decade",
+            f"{100 * theta['relaxation']:.2g} % a decade",
             f"None: the springs hold what the band holds after {after}. What relaxation takes from"
             " a launch is in their damping.",
         ),
         (
-            "mooney_share",
-            f"{theta['mooney_share']:.2g}",
+            "mooney_share, upturn",
+            f"{theta['mooney_share']:.2g}, {theta['upturn']:.2g}",
             "The shape of the springs' pull, with a share of its own.",
+        ),
+        (
+            "softening",
+            f"{100 * theta['softening']:.2g} %",
+            "None: the springs hold what a band holds that was drawn so far before. What softening"
+            " takes from a launch is in their damping.",
         ),
     ]

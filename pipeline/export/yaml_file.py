@@ -44,7 +44,7 @@ def content_of(model: CalibratedBand) -> dict:
     """What the file holds."""
     parameters, draws = model.parameters, draws_of(model)
     theta = parameters.sample()
-    share = theta.get("mooney_share", 0.0)
+    shape = theta.get("mooney_share", 0.0), theta.get("upturn", 0.0)
     strength = theta["youngs_modulus"] * np.pi * model.band.diameter**2 / 4
     done = model.launches(draws)
     return {
@@ -56,7 +56,7 @@ def content_of(model: CalibratedBand) -> dict:
         "history": about.history(model),
         "curve": {
             "stretch": [rounded(one, 4) for one in STRETCHES.tolist()],
-            "pull_n": [rounded(one, 5) for one in (strength / 3 * uniaxial(STRETCHES, share))],
+            "pull_n": [rounded(one, 5) for one in (strength / 3 * uniaxial(STRETCHES, *shape))],
         },
         "launches": [
             {
@@ -92,9 +92,10 @@ def _readme(model: CalibratedBand, name: str, content: dict) -> str:
 - `values`: what was identified, {kilo} here. Nine of ten compatible values lie between `low` and
   `high`; null means fixed, or not known.
 - `law`, `relaxation_times_s`: neo-Hookean, or rubber. Of rubber, a branch with each of these times
-  carries `relaxation` times the relaxed stress besides.
-- `curve`: relaxed pull of the straight band by its stretch λ: E A/3 (λ − λ⁻²)(1 − m + m/λ), with
-  the section A and Mooney's share m.
+  carries its share of `relaxation`, which is that of a decade of time, times the stress besides.
+- `curve`: first pull of the straight band by its stretch λ, after ten seconds:
+  E A/3 (λ − λ⁻²)(1 − m + m/λ + c (λ² + 2/λ − 3)), with the section A, Mooney's share m and the
+  upturn c. Up to a stretch that it has seen, a band is softer (`softening`).
 - `launches`: what the calibrated simulation does{after}: the force to hold a draw, speed, angle and
   place where the projectile leaves the pouch, and the landing.
 

@@ -102,6 +102,7 @@ class BandParams(Section):
     mass: Annotated[float, Range(1e-4, 1)]
     diameter: Annotated[float, Range(5e-4, 0.05)]
     rest_length: Annotated[float, Range(0.05, 3)]
+    preconditioned: bool | Annotated[float, Range(0, 3)] = False
 
     @property
     def density(self) -> float:

@@ -30,7 +30,9 @@ class Quantity:
 QUANTITIES = {  # in the order of the cards
     "youngs_modulus": Quantity("Young's modulus", "E", "kPa", 1e-3),
     "mooney_share": Quantity("Mooney share", "Mooney share"),
-    "relaxation": Quantity("stress relaxation per half decade", "relaxation", "%", 100.0),
+    "upturn": Quantity("upturn of the stress", "upturn"),
+    "softening": Quantity("softening by the first stretch", "softening", "%", 100.0),
+    "relaxation": Quantity("stress relaxation per decade of time", "relaxation", "%", 100.0),
     "elasticity_damping": Quantity("damping time", "d", "ms", 1e3),
     "damping_scale": Quantity("damping scale", "s"),
     "poissons_ratio": Quantity("Poisson's ratio", "ν"),

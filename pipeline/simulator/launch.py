@@ -78,7 +78,7 @@ def unrelaxed(
         return np.zeros((len(draws), len(TIMES)))
     part = np.linspace(0, 1, HISTORY_STEPS + 1)
     drawn = np.linalg.norm(draws, axis=1)[:, None] * (part**2 * (3 - 2 * part))
-    stretch = np.maximum(2 * np.hypot(band.half_width, drawn) / band.rest_length, 1.0)
+    stretch = band.drawn(drawn)
     shape = (parameters.column(name)[:, None] for name in ("mooney_share", "upturn"))
     stress = uniaxial(stretch, *shape)
     carried = overstress(stress, history.pull_time / HISTORY_STEPS)
@@ -110,6 +110,9 @@ def launch(
     parameters, draws = parameters.spread(count), np.broadcast_to(draws, (count, 2))
     distance = np.linalg.norm(draws, axis=1, keepdims=True)
     direction = np.column_stack([np.zeros(count), -draws / np.maximum(distance, 1e-9)])
+    if setup.history is not None:
+        before = max(band.stretched, float(band.drawn(np.array(setup.history.deepest))))
+        band = replace(band, stretched=before)
     slings = Slings.of(
         band, parameters, drawn_guess(band, draws), direction=direction,
         payload=setup.projectile_mass, unrelaxed=unrelaxed(band, setup.history, parameters, draws),

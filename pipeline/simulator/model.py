@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -18,7 +18,11 @@ ROD, TETRAHEDRA = "rod", "tetrahedra"  # meshes: rod.h, tetrahedra.h
 
 
 class BandSizes(Protocol):
-    """What a scale and a ruler say of a band: mass between the clamps, diameter, length [kg, m]."""
+    """What a scale and a ruler say of a band: mass between the clamps, diameter, length [kg, m].
+
+    `preconditioned`: its largest draw before it was recorded [m], or that it was drawn as far as
+    the arm draws it.
+    """
 
     @property
     def mass(self) -> float: ...
@@ -26,6 +30,8 @@ class BandSizes(Protocol):
     def diameter(self) -> float: ...
     @property
     def rest_length(self) -> float: ...
+    @property
+    def preconditioned(self) -> float | bool: ...
 
 
 class ClampValues(Protocol):
@@ -42,10 +48,12 @@ class LaunchHistory:
     Attributes:
         pull_time: That the way takes, a cubic in time [s].
         pause: From there to the release [s].
+        deepest: Largest draw that the band has seen before, which softened it [m].
     """
 
     pull_time: float
     pause: float
+    deepest: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -153,7 +161,7 @@ class ClampedBand:
             mesh = resolution.mesh
             edges = {ROD: edges, TETRAHEDRA: resolution.tet_edges}[mesh]
         direction = np.asarray((mounting or setup).clamp_direction, float)
-        return cls(
+        made = cls(
             edges=edges,
             rest_length=band.rest_length,
             radius=band.diameter / 2,
@@ -168,6 +176,15 @@ class ClampedBand:
             mesh=mesh,
             law=law,
         )
+        before = band.preconditioned
+        if isinstance(before, bool):
+            reach = np.hypot(np.abs(setup.draw_y).max(), np.abs(setup.draw_z).max())
+            before = before * float(reach)
+        return replace(made, stretched=float(made.drawn(np.array(before))))
+
+    def drawn(self, distance: np.ndarray) -> np.ndarray:
+        """Stretch (...) of straight halves that are drawn so far from the fork [m], 1 if slack."""
+        return np.maximum(2 * np.hypot(self.half_width, distance) / self.rest_length, 1.0)
 
     @property
     def sections(self) -> int:

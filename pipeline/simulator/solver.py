@@ -52,7 +52,7 @@ class Slings:
         records = np.zeros(len(parameters), LANE)
         if band.law == RUBBER:
             shape = map(parameters.column, ("mooney_share", "upturn"))
-            records["worst"] = work(band.stretched, *shape)
+            records["worst"] = work(np.array(band.stretched), *shape)
         for name, values in lanes.items():
             records[name] = values
         shape = len(parameters), band.sections, band.dofs

@@ -49,6 +49,8 @@ class ThetaValues(Section):
     dynamic_friction: DynamicFriction
     damping_scale: DampingScale
     mooney_share: Annotated[float, Range(*LAWS[RUBBER]["mooney_share"])] = 0.0
+    upturn: Annotated[float, Range(*LAWS[RUBBER]["upturn"])] = 0.0
+    softening: Annotated[float, Range(*LAWS[RUBBER]["softening"])] = 0.0
     relaxation: Annotated[float, Range(*LAWS[RUBBER]["relaxation"])] = 0.0
 
 
@@ -59,6 +61,7 @@ class Nuisances(Section):
 class RecordedPull(Section):
     pull_time: Annotated[float, Range(0.01, 1000)]
     pause: Annotated[float, Range(0, 1e5)]
+    deepest: Annotated[float, Range(0, 10)] = 0.0
 
 
 class ThetaFile(JsonRecord):
@@ -78,9 +81,9 @@ class ThetaFile(JsonRecord):
     @model_validator(mode="after")
     def _keys_of_its_law(self) -> ThetaFile:
         wanted, given = set(LAWS[self.law]), self.theta.model_fields_set - {*THETA}
-        if wanted != given:
+        if not given <= wanted:
             names = ", ".join((*THETA, *LAWS[self.law]))
-            raise refusal(f"theta: of the law {self.law} it must have exactly {names}")
+            raise refusal(f"theta: of the law {self.law} it has {names}, and nothing else")
         if self.law == RUBBER and self.history is None:
             raise refusal("history: {pull_time, pause} is missing, which the law rubber needs")
         return self

@@ -58,6 +58,11 @@ class Episode:
     def sample_period(self) -> float:
         return float(self.time[1] - self.time[0])
 
+    @property
+    def cautions(self) -> list[dict[str, str]]:
+        """What of its recording costs accuracy: `about`, `what` and `cure` of each finding."""
+        return self.metadata.get("cautions", [])
+
     def save(self, folder: Path) -> None:
         """Write `signals.parquet` and `clouds.parquet` into `folder`."""
         signals = {"t": pa.array(self.time, pa.float64())}

@@ -10,7 +10,6 @@ import pytest
 
 from app.preflight.command import check
 from app.preflight.recordings import add_recording
-from app.preflight.verdict import cautions_of
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from tests.app.preflight.test_add_band import add, content, project
@@ -54,7 +53,7 @@ def test_check_lists_the_pulls_and_looks_at_the_first_that_can_be_used(three, se
 
 
 def test_a_pull_alone_has_nothing_to_rest_from(looked, params) -> None:
-    found = {one.about for one in cautions_of(looked.report, looked.done)}
+    found = {one.about for one in looked.report.cautions}
     assert "rest" not in found and looked.report.pulls == [looked.report.row]
 
 

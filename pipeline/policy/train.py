@@ -145,8 +145,6 @@ def train(
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
             configured = settings(params, env.groups)
             runner = OnPolicyRunner(env, configured, log_dir=None, device="cpu")
-        for group in runner.alg.optimizer.param_groups:
-            group["fused"] = True  # Adam of all weights in one call
         training = _Training(runner, env, params, progress, projectile)
         runner.logger = training  # pyright: ignore[reportAttributeAccessIssue]
         runner.learn(params.iterations)  # once: another call would start from stale observations

@@ -9,7 +9,7 @@ import os
 
 from pipeline.base import home
 
-gc.set_threshold(100_000)  # while torch loads, one in four of its seconds looked for garbage
+gc.set_threshold(100_000)  # while torch loads, a tenth or more of the time looked for garbage
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # NumPy's and SciPy's; read when they are imported
 home.settle()

@@ -94,7 +94,7 @@ def repro(
     on_line: Callable[[str], None],
     on_stage: Callable[[str], None] = lambda name: None,
     *,
-    command: str,
+    command: str = "dvc repro",
     producers: Mapping[str, Sequence[str]] | None = None,
 ) -> None:
     """Let DVC run a stage and what it needs, as far as it is stale, on all cores.

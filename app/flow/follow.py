@@ -108,7 +108,8 @@ class Log:
             await self._write(batch, at, picture)
             batch.clear()
         if not (ended or alive) and self.read == at:  # once
-            await self._write([{**last, "what": "ended", "state": "killed"}], at + 1, "")
+            end = {"at": last["at"], "what": "ended", "state": "killed", "message": "was killed"}
+            await self._write([end], at + 1, "")
         self.over = ended or not alive
 
     def _alive(self) -> bool:
@@ -142,7 +143,7 @@ class Log:
         bars: dict[str, tuple[Step, str]] = {}  # the last one, by title
         async with provide_database_interface().session_context(begin_transaction=True) as session:
             for event in events:
-                stage = event.get("stage")
+                stage = event.get("stage", "")
                 if event["what"] == "begins":
                     await self._begin(session, event)
                 elif event["what"] == "stage":
@@ -161,8 +162,8 @@ class Log:
                 await self._artifact(session, stage, stage, "markdown", picture, stage)
             if lines:
                 await models.logs.create_logs(session, lines)
-            run = await models.flow_runs.read_flow_run(session, self._run)
-            run.context = {"read": read}
+            if run := await models.flow_runs.read_flow_run(session, self._run):
+                run.context = {"read": read}
         self.read = read
 
     @property
@@ -198,16 +199,13 @@ class Log:
 
     async def _end(self, session: Any, event: dict) -> None:
         """Of a stage, or of the run with all that is still at work."""
-        state, message = STATES[event["state"]], event.get("message", "")
-        own = event["what"] == "ended" and "stage" in event and event["state"] != "killed"
-        for stage in [event["stage"]] if own else self.open:
-            await models.task_runs.set_task_run_state(
-                session, self._task(stage), _state(*state, event["at"], message), force=True
-            )
-        if not own:
-            await models.flow_runs.set_flow_run_state(
-                session, self._run, _state(*state, event["at"], message), force=True
-            )
+        told = *STATES[event["state"]], event["at"], event["message"]
+        for stage in [event["stage"]] if "stage" in event else self.open:
+            task = self._task(stage)
+            await models.task_runs.set_task_run_state(session, task, _state(*told), force=True)
+        if "stage" not in event:
+            run = self._run
+            await models.flow_runs.set_flow_run_state(session, run, _state(*told), force=True)
 
     def _line(self, stage: str, text: str, at: float) -> actions.LogCreate:
         return actions.LogCreate(
@@ -230,17 +228,13 @@ class Log:
     ) -> None:
         """Make it, or change the one that there is."""
         one = uuid5(self._task(stage), f"{kind} {title}")
-        change = actions.ArtifactUpdate(data=data, description=words)
+        told = {"data": data, "description": words}
+        change = actions.ArtifactUpdate.model_validate(told)
         if await models.artifacts.update_artifact(session, one, change):
             return
-        new = core.Artifact(
-            id=one,
-            key=key(title),
-            type=kind,
-            data=data,
-            description=words,
-            flow_run_id=self._run,
-            task_run_id=self._task(stage),
+        of = {"flow_run_id": self._run, "task_run_id": self._task(stage)}
+        new = core.Artifact.model_validate(
+            {"id": one, "key": key(title), "type": kind, **told, **of}
         )
         await models.artifacts.create_artifact(session, new)
 

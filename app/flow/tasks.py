@@ -40,17 +40,18 @@ class Tasks:
         except child.Cancelled:
             self.log.ended(stage.name, "cancelled", "interrupted")
             return child.StageFailed(f"{stage.name}: interrupted")
-        except Exception as error:
-            failed = error
-            if not isinstance(error, UserError):  # a fault of ours is a failed stage too
-                logging.getLogger(__name__).debug("%s", stage.name, exc_info=error)
-                failed = child.StageFailed(
-                    f"{stage.name}: {type(error).__name__}: {one_line(error)}"
-                )
-            self.log.ended(stage.name, "failed", str(failed))
-            return failed
+        except UserError as error:
+            return self._failed(stage, error)
+        except Exception as error:  # a fault of ours is a failed stage too
+            logging.getLogger(__name__).debug("%s", stage.name, exc_info=error)
+            why = f"{stage.name}: {type(error).__name__}: {one_line(error)}"
+            return self._failed(stage, child.StageFailed(why))
         self.log.ended(stage.name, state)
         return state == "ran"
+
+    def _failed(self, stage: Stage, error: UserError) -> UserError:
+        self.log.ended(stage.name, "failed", str(error))
+        return error
 
     def _run(self, stage: Stage, share: Mapping[str, str]) -> str:
         if self.graph.is_fresh(stage.name):

@@ -49,10 +49,10 @@ ASKED = {"force_n": 1e-3, "nodes_held_m": 2e-5, "nodes_swinging_m": 2e-5, "landi
 USERS = ("string", "launch", "servo", "rubber")  # modules of rig.physics that integrate
 
 
-def lsoda(rtol: float) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
+def lsoda(tight: float) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
     """`rig.physics.integration.integrated` by SciPy's LSODA, at a tolerance of its own."""
 
-    def integrated(rates, y, times, data, asked, atol, *, event=None, **_):
+    def integrated(rates, y, times, data, rtol, atol, *, event=None, **_):
         def change(t: float, flat: np.ndarray) -> np.ndarray:
             out = np.empty_like(flat)
             rates(t, flat, out, data)
@@ -67,8 +67,8 @@ def lsoda(rtol: float) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
             y,
             method="LSODA",
             t_eval=times,
-            rtol=rtol,
-            atol=atol * rtol / asked,
+            rtol=tight,
+            atol=atol * tight / rtol,
             **options,
         )
         if solution.status < 0:

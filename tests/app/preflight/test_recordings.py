@@ -12,6 +12,9 @@ from app.preflight.command import check
 from app.preflight.recordings import add_recording
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
+from pipeline.params import load
+from pipeline.recording import kept
+from stages import episode
 from tests.app.preflight.test_add_band import add, content, project
 from tests.recording.joined import joined
 from tests.recording.split import metadata, split
@@ -68,6 +71,21 @@ def test_recordings_are_added_to_a_band(project, seen, three) -> None:
     assert names == ["seen.mcap", "three.mcap"]
     assert (project / "data/raw/red/three.mcap").read_bytes() == three[0].read_bytes()
     assert (project / "params.yaml").read_bytes() == before
+
+
+def test_episodes_of_a_check_are_the_stages(project, seen, monkeypatch) -> None:
+    """Made once; the stage takes them, and then they are gone."""
+    add(project, seen[0])
+    params, layout = load(project / "params.yaml"), Layout(project)
+    (path,) = layout.recordings("red")
+    (made,), _ = kept.build_episodes(path, "red", params)
+    monkeypatch.chdir(project)
+    monkeypatch.setattr(kept, "build_episodes", lambda *_: pytest.fail("made again"))
+    monkeypatch.setattr(episode, "started", lambda *_: (params, "red"))
+    episode.main()
+    made.save(project / "made")
+    assert content(project / "made") == content(layout.episode("red"))
+    assert not (project / ".checkpoints/red-episodes").exists()
 
 
 def test_a_split_bag_is_checked_and_kept_as_its_folder(project, seen, params, tmp_path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -136,6 +136,7 @@ def interact(
     fetch: bool = True,
     refine: int = 1,
     double: bool = False,
+    until: float = np.inf,
 ) -> Rollouts:
     """Simulate the episode's interaction with N parameters.
 
@@ -144,20 +145,29 @@ def interact(
         workers: Threads, on the CPU; results do not depend on their number.
         fetch: Copy forces and centre lines from a GPU; else they stay there as Warp arrays.
         refine: How many times finer the steps are than `band` says.
+        until: Nothing is simulated after this time [s], if the band is free then: pictures end
+            there, and what is left of the force is 0, as it is on the host. All else is the same
+            to the bit.
     """
     schedule = schedule_of(band, episode, refine)
-    times = schedule.steps["time"]
+    times, stamps = schedule.steps["time"], episode.cloud_time
+    last = max(np.searchsorted(times, until) + 1, schedule.first_free)
+    schedule = replace(schedule, steps=schedule.steps[:last])
+    stamps = stamps[stamps <= max(until, schedule.steps["time"][-1])]
     done = run(
         band,
         schedule,
         Slings.of(band, parameters, hanging_guess(band), rigidity),
-        _frames(schedule, episode.cloud_time),
+        _frames(schedule, stamps),
         Options(device, workers, fetch=fetch, double=double),
     )
+    force = done.output[:, RELAX_STEPS - 1 :, :3]
+    if unfelt := len(times) - len(schedule.steps):
+        force = np.pad(force, ((0, 0), (0, unfelt), (0, 0)))
     return Rollouts(
         times=times[RELAX_STEPS - 1 :],
-        force=done.output[:, RELAX_STEPS - 1 :, :3],
-        cloud_time=episode.cloud_time,
+        force=force,
+        cloud_time=stamps,
         center_line=done.frames,
         failure=[FAILURES[Outcome(round(code))] for code in done.lanes["outcome"]],
         iterations=done.lanes["iterations"].astype(int),

@@ -1,4 +1,4 @@
-"""What a check has made of a recording is what the stage would make; anything changed unkeeps it."""
+"""What a check has made of a recording is what the stage would make, while nothing changes."""
 
 import shutil
 from pathlib import Path

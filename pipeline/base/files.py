@@ -94,6 +94,14 @@ def _alive(pid: int) -> bool:
     return True
 
 
+def read_table(path: Path):
+    """A Parquet file as a pyarrow.Table; pyarrow's own `read_table` imports pandas first."""
+    from pyarrow.parquet import ParquetFile
+
+    with ParquetFile(path) as file:
+        return file.read()
+
+
 def write_text(path: Path, text: str) -> None:
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.base.files import replacing
+from pipeline.base.files import read_table, replacing
 from pipeline.base.layout import NotMade, made
 
 SCHEMA_VERSION = 1
@@ -107,7 +107,7 @@ class Episode:
         """Read an episode that `save` wrote. Raises NotMade."""
         header = read_metadata(folder)
         signals, clouds = (
-            pq.read_table(made(folder / f"{name}.parquet")) for name in ("signals", "clouds")
+            read_table(made(folder / f"{name}.parquet")) for name in ("signals", "clouds")
         )
 
         def vectors(name: str) -> np.ndarray:

@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.ndimage import maximum_filter1d
 
 from pipeline.base.errors import UserError
 from pipeline.simulator.initial import hanging_guess
@@ -18,6 +16,8 @@ from pipeline.simulator.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.simulator.solver import Frames, Options, Slings, run
 
 if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
     from pipeline.episode.episode import Episode
 
 FAILURES = {
@@ -57,6 +57,8 @@ def schedule_of(sling: ClampedBand, episode: Episode, refine: int = 1) -> Schedu
     shows that moment, whatever the friction. From then on the friction that is left falls as the
     pads' normal force does, which is gone after `finger_opening_time`.
     """
+    from scipy.interpolate import CubicSpline  # which takes a third of a second
+
     size, release = sling.steps, episode.release_time
     if release <= episode.grasp_time:
         raise UserError(
@@ -93,6 +95,8 @@ def _held_times(hand: CubicSpline, episode: Episode, size, refine: int) -> np.nd
     A step of h bows from its chord by h^2 |a| / 8, which is at most BOW, and a band that the hand
     holds follows it. Between `grip_step` and `hold_step`.
     """
+    from scipy.ndimage import maximum_filter1d
+
     time = np.arange(episode.grasp_time, episode.release_time, GRID)
     bend = np.linalg.norm(hand(_within(time, episode), 2), axis=1)
     bend = maximum_filter1d(bend, 2 * round(AROUND / GRID) + 1)

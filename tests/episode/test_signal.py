@@ -8,7 +8,14 @@ from itertools import product
 import numpy as np
 import pytest
 
-from pipeline.episode.signal import average, cutoff_hz, lowpass, recording_matrix, uniform
+from pipeline.episode.signal import (
+    as_recorded,
+    average,
+    cutoff_hz,
+    lowpass,
+    recording_matrix,
+    uniform,
+)
 
 
 def test_the_papers_cutoff_is_the_same_frequency_at_any_rate() -> None:

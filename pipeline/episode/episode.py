@@ -72,10 +72,7 @@ class Episode:
         signals["opening"] = pa.array(self.opening, pa.float64())
         clouds = {
             "t": pa.array(self.cloud_time, pa.float64()),
-            "points": pa.array(
-                [cloud.astype(np.float32).tolist() for cloud in self.clouds],
-                pa.list_(pa.list_(pa.float32(), 3)),
-            ),
+            "points": _nested(self.clouds),
         }
         header = {
             "version": SCHEMA_VERSION,
@@ -113,7 +110,9 @@ class Episode:
         def vectors(name: str) -> np.ndarray:
             return np.stack([signals[f"{name}_{axis}"].to_numpy() for axis in "xyz"], axis=1)
 
-        points = [np.asarray(row.as_py(), np.float32).reshape(-1, 3) for row in clouds["points"]]
+        nested = clouds["points"].combine_chunks()
+        flat = nested.values.flatten().to_numpy().reshape(-1, 3).copy()
+        points = np.split(flat, nested.offsets.to_numpy()[1:-1])
         for name in ("frame", "sample_period"):  # which are not for the metadata
             header.pop(name)
         return cls(
@@ -130,6 +129,14 @@ class Episode:
             camera=np.array(header.pop("camera")),
             metadata=header,
         )
+
+
+def _nested(clouds: list[np.ndarray]) -> pa.Array:
+    """Clouds as a column of lists of points."""
+    flat = np.concatenate([np.zeros((0, 3)), *clouds]).astype(np.float32)
+    points = pa.FixedSizeListArray.from_arrays(pa.array(flat.ravel()), 3)
+    ends = np.cumsum([0, *map(len, clouds)]).astype(np.int32)
+    return pa.ListArray.from_arrays(ends, points)
 
 
 def read_metadata(folder: Path) -> dict[str, Any]:

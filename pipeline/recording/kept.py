@@ -18,7 +18,6 @@ from pipeline.base.fingerprint import fingerprint
 from pipeline.base.layout import Layout, NotMade
 from pipeline.episode.episode import Episode
 from pipeline.params import Params
-from pipeline.recording.build import build_episodes
 from pipeline.recording.input.bag import sha256
 
 PIPELINE = Path(__file__).parents[1]
@@ -43,6 +42,8 @@ def episodes_of(
             return Episode.load_all(_folder(path, band, params, layout)), []
         except NotMade:
             pass
+    from pipeline.recording.build import build_episodes  # which takes a second to import
+
     return build_episodes(path, band, params)
 
 

@@ -31,7 +31,7 @@ def never(*_):
 def test_what_is_kept_is_what_would_be_made(layout, seen, params, monkeypatch) -> None:
     (made,), _ = build_episodes(seen[0], "band1", params)
     made.save(layout.root / "made")
-    monkeypatch.setattr(kept, "build_episodes", never)
+    monkeypatch.setattr("pipeline.recording.build.build_episodes", never)
     (found,), refused = kept.episodes_of(seen[0], "band1", params, layout)
     found.save(layout.root / "found")
     assert files(layout.root / "found") == files(layout.root / "made") and not refused
@@ -43,7 +43,7 @@ def changed(params: Params, section: str, **values) -> Params:
 
 
 def test_anything_changed_makes_it_again(layout, seen, params, monkeypatch) -> None:
-    monkeypatch.setattr(kept, "build_episodes", lambda *_: "made")
+    monkeypatch.setattr("pipeline.recording.build.build_episodes", lambda *_: "made")
 
     def asked(path: Path = seen[0], band: str = "band1", params: Params = params):
         return kept.episodes_of(path, band, params, layout)

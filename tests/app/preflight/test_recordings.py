@@ -13,7 +13,7 @@ from app.preflight.recordings import add_recording
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
 from pipeline.params import load
-from pipeline.recording import kept
+from pipeline.recording.build import build_episodes
 from stages import episode
 from tests.app.preflight.test_add_band import add, content, project
 from tests.recording.joined import joined
@@ -78,9 +78,11 @@ def test_episodes_of_a_check_are_the_stages(project, seen, monkeypatch) -> None:
     add(project, seen[0])
     params, layout = load(project / "params.yaml"), Layout(project)
     (path,) = layout.recordings("red")
-    (made,), _ = kept.build_episodes(path, "red", params)
+    (made,), _ = build_episodes(path, "red", params)
     monkeypatch.chdir(project)
-    monkeypatch.setattr(kept, "build_episodes", lambda *_: pytest.fail("made again"))
+    monkeypatch.setattr(
+        "pipeline.recording.build.build_episodes", lambda *_: pytest.fail("made again")
+    )
     monkeypatch.setattr(episode, "started", lambda *_: (params, "red"))
     episode.main()
     made.save(project / "made")

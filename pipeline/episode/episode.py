@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.base.files import read_table, replacing
+from pipeline.base.files import column, read_table, replacing
 from pipeline.base.layout import NotMade, made
 
 SCHEMA_VERSION = 1
@@ -67,8 +67,8 @@ class Episode:
         """Write `signals.parquet` and `clouds.parquet` into `folder`."""
         signals = {"t": pa.array(self.time, pa.float64())}
         for name in ("position", "velocity", "force"):
-            for axis, column in zip("xyz", getattr(self, name).T, strict=True):
-                signals[f"{name}_{axis}"] = pa.array(column, pa.float64())
+            for axis, values in zip("xyz", getattr(self, name).T, strict=True):
+                signals[f"{name}_{axis}"] = pa.array(values, pa.float64())
         signals["opening"] = pa.array(self.opening, pa.float64())
         clouds = {
             "t": pa.array(self.cloud_time, pa.float64()),
@@ -108,21 +108,21 @@ class Episode:
         )
 
         def vectors(name: str) -> np.ndarray:
-            return np.stack([signals[f"{name}_{axis}"].to_numpy() for axis in "xyz"], axis=1)
+            return np.stack([column(signals, f"{name}_{axis}") for axis in "xyz"], axis=1)
 
         nested = clouds["points"].combine_chunks()
-        flat = nested.values.flatten().to_numpy().reshape(-1, 3).copy()
-        points = np.split(flat, nested.offsets.to_numpy()[1:-1])
+        flat = np.array(np.from_dlpack(nested.values.flatten())).reshape(-1, 3)
+        points = np.split(flat, np.from_dlpack(nested.offsets)[1:-1])
         for name in ("frame", "sample_period"):  # which are not for the metadata
             header.pop(name)
         return cls(
             band=header.pop("band"),
-            time=signals["t"].to_numpy(),
+            time=column(signals, "t"),
             position=vectors("position"),
             velocity=vectors("velocity"),
             force=vectors("force"),
-            opening=signals["opening"].to_numpy(),
-            cloud_time=clouds["t"].to_numpy(),
+            opening=column(signals, "opening"),
+            cloud_time=column(clouds, "t"),
             clouds=points,
             grasp_time=header.pop("grasp_time"),
             release_time=header.pop("release_time"),

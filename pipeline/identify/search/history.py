@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.base.errors import UserError
-from pipeline.base.files import read_table, replacing
+from pipeline.base.files import column, read_table, replacing
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.objective.loss import TERMS
 from pipeline.params.identification import LEAST_SQUARES
@@ -47,8 +47,8 @@ class History:
             "solver": pa.array([None] * count if solver is None else solver, pa.int32()),
         }
         for prefix, values in (("unit_", evaluation.unit), ("", evaluation.theta)):
-            for name, column in zip(self.names, values.T, strict=True):
-                columns[prefix + name] = pa.array(column, pa.float64())
+            for name, axis in zip(self.names, values.T, strict=True):
+                columns[prefix + name] = pa.array(axis, pa.float64())
         for name in TERMS:
             columns[name] = pa.array(evaluation.terms[name], pa.float64())
         columns["total"] = pa.array(evaluation.total, pa.float64())
@@ -66,12 +66,13 @@ class History:
     @property
     def unit(self) -> np.ndarray:
         """Shape (N, D)."""
-        return np.stack([self.table[f"unit_{name}"].to_numpy() for name in self.names], axis=1)
+        table = self.table
+        return np.stack([column(table, f"unit_{name}") for name in self.names], axis=1)
 
     @property
     def total(self) -> np.ndarray:
         """Shape (N,); +inf where failed."""
-        return self.table["total"].to_numpy()
+        return column(self.table, "total")
 
     def save(self, path: Path) -> None:
         with replacing(path) as temporary:
@@ -89,7 +90,7 @@ class History:
     def of_phase(self, phase: str) -> History:
         """The rows of one phase alone."""
         table = self.table
-        chosen = pa.array(table["phase"].to_numpy() == phase)
+        chosen = pa.array([one == phase for one in table["phase"].to_pylist()], pa.bool_())
         return History(self.method, self.names, [table.filter(chosen)])
 
     def best_parameters(self, law: str) -> Parameters:

@@ -41,10 +41,12 @@ class History:
         """Append a batch; `solver` says who asked for each point, shape (N,)."""
         count = len(evaluation.total)
         columns = {
-            "method": pa.array([self.method] * count, pa.string()),
-            "phase": pa.array([phase] * count, pa.string()),
-            "generation": pa.array([generation] * count, pa.int32()),
-            "solver": pa.array([None] * count if solver is None else solver, pa.int32()),
+            "method": pa.repeat(self.method, count),
+            "phase": pa.repeat(phase, count),
+            "generation": pa.array(np.full(count, generation, np.int32)),
+            "solver": pa.nulls(count, pa.int32())
+            if solver is None
+            else pa.array(solver, pa.int32()),
         }
         for prefix, values in (("unit_", evaluation.unit), ("", evaluation.theta)):
             for name, axis in zip(self.names, values.T, strict=True):
@@ -52,7 +54,7 @@ class History:
         for name in TERMS:
             columns[name] = pa.array(evaluation.terms[name], pa.float64())
         columns["total"] = pa.array(evaluation.total, pa.float64())
-        columns["failure"] = pa.array(evaluation.failure, pa.string())
+        columns["failure"] = pa.array(np.array(evaluation.failure, object), pa.string())
         self._parts.append(pa.table(columns))
 
     @property
@@ -90,7 +92,7 @@ class History:
     def of_phase(self, phase: str) -> History:
         """The rows of one phase alone."""
         table = self.table
-        chosen = pa.array([one == phase for one in table["phase"].to_pylist()], pa.bool_())
+        chosen = pa.array(np.array(table["phase"].to_pylist(), object) == phase)
         return History(self.method, self.names, [table.filter(chosen)])
 
     def best_parameters(self, law: str) -> Parameters:

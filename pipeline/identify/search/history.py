@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.base.errors import UserError
-from pipeline.base.files import column, read_table, replacing
+from pipeline.base.files import read_table, replacing
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.objective.loss import TERMS
 from pipeline.params.identification import LEAST_SQUARES
@@ -41,20 +41,18 @@ class History:
         """Append a batch; `solver` says who asked for each point, shape (N,)."""
         count = len(evaluation.total)
         columns = {
-            "method": pa.repeat(self.method, count),
-            "phase": pa.repeat(phase, count),
-            "generation": pa.array(np.full(count, generation, np.int32)),
-            "solver": pa.nulls(count, pa.int32())
-            if solver is None
-            else pa.array(solver, pa.int32()),
+            "method": pa.array([self.method] * count, pa.string()),
+            "phase": pa.array([phase] * count, pa.string()),
+            "generation": pa.array([generation] * count, pa.int32()),
+            "solver": pa.array([None] * count if solver is None else solver, pa.int32()),
         }
         for prefix, values in (("unit_", evaluation.unit), ("", evaluation.theta)):
-            for name, axis in zip(self.names, values.T, strict=True):
-                columns[prefix + name] = pa.array(axis, pa.float64())
+            for name, column in zip(self.names, values.T, strict=True):
+                columns[prefix + name] = pa.array(column, pa.float64())
         for name in TERMS:
             columns[name] = pa.array(evaluation.terms[name], pa.float64())
         columns["total"] = pa.array(evaluation.total, pa.float64())
-        columns["failure"] = pa.array(np.array(evaluation.failure, object), pa.string())
+        columns["failure"] = pa.array(evaluation.failure, pa.string())
         self._parts.append(pa.table(columns))
 
     @property
@@ -68,13 +66,12 @@ class History:
     @property
     def unit(self) -> np.ndarray:
         """Shape (N, D)."""
-        table = self.table
-        return np.stack([column(table, f"unit_{name}") for name in self.names], axis=1)
+        return np.stack([self.table[f"unit_{name}"].to_numpy() for name in self.names], axis=1)
 
     @property
     def total(self) -> np.ndarray:
         """Shape (N,); +inf where failed."""
-        return column(self.table, "total")
+        return self.table["total"].to_numpy()
 
     def save(self, path: Path) -> None:
         with replacing(path) as temporary:
@@ -92,7 +89,7 @@ class History:
     def of_phase(self, phase: str) -> History:
         """The rows of one phase alone."""
         table = self.table
-        chosen = pa.array(np.array(table["phase"].to_pylist(), object) == phase)
+        chosen = pa.array(table["phase"].to_numpy() == phase)
         return History(self.method, self.names, [table.filter(chosen)])
 
     def best_parameters(self, law: str) -> Parameters:

@@ -112,7 +112,7 @@ class Episode:
 
         nested = clouds["points"].combine_chunks()
         flat = np.array(np.from_dlpack(nested.values.flatten())).reshape(-1, 3)
-        points = np.split(flat, np.from_dlpack(nested.offsets)[1:-1])
+        points = np.split(flat, nested.offsets.to_pylist()[1:-1])
         for name in ("frame", "sample_period"):  # which are not for the metadata
             header.pop(name)
         return cls(

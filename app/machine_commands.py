@@ -10,7 +10,7 @@ from app.command_line import Done, command, flag
 
 
 @command(
-    "run all stale stages in parallel, and show them in the Prefect UI",
+    "run all stale stages in parallel",
     "--workers 2",
     flag(
         "--workers",
@@ -42,7 +42,7 @@ def flow(arguments: argparse.Namespace) -> Done:
 
 
 @command(
-    "serve the Prefect UI of this project, for this machine alone",
+    "serve the Prefect UI, with recent and present runs, for this machine alone",
     "--port 4201",
     flag("--port", type=kinds.count, metavar="N", help="default 4200"),
 )

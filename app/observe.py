@@ -111,7 +111,7 @@ def _place_and_stage(
 def _run(stage: str | None, layout: Layout) -> bool:
     """Have DVC run a stage; whether there was one. Raises UserError."""
     if stage:
-        child.repro(layout.root, stage, say)
+        child.repro(layout.root, stage, say, command="sling observe")
     return bool(stage)
 
 

@@ -4,9 +4,12 @@ The sums of several threads round otherwise, and DVC would see another result on
 cores. Our own threads, which change no bit, are as many as SLING_WORKERS says.
 """
 
+import gc
 import os
 
 from pipeline.base import home
+
+gc.set_threshold(100_000)  # while torch loads, a tenth or more of the time looked for garbage
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # NumPy's and SciPy's; read when they are imported
 home.settle()

@@ -5,7 +5,7 @@
 Reads the recordings in data/raw/<band>/; writes data/episodes/<band>/<n>/ for each pull that they
 hold, n = 1, 2, ... by the recording's name, then by time: signals.parquet and clouds.parquet. A
 pull that cannot be used is left out, with a warning; a recording without any that can be used is an
-error.
+error. What the check of a recording has made on its way is taken, not made again.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import sys
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder
 from pipeline.base.layout import Layout, NotMade
-from pipeline.recording.build import build_episodes
 from pipeline.recording.input.bag import once
+from pipeline.recording.kept import episodes_of, forget
 from stages.start import run, started
 
 
@@ -33,7 +33,7 @@ def main() -> None:
         )
     with replacing_folder(layout.episodes(band)) as folder:
         for path in recordings:
-            episodes, refused = build_episodes(path, band, params)
+            episodes, refused = episodes_of(path, band, params, layout)
             for reason in refused:
                 print(f"warning: left out: {reason}", file=sys.stderr)
             for episode in episodes:
@@ -46,6 +46,7 @@ def main() -> None:
                     f" {len(episode.clouds)} clouds",
                     flush=True,
                 )
+    forget(band, layout)
 
 
 if __name__ == "__main__":

@@ -2,10 +2,9 @@
 
 import gc
 import os
-import shutil
 import signal
+import subprocess
 import sys
-import urllib.request
 from pathlib import Path
 
 import pytest
@@ -81,20 +80,15 @@ def delivered():
 
 @pytest.fixture(scope="session")
 def history(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Prefect's history, to be copied as a project's .prefect/: a new one takes it seconds.
-
-    There is one flow in it, `kept`, and no run.
-    """
+    """Prefect's history, to be copied as a project's .prefect/: a new one takes it seconds."""
 
     def make(folder: Path) -> None:
         from app.flow import server
 
-        with server.served(folder) as url:
-            kept = urllib.request.Request(
-                f"{url}/api/flows/", b'{"name": "kept"}', {"Content-Type": "application/json"}
-            )
-            urllib.request.urlopen(kept).close()
-        shutil.rmtree(server.home(folder) / "ui")
+        server.home(folder).mkdir()
+        code = "import asyncio; from prefect.server.database import provide_database_interface as d"
+        command = [sys.executable, "-c", f"{code}; asyncio.run(d().create_db())"]
+        subprocess.run(command, env=server.clean(folder), check=True)
 
     return once.folder(tmp_path_factory, "prefect", make) / ".prefect"
 

@@ -1,6 +1,6 @@
 """Stages on a Dask cluster: `sling flow --cluster tcp://scheduler:8786`.
 
-The flow and its Prefect tasks stay on the head; a task sends its stage to a Dask worker and waits.
+The flow stays on the head; a thread for each stage sends it to a Dask worker and waits.
 A worker runs it in its working copy, the folder that it was started in or SLING_COPY:
 
 - the head's own, in a shared folder: nothing travels;

@@ -1,6 +1,6 @@
 """What a Dask worker does for a flow: run a stage in its own working copy.
 
-Needs neither Prefect nor a way to its server: what a stage says travels to the head by Dask.
+What the stage says travels to the head by Dask.
 """
 
 from __future__ import annotations

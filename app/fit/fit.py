@@ -85,8 +85,16 @@ def fit(
         count = evidence.add(layout, name, told, "passed over")
         say(f"{layout.evidence / name}.csv: {count} launches as evidence")
     read_evidence(layout.evidence, name, params)
-    countdown = Countdown(leading_to(stages_of(root), card_stage))
-    child.repro(root, card_stage, countdown.line, countdown.begins)
+    stages = leading_to(stages_of(root), card_stage)
+    countdown = Countdown(stages)
+    child.repro(
+        root,
+        card_stage,
+        countdown.line,
+        countdown.begins,
+        command="sling fit",
+        producers={one.name: one.producers for one in stages},
+    )
     countdown.ends()
     card = layout.card(name)
     return json.loads((card / "card.json").read_text("utf-8")) | {"card": str(card / "README.md")}

@@ -1,1 +1,1 @@
-"""The stale stages in parallel, as a Prefect flow: DVC decides what is stale and owns the cache."""
+"""The stale stages in parallel, and what runs leave for Prefect's UI; DVC decides what is stale."""

@@ -5,13 +5,11 @@ from __future__ import annotations
 import base64
 import re
 import tempfile
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
-from app.flow.graph import Stage
 from pipeline.base.layout import Layout
 from stages.start import ungrouped
 
@@ -21,21 +19,21 @@ if TYPE_CHECKING:
 PICTURE = re.compile(r"!\[[^\]]*\]\([^)]*\)\n")
 LINK = re.compile(r"\[([^\]]*)\]\((?!https?:)[^)]*\)")  # to a file beside the report
 CHAPTERS = ("What came out", "The paper's tables")
-DRAWING = threading.Lock()  # pyplot knows one thread
 
 
-def artifact(stage: Stage, root: Path) -> str:
-    """What there is to show of a stage that has run, as markdown; "" of most steps.
+def artifact(stage: str, root: Path) -> str:
+    """What there is to show of what a stage made, by its name, as markdown; "" of most steps.
 
     Pictures are in it as data URIs, for Prefect's server keeps no files.
     """
-    make = MAKERS.get(ungrouped(stage.step))
-    band, _, method = stage.item.partition("-")
+    step, _, item = stage.partition("@")
+    make = MAKERS.get(ungrouped(step))
+    band, _, method = item.partition("-")
     return "\n".join(make(Path(root), band, method)) if make else ""
 
 
 def _drawn(name: str, draw: Callable[[Path], None]) -> str:
-    with DRAWING, tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.png")
         draw(path)
         content = base64.b64encode(path.read_bytes()).decode("ascii")

@@ -13,6 +13,7 @@ from threading import Event, Thread
 
 from app.flow import dvc_process, guard
 from app.flow.disk import with_disk
+from app.flow.log import RunLog
 from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 from stages import dvc_files
@@ -92,6 +93,9 @@ def repro(
     stage: str,
     on_line: Callable[[str], None],
     on_stage: Callable[[str], None] = lambda name: None,
+    *,
+    command: str = "dvc repro",
+    producers: Mapping[str, Sequence[str]] | None = None,
 ) -> None:
     """Let DVC run a stage and what it needs, as far as it is stale, on all cores.
 
@@ -99,26 +103,45 @@ def repro(
 
     Args:
         on_line, on_stage: As `dvc` has them.
+        command: Whose run this is, for its log.
+        producers: By stage, those whose outputs it reads, for the log too.
 
     Raises:
         StageFailed: With the name of the stage that failed and its clear line.
     """
-    running = [stage]
+    running: list[str] = []
 
     def begins(name: str) -> None:
+        if running:
+            log.ended(running[-1], "ran")
         running.append(name)
+        log.begins(name, (producers or {}).get(name, ()))
         on_stage(name)
+
+    def line(text: str) -> None:
+        if running:
+            log.line(running[-1], text)
+        on_line(text)
 
     environment = stage_environment(cores())
     dvc_files.mend(root)
-    try:
-        status, said = dvc(
-            root, ("repro", stage), environment=environment, on_line=on_line, on_stage=begins
-        )
-    finally:
-        dvc_files.mend(root)
-    if status:
-        raise StageFailed(with_disk(f"{running[-1]}: {reason(running[-1], said, status)}", root))
+    with RunLog(root, command, [stage]) as log:
+        try:
+            status, said = dvc(
+                root, ("repro", stage), environment=environment, on_line=line, on_stage=begins
+            )
+        except BaseException:
+            if running:
+                log.ended(running[-1], "cancelled", "interrupted")
+            raise
+        finally:
+            dvc_files.mend(root)
+        last = running[-1] if running else stage
+        failed = with_disk(f"{last}: {reason(last, said, status)}", root) if status else ""
+        if running:
+            log.ended(last, "failed" if failed else "ran", failed)
+        if failed:
+            raise StageFailed(failed)
 
 
 def dvc(

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from pipeline.base.errors import UserError, refused
 
-ROOM = 1_000_000  # bytes at least, with which Prefect's server, DVC and their locks can write
+ROOM = 1_000_000  # bytes at least, with which DVC, Prefect and their locks can write
 WRITTEN = (  # by stages and by DVC, `*` for a band; recordings lie where they lie
     "dvc.lock",
     ".dvc/tmp/*",

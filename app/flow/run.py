@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import fcntl
 import os
+import signal
+import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from app.flow import child, guard
+from app.flow import child, guard, server
 from app.flow.disk import expect_ready
 from app.flow.graph import Graph
+from app.flow.log import RunLog
 from app.flow.scheduler import Scheduler, width
 from app.flow.tasks import Place, Tasks, lasted, perform, say
 from pipeline.base import machine
@@ -59,16 +62,33 @@ def run(
             f"{len(stale)} of {len(graph.stages)} stages are stale or follow from such;"
             f" {workers} at a time"
         )
-        tasks = Tasks(root, graph, environment, place, limited=shares is not None)
-        try:
-            perform(root, scheduler, tasks)
-        finally:
-            dvc_files.mend(root)  # what next comes may be a `dvc` of the user's
-    summary = f"{scheduler.summary()} ({lasted(start)})"
-    if scheduler.failed:
-        say(summary)
-        raise next(iter(scheduler.failed.values()))
+        if where := server.address(root):
+            say(f"seen at {where}")
+        with RunLog(root, "sling flow", [stage.name for stage in stale]) as log, terminable():
+            tasks = Tasks(root, graph, environment, place, log)
+            try:
+                perform(scheduler, tasks)
+            finally:
+                log.message = scheduler.summary()
+                dvc_files.mend(root)  # what next comes may be a `dvc` of the user's
+            summary = f"{scheduler.summary()} ({lasted(start)})"
+            if scheduler.failed:
+                say(summary)
+                raise next(iter(scheduler.failed.values()))
     return summary
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """SIGTERM interrupts as Ctrl-C does."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def gpu_shares(

@@ -1,12 +1,13 @@
 """The project's own Prefect server: its history is SQLite in .prefect/, it listens on this machine
 alone, and it reports to nobody.
 
-It is `prefect server start` behind a guard, so that it ends with whoever started it. `sling ui`
-serves until Ctrl-C; `served` is that server, or else one that ends with the caller.
+It is `prefect server start` behind a guard, so that it ends with `sling ui`, which serves until
+Ctrl-C and shows what is in the logs of runs meanwhile.
 """
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import os
@@ -14,7 +15,6 @@ import socket
 import subprocess
 import sys
 import time
-import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -47,15 +47,11 @@ def environment(root: Path) -> dict[str, str]:
         "PREFECT_SERVER_UI_STATIC_DIRECTORY": str(folder / "ui"),  # not in site-packages
         "PREFECT_SERVER_API_HOST": HOST,
         "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
-        "DO_NOT_TRACK": "1",  # the same, of Prefect's clients
+        "DO_NOT_TRACK": "1",  # the same, elsewhere in Prefect
         "PREFECT_SERVER_UI_V2_ENABLED": "false",  # V1 asks nobody, and has stages beside log lines
         "PREFECT_SERVER_UI_SHOW_PROMOTIONAL_CONTENT": "false",
-        "PREFECT_CLIENT_SERVER_VERSION_CHECK_ENABLED": "false",  # one package is both
-        "PREFECT_CLIENT_MAX_RETRIES": "3",  # some 14 s without a server; the default is a minute
         "PREFECT_SERVER_LOGGING_LEVEL": "WARNING",
         "PREFECT_INTERNAL_LOGGING_LEVEL": "CRITICAL",  # no words of a server that is gone
-        "PREFECT_LOGGING_TO_API_BATCH_INTERVAL": "1",  # s, until lines show
-        "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL": "CRITICAL",  # the flow prints for itself
     }
 
 
@@ -87,6 +83,8 @@ def _url(port: int) -> str:
 
 def _home_at(port: int) -> Path | None:
     """Whose Prefect server listens on a port, as it says itself; None: no one's."""
+    import urllib.request  # takes its time, and few ask
+
     direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
         with direct.open(f"{_url(port)}/api/admin/settings", timeout=ASKING) as answer:
@@ -112,7 +110,12 @@ def serve(root: Path, port: int | None = None) -> str:
         write_text(note, str(port))
         try:
             print(f"Prefect UI: {_url(port)} (Ctrl-C ends it)", file=sys.stderr, flush=True)
-            server.wait()
+            settings = clean(root)
+            os.environ.clear()
+            os.environ.update(settings)  # before Prefect is imported
+            from app.flow.follow import follow
+
+            asyncio.run(follow(root, lambda: server.poll() is None))
         finally:
             note.unlink(missing_ok=True)
         raise UserError(f"Prefect's server has ended; {_log(root)} says why")
@@ -137,35 +140,6 @@ def expect_free(port: int) -> None:
 
 def _bound(port: int) -> socket.socket:
     return socket.create_server((HOST, port))
-
-
-@contextlib.contextmanager
-def served(root: Path) -> Iterator[str]:
-    """Set this process up for Prefect, and give the URL of the project's UI.
-
-    It is that of `sling ui`, or of a server that ends with the block, or with this process however
-    that ends. To be entered before `prefect` is imported. Raises UserError.
-    """
-    where = address(root)
-    with contextlib.ExitStack() as stack:
-        if not where:
-            with _bound(0) as listener:
-                port = listener.getsockname()[1]
-            stack.enter_context(_server(root, port))
-            where = _url(port)
-        before = dict(os.environ)
-        _take(clean(root) | {"PREFECT_API_URL": f"{where}/api"})
-        try:
-            yield where
-        finally:
-            _take(before)
-
-
-def _take(environment: dict[str, str]) -> None:
-    """Make this process's environment so."""
-    for name in os.environ.keys() - environment.keys():
-        del os.environ[name]
-    os.environ.update(environment)
 
 
 def _log(root: Path) -> Path:

@@ -81,7 +81,7 @@ def add_band(
         return f"{name} is there already: nothing to do"
 
     expect_writable(params_path.parent, layout.raw(name))
-    reports = files.checked(recordings, after, name)
+    reports = files.checked(recordings, after, name, layout)
     if same:
         files.renew_masks(recordings, there)
     else:

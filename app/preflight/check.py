@@ -6,18 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
-from app.preflight.coverage import by_phase, over_time
 from app.preflight.facts import BandFacts, CloudFacts, DelayFacts, ExtrinsicFacts, SignalSummary
 from app.preflight.report import CheckReport, Chosen, Topic
-from app.preflight.tips import Tips, measure_tips
-from app.preflight.verdict import cautions_of
 from app.sizes import DIAMETER, MASS, REST_LENGTH, band_to_come
 from pipeline.base.errors import UserError
 from pipeline.params import Params, expect_known
 from pipeline.params.lab import BandParams
-from pipeline.recording.build import Processed
+from pipeline.recording.build import Checked
+from pipeline.recording.checks.finding import Finding
+from pipeline.recording.checks.table import UNDERSTOOD
+from pipeline.recording.coverage import by_phase
 from pipeline.recording.input.bag import sha256
 from pipeline.recording.input.container import Container, read_container
 from pipeline.recording.input.reader import Recording, recording_of
@@ -39,9 +37,8 @@ class Look:
 
     report: CheckReport
     recording: Recording | None = None
-    done: Processed | None = None
-    tips: Tips | None = None
-    pulls: Sequence[Processed] = ()
+    done: Checked | None = None
+    pulls: Sequence[Checked] = ()
 
 
 def check_recording(path: Path, params: Params, band: BandParams | None = None) -> CheckReport:
@@ -95,7 +92,7 @@ def look_at(
         return Look(report, recording)
     if pull is not None and pull > len(pulls):
         raise UserError(f"--pull {pull}: the last pull in {path} is number {len(pulls)}")
-    processed = [Processed.of(one, about, params) for one in pulls]
+    processed = [Checked.of(one, about, params) for one in pulls]
     looks = [_look_at_pull(replace(report), one) for one in processed]
     usable = [look for look in looks if look.report.usable]
     chosen = looks[pull - 1] if pull else (usable or looks)[0]
@@ -123,41 +120,29 @@ def band_of(
     return band, f"given, but assumed: {left[0]}" if left else "given"
 
 
-def _look_at_pull(report: CheckReport, done: Processed) -> Look:
+def _look_at_pull(report: CheckReport, done: Checked) -> Look:
     """Fills the report of what the file is with what the pull is."""
     recording = done.pull.recording
     report.pull, report.frames = done.pull.number, done.pull.geometry.sources
     report.delays = DelayFacts.of(done.delays)
+    report.cautions, refusal = done.cautions, done.refusal
+    report.problem = _without(recording.path, refusal) if refusal else None
     try:
         report.signals = SignalSummary.of(done)
+        if refusal and refusal.about == UNDERSTOOD.name:
+            return Look(report, recording)
         report.cloud = CloudFacts.of(done)
-    except UserError as error:
-        report.problem = _without(recording.path, error)
+    except UserError:
         return Look(report, recording)
-    report.coverage = over_time(done, report.signals.window_start_s)
+    report.coverage = done.coverage
     report.phases = by_phase(report.coverage)
-    tips = measure_tips(
-        done.scene,
-        done.clouds.time,
-        done.clouds.points,
-        done.pull.geometry.camera.translation,
-        np.array(done.params.setup.clamp_direction),
-    )
-    if tips:
-        report.extrinsics = ExtrinsicFacts.of(tips, done)
-    if report.cloud.taut_coverage is None:
-        assumed = report.band.source == ASSUMED
-        cure = "which is assumed: give --rest-length" if assumed else "check it"
-        report.problem = (
-            "no picture shows the band drawn taut at a rest length of"
-            f" {report.band.rest_length_m:g} m, {cure}, or record a longer pull"
-        )
-    report.cautions = cautions_of(report, done)
-    return Look(report, recording, done, tips)
+    if done.tips:
+        report.extrinsics = ExtrinsicFacts.of(done.tips, done)
+    return Look(report, recording, done)
 
 
-def _without(path: Path, error: UserError) -> str:
-    return str(error).removeprefix(f"{path}: ")
+def _without(path: Path, problem: UserError | Finding) -> str:
+    return str(problem).removeprefix(f"{path}: ")
 
 
 def _topics(container: Container) -> list[Topic]:

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.preflight.coverage import coverage
-from app.preflight.tips import Tips, along
-from pipeline.recording.build import Processed
+from pipeline.recording.checks.camera import camera_to_fork
 from pipeline.recording.delays import Delays
-from pipeline.recording.input.frames import Transform
+from pipeline.recording.processed import Processed
+from pipeline.recording.tips import Tips
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ class SignalSummary:
         """Raises UserError where the pull cannot be understood."""
         recording, signals, scene = done.pull.recording, done.signals, done.scene
         facts = signals.facts
-        start = (signals.origin - recording.origin) * 1e-9
+        start = done.start
         return cls(
             window_start_s=start,
             grasp_s=start + signals.grasp_time,
@@ -106,7 +105,7 @@ class CloudFacts:
         """Raises UserError where the pictures show no band."""
         clouds = done.clouds
         sizes = [len(points) for points in clouds.points]
-        covered, off = coverage(done)
+        covered, off = done.taut_coverage
         return cls(
             frames=len(sizes),
             empty=clouds.empty,
@@ -145,8 +144,7 @@ class ExtrinsicFacts:
 
     @classmethod
     def of(cls, tips: Tips, done: Processed) -> ExtrinsicFacts:
-        geometry, turn = done.pull.geometry, tips.correction.rotation.as_rotvec()
-        believed = geometry.camera @ geometry.color.inverse()
+        turn = tips.correction.rotation.as_rotvec()
         return cls(
             pictures=tips.frames,
             off_m=tips.off,
@@ -157,16 +155,10 @@ class ExtrinsicFacts:
             right_tip_error_m=tips.errors[1].tolist(),
             turn_deg=np.degrees(-turn).tolist(),
             turn_error_deg=np.degrees(tips.rotation_error).tolist(),
-            hand_off_m=float(np.linalg.norm(tips.hand)),
-            hand_off_error_m=along(tips.hand, tips.hand_error),
+            hand_off_m=tips.hand_off,
+            hand_off_error_m=tips.hand_off_error,
             hand_m=tips.hand.tolist(),
             hand_error_m=tips.hand_error.tolist(),
             residual_m=tips.residual,
-            camera_to_fork=_pose((tips.correction @ believed).inverse()),
+            camera_to_fork=camera_to_fork(tips, done.pull.geometry),
         )
-
-
-def _pose(transform: Transform) -> list[float]:
-    """As setup.camera_to_fork has it."""
-    parts = [*transform.translation, *transform.rotation.as_quat(canonical=True)]
-    return [round(float(number), 6) for number in parts]

@@ -12,8 +12,8 @@ import cv2
 from app.preflight.output import expect_folder
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing_folder
-from pipeline.recording.build import Processed
 from pipeline.recording.masks.folder import mask_name
+from pipeline.recording.processed import Processed
 
 
 def expect_new(folder: Path) -> None:

@@ -8,12 +8,14 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from app.flow.disk import expect_writable
-from app.preflight.check import check_recording
+from app.preflight.check import look_at
 from app.preflight.report import CheckReport
 from pipeline.base.errors import UserError, printable
 from pipeline.base.files import replacing, replacing_folder
 from pipeline.base.layout import Layout
 from pipeline.params import Params, expect_known, load
+from pipeline.recording import kept
+from pipeline.recording.build import episode_of
 from pipeline.recording.input import bag
 from pipeline.recording.input.bag import sha256
 from pipeline.recording.masks.folder import MASK_NAME, masks_beside
@@ -45,7 +47,7 @@ def add_recording(
         if target.exists():
             raise UserError(f"{target} is there already: give {file} another name")
     expect_writable(layout.raw(band))
-    reports = checked(recordings, params, band)
+    reports = checked(recordings, params, band, layout)
     copy(files)
     return told(f"{band}: added to the {len(there)} that were there", reports)
 
@@ -73,12 +75,23 @@ def digests(recordings: Sequence[Path]) -> dict[str, Path]:
     return {sha256(file): file for file in recordings}
 
 
-def checked(recordings: Sequence[Path], params: Params, band: str) -> list[CheckReport]:
-    """What `sling check` says of each. Raises UserError where one cannot be used."""
-    reports = [check_recording(file, params, params.bands[band]) for file in recordings]
-    for report in reports:
-        if not report.usable:
-            raise UserError(f"{report.path}: {report.problem}")
+def checked(
+    recordings: Sequence[Path], params: Params, band: str, layout: Layout
+) -> list[CheckReport]:
+    """What `sling check` says of each. Raises UserError where one cannot be used.
+
+    The episodes that it makes on its way are kept for the stage that wants them.
+    """
+    reports, made = [], {}
+    for file in recordings:
+        look = look_at(file, params, params.bands[band])
+        reports.append(look.report)
+        if not look.report.usable:
+            raise UserError(f"{file}: {look.report.problem}")
+        if all(pull.usable for pull in look.report.pulls):
+            made[file] = [episode_of(one, band, params) for one in look.pulls]
+    for file, episodes in made.items():
+        kept.keep(file, episodes, params, layout)
     return reports
 
 

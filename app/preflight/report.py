@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 
-from app.preflight.coverage import PhaseLine, PictureLine
 from app.preflight.facts import BandFacts, CloudFacts, DelayFacts, ExtrinsicFacts, SignalSummary
 from pipeline.base.errors import printable
+from pipeline.recording.checks.finding import Finding
+from pipeline.recording.coverage import PhaseLine, PictureLine
 
 
 @dataclass(frozen=True)
@@ -49,18 +50,6 @@ class Chosen(Topic):
     lost: int = 0
     delay: float = 0.0
     clock_offset: float = 0.0
-
-
-@dataclass(frozen=True)
-class Caution:
-    """Something that costs accuracy: `about` names it for programs, `cure` says what to do."""
-
-    about: str
-    what: str
-    cure: str
-
-    def __str__(self) -> str:
-        return f"{self.what}: {self.cure}"
 
 
 @dataclass(frozen=True)
@@ -119,7 +108,7 @@ class CheckReport:
     phases: list[PhaseLine] = field(default_factory=list)
     coverage: list[PictureLine] = field(default_factory=list)
     extrinsics: ExtrinsicFacts | None = None
-    cautions: list[Caution] = field(default_factory=list)
+    cautions: list[Finding] = field(default_factory=list)
     written: list[str] = field(default_factory=list)
     pull: int = 1
     pulls: list[PullLine] = field(default_factory=list)
@@ -145,6 +134,7 @@ class CheckReport:
     def to_json(self, frames: bool = False) -> str:
         """As one object; `frames` adds `coverage`, a row for each picture."""
         content = {**asdict(self), "usable": self.usable, "verdict": self.verdict}
+        content["cautions"] = [caution.content() for caution in self.cautions]
         content |= {name: content[name] or {} for name in ("signals", "cloud", "extrinsics")}
         if not frames:
             del content["coverage"]

@@ -11,16 +11,16 @@ import cv2
 import numpy as np
 
 from app.preflight.check import Look
-from app.preflight.coverage import PictureLine
 from app.preflight.facts import SignalSummary
 from app.preflight.output import expect_writable
 from pipeline.base.files import replacing
 from pipeline.params import Params
 from pipeline.params.recording import CloudParams
-from pipeline.recording.build import Processed
+from pipeline.recording.coverage import PictureLine
 from pipeline.recording.input import images
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.masks import masker
+from pipeline.recording.processed import Processed
 from pipeline.recording.view import Frame, Scene
 from pipeline.report.drawing.names import as_label
 from pipeline.report.drawing.styles import COLORS, INK, THEME

@@ -20,11 +20,11 @@ from app.preflight.sheet import masked_frames
 from pipeline.base.errors import UserError
 from pipeline.base.files import replacing
 from pipeline.params import Params
-from pipeline.recording.build import Processed
 from pipeline.recording.input import images
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.frames import Transform
 from pipeline.recording.input.reader import Recording, Stream
+from pipeline.recording.processed import Processed
 from pipeline.recording.signals import Signals
 
 if TYPE_CHECKING:

@@ -13,8 +13,13 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pipeline.base.errors import UserError, refused
+
+if TYPE_CHECKING:
+    import numpy as np
+    from pyarrow import Table
 
 
 @contextmanager
@@ -92,6 +97,21 @@ def _alive(pid: int) -> bool:
     except PermissionError:
         return True
     return True
+
+
+def read_table(path: Path) -> Table:
+    """A Parquet file as a table; pyarrow's own `read_table` imports pandas first."""
+    from pyarrow.parquet import ParquetFile
+
+    with ParquetFile(path) as file:
+        return file.read()
+
+
+def column(table: Table, name: str) -> np.ndarray:
+    """A table's column of numbers, of which none is null; its own `to_numpy` imports pandas too."""
+    import numpy as np
+
+    return np.array(np.from_dlpack(table[name].combine_chunks()))
 
 
 def write_text(path: Path, text: str) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.base.files import replacing
+from pipeline.base.files import column, read_table, replacing
 from pipeline.base.layout import NotMade, made
 
 SCHEMA_VERSION = 1
@@ -58,19 +58,21 @@ class Episode:
     def sample_period(self) -> float:
         return float(self.time[1] - self.time[0])
 
+    @property
+    def cautions(self) -> list[dict[str, str]]:
+        """What of its recording costs accuracy: `about`, `what` and `cure` of each finding."""
+        return self.metadata.get("cautions", [])
+
     def save(self, folder: Path) -> None:
         """Write `signals.parquet` and `clouds.parquet` into `folder`."""
         signals = {"t": pa.array(self.time, pa.float64())}
         for name in ("position", "velocity", "force"):
-            for axis, column in zip("xyz", getattr(self, name).T, strict=True):
-                signals[f"{name}_{axis}"] = pa.array(column, pa.float64())
+            for axis, values in zip("xyz", getattr(self, name).T, strict=True):
+                signals[f"{name}_{axis}"] = pa.array(values, pa.float64())
         signals["opening"] = pa.array(self.opening, pa.float64())
         clouds = {
             "t": pa.array(self.cloud_time, pa.float64()),
-            "points": pa.array(
-                [cloud.astype(np.float32).tolist() for cloud in self.clouds],
-                pa.list_(pa.list_(pa.float32(), 3)),
-            ),
+            "points": _nested(self.clouds),
         }
         header = {
             "version": SCHEMA_VERSION,
@@ -102,29 +104,39 @@ class Episode:
         """Read an episode that `save` wrote. Raises NotMade."""
         header = read_metadata(folder)
         signals, clouds = (
-            pq.read_table(made(folder / f"{name}.parquet")) for name in ("signals", "clouds")
+            read_table(made(folder / f"{name}.parquet")) for name in ("signals", "clouds")
         )
 
         def vectors(name: str) -> np.ndarray:
-            return np.stack([signals[f"{name}_{axis}"].to_numpy() for axis in "xyz"], axis=1)
+            return np.stack([column(signals, f"{name}_{axis}") for axis in "xyz"], axis=1)
 
-        points = [np.asarray(row.as_py(), np.float32).reshape(-1, 3) for row in clouds["points"]]
+        nested = clouds["points"].combine_chunks()
+        flat = np.array(np.from_dlpack(nested.values.flatten())).reshape(-1, 3)
+        points = np.split(flat, nested.offsets.to_pylist()[1:-1])
         for name in ("frame", "sample_period"):  # which are not for the metadata
             header.pop(name)
         return cls(
             band=header.pop("band"),
-            time=signals["t"].to_numpy(),
+            time=column(signals, "t"),
             position=vectors("position"),
             velocity=vectors("velocity"),
             force=vectors("force"),
-            opening=signals["opening"].to_numpy(),
-            cloud_time=clouds["t"].to_numpy(),
+            opening=column(signals, "opening"),
+            cloud_time=column(clouds, "t"),
             clouds=points,
             grasp_time=header.pop("grasp_time"),
             release_time=header.pop("release_time"),
             camera=np.array(header.pop("camera")),
             metadata=header,
         )
+
+
+def _nested(clouds: list[np.ndarray]) -> pa.Array:
+    """Clouds as a column of lists of points."""
+    flat = np.concatenate([np.zeros((0, 3)), *clouds]).astype(np.float32)
+    points = pa.FixedSizeListArray.from_arrays(pa.array(flat.ravel()), 3)
+    ends = np.cumsum([0, *map(len, clouds)]).astype(np.int32)
+    return pa.ListArray.from_arrays(ends, points)
 
 
 def read_metadata(folder: Path) -> dict[str, Any]:

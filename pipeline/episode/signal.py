@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 NOMINAL_RATE = 1000.0  # Hz: "rad/sample" counts samples of a 1 kHz sensor
 SIMULATED_RATE = 1000.0  # of simulated forces on their way through the filter [Hz]
 ORDER = 2
+PULSES = 32  # that are filtered at once
+FORGOTTEN = 140.0  # time constants of the low-pass after which no rounding shows what was before
 SETTLING = 0.2  # s of odd extension at each end, many time constants of any useful cutoff
 
 
@@ -39,6 +40,8 @@ def lowpass(x: np.ndarray, rate: float, cutoff: float) -> np.ndarray:
         rate: Samples a second.
         cutoff: Of one pass, in Hz.
     """
+    from scipy.signal import butter, sosfiltfilt  # which takes half a second
+
     if cutoff >= rate / 2:
         return np.array(x, float)
     sections = butter(ORDER, cutoff, fs=rate, output="sos")
@@ -59,7 +62,11 @@ def average(t: np.ndarray, x: np.ndarray, t0: float, period: float, samples: int
     Returns:
         Shape (samples, ...).
     """
-    edges = t0 + period * np.arange(samples + 1)
+    return _means(t, x, t0 + period * np.arange(samples + 1), period)
+
+
+def _means(t: np.ndarray, x: np.ndarray, edges: np.ndarray, period: float) -> np.ndarray:
+    """Mean of x between edges (N + 1,) that are `period` apart, as `average` has it, (N, ...)."""
     inside = t[(t > edges[0]) & (t < edges[-1])]
     knots = np.union1d(edges, inside)
     values = _at(knots, t, x)
@@ -85,6 +92,34 @@ def as_recorded(
     """
     grid, x = uniform(t, x, SIMULATED_RATE)
     return average(grid, lowpass(x, SIMULATED_RATE, cutoff), t0, period, samples)
+
+
+def recording_matrix(
+    t: np.ndarray, cutoff: float, t0: float, period: float, samples: int
+) -> np.ndarray:
+    """`as_recorded`, which is linear, as a matrix: shape (samples, S), for arguments as there.
+
+    Each column is what a pulse at one time becomes, and is looked for where the filter remembers it
+    alone.
+    """
+    grid = t[0] + np.arange(int((t[-1] - t[0]) * SIMULATED_RATE + 1e-6) + 1) / SIMULATED_RATE
+    edges = t0 + period * np.arange(samples + 1)
+    reach = FORGOTTEN * math.sqrt(2) / (math.tau * cutoff) + SETTLING
+    matrix = np.zeros((samples, len(t)))
+    for first in range(0, len(t), PULSES):
+        last = min(first + PULSES, len(t))
+        begin = t[first - 1] - reach if first else -np.inf
+        end = t[last] + reach if last < len(t) else np.inf
+        g = slice(*np.searchsorted(grid, (begin, end)))
+        row = slice(*np.searchsorted(edges, (begin, end)) + (-1, 1))
+        # what is at an end of the grid goes on beyond it
+        row = slice(
+            row.start if g.start else 0, min(row.stop, samples) if g.stop < len(grid) else samples
+        )
+        pulses = _at(grid[g], t, np.eye(len(t), last - first, -first))
+        felt = lowpass(pulses, SIMULATED_RATE, cutoff)
+        matrix[row, first:last] = _means(grid[g], felt, edges[row.start : row.stop + 1], period)
+    return matrix
 
 
 def _at(times: np.ndarray, t: np.ndarray, x: np.ndarray) -> np.ndarray:

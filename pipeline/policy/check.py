@@ -20,7 +20,7 @@ CRITERION = (
 
 
 @dataclass(frozen=True)
-class Check:
+class PolicyCheck:
     """Launches of a policy's draws.
 
     Attributes:
@@ -33,7 +33,7 @@ class Check:
     failures: dict[str, int]
 
 
-def check(policy: Policy, launcher: Launcher, params: Params) -> Check:
+def check(policy: Policy, launcher: Launcher, params: Params) -> PolicyCheck:
     """Launch the policy's draws for targets spread over the trained range, as they are.
 
     Args:
@@ -48,14 +48,14 @@ def check(policy: Policy, launcher: Launcher, params: Params) -> Check:
     error = np.abs(np.asarray(launched.landing_y)[landed] - targets[landed])
     failures = Counter(reason for reason in reasons if reason)
     nan = float("nan")
-    return Check(
+    return PolicyCheck(
         mean_error=float(error.mean()) if len(error) else nan,
         max_error=float(error.max()) if len(error) else nan,
         failures=dict(sorted(failures.items())),
     )
 
 
-def figures(trained: Trained, checked: Check, landings: str = "map") -> dict:
+def figures(trained: Trained, checked: PolicyCheck, landings: str = "map") -> dict:
     """What a card tells of a training; errors are |y_p - g| of the deterministic policy [m].
 
     Args:

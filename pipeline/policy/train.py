@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
+from rsl_rl.runners import OnPolicyRunner
 from torch import nn
 
 from pipeline.base.machine import one_thread
@@ -23,9 +24,6 @@ from pipeline.launching.surface.simulated import Source
 from pipeline.params.launches import PolicyParams, Reward
 from pipeline.policy.environment import SlingshotEnv, draw_box, rewarded
 from pipeline.policy.ppo import settings
-
-if TYPE_CHECKING:
-    from rsl_rl.runners import OnPolicyRunner
 
 CHECKED_TARGETS = 256
 
@@ -134,8 +132,6 @@ def train(
     Runs on one thread with seeded generators: the same input gives the same network, bit for bit,
     on one machine.
     """
-    from rsl_rl.runners import OnPolicyRunner
-
     with one_thread():
         torch.manual_seed(params.seed)
         env = SlingshotEnv(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,62 +12,41 @@ from pipeline.base.schema import Section
 from pipeline.episode.episode import Episode
 from pipeline.params import Params, expect_known
 from pipeline.params.lab import BandParams
-from pipeline.recording.cloud import Clouds, clouds_of
-from pipeline.recording.delays import Delays, correct_delays
+from pipeline.recording.checks.finding import Finding
+from pipeline.recording.checks.table import findings_of
 from pipeline.recording.geometry import EpisodeGeometry
 from pipeline.recording.input.reader import explained, read_recording
+from pipeline.recording.processed import Processed
 from pipeline.recording.pulls import Pull, pulls_of
-from pipeline.recording.signals import Signals, signals_of
-from pipeline.recording.view import Scene, View
 
 
-@dataclass(frozen=True)
-class Processed:
-    """Every step's result for one pull. What is below `delays` is computed when first asked for.
-
-    Attributes:
-        pull: With the stamps corrected by `delays`.
-    """
-
-    pull: Pull
-    delays: Delays
-    band: BandParams
-    params: Params
-
-    @classmethod
-    def of(cls, pull: Pull, band: BandParams, params: Params) -> Processed:
-        return cls(*correct_delays(pull, params), band, params)
+class Checked(Processed):
+    """A pull, and what its checks find."""
 
     @cached_property
-    def signals(self) -> Signals:
-        """Raises UserError."""
-        return signals_of(self.pull, self.params, self.delays.tool_inertia)
+    def findings(self) -> list[Finding]:
+        """In the order of a recording's way."""
+        return findings_of(self)
 
-    @cached_property
-    def scene(self) -> Scene:
-        """Raises UserError."""
-        return Scene.of(self.band, self.params.setup, self.signals)
+    @property
+    def cautions(self) -> list[Finding]:
+        """What costs accuracy, and not the recording."""
+        return [one for one in self.findings if not one.refused]
 
-    @cached_property
-    def view(self) -> View:
-        """Raises UserError."""
-        duration = self.params.episode.duration
-        return View(self.pull.recording, self.pull.geometry, self.scene, duration)
-
-    @cached_property
-    def clouds(self) -> Clouds:
-        """Raises UserError."""
-        return clouds_of(self.view, self.params.cloud)
+    @property
+    def refusal(self) -> Finding | None:
+        """Why the pull cannot be used."""
+        return next((one for one in self.findings if one.refused), None)
 
 
-def process(path: Path, band: BandParams, params: Params) -> Processed:
+def process(path: Path, band: BandParams, params: Params) -> Checked:
     """Of a recording's pulls the first that can be used. Raises UserError."""
     return process_pulls(path, band, params)[0][0]
 
 
 def process_pulls(
     path: Path, band: BandParams, params: Params
-) -> tuple[list[Processed], list[UserError]]:
+) -> tuple[list[Checked], list[UserError]]:
     """Read, then for each pull resolve frames, set stamps right, find events, mask.
 
     Returns:
@@ -77,7 +56,7 @@ def process_pulls(
         UserError: None can be used: about the first.
     """
     recording = read_recording(path, params.setup)
-    usable: list[Processed] = []
+    usable: list[Checked] = []
     refused: list[UserError] = []
     try:
         pulls = pulls_of(Pull.of(recording, params.setup))
@@ -94,10 +73,11 @@ def process_pulls(
     return usable, refused
 
 
-def process_pull(pull: Pull, band: BandParams, params: Params) -> Processed:
+def process_pull(pull: Pull, band: BandParams, params: Params) -> Checked:
     """All of one pull. Raises UserError where it cannot be used."""
-    done = Processed.of(pull, band, params)
-    _ = done.clouds
+    done = Checked.of(pull, band, params)
+    if done.refusal:
+        raise UserError(str(done.refusal))
     return done
 
 
@@ -110,7 +90,7 @@ def build_episodes(
     return [episode_of(done, band_name, params) for done in usable], refused
 
 
-def episode_of(done: Processed, band_name: str, params: Params) -> Episode:
+def episode_of(done: Checked, band_name: str, params: Params) -> Episode:
     """The episode, with everything in its metadata that was chosen on the way."""
     signals, clouds = done.signals, done.clouds
     recording, geometry = done.pull.recording, done.pull.geometry
@@ -138,6 +118,7 @@ def episode_of(done: Processed, band_name: str, params: Params) -> Episode:
             "losses": recording.losses,
             "notes": recording.notes,
         },
+        "cautions": [one.content() for one in done.cautions],
         "geometry": EpisodeGeometry.of(recording, geometry).content(),
         "preprocessing": {
             **asdict(signals.facts),

@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.base.machine import cores
 from pipeline.params.recording import CloudParams
 from pipeline.recording.masks import masker
 from pipeline.recording.view import Frame, View
@@ -44,7 +46,7 @@ class Clouds:
 
 
 def clouds_of(view: View, cloud: CloudParams) -> Clouds:
-    """Mask and sample every frame.
+    """Mask and sample every frame, several at once.
 
     Raises:
         UserError: if the band is seen in too few frames.
@@ -53,15 +55,21 @@ def clouds_of(view: View, cloud: CloudParams) -> Clouds:
     if not len(view):
         raise UserError(f"{path}: no camera frames between the window's start and end")
     mask = masker(cloud.mask, view, cloud.sam3)
-    times, points, pixels = [], [], []
-    for _, frame in view.frames():
-        found = mask.mask(frame)
-        times.append(frame.time)
-        pixels.append(int(found.sum()))
-        points.append(cloud_of(view, frame, found, cloud))
+
+    def of_frame(number: int) -> list[tuple[float, np.ndarray, int]]:
+        """Nothing of a damaged frame."""
+        return [
+            (frame.time, cloud_of(view, frame, found, cloud), int(found.sum()))
+            for _, frame in view.frames([number])
+            for found in [mask.mask(frame)]
+        ]
+
+    with ThreadPoolExecutor(cores()) as pool:
+        rows = [row for rows in pool.map(of_frame, range(len(view))) for row in rows]
+    times, points, pixels = zip(*rows, strict=True) if rows else ((), (), ())
     clouds = Clouds(
         np.array(times),
-        points,
+        list(points),
         np.array(pixels),
         getattr(mask, "colors", None) is not None,
         len(view.damaged),

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.ndimage import maximum_filter1d
 
 from pipeline.base.errors import UserError
 from pipeline.simulator.initial import hanging_guess
@@ -18,6 +16,8 @@ from pipeline.simulator.schedule import RELAX_STEPS, Schedule, relaxation, steps
 from pipeline.simulator.solver import Frames, Options, Slings, run
 
 if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
     from pipeline.episode.episode import Episode
 
 FAILURES = {
@@ -57,6 +57,8 @@ def schedule_of(sling: ClampedBand, episode: Episode, refine: int = 1) -> Schedu
     shows that moment, whatever the friction. From then on the friction that is left falls as the
     pads' normal force does, which is gone after `finger_opening_time`.
     """
+    from scipy.interpolate import CubicSpline  # which takes a third of a second
+
     size, release = sling.steps, episode.release_time
     if release <= episode.grasp_time:
         raise UserError(
@@ -93,6 +95,8 @@ def _held_times(hand: CubicSpline, episode: Episode, size, refine: int) -> np.nd
     A step of h bows from its chord by h^2 |a| / 8, which is at most BOW, and a band that the hand
     holds follows it. Between `grip_step` and `hold_step`.
     """
+    from scipy.ndimage import maximum_filter1d
+
     time = np.arange(episode.grasp_time, episode.release_time, GRID)
     bend = np.linalg.norm(hand(_within(time, episode), 2), axis=1)
     bend = maximum_filter1d(bend, 2 * round(AROUND / GRID) + 1)
@@ -136,6 +140,7 @@ def interact(
     fetch: bool = True,
     refine: int = 1,
     double: bool = False,
+    until: float = np.inf,
 ) -> Rollouts:
     """Simulate the episode's interaction with N parameters.
 
@@ -144,20 +149,29 @@ def interact(
         workers: Threads, on the CPU; results do not depend on their number.
         fetch: Copy forces and centre lines from a GPU; else they stay there as Warp arrays.
         refine: How many times finer the steps are than `band` says.
+        until: Nothing is simulated after this time [s], if the band is free then: pictures end
+            there, and what is left of the force is 0, as it is on the host. All else is the same
+            to the bit.
     """
     schedule = schedule_of(band, episode, refine)
-    times = schedule.steps["time"]
+    times, stamps = schedule.steps["time"], episode.cloud_time
+    last = max(np.searchsorted(times, until) + 1, schedule.first_free)
+    schedule = replace(schedule, steps=schedule.steps[:last])
+    stamps = stamps[stamps <= max(until, schedule.steps["time"][-1])]
     done = run(
         band,
         schedule,
         Slings.of(band, parameters, hanging_guess(band), rigidity),
-        _frames(schedule, episode.cloud_time),
+        _frames(schedule, stamps),
         Options(device, workers, fetch=fetch, double=double),
     )
+    force = done.output[:, RELAX_STEPS - 1 :, :3]
+    if unfelt := len(times) - len(schedule.steps):
+        force = np.pad(force, ((0, 0), (0, unfelt), (0, 0)))
     return Rollouts(
         times=times[RELAX_STEPS - 1 :],
-        force=done.output[:, RELAX_STEPS - 1 :, :3],
-        cloud_time=episode.cloud_time,
+        force=force,
+        cloud_time=stamps,
         center_line=done.frames,
         failure=[FAILURES[Outcome(round(code))] for code in done.lanes["outcome"]],
         iterations=done.lanes["iterations"].astype(int),

@@ -8,7 +8,14 @@ from itertools import product
 import numpy as np
 import pytest
 
-from pipeline.episode.signal import average, cutoff_hz, lowpass, uniform
+from pipeline.episode.signal import (
+    as_recorded,
+    average,
+    cutoff_hz,
+    lowpass,
+    recording_matrix,
+    uniform,
+)
 
 
 def test_the_papers_cutoff_is_the_same_frequency_at_any_rate() -> None:
@@ -59,3 +66,15 @@ def test_uniform_grid_covers_the_samples() -> None:
     grid, x = uniform(np.array([0.0, 0.3, 1.0]), np.array([0.0, 3.0, 10.0]), 10)
     np.testing.assert_allclose(grid, np.arange(11) / 10)
     np.testing.assert_allclose(x, np.arange(11.0))
+
+
+@pytest.mark.parametrize("cutoff", [0.5, 5.0, 35.65, 600.0])
+@pytest.mark.parametrize("ends", [(0.0, 4.0), (0.7, 3.1)])  # times before and after the simulation
+def test_the_matrix_does_what_is_done_to_a_force(cutoff, ends) -> None:
+    """Whose columns are looked for in windows, at irregular times."""
+    rng = np.random.default_rng(1)
+    t = np.sort(rng.uniform(*ends, 400))
+    x = rng.normal(size=(400, 3))
+    recorded = as_recorded(t, x, cutoff, 0.0, 0.03, 133)
+    matrix = recording_matrix(t, cutoff, 0.0, 0.03, 133)
+    np.testing.assert_allclose(matrix @ x, recorded, atol=1e-11)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.launching.surface.response_surface import TOO_MUCH_FORCE
-from pipeline.policy.check import CONVERGED, Check, check, figures, verdict
+from pipeline.policy.check import CONVERGED, PolicyCheck, check, figures, verdict
 from tests.policy import toy
 
 
@@ -25,7 +25,7 @@ def test_it_launches_the_draws_themselves(trained) -> None:
     targets = np.linspace(1.425, 2.425, 256)
     truth = np.abs(toy.launch(trained.policy.draws(targets)).landing_y - targets)
     found = check(trained.policy, toy.launch, params())
-    assert found == Check(pytest.approx(truth.mean()), pytest.approx(truth.max()), {})
+    assert found == PolicyCheck(pytest.approx(truth.mean()), pytest.approx(truth.max()), {})
     told = figures(trained, found)
     assert told["converged"] and told["mean_error_m"] <= CONVERGED
     assert told["map_mean_error_m"] == trained.mean_error != told["mean_error_m"]
@@ -66,7 +66,7 @@ def test_failures_are_counted_by_reason_and_forbid_convergence(trained) -> None:
 
 
 def test_where_nothing_lands_there_is_no_error() -> None:
-    none = Check(float("nan"), float("nan"), {"it broke": 256})
+    none = PolicyCheck(float("nan"), float("nan"), {"it broke": 256})
     told = figures(TRAINED, none)
     assert not told["converged"]
     assert verdict(told, none.failures) == "NOT converged; 256 of 256 targets fail: it broke 256"

@@ -14,7 +14,7 @@ import torch
 from pipeline.base.files import write_json
 from pipeline.launching.surface.stored import Stored
 from pipeline.params import load
-from pipeline.policy.check import Check, figures
+from pipeline.policy.check import PolicyCheck, figures
 from pipeline.policy.export import card, write_onnx, write_torchscript
 from pipeline.simulator.parameters import THETA
 from tests.policy import toy
@@ -227,5 +227,5 @@ def test_a_policy_that_never_hits_has_no_errors_in_its_card(trained) -> None:
 
 
 def test_what_is_checked_is_what_the_schema_wants(trained) -> None:
-    checked = Check(0.004, 0.011, {})
+    checked = PolicyCheck(0.004, 0.011, {})
     assert figures(trained, checked).keys() == FIGURES.keys()

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from pipeline.params import Params, load
-from pipeline.recording.build import process
+from pipeline.recording.build import Checked, process
 from pipeline.recording.masks.ridge import RidgeMask
 from tests import once
 from tests.project import DEFAULTS
@@ -27,6 +27,12 @@ def params() -> Params:
 def seen(tmp_path_factory):
     """(path, truth) of a recording with pictures."""
     return written(tmp_path_factory, "seen.mcap")
+
+
+@pytest.fixture(scope="session")
+def checked(seen, params) -> Checked:
+    """`seen`, worked out once; to be read only."""
+    return process(seen[0], params.bands["band1"], params)
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.preflight.coverage import coverage
 from pipeline.params import BandParams, load
 from pipeline.recording.build import episode_of, process
 from tests.project import DEFAULTS
@@ -45,7 +44,7 @@ def test_events_and_force(episode) -> None:
 
 def test_clouds_of_the_drawn_band(built) -> None:
     done, episode = built
-    share, offset = coverage(done)
+    share, offset = done.taut_coverage
     assert share > 0.9 and offset == pytest.approx(0.005, abs=0.002)
     tips = np.array([[-0.1375, 0, 0], [0.1375, 0, 0]])
     hand, near, covered = np.array([0, -0.4, 0]), [], []

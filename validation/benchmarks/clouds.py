@@ -16,10 +16,10 @@ import cv2
 
 from pipeline.params import Params
 from pipeline.params.lab import BandParams
-from pipeline.recording.build import Processed
 from pipeline.recording.cloud import cloud_of
 from pipeline.recording.input.reader import Recording, read_recording
 from pipeline.recording.masks import masker
+from pipeline.recording.processed import Processed
 from pipeline.recording.pulls import Pull
 from pipeline.recording.view import View
 from validation.benchmarks.timing import timed

@@ -13,6 +13,8 @@ from resource import RUSAGE_CHILDREN, getrusage
 
 import psutil
 
+from validation.benchmarks.timing import busy, others_share
+
 EVERY = 1.0  # s between two looks at the memory
 
 
@@ -25,7 +27,7 @@ def measured(
     counted once (PSS), looked at every so often [s].
     """
     log.parent.mkdir(parents=True, exist_ok=True)
-    before, busy = getrusage(RUSAGE_CHILDREN), _busy()
+    before, ours = getrusage(RUSAGE_CHILDREN), busy()
     start, peak, seen = time.perf_counter(), 0, []
     with log.open("wb") as file:
         process = psutil.Popen(
@@ -44,20 +46,13 @@ def measured(
             raise
     seconds, after = time.perf_counter() - start, getrusage(RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    available = seconds * (os.cpu_count() or 1)
     return {
         "status": status,
         "seconds": round(seconds, 1),
         "cpu_seconds": round(cpu, 1),
         "peak_memory_bytes": peak,
-        "others_share": round(max(0.0, _busy() - busy - cpu) / available, 3),
+        "others_share": others_share(ours, cpu, seconds),
     }
-
-
-def _busy() -> float:
-    """Seconds that this machine's cores have worked, for whomever."""
-    spent = psutil.cpu_times()
-    return spent.user + spent.nice + spent.system
 
 
 def _family(process: psutil.Process, seen: Iterable[psutil.Process]) -> list[psutil.Process]:

@@ -30,7 +30,7 @@ from pipeline.identify.search.regions import regions_asked
 from pipeline.params import Params, expect_known
 from pipeline.params.identification import LEAST_SQUARES, OptimizerParams
 from pipeline.simulator.model import ClampedBand
-from validation.benchmarks.timing import seconds, shared, timed
+from validation.benchmarks.timing import busy, others_share, seconds, shared, timed
 from validation.synthetic import recorded_yardstick
 
 LARGE = {"population": 64, "generations": 39, "cma_population": 16, "cma_rollouts": 3200}
@@ -63,7 +63,8 @@ def bench_methods(
         `budget`: its name and settings; `batch`: seconds of one generation, simulated alone and
         with the loss; `methods`, by name: regions (0: it has none), rollouts, failures, seconds of
         the whole, CPU seconds of all threads, seconds of evaluations and of the optimiser,
-        rollouts/s, best loss that was explored or refined.
+        rollouts/s, best loss that was explored or refined, share of the cores that other programs
+        took meanwhile.
 
     Raises:
         UserError: There is no such device or method.
@@ -110,7 +111,7 @@ def time_search(
         cache = EvaluationCache(
             evaluator(params, method, sling, episode, devices), Path(folder), "bench"
         )
-        evaluate = Clocked(cache)
+        evaluate, before = Clocked(cache), busy()
         (history, count), cpu, wall = timed(partial(whole, evaluate))
     row = {
         "regions": regions_asked(about, optimizer) if about.search == "multistart" else 0,
@@ -122,6 +123,7 @@ def time_search(
         "optimizer_s": wall - evaluate.seconds,
         "rollouts_per_s": count / wall,
         "best_loss": history.best()["total"],
+        "others_share": others_share(before, cpu, wall),
     }
     return row, history
 

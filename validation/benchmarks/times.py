@@ -4,8 +4,8 @@
 
 clones the commit that is checked out here into FOLDER, with caches of its own, so that everything
 is downloaded and compiled, and measures each step there. What succeeded is not measured again: the
-same command goes on where it was killed. It writes reports/benchmarks/times.json, and its table
-into docs/times.md.
+same command goes on where it was killed. It writes reports/benchmarks/times.json, its table into
+docs/times.md, and the seconds by which `sling fit` counts down into app/fit/seconds.json.
 """
 
 from __future__ import annotations
@@ -33,8 +33,13 @@ from validation.benchmarks.command import disk, measured
 from validation.marked import marks, with_block
 
 REPORT, PAGE = Path("reports/benchmarks/times.json"), Path("docs/times.md")
+SECONDS = Path("app/fit/seconds.json")
 BEGIN, END = marks("times")
 BAND = "timed"  # of the recording
+DEMO = (  # `make demo` in a clone of its own, where nothing has run
+    "clone=$PWD && rm -rf ../demo && git clone -q . ../demo && cd ../demo"
+    ' && PATH="$clone/.venv/bin:$PATH" sling fit --name band1'
+)
 CHANGES = ("PYTHONPATH", "VIRTUAL_ENV", "UV_CACHE_DIR", "PIP_CACHE_DIR", "WARP_CACHE_PATH")
 STAGE = re.compile(r"^([a-z]+)(?:@[\w-]+)? \| done \((?:(\d+) min )?([\d.]+) s\)$", re.MULTILINE)
 GROUP = re.compile("^(ablation|own)_", re.MULTILINE)
@@ -65,14 +70,21 @@ class MeasuredStep:
 
 def steps(recording: Path | None, mass: float) -> list[MeasuredStep]:
     """All steps, in their order; a fit, which adds a band to params.yaml, comes last."""
-    sling = ".venv/bin/sling"
+    sling, mine, draw = ".venv/bin/sling", ("--band", "band1"), "--draw=-0.30,-0.15"
+    aim = (sling, "aim", *mine, "--target", "1.925", "--force")
+    observe = (sling, "observe", *mine, draw, "--landing", "1.85")
     file = str(recording.resolve()) if recording else "FILE.mcap"
     mass = ("--mass", f"{mass:g}")
-    made = ("data", ".dvc/cache", ".prefect")
+    made = ("data", ".dvc/cache", "logs")
     rows = [
         ("setup", "`make setup`, nothing downloaded yet", ("make", "setup"), "", (".venv",)),
         ("run", "`make run`, after set-up", ("make", "run"), "[1-9][0-9]* ran", made, "setup"),
         ("again", "`sling flow`, nothing stale", (sling, "flow"), "are fresh", (), "run"),
+        ("drift", "`sling drift`, one recording", (sling, "drift", *mine), "", (), "run"),
+        ("aim", "`sling aim`", aim, "", (), "run"),
+        ("launch", "`sling launch`", (sling, "launch", *mine, draw), "", (), "run"),
+        ("observe", "`sling observe`", observe, "", (), "run"),
+        ("demo", "`make demo`, after set-up", ("sh", "-c", DEMO), "", (), "setup"),
         ("test", "`make test`, after set-up", ("make", "test"), "[0-9] passed", (), "setup"),
         ("check", "`sling check`", (sling, "check", file), "", (), "setup"),
         ("fit", "`sling fit`", (sling, "fit", file, *mass, "--name", BAND), "", (), "setup"),
@@ -120,6 +132,21 @@ def seconds_of_stages(log: str) -> dict[str, dict]:
         step: {"count": len(own), "median_s": statistics.median(own), "most_s": max(own)}
         for step, own in found.items()
     }
+
+
+def seconds_of_fit(folder: Path) -> dict[str, int]:
+    """Seconds of the steps of the fit in a clone, by the log that it left there."""
+    found: dict[str, int] = {}
+    for path in sorted((folder / "logs" / "runs").glob("*.jsonl")):
+        events = [json.loads(line) for line in path.read_text("utf-8").splitlines()]
+        if events[0]["command"] != "sling fit":
+            continue
+        begun = {one["stage"]: one["at"] for one in events if one["what"] == "stage"}
+        for one in events:
+            if one["what"] == "ended" and one.get("stage") in begun:
+                step = GROUP.sub("", one["stage"].partition("@")[0])
+                found[step] = max(round(one["at"] - begun[one["stage"]]), 1)
+    return found
 
 
 def perform(step: MeasuredStep, done: dict[str, dict], folder: Path) -> dict:
@@ -230,6 +257,9 @@ def times(
         "met": all(one["ok"] or "skipped" in one for one in done.values()),
     }
     write_json(root / REPORT, report)
+    fits = seconds_of_fit(folder / "demo") | seconds_of_fit(clone)  # a recording's, and a demo's
+    if fits:
+        write_json(root / SECONDS, fits)
     page = root / PAGE
     write_text(page, with_block(page.read_text(encoding="utf-8"), table(report)))
     return report

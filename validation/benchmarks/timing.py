@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import psutil
 
 from pipeline.base.machine import gpus
 from pipeline.simulator.parameters import Parameters
@@ -19,6 +21,22 @@ def timed(work: Callable[[], object]) -> tuple:
     cpu, wall = time.process_time(), time.perf_counter()
     result = work()
     return result, time.process_time() - cpu, time.perf_counter() - wall
+
+
+def busy() -> float:
+    """Seconds that this machine's cores have worked, for whomever."""
+    spent = psutil.cpu_times()
+    return spent.user + spent.nice + spent.system
+
+
+def others_share(before: float, cpu: float, wall: float) -> float:
+    """Share of the cores that other programs took since `busy()` was `before`.
+
+    Args:
+        cpu, wall: What we took since then [s].
+    """
+    available = wall * (os.cpu_count() or 1)
+    return round(max(0.0, busy() - before - cpu) / available, 3)
 
 
 def seconds(run: Callable[[], object], repeats: int = REPEATS) -> float:

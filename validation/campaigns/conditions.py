@@ -242,7 +242,7 @@ def run(cell: Cell, work: Path) -> Result:
     shutil.rmtree(folder, ignore_errors=True)
     (folder / "tmp").mkdir(parents=True)
     subprocess.run(["cp", "-a", work / "project", folder / "copy"], check=True)
-    if cell.command == "flow":  # else all is fresh, and no server of Prefect's starts
+    if cell.command == "flow":  # else all is fresh, and no stage runs
         (folder / "copy/data/floor/band1.json").unlink()
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]

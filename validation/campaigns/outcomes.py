@@ -22,7 +22,8 @@ import numpy as np
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.params import Params
-from pipeline.recording.build import Processed, episode_of, process
+from pipeline.recording.build import episode_of, process
+from pipeline.recording.processed import Processed
 from validation.campaigns.damage import mutated
 from validation.recordings.small import CHECKED, small_params
 

@@ -14,7 +14,7 @@ from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
 from validation.engines import mujoco_flex
 from validation.simulator.experiment import setup_of
-from validation.simulator.finding import Bench, Finding, Theme
+from validation.simulator.finding import Bench, Measure, Theme
 from validation.synthetic import ease, unseen
 
 THETA = np.array([2.2e5, 0.30, 3e-3, 1.0, 1.0])
@@ -120,12 +120,12 @@ def pull(bench: Bench, theta, step: float = 5e-4, **mesh) -> EnginePull:
     )
 
 
-def pull_checks(result: EnginePull, title: str, fine: bool) -> list[Finding]:
+def pull_checks(result: EnginePull, title: str, fine: bool) -> list[Measure]:
     """Force and centre line; without limits where the mesh is known to be too coarse."""
     worst = result.line_errors
     frame = int(worst.argmax())
     return [
-        Finding(
+        Measure(
             f"force on the hand while held, of its peak, {title}",
             "MuJoCo 3D flex",
             result.force_error,
@@ -134,7 +134,7 @@ def pull_checks(result: EnginePull, title: str, fine: bool) -> list[Finding]:
             f"{result.held_error:+.2f} % at the end of the hold"
             + ("" if fine else "; its section is too coarse to bend freely"),
         ),
-        Finding(
+        Measure(
             f"centre line while held, rms, {title}",
             "MuJoCo 3D flex",
             float(np.sqrt((worst**2).mean())),
@@ -147,7 +147,7 @@ def pull_checks(result: EnginePull, title: str, fine: bool) -> list[Finding]:
 
 def launch_check(
     bench: Bench, cases=LAUNCHES, step: float = 2.5e-4, title: str = "", **mesh
-) -> Finding:
+) -> Measure:
     """The largest difference of the landings of `cases`, as listed in LAUNCHES."""
     sling, setup = sling_of(bench), setup_of(bench)
     thetas = np.array([[young, poisson, d, 1.0, 1.0] for young, poisson, d, _ in cases])
@@ -160,7 +160,7 @@ def launch_check(
     landing = 100 * (np.array([one.landing_y for one in theirs]) / ours.landing_y - 1)
     speed = 100 * (np.array([one.speed for one in theirs]) / ours.speed - 1)
     hold = 100 * (np.array([one.hold_force for one in theirs]) / ours.hold_force - 1)
-    return Finding(
+    return Measure(
         f"landing of {len(cases)} launches, the largest difference{title}",
         "MuJoCo 3D flex",
         float(np.abs(landing).max()),

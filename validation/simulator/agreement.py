@@ -21,7 +21,7 @@ from validation.simulator.experiment import (
     straight,
     straight_guess,
 )
-from validation.simulator.finding import Bench, Finding, Theme
+from validation.simulator.finding import Bench, Measure, Theme
 from validation.simulator.march import march
 from validation.simulator.reference import ReferenceRod
 
@@ -123,18 +123,18 @@ def compare(
 
 def checks(
     bench: Bench, count: int = 4, sling: ClampedBand | None = None, **others: float
-) -> list[Finding]:
+) -> list[Measure]:
     against = "NumPy reference implementation, Newton's method to rounding"
     note = f"{count} random θ of the box, double precision"
     result = []
     found = compare(bench, random_thetas(bench, count), sling, **others)
     for name, (states, forces) in found.items():
         result.append(
-            Finding(f"states of a band {name}", against, states, "of its motion", LIMIT, note)
+            Measure(f"states of a band {name}", against, states, "of its motion", LIMIT, note)
         )
         if forces > 0:
             result.append(
-                Finding(f"force of a band {name}", against, forces, "of its peak", LIMIT, note)
+                Measure(f"force of a band {name}", against, forces, "of its peak", LIMIT, note)
             )
     return result
 

@@ -22,7 +22,7 @@ from validation.simulator.experiment import (
     straight,
     straight_guess,
 )
-from validation.simulator.finding import Bench, Finding, Theme, off
+from validation.simulator.finding import Bench, Measure, Theme, off
 from validation.simulator.launching import with_edges
 from validation.simulator.reference import ReferenceRod
 
@@ -84,12 +84,12 @@ def drawn_pull(bench: Bench, depth: float, theta: np.ndarray) -> tuple[np.ndarra
     return done.hold_force, np.array(expected)
 
 
-def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> list[Finding]:
+def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> list[Measure]:
     """Pull forces in single precision, the default."""
     theta = thetas() if theta is None else theta
     against = "closed form in uniaxial stress, P = μ (λ − J/λ²)"
     checks = [
-        Finding(
+        Measure(
             f"pull of a straight string at stretch {stretch:g}, worst of E and ν",
             against,
             off(*straight_pull(bench, stretch, theta, STRING)),
@@ -101,7 +101,7 @@ def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> li
         for stretch in stretches
     ]
     checks.append(
-        Finding(
+        Measure(
             f"pull of the band itself at stretch {stretches[0]:g}, worst of E and ν",
             against,
             off(*straight_pull(bench, stretches[0], theta)),
@@ -115,7 +115,7 @@ def pull(bench: Bench, theta: np.ndarray | None = None, stretches=STRETCH) -> li
     for stretch in DRAWN:
         depth = np.sqrt((stretch * length / 2) ** 2 - width**2)
         checks.append(
-            Finding(
+            Measure(
                 f"hold force of a draw of {depth:.2f} m (stretch {stretch:g}), worst of E and ν",
                 f"two straight strings, {against}",
                 off(*drawn_pull(bench, depth, theta)),
@@ -149,7 +149,7 @@ def _beam(
     return -sections[node, 2] / closed(load, sling.rest_length, rigidity)
 
 
-def beams(bench: Bench, poissons=BEAM_POISSON, double: bool = True) -> list[Finding]:
+def beams(bench: Bench, poissons=BEAM_POISSON, double: bool = True) -> list[Measure]:
     """Deflections on the default mesh, and on one of twice as many edges for comparison."""
     edges, checks = band_of(bench).edges, []
     for name, clamped, formula in (
@@ -169,7 +169,7 @@ def beams(bench: Bench, poissons=BEAM_POISSON, double: bool = True) -> list[Find
                 ),
             )
             checks += [
-                Finding(
+                Measure(
                     title,
                     f"Euler–Bernoulli, {formula}",
                     off(one, 1.0),
@@ -200,14 +200,14 @@ def torque_ratio(bench: Bench, angle: float, poisson: float) -> float:
     return (sides[0] - sides[1]) / (2 * step) / expected
 
 
-def torsion(bench: Bench, poissons=BEAM_POISSON) -> list[Finding]:
+def torsion(bench: Bench, poissons=BEAM_POISSON) -> list[Measure]:
     against = "torsion of a cylinder, G J θ / L"
     checks = []
     for poisson in poissons:
         ratio = torque_ratio(bench, 0.1, poisson)
         note = f"{ratio:.4f} of it"
         checks.append(
-            Finding(
+            Measure(
                 f"torque at a twist of 0.1 rad, ν {poisson:.2f}",
                 against,
                 off(ratio, 1.0),
@@ -218,7 +218,7 @@ def torsion(bench: Bench, poissons=BEAM_POISSON) -> list[Finding]:
         )
     ratio = torque_ratio(bench, np.pi, 0.45)
     checks.append(
-        Finding(
+        Measure(
             "torque at half a turn, ν 0.45",
             against,
             off(ratio, 1.0),

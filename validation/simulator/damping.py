@@ -22,7 +22,7 @@ from validation.simulator.experiment import (
     straight,
     straight_guess,
 )
-from validation.simulator.finding import Bench, Finding, Theme, off
+from validation.simulator.finding import Bench, Measure, Theme, off
 from validation.simulator.reference import ReferenceRod
 
 SEED = 11
@@ -66,7 +66,7 @@ def power_gain(rod: ReferenceRod, sections: np.ndarray) -> float:
     return float(max(-lowest, 0.0))
 
 
-def dissipation(bench: Bench, count: int = 10) -> list[Finding]:
+def dissipation(bench: Bench, count: int = 10) -> list[Measure]:
     """Over `count` random states of each kind, a random theta each."""
     sling, rng = band_of(bench), np.random.default_rng(SEED)
     checks = []
@@ -78,7 +78,7 @@ def dissipation(bench: Bench, count: int = 10) -> list[Finding]:
             for theta, x in zip(thetas, states, strict=True)
         ]
         checks.append(
-            Finding(
+            Measure(
                 f"power gained in states {kind}",
                 "no rates gain energy: lowest eigenvalue of the dissipation ≥ 0",
                 float(max(gains)),
@@ -112,7 +112,7 @@ def recoil_energies(
     return np.reshape(energies, (-1, steps + 1))
 
 
-def growth(bench: Bench, count: int = 48) -> list[Finding]:
+def growth(bench: Bench, count: int = 48) -> list[Measure]:
     """Energy of the kernel's own steps from random states of every kind."""
     size = bench.params.sling
     checks = []
@@ -131,7 +131,7 @@ def growth(bench: Bench, count: int = 48) -> list[Finding]:
         kept = ", ".join(f"{len(energy)} {kind}" for kind, energy in energies.items())
         note = f"kept of {2 * count} random states and θ each: {kept}; the others are marked failed"
         checks.append(
-            Finding(
+            Measure(
                 f"rise above the start, {label}, {1e3 * h:g} ms",
                 "energy never grows without work",
                 float(np.max(every - 1, initial=0.0)),
@@ -141,7 +141,7 @@ def growth(bench: Bench, count: int = 48) -> list[Finding]:
             )
         )
         checks.append(
-            Finding(
+            Measure(
                 f"rise in any one step, {label}, {1e3 * h:g} ms",
                 "energy never grows without work",
                 float(np.max(np.diff(every, axis=1), initial=0.0)),
@@ -205,7 +205,7 @@ def oscillate(
     return time, place, modes(fit.x[0] * k, fit.x[1] * c), modes(k, c)
 
 
-def oscillator(bench: Bench, cases=None, per_period: int = 800) -> list[Finding]:
+def oscillator(bench: Bench, cases=None, per_period: int = 800) -> list[Measure]:
     """Frequency and decay of the middle, along and across the band.
 
     Args:
@@ -227,14 +227,14 @@ def oscillator(bench: Bench, cases=None, per_period: int = 800) -> list[Finding]
             ("decay", fitted[1], closed[1], DECAY_LIMIT, "/s"),
         ):
             note = f"{one:.4g} {unit}, closed form {other:.4g} {unit}"
-            checks.append(Finding(f"{name} {where}", against, off(one, other), "%", limit, note))
+            checks.append(Measure(f"{name} {where}", against, off(one, other), "%", limit, note))
     theta = [1e6, 0.45, 2e-2, 0.5, 1.0]
     slow, fast = (
         oscillate(bench, theta, axis=1, per_period=per_period, turn_damping=share)[index][1]
         for share, index in ((0.0, 2), (1.0, 3))
     )
     checks.append(
-        Finding(
+        Measure(
             "decay across the band, turns not braked",
             "0: what only turns loses nothing",
             100 * slow / fast,

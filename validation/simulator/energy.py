@@ -14,7 +14,7 @@ from pipeline.simulator.records import Grip, Mode
 from pipeline.simulator.schedule import RELAX_STEPS
 from validation.simulator import figures
 from validation.simulator.experiment import band_of, move
-from validation.simulator.finding import Bench, Finding, Theme
+from validation.simulator.finding import Bench, Measure, Theme
 from validation.simulator.reference import ReferenceRod
 from validation.synthetic import pull_and_release
 
@@ -184,7 +184,7 @@ def balance(
     )
 
 
-def checks(done: Balance) -> list[Finding]:
+def checks(done: Balance) -> list[Measure]:
     held = done.time <= done.release + 1e-9
     total = np.abs(done.hand).max()
     taut = (done.time > done.release) & (done.time < done.release + 0.1)
@@ -201,7 +201,7 @@ def checks(done: Balance) -> list[Finding]:
         " relaxed, softened, pads)"
     )
     return [
-        Finding(
+        Measure(
             "balance of energy, largest miss at any time",
             against,
             done.share(done.miss),
@@ -209,7 +209,7 @@ def checks(done: Balance) -> list[Finding]:
             LIMIT,
             "of the hand's work; the steps' own loss is the miss",
         ),
-        Finding(
+        Measure(
             "balance of energy, miss at the end",
             against,
             float(100 * np.abs(done.miss[-1]) / total),
@@ -217,7 +217,7 @@ def checks(done: Balance) -> list[Finding]:
             LIMIT,
             f"hand {done.hand[-1]:.4f} J and turning {done.turning[-1]:.4f} J = {note} J",
         ),
-        Finding(
+        Measure(
             "work of the fingers' turning, largest at any time",
             "—",
             done.share(done.turning),
@@ -227,7 +227,7 @@ def checks(done: Balance) -> list[Finding]:
             f" elastic energy; the balance misses {done.share(done.miss - done.turning):.2f} %"
             " without it",
         ),
-        Finding(
+        Measure(
             "residual of the kernel's steps by the reference's forces",
             "balance with the steps' loss, by its formula, as an entry",
             done.share(done.remainder),
@@ -235,7 +235,7 @@ def checks(done: Balance) -> list[Finding]:
             LIMIT,
             "of the hand's work, largest at any time: every step is solved, no force is missing",
         ),
-        Finding(
+        Measure(
             "lost to the steps while held",
             "0 for infinitely short steps",
             done.share(done.integrator[held]),
@@ -243,7 +243,7 @@ def checks(done: Balance) -> list[Finding]:
             LIMIT,
             "second order, of the hand's work",
         ),
-        Finding(
+        Measure(
             "lost to the steps in the first 0.1 s after the release",
             "0 for infinitely short steps",
             float(100 * np.abs(done.integrator[taut] - done.integrator[held][-1]).max() / total),
@@ -251,7 +251,7 @@ def checks(done: Balance) -> list[Finding]:
             LIMIT,
             "second order, of the hand's work",
         ),
-        Finding(
+        Measure(
             "lost to the opening pads",
             "their friction at the band's path",
             float(100 * done.pads[-1] / total),

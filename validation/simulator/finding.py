@@ -11,7 +11,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Finding:
+class Measure:
     """A figure of the simulator and what it may be at most.
 
     Attributes:
@@ -49,7 +49,7 @@ class Theme:
     """
 
     title: str
-    checks: list[Finding]
+    checks: list[Measure]
     text: str = ""
     pictures: dict[str, str] = field(default_factory=dict)
     details: dict = field(default_factory=dict)
@@ -77,5 +77,5 @@ def off(value, expected) -> float:
     return float(100 * np.abs(ratio).max())
 
 
-def unmet(checks: Iterable[Finding]) -> list[Finding]:
+def unmet(checks: Iterable[Measure]) -> list[Measure]:
     return [check for check in checks if check.met is False]

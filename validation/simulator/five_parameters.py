@@ -13,7 +13,7 @@ from validation.simulator.at_rest import STRING
 from validation.simulator.closed import String
 from validation.simulator.damping import oscillate
 from validation.simulator.experiment import band_of, move, settling, straight, straight_guess
-from validation.simulator.finding import Bench, Finding, Theme, off
+from validation.simulator.finding import Bench, Measure, Theme, off
 from validation.synthetic import pull_and_release
 
 THETA = (6e5, 0.45, 5e-3, 0.6, 0.8)
@@ -35,11 +35,11 @@ def held_force(
     return np.where([reason is None for reason in done.failure], force, np.nan)
 
 
-def young(bench: Bench) -> list[Finding]:
+def young(bench: Bench) -> list[Measure]:
     sling = replace(band_of(bench), mass=1e-4, grip_force=1e5)
     one, two = held_force(bench, sling, _with(youngs_modulus=THETA[0] * np.array([1.0, 2.0])))
     return [
-        Finding(
+        Measure(
             "held force at 2 E over that at E",
             "2",
             off(two / one, 2.0),
@@ -50,7 +50,7 @@ def young(bench: Bench) -> list[Finding]:
     ]
 
 
-def poisson(bench: Bench, stretch: float = 1.5) -> list[Finding]:
+def poisson(bench: Bench, stretch: float = 1.5) -> list[Measure]:
     """Volume of a straight, held string, and its pull at given E, from nu 0.30 to 0.49."""
     sling = band_of(bench)
     sling = replace(sling, radius=sling.radius / STRING)
@@ -71,7 +71,7 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Finding]:
     pull = -motion.force[:, -1, 0]
     ratio = float(strings[1].force(stretch) / strings[0].force(stretch))
     return [
-        Finding(
+        Measure(
             f"volume that a string gains at stretch {stretch:g}, ν 0.30 and 0.49",
             "J − 1 = μ/λ (1 − 1/l)",
             off(volume - 1, expected - 1),
@@ -79,7 +79,7 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Finding]:
             1.0,
             f"{100 * (volume[0] - 1):.2f} % and {100 * (volume[1] - 1):.2f} %; {THIN}",
         ),
-        Finding(
+        Measure(
             "pull at ν 0.49 over that at ν 0.30, same E",
             "P = μ (l − J/l²)",
             off(pull[1] / pull[0], ratio),
@@ -90,7 +90,7 @@ def poisson(bench: Bench, stretch: float = 1.5) -> list[Finding]:
     ]
 
 
-def damping(bench: Bench) -> list[Finding]:
+def damping(bench: Bench) -> list[Measure]:
     """Decay of the heavy middle: d scales it, s its shape part and not its volume part."""
 
     def decay(d: float, s: float) -> tuple[float, float]:
@@ -104,7 +104,7 @@ def damping(bench: Bench) -> list[Finding]:
     none, closed_none = decay(1e-2, 0.0)
     volume = closed_none / closed
     return [
-        Finding(
+        Measure(
             "decay at 2 d over that at d",
             "2",
             off(twice / base, 2.0),
@@ -112,7 +112,7 @@ def damping(bench: Bench) -> list[Finding]:
             1.0,
             f"{twice / base:.4f}; along the band, ν 0.30, s 1; {THIN}",
         ),
-        Finding(
+        Measure(
             "decay lost from s = 1 to s = 0.5",
             "half of the shape part",
             off((base - half) / (base - none), 0.5),
@@ -120,7 +120,7 @@ def damping(bench: Bench) -> list[Finding]:
             1.0,
             f"{(base - half) / (base - none):.4f} of what is lost from 1 to 0; {THIN}",
         ),
-        Finding(
+        Measure(
             "decay that is left at s = 0, over that at s = 1",
             "the volume part, d (λ − μ/3) J'²",
             off(none / base, volume),
@@ -131,7 +131,7 @@ def damping(bench: Bench) -> list[Finding]:
     ]
 
 
-def friction(bench: Bench, count: int = 33) -> list[Finding]:
+def friction(bench: Bench, count: int = 33) -> list[Measure]:
     """Coulomb: pads with the normal force N hold a pull of 2 mu N; then they open."""
     sling = band_of(bench)
     episode = pull_and_release("band", bench.params.episode, sling)
@@ -162,7 +162,7 @@ def friction(bench: Bench, count: int = 33) -> list[Finding]:
     expected = np.maximum(size[first] - rate * times[window], 0)
     miss = 100 * np.abs(size[window] - expected).max() / size[first]
     return [
-        Finding(
+        Measure(
             "least friction that holds the pull",
             "Coulomb, F = 2 μ N",
             off(found, least),
@@ -170,7 +170,7 @@ def friction(bench: Bench, count: int = 33) -> list[Finding]:
             0.25,
             f"{found:.4f}; {peak:.2f} N, pads of {sling.grip_force:g} N; below it: “{SLIP}”",
         ),
-        Finding(
+        Measure(
             "θ below it that do not slip",
             "0",
             float(holds[tries < 0.999 * least].sum()),
@@ -178,7 +178,7 @@ def friction(bench: Bench, count: int = 33) -> list[Finding]:
             0.0,
             f"of {int((tries < 0.999 * least).sum())}",
         ),
-        Finding(
+        Measure(
             "force while the fingers open",
             f"pull − 2 μ N t / T, T {1e3 * sling.finger_opening_time:g} ms",
             float(miss),

@@ -10,7 +10,7 @@ from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import steps
 from validation.simulator.experiment import TIGHT, band_of, launched, move, straight, straight_guess
-from validation.simulator.finding import Bench, Finding, Theme
+from validation.simulator.finding import Bench, Measure, Theme
 from validation.simulator.reference import ReferenceRod
 
 ROUNDING = 1e-11
@@ -50,7 +50,7 @@ def loose_band(bench: Bench) -> ClampedBand:
     return straight(sling, sling.rest_length, clamped=(False, False))
 
 
-def free_fall(bench: Bench, count: int = 60) -> list[Finding]:
+def free_fall(bench: Bench, count: int = 60) -> list[Measure]:
     sling, times = loose_band(bench), uneven(count)
     checks = []
     for order, name in ((1, "backward Euler"), (2, "second order, uneven steps")):
@@ -62,7 +62,7 @@ def free_fall(bench: Bench, count: int = 60) -> list[Finding]:
         miss = np.abs(motion.x[0, :, :, 2] - fall_of_a_point(times, order)[1:, None]).max()
         fallen = -motion.x[0, -1, 0, 2]
         checks.append(
-            Finding(
+            Measure(
                 f"height in free fall, {name}",
                 "the steps' own solution for a point mass",
                 float(miss / fallen),
@@ -124,7 +124,7 @@ def recoil(bench: Bench, h: float, order: int, damping: float, span: float = 0.0
     )
 
 
-def momentum(bench: Bench) -> list[Finding]:
+def momentum(bench: Bench) -> list[Measure]:
     """Linear momentum to rounding; angular momentum as far as the steps and the damping keep it."""
     step = bench.params.sling.recoil_step
     checks = []
@@ -132,7 +132,7 @@ def momentum(bench: Bench) -> list[Finding]:
         linear, coarse = recoil(bench, step, order, 0.0)
         _, fine = recoil(bench, step / 2, order, 0.0)
         checks.append(
-            Finding(
+            Measure(
                 f"linear momentum out of nothing, {name}",
                 "conservation",
                 linear,
@@ -142,7 +142,7 @@ def momentum(bench: Bench) -> list[Finding]:
             )
         )
         checks.append(
-            Finding(
+            Measure(
                 f"angular momentum out of nothing, {name}, no damping",
                 "conservation",
                 coarse,
@@ -153,7 +153,7 @@ def momentum(bench: Bench) -> list[Finding]:
             )
         )
     checks.append(  # of the second order, the last of both
-        Finding(
+        Measure(
             "order of angular momentum in time, second order, what it is short of 2",
             "conservation",
             float(np.maximum(2 - np.log2(coarse / fine), 0.0)),
@@ -164,7 +164,7 @@ def momentum(bench: Bench) -> list[Finding]:
     )
     damped, finer = (recoil(bench, h, 2, THETA[2])[1] for h in (step, step / 2))
     checks.append(
-        Finding(
+        Measure(
             f"angular momentum out of nothing, second order, d {1e3 * THETA[2]:g} ms",
             "conservation",
             damped,

@@ -14,7 +14,7 @@ from pipeline.simulator.model import GRAVITY, LaunchHistory
 from pipeline.simulator.records import Grip
 from pipeline.simulator.schedule import relaxation
 from validation.simulator.experiment import band_of, rest, setup_of
-from validation.simulator.finding import Bench, Finding, Theme, off
+from validation.simulator.finding import Bench, Measure, Theme, off
 from validation.simulator.reference import ReferenceRod
 
 COUNT, SEED, REFINE = 20, 3, 10
@@ -74,7 +74,7 @@ def convergence(
     sling: ClampedBand | None = None,
     history: LaunchHistory | None = None,
     **others: float,
-) -> list[Finding]:
+) -> list[Measure]:
     sling, (thetas, draws) = sling or band_of(bench), random_launches(count)
     setup = setup_of(bench, history=history)
     thetas = Parameters.of(sling.law, thetas, **others)
@@ -100,14 +100,14 @@ def convergence(
             note += f"; stated: past the {meshes[0]} times finer mesh that the limit is for"
         limit = None if name in stated else LIMIT
         checks.append(
-            Finding(
+            Measure(
                 f"launch speed, worst of {count} random θ", name, far["speed"], "%", limit, note
             )
         )
     return checks
 
 
-def order_in_time(bench: Bench, count: int = COUNT) -> list[Finding]:
+def order_in_time(bench: Bench, count: int = COUNT) -> list[Measure]:
     """Observed order of each launch's speed, from the default steps to the finest of REFINED."""
     sling, setup, (thetas, draws) = band_of(bench), setup_of(bench), random_launches(count)
     parameters = Parameters.of(sling.law, thetas)
@@ -122,7 +122,7 @@ def order_in_time(bench: Bench, count: int = COUNT) -> list[Finding]:
     worst = 100 * errors.max(axis=1)
     orders = np.log2(worst[:-1] / worst[1:])
     return [
-        Finding(
+        Measure(
             f"order of the launch speed in time, what it is short of 2 at worst of {count}",
             f"{REFERENCE} times finer steps, double precision",
             float(np.maximum(2 - lowest, 0.0)),
@@ -150,7 +150,7 @@ def _flight(y: float, z: float, speed: float, angle: float, floor: float) -> flo
     return float(path.y_events[0][0][0])
 
 
-def physics(bench: Bench, count: int = COUNT) -> list[Finding]:
+def physics(bench: Bench, count: int = COUNT) -> list[Measure]:
     """Ballistic flight, and the energy that the drawn band holds."""
     sling, setup, (thetas, draws) = band_of(bench), setup_of(bench), random_launches(count)
     parameters = Parameters.of(sling.law, thetas)
@@ -171,7 +171,7 @@ def physics(bench: Bench, count: int = COUNT) -> list[Finding]:
         shares.append(gained / rod.elastic(drawn))
     named = sum(reason is not None for reason in done.failure)
     return [
-        Finding(
+        Measure(
             "landing",
             "flight from where it leaves the pouch, integrated apart",
             off(done.landing_y, flights),
@@ -179,7 +179,7 @@ def physics(bench: Bench, count: int = COUNT) -> list[Finding]:
             1e-4,
             f"{count} random θ and draws; {named} failed",
         ),
-        Finding(
+        Measure(
             "energy of the projectile",
             "elastic energy of the drawn band",
             float(100 * np.max(shares)),

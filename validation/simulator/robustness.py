@@ -13,7 +13,7 @@ from pipeline.simulator import THETA, ClampedBand, Parameters, interact, launch
 from pipeline.simulator.parameters import EXTRA
 from validation.simulator.agreement import random_thetas
 from validation.simulator.experiment import band_of, setup_of
-from validation.simulator.finding import Bench, Finding, Theme
+from validation.simulator.finding import Bench, Measure, Theme
 from validation.synthetic import pull_and_release
 
 COUNT, LAUNCHES, FACES, BATCH, SEED = 10_000, 2_000, 500, 500, 1
@@ -118,12 +118,12 @@ def section(
     def told(reasons: dict) -> str:
         return "; ".join(f"{number} “{reason}”" for reason, number in reasons.items()) or "none"
 
-    def failed(name: str, one: dict) -> Finding:
+    def failed(name: str, one: dict) -> Measure:
         total = float(sum(one["reasons"].values()))
-        return Finding(name, "—", total, "θ", None, told(one["reasons"]))
+        return Measure(name, "—", total, "θ", None, told(one["reasons"]))
 
     boundary = [
-        Finding(
+        Measure(
             f"unconverged, and marked so, of {one['rollouts']} rollouts {where}, held fast",
             "0",
             float(len(one["unconverged"])),
@@ -137,7 +137,7 @@ def section(
         )
     ]
     checks = [
-        Finding(
+        Measure(
             f"not finite, though not marked failed, of {count} rollouts, {len(corners(bench))} at"
             f" corners and {faces} on faces of the box, {launches} with the default grip and"
             f" {launches} launches",
@@ -147,7 +147,7 @@ def section(
             0.0,
             f"farthest node {held['farthest_node_m']:.2f} m from the fork",
         ),
-        Finding(
+        Measure(
             f"unconverged, and marked so, of {count} rollouts within the box, held fast",
             "0, or marked failed with a reason",
             float(len(held["unconverged"])),

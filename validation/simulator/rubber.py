@@ -30,7 +30,7 @@ from validation.simulator.experiment import (
     straight,
     straight_guess,
 )
-from validation.simulator.finding import Bench, Finding, Theme, off
+from validation.simulator.finding import Bench, Measure, Theme, off
 from validation.simulator.reference import ReferenceRod
 
 SHAPES = (-0.3, 0.2), (0.3, 0.0), (0.9, 0.05)  # Mooney's share and the upturn
@@ -113,7 +113,7 @@ def drawn_across(
     return pull / (sling.area * young / (2 * (1 + FULL))), table["time"]
 
 
-def pull(bench: Bench, stretches=(1.2, 1.6, 2.2), shapes=SHAPES) -> list[Finding]:
+def pull(bench: Bench, stretches=(1.2, 1.6, 2.2), shapes=SHAPES) -> list[Measure]:
     """At rest, drawn so slowly that branches with weight 0 do nothing."""
     worst = 0.0
     for shape in shapes:
@@ -125,7 +125,7 @@ def pull(bench: Bench, stretches=(1.2, 1.6, 2.2), shapes=SHAPES) -> list[Finding
             )
             worst = max(worst, off(got[-1], stress(stretch, shape)))
     return [
-        Finding(
+        Measure(
             f"pull of a thin string to stretch {max(stretches):g}, worst of shares and upturns"
             f" {', '.join(f'{share:g}, {upturn:g}' for share, upturn in shapes)}",
             "Biderman in uniaxial stress, P = μ (λ − λ⁻²)(1 − m + m/λ + c (I₁ − 3))",
@@ -137,7 +137,7 @@ def pull(bench: Bench, stretches=(1.2, 1.6, 2.2), shapes=SHAPES) -> list[Finding
     ]
 
 
-def cycle(bench: Bench, most: float = 1.8, softening: float = SOFTENING) -> list[Finding]:
+def cycle(bench: Bench, most: float = 1.8, softening: float = SOFTENING) -> list[Measure]:
     """Drawn to a stretch, led back, drawn beyond it: no rate, so that softening alone is seen."""
     sling, shape = _string(bench), SHAPE
     turns = np.array([1.001, most, 1.3, most + 0.2])
@@ -148,7 +148,7 @@ def cycle(bench: Bench, most: float = 1.8, softening: float = SOFTENING) -> list
     left = [left_of(*pair, shape, softening) for pair in zip(path, worst, strict=True)]
     told, taut = stress(path, shape) * left, path > 1.05
     return [
-        Finding(
+        Measure(
             f"stress of a slow cycle to stretch {most:g}, back, and to {most + 0.2:g}, worst moment",
             "Ogden and Roxburgh's pseudo-elastic softening, by integrated works",
             float(100 * np.abs(got - told)[taut].max() / told.max()),
@@ -177,7 +177,7 @@ def integral(history, time: float, shape: tuple[float, float]) -> float:
     return left * (stress(history(time), shape) + weight * added)
 
 
-def relaxation(bench: Bench, shape=SHAPE, most: float = 1.6) -> list[Finding]:
+def relaxation(bench: Bench, shape=SHAPE, most: float = 1.6) -> list[Measure]:
     """A step of 0.2 s held for 3 s, and a loop out and back in 1 s."""
     ramp, turn = 0.2, 0.5
     histories = {
@@ -194,7 +194,7 @@ def relaxation(bench: Bench, shape=SHAPE, most: float = 1.6) -> list[Finding]:
         told = np.array([integral(history, at[k], shape) for k in chosen])
         worst = 100 * np.abs(got[chosen] - told).max() / told.max()
         checks.append(
-            Finding(
+            Measure(
                 f"stress {name}, to {100 * (most - 1):.0f} % strain, worst moment",
                 "hereditary integral of the nominal stress",
                 float(worst),
@@ -206,7 +206,7 @@ def relaxation(bench: Bench, shape=SHAPE, most: float = 1.6) -> list[Finding]:
     return checks
 
 
-def oscillator(bench: Bench, shape=SHAPE, stretch: float = 1.5) -> list[Finding]:
+def oscillator(bench: Bench, shape=SHAPE, stretch: float = 1.5) -> list[Measure]:
     """A heavy middle, its memory relaxed where it is let go, by the matrix exponential."""
     left, weight = relaxed_share(RELAXATION)
     mass, theta = 0.5, [1e6, FULL, 1e-6, 0.5, 0.0]
@@ -243,11 +243,11 @@ def oscillator(bench: Bench, shape=SHAPE, stretch: float = 1.5) -> list[Finding]
     ):
         note = f"{one:.4g} {unit}, closed form {other:.4g} {unit}; both as one damped oscillation"
         where = f"{name} of a heavy middle, damped by relaxation alone"
-        checks.append(Finding(where, against, off(one, other), "%", limit, note))
+        checks.append(Measure(where, against, off(one, other), "%", limit, note))
     return checks
 
 
-def growth(bench: Bench, count: int = 16, kinds=tuple(STATES)) -> list[Finding]:
+def growth(bench: Bench, count: int = 16, kinds=tuple(STATES)) -> list[Measure]:
     """Elastic, kinetic and the branches' energy after random states, relaxed there, are let go."""
     rng, worst, kept = np.random.default_rng(SEED), 0.0, 0
     for kind in kinds:
@@ -270,7 +270,7 @@ def growth(bench: Bench, count: int = 16, kinds=tuple(STATES)) -> list[Finding]:
             total = np.append(rod.elastic(motion.start[0]), total)
             worst = max(worst, float(np.diff(total).max() / total[0]))
     return [
-        Finding(
+        Measure(
             "rise of elastic, kinetic and branches' energy in any one step, backward Euler",
             "energy never grows without work",
             worst,
@@ -281,7 +281,7 @@ def growth(bench: Bench, count: int = 16, kinds=tuple(STATES)) -> list[Finding]:
     ]
 
 
-def slack(bench: Bench) -> list[Finding]:
+def slack(bench: Bench) -> list[Measure]:
     """A band that relaxed while drawn and is led back to its rest length pushes the hand no more.
 
     It is longer than it was; it bends out and grows short again.
@@ -299,7 +299,7 @@ def slack(bench: Bench) -> list[Finding]:
     force = np.linalg.norm(motion.force[0], axis=1)
     weight = sling.mass * 9.81
     return [
-        Finding(
+        Measure(
             "force on the hand a minute after a drawn band was led back, over the band's weight",
             "at most its weight: nothing is stretched",
             float(force[-1] / weight) if not motion.failed[0] else float("nan"),
@@ -310,7 +310,7 @@ def slack(bench: Bench) -> list[Finding]:
     ]
 
 
-def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Finding]:
+def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Measure]:
     """`launch` starts with what a pull and a pause leave in the memory: the march of that pull."""
     sling, draw = rubber_of(bench), np.array([-0.35, -0.15])
     theta = Parameters.of(RUBBER, theta, **own())
@@ -332,7 +332,7 @@ def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Finding]:
     )  # fmt: skip
     hold = float(np.linalg.norm(motion.force[0, -1]))
     return [
-        Finding(
+        Measure(
             "hold force of a launch with a history",
             "a simulated pull of 4 s and a pause of 2 s to that draw",
             off(done.hold_force[0], hold),
@@ -340,7 +340,7 @@ def histories(bench: Bench, theta=(3e5, 0.45, 2e-3, 0.5, 0.7)) -> list[Finding]:
             0.5,
             f"{done.hold_force[0]:.3f} N; {none.hold_force[0]:.3f} N without memory",
         ),
-        Finding(
+        Measure(
             "landing with a history against one that has forgotten all",
             "—",
             float(100 * (done.landing_y[0] / none.landing_y[0] - 1)),
@@ -358,13 +358,13 @@ def random_points(bench: Bench, count: int) -> Parameters:
     return box.parameters(box.to_physical(unit))
 
 
-def survey(bench: Bench, count: int = 10_000, progress=print) -> tuple[list[Finding], dict]:
+def survey(bench: Bench, count: int = 10_000, progress=print) -> tuple[list[Measure], dict]:
     sling = replace(rubber_of(bench), grip_force=robustness.HELD_FAST)
     found = robustness.survey(bench, sling, random_points(bench, count), progress)
     names = parameter_names(RUBBER)
     failed = robustness.ranges(found["unconverged"], names) if found["unconverged"] else ""
     return [
-        Finding(
+        Measure(
             f"not finite, though not marked failed, of {count} random points, negative shares among"
             " them",
             "0",
@@ -372,7 +372,7 @@ def survey(bench: Bench, count: int = 10_000, progress=print) -> tuple[list[Find
             "θ",
             0.0,
         ),
-        Finding(
+        Measure(
             f"unconverged, and marked so, of {count} random points, held fast",
             "0, or marked failed with a reason",
             float(len(found["unconverged"])),

@@ -30,7 +30,7 @@ from validation.simulator import (
     robustness,
     rubber,
 )
-from validation.simulator.finding import Bench, Finding, Theme, unmet
+from validation.simulator.finding import Bench, Measure, Theme, unmet
 
 HEAD = """\
 # The simulator, held against what is known
@@ -158,17 +158,17 @@ def _part(section: Theme, folder: str) -> str:
     return "\n".join(lines)
 
 
-def _row(check: Finding) -> str:
+def _row(check: Measure) -> str:
     met = {None: "", True: "yes", False: "**no**"}[check.met]
     cells = (check.name, figure(check), limit(check), met, check.against, check.note)
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def figure(check: Finding) -> str:
+def figure(check: Measure) -> str:
     return f"{_short(check.value)} {check.unit}"
 
 
-def limit(check: Finding) -> str:
+def limit(check: Measure) -> str:
     return "" if check.limit is None else f"≤ {_short(check.limit)} {check.unit}"
 
 

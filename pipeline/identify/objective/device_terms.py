@@ -6,13 +6,13 @@ import threading
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from pipeline.identify.objective.chamfer import Chamfer
 from pipeline.simulator.interaction import Rollouts
 
 if TYPE_CHECKING:
     import warp as wp
+    from scipy.sparse import csr_array
 
 
 class DeviceTerms:

@@ -12,20 +12,22 @@ from __future__ import annotations
 
 import threading
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import median_filter
-from scipy.sparse import csr_array
 
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 from pipeline.episode.phases import held_out_blocks, reach, within
-from pipeline.episode.signal import as_recorded, cutoff_hz
+from pipeline.episode.signal import cutoff_hz, recording_matrix
 from pipeline.identify.objective.chamfer import Chamfer, CloudDistance
 from pipeline.identify.objective.device_terms import DeviceTerms
 from pipeline.params import Params
 from pipeline.simulator.interaction import Rollouts
 from pipeline.simulator.model import ClampedBand
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 TERMS = ("geom", "force", "work")
 LOCK = threading.Lock()  # while a filter is made, which takes a second
@@ -188,6 +190,8 @@ class EpisodeLoss:
 
     def smooth(self, signal: np.ndarray) -> np.ndarray:
         """Median filter along the samples of (..., T, 3)."""
+        from scipy.ndimage import median_filter
+
         window = (1,) * (signal.ndim - 2) + (self.median_window, 1)
         return median_filter(signal, size=window, mode="nearest")
 
@@ -234,9 +238,7 @@ def _recording_filter(
     It is the recorded force's way (interpolation, low-pass, averages), which is linear, and
     forgets: weights that no rounding would show are left out.
     """
-    times, parts = np.frombuffer(stamps), []
-    for first in range(0, len(times), 32):
-        pulses = np.eye(len(times), min(32, len(times) - first), -first)
-        parts.append(as_recorded(times, pulses, cutoff, start, period, samples))
-    weights = np.hstack(parts)
+    from scipy.sparse import csr_array
+
+    weights = recording_matrix(np.frombuffer(stamps), cutoff, start, period, samples)
     return csr_array(np.where(np.abs(weights) > 1e-18, weights, 0))

@@ -66,7 +66,7 @@ class Identified:
     @property
     def rollouts(self) -> int:
         """Simulated interactions of the fit."""
-        each = len(self.coordinates.names) + 1 + len(SIMULATED)
+        each = len(self.coordinates.names) + len(SIMULATED)  # with the mode, without the clock
         return self.fit.steps * len(self.recordings) * each
 
 

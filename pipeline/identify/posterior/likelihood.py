@@ -3,21 +3,22 @@
     -2 log p(recording | phi) = min over n of |r(phi, n) / sigma|^2 + |n / tolerance|^2
 
 Nuisances n are what a recording leaves open of its instruments, Gaussian, each recording's own.
-Release, camera's clock and the hand's offset along the pull must be simulated; bias and drift of
-the force, the extrinsics and the stamp of each picture act linearly on the measured side. For
-Gaussians the minimum over n is, up to a constant, the integral over n.
+Release and the hand's offset along the pull are simulated, and what another camera's clock sees is
+taken from the same rollouts; bias and drift of the force, the extrinsics and the stamp of each
+picture act linearly on the measured side. For Gaussians the minimum over n is, up to a constant,
+the integral over n.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.episode.episode import Episode
-from pipeline.identify.posterior.residuals import Residuals
+from pipeline.identify.posterior.residuals import Residuals, Rule
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
@@ -142,23 +143,39 @@ class Likelihood:
         end = np.searchsorted(episode.time, episode.release_time)
         place = episode.position[max(end - 5, 0) : end].mean(axis=0)
         self._away = place / np.linalg.norm(place)
+        self._frames = max(Rule().frames(episode), default=-1) + 1  # what follows counts nowhere
 
     def shifted(self, nuisances: np.ndarray) -> Episode:
-        """The episode with another release, camera's clock and place of the hand, (3,)."""
+        """The episode with another release, camera's clock and place of the hand, (3,).
+
+        Without the pictures that count nowhere.
+        """
         release, camera, hand = nuisances
         return replace(
             self.episode,
             release_time=self.episode.release_time + release,
-            cloud_time=self.episode.cloud_time + camera,
+            cloud_time=self.episode.cloud_time[: self._frames] + camera,
             position=self.episode.position + hand * self._away,
         )
 
-    def simulate(self, parameters: Parameters, nuisances: np.ndarray) -> Rollouts:
-        """Rollouts of N parameters. Raises Failed."""
-        rollouts = interact(self.sling, self.shifted(nuisances), parameters)
-        if why := next((one for one in rollouts.failure if one), None):
+    def simulate(
+        self, parameters: Parameters, nuisances: np.ndarray, late: Sequence[float] = (0.0,)
+    ) -> list[Rollouts]:
+        """Rollouts of N parameters, as pictures show them that are so late [s]. Raises Failed.
+
+        They end with the last picture that counts.
+        """
+        episode = self.shifted(nuisances)
+        stamps = [episode.cloud_time + one for one in late]
+        every, places = np.unique(np.concatenate(stamps), return_inverse=True)
+        seen = replace(episode, cloud_time=every)
+        done = interact(self.sling, seen, parameters, until=max(every, default=np.inf))
+        if why := next((one for one in done.failure if one), None):
             raise Failed(why)
-        return rollouts
+        return [
+            replace(done, cloud_time=one, center_line=done.center_line[:, where])
+            for one, where in zip(stamps, np.split(places, len(stamps)), strict=True)
+        ]
 
     def expand(
         self,
@@ -177,14 +194,19 @@ class Likelihood:
             residuals: Whose bins are taken; None: bins of the rollout there.
         """
         around = parameters_of(phi + np.vstack([0 * steps, np.diag(steps)]))
-        jobs = [(around, nuisances)]
-        jobs += [(around[:1], nuisances + nudge) for nudge in np.diag(NUDGE)]
-        first, *others = pool.map(lambda job: self.simulate(*job), jobs)
+        release, _, hand = np.diag(NUDGE)
+        jobs = [
+            (around, nuisances, (0.0, NUDGE[1])),
+            (around[:1], nuisances + release),
+            (around[:1], nuisances + hand),
+        ]
+        (first, later), (released,), (led,) = pool.map(lambda job: self.simulate(*job), jobs)
+        later = replace(later, force=later.force[:1], center_line=later.center_line[:1])
         residuals = residuals or Residuals(
             self.episode, self.sling, self.cutoff, first.center_line[0]
         )
         vectors = residuals(first)
-        moved = np.concatenate([residuals(one) for one in others])
+        moved = np.concatenate([residuals(one) for one in (released, later, led)])
         gap = vectors[0]
         slopes = ((vectors[1:] - gap) / steps[:, None], (moved - gap) / NUDGE[:, None])
         return self._eliminated(residuals, gap, *slopes, nuisances)

@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipeline.base.errors import UserError
-from pipeline.base.files import replacing
+from pipeline.base.files import read_table, replacing
 from pipeline.identify.objective.evaluate import Evaluation
 from pipeline.identify.objective.loss import TERMS
 from pipeline.params.identification import LEAST_SQUARES
@@ -80,7 +80,7 @@ class History:
     @classmethod
     def load(cls, method: str, names: tuple[str, ...], *paths: Path) -> History:
         """Read files that `save` wrote, one after the other."""
-        return cls(method, names, [pq.read_table(path) for path in paths])
+        return cls(method, names, [read_table(path) for path in paths])
 
     def followed_by(self, other: History) -> History:
         """These rows, then those of `other`."""

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
-from scipy.stats import qmc
 
 from pipeline.base.errors import UserError
 from pipeline.identify.objective.box import SearchBox
@@ -44,6 +43,8 @@ def latin_hypercube(dimension: int, count: int, seed: int) -> np.ndarray:
     SciPy's differential evolution shifts what it is given by a half and back; these points stand
     that to the last bit, so that all searches start with the very same ones.
     """
+    from scipy.stats import qmc  # which takes half a second
+
     points = qmc.LatinHypercube(dimension, rng=np.random.default_rng(seed)).random(count)
     return (points - 0.5) + 0.5
 

@@ -18,7 +18,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.base.files import replacing
+from pipeline.base.files import read_table, replacing
 from pipeline.launching.surface.response_surface import NO_FAILURE, Landings, ResponseSurface
 
 
@@ -139,7 +139,7 @@ class LandingMap:
     @classmethod
     def load(cls, path: Path) -> LandingMap:
         """Read a map that `save` wrote. Raises FileNotFoundError."""
-        table = pq.read_table(path)
+        table = read_table(path)
         header = json.loads(table.schema.metadata[b"landing_map"])
         kind = np.array(table["kind"].to_pylist())
         column = {

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.special import ndtri
 
@@ -14,13 +16,32 @@ MOST = 60  # samples of θ that are launched
 ERRORS = ndtri((np.arange(401) + 0.5) / 401)  # equally likely; 41 end 6 % too soon
 
 
+@dataclass(frozen=True)
+class Spread:
+    """Landings of N draws.
+
+    Attributes:
+        centres: With each sample of θ, or with θ alone [m], shape (N, M); NaN where one fails.
+        slope: Standard deviation by the error of the draw [m], shape (N,).
+        interval: Central 90 % [m], shape (N, 2); NaN where launches fail.
+    """
+
+    centres: np.ndarray
+    slope: np.ndarray
+    interval: np.ndarray
+
+
 def landing_intervals(
-    launcher: Launcher,
-    draws: np.ndarray,
-    samples: Parameters | None,
-    error: float,
+    launcher: Launcher, draws: np.ndarray, samples: Parameters | None, error: float
 ) -> np.ndarray:
-    """Central 90 % of the landings of each draw [m], shape (N, 2); NaN where launches fail.
+    """The intervals of `landing_spread`, shape (N, 2)."""
+    return landing_spread(launcher, draws, samples, error).interval
+
+
+def landing_spread(
+    launcher: Launcher, draws: np.ndarray, samples: Parameters | None, error: float
+) -> Spread:
+    """Where draws may land.
 
     Landings of samples of θ, what the law gets wrong among them (`returned_share`), spread by the
     error of the draw through the launch's own gradient. More than a tenth of failures among the
@@ -50,7 +71,7 @@ def landing_intervals(
         if len(good) >= 0.9 * len(centre) and np.isfinite(width):
             all_of_them = (good[:, None] + width * ERRORS).ravel()
             result[row] = np.quantile(all_of_them, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return result
+    return Spread(centres, spread, result)
 
 
 def _landing(launched: Launched) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.base.files import replacing
+from pipeline.base.files import read_table, replacing
 from pipeline.base.layout import made
 from pipeline.base.pool import Pool
 from pipeline.launching.surface.stored import Stored
@@ -101,7 +101,7 @@ class Batch:
     @classmethod
     def load(cls, path: Path) -> Batch:
         """Read what `save` wrote. Raises NotMade."""
-        rows = pq.read_table(made(path)).to_pylist()
+        rows = read_table(made(path)).to_pylist()
         ways = [
             None if row["flight_y"] is None else np.stack([row["flight_y"], row["flight_z"]], 1)
             for row in rows

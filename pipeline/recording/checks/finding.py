@@ -33,7 +33,7 @@ class Finding:
     Attributes:
         about: The check's name.
         what: With the numbers of this recording.
-        cure: What to do about it.
+        cure: What to do about it; "" where `what` says it.
         refused: The recording cannot be used.
     """
 
@@ -43,4 +43,8 @@ class Finding:
     refused: bool = False
 
     def __str__(self) -> str:
-        return f"{self.what}: {self.cure}"
+        return f"{self.what}: {self.cure}" if self.cure else self.what
+
+    def content(self) -> dict[str, str]:
+        """For an episode's metadata."""
+        return {"about": self.about, "what": self.what, "cure": self.cure}

@@ -11,7 +11,7 @@ from pipeline.params import Params
 from pipeline.report.card.inputs import CardInputs
 from pipeline.report.card.values import boxes
 from pipeline.report.card.verdict import FURTHER, Findings
-from pipeline.report.drawing.names import as_code
+from pipeline.report.drawing.names import as_code, as_text
 from pipeline.report.quantities import QUANTITIES, rounded
 
 OUTSIDE = float(ndtri((1 + LEVEL) / 2))  # standard deviations: beyond the interval
@@ -44,6 +44,7 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
     left = [abs(one["left"]) for one in evidence if one["left"] is not None]
     miss = np.abs(aims.landing - aims.target)
     return Findings(
+        cautions=_cautions(inputs.episodes),
         settled=confidence.get("settled"),
         force=worst("force_rms"),
         held=worst("held_rms"),
@@ -104,6 +105,19 @@ def _density(params: Params, band: str) -> float | None:
     """Of a band that somebody weighed [kg/m^3]."""
     sizes = params.bands[band]
     return None if sizes.source == "rig" else sizes.density
+
+
+def _cautions(episodes: list[Episode]) -> list[tuple[str, str]]:
+    """What of each pull's recording costs accuracy, and what to do about it: sentences."""
+    found = []
+    for episode in episodes:
+        source = episode.metadata["input"]
+        pull = f"pull {source.get('pull', 1)} of {as_code(source['file'])}"
+        for one in episode.cautions:
+            cure = as_text(one["cure"])
+            told = f"In {pull}, {as_text(one['what'])}.", f"For {pull}: {cure}."
+            found.append(told)
+    return found
 
 
 def _odd(recordings: list[dict]) -> str:

@@ -15,10 +15,10 @@ from pipeline.episode.episode import Episode
 from pipeline.identify.results.theta import load_samples, load_theta, parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.surface.stored import Stored
-from pipeline.launching.trials.spread import MOST, landing_intervals
+from pipeline.launching.trials.spread import landing_spread
 from pipeline.launching.trials.stretch import recorded_stretch, stretch_of
 from pipeline.params import Params
-from pipeline.simulator.launch import Launches, landing_gradient, limited
+from pipeline.simulator.launch import Launches, limited
 from pipeline.simulator.parameters import Parameters
 
 
@@ -133,21 +133,13 @@ def aims(
     """Launch draws (T, 2) at targets (T,), with the best θ and with samples of it.
 
     Args:
-        launcher: As `landing_intervals` takes it.
+        launcher: As `landing_spread` takes it.
         stretch: Of the band held at points (N, 3).
         params: The whole of params.yaml.
     """
-    error, count = params.trials.actuation_error, len(draw)
     launches = limited(launcher(draw), params.setup.max_force)
-    interval = landing_intervals(launcher, draw, samples, error)
-    interval[np.isnan(launches.landing_y)] = np.nan
-    _, gradient = landing_gradient(lambda around: launcher(around).landing_y, draw)
-    slope = error * np.linalg.norm(gradient, axis=1)
-    landings = np.zeros((count, 0))
-    if samples is not None:
-        some = np.linspace(0, len(samples) - 1, min(MOST, len(samples))).astype(int)
-        launched = launcher(np.repeat(draw, len(some), axis=0), samples[np.tile(some, count)])
-        landings = launched.landing_y.reshape(count, -1)
+    spread = landing_spread(launcher, draw, samples, params.trials.actuation_error)
+    interval = np.where(np.isnan(launches.landing_y)[:, None], np.nan, spread.interval)
     return Aims(
         target=target,
         draw=draw,
@@ -156,6 +148,6 @@ def aims(
         hold_force=launches.hold_force,
         failure=launches.failure,
         stretch=stretch(np.insert(draw, 0, 0, axis=1)),
-        slope=slope,
-        samples=landings,
+        slope=spread.slope,
+        samples=np.zeros((len(draw), 0)) if samples is None else spread.centres,
     )

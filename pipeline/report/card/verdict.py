@@ -55,6 +55,7 @@ class Findings:
     """What is known of a band, in plain numbers; SI units.
 
     Attributes:
+        cautions: Of the recordings, in words, and what would mend them.
         settled: Whether the density's last step was small; None where the method has no density.
         force, held, recoil: Worst root mean squares of all recordings [N], [m], [m].
         recoil_seen: Whether any picture shows the recoil.
@@ -78,6 +79,7 @@ class Findings:
         density: Of the band by its mass and size [kg/m^3]; None of the virtual rig's.
     """
 
+    cautions: Sequence[tuple[str, str]]
     settled: bool | None
     force: float
     held: float
@@ -126,7 +128,8 @@ class Reason:
 
 def judge(found: Findings) -> tuple[str, list[Reason]]:
     """The verdict and what speaks against, causes before what may follow from them."""
-    reasons = [*_identified(found), *_launches(found), *_tried(found)]
+    recorded = [Reason(False, what, cure) for what, cure in found.cautions]
+    reasons = [*recorded, *_identified(found), *_launches(found), *_tried(found)]
     if not reasons:
         return TRUSTED, []
     return (NO if any(reason.against for reason in reasons) else CARE), reasons

@@ -14,6 +14,12 @@ def as_code(name: str) -> str:
     return f"{fence} {shown} {fence}" if "`" in shown else f"{fence}{shown}{fence}"
 
 
+def as_text(words: str) -> str:
+    """Words with names in them, in a sentence: no markup of theirs counts."""
+    shown = printable(words).replace("&", "&amp;").replace("<", "&lt;").replace("](", "]\\(")
+    return re.sub(r"([`*])", r"\\\1", shown)
+
+
 def cell(text: str) -> str:
     """In a table, where a bar would end the cell, in code too."""
     return text.replace("|", "\\|")

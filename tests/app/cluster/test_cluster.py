@@ -1,6 +1,5 @@
 """Stages on Dask workers: a toy project in working copies of its own, a scheduler, a DVC remote."""
 
-import shutil
 import signal
 import subprocess
 import sys
@@ -18,11 +17,10 @@ from tests.project import alive, until
 
 
 @pytest.fixture(scope="module")
-def several(tmp_path_factory: pytest.TempPathFactory, history: Path) -> Iterator[Several]:
+def several(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Several]:
     several = None
     try:
         several = Several(tmp_path_factory.mktemp("several"))
-        shutil.copytree(history, several.head.folder / ".prefect")
         yield several
     finally:
         if several:

@@ -8,7 +8,6 @@ import numpy as np
 from PIL import Image
 
 from app.flow.artifacts import artifact
-from app.flow.graph import Stage
 from pipeline.base.files import write_text
 from tests.report.run.conftest import BAND, METHOD, root, template
 
@@ -16,7 +15,7 @@ __all__ = ["root", "template"]  # fixtures
 
 
 def shown(root, step: str, item: str = f"{BAND}-{METHOD}") -> str:
-    return artifact(Stage(f"{step}@{item}", step, item, (), False), root)
+    return artifact(f"{step}@{item}", root)
 
 
 def picture(text: str, name: str) -> np.ndarray:

@@ -14,7 +14,6 @@ from app.flow import guard
 from app.flow.child import StageFailed, run_stage
 from stages import dvc_files
 from tests.app.flow.killing import OUTPUTS, STEPS, Toy
-from tests.app.flow.serving import serving
 from validation.projects import SLING, command_line, send, wait
 
 pytestmark = pytest.mark.slow
@@ -43,20 +42,18 @@ def temporaries(toy: Toy) -> list[Path]:
     return [file for file in toy.folder.rglob("*.tmp") if file.is_file()]
 
 
-def test_flows_are_interrupted_and_killed_and_the_next_one_goes_on(toy: Toy, history) -> None:
+def test_flows_are_interrupted_and_killed_and_the_next_one_goes_on(toy: Toy) -> None:
     """One after the other; of the real stages, to the same bytes: validation/campaigns."""
-    shutil.copytree(history, toy.folder / ".prefect")
-    interrupted(toy, os.killpg, signal.SIGINT)  # as a terminal does, with a server of its own
-    with serving(toy.folder, {**toy.environment, "SLING_TEST_RUN": ""}):
-        interrupted(toy, os.kill, signal.SIGTERM)
-        flow = at_work(toy)
-        flow.kill()
-        flow.wait()
-        assert toy.run.left() == []
-        assert "Traceback" not in toy.run.said
-        remaining = sum(STEPS - kept(toy, name) for name in "ab")
-        flow = toy.run.start(*FLOW)
-        assert flow.wait(READY) == 0, toy.run.said
+    interrupted(toy, os.killpg, signal.SIGINT)  # as a terminal does
+    interrupted(toy, os.kill, signal.SIGTERM)
+    flow = at_work(toy)
+    flow.kill()
+    flow.wait()
+    assert toy.run.left() == []
+    assert "Traceback" not in toy.run.said
+    remaining = sum(STEPS - kept(toy, name) for name in "ab")
+    flow = toy.run.start(*FLOW)
+    assert flow.wait(READY) == 0, toy.run.said
     assert steps(toy.run.said) == remaining  # from where they were killed
     assert toy.outputs() == OUTPUTS
     assert not temporaries(toy)

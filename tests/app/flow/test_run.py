@@ -1,20 +1,21 @@
-"""Flows of a small project as a user starts them, shown by one Prefect server."""
+"""Flows of a small project as a user starts them."""
 
+import json
 import os
 import re
 import shutil
 import subprocess
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from app.flow import guard, run
+from app.flow.log import FOLDER
 from pipeline.base.errors import UserError
-from tests.app.flow.serving import ask, serving
+from tests.app.flow.serving import SECONDS, ask, serving
 from tests.app.flow.toy import Toy, stage
-from tests.project import python
+from tests.project import python, until
 from validation.projects import CLI
 
 GPU = {"gpu": True}
@@ -32,22 +33,20 @@ NAMES = {"top", "side@left", "side@right", "free-a", "free-b", "bottom"}
 
 
 @pytest.fixture(scope="module")
-def toy(tmp_path_factory: pytest.TempPathFactory, history: Path) -> Toy:
+def toy(tmp_path_factory: pytest.TempPathFactory) -> Toy:
     toy = Toy(tmp_path_factory.mktemp("run") / "toy", STAGES, word="one\n", other="one\n")
-    shutil.copytree(history, toy.folder / ".prefect")
     return toy
-
-
-@pytest.fixture(scope="module")
-def api(toy: Toy) -> Iterator[str]:
-    """The address of Prefect's API, served by `sling ui`."""
-    with serving(toy.folder, toy.environment) as (url, _):
-        yield f"{url}/api"
 
 
 def sling(toy: Toy, *arguments: str, **exported: str) -> subprocess.CompletedProcess:
     """`sling flow`."""
     return python(*CLI, "flow", *arguments, folder=toy.folder, **{**toy.environment, **exported})
+
+
+def last(toy: Toy) -> list[dict]:
+    """The log of the last run."""
+    path = max((toy.folder / FOLDER).iterdir(), key=lambda one: one.stat().st_mtime_ns)
+    return [json.loads(line) for line in path.read_text("utf-8").splitlines()]
 
 
 def overlap(toy: Toy, *names: str) -> bool:
@@ -56,7 +55,7 @@ def overlap(toy: Toy, *names: str) -> bool:
 
 
 @pytest.mark.slow
-def test_a_whole_flow(toy: Toy, api: str) -> None:
+def test_a_whole_flow(toy: Toy) -> None:
     done = sling(toy, "--workers", "3", "--gpus", "1", SLING_DEVICE="cpu", COLOUR="blue")
     assert done.returncode == 0, done.stderr
     assert re.fullmatch(
@@ -77,24 +76,23 @@ def test_a_whole_flow(toy: Toy, api: str) -> None:
 
     assert toy.dvc("repro") == set()
     assert not (toy.folder / ".gitignore").exists()
-    limit = ask(api, "/v2/concurrency_limits/sling-gpu")
-    assert (limit["limit"], limit["active_slots"]) == (1, 0)
-    tasks = ask(api, "/task_runs/filter", {})
-    assert {one["name"]: one["state_name"] for one in tasks} == dict.fromkeys(NAMES, "Completed")
 
 
 @pytest.mark.slow
-def test_what_is_fresh_needs_no_prefect(toy: Toy, api: str) -> None:
+def test_a_flow_needs_no_prefect(toy: Toy) -> None:
+    (toy.folder / "other").write_text("one\nmore\n")
     script = (
         "import sys; from pathlib import Path; from app.flow.run import run\n"
         "print(run(Path.cwd())); assert 'prefect' not in sys.modules"
     )
+    assert "stages: 2 ran" in toy("python", "-c", script)
     said = toy("python", "-c", script)
     assert re.fullmatch(r"all 6 stages are fresh \(.* s\)\n", said)
+    assert not (toy.folder / ".prefect").exists()
 
 
 @pytest.mark.slow
-def test_a_failure_stops_only_what_follows_from_it(toy: Toy, api: str) -> None:
+def test_a_failure_stops_only_what_follows_from_it(toy: Toy) -> None:
     toy.ran()
     (toy.folder / "word").write_text("bad\n")
     (toy.folder / "other").write_text("two\n")
@@ -108,7 +106,7 @@ def test_a_failure_stops_only_what_follows_from_it(toy: Toy, api: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_next_flow_goes_on_and_an_unchanged_output_ends_it(toy: Toy, api: str) -> None:
+def test_the_next_flow_goes_on_and_an_unchanged_output_ends_it(toy: Toy) -> None:
     """After the failure above, with the word that was there before it."""
     toy.ran()
     (toy.folder / "word").write_text("one\nmore\n")
@@ -116,8 +114,36 @@ def test_the_next_flow_goes_on_and_an_unchanged_output_ends_it(toy: Toy, api: st
     assert done.stdout.startswith("stages: 1 ran, 3 fresh after all, 0 failed, 0 not run (")
     assert toy.ran() == {"top"}
     assert toy.dvc("repro") == set()
-    tasks = ask(api, "/task_runs/filter", {"sort": "EXPECTED_START_TIME_DESC", "limit": 4})
-    assert sorted(one["state_name"] for one in tasks) == ["Completed", "Fresh", "Fresh", "Fresh"]
+    states = {one.get("stage"): one["state"] for one in last(toy) if one["what"] == "ended"}
+    assert states == {
+        "top": "ran", "side@left": "fresh", "side@right": "fresh", "bottom": "fresh", None: "ran",
+    }  # fmt: skip
+
+
+@pytest.mark.slow
+def test_the_ui_shows_runs_that_were_and_the_one_that_is(tmp_path: Path, history: Path) -> None:
+    """By a server of Prefect's."""
+    stages = {"top": stage("top", "word"), "low": stage("low", "top.out")}
+    toy = Toy(tmp_path / "toy", stages, word="one\n")
+    shutil.copytree(history, toy.folder / ".prefect")
+    assert sling(toy).returncode == 0
+    with serving(toy.folder, toy.environment) as (url, _):
+
+        def shown() -> list[dict]:
+            return ask(f"{url}/api", "/flow_runs/filter", {"sort": "START_TIME_ASC"})
+
+        until(lambda: [one["state_name"] for one in shown()] == ["Completed"], SECONDS)
+        (toy.folder / "word").write_text("bad\n")
+        done = sling(toy)
+        assert f"seen at {url}" in done.stderr
+        until(lambda: [one["state_name"] for one in shown()] == ["Completed", "Failed"], SECONDS)
+        graph = ask(f"{url}/api", f"/flow_runs/{shown()[0]['id']}/graph-v2")
+        nodes = {node["label"]: node for _, node in graph["nodes"]}
+        assert [one["id"] for one in nodes["low"]["parents"]] == [nodes["top"]["id"]]
+        said = ask(f"{url}/api", "/logs/filter", {})
+        assert {"top works", "error: word: says bad; write something else"} <= {
+            one["message"] for one in said
+        }
 
 
 def test_two_flows_in_one_folder_are_refused(tmp_path, monkeypatch) -> None:

@@ -1,50 +1,72 @@
-"""What becomes of a flow that Prefect ends before its time; the rest is in test_run.py."""
+"""What becomes of stages that fail and of an interrupt; of real stages: test_run.py."""
 
-import shutil
-from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from app.flow import tasks
+from app.flow import child
 from app.flow.graph import Stage
+from app.flow.log import RunLog
 from app.flow.scheduler import Scheduler
+from app.flow.tasks import Tasks, perform
 from pipeline.base.errors import UserError
+from tests.app.flow.test_log import without_time
 
-STATE = SimpleNamespace(name="Failed", message="it raised:\n  RuntimeError: no\nmore")
+ONE, TWO = Stage("one", "one", "", (), False), Stage("two", "two", "", ("one",), False)
+GRAPH = SimpleNamespace(is_fresh=lambda name: False)
 
 
-def test_a_flow_that_prefect_ends_early_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Prefect keeps what the body of a flow raises, and returns its state."""
-    stage = Stage("one", "one", "", (), False)
-    for name in ("_prepare", "_flush"):
-        monkeypatch.setattr(tasks, name, lambda *_: None)
-    monkeypatch.setattr(tasks, "Run", lambda *_: lambda: STATE)
-    monkeypatch.setattr("app.flow.server.served", lambda root: nullcontext("nowhere"))
-    early = r"^Prefect ended the flow early \(it raised: .* no more\); run"
-    for waiting, interrupted, ends in (
-        ([stage], False, pytest.raises(UserError, match=early)),
-        ([], True, pytest.raises(KeyboardInterrupt)),
-        ([], False, nullcontext()),
+def performed(root: Path, place) -> Scheduler:
+    """Both stages, run by `place`."""
+    scheduler = Scheduler([ONE, TWO], 2)
+    with RunLog(root, "sling flow", ["one", "two"]) as log:
+        perform(scheduler, Tasks(root, GRAPH, {}, place, log))  # pyright: ignore[reportArgumentType]
+    return scheduler
+
+
+def ended(root: Path) -> dict[str, str]:
+    """States by stage, and of the run."""
+    events = without_time(root)
+    return {one.get("stage", "run"): one["state"] for one in events if one["what"] == "ended"}
+
+
+def test_what_ran_and_what_came_from_the_cache(tmp_path: Path) -> None:
+    done = performed(tmp_path, lambda root, name, **_: name == "one")
+    assert (done.ran, done.fresh) == (["one"], ["two"])
+    assert ended(tmp_path) == {"one": "ran", "two": "cached", "run": "ran"}
+
+
+def test_a_fault_of_ours_is_a_failed_stage_in_one_line(tmp_path: Path) -> None:
+    for error, line in (
+        (RuntimeError("no\nmore"), "one: RuntimeError: no more"),
+        (child.StageFailed("one: says bad"), "one: says bad"),
     ):
-        with ends:
-            tasks.perform(Path(), Scheduler(waiting, 1), SimpleNamespace(interrupted=interrupted))
+
+        def place(*_, error: Exception = error, **__) -> bool:
+            raise error
+
+        done = performed(tmp_path / type(error).__name__, place)
+        assert isinstance(done.failed["one"], UserError) and str(done.failed["one"]) == line
+        assert done.not_run == ["two"]
+        assert ended(tmp_path / type(error).__name__)["one"] == "failed"
 
 
-def test_prefects_failure_on_a_full_disk_is_the_disks(tmp_path, monkeypatch) -> None:
-    """Its server answers with a bare 500."""
+def test_an_interrupt_ends_what_runs_before_it_goes_on(tmp_path: Path, monkeypatch) -> None:
+    class Interrupted:
+        """As a queue is at Ctrl-C."""
 
-    def fails(*_) -> None:
-        raise RuntimeError("500 Internal Server Error")
+        def put(self, _) -> None: ...
 
-    for name, stub in (("_prepare", fails), ("_flush", lambda: None)):
-        monkeypatch.setattr(tasks, name, stub)
-    monkeypatch.setattr("app.flow.server.served", lambda root: nullcontext("nowhere"))
-    stage = Stage("one", "one", "", (), False)
-    usage = shutil.disk_usage(tmp_path)
-    for free, says in ((10_000, "No space left on device"), (10**8, "500 Internal")):
-        found = usage._replace(free=free)
-        monkeypatch.setattr(shutil, "disk_usage", lambda _, found=found: found)
-        with pytest.raises(UserError, match=says):
-            tasks.perform(tmp_path, Scheduler([stage], 1), SimpleNamespace(interrupted=False))
+        def get(self):
+            raise KeyboardInterrupt
+
+    def place(root, name: str, *, cancelled, **_) -> bool:
+        while not cancelled():
+            pass
+        raise child.Cancelled
+
+    monkeypatch.setattr("app.flow.tasks.SimpleQueue", Interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        performed(tmp_path, place)
+    assert ended(tmp_path) == {"one": "cancelled", "run": "cancelled"}

@@ -8,10 +8,10 @@ import pytest
 
 from app.preflight.check import ASSUMED, band_of, check_recording
 from app.preflight.command import check
-from app.preflight.facts import BandFacts, DelayFacts
-from app.preflight.report import Caution, CheckReport
-from app.preflight.verdict import cautions_of, pause
+from app.preflight.facts import BandFacts
+from app.preflight.report import CheckReport
 from pipeline.base.errors import UserError, printable
+from pipeline.recording.checks.finding import Finding
 from tests.hostile import MARKUP
 from tests.project import with_
 from validation.recordings.bag import RADIUS, START, Truth, blind_bag, edit, head, write_bag
@@ -44,7 +44,7 @@ def test_the_report_of_a_good_recording(looked, seen) -> None:
 
 
 def test_the_verdict_and_its_cautions_come_first(looked) -> None:
-    cautions = [Caution("gap", "the force has a gap", "record it again")]
+    cautions = [Finding("gap", "the force has a gap", "record it again")]
     for problem, verdict in (
         (None, "can be used, but:"),
         ("no force", "cannot be used: no force"),
@@ -89,47 +89,6 @@ def test_what_is_wrong_is_said_with_its_cure(tmp_path, params) -> None:
         assert caution.cure and "\n" not in str(caution) and str(caution) in text
 
 
-def test_cautions_come_from_the_report_alone(looked, params) -> None:
-    report = looked.report
-    bad = replace(
-        report,
-        notes=["no checksums in the file: damage to its messages would not be noticed"],
-        losses=["2 damaged chunks dropped"],
-        signals=replace(
-            report.signals,
-            grasp_s=0.3,
-            drift_n_s=[0.0, 1.0, 0.0],
-            turn_deg=3.0,
-            release_error_s=0.004,
-            slips_s=[1.5],
-        ),
-        delays={"pose": DelayFacts(0.012, 0.001, source="x", applied=True)},
-        cloud=replace(report.cloud, empty=20, damaged=20, unpaired=20),
-        phases=[replace(report.phases[2], coverage=0.5)],
-        extrinsics=replace(report.extrinsics, off_m=0.02, hand_off_m=0.05),
-    )
-    found = {caution.about for caution in cautions_of(bad, looked.done)}
-    said = "checksums losses lead_in drift turn release slip delay empty damaged unpaired coverage"
-    assert {*said.split(), "extrinsics", "hand"} <= found
-    none = cautions_of(replace(report, extrinsics={}), looked.done)
-    assert "extrinsics" in {caution.about for caution in none}
-
-
-def test_times_of_receipt_tell_of_another_clock(looked, params) -> None:
-    """A picture may come late, by a slow driver, and not before it was taken."""
-    poses, pictures = (
-        {0.3: True, -0.05: True, -0.01: False},
-        {0.045: True, -0.06: False, -0.2: True},
-    )
-    for role, cases in (("pose", poses), ("color", pictures)):
-        for offset, said in cases.items():
-            rows = looked.report.topics
-            topics = [replace(r, clock_offset=offset) if r.role == role else r for r in rows]
-            found = cautions_of(replace(looked.report, topics=topics), looked.done)
-            words = [caution.what for caution in found if caution.about == "clock"]
-            assert len(words) == said and all(f"{offset:+.3f} s" in what for what in words)
-
-
 def test_a_clock_ahead_is_shown_with_its_sign(tmp_path, params) -> None:
     """Stamps of the pose that are 0.2 s too large."""
 
@@ -141,29 +100,6 @@ def test_a_clock_ahead_is_shown_with_its_sign(tmp_path, params) -> None:
     assert rows["pose"].clock_offset == pytest.approx(0.2, abs=0.001)
     assert rows["wrench"].clock_offset == 0
     assert rows["depth"].clock_offset == pytest.approx(-0.0155, abs=0.001)  # it takes a while
-
-
-def test_a_camera_that_stops_before_the_release_is_said(looked, params) -> None:
-    phases = [row for row in looked.report.phases if row.phase in ("hanging", "held", "drawn")]
-    found = cautions_of(replace(looked.report, phases=phases), looked.done)
-    said = [caution.what for caution in found if caution.about == "unseen"]
-    assert said == [f"no picture shows how the band {how}" for how in ("recoils", "swings")]
-
-
-def test_a_sensor_that_tf_static_does_not_know_is_said(looked, params) -> None:
-    assert "sensor" not in abouts(looked.report)
-    recording = looked.done.pull.recording
-    loose = replace(recording, wrench=replace(recording.wrench, frame="elsewhere"))
-    done = replace(looked.done, pull=replace(looked.done.pull, recording=loose))
-    found = cautions_of(looked.report, done)
-    assert any(c.about == "sensor" and "'elsewhere'" in c.what for c in found)
-
-
-def test_tips_are_off_from_three_standard_errors(looked, params) -> None:
-    for off, error, said in ((0.0039, 0.0001, 0), (0.0045, 0.0016, 0), (0.0045, 0.0014, 1)):
-        facts = replace(looked.report.extrinsics, off_m=off, off_error_m=error)
-        found = cautions_of(replace(looked.report, extrinsics=facts), looked.done)
-        assert sum(caution.about == "extrinsics" for caution in found) == said
 
 
 def test_each_chosen_topic_stands_apart_from_its_role(looked) -> None:
@@ -180,18 +116,6 @@ def test_a_disk_that_is_full_is_one_line(seen, params, tmp_path, monkeypatch) ->
     with pytest.raises(UserError, match="out.png: cannot be written .No space left"):
         check(seen[0], params, sheet=tmp_path / "out.png")
     assert not list(tmp_path.iterdir())
-
-
-def test_the_pause_before_the_release(looked, seen) -> None:
-    still, change = pause(looked.done.signals)
-    truth = seen[1]
-    assert still == pytest.approx(truth.release - truth.drawn, abs=0.25)  # it creeps to its end
-    assert change < 0.005
-    signals = looked.done.signals
-    rising = replace(signals, force=signals.force * (1 + 0.2 * signals.time[:, None]))
-    release = signals.release_time
-    middle = 1 + 0.2 * (release - 0.3)
-    assert pause(rising)[1] == pytest.approx(0.5 * 0.2 / middle, rel=0.1)
 
 
 def test_the_report_of_a_bad_recording(tmp_path, params) -> None:

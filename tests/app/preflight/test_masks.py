@@ -95,7 +95,7 @@ def test_a_further_recording_brings_its_masks(project, by_folder, masked, tmp_pa
 def test_fit_brings_better_masks_of_a_recording_that_is_there(
     by_folder, mine, tmp_path_factory, monkeypatch
 ) -> None:
-    def repro(root, *_) -> None:
+    def repro(root, *_, **__) -> None:
         card = root / "reports/bands/red"
         card.mkdir(parents=True, exist_ok=True)
         (card / "card.json").write_text("{}")

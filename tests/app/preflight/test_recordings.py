@@ -10,9 +10,11 @@ import pytest
 
 from app.preflight.command import check
 from app.preflight.recordings import add_recording
-from app.preflight.verdict import cautions_of
 from pipeline.base.errors import UserError
 from pipeline.base.layout import Layout
+from pipeline.params import load
+from pipeline.recording.build import build_episodes
+from stages import episode
 from tests.app.preflight.test_add_band import add, content, project
 from tests.recording.joined import joined
 from tests.recording.split import metadata, split
@@ -54,7 +56,7 @@ def test_check_lists_the_pulls_and_looks_at_the_first_that_can_be_used(three, se
 
 
 def test_a_pull_alone_has_nothing_to_rest_from(looked, params) -> None:
-    found = {one.about for one in cautions_of(looked.report, looked.done)}
+    found = {one.about for one in looked.report.cautions}
     assert "rest" not in found and looked.report.pulls == [looked.report.row]
 
 
@@ -69,6 +71,23 @@ def test_recordings_are_added_to_a_band(project, seen, three) -> None:
     assert names == ["seen.mcap", "three.mcap"]
     assert (project / "data/raw/red/three.mcap").read_bytes() == three[0].read_bytes()
     assert (project / "params.yaml").read_bytes() == before
+
+
+def test_episodes_of_a_check_are_the_stages(project, seen, monkeypatch) -> None:
+    """Made once; the stage takes them, and then they are gone."""
+    add(project, seen[0])
+    params, layout = load(project / "params.yaml"), Layout(project)
+    (path,) = layout.recordings("red")
+    (made,), _ = build_episodes(path, "red", params)
+    monkeypatch.chdir(project)
+    monkeypatch.setattr(
+        "pipeline.recording.build.build_episodes", lambda *_: pytest.fail("made again")
+    )
+    monkeypatch.setattr(episode, "started", lambda *_: (params, "red"))
+    episode.main()
+    made.save(project / "made")
+    assert content(project / "made") == content(layout.episode("red"))
+    assert not (project / ".checkpoints/red-episodes").exists()
 
 
 def test_a_split_bag_is_checked_and_kept_as_its_folder(project, seen, params, tmp_path) -> None:

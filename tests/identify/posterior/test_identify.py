@@ -116,7 +116,7 @@ def test_residuals_at_the_truth_are_of_the_size_of_the_noise():
     """Of the force what its low-pass leaves of white noise, and of a bin far below a point's."""
     episode = recorded(0.012, 5, NOISE)
     recording = Likelihood(episode, SLING, CUTOFF, 0.7)
-    rollouts = recording.simulate(TRUTH, np.zeros(3))
+    (rollouts,) = recording.simulate(TRUTH, np.zeros(3))
     residuals = Residuals(episode, SLING, CUTOFF, rollouts.center_line[0])
     gap, count = residuals(rollouts)[0], 3 * len(residuals.samples)
     assert 0.1 * NOISE[0] < gap[:count].std() < 0.5 * NOISE[0]

@@ -11,6 +11,7 @@ from pipeline.report.card.verdict import CARE, NO, TRUSTED, Findings, judge, que
 from tests.report.card.conftest import trials
 
 GOOD = Findings(
+    cautions=(),
     settled=True, force=0.05, held=8e-4, recoil=2e-3, recoil_seen=True, disagreement=1.1, odd="",
     at_sides=(),
     stretch=1.5, recorded_stretch=1.6, hold_force=9.0, max_force=30.0, failures=(), converged=True,
@@ -19,6 +20,7 @@ GOOD = Findings(
     carried=1.1, density=1e3,
 )  # fmt: skip
 CASES = [
+    ({"cautions": (("In pull 1 of a.mcap, the force drifts.", "Warm up."),)}, CARE, "force drifts"),
     ({"settled": None}, CARE, "does not tell how sure"),
     ({"settled": False}, CARE, "not settled"),
     ({"force": 0.2}, CARE, "force of the pull: 0.2 N off"),
@@ -127,6 +129,20 @@ def test_findings_are_those_of_the_files(told) -> None:
     half = np.hypot(0.1375, np.linalg.norm(told.aims.draw, axis=1))
     assert found.stretch == pytest.approx(2 * half.max() / 0.52, rel=1e-6)
     assert found.recorded_stretch == pytest.approx(2 * np.hypot(0.1375, 0.38) / 0.52, rel=1e-3)
+
+
+def test_findings_tell_what_was_odd_of_a_recording(told) -> None:
+    about = {"about": "gap", "what": "/a*b <x> has a gap of 0.1 s", "cure": "record it again"}
+    source = {"file": "a.mcap", "pull": 2}
+    odd = replace(told.episode, metadata={"input": source, "cautions": [about]})
+    sound = replace(odd, metadata={"input": source})
+    assert findings(replace(told, episodes=[sound])).cautions == []
+    assert findings(replace(told, episodes=[sound, odd])).cautions == [
+        (
+            r"In pull 2 of `a.mcap`, /a\*b &lt;x> has a gap of 0.1 s.",
+            "For pull 2 of `a.mcap`: record it again.",
+        )
+    ]
 
 
 def test_findings_see_a_bad_score_a_side_and_odd_evidence(told) -> None:

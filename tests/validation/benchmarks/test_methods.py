@@ -44,7 +44,7 @@ def test_every_search_spends_its_budget_and_says_what_it_took(monkeypatch) -> No
         assert row["regions"] == (2 if name == "sling2sim2real" else 0)
         assert row["seconds"] == pytest.approx(row["evaluation_s"] + row["optimizer_s"])
         assert min(row["evaluation_s"], row["optimizer_s"]) > 0
-        assert np.isfinite(row["best_loss"])
+        assert np.isfinite(row["best_loss"]) and 0 <= row["others_share"] <= 1
     assert 0 < result["batch"]["simulation_s"] < 2 * result["batch"]["with_loss_s"]
     text = bench.table(result)
     assert all(name in text for name in names)

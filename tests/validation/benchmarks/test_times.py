@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from app.cli import parser
 from pipeline.base.errors import UserError
 from tests.project import ROOT
 from validation.benchmarks import times as bench
@@ -78,6 +79,32 @@ def test_seconds_of_stages_are_of_those_that_ran() -> None:
         "record": {"count": 2, "median_s": 61.0, "most_s": 64.0},
         "theta": {"count": 2, "median_s": 8.0, "most_s": 8.5},
     }
+
+
+def test_seconds_of_a_fit_are_those_of_its_log(tmp_path: Path) -> None:
+    for number, (command, stages) in enumerate((
+        ("sling fit", {"record@band1": 44.6, "own_episode@timed": 14.2, "own_card@timed": 0.2}),
+        ("sling flow", {"record@band1": 99.0, "theta@band1-de": 99.0}),
+    )):  # fmt: skip
+        at, lines = 1000.0, [{"at": 1000.0, "what": "begins", "command": command}]
+        for name, seconds in stages.items():
+            lines.append({"at": at, "what": "stage", "stage": name, "producers": []})
+            at += seconds
+            lines.append({"at": at, "what": "ended", "stage": name, "state": "ran"})
+        lines.append({"at": at, "what": "ended", "state": "ran"})
+        path = tmp_path / "logs/runs" / f"{number}.jsonl"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("".join(f"{json.dumps(line)}\n" for line in lines))
+    assert bench.seconds_of_fit(tmp_path) == {"record": 45, "episode": 14, "card": 1}
+    assert bench.seconds_of_fit(tmp_path / "none") == {}
+
+
+def test_each_row_measures_a_command_that_there_is(tmp_path: Path) -> None:
+    steps = {one.name: one for one in bench.steps(tmp_path / "mine.mcap", 0.04)}
+    for one in steps.values():
+        if one.command[0].endswith("sling"):
+            parser().parse_args(one.command[1:])  # exits where it cannot be understood
+        assert not one.needs or list(steps).index(one.needs) < list(steps).index(one.name)
 
 
 def test_steps_are_measured_once_and_failures_again(project: Path, tmp_path: Path) -> None:

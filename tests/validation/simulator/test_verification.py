@@ -7,16 +7,16 @@ import pytest
 
 from pipeline.base.errors import UserError
 from validation.simulator import verification as report
-from validation.simulator.finding import Finding, Theme, off
+from validation.simulator.finding import Measure, Theme, off
 
-KEPT = Finding("pull", "closed form", 0.2, "%", 0.5, "16 pairs")
-MISSED = Finding("beam", "Euler–Bernoulli", 3.4, "%", 3.0)
-STATED = Finding("cost", "—", 12.0, "s")
+KEPT = Measure("pull", "closed form", 0.2, "%", 0.5, "16 pairs")
+MISSED = Measure("beam", "Euler–Bernoulli", 3.4, "%", 3.0)
+STATED = Measure("cost", "—", 12.0, "s")
 
 
 def test_a_check_is_met_within_its_limit_and_never_without_a_number():
     assert KEPT.met is True and MISSED.met is False and STATED.met is None
-    assert Finding("x", "y", math.nan, "%", 1.0).met is False
+    assert Measure("x", "y", math.nan, "%", 1.0).met is False
     assert math.isnan(off([1.0, math.nan], [1.0, 1.0]))
     assert off([1.01, 0.98], [1.0, 1.0]) == pytest.approx(2.0)
 

@@ -32,7 +32,6 @@ def kind(command: str) -> str:
         ("dask_worker", "Dask's worker"),
         ("dask_scheduler", "Dask's scheduler"),
         ("repro", "DVC"),
-        ("server", "Prefect's server"),
         ("spawn_main", "worker of a stage"),
         ("dvc", "DVC"),
     ):

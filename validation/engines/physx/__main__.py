@@ -10,7 +10,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
 from pipeline.params import load
 from validation.engines.physx import bands, study
-from validation.simulator.finding import Bench, Finding, unmet
+from validation.simulator.finding import Bench, Measure, unmet
 
 REPORT = Path("reports/validation/physx.json")
 DEVICE = "cuda:0"
@@ -34,7 +34,7 @@ def main() -> None:
     write_json(REPORT, content | about)
 
 
-def _plain(check: Finding) -> dict:
+def _plain(check: Measure) -> dict:
     value = check.value if math.isfinite(check.value) else None
     return asdict(check) | {"met": check.met, "value": value}
 

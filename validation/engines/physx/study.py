@@ -14,7 +14,7 @@ from validation.benchmarks.timing import timed
 from validation.engines import checks
 from validation.engines.physx.bands import Course, Drive, Engine
 from validation.engines.physx.law import energy_left, equal_modulus, force_on
-from validation.simulator.finding import Bench, Finding, off
+from validation.simulator.finding import Bench, Measure, off
 from validation.synthetic import pull_and_release, yardstick
 
 MARK = 200  # a second: both engines are compared at these marks
@@ -140,7 +140,7 @@ def ours(sling: ClampedBand, episode, thetas: np.ndarray) -> list[BandMotion]:
     ]
 
 
-def compared(setting: str, ours: BandMotion, theirs: BandMotion, limits: bool) -> list[Finding]:
+def compared(setting: str, ours: BandMotion, theirs: BandMotion, limits: bool) -> list[Measure]:
     """PhysX against ours: force, centre line, recoil."""
     held = len(ours.force)
     force = np.linalg.norm(theirs.force - ours.force, axis=1).max()
@@ -148,8 +148,8 @@ def compared(setting: str, ours: BandMotion, theirs: BandMotion, limits: bool) -
     distance = np.linalg.norm(theirs.lines - ours.lines, axis=2)[:held]
     against = "our simulator, the same tetrahedra"
 
-    def finding(name: str, value: float, unit: str, limit: float, note: str) -> Finding:
-        return Finding(f"{name}, {setting}", against, value, unit, limit if limits else None, note)
+    def finding(name: str, value: float, unit: str, limit: float, note: str) -> Measure:
+        return Measure(f"{name}, {setting}", against, value, unit, limit if limits else None, note)
 
     return [
         finding(
@@ -167,7 +167,7 @@ def compared(setting: str, ours: BandMotion, theirs: BandMotion, limits: bool) -
     ]  # fmt: skip
 
 
-def pulls(bench: Bench, engine: Engine) -> list[Finding]:
+def pulls(bench: Bench, engine: Engine) -> list[Measure]:
     """The same pull in both engines, at each of SETTINGS, with our modulus and with a matched one.
 
     Raises:
@@ -198,7 +198,7 @@ def pulls(bench: Bench, engine: Engine) -> list[Finding]:
             law = float(equal_modulus(sling, theta[nu], stretch))
             energy = 100 * energy_left(sling, theta[nu], stretch)
             found.append(
-                Finding(
+                Measure(
                     f"factor on Young's modulus that holds as ours, {title}",
                     "our modulus",
                     factors[nu],
@@ -211,7 +211,7 @@ def pulls(bench: Bench, engine: Engine) -> list[Finding]:
         if not np.isfinite(matched).all():
             title = f"force held by some modulus, {rate} Hz, {iterations} iterations"
             about = f"ours lies outside of what {FACTORS[0]:g} to {FACTORS[-1]:g} of E hold"
-            found.append(Finding(title, "our simulator", np.nan, "", 0.0, about))
+            found.append(Measure(title, "our simulator", np.nan, "", 0.0, about))
             continue
         courses = engine.simulate(tube, matched, course, **size)
         left = balance(tube, matched, courses)
@@ -219,7 +219,7 @@ def pulls(bench: Bench, engine: Engine) -> list[Finding]:
             title = f"Poisson's ratio {nu:.2f}, {rate} Hz, {iterations} iterations, modulus matched"
             found += compared(title, expected[nu], motion, limits=(rate, iterations) == SETTINGS[0])
             found.append(
-                Finding(
+                Measure(
                     f"hand, clamps and weight out of balance, {title}",
                     "the stress of PhysX's tetrahedra",
                     float(rest),

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from app.preflight import taut
-from app.preflight.taut import HAND, PRIOR_MEAN, PRIOR_SPREAD, SHIFT, TURN, Samples
+from pipeline.recording import taut
 from pipeline.recording.input.frames import Transform
+from pipeline.recording.taut import HAND, PRIOR_MEAN, PRIOR_SPREAD, SHIFT, TURN, Samples
 from pipeline.recording.view import Scene
 
 ROUNDS = 25
@@ -58,6 +58,16 @@ class Tips:
         """Standard error of `off` [m]."""
         worst = np.argmax(np.linalg.norm(self.offsets, axis=1))
         return along(self.offsets[worst], self.errors[worst])
+
+    @property
+    def hand_off(self) -> float:
+        """Distance of the band's end from the tool centre point [m]."""
+        return float(np.linalg.norm(self.hand))
+
+    @property
+    def hand_off_error(self) -> float:
+        """Standard error of `hand_off` [m]."""
+        return along(self.hand, self.hand_error)
 
 
 def along(vector: np.ndarray, errors: np.ndarray) -> float:

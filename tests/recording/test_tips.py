@@ -7,8 +7,9 @@ import pytest
 from scipy.integrate import trapezoid
 from scipy.spatial.transform import Rotation
 
-from app.preflight.check import look_at
-from app.preflight.tips import measure_tips
+from pipeline.recording.build import process
+from pipeline.recording.checks.camera import camera_to_fork
+from pipeline.recording.tips import measure_tips
 from pipeline.recording.view import Scene
 from tests.project import with_
 from validation.recordings.bag import BASE, EYE, TIPS, edit, write_bag
@@ -168,19 +169,20 @@ def misplaced(shift: np.ndarray, turn: np.ndarray):
     return edit(tf=move)
 
 
-def test_a_misplaced_tf_static_is_measured(looked, params, tmp_path) -> None:
+def test_a_misplaced_tf_static_is_measured(checked, params, tmp_path) -> None:
     """The renderer's own bias is in both recordings; each is within its errors, too."""
     shift, turn = (0.002, -0.005, 0.004), (0.0, 0.005, 0.0052)
     path = tmp_path / "misplaced.mcap"
     write_bag(path, rate=500, change=misplaced(np.array(shift), np.array(turn)))
-    look, truth = look_at(path, params), offsets(shift, turn)
-    found = look.tips.offsets
-    np.testing.assert_allclose(found - looked.tips.offsets, truth, atol=0.0007)
-    assert np.all(np.abs(found - truth) < 3 * look.tips.errors)
-    assert [c for c in look.report.cautions if c.about == "extrinsics"]
-    assert not [c for c in looked.report.cautions if c.about == "extrinsics"]
+    done, truth = process(path, params.bands["band1"], params), offsets(shift, turn)
+    found = done.tips.offsets
+    np.testing.assert_allclose(found - checked.tips.offsets, truth, atol=0.0007)
+    assert np.all(np.abs(found - truth) < 3 * done.tips.errors)
+    assert [one for one in done.cautions if one.about == "extrinsics"]
+    assert not [one for one in checked.cautions if one.about == "extrinsics"]
 
-    # What the report proposes for params.yaml brings the clouds back.
-    pose = tuple(look.report.extrinsics.camera_to_fork)
-    again = look_at(path, with_(params, "setup", camera_to_fork=pose))
+    # What is proposed for params.yaml brings the clouds back.
+    pose = tuple(camera_to_fork(done.tips, done.pull.geometry))
+    placed = with_(params, "setup", camera_to_fork=pose)
+    again = process(path, params.bands["band1"], placed)
     assert np.abs(again.tips.offsets).max() < 0.0007

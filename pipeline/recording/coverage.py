@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.recording.build import Processed
+from pipeline.recording.cloud import Clouds
 from pipeline.recording.masks.ridge import HAND, distance_to_lines
 from pipeline.recording.view import Scene
 
@@ -50,7 +50,7 @@ class PhaseLine:
     coverage: float
 
 
-def coverage(done: Processed) -> tuple[float | None, float | None]:
+def taut_coverage(scene: Scene, clouds: Clouds) -> tuple[float | None, float | None]:
     """How well the clouds see the drawn band, whose place is known: two lines, tip to hand.
 
     Returns:
@@ -58,7 +58,6 @@ def coverage(done: Processed) -> tuple[float | None, float | None]:
         distance of points from the lines [m], which is the band's radius where the calibration is
         right; None where the band was never taut.
     """
-    scene, clouds = done.scene, done.clouds
     taut = [
         (time, points)
         for time, points in zip(clouds.time, clouds.points, strict=True)
@@ -122,17 +121,17 @@ def phase(scene: Scene, time: float) -> str:
     return "recoil" if time < signals.release_time + RECOIL else "swing"
 
 
-def over_time(done: Processed, start: float) -> list[PictureLine]:
+def over_time(scene: Scene, clouds: Clouds, start: float) -> list[PictureLine]:
     """A row a picture; times count from `start` seconds before the window."""
     return [
         PictureLine(
             time=round(start + float(time), 6),
-            phase=phase(done.scene, time),
+            phase=phase(scene, time),
             points=len(points),
-            coverage=round(share_covered(done.scene, time, points), 4),
-            off_plane=share_off_plane(done.scene, time, points),
+            coverage=round(share_covered(scene, time, points), 4),
+            off_plane=share_off_plane(scene, time, points),
         )
-        for time, points in zip(done.clouds.time, done.clouds.points, strict=True)
+        for time, points in zip(clouds.time, clouds.points, strict=True)
     ]
 
 

@@ -6,28 +6,26 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.preflight.coverage import over_time, share_covered, share_off_plane
-from app.preflight.verdict import cautions_of
+from pipeline.recording.checks.pictures import of_coverage
+from pipeline.recording.coverage import by_phase, over_time, share_covered, share_off_plane
 
 
-def test_points_of_the_arm_in_the_hanging_band_are_said(looked, params) -> None:
+def test_points_of_the_arm_in_the_hanging_band_are_said(checked, params) -> None:
     """Points 5 cm towards the hand, off the upright plane through the tips, in one picture."""
-    assert "off_plane" not in {caution.about for caution in looked.report.cautions}
-    clouds = looked.done.clouds
+    assert "off_plane" not in {one.about for one in of_coverage(checked.coverage)}
+    clouds = checked.clouds
     arm = np.array([[0.0, -0.05, -0.2]], np.float32).repeat(len(clouds.points[1]) // 20, 0)
     points = [*clouds.points]
     points[1] = np.vstack([points[1], arm])
-    done = SimpleNamespace(scene=looked.done.scene, clouds=replace(clouds, points=points))
-    rows = over_time(done, 0.0)
+    rows = over_time(checked.scene, replace(clouds, points=points), 0.0)
     assert rows[1].phase == "hanging" and rows[1].off_plane == pytest.approx(0.05, abs=0.01)
     assert all(row.off_plane in (None, 0.0) for row in (rows[0], *rows[2:]))
-    found = cautions_of(replace(looked.report, coverage=rows), looked.done)
-    (said,) = [caution.what for caution in found if caution.about == "off_plane"]
+    (said,) = [one.what for one in of_coverage(rows) if one.about == "off_plane"]
     told = sum(row.off_plane is not None for row in rows)
     assert said.startswith(f"1 of {told} pictures of the hanging band hold points off the plane")
 
 
-def test_the_plane_is_that_of_the_tips_and_the_hand(looked) -> None:
+def test_the_plane_is_that_of_the_tips_and_the_hand(checked) -> None:
     """Held 45 degrees below and behind the tips, points there lie in the plane, others do not."""
     hand = np.array([0.0, -0.1, -0.1])
     signals = SimpleNamespace(grasp_time=1.0, release_time=2.0, hand=lambda time: hand)
@@ -39,21 +37,21 @@ def test_the_plane_is_that_of_the_tips_and_the_hand(looked) -> None:
     assert share_off_plane(scene, 1.5, points[:0]) is None
 
 
-def test_coverage_over_time_follows_the_phases(looked, seen) -> None:
-    rows, truth = looked.report.coverage, seen[1]
-    assert len(rows) == looked.report.cloud.frames
+def test_coverage_over_time_follows_the_phases(checked, seen) -> None:
+    rows, truth = checked.coverage, seen[1]
+    assert len(rows) == len(checked.clouds.points)
     for row in rows:
         if truth.drawn < row.time < truth.release:
             assert row.phase == "drawn" and row.coverage > 0.9
-        assert (row.phase == "hanging") == (row.time < looked.report.signals.grasp_s)
+        assert (row.phase == "hanging") == (row.time < checked.start + checked.signals.grasp_time)
         assert (row.phase in ("recoil", "swing")) == (row.time >= truth.release)
-    phases = looked.report.phases
+    phases = by_phase(checked.coverage)
     assert [row.phase for row in phases] == ["hanging", "held", "drawn", "recoil", "swing"]
     assert sum(row.pictures for row in phases) == len(rows)
 
 
-def test_a_cloud_without_one_side_covers_half(looked) -> None:
-    scene, clouds = looked.done.scene, looked.done.clouds
+def test_a_cloud_without_one_side_covers_half(checked) -> None:
+    scene, clouds = checked.scene, checked.clouds
     time = max(t for t in clouds.time if scene.taut(t))
     points = clouds.points[int(np.flatnonzero(clouds.time == time)[0])]
     assert share_covered(scene, time, points[points[:, 0] < 0]) == pytest.approx(0.5, abs=0.06)

@@ -1,0 +1,78 @@
+"""Messages of the topics that play a role: gaps, what is missing, how often they come."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pipeline.recording.checks.finding import Check, Finding
+from pipeline.recording.input.streams import Stream
+from pipeline.recording.processed import Processed
+
+GAPS = {"wrench": 0.02, "pose": 0.05, "color": 0.2, "depth": 0.2}  # s
+MISSING = 0.05  # share of the messages
+FORCE_RATE, PICTURE_RATE = 900.0, 20.0  # Hz
+RELIABLE = "record with reliable QoS to a local disk"
+
+GAP = Check(
+    "gap",
+    "the longest time between two messages of a topic with what the episode needs",
+    "none: stamps are exact",
+    f"{1e3 * GAPS['wrench']:g} ms of force, {1e3 * GAPS['pose']:g} ms of the pose,"
+    f" {1e3 * GAPS['depth']:g} ms of pictures",
+    "0.3 s of force or pose, or a gap at the release",
+    RELIABLE,
+)
+MISSED = Check(
+    "missing",
+    "messages with as many as a constant rate has",
+    "none: they are counted",
+    f"{100 * MISSING:g} % are missing",
+    "nearly all are missing",
+    RELIABLE,
+)
+FORCE = Check(
+    "force_rate",
+    "the force's rate with that at which the release is known to a millisecond",
+    "the median time between messages",
+    f"below {FORCE_RATE:g} Hz",
+    "",
+    "record it at 1 kHz",
+)
+PICTURES = Check(
+    "picture_rate",
+    "the pictures' rate with the length of a recoil",
+    "the median time between pictures",
+    f"below {PICTURE_RATE:g} Hz",
+    "",
+    "record 30 a second or more",
+)
+CHECKS = (GAP, MISSED, FORCE, PICTURES)
+
+
+def findings(done: Processed) -> Iterator[Finding]:
+    for stream, roles in topics(done):
+        most = min([GAPS[role] for role in roles if role in GAPS], default=np.inf)
+        if stream.longest_gap > most:
+            what = f"{stream.topic} has a gap of {stream.longest_gap:.3f} s"
+            yield Finding(GAP.name, what, GAP.remedy)
+        elif stream.missing > MISSING * (len(stream.stamp) + stream.lost):
+            what = f"{stream.missing} messages of {stream.topic} are missing"
+            yield Finding(MISSED.name, what, MISSED.remedy)
+        rate = 1 / stream.period
+        if "wrench" in roles and rate < FORCE_RATE:
+            what = f"the force comes at {rate:.0f} Hz, so the release is known only that coarsely"
+            yield Finding(FORCE.name, what, FORCE.remedy)
+        if "depth" in roles and rate < PICTURE_RATE:
+            what = f"pictures come at {rate:.0f} Hz, so few of them show the recoil"
+            yield Finding(PICTURES.name, what, PICTURES.remedy)
+
+
+def topics(done: Processed) -> list[tuple[Stream, list[str]]]:
+    """The topics that play a role, by name, each with its roles."""
+    streams = done.pull.recording.streams
+    roles: dict[str, list[str]] = {}
+    for role, stream in streams.items():
+        roles.setdefault(stream.topic, []).append(role)
+    return [(streams[played[-1]], played) for _, played in sorted(roles.items())]

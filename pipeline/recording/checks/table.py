@@ -1,0 +1,42 @@
+"""The table of all checks, in the order of a recording's way, and what they find."""
+
+from __future__ import annotations
+
+from pipeline.base.errors import UserError
+from pipeline.recording.checks import (
+    camera,
+    container,
+    force,
+    frames,
+    motion,
+    pictures,
+    rates,
+    roles,
+    times,
+)
+from pipeline.recording.checks.finding import Check, Finding
+from pipeline.recording.processed import Processed
+
+CONCERNS = (container, roles, rates, times, force, motion, pictures, frames, camera)
+UNDERSTOOD = Check(
+    "pull",
+    "what was recorded with a pull: a lead-in, a grasp, a draw, a release, pictures of a band",
+    "each step's own",
+    "",
+    "one of them is not there or cannot be told",
+    "as the reason says (docs/faq.md)",
+)
+CHECKS: tuple[Check, ...] = (*(check for one in CONCERNS for check in one.CHECKS), UNDERSTOOD)
+
+
+def findings_of(done: Processed) -> list[Finding]:
+    """Of one pull, in the order of the table; what refuses it is the last, for more may follow."""
+    found: list[Finding] = []
+    for concern in CONCERNS:
+        try:
+            found += concern.findings(done)
+        except UserError as error:
+            found.append(Finding(UNDERSTOOD.name, str(error), "", refused=True))
+        if any(one.refused for one in found):
+            break
+    return found

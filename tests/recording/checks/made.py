@@ -1,0 +1,30 @@
+"""Sound recordings, changed in one thing."""
+
+from dataclasses import replace
+
+from pipeline.recording.build import Checked
+from pipeline.recording.checks.finding import Finding
+
+
+def with_recording(done: Checked, **changes) -> Checked:
+    """With other streams or words; everything is worked out anew."""
+    recording = replace(done.pull.recording, **changes)
+    return replace(done, pull=replace(done.pull, recording=recording))
+
+
+def with_results(done: Checked, **results) -> Checked:
+    """With other results of steps (`signals`, `clouds`, `tips` ...); the rest is as it was."""
+    changed = replace(done)
+    vars(changed).update({**vars(done), **results})
+    vars(changed).pop("findings", None)
+    return changed
+
+
+def with_facts(done: Checked, **facts) -> Checked:
+    """With other `SignalFacts`."""
+    signals = replace(done.signals, facts=replace(done.signals.facts, **facts))
+    return with_results(done, signals=signals)
+
+
+def abouts(findings: list[Finding]) -> set[str]:
+    return {one.about for one in findings}

@@ -1,0 +1,59 @@
+"""What a check has made of a recording is what the stage would make, while nothing changes."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from pipeline.base.layout import Layout
+from pipeline.params import Params
+from pipeline.recording import kept
+from pipeline.recording.build import build_episodes
+
+
+@pytest.fixture
+def layout(tmp_path: Path, seen, params) -> Layout:
+    """Of a project that keeps the episode of a recording of band1."""
+    layout = Layout(tmp_path)
+    episodes, _ = build_episodes(seen[0], "band1", params)
+    kept.keep(seen[0], episodes, params, layout)
+    return layout
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def never(*_):
+    raise AssertionError("it was made again")
+
+
+def test_what_is_kept_is_what_would_be_made(layout, seen, params, monkeypatch) -> None:
+    (made,), _ = build_episodes(seen[0], "band1", params)
+    made.save(layout.root / "made")
+    monkeypatch.setattr("pipeline.recording.build.build_episodes", never)
+    (found,), refused = kept.episodes_of(seen[0], "band1", params, layout)
+    found.save(layout.root / "found")
+    assert files(layout.root / "found") == files(layout.root / "made") and not refused
+
+
+def changed(params: Params, section: str, **values) -> Params:
+    section_changed = getattr(params, section).model_copy(update=values)
+    return params.model_copy(update={section: section_changed})
+
+
+def test_anything_changed_makes_it_again(layout, seen, params, monkeypatch) -> None:
+    monkeypatch.setattr("pipeline.recording.build.build_episodes", lambda *_: "made")
+
+    def asked(path: Path = seen[0], band: str = "band1", params: Params = params):
+        return kept.episodes_of(path, band, params, layout)
+
+    assert asked() != "made"
+    other = shutil.copy(seen[0], layout.root / "other.mcap")
+    assert asked(path=other) == "made"  # an episode says of which file it is
+    assert asked(band="band2") == "made"
+    assert asked(params=changed(params, "force", cutoff=0.2)) == "made"
+    assert asked(params=changed(params, "cloud", mask="folder")) == "made"
+    kept.forget("band1", layout)
+    assert asked() == "made"
+    assert not (layout.root / ".checkpoints/band1-episodes").exists()

@@ -111,13 +111,21 @@ def own_law(params, method: str, number: int) -> dict:
     sling = ClampedBand.of(params.bands[band], params.setup, params.sling, law=about.law)
     coordinates = posterior.Coordinates.of_method(params, method, sling)
     true = coordinates.expected.copy()
+
+    def at(name: str, value: float) -> None:
+        true[coordinates.names.index(name)] = value
+
+    def spread(name: str) -> float:
+        return coordinates.precision[coordinates.names.index(name)] ** -0.5
+
     true[0] = rng.uniform(*np.log([1.5e5, 4.5e5]))
     true[1] += rng.normal(0, coordinates.precision[1] ** -0.5)
     if number % 2:
-        true[2:4] = rng.uniform([0.0, 0.0], [0.6, 0.03])
-    true[4] = abs(rng.normal(0, coordinates.precision[4] ** -0.5))
-    true[5] = rng.uniform() if number % 4 > 1 else 0.0
-    true[6] = rng.normal(0, coordinates.precision[6] ** -0.5)
+        at("mooney_share", rng.uniform(0.0, 0.6))
+        at("relaxation", rng.uniform(0.0, 0.06))
+    at("air_drag", abs(rng.normal(0, spread("air_drag"))))
+    at("turn_damping", rng.uniform() if number % 4 > 1 else 0.0)
+    at("log_returned_share", rng.normal(0, spread("log_returned_share")))
     truth = coordinates.parameters(true[None])
     cutoff = cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
     plan = pull_and_release(band, params.episode, sling)

@@ -204,10 +204,13 @@ class MethodParams(MethodDefaults):
 
     @model_validator(mode="after")
     def _least_squares_fixes_the_unseen(self) -> MethodParams:
-        if self.search == LEAST_SQUARES and set(self.fixed) != set(UNSEEN):
+        more = {*self.fixed} - {*UNSEEN}
+        if self.search == LEAST_SQUARES and not (
+            more <= {*LAWS[self.law]} and {*UNSEEN} <= {*self.fixed}
+        ):
             raise refusal(
                 f"search: {LEAST_SQUARES} wants `fixed` to name {', '.join(UNSEEN)}, which no pull"
-                " shows"
+                " shows, and besides them no more than what its law adds"
             )
         if self.search == LEAST_SQUARES and self.settings:
             raise refusal(f"settings: {LEAST_SQUARES} has none")
@@ -222,7 +225,7 @@ class MethodParams(MethodDefaults):
     @model_validator(mode="after")
     def _law_has_its_box(self) -> MethodParams:
         for name, reach in LAWS[self.law].items():
-            if name not in self.bounds:
+            if name not in self.bounds and name not in self.fixed:
                 raise refusal(
                     f"bounds: {name} is missing, [low, high] within {list(reach)}, which the law"
                     f" {self.law} searches"

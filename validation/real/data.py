@@ -50,7 +50,7 @@ def _silicone(file: Path) -> Curve:
 
 
 def multiaxial(folder: Path) -> dict[str, dict[str, np.ndarray]]:
-    """By publication, of each mode the stretches and nominal stresses (n, 5): F11, F22, F33, S11, S22.
+    """By publication, of each mode stretches and nominal stresses (n, 5): F11, F22, F33, S11, S22.
 
     Cauchy stresses are taken back to nominal ones.
     """

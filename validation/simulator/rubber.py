@@ -1,4 +1,4 @@
-"""The law `rubber`: Biderman's string, softening, relaxation by its integral, energy, finer steps."""
+"""The law `rubber`: Biderman's string, softening, relaxation by its integral, energy, steps."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def cycle(bench: Bench, most: float = 1.8, softening: float = SOFTENING) -> list
     told, taut = stress(path, shape) * left, path > 1.05
     return [
         Measure(
-            f"stress of a slow cycle to stretch {most:g}, back, and to {most + 0.2:g}, worst moment",
+            f"stress of a slow cycle to stretch {most:g}, back, to {most + 0.2:g}, worst moment",
             "Ogden and Roxburgh's pseudo-elastic softening, by integrated works",
             float(100 * np.abs(got - told)[taut].max() / told.max()),
             "% of its peak",

@@ -6,7 +6,7 @@ A taut band feels the product s d alone. Over L/c, the time that a small wave ta
 log E, log of the loss factor s d c/L, what the law adds, the linear rest of the air's drag, how far
 damping brakes turns, and the log of the returned share: what a launch gets of the energy that the
 law would give it, which launches alone can show. What no recording of a pull can tell is fixed by
-the method: Poisson's ratio, friction and the damping's scale.
+the method: Poisson's ratio, friction and the damping's scale; and what of the law it fixes besides.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.params import Params
-from pipeline.params.identification import LAWS, UNSEEN
+from pipeline.params.identification import LAWS
 from pipeline.simulator.model import ClampedBand
-from pipeline.simulator.parameters import EXTRA, THETA, Parameters
+from pipeline.simulator.parameters import THETA, Parameters
 
 YOUNG, POISSON, DAMPING, FRICTION, SCALE = range(5)
 LOGS = "log_youngs_modulus", "log_loss_factor"  # of Pa
+RETURNED = "log_returned_share"
 STEPS = {  # of finite differences
     "log_youngs_modulus": 0.005,
     "log_loss_factor": 0.05,
@@ -40,6 +41,7 @@ PRIORS = {  # mean and standard deviation of Gaussians
         np.log(0.06),
         0.35,
     ),  # of the rubbers that validation/rubbers.py DEVELOPs on
+    "softening": (0.1, 0.1),  # gum to filled: Diani et al., 10.1016/j.eurpolymj.2008.11.017
     "air_drag": (0.0, 1.0),  # a half-normal: little beside the cylinder's drag
     "log_returned_share": (0.0, 0.015),  # the law's discrepancy, common to a band's launches
 }
@@ -53,7 +55,7 @@ class Coordinates:
         law: Whose parameters they stand for.
         names: Of the coordinates, length D.
         low, high: Their bounds, shape (D,).
-        fixed: Values of UNSEEN by name.
+        fixed: Values by name: of UNSEEN, and of the law's parameters that are no coordinates.
         wave: L / (c sqrt(E)) of the band [s Pa^-1/2].
         expected, precision: Of Gaussian priors, shape (D,); precision 0 where there is none.
     """
@@ -77,15 +79,15 @@ class Coordinates:
         wave = np.sqrt(sling.rest_length * sling.mass / sling.area)
         loss = np.log(product / wave) + np.log(young) / 2
         ends = dict(zip(LOGS, (np.log(young), loss), strict=True))
-        ends |= {name: box[name] for name in LAWS[about.law]} | {
+        ends |= {name: box[name] for name in LAWS[about.law] if name not in about.fixed} | {
             "air_drag": (0.0, MOST_DRAG),
             "turn_damping": (0.0, 1.0),
             "log_returned_share": (-MOST_LOST, MOST_LOST),
         }
         low, high = np.array(list(ends.values()), float).T
         expected, spread = np.array([PRIORS.get(name, (0.0, np.inf)) for name in ends]).T
-        fixed = {name: about.fixed[name] for name in UNSEEN}
-        return cls(about.law, tuple(ends), low, high, fixed, float(wave), expected, spread**-2)
+        names, fixed = tuple(ends), dict(about.fixed)
+        return cls(about.law, names, low, high, fixed, float(wave), expected, spread**-2)
 
     @property
     def steps(self) -> np.ndarray:
@@ -94,23 +96,29 @@ class Coordinates:
 
     def parameters(self, phi: np.ndarray) -> Parameters:
         """N parameters of coordinates (N, D)."""
-        theta = np.empty((len(phi), len(THETA)))
-        theta[:, YOUNG] = np.exp(phi[:, 0])
-        for name in UNSEEN:
-            theta[:, THETA.index(name)] = self.fixed[name]
-        product = np.exp(phi[:, 1] - phi[:, 0] / 2) * self.wave
-        theta[:, DAMPING] = product / self.fixed["damping_scale"]
-        values = np.concatenate([theta, phi[:, 2:-1], np.exp(phi[:, -1:])], axis=1)
-        return Parameters(self.law, values)
+        columns = dict(zip(self.names, phi.T, strict=True))
+        young, loss, returned = (columns.pop(name) for name in (*LOGS, RETURNED))
+        product = np.exp(loss - young / 2) * self.wave
+        return Parameters.named(
+            self.law,
+            {
+                **columns,
+                THETA[YOUNG]: np.exp(young),
+                THETA[DAMPING]: product / self.fixed["damping_scale"],
+                "returned_share": np.exp(returned),
+            },
+            self.fixed,
+        )
 
     def of(self, parameters: Parameters) -> np.ndarray:
         """Coordinates (D,) of one sample of what is searched, within the bounds.
 
         What is beside that (EXTRA) is as expected.
         """
-        phi, own = self.expected.copy(), len(self.names) - len(EXTRA)
-        theta = parameters.values[0]
+        phi, theta = self.expected.copy(), parameters.values[0]
         loss = theta[DAMPING] * self.fixed["damping_scale"] * np.sqrt(theta[YOUNG]) / self.wave
         phi[:2] = np.log(theta[YOUNG]), np.log(loss)
-        phi[2:own] = theta[len(THETA) : -len(EXTRA)]
+        for name in LAWS[self.law]:
+            if name in self.names:
+                phi[self.names.index(name)] = parameters.column(name)[0]
         return np.clip(phi, self.low, self.high)

@@ -25,7 +25,7 @@ from pipeline.identify.posterior.residuals import BINS, LEAST_POINTS
 from pipeline.identify.results.theta import content_of
 from pipeline.identify.results.units import SI_UNITS
 from pipeline.params import Params
-from pipeline.params.identification import UNSEEN, ParameterBoxes, parameter_names
+from pipeline.params.identification import ParameterBoxes, parameter_names
 from pipeline.simulator.model import ClampedBand, LaunchHistory
 from pipeline.simulator.parameters import EXTRA, Parameters
 from pipeline.simulator.rubber import RUBBER
@@ -157,8 +157,9 @@ def confidence(found: Identified, boxes: ParameterBoxes) -> dict:
     columns = {name: samples.column(name) for name in samples.names}
     for name in parameter_names(samples.law):
         low, high = interval(columns[name], mode[name])
-        entry = {"low": low, "high": high, "identifiable": name not in UNSEEN}
-        if name in UNSEEN:
+        fixed = name in found.coordinates.fixed
+        entry = {"low": low, "high": high, "identifiable": not fixed}
+        if fixed:
             entry["fixed"] = True
         elif box := getattr(boxes, name, None):
             ends = np.array([low, high, box.low, box.high])

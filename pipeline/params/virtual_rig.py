@@ -20,6 +20,7 @@ from pipeline.base.schema import (
 )
 
 Share = Annotated[float, Range(0, 1)]
+Value = Annotated[float, Range(-1e6, 1e6)]
 Point = Annotated[tuple[Metres, Metres, Metres], LIST]
 Time = Annotated[float, Range(1e-4, 1e4)]
 Relaxation = Annotated[tuple[Annotated[float, Range(0, 10)], Time], LIST]  # weight and time
@@ -150,7 +151,18 @@ class RigParams(Section):
     clock: RigClock
     wrench: RigWrench
     camera: RigCamera
+    draws: dict[str, Annotated[tuple[Value, Value], LIST, ASCENDING]]
     bands: dict[Name, RigBand]
+
+    @model_validator(mode="after")
+    def _draws_are_of_keys(self) -> RigParams:
+        for key in self.draws:
+            value: object = self
+            for name in key.split("."):
+                value = getattr(value, name, None)
+            if not isinstance(value, float):
+                raise refusal(f"draws: {key} is no number of the rig")
+        return self
 
     @model_validator(mode="after")
     def _middle_is_a_node(self) -> RigParams:

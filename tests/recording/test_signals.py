@@ -21,7 +21,7 @@ TOOL = (0.01, -0.02, 0.05)  # its centre of mass
 
 
 def tool(mass: float = MASS, center=TOOL) -> SimpleNamespace:
-    return SimpleNamespace(mass=mass, center=center)
+    return SimpleNamespace(mass=mass, center=center, preconditioned=False)
 
 
 def signals(played: Played, params, tool=None, recording=None, inertia=None):

@@ -13,7 +13,7 @@ from pipeline.simulator.model import TETRAHEDRA
 
 @pytest.fixture(scope="session")
 def sling(params):
-    band = SimpleNamespace(mass=0.023, diameter=0.01, rest_length=0.52)
+    band = SimpleNamespace(mass=0.023, diameter=0.01, rest_length=0.52, preconditioned=False)
     return ClampedBand.of(band, params.setup, params.sling)
 
 

@@ -48,9 +48,9 @@ class Tolerances:
     release: float = 3e-4
     camera: float = 1e-3
     hand: float = 1e-5
-    jitter: float = 1e-4
-    shift: float = 1e-3
-    turn: float = 1.7e-3
+    jitter: float = 3e-4
+    shift: float = 2e-3
+    turn: float = 3e-3
     bias: float = 0.02
     drift: float = 0.02
 

@@ -15,7 +15,7 @@ PERIOD = 0.03
 
 def sling_of(mass: float, clamps: ClampValues | None = None) -> ClampedBand:
     """A band of 10 mm and 52 cm at params.yaml's resolution."""
-    band = SimpleNamespace(mass=mass, diameter=0.01, rest_length=0.52)
+    band = SimpleNamespace(mass=mass, diameter=0.01, rest_length=0.52, preconditioned=False)
     return ClampedBand.of(band, PARAMS.setup, PARAMS.sling, clamps)
 
 

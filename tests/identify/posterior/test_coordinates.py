@@ -45,9 +45,10 @@ def test_the_loss_factor_is_what_a_wave_loses_along_the_band():
     assert np.log(young) == pytest.approx(named["log_youngs_modulus"])
     assert np.log(product * speed / SLING.rest_length) == pytest.approx(named["log_loss_factor"])
     assert np.log(values["returned_share"]) == pytest.approx(named["log_returned_share"])
-    same = "mooney_share", "relaxation", "air_drag", "turn_damping"
+    same = "mooney_share", "upturn", "relaxation", "air_drag", "turn_damping"
     assert [values[name] for name in same] == [named[name] for name in same]
-    assert {name: values[name] for name in UNSEEN} == PARAMS.methods[METHOD].fixed
+    fixed = PARAMS.methods[METHOD].fixed
+    assert {*UNSEEN} < {*fixed} and {name: values[name] for name in fixed} == fixed
 
 
 def test_bounds_are_the_boxs_the_methods_and_what_is_possible():
@@ -55,7 +56,8 @@ def test_bounds_are_the_boxs_the_methods_and_what_is_possible():
     ends = dict(zip(OURS.names, zip(OURS.low, OURS.high, strict=True), strict=True))
     bounds = PARAMS.methods[METHOD].bounds
     assert ends["mooney_share"] == bounds["mooney_share"]
-    assert ends["relaxation"] == bounds["relaxation"]
+    assert ends["relaxation"] == bounds["relaxation"] and ends["upturn"] == bounds["upturn"]
+    assert "softening" not in ends  # which the method fixes
     assert ends["air_drag"] == (0.0, MOST_DRAG) and ends["turn_damping"] == (0.0, 1.0)
     assert ends["log_returned_share"] == (-MOST_LOST, MOST_LOST)
     box = PARAMS.parameters

@@ -1,0 +1,67 @@
+"""What a recording draws for itself, and that the identification assumes none of it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import pytest
+from pydantic import ValidationError
+
+from pipeline.identify.posterior.likelihood import Tolerances
+from pipeline.params import Params
+from pipeline.params.identification import LEAST_SQUARES
+from rig.draw import OF_LAUNCHES, drawn
+from tests.project import with_
+
+
+def value_of(params: Params, key: str) -> float:
+    found: object = params.rig
+    for name in key.split("."):
+        found = getattr(found, name)
+    assert isinstance(found, float)
+    return found
+
+
+def test_each_recording_has_its_own_within_the_ranges(params: Params) -> None:
+    worlds = [drawn(params, "band1"), drawn(params, "band2")]
+    worlds.append(drawn(with_(params, "rig", seed=params.rig.seed + 1), "band1"))
+    for key, (low, high) in params.rig.draws.items():
+        if key in OF_LAUNCHES:
+            continue
+        values = [value_of(world, key) for world in worlds]
+        assert len({*values}) == 3, key
+        assert all(low <= one <= high for one in values), key
+    assert drawn(params, "band1") == worlds[0]
+
+
+def test_launches_and_recordings_share_no_draw(params: Params) -> None:
+    recording, launching = drawn(params, "band1"), drawn(params, "band1", launching=True)
+    for key in params.rig.draws:
+        same = value_of(recording, key) == value_of(params, key)
+        assert same == (key in OF_LAUNCHES)
+        assert (value_of(launching, key) != value_of(params, key)) == (key in OF_LAUNCHES)
+
+
+@pytest.mark.parametrize("key", ["pads", "pads.colour", "nothing"])
+def test_a_key_that_is_no_number_is_refused(params: Params, key: str) -> None:
+    content = params.model_dump(mode="json", exclude_unset=True)
+    content["rig"]["draws"] = {key: [0.1, 1.0]}
+    with pytest.raises(ValidationError, match="is no number of the rig"):
+        Params.model_validate(content)
+
+
+ASSUMED = {  # of the identification and the lab, and the rig's number that it stands for
+    "dynamic_friction": "pads.friction",
+    "shift": "camera.translation_error",
+    "turn": "camera.rotation_error",
+    "jitter": "camera.clock.stamp_jitter",
+    "grip_force": "pads.force",
+    "finger_opening_time": "pads.opening_time",
+}
+
+
+def test_no_assumption_of_the_identification_is_the_rigs_number(params: Params) -> None:
+    assumed = asdict(Tolerances()) | params.methods[LEAST_SQUARES].fixed | dict(params.setup)
+    for name, key in ASSUMED.items():
+        hidden = value_of(params, key), value_of(drawn(params, "band1"), key)
+        assert assumed[name] not in (*hidden, *params.rig.draws[key]), name

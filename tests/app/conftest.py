@@ -20,6 +20,8 @@ def sling(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> Cal
         capsys.readouterr()
         with pytest.raises(SystemExit) as ended:
             cli.main()
-        return subprocess.CompletedProcess(arguments, ended.value.code or 0, *capsys.readouterr())
+        return subprocess.CompletedProcess(
+            arguments, int(ended.value.code or 0), *capsys.readouterr()
+        )
 
     return run

@@ -63,7 +63,7 @@ def find_releases(t: np.ndarray, force: np.ndarray, gripper: Opening | None) -> 
     """
     found: list[float] = []
     try:
-        _, free, ends, _ = _drops(t, force, *_reach(t), gripper)
+        _, free, ends, _ = _drops(t, force, *reach(t), gripper)
     except UserError:
         return []
     for i, later in pairwise([*free, None]):
@@ -96,7 +96,7 @@ def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = Non
             more than once.
     """
     period = float(np.median(np.diff(t)))
-    near, far = _reach(t)
+    near, far = reach(t)
     center, others = _steepest(t, force, near, far, gripper)
 
     quiet = slice(max(0, center - 6 * far), center - far)
@@ -104,8 +104,7 @@ def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = Non
     hold, free = force[quiet].mean(axis=0), force[settled].mean(axis=0)
     drop = float(np.linalg.norm(hold - free))
     along = force @ ((hold - free) / drop)
-    level, spread = along[quiet].mean(), np.diff(along[quiet])
-    noise = float(1.4826 * np.median(np.abs(spread - np.median(spread))) / np.sqrt(2))
+    level, noise = along[quiet].mean(), sample_noise(along[quiet])
     threshold = max(SIGMAS * noise, 0.02 * drop)
 
     window = slice(quiet.stop - far, settled.stop)
@@ -124,13 +123,20 @@ def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = Non
     return Release(time, error, lasted, resolution, hold, noise, drop, slips)
 
 
-def _reach(t: np.ndarray) -> tuple[int, int]:
+def reach(t: np.ndarray) -> tuple[int, int]:
     """Samples to either side over which short and long means are taken. Raises UserError."""
     period = float(np.median(np.diff(t)))
     near, far = max(1, round(0.005 / period)), max(3, round(0.05 / period))
     if len(t) < 4 * far:
         raise UserError("the force is too short to find a release in it")
     return near, far
+
+
+def sample_noise(x: np.ndarray) -> float:
+    """Standard deviation of single samples (S, ...) about what changes slowly: the largest."""
+    change = np.diff(x, axis=0)
+    spread = np.median(np.abs(change - np.median(change, axis=0)), axis=0)
+    return float(np.max(1.4826 * spread / np.sqrt(2)))
 
 
 def _steepest(
@@ -151,8 +157,8 @@ def _drops(
     """Samples of sudden drops; which leave the hand free; which the fingers let go (all of these
     where none does); the drop at each sample of the force.
     """
-    sudden = np.linalg.norm(np.subtract(*_means(force, near, far)), axis=1)
-    before, after = _means(force, far, 6 * far)
+    sudden = np.linalg.norm(np.subtract(*means(force, near, far)), axis=1)
+    before, after = means(force, far, 6 * far)
     lasting = np.linalg.norm(before - after, axis=1)
     size = np.where(sudden >= SUDDEN * lasting, np.minimum(sudden, lasting), 0)
     size[: far + 1] = size[-far:] = 0
@@ -172,7 +178,7 @@ def _drops(
     return drops, free, opened or free, size
 
 
-def _means(x: np.ndarray, near: int, far: int) -> tuple[np.ndarray, np.ndarray]:
+def means(x: np.ndarray, near: int, far: int) -> tuple[np.ndarray, np.ndarray]:
     """Means over [-far, -near] and over [near, far] samples around each sample, two (S, 3)."""
     sums = np.concatenate([np.zeros((1, 3)), np.cumsum(x, axis=0)])
     middle, last = np.arange(len(x)), len(x)

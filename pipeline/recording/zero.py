@@ -14,7 +14,7 @@ from pipeline.recording.events import means, reach, sample_noise
 LEAST_STEP = 0.03  # of the largest sudden change: less may be a hand that starts or stops
 SIGMAS = 6.0  # of a mean: what is less sudden than this is noise
 INSTANT = 0.7  # share of a lasting change that comes at once
-MATCH = 0.35  # share of a step by which the zeros before and after it may differ otherwise
+MATCH = 0.4  # share of a step by which the zeros before and after it may differ otherwise
 FREE = 0.5  # s at each end, at most, of which the zero is taken
 BLOCK = 0.05  # s: means over so long are independent of one another
 LEAST_BLOCKS = 6

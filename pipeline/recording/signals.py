@@ -51,8 +51,10 @@ class SignalFacts:
         rate: Of the force [Hz].
         longest_gap: In the window, by topic [s].
         cutoff_hz: Of the force's filter [Hz].
-        release_error, release_fall, release_resolution: Of `events.Release` [s].
-        slips: Sudden drops of the force before the release, since the window's start [s].
+        release_error, release_fall, release_resolution, release_spread: Of `events.Release` [s].
+        filtered: A filter is between sensor and recording, by how the force falls.
+        slips: Sudden drops of the held force before the release, since the window's start [s].
+        jumps: Those of the free hand before the grasp, that are not in `zeroed` [s].
         velocity_window: Of the fits that differentiate the path [s].
         twist_difference: Median difference of speed to a recorded twist [m/s]; None without one.
     """
@@ -75,7 +77,10 @@ class SignalFacts:
     release_error: float
     release_fall: float
     release_resolution: float
+    release_spread: float
+    filtered: bool
     slips: list[float]
+    jumps: list[float]
     velocity_window: float
     twist_difference: float | None
 
@@ -174,7 +179,10 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
         release_error=release.error,
         release_fall=release.fall,
         release_resolution=release.resolution,
-        slips=[time - start for time in release.slips],
+        release_spread=release.spread,
+        filtered=release.filtered,
+        slips=[time - start for time in release.slips if time >= grasp - MARGIN],
+        jumps=[time - start for time in release.slips if time < grasp - MARGIN],
         velocity_window=VELOCITY_WINDOW,
         twist_difference=_twist_difference(pull, pose_grid, velocity),
     )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.recording.build import Processed
+from pipeline.recording.processed import Processed
 from pipeline.recording.tare import GRAVITY
 from pipeline.recording.view import Scene
 

@@ -17,6 +17,7 @@ from pipeline.recording.view import Scene
 HAND_ERROR, GRIP_ERROR = 0.005, 0.005  # m: of the tool centre point; of the grip along the band
 FRAME_ERROR = np.deg2rad(0.5)  # of a sensor that is mounted and calibrated well
 WEIGHT_ERROR = 0.3  # of half the weight, by sag and a band that is not alike all along
+CREEP = 0.002  # of the held force, that a zero may be off meanwhile
 SLACK = 0.9  # way over rest length, below which the band hangs in a bow
 AFTER_GRASP = 0.3  # s
 LEAST_SLACK = 10  # samples
@@ -55,7 +56,7 @@ def hold_of(done: Processed) -> Hold:
     force = np.array(facts.hold_force) - half
     size = float(np.linalg.norm(force))
     up, along, across = _axes(scene, hand)
-    angles = np.array([_angle(force @ up, size), _angle(force @ across, size)])
+    angles = np.array([_angle(float(force @ way), size) for way in (up, across)])
     # By how much the axes turn where the hand or the grip is elsewhere.
     spread = np.zeros(2)
     for axis in np.eye(3) * HAND_ERROR:
@@ -65,7 +66,7 @@ def hold_of(done: Processed) -> Hold:
     zero = np.hypot(facts.zero_error, _unsure(facts.zero_change, facts.zero_steady))
     spread += FRAME_ERROR**2 + (zero / size) ** 2
     spread += np.array([WEIGHT_ERROR * float(np.linalg.norm(half)) / size, 0.0]) ** 2
-    weight, weight_error = _weight(done, float(zero))
+    weight, weight_error = _weight(done, float(np.hypot(zero, CREEP * size)))
     area = np.pi * done.band.diameter**2 / 4
     return Hold(
         size=size,

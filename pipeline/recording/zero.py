@@ -129,7 +129,7 @@ def drift_of(
     rate = change / (t[end].mean() - t[lead_in].mean())
     along = rest @ (change / max(size, 1e-12))
     courses = [course(t[which], along[which]) for which in (lead_in, end)]
-    error = float(np.hypot(*(one[2] for one in courses)))
+    error = float(np.hypot(courses[0][2], courses[1][2]))
     speed = float(np.linalg.norm(rate))
     other = any(
         abs(slope - speed) > max(SURE * spread, OTHER * speed) for slope, spread, _ in courses

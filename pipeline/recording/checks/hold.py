@@ -62,34 +62,34 @@ def findings(done: Processed) -> Iterator[Finding]:
 
 def _of_stiffness(hold: Hold) -> Iterator[Finding]:
     soft, hard = hold.modulus < RUBBERS[0], hold.modulus > RUBBERS[1]
-    light = hold.weight is not None and hold.weight + SURE * hold.weight_error < LIGHT
+    # One that feels no weight at all tells of a sensor that estimates, not of units.
+    weighs = hold.weight is not None and hold.weight > SURE * hold.weight_error
+    light = weighs and (hold.weight or 0) + SURE * hold.weight_error < LIGHT
     if not (soft or hard or light):
         return
     what = f"a band that holds {hold.size:.3g} N here would be of {_pascals(hold.modulus)}"
-    if hold.weight is not None:
+    if weighs:
         what += f" and weigh {hold.weight:.2g} times its mass on the hand"
-    unit = _unit(hold)
+    unit = _unit(hold.modulus, hold.weight if weighs else None)
     if unit:
         what += f": the force seems to be in {unit}"
     refused = not NO_RUBBER[0] < hold.modulus < NO_RUBBER[1]
     yield Finding(STIFFNESS.name, what, STIFFNESS.remedy, refused)
 
 
-def _unit(hold: Hold) -> str:
+def _unit(modulus: float, weight: float | None) -> str:
     """Of the units that make a rubber of the band, the one that makes its weight right."""
     fitting = [
         name
         for name, newtons in UNITS.items()
-        if RUBBERS[0] < hold.modulus * newtons < RUBBERS[1]
-        and (hold.weight is None or LIGHT < hold.weight * newtons < 1 / WEIGHS)
+        if RUBBERS[0] < modulus * newtons < RUBBERS[1]
+        and (weight is None or LIGHT < weight * newtons < 1 / WEIGHS)
     ]
-    if hold.weight is None:
+    if weight is None:
         return " or ".join(fitting)
-    weight = hold.weight
     fitting.sort(key=lambda name: abs(np.log(weight * UNITS[name] / WEIGHS)))
-    # Forces that differ by 2 % in size are told by neither weight nor modulus.
-    near = [one for one in fitting if 0.9 < UNITS[one] / UNITS[fitting[0]] < 1.1]
-    return " or ".join(near)
+    # What differs by a few percent is told by neither weight nor modulus.
+    return " or ".join(name for name in fitting if 0.9 < UNITS[name] / UNITS[fitting[0]] < 1.1)
 
 
 def _pascals(modulus: float) -> str:

@@ -19,11 +19,12 @@ import numpy as np
 CLOSE = 0.25  # of the mean way between messages: what is nearer is of one burst
 MOST_CLOSE = 0.4  # share of such ways from which they are no accident
 TWINS = 0.5  # share of bursts of one and the same value, from which messages are doubled
-LONGEST = 3.0  # mean lengths of a burst: what is further back was lost
+LONGEST = 1.6  # usual lengths of a burst: what is further back was lost
 HELD = 1.8  # mean ways between messages from which a value is held
 ALIKE, MOST_ALIKE = 0.25, 0.7  # by which share holds differ, and how many of them by no more
 REST = 3.0  # median holds: a value that stays for longer is at rest
 LEAST_HOLDS = 10
+COARSE = 0.001  # by which steps of one resolution differ
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def without_bursts(
     usual = interval / counts.mean()  # between samples
     # Whose interval is known: that before a burst's end, or that behind a tick.
     spans = np.concatenate([[0.0], between]) if before else np.append(between, 0.0)
-    sound = (spans > 0) & (spans < LONGEST * np.maximum(interval, counts * usual))
+    sound = (spans > 0) & (spans < LONGEST * counts * usual)
     spans = np.where(sound, spans, counts * usual)
     burst = np.repeat(np.arange(len(first)), counts)
     place = np.arange(len(stamp)) - first[burst]
@@ -91,19 +92,26 @@ def hold_of(stamp: np.ndarray, values: np.ndarray) -> float | None:
         stamp: Increasing [ns], shape (S,).
         values: Shape (S, C).
     """
-    ways = np.diff(stamp)
-    new = stamp[1:][np.any(np.diff(values, axis=0) != 0, axis=1)]
+    ways, change = np.diff(stamp), np.diff(values, axis=0)
+    new = stamp[1:][np.any(change != 0, axis=1)]
     holds = np.diff(new).astype(float)
-    if len(holds) < LEAST_HOLDS:
+    if len(holds) < LEAST_HOLDS or _steps_alike(change):
         return None
     mean = mean_way(ways)
     for _ in range(2):  # without what is at rest, which may be most of the time
         holds = holds[holds <= REST * np.median(holds)]
     hold = float(np.median(holds))
-    alike = np.abs(holds - hold) <= max(ALIKE * hold, mean)
+    alike = np.abs(holds - hold) <= max(ALIKE * hold, 0.6 * mean)
     if hold < HELD * mean or alike.mean() < MOST_ALIKE:
         return None
     return float(holds[alike].mean())
+
+
+def _steps_alike(change: np.ndarray) -> bool:
+    """A coarse encoder changes by its resolution, whenever the hand has come that far."""
+    moves = change[:, np.argmax(np.count_nonzero(change, axis=0))]
+    sizes = np.abs(moves[moves != 0])
+    return bool(np.median(np.abs(sizes / np.median(sizes) - 1)) < COARSE)
 
 
 def first_of_each(stamp: np.ndarray, values: np.ndarray, hold: float) -> np.ndarray:

@@ -71,10 +71,10 @@ def without_bursts(
     before = np.median((log[last] - log[first])[counts == count]) < CLOSE * mean * (count - 1)
     tick = stamp[last] if before else stamp[first]
     between = np.diff(tick).astype(float)
-    interval = mean_way(between)
-    usual = interval / counts.mean()  # between samples
+    interval = float(np.median(between))
+    usual = float(np.median(between / (counts[1:] if before else counts[:-1])))  # between samples
     # Whose interval is known: that before a burst's end, or that behind a tick.
-    spans = np.concatenate([[0.0], between]) if before else np.append(between, 0.0)
+    spans = np.append(0.0, between) if before else np.append(between, 0.0)
     sound = (spans > 0) & (spans < LONGEST * counts * usual)
     spans = np.where(sound, spans, counts * usual)
     burst = np.repeat(np.arange(len(first)), counts)

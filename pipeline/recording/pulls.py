@@ -27,7 +27,7 @@ from pipeline.recording.events import (
 from pipeline.recording.geometry import Geometry, geometry_of
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.motion import Motion, expect_dense
-from pipeline.recording.zero import Step, zeroed
+from pipeline.recording.zero import NewZero, zeroed
 
 CALM = 3.0  # s after a release until the band hangs at rest again, to some 2 mm
 APART = 1.0  # s: what is let go twice within this is one pull, and not understood
@@ -69,12 +69,12 @@ class Pull:
         return self._zeroed[0]
 
     @property
-    def zeroed(self) -> list[Step]:
+    def zeroed(self) -> list[NewZero]:
         """When the sensor was zeroed, and by how much: `force` is without these steps."""
         return self._zeroed[1]
 
     @cached_property
-    def _zeroed(self) -> tuple[np.ndarray, list[Step]]:
+    def _zeroed(self) -> tuple[np.ndarray, list[NewZero]]:
         return zeroed(self.force_time, self.recording.wrench.values)
 
     @cached_property

@@ -24,14 +24,14 @@ OTHER = 0.5  # of a steady drift, by which its slope in a window may differ
 
 
 @dataclass(frozen=True)
-class Step:
+class NewZero:
     """The sensor was zeroed: from `time` [s] on its values are greater by `size` (3,) [N]."""
 
     time: float
     size: np.ndarray
 
 
-def zeroed(t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, list[Step]]:
+def zeroed(t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, list[NewZero]]:
     """The force with the zero that it has at the end, and when that was set.
 
     A sudden change that lasts is another zero where the free hand at the end feels that much more
@@ -61,7 +61,7 @@ def zeroed(t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, list[Step]]:
         change = values[end:].mean(axis=0) - values[:begin].mean(axis=0)
         if np.linalg.norm(change - step) < MATCH * np.linalg.norm(step):
             values[:k] += step
-            found.append(Step(float(t[k]), step))
+            found.append(NewZero(float(t[k]), step))
     return (values, sorted(found, key=lambda one: one.time)) if found else (force, [])
 
 

@@ -31,7 +31,7 @@ MODEL = 0.15  # of the bending at the tips that its law may be wrong by
 
 
 @dataclass(frozen=True)
-class Lens:
+class LensFactor:
     """One factor of what the depth camera sees that explains what is off without another pose.
 
     Attributes:
@@ -71,7 +71,7 @@ class Tips:
     residual: float
     frames: int
     reach: float
-    lens: Lens | None = None
+    lens: LensFactor | None = None
 
     @property
     def sure(self) -> np.ndarray:
@@ -181,10 +181,10 @@ def _seen_by(
     return eye + deep + factor * (away - deep)
 
 
-def _lens(tips: Tips, seen_by: Callable[[str, float], Tips]) -> Lens | None:
+def _lens(tips: Tips, seen_by: Callable[[str, float], Tips]) -> LensFactor | None:
     """The factor that leaves least of what is off, where it leaves little; it acts linearly."""
     off, errors = tips.parts
-    found: list[tuple[float, Lens]] = []
+    found: list[tuple[float, LensFactor]] = []
     for kind in ("depth", "width"):
         slope = (seen_by(kind, 1 + TRY).parts[0] - off) / TRY
         variance = 1 / float(np.sum((slope / errors) ** 2))
@@ -194,7 +194,7 @@ def _lens(tips: Tips, seen_by: Callable[[str, float], Tips]) -> Lens | None:
         little = max(MATTERS, LITTLE * float(np.linalg.norm(off)))
         error = float(np.hypot(np.sqrt(variance), LENS_FLOOR))
         if np.linalg.norm(beyond) <= little and abs(more) > SURE * error:
-            lens = Lens(kind, 1 / (1 + more), error)
+            lens = LensFactor(kind, 1 / (1 + more), error)
             found.append((float(np.sum((left / errors) ** 2)), lens))
     return min(found, key=lambda one: one[0])[1] if found else None
 

@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 from pipeline.params.recording import CloudParams
+from pipeline.recording.blind import why_no_band
 from pipeline.recording.masks import masker
 from pipeline.recording.view import Frame, View
 
@@ -77,9 +78,10 @@ def clouds_of(view: View, cloud: CloudParams) -> Clouds:
     )
     if clouds.empty > MOST_EMPTY * len(times):
         cure = "the masks" if cloud.mask == "folder" else "the band's diameter and rest_length"
+        why = why_no_band(view) or f"check the camera's extrinsics and {cure}"
         raise UserError(
             f"{path}: empty mask, the band is not found in {clouds.empty} of {len(times)} frames:"
-            f" check the camera's extrinsics and {cure}"
+            f" {why}"
         )
     return clouds
 

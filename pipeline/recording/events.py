@@ -26,6 +26,9 @@ LEAD_IN = 0.2  # s at least
 LIFT = 0.005  # m
 AT_REST = 0.02  # m/s
 SLOWEST_FALL = 0.03  # s
+FALLING = (0.9, 0.3)  # shares of the drop between which the fall is timed: what rings is below
+RUBBER = 0.006  # s: pads open in less, and rubber follows them at once
+ALIKE = 0.4  # correlation of neighbouring samples' noise, from which a filter may have made it
 RINGS = 0.15  # share of the drop: past half of the fall the sensor may ring by this
 
 
@@ -35,7 +38,8 @@ class Release:
 
     Attributes:
         time: The force begins to drop [s].
-        error: Standard deviation of `time` [s], by the samples' spacing and noise.
+        error: Standard deviation of `time` [s], by the samples' spacing and noise, and by the delay
+            of a filter.
         fall: In which the force falls to nothing [s]; where that is over between two samples, some
             of their distance.
         resolution: Time between force samples around it [s].
@@ -43,6 +47,8 @@ class Release:
         noise: Standard deviation of one force sample along the pull [N].
         drop: How much the force fell [N].
         slips: Other sudden drops of the force [s].
+        spread: Time from 9 to 3 tenths of the held force [s].
+        filtered: It is more than rubber needs: a filter is between sensor and recording.
     """
 
     time: float
@@ -53,6 +59,8 @@ class Release:
     noise: float
     drop: float
     slips: list[float] = field(default_factory=list)
+    spread: float = 0.0
+    filtered: bool = False
 
 
 def find_releases(t: np.ndarray, force: np.ndarray, gripper: Opening | None) -> list[float]:
@@ -63,7 +71,7 @@ def find_releases(t: np.ndarray, force: np.ndarray, gripper: Opening | None) -> 
     """
     found: list[float] = []
     try:
-        _, free, ends, _ = _drops(t, force, *_reach(t), gripper)
+        _, free, ends, _ = _drops(t, force, *reach(t), gripper)
     except UserError:
         return []
     for i, later in pairwise([*free, None]):
@@ -96,7 +104,7 @@ def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = Non
             more than once.
     """
     period = float(np.median(np.diff(t)))
-    near, far = _reach(t)
+    near, far = reach(t)
     center, others = _steepest(t, force, near, far, gripper)
 
     quiet = slice(max(0, center - 6 * far), center - far)
@@ -104,8 +112,7 @@ def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = Non
     hold, free = force[quiet].mean(axis=0), force[settled].mean(axis=0)
     drop = float(np.linalg.norm(hold - free))
     along = force @ ((hold - free) / drop)
-    level, spread = along[quiet].mean(), np.diff(along[quiet])
-    noise = float(1.4826 * np.median(np.abs(spread - np.median(spread))) / np.sqrt(2))
+    level, noise = along[quiet].mean(), sample_noise(along[quiet])
     threshold = max(SIGMAS * noise, 0.02 * drop)
 
     window = slice(quiet.stop - far, settled.stop)
@@ -121,16 +128,49 @@ def find_release(t: np.ndarray, force: np.ndarray, gripper: Opening | None = Non
     fall = (level - along) / drop
     time, error, lasted = _onset(t, fall, first, max(noise / drop, 0.003), period)
     slips = [float(t[i]) for i in others]
-    return Release(time, error, lasted, resolution, hold, noise, drop, slips)
+    high, low = (level - drop * (1 - share) for share in FALLING)
+    spread = _first_below(t, along, low, half) - _last_above(t, along, high, half)
+    filtered = spread > 3 * period and (spread > RUBBER or _alike(along[quiet]) > ALIKE)
+    if filtered:  # it may have been applied forwards, or both ways
+        error = float(np.hypot(error, spread / 2))
+    return Release(time, error, lasted, resolution, hold, noise, drop, slips, spread, filtered)
 
 
-def _reach(t: np.ndarray) -> tuple[int, int]:
+def _first_below(t: np.ndarray, x: np.ndarray, value: float, near: int) -> float:
+    """When x (S,) first falls below a value, from sample `near` - 1 on [s]; linear between."""
+    below = x[near:] < value
+    k = near + int(np.argmax(below)) if below.any() else len(x) - 1
+    return float(np.interp(-value, [-x[k - 1], -min(x[k], x[k - 1])], [t[k - 1], t[k]]))
+
+
+def _last_above(t: np.ndarray, x: np.ndarray, value: float, near: int) -> float:
+    """When x (S,) is last above a value, up to sample `near` [s]; linear between."""
+    above = np.flatnonzero(x[:near] > value)
+    k = int(above[-1]) + 1 if len(above) else near
+    return float(np.interp(-value, [-x[k - 1], -min(x[k], x[k - 1])], [t[k - 1], t[k]]))
+
+
+def _alike(x: np.ndarray) -> float:
+    """Correlation of neighbouring samples (S,) of noise about a straight line."""
+    at = np.arange(len(x))
+    left = x - np.polyval(np.polyfit(at, x, 1), at)
+    return float(left[1:] @ left[:-1] / max(left @ left, 1e-30))
+
+
+def reach(t: np.ndarray) -> tuple[int, int]:
     """Samples to either side over which short and long means are taken. Raises UserError."""
     period = float(np.median(np.diff(t)))
     near, far = max(1, round(0.005 / period)), max(3, round(0.05 / period))
     if len(t) < 4 * far:
         raise UserError("the force is too short to find a release in it")
     return near, far
+
+
+def sample_noise(x: np.ndarray) -> float:
+    """Standard deviation of single samples (S, ...) about what changes slowly: the largest."""
+    change = np.diff(x, axis=0)
+    spread = np.median(np.abs(change - np.median(change, axis=0)), axis=0)
+    return float(np.max(1.4826 * spread / np.sqrt(2)))
 
 
 def _steepest(
@@ -151,8 +191,8 @@ def _drops(
     """Samples of sudden drops; which leave the hand free; which the fingers let go (all of these
     where none does); the drop at each sample of the force.
     """
-    sudden = np.linalg.norm(np.subtract(*_means(force, near, far)), axis=1)
-    before, after = _means(force, far, 6 * far)
+    sudden = np.linalg.norm(np.subtract(*means(force, near, far)), axis=1)
+    before, after = means(force, far, 6 * far)
     lasting = np.linalg.norm(before - after, axis=1)
     size = np.where(sudden >= SUDDEN * lasting, np.minimum(sudden, lasting), 0)
     size[: far + 1] = size[-far:] = 0
@@ -161,9 +201,7 @@ def _drops(
     drops, _ = find_peaks(size, height=least, distance=far)
     drops = np.array([i for i in drops if _median_step(force, i, far) > least], int)
     if not len(drops):
-        raise UserError(
-            f"the force never drops by {LEAST_PULL} N at once: no release of a drawn band is in it"
-        )
+        raise UserError(_no_drop(t, force, lasting[far:-far], size, far))
     rest = force[t < t[0] + LEAD_IN].mean(axis=0)
     held, left = (np.linalg.norm(x[drops] - rest, axis=1) for x in (before, after))
     opened = [i for i in drops[left < FREE * held] if gripper and _opens(*gripper, float(t[i]))]
@@ -172,7 +210,27 @@ def _drops(
     return drops, free, opened or free, size
 
 
-def _means(x: np.ndarray, near: int, far: int) -> tuple[np.ndarray, np.ndarray]:
+def _no_drop(
+    t: np.ndarray, force: np.ndarray, lasting: np.ndarray, size: np.ndarray, far: int
+) -> str:
+    """Why no sudden drop is found: too slow, in other units, or not there."""
+    slow, noise = float(lasting.max(initial=0)), sample_noise(force)
+    whole = float(np.linalg.norm(np.ptp(force, axis=0)))
+    if slow > max(LEAST_PULL, SUDDEN * whole):
+        at = t[far + int(np.argmax(lasting))]
+        return (
+            f"the force falls by {slow:.1f} N at {at:.1f} s, but not at once as rubber does: it is"
+            " filtered; record the sensor's own, unfiltered force"
+        )
+    if 0 < 30 * noise / np.sqrt(far) < size.max() < LEAST_PULL / 5:
+        return (
+            f"the force drops suddenly, but by {size.max():.2g} N only: a drawn band pulls with"
+            " newtons; is it in kilonewtons? Let the driver publish newtons"
+        )
+    return f"the force never drops by {LEAST_PULL} N at once: no release of a drawn band is in it"
+
+
+def means(x: np.ndarray, near: int, far: int) -> tuple[np.ndarray, np.ndarray]:
     """Means over [-far, -near] and over [near, far] samples around each sample, two (S, 3)."""
     sums = np.concatenate([np.zeros((1, 3)), np.cumsum(x, axis=0)])
     middle, last = np.arange(len(x)), len(x)

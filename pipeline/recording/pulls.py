@@ -27,10 +27,12 @@ from pipeline.recording.events import (
 from pipeline.recording.geometry import Geometry, geometry_of
 from pipeline.recording.input.reader import Recording
 from pipeline.recording.motion import Motion, expect_dense
+from pipeline.recording.zero import NewZero, zeroed
 
 CALM = 3.0  # s after a release until the band hangs at rest again, to some 2 mm
 APART = 1.0  # s: what is let go twice within this is one pull, and not understood
-UNMOVED = ("force_time", "opening", "release")  # what a delay of the pose does not change
+# What a delay of the pose does not change.
+UNMOVED = ("force_time", "_zeroed", "opening", "release")
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,20 @@ class Pull:
         """Of the force's samples [s], shape (S,)."""
         return self.recording.wrench.seconds(self.recording.origin)
 
+    @property
+    def force(self) -> np.ndarray:
+        """In the wrench's frame, with the zero that the sensor has at the end [N], shape (S, 3)."""
+        return self._zeroed[0]
+
+    @property
+    def zeroed(self) -> list[NewZero]:
+        """When the sensor was zeroed, and by how much: `force` is without these steps."""
+        return self._zeroed[1]
+
+    @cached_property
+    def _zeroed(self) -> tuple[np.ndarray, list[NewZero]]:
+        return zeroed(self.force_time, self.recording.wrench.values)
+
     @cached_property
     def opening(self) -> Opening | None:
         """Times [s] and opening [m] of the gripper; None where it was not recorded."""
@@ -73,12 +89,16 @@ class Pull:
 
     @cached_property
     def release(self) -> Release:
-        return find_release(self.force_time, self.recording.wrench.values, self.opening)
+        found = find_release(self.force_time, self.force, self.opening)
+        bursts = self.recording.wrench.bursts
+        if bursts:
+            found = replace(found, error=float(np.hypot(found.error, 1e-9 * bursts.error)))
+        return found
 
     @cached_property
     def releases(self) -> list[float]:
         """About when the pulls of a recording of several end [s]."""
-        return find_releases(self.force_time, self.recording.wrench.values, self.opening)
+        return find_releases(self.force_time, self.force, self.opening)
 
     @cached_property
     def grasp(self) -> float:

@@ -37,6 +37,11 @@ class SignalFacts:
 
     Attributes:
         bias, drift: Taken off the force, frame O [N], [N/s].
+        zero_change: Of the zero, from the lead-in to the free hand at the end, frame O [N]; None
+            where the latter says nothing of it.
+        zero_error: Standard deviation of its length [N].
+        zero_steady: The zero drifts steadily, if at all: `drift` is 0 where it does not.
+        zeroed: When the sensor was zeroed while recording, since the window's start [s].
         noise: Standard deviation of one force sample [N].
         hold_force: Mean just before the release, frame O [N].
         peak_force: Largest of the filtered force while the band is held [N].
@@ -46,14 +51,20 @@ class SignalFacts:
         rate: Of the force [Hz].
         longest_gap: In the window, by topic [s].
         cutoff_hz: Of the force's filter [Hz].
-        release_error, release_fall, release_resolution: Of `events.Release` [s].
-        slips: Sudden drops of the force before the release, since the window's start [s].
+        release_error, release_fall, release_resolution, release_spread: Of `events.Release` [s].
+        filtered: A filter is between sensor and recording, by how the force falls.
+        slips: Sudden drops of the held force before the release, since the window's start [s].
+        jumps: Those of the free hand before the grasp, that are not in `zeroed` [s].
         velocity_window: Of the fits that differentiate the path [s].
         twist_difference: Median difference of speed to a recorded twist [m/s]; None without one.
     """
 
     bias: list[float]
     drift: list[float]
+    zero_change: list[float] | None
+    zero_error: float
+    zero_steady: bool
+    zeroed: list[float]
     noise: float
     hold_force: list[float]
     peak_force: float
@@ -66,7 +77,10 @@ class SignalFacts:
     release_error: float
     release_fall: float
     release_resolution: float
+    release_spread: float
+    filtered: bool
     slips: list[float]
+    jumps: list[float]
     velocity_window: float
     twist_difference: float | None
 
@@ -117,7 +131,7 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
     tool, episode, recording = params.setup.tool, params.episode, pull.recording
     inertia = inertia if tool is None else None
     expect_dense(recording.wrench)
-    t, raw, motion = pull.force_time, recording.wrench.values, pull.motion
+    t, raw, motion = pull.force_time, pull.force, pull.motion
     grasp, release = pull.grasp, pull.release
     until = (motion.time >= t[0]) & (motion.time <= release.time)
     if until.sum() < 10:
@@ -149,6 +163,10 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
     facts = SignalFacts(
         bias=band.bias.tolist(),
         drift=band.drift.tolist(),
+        zero_change=None if band.zero.change is None else band.zero.change.tolist(),
+        zero_error=band.zero.error,
+        zero_steady=band.zero.steady,
+        zeroed=[step.time - start for step in pull.zeroed],
         noise=release.noise,
         hold_force=band.hold.tolist(),
         peak_force=float(np.linalg.norm(pulled, axis=1).max()),
@@ -161,7 +179,10 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
         release_error=release.error,
         release_fall=release.fall,
         release_resolution=release.resolution,
-        slips=[time - start for time in release.slips],
+        release_spread=release.spread,
+        filtered=release.filtered,
+        slips=[time - start for time in release.slips if time >= grasp - MARGIN],
+        jumps=[time - start for time in release.slips if time < grasp - MARGIN],
         velocity_window=VELOCITY_WINDOW,
         twist_difference=_twist_difference(pull, pose_grid, velocity),
     )

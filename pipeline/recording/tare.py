@@ -12,10 +12,10 @@ from pipeline.params.lab import Tool
 from pipeline.recording.events import LEAD_IN, MARGIN, SETTLE, Release
 from pipeline.recording.geometry import Geometry
 from pipeline.recording.motion import Motion
+from pipeline.recording.zero import Drift, drift_of
 
 GRAVITY = np.array([0.0, 0.0, -9.81])  # m/s^2, frame O
 MOST_ASKEW = np.deg2rad(30.0)  # between the held force and the way to the fork
-MOST_DRIFT = 0.05  # of the held force: more is no drift of the sensor
 STRAIGHT = np.deg2rad(1.0)  # of a hand whose weight, if unknown, may be compared with the lead-in's
 
 
@@ -28,6 +28,7 @@ class BandForce:
         flipped: The sensor reports the force of the gripper on the band.
         hold: Mean just before the release, shape (3,) [N].
         bias, drift: What was taken away beside the tool's load, in frame O [N], [N/s].
+        zero: How the zero moved, in frame O.
     """
 
     values: np.ndarray
@@ -35,6 +36,7 @@ class BandForce:
     hold: np.ndarray
     bias: np.ndarray
     drift: np.ndarray
+    zero: Drift
 
 
 def band_force(
@@ -49,7 +51,7 @@ def band_force(
     """Take the tool, the bias and the drift from a raw force, and find its sign.
 
     Taken away are the tool's load, then, in the sensor's frame, the lead-in's mean and the drift
-    until the free hand at the end.
+    until the free hand at the end where that is steady (`zero`).
 
     Args:
         t: Times [s], shape (S,).
@@ -76,31 +78,27 @@ def band_force(
         )
     usual = turn[lead_in].mean()  # pyright: ignore[reportArgumentType]
 
-    def tared(sign: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def tared(sign: float) -> tuple[np.ndarray, np.ndarray, Drift]:
         """The force in frame O (S, 3), with the sensor's sign, and the bias and drift in it."""
         rest = raw - sign * load
         bias, late = rest[lead_in].mean(axis=0), end
         if not load.any():
             late = late & ((usual.inv() * turn).magnitude() < STRAIGHT)
-        drift = np.zeros(3)
-        if late.sum() >= 20:
-            change = rest[late].mean(axis=0) - bias
-            if np.linalg.norm(change) < MOST_DRIFT * release.drop:
-                drift = change / (t[late].mean() - t[lead_in].mean())
-        force = rest - bias - drift * (t - t[lead_in].mean())[:, None]
-        return turn.apply(force), usual.apply(bias), usual.apply(drift)
+        zero = drift_of(t, rest, lead_in, late, release.drop)
+        force = rest - bias - zero.rate * (t - t[lead_in].mean())[:, None]
+        return turn.apply(force), usual.apply(bias), zero.seen_from(usual)
 
-    force, bias, drift = tared(1.0)
+    force, bias, zero = tared(1.0)
     sign = _sign(force[held].mean(axis=0), hand)
     if sign < 0 and tool is not None:  # the sensor feels its tool with the other sign, too
-        force, bias, drift = tared(sign)
+        force, bias, zero = tared(sign)
         if _sign(force[held].mean(axis=0), hand) > 0:
             raise UserError(
                 f"a tool of {tool.mass:.3g} kg hides which sign the force has: check setup.tool and"
                 " the wrench's frame"
             )
     force = sign * force
-    return BandForce(force, sign < 0, force[held].mean(axis=0), bias, drift)
+    return BandForce(force, sign < 0, force[held].mean(axis=0), bias, zero.rate, zero)
 
 
 def _sign(hold: np.ndarray, hand: np.ndarray) -> float:

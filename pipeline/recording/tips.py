@@ -8,7 +8,7 @@ lines turn about the tips, and so the two errors come apart.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,7 +21,28 @@ from pipeline.recording.view import Scene
 ROUNDS = 25
 SHARP = 1.345  # scales from which Huber's weights fall
 FLOOR = 0.0003  # m: systematic errors of depth that no repetition shows
+SURE = 3.5  # standard errors from which one of several components is more than noise
+TURN_FLOOR = np.deg2rad(0.1)  # as FLOOR, of a turn
+LENS_FLOOR = 0.001  # as FLOOR, of a factor
+MATTERS = 0.004  # m
+LITTLE = 0.2  # of what is off, that a factor may leave
+TRY = 0.01  # by which a factor is changed to see what it does
 MODEL = 0.15  # of the bending at the tips that its law may be wrong by
+
+
+@dataclass(frozen=True)
+class LensFactor:
+    """One factor of what the depth camera sees that explains what is off without another pose.
+
+    Attributes:
+        kind: "depth": of all distances from it; "width": across its sight (its focal length).
+        factor: Over the true one.
+        error: Standard deviation of it.
+    """
+
+    kind: str
+    factor: float
+    error: float
 
 
 @dataclass(frozen=True)
@@ -37,6 +58,8 @@ class Tips:
         hand_error: [m], shape (3,).
         residual: Median distance of points from the band's surface after the correction [m].
         frames: Pictures that were used.
+        reach: From the tips' middle to the hand where it was furthest [m].
+        lens: What explains it if it `is_off`, where one factor does.
     """
 
     offsets: np.ndarray
@@ -47,6 +70,33 @@ class Tips:
     hand_error: np.ndarray
     residual: float
     frames: int
+    reach: float
+    lens: LensFactor | None = None
+
+    @property
+    def sure(self) -> np.ndarray:
+        """The offsets' components that are more than noise [m], shape (2, 3); others are 0."""
+        return np.where(np.abs(self.offsets) > SURE * self.errors, self.offsets, 0.0)
+
+    @property
+    def turned(self) -> np.ndarray:
+        """The correction's turns that are more than noise [rad], shape (3,); others are 0."""
+        turn = self.correction.rotation.as_rotvec()
+        error = np.hypot(self.rotation_error, TURN_FLOOR)
+        return np.where(np.abs(turn) > SURE * error, turn, 0.0)
+
+    @property
+    def is_off(self) -> bool:
+        """More than noise, and enough to matter."""
+        far = float(np.linalg.norm(self.sure, axis=1).max())
+        return max(far, float(np.linalg.norm(self.turned)) * self.reach) > MATTERS
+
+    @property
+    def parts(self) -> tuple[np.ndarray, np.ndarray]:
+        """What may be off [m], and its standard errors, both (9,): tips, and turns at the hand."""
+        turn = self.correction.rotation.as_rotvec() * self.reach
+        spread = np.hypot(self.rotation_error, TURN_FLOOR) * self.reach
+        return np.append(self.offsets, turn), np.append(self.errors, spread)
 
     @property
     def off(self) -> float:
@@ -95,12 +145,58 @@ def measure_tips(
     samples = taut.samples_of(scene, times, clouds, eye, clamp)
     if samples is None:
         return None
+    tips = _of_samples(scene, samples, eye)
+    if not tips.is_off:
+        return tips
+
+    def seen_by(kind: str, factor: float) -> Tips:
+        """What would be off if the camera saw by so much more."""
+        sight = samples.points.mean(axis=0) - eye
+        points, hanging = (
+            _seen_by(kind, factor, one, eye, sight) for one in (samples.points, samples.hanging)
+        )
+        return _of_samples(scene, replace(samples, points=points, hanging=hanging), eye)
+
+    return replace(tips, lens=_lens(tips, seen_by))
+
+
+def _of_samples(scene: Scene, samples: Samples, eye: np.ndarray) -> Tips:
     first = _fit(samples, taut.from_middle, PRIOR_MEAN, eye)[0]
     state, covariance, off = _fit(samples, taut.from_surface, first, eye)
     # The law of bending is no exact one, and shifts the line's beginning as a camera would.
     bend = 2 * state[taut.STIFFNESS] / np.sqrt(np.median(samples.tension)) * np.sqrt(0.5)
     spare = np.hypot(FLOOR, MODEL * bend * samples.clamp)
-    return _tips(scene, state, covariance, spare, float(np.median(np.abs(off))), samples.frames)
+    return _tips(scene, samples, state, covariance, spare, float(np.median(np.abs(off))))
+
+
+def _seen_by(
+    kind: str, factor: float, points: np.ndarray, eye: np.ndarray, sight: np.ndarray
+) -> np.ndarray:
+    """Points (P, 3) as a camera at `eye` that looks along `sight` (3,) sees them by this factor."""
+    away = points - eye
+    if kind == "depth":
+        return eye + factor * away
+    axis = sight / np.linalg.norm(sight)
+    deep = (away @ axis)[:, None] * axis
+    return eye + deep + factor * (away - deep)
+
+
+def _lens(tips: Tips, seen_by: Callable[[str, float], Tips]) -> LensFactor | None:
+    """The factor that leaves least of what is off, where it leaves little; it acts linearly."""
+    off, errors = tips.parts
+    found: list[tuple[float, LensFactor]] = []
+    for kind in ("depth", "width"):
+        slope = (seen_by(kind, 1 + TRY).parts[0] - off) / TRY
+        variance = 1 / float(np.sum((slope / errors) ** 2))
+        more = -variance * float(np.sum(slope * off / errors**2))
+        left = off + more * slope
+        beyond = np.where(np.abs(left) > SURE * errors, left, 0.0)
+        little = max(MATTERS, LITTLE * float(np.linalg.norm(off)))
+        error = float(np.hypot(np.sqrt(variance), LENS_FLOOR))
+        if np.linalg.norm(beyond) <= little and abs(more) > SURE * error:
+            lens = LensFactor(kind, 1 / (1 + more), error)
+            found.append((float(np.sum((left / errors) ** 2)), lens))
+    return min(found, key=lambda one: one[0])[1] if found else None
 
 
 def _fit(
@@ -144,11 +240,11 @@ def _huber(off: np.ndarray, scale: float) -> np.ndarray:
 
 def _tips(
     scene: Scene,
+    samples: Samples,
     state: np.ndarray,
     covariance: np.ndarray,
     spare: np.ndarray,
     residual: float,
-    frames: int,
 ) -> Tips:
     correction = Transform(Rotation.from_rotvec(state[TURN]), state[SHIFT])
     errors = []
@@ -166,5 +262,6 @@ def _tips(
         hand=state[HAND],
         hand_error=np.hypot(spread[HAND], FLOOR),
         residual=residual,
-        frames=frames,
+        frames=samples.frames,
+        reach=float(np.linalg.norm(samples.hand, axis=1).max()),
     )

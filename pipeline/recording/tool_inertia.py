@@ -66,7 +66,7 @@ def estimate_tool_inertia(pull: Pull, tool: Tool | None) -> ToolInertia | None:
     Args:
         tool: setup.tool; only its centre of mass is used, the mass is fitted.
     """
-    t, raw, motion = pull.force_time, pull.recording.wrench.values, pull.motion
+    t, raw, motion = pull.force_time, pull.force, pull.motion
     grasp, release = pull.grasp, pull.release.time
     sure = MARGIN + WINDOW / 2
     inside = (t > max(t[0], motion.time[0]) + sure) & (t < min(t[-1], motion.time[-1]) - sure)

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -20,17 +21,13 @@ SOFT = dict(zip(THETA, (6e5, 0.45, 5e-3, 0.5, 1.0), strict=True))
 
 
 @pytest.fixture
-def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
-    """Runs a command in this process, and gives the one line with which it refuses."""
+def refused(sling: Callable):
+    """Runs a command, and gives the one line with which it refuses."""
 
     def run(status: int, *arguments: str, folder: Path = DEFAULTS.parent) -> str:
-        monkeypatch.chdir(folder)
-        monkeypatch.setattr(sys, "argv", ["sling", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        out, err = capsys.readouterr()
-        assert (ended.value.code, out) == (status, ""), err
-        (line,) = err.splitlines()
+        done = sling(*arguments, folder=folder)
+        assert (done.returncode, done.stdout) == (status, ""), done.stderr
+        (line,) = done.stderr.splitlines()
         assert line.startswith("error: ")
         return line
 
@@ -181,14 +178,14 @@ def aimable(folder: Path) -> None:
     write_policy(policy, slope=(-0.01, 0.0), offset=(-0.31, -0.15))
 
 
-def test_aim_prints_one_json_object(tmp_path: Path) -> None:
+def test_aim_prints_one_json_object(tmp_path: Path, sling: Callable) -> None:
     """The keys that scripts rely on, and the pose in the robot's base; the text has them too."""
     aimable(tmp_path)
     arguments = ("aim", "--band", "band1", "--target", "1.9")
-    done = python("-m", "app.cli", *arguments, folder=tmp_path)
+    done = sling(*arguments, folder=tmp_path)
     assert (done.returncode, done.stdout, done.stderr.count("\nerror: ")) == (3, "", 1)
     assert re.search("off the target; --force answers all the same\n$", done.stderr)
-    done = python("-m", "app.cli", *arguments, "--json", folder=tmp_path)
+    done = sling(*arguments, "--json", folder=tmp_path)
     answer = json.loads(done.stdout)
     assert done.returncode == 3 and answer.keys() == {"refused", "warnings"}
     assert "miss" in [one["about"] for one in answer["warnings"]]
@@ -209,7 +206,7 @@ def test_aim_prints_one_json_object(tmp_path: Path) -> None:
     params = tmp_path / "params.yaml"
     known = "base_to_fork: [0.5, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0]  #"
     params.write_text(params.read_text().replace("base_to_fork:", known))
-    done = python("-m", "app.cli", *arguments, "--force", folder=tmp_path)
+    done = sling(*arguments, "--force", folder=tmp_path)
     shown = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
     assert shown["tcp_position_m"] == "0.5 -0.329 0.25"
     assert shown["max_force_n"] == "30" and "warnings" not in shown
@@ -235,7 +232,7 @@ def test_aim_names_the_stage_that_makes_what_is_missing(tmp_path: Path, refused)
     )
 
 
-def test_launch_prints_one_json_object(tmp_path: Path) -> None:
+def test_launch_prints_one_json_object(tmp_path: Path, sling: Callable) -> None:
     """A hand-written θ file with only band and theta is enough."""
     theta = tmp_path / "theta.json"
     theta.write_text(json.dumps({"band": "band1", "theta": SOFT}))
@@ -248,7 +245,7 @@ def test_launch_prints_one_json_object(tmp_path: Path) -> None:
     assert result["failure"] is None
     assert 0.5 < result["landing_y_m"] < 6.0
     assert 1.0 < result["hold_force_n"] < 30.0
-    done = python("-m", "app.cli", *arguments, "--draw=-0.45,-0.30", folder=folder)
+    done = sling(*arguments, "--draw=-0.45,-0.30", folder=folder)
     broken = json.loads(done.stdout)
     assert broken["landing_y_m"] is None
     assert "N, more than" in broken["failure"]
@@ -256,6 +253,6 @@ def test_launch_prints_one_json_object(tmp_path: Path) -> None:
     history = {"pull_time": 3.5, "pause": 2.0}
     rubber = {"band": "band1", "law": "rubber", "theta": SOFT | more, "history": history}
     theta.write_text(json.dumps(rubber))
-    done = python("-m", "app.cli", *arguments[:-1], "--draw=-0.30,-0.17", folder=folder)
+    done = sling(*arguments[:-1], "--draw=-0.30,-0.17", folder=folder)
     lines = done.stdout.splitlines()
     assert ["pull_and_pause_s", "3.5", "2"] in [line.split() for line in lines]

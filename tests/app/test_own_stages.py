@@ -3,7 +3,6 @@
 import pytest
 
 from app.flow.graph import leading_to, stages_of
-from app.preflight.add_band import _with_band
 from pipeline.params import load
 from stages.start import stage_of
 from validation.projects import ProjectCopy, copy_project, run_of
@@ -26,9 +25,9 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> ProjectCopy:
 
 
 def add(project: ProjectCopy, *names: str) -> None:
-    path = project.folder / "params.yaml"
+    """All at once; how `sling add-band` writes one: tests/app/preflight/test_add_band.py."""
+    project.set({"run.own": [*names], **{f"bands.{name}": BAND for name in names}})
     for name in names:
-        path.write_text(_with_band(path, name, BAND), "utf-8")
         recording = project.folder / "data" / "raw" / name / f"{name}.mcap"
         recording.parent.mkdir(parents=True)
         recording.write_bytes(b"")

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from app.setup import LabMeasures, asked, confirmed, fork_of, set_up, shown
 from pipeline.base.errors import UserError
 from pipeline.params import load
-from tests.project import DEFAULTS, python
+from tests.project import DEFAULTS
 
 LEFT, RIGHT = (0.70, 0.1375, 0.42), (0.70, -0.1375, 0.42)  # the target along the base's x
 FORK = (0.7, 0, 0.42, 0, 0, -(0.5**0.5), 0.5**0.5)
@@ -164,8 +164,8 @@ def test_a_user_is_asked_and_may_say_no(path, capsys) -> None:
     assert set_up(measured, path, lambda said: confirmed(said, lambda question: ""))["written"]
 
 
-def test_the_command_line(path) -> None:
-    done = python(*CLI, "setup", "--max-force=20", "--json", folder=path.parent)
+def test_the_command_line(path, sling) -> None:
+    done = sling("setup", "--max-force=20", "--json", folder=path.parent)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["changed"] == {"max_force": {"old": 30.0, "new": 20.0}}
     assert YAML(typ="safe").load(path.read_text())["setup"]["max_force"] == 20.0
@@ -175,6 +175,6 @@ def test_the_command_line(path) -> None:
         (("--floor=-520",), "must be in metres, from -10 to 10, got -520, which looks like milli"),
         (("--base-to-camera=1,2,3,0,0,0,2",), "its quaternion must have length 1, not 2"),
     ):
-        done = python(*CLI, "setup", *arguments, folder=path.parent)
+        done = sling("setup", *arguments, folder=path.parent)
         assert done.returncode in (1, 2) and words in done.stderr
         assert done.stderr.count("\n") == 1

@@ -5,6 +5,9 @@ import sys
 import pytest
 
 from sling2sim2real import Band, LaunchHistory, Model, Settings, Theta
+from tests.app.conftest import sling
+
+__all__ = ["sling"]
 
 
 @pytest.fixture(scope="session", autouse=True)

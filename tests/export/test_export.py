@@ -3,6 +3,7 @@
 import json
 import shutil
 import sys
+from functools import partial
 
 import pytest
 from ruamel.yaml import YAML
@@ -45,25 +46,25 @@ def test_what_it_refuses(model, tmp_path, monkeypatch) -> None:
     assert [one.name for one in tmp_path.rglob("*")] == ["mine", "thesis.tex"]
 
 
-def test_the_command(tmp_path) -> None:
+def test_the_command(tmp_path, sling) -> None:
     """With a θ file written by hand; a second run replaces the first."""
     shutil.copy(DEFAULTS, tmp_path)
     theta = tmp_path / "data/theta/band1/least_squares.json"
     theta.parent.mkdir(parents=True)
     soft = dict(zip(THETA, (2.2e5, 0.45, 2e-3, 0.5, 1.0), strict=True))
     theta.write_text(json.dumps({"band": "band1", "theta": soft}))
-    command = (*CLI, "export", "--band", "band1", "--to", "yaml")
-    for _ in range(2):
-        done = python(*command, folder=tmp_path)
+    command = ("export", "--band", "band1", "--to", "yaml")
+    for run in (partial(python, *CLI), sling):
+        done = run(*command, folder=tmp_path)
         assert (done.returncode, done.stderr) == (0, "")
         assert done.stdout == "data/exports/band1/yaml: README.md, band1.yaml, card.json\n"
-    done = python(*command, "--json", "--out", "elsewhere", folder=tmp_path)
+    done = sling(*command, "--json", "--out", "elsewhere", folder=tmp_path)
     assert json.loads(done.stdout) == json.loads((tmp_path / "elsewhere/card.json").read_text())
     for arguments, expected in (
         (("--band", "band9"), "band band9: not in params.yaml"),
         (("--method", "de"), "de.json: missing"),
         (("--to", "drake"), "invalid choice: 'drake'"),
     ):
-        done = python(*command, *arguments, folder=tmp_path)
+        done = sling(*command, *arguments, folder=tmp_path)
         assert done.returncode and expected in done.stderr and not done.stdout
         assert done.stderr.count("\n") == 1

@@ -186,3 +186,16 @@ def test_a_misplaced_tf_static_is_measured(checked, params, tmp_path) -> None:
     placed = with_(params, "setup", camera_to_fork=pose)
     again = process(path, params.bands["band1"], placed)
     assert np.abs(again.tips.offsets).max() < 0.0007
+
+
+@pytest.mark.parametrize("factor", [0.97, 1.01, 1.03])
+def test_a_scale_of_depth_is_told_from_a_misplaced_camera(factor) -> None:
+    scene, times, clouds = drawn()
+    seen = [EYE + factor * (cloud - EYE) for cloud in clouds]
+    found = measure_tips(scene, times, seen, EYE, DOWN)
+    assert found.is_off and found.lens.kind == "depth"
+    assert found.lens.factor == pytest.approx(factor, abs=3 * found.lens.error)
+    across = np.cross(EYE, [0.0, 0.0, 1.0])
+    moved = [cloud + 0.012 * across / np.linalg.norm(across) for cloud in clouds]
+    found = measure_tips(scene, times, moved, EYE, DOWN)
+    assert found.is_off and found.lens is None

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.recording.checks.finding import Check, Finding
+from pipeline.recording.input.pace import HELD as SENT
+from pipeline.recording.input.pace import MOST_CLOSE
 from pipeline.recording.input.streams import Stream
 from pipeline.recording.processed import Processed
 
@@ -35,7 +37,7 @@ MISSED = Check(
 FORCE = Check(
     "force_rate",
     "the force's rate with that at which the release is known to a millisecond",
-    "the median time between messages",
+    "the usual time between values",
     f"below {FORCE_RATE:g} Hz",
     "",
     "record it at 1 kHz",
@@ -43,12 +45,28 @@ FORCE = Check(
 PICTURES = Check(
     "picture_rate",
     "the pictures' rate with the length of a recoil",
-    "the median time between pictures",
+    "the usual time between pictures",
     f"below {PICTURE_RATE:g} Hz",
     "",
     "record 30 a second or more",
 )
-CHECKS = (GAP, MISSED, FORCE, PICTURES)
+BURSTS = Check(
+    "bursts",
+    "how the stamps of force, pose and gripper follow on one another with an even rate",
+    "the even stamps' scatter, which is in the release's",
+    f"{100 * MOST_CLOSE:g} % of them come at once, and are spread evenly",
+    "",
+    "stamp each sample when it is measured (of an FTDI adapter: set its latency timer to 1 ms)",
+)
+HELD = Check(
+    "held",
+    "how often the values of force, pose and twist change with how often they are sent",
+    "none: they are counted",
+    f"each is sent {SENT:g} times or more: only its first message counts",
+    "",
+    "record the topic of what measures it, or send each value once",
+)
+CHECKS = (GAP, MISSED, BURSTS, HELD, FORCE, PICTURES)
 
 
 def findings(done: Processed) -> Iterator[Finding]:
@@ -61,6 +79,16 @@ def findings(done: Processed) -> Iterator[Finding]:
             what = f"{stream.missing} messages of {stream.topic} are missing"
             yield Finding(MISSED.name, what, MISSED.remedy)
         rate = 1 / stream.period
+        if stream.bursts:
+            many, every = stream.bursts.count, stream.bursts.interval * 1e-6
+            error = stream.bursts.error * 1e-6
+            what = f"{stream.topic} is stamped in bursts of {many} every {every:.3g} ms"
+            what += f", spread evenly to ± {error:.2g} ms"
+            yield Finding(BURSTS.name, what, BURSTS.remedy)
+        if stream.hold:
+            what = f"{stream.topic} repeats each value for {1e3 * stream.hold:.3g} ms"
+            what += f": it has {rate:.0f} new values a second"
+            yield Finding(HELD.name, what, HELD.remedy)
         if "wrench" in roles and rate < FORCE_RATE:
             what = f"the force comes at {rate:.0f} Hz, so the release is known only that coarsely"
             yield Finding(FORCE.name, what, FORCE.remedy)

@@ -8,6 +8,7 @@ from pipeline.recording.checks import (
     container,
     force,
     frames,
+    hold,
     motion,
     pictures,
     rates,
@@ -17,7 +18,7 @@ from pipeline.recording.checks import (
 from pipeline.recording.checks.finding import Check, Finding
 from pipeline.recording.processed import Processed
 
-CONCERNS = (container, roles, rates, times, force, motion, pictures, frames, camera)
+CONCERNS = (container, roles, rates, times, force, hold, motion, pictures, frames, camera)
 UNDERSTOOD = Check(
     "pull",
     "what was recorded with a pull: a lead-in, a grasp, a draw, a release, pictures of a band",

@@ -14,7 +14,8 @@ a while are worth comparing. The rule, for each break in a topic:
 A step is taken out by continuity: the message after it comes a whole number of periods after the
 one before, that number being told by log_time. So a topic needs an even rate; the step of another
 topic is refused, as log_time alone is not good to a millisecond. Where several topics step at once,
-the fastest one tells by how much. A lone stamp far from both of its neighbours is damage.
+the fastest one tells by how much. A lone stamp far from both of its neighbours is damage, and so
+are one or two at the ends that log_time puts elsewhere.
 
 A whole topic on another clock than the wrench's can be tied to it by log_time only as well as the
 two transports' least delays agree: about a millisecond for what a controller publishes (pose,
@@ -36,6 +37,7 @@ EVEN = 0.2  # of the period, by which intervals of an even rate differ in the me
 PILED = 0.2  # of the period, within which messages come that had to wait
 AGREE = 0.003  # s between a step by continuity and by log_time
 FAR = 1.0  # s between a stamp and those around it
+ALONE = 60.0  # s between one or two messages at a topic's end and the rest of it
 DISORDER = 10  # messages that go back, from which no clock was set, but the file has no order
 INTERLEAVED = 6  # how often stamps of two runs alternate that cover the same time
 TOLERANCE = 0.5  # s between the clocks of two topics
@@ -60,14 +62,29 @@ class Jump:
     exact: bool
 
 
-def outliers(stamp: np.ndarray) -> np.ndarray:
-    """Which stamps [ns], in the order of arrival, are far from all around them; shape (S,)."""
+def outliers(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:
+    """Which stamps [ns], in the order of arrival, are far from all around them; shape (S,).
+
+    At the ends of a topic these are also one or two that log_time has elsewhere, or that come a
+    minute before or after all others: too few to tell of a clock.
+    """
     if len(stamp) < 5:
         return np.zeros(len(stamp), bool)
     middle = np.median(stamp.astype(float))
     usual = median_filter(stamp - middle, 5, mode="nearest") + middle
     limit = max(FAR * 1e9, 10 * _period(stamp))
-    return np.abs(stamp - usual) > limit
+    found = np.abs(stamp - usual) > limit
+    for order in (1, -1):
+        kept = np.flatnonzero(~found)[::order]
+        ways, by_log = np.abs(np.diff(stamp[kept])), np.abs(np.diff(log[kept]))
+        far = ways > np.where(np.abs(ways - by_log) > limit / 2, limit, max(ALONE * 1e9, limit))
+        begin = 0
+        for i in np.flatnonzero(far[: 2 * LEAST_AROUND]):
+            if i + 1 - begin >= LEAST_AROUND or 2 * i > len(kept):
+                break
+            begin = i + 1
+        found[kept[:begin]] = True
+    return found
 
 
 def arrival(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:

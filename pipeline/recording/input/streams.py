@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from pipeline.base.errors import UserError, printable
-from pipeline.recording.input import clocks
+from pipeline.recording.input import clocks, pace
 from pipeline.recording.input.decode import Unreadable
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.input.roles import OPTIONAL, Choice
@@ -25,14 +25,18 @@ from pipeline.recording.input.words import counted, few, shortened
 ABSURD = 1e6  # N, m, m/s, rad: nothing here is as large
 # What a lone message may be off the four around it: a knock or a fall lasts for more than one.
 LONE = {"wrench": 30.0, "pose": 0.05}  # N, m
+MOST_LONE = 0.05  # share of the messages that may be alone: more are the sensor's noise, or units
 FASTEST = 2.0  # m/s of the hand
 TIMED = ("gripper",)  # roles for which log_time will do where there are no stamps
 LONG_GAP, LONG_GAP_S = 5.0, 0.02  # periods and seconds from which a gap is named
 ENDS = 0.3  # s by which a topic may start later or stop earlier than the others
 FROZEN = 0.25  # s of one and the same value of a sensor that has noise
 FROZEN_FRAMES = 3  # pictures that are the same, byte for byte
+EVEN = 0.1  # of the period, by which the median way may differ from the mean one
 NAMED = 3  # places named in one line
 REASON = 100  # characters of why a message is damaged
+CAMERAS = ("color", "depth")
+HELD = ("wrench", "pose", "twist")  # roles of which each value is measured anew
 CORRECTABLE = ("pose", "twist", "gripper")  # by log_time, if they have a clock of their own
 
 
@@ -51,6 +55,8 @@ class Stream(Generic[Values]):
         delay: Median of log_time - stamp [s].
         lost: Messages that are not in it, for whatever reason.
         notes: What was lost or mended, in words.
+        bursts: In which the stamps came; None where they were even.
+        hold: For how long each value was repeated [s], 0 where it was not: repeats are left out.
     """
 
     topic: str
@@ -60,14 +66,18 @@ class Stream(Generic[Values]):
     delay: float
     lost: int
     notes: list[str] = field(default_factory=list)
+    bursts: pace.Bursts | None = None
+    hold: float = 0.0
 
     def seconds(self, origin: int) -> np.ndarray:
         return (self.stamp - origin) * 1e-9
 
     @property
     def period(self) -> float:
-        """Median time between messages [s]."""
-        return float(np.median(np.diff(self.stamp))) * 1e-9
+        """Usual time between messages [s]: the median, or where that is none, the mean."""
+        ways = np.diff(self.stamp)
+        median, mean = float(np.median(ways)), pace.mean_way(ways)
+        return (median if abs(median - mean) < EVEN * mean else mean) * 1e-9
 
     @property
     def longest_gap(self) -> float:
@@ -104,6 +114,7 @@ class Raw:
     reason: str = ""  # why the first damaged message cannot be read
     notes: list[str] = field(default_factory=list)
     late: int = 0  # how often the stamps go back
+    bursts: pace.Bursts | None = None
 
     @property
     def topic(self) -> str:
@@ -142,7 +153,8 @@ def streams_of(chosen: dict[str, Choice]) -> tuple[dict[str, Stream[Any]], list[
     for one in raw.values():
         one.late = int(np.count_nonzero(np.diff(one.stamp) < 0))
         one.keep(clocks.arrival(one.stamp, one.log))
-        one.drop(clocks.outliers(one.stamp), "far off in time")
+        one.drop(clocks.outliers(one.stamp, one.log), "far off in time")
+        _take_bursts_out(one)
     _take_steps_out(raw)
     _on_one_clock(raw)
     streams = {role: _sorted(one) for role, one in raw.items()}
@@ -206,6 +218,21 @@ def _take_rewinds_out(raw: dict[str, Raw]) -> None:
             role.notes.append(
                 f"step of its machine's clock of {size:+.4f} s at {at:.2f} s taken out"
             )
+
+
+def _take_bursts_out(raw: Raw) -> None:
+    """Stamps of buffers that are read at once, or of a coarse clock."""
+    if raw.role in CAMERAS:
+        return
+    even = pace.without_bursts(raw.stamp, raw.log, np.array(raw.values, float))
+    if even is None:
+        return
+    raw.stamp, raw.bursts = even
+    side = "before" if raw.bursts.before else "after"
+    raw.notes.append(
+        f"stamped in bursts of {raw.bursts.count} every {raw.bursts.interval * 1e-6:.3g} ms: spread"
+        f" evenly over the time {side} each"
+    )
 
 
 def _take_steps_out(raw: dict[str, Raw]) -> None:
@@ -293,11 +320,19 @@ def _sorted(raw: Raw) -> Stream[Any]:
             values = _without_lone(raw, values)
         if raw.choice.convert is not None:
             values = raw.choice.convert(raw.stamp, values)
+    hold = pace.hold_of(raw.stamp, values) if raw.role in HELD else None
+    if hold:
+        kept = pace.first_of_each(raw.stamp, values, hold)
+        times = f"{len(values) / np.count_nonzero(kept):.0f}"
+        raw.notes.append(f"each value is sent {times} times: the repeats are left out")
+        raw.keep(kept)
+        values = values[kept]
     if raw.lost:
         raw.notes.append(f"lost {_words(raw)}")
     delay = float(np.median(raw.log - raw.stamp)) * 1e-9
     lost = sum(raw.lost.values())
-    return Stream(raw.topic, raw.frame, raw.stamp, values, delay, lost, raw.notes)
+    stream = Stream(raw.topic, raw.frame, raw.stamp, values, delay, lost, raw.notes)
+    return replace(stream, bursts=raw.bursts, hold=(hold or 0.0) * 1e-9)
 
 
 def _without_lone(raw: Raw, values: np.ndarray) -> np.ndarray:
@@ -307,7 +342,7 @@ def _without_lone(raw: Raw, values: np.ndarray) -> np.ndarray:
     if raw.role == "pose":
         limit = max(limit, FASTEST * 1e-9 * float(np.median(np.diff(raw.stamp))))
     lone = np.abs(values[:, :3] - around).max(axis=1) > limit
-    if len(values) - lone.sum() < 2:
+    if lone.mean() > MOST_LONE:
         return values
     raw.drop(lone, "far off those around")
     return values[~lone]

@@ -14,8 +14,7 @@ from app.drift.drift import BY_NAME, BY_TIME, SAME, anew, drift, shown
 from app.drift.recordings import IdentifiedRecording, in_time
 from pipeline.base.errors import UserError
 from sling2sim2real import Band, Model, Settings, Theta, episode_from_arrays, rehearse
-from tests.project import DEFAULTS, python
-from validation.projects import CLI
+from tests.project import DEFAULTS
 
 BAND = Band(0.023, 0.010, 0.52, "mine")
 SECOND, DAY = 10**9, 86400 * 10**9
@@ -150,11 +149,11 @@ def test_the_command_names_sizes_that_are_not_the_usual_ones() -> None:
     assert "--diameter 0.008 --rest-length 0.5" in anew(other, [])
 
 
-def test_a_mistake_is_one_line(tmp_path) -> None:
+def test_a_mistake_is_one_line(tmp_path, sling) -> None:
     (tmp_path / "params.yaml").write_text(DEFAULTS.read_text())
 
     def told(band: str) -> str:
-        done = python(*CLI, "drift", "--band", band, folder=tmp_path)
+        done = sling("drift", "--band", band, folder=tmp_path)
         assert done.returncode == 1 and done.stdout == ""
         (line,) = (one for one in done.stderr.splitlines() if not one.endswith(" ..."))
         return line

@@ -1,0 +1,110 @@
+"""Forces that no sound sensor makes of a drawn band: each is found by its name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
+
+from pipeline.base.errors import UserError
+from pipeline.recording.checks import force, hold, rates
+from pipeline.recording.checks.finding import Finding
+from pipeline.recording.input.pace import Bursts
+from pipeline.recording.processed import Processed
+from pipeline.recording.tare import sensor_turns
+from tests.recording.checks.made import abouts, with_facts, with_recording
+
+
+def with_force(done, change):
+    """With `change(times, values)` of the raw force, from the reader on."""
+    wrench = done.pull.recording.wrench
+    values = change(done.pull.force_time, wrench.values)
+    odd = with_recording(done, wrench=replace(wrench, values=values))
+    return type(done).of(odd.pull, done.band, done.params)
+
+
+def found(done: Processed) -> list[Finding]:
+    return [*force.findings(done), *hold.findings(done)]
+
+
+def turned(done, axis: str, degrees: float):
+    turn = sensor_turns(done.pull.motion, done.pull.geometry, done.pull.force_time[:1])[0]
+    turn = turn.inv() * Rotation.from_euler(axis, degrees, degrees=True) * turn
+    return with_force(done, lambda _, values: turn.apply(values))
+
+
+def test_a_sound_force_is_left(checked) -> None:
+    assert not found(checked)
+
+
+@pytest.mark.parametrize("axis", ["x", "z"])
+@pytest.mark.parametrize("degrees", [-28, -15, -6, 6, 15, 28])
+def test_a_turned_sensor(checked, axis, degrees) -> None:
+    said = [one for one in found(turned(checked, axis, degrees)) if one.about == "direction"]
+    assert len(said) == 1 and said[0].refused == (abs(degrees) > 12)
+    way = {"x": ("presses down", "lifts"), "z": ("to the right", "to the left")}[axis]
+    assert way[degrees > 0] in said[0].what
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7, 0.95])
+def test_a_range_that_ends(checked, share) -> None:
+    peak = share * np.linalg.norm(checked.signals.facts.hold_force)
+
+    def clipped(t, values):
+        rest = values[t < 0.5].mean(axis=0)
+        k = int(np.argmax(np.ptp(values, axis=0)))
+        most = peak * np.ptp(values[:, k]) / np.linalg.norm(checked.signals.facts.hold_force)
+        values = values.copy()
+        values[:, k] = np.clip(values[:, k], rest[k] - most, rest[k] + most)
+        return values
+
+    said = found(with_force(checked, clipped))
+    assert [one.about for one in said if one.refused][0] == "range"
+    assert "its range ends" in said[0].what
+
+
+def test_units(checked) -> None:
+    for newtons, name, refused in (
+        (1e-3, "millinewtons", True),
+        (9.81, "kilograms-force", False),
+    ):
+        said = found(with_force(checked, lambda _, values, by=newtons: values / by))
+        units = [one for one in said if one.about == "units"]
+        assert units and units[0].refused == refused and name in units[0].what
+    with pytest.raises(UserError, match="is it in kilonewtons"):
+        _ = with_force(checked, lambda _, values: values / 1e3).pull.release
+
+
+@pytest.mark.parametrize("count", [10, 20, 40])
+def test_a_filtered_force(checked, count) -> None:
+    """A moving average: its release is unsure by what it delays."""
+
+    def averaged(_, values):
+        return values[0] + lfilter(np.ones(count) / count, 1, values - values[0], axis=0)
+
+    odd = with_force(checked, averaged)
+    assert "filter" in abouts(force.findings(odd))
+    late = (count - 1) / 2 * odd.pull.recording.wrench.period
+    assert odd.pull.release.error > late / 2
+
+
+def test_zeros_are_named(checked) -> None:
+    release = checked.pull.release.time
+    zero = with_force(checked, lambda t, values: values - 3.0 * (t > 0.4)[:, None])
+    assert abouts(found(zero)) == {"zeroed"} and not zero.signals.facts.slips
+    hold_force = np.linalg.norm(checked.signals.facts.hold_force)
+    for share, refused in ((0.05, False), (0.2, True)):
+        off = share * hold_force / np.sqrt(3)
+        odd = with_force(checked, lambda t, x, by=off: x + by * (t > release + 0.01)[:, None])
+        (said,) = (one for one in found(odd) if one.about == "zero")
+        assert said.refused == refused and "after the release" in said.what
+    assert "jump" in abouts(force.findings(with_facts(checked, jumps=[0.1])))
+
+
+def test_bursts_and_held_values_are_said(checked) -> None:
+    wrench, pose = checked.pull.recording.wrench, checked.pull.recording.pose
+    bursts = replace(wrench, bursts=Bursts(16, 16e6, True, 3e5))
+    assert "bursts" in abouts(rates.findings(with_recording(checked, wrench=bursts)))
+    held = replace(pose, hold=0.033)
+    assert "held" in abouts(rates.findings(with_recording(checked, pose=held)))

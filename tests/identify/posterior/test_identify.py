@@ -23,8 +23,8 @@ METHOD, WORKERS, LOSS = "least_squares", 2, "log_loss_factor"
 SLING = replace(sling_of(0.03), law="rubber")
 SPACE = Coordinates.of_method(PARAMS, METHOD, SLING)
 CUTOFF = cutoff_hz(PARAMS.force.cutoff, PARAMS.force.cutoff_unit)
-TRUE = np.array([np.log(3e5), np.log(0.07), 0.3, 0.01, 0.0, 0.4, 0.0])
-START = TRUE + [0.1, -0.3, -0.1, 0.005, 0.0, 0.0, 0.0]
+TRUE = np.array([np.log(3e5), np.log(0.07), 0.3, 0.05, 0.02, 0.0, 0.4, 0.0])
+START = TRUE + [0.1, -0.3, -0.1, 0.03, 0.01, 0.0, 0.0, 0.0]
 TRUTH, FROM = (SPACE.parameters(phi[None]) for phi in (TRUE, START))
 NOISE = 0.05, 0.0006  # N, m
 

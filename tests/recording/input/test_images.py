@@ -218,12 +218,12 @@ def test_what_a_whole_topic_cannot_be_is_told_from_damage() -> None:
     bomb = jpeg[:place] + struct.pack(">HH", 65500, 65500) + jpeg[place + 4 :]  # of 12 GB
     place = png(MILLIMETRES).index(b"IDAT") - 4
     long = png(MILLIMETRES)[:place] + b"\x7f" + png(MILLIMETRES)[place + 1 :]  # a chunk of 2 GB
-    tiff = cv2.imencode(".tiff", BGR)[1].tobytes()
+    gif = cv2.imencode(".gif", BGR)[1].tobytes()
     whole = raw("rgb8", BGR)
     for read, picture in (
         (color, packed("jpeg", b"")),
         (color, packed("jpeg", jpeg[: len(jpeg) // 2])),
-        (color, packed("tiff", tiff)),
+        (color, packed("gif", gif)),
         (color, packed("jpeg", bomb)),
         (depth, packed("png", long)),
         (depth, packed("16UC1; compressedDepth png", bytes(12) + long)),

@@ -35,6 +35,10 @@ class Unreadable(Exception):
         return cls(str(error).partition("\n")[0] or type(error).__name__)
 
 
+class Elsewhere(Unreadable):
+    """A message of another publisher on the same topic."""
+
+
 def decoder(channel: Channel) -> Decoder:
     """A function from payload to a message with attributes; it raises Unreadable.
 

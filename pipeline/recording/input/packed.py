@@ -1,4 +1,4 @@
-"""Packed pictures: JPEG, PNG and what else OpenCV unpacks, as far as their bytes can be believed."""
+"""Packed pictures: JPEG, PNG and what else OpenCV unpacks, as far as they can be believed."""
 
 from __future__ import annotations
 

@@ -39,13 +39,15 @@ class Recording:
         wrench: Force [N] in `wrench.frame`, values (S, 3).
         pose: Position [m] and quaternion xyzw in `pose.frame`, values (S, 7).
         twist: Velocity [m/s] and angular velocity [rad/s], values (S, 6); None where not recorded.
-        gripper: Sum of the finger positions [m], values (S, 1); None where not recorded.
+        gripper: Sum of the finger positions, as they are reported [m], values (S, 1); None where
+            not recorded.
         color, depth: `Picture`s, decoded by `pipeline.recording.input.images`.
         color_camera, depth_camera: Their intrinsics.
         transforms: The static tree.
         losses: What was lost of the file or mended in it, in words.
         notes: What else to know of it, which cost nothing.
         choices: Why each role has its topic.
+        doubts: Why a role could have another topic.
         sha256: Hash of the file.
         start: From which seconds count [ns]: the file's first force, also in a part of it; None
             for that of `wrench`.
@@ -65,6 +67,7 @@ class Recording:
     twist: Stream[np.ndarray] | None = None
     notes: list[str] = field(default_factory=list)
     choices: dict[str, str] = field(default_factory=dict)
+    doubts: dict[str, str] = field(default_factory=dict)
     start: int | None = None
 
     @property
@@ -110,11 +113,11 @@ def read_recording(path: Path, setup: SetupParams) -> Recording:
 def recording_of(container: Container, setup: SetupParams) -> Recording:
     """As `read_recording`, from a file that was read already."""
     try:
-        chosen = choose(container, setup)
+        transforms = transforms_of(container)
+        chosen = choose(container, setup, transforms.frames)
         color_camera, depth_camera = (camera_of(chosen, role) for role in CAMERAS)
         found = {role: chosen[role] for role in ROLES if role in chosen}
         streams, remarks = streams_of(found)
-        transforms = transforms_of(container)
     except UserError as error:
         raise explained(error, container.path, container.losses) from None
     lost = [f"{stream.topic}: {note}" for stream in streams.values() for note in stream.notes]
@@ -132,6 +135,7 @@ def recording_of(container: Container, setup: SetupParams) -> Recording:
         losses=[*container.losses, *lost],
         notes=[*container.notes, *remarks],
         choices={role: choice.why for role, choice in chosen.items()},
+        doubts={role: choice.doubt for role, choice in chosen.items() if choice.doubt},
         sha256=sha256(container.path),
     )
 

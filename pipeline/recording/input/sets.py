@@ -128,7 +128,19 @@ def follows(force: Course, hand: Course) -> float:
     return max(0.0, 1.0 - float((left**2).sum()) / total) if total > 0 else 0.0
 
 
-def opening_of(values: np.ndarray, moments: np.ndarray, fall: Callable[[], int | None]):
+def moves_at(fingers: Course, fall: float) -> bool:
+    """Whether fingers (N, C) move within half a second of `fall` [s], by when they were logged."""
+    since = fingers.time - fall
+    held, after = (since > -1.0) & (since < 0), (since > 0) & (since < AT_FALL)
+    if not held.any() or not after.any():
+        return False
+    away = np.abs(fingers.values[after] - np.median(fingers.values[held], axis=0)).max(axis=0)
+    return bool((away > np.maximum(0.2 * np.ptp(fingers.values, axis=0), 1e-9)).any())
+
+
+def opening_of(
+    values: np.ndarray, moments: np.ndarray, fall: Callable[[], int | None]
+) -> np.ndarray:
     """Of the positions of fingers (S, C) that of the hand that let go, shape (S, 1).
 
     Fingers of a mirrored sign count the other way round, those of another device not at all.

@@ -17,7 +17,7 @@ from scipy.ndimage import median_filter
 
 from pipeline.base.errors import UserError, printable
 from pipeline.recording.input import clocks
-from pipeline.recording.input.decode import Unreadable
+from pipeline.recording.input.decode import Elsewhere, Unreadable
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.input.roles import OPTIONAL, Choice
 from pipeline.recording.input.words import counted, few, shortened
@@ -161,6 +161,8 @@ def _read(role: str, choice: Choice) -> Raw:
     for log_time, payload in zip(channel.log_times, channel.payloads, strict=True):
         try:
             stamp, frame, value = choice.read(payload)
+        except Elsewhere:
+            continue
         except Unreadable as error:
             lost["damaged"] += 1
             reason = reason or shortened(printable(str(error)), REASON)

@@ -34,6 +34,7 @@ from pipeline.recording.input import bag
 from pipeline.recording.input import records as of
 from pipeline.recording.input.opened import opened
 from pipeline.recording.input.records import Damaged, Record
+from pipeline.recording.input.standard import guessed
 from pipeline.recording.input.words import counted, few
 
 MOST = 2**30  # bytes of messages that are held at once
@@ -272,7 +273,8 @@ class _Contents:
             if schema is None and known.schema_id:
                 losses.append(f"{count} of {known.topic} dropped: its schema is missing")
                 continue
-            schema = schema or NO_SCHEMA
+            encoding = known.message_encoding
+            schema = schema or guessed(known.topic, encoding, channel.payloads) or NO_SCHEMA
             key = (known.topic, schema.name, schema.encoding, schema.data, known.message_encoding)
             one = found.setdefault(key, Channel(known.topic, schema, known.message_encoding))
             one.log_times += channel.log_times

@@ -70,7 +70,7 @@ class Reading(NamedTuple):
 
 def kind_of(schema: str) -> str:
     """The schema's own name: geometry_msgs/msg/PoseStamped, a.b.PoseStamped -> PoseStamped."""
-    kind = re.split(r"[/.:]+", schema)[-1]
+    kind = re.split(r"[/.:]+", schema)[-1].removesuffix("_")  # which DDS adds
     return "WrenchStamped" if kind.endswith("WrenchStamped") else kind
 
 

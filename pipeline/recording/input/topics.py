@@ -30,6 +30,7 @@ from pipeline.recording.input.words import few
 SHOWN = 12  # topics named in a message
 COLOUR = {"color": "colour", "depth": "depth"}
 PICTURES = tuple(COLOUR)
+VIDEO = ("FFMPEGPacket", "CompressedVideo")
 
 
 def choose(
@@ -105,6 +106,12 @@ class _Chooser:
 
     def lacking(self, role: str) -> UserError:
         what = ROLES[role].what
+        if role in PICTURES:
+            self.problems += [
+                f"{c.topic} is video ({of.kind_of(_type(c))}): record images"
+                for c in self.container.channels
+                if of.kind_of(_type(c)) in VIDEO
+            ]
         if self.problems:
             return UserError(f"no {what}; {'; or '.join(self.problems[:2])}")
         if not self.container.channels:

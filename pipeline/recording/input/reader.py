@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.base.errors import UserError, printable
 from pipeline.params.lab import SetupParams
+from pipeline.params.recording import DelayParams
 from pipeline.recording.input import images
 from pipeline.recording.input.bag import sha256
 from pipeline.recording.input.camera import Camera
@@ -51,6 +52,7 @@ class Recording:
         sha256: Hash of the file.
         start: From which seconds count [ns]: the file's first force, also in a part of it; None
             for that of `wrench`.
+        late: By what the stamps of a role were given to be late [s], and are not any more.
     """
 
     path: Path
@@ -69,6 +71,7 @@ class Recording:
     choices: dict[str, str] = field(default_factory=dict)
     doubts: dict[str, str] = field(default_factory=dict)
     start: int | None = None
+    late: dict[str, float] = field(default_factory=dict)
 
     @property
     def origin(self) -> int:
@@ -105,19 +108,26 @@ class Recording:
         )
 
 
-def read_recording(path: Path, setup: SetupParams) -> Recording:
-    """Read and check a recording. Raises UserError with one line about what is missing or wrong."""
-    return recording_of(read_container(Path(path)), setup)
+def read_recording(path: Path, setup: SetupParams, delays: DelayParams | None = None) -> Recording:
+    """Read and check a recording. Raises UserError with one line about what is missing or wrong.
+
+    Args:
+        delays: By what stamps are known to be late [s]: taken off before clocks are compared.
+    """
+    return recording_of(read_container(Path(path)), setup, delays)
 
 
-def recording_of(container: Container, setup: SetupParams) -> Recording:
+def recording_of(
+    container: Container, setup: SetupParams, delays: DelayParams | None = None
+) -> Recording:
     """As `read_recording`, from a file that was read already."""
     try:
         transforms = transforms_of(container)
         chosen = choose(container, setup, transforms.frames)
         color_camera, depth_camera = (camera_of(chosen, role) for role in CAMERAS)
         found = {role: chosen[role] for role in ROLES if role in chosen}
-        streams, remarks = streams_of(found)
+        late = late_by(delays)
+        streams, remarks = streams_of(found, late)
     except UserError as error:
         raise explained(error, container.path, container.losses) from None
     lost = [f"{stream.topic}: {note}" for stream in streams.values() for note in stream.notes]
@@ -137,7 +147,15 @@ def recording_of(container: Container, setup: SetupParams) -> Recording:
         choices={role: choice.why for role, choice in chosen.items()},
         doubts={role: choice.doubt for role, choice in chosen.items() if choice.doubt},
         sha256=sha256(container.path),
+        late={role: seconds for role, seconds in late.items() if role in streams},
     )
+
+
+def late_by(delays: DelayParams | None) -> dict[str, float]:
+    """Seconds by which the stamps of each role are given to be late; none where nothing is."""
+    given = {"pose": delays and delays.pose, "camera": delays and delays.camera}
+    roles = {"pose": ("pose", "twist"), "camera": CAMERAS}
+    return {role: late for name, late in given.items() if late for role in roles[name]}
 
 
 def explained(error: UserError, path: Path, losses: list[str], pull: str = "") -> UserError:

@@ -36,11 +36,13 @@ class Company:
         if found and not own:
             one, (other, of) = found[0], next(iter(self._strangers(found[0], chosen)))
             return None, f"{one.topic} is of another device than the {other}'s topic {of}"
-        if len(own) < 2:
-            return (own[0] if own else None), ""
-        live = [one for one in own if self._alive(one)] or own
+        if not own:
+            return None, ""
+        live = own
+        if len(own) > 1:
+            live = [one for one in own if self._alive(one)] or own
         meant = [one for one in live if not set(one.doubts) & set(COMMANDS)] or live
-        if role == "wrench":
+        if role == "wrench" and len(meant) > 1:
             meant = [one for one in meant if self._falls(one)] or meant
         elif role == "pose" and len(meant) > 1:
             meant = self._followed(meant, chosen["wrench"])

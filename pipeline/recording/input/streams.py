@@ -290,7 +290,7 @@ def _on_one_clock(raw: dict[str, Raw], late: Mapping[str, float]) -> None:
 
 
 def _camera_cure(offsets: dict[str, float], late: Mapping[str, float]) -> str:
-    """The delay that puts the pictures on the force's clock; "" where the cameras' clocks differ."""
+    """The delay that puts pictures on the force's clock; "" where the cameras' clocks differ."""
     pictures = [late.get(one, 0.0) - offsets[one] for one in offsets if one in CAMERAS]
     if not pictures or np.ptp(pictures) > clocks.TOLERANCE:
         return ""

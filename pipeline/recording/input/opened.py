@@ -16,7 +16,7 @@ from pipeline.base.errors import UserError
 from pipeline.recording.input.records import MAGIC
 
 MOST = 2**32  # bytes of what was packed
-BLOCK = 2**20
+BLOCK = 2**16
 PACKED: dict[bytes, Callable[[BinaryIO], Any]] = {
     b"\x28\xb5\x2f\xfd": lambda file: zstandard.ZstdDecompressor().stream_reader(
         file, read_across_frames=True, closefd=False
@@ -57,6 +57,8 @@ def opened(path: Path) -> Iterator[BinaryIO]:
             _unpack(path, unpack(file), plain)
             plain.seek(0)
             first = plain.read(32)
+            if not first:
+                raise UserError(f"{path}: packed, and damaged or cut off: copy it again")
             if not first.startswith(MAGIC):
                 raise UserError(f"{path}: what is packed in it is {_what(first, path)}")
             yield plain
@@ -81,7 +83,7 @@ def _unpack(path: Path, packed: Any, plain: BinaryIO) -> None:
     size = 0
     while True:
         try:
-            block = packed.read(BLOCK)
+            block = packed.read1(BLOCK)
         except (EOFError, ValueError, RuntimeError, zstandard.ZstdError, gzip.BadGzipFile):
             return
         if not block:

@@ -30,6 +30,7 @@ TOLD = (
 )
 TWISTS = ("geometry_msgs/msg/TwistStamped",)
 LONGEST = 2**27  # bytes of a message
+EMPTY = 8  # bytes of CDR's header and of a list without anything
 RULE = re.compile("^=+$", re.MULTILINE)  # between the types of a schema
 
 
@@ -82,6 +83,8 @@ def _same(payload: bytes, name: str) -> bool:
     little = payload[1:2] == b"\x01"
     message = _store().deserialize_cdr(payload, name)
     written = bytes(_store().serialize_cdr(message, name, little_endian=little))
+    if len(written) <= EMPTY:
+        return False
     return written[4:] == payload[4:][: len(written) - 4] and len(payload) - len(written) < 4
 
 

@@ -306,9 +306,7 @@ def test_shifted_puts_late_stamps_right(good) -> None:
 
 
 @pytest.mark.parametrize("late", [-2.8, 0.66, 1000.0])
-def test_a_given_delay_is_taken_off_before_clocks_are_compared(
-    tmp_path, params, good, late
-) -> None:
+def test_a_given_delay_is_taken_off_first(tmp_path, params, good, late) -> None:
     """The refusal says which, to some hundredths of a second."""
     path = blind_bag(tmp_path, change=shift("color", "depth", by=late))
     with pytest.raises(UserError, match=r"episode\.delays\.camera: (\S+) in params") as caught:

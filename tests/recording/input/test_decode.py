@@ -134,7 +134,7 @@ NESTED = b"p/A[5000] x\n" + b"=" * 80 + b"\nMSG: p/A\nuint8[5000] y\n"  # 25 mil
             "omgidl",
             b"",
             "cdr",
-            "schema 'omgidl' with messages 'cdr' cannot be read, record",
+            "schema 'omgidl' with messages 'cdr' cannot",
         ),
         (NAME, "ros2msg", MSG.encode(), "json", "cannot be read"),
         ("lab.Wrench", "flatbuffer", b"", "flatbuffer", "ros2msg with cdr.*jsonschema with json"),

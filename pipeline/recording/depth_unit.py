@@ -70,8 +70,10 @@ def misread(recording: Recording, geometry: Geometry, scene: Scene) -> str | Non
 def _said(name: str, factor: float) -> str:
     if factor == 1.0:
         return name
-    known = "what it must be between fork and hand"
-    unit = f"the depth is {factor:g} times {known}, as of unit {FACTORS[factor]}"
+    unit = (
+        f"the depth is {factor:g} times what it must be between fork and hand, as of unit"
+        f" {FACTORS[factor]}"
+    )
     return f"{name}, and {unit}" if name else unit
 
 

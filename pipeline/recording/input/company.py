@@ -24,7 +24,7 @@ class Company:
 
     def __init__(self, fitting: Callable[[str], list[Candidate]], frames: Collection[str]) -> None:
         self.fitting, self.frames = fitting, frames
-        self.courses: dict[str, sets.Course | None] = {}
+        self.courses: dict[str, sets.Track | None] = {}
 
     def best(
         self, role: str, found: list[Candidate], chosen: dict[str, Choice]
@@ -85,7 +85,7 @@ class Company:
 
     # What they say
 
-    def _course(self, one: Candidate | Choice) -> sets.Course | None:
+    def _course(self, one: Candidate | Choice) -> sets.Track | None:
         choice = one.choice if isinstance(one, Candidate) else one
         topic = choice.channel.topic
         if topic not in self.courses:

@@ -33,7 +33,7 @@ ALIKE = 0.9  # correlation of fingers that move as one
 
 
 @dataclass(frozen=True)
-class Course:
+class Track:
     """What some messages of a topic say, in the order of the file.
 
     Attributes:
@@ -49,7 +49,7 @@ class Course:
 
 def course_of(
     channel: Channel, read: Callable[[bytes], Reading], most: int = LOOKED_AT
-) -> Course | None:
+) -> Track | None:
     """Of at most so many messages, evenly spread; None where fewer than two can be read."""
     count = len(channel.payloads)
     times, stamps, values = [], [], []
@@ -66,7 +66,7 @@ def course_of(
             values.append(value)
     if len(values) < 2:
         return None
-    return Course(np.array(times), np.array(stamps, np.int64), np.array(values, float))
+    return Track(np.array(times), np.array(stamps, np.int64), np.array(values, float))
 
 
 def alive(channel: Channel, read: Callable[[bytes], Reading]) -> bool:
@@ -94,7 +94,7 @@ def apart(one: Iterable[str], other: Iterable[str], sides: Sequence[set[str]]) -
     return any(a & side and b & side and not a & b & side for side in sides)
 
 
-def fall_of(course: Course) -> int | None:
+def fall_of(course: Track) -> int | None:
     """Number of the message at which a force (N, 3) falls for good, as of a band that is let go."""
     force = course.values[:, :3]
     if len(force) < 6 * AROUND:
@@ -111,7 +111,7 @@ def fall_of(course: Course) -> int | None:
     return k + AROUND if change[k] > SUDDEN * max(usual, 1e-9) else None
 
 
-def follows(force: Course, hand: Course) -> float:
+def follows(force: Track, hand: Track) -> float:
     """Share of the steps of a force (N, 3) that those of a hand's place (N, 3) explain, 0 to 1."""
     fall = fall_of(force)
     end = force.time[fall - 1] if fall else force.time[-1]
@@ -128,7 +128,7 @@ def follows(force: Course, hand: Course) -> float:
     return max(0.0, 1.0 - float((left**2).sum()) / total) if total > 0 else 0.0
 
 
-def moves_at(fingers: Course, fall: float) -> bool:
+def moves_at(fingers: Track, fall: float) -> bool:
     """Whether fingers (N, C) move within half a second of `fall` [s], by when they were logged."""
     since = fingers.time - fall
     held, after = (since > -1.0) & (since < 0), (since > 0) & (since < AT_FALL)
@@ -175,7 +175,7 @@ def _alike(values: np.ndarray) -> bool:
     return bool((np.corrcoef(values.T) > ALIKE).all())
 
 
-def _means(course: Course, edges: np.ndarray) -> np.ndarray:
+def _means(course: Track, edges: np.ndarray) -> np.ndarray:
     """Means of the first three values between edges (K + 1,), NaN where nothing is, (K, 3)."""
     bins = np.searchsorted(edges, course.time, side="right") - 1
     inside = (bins >= 0) & (bins < len(edges) - 1)

@@ -212,9 +212,9 @@ def test_a_fall_is_found_where_it_is_and_noise_has_none(seed, noise, release) ->
     random = np.random.default_rng(seed)
     values = random.normal(0, noise, (COUNT, 3)) + random.normal(0, 9, 3)
     stamps = (1e9 * TIME).astype(np.int64)
-    assert sets.fall_of(sets.Course(TIME, stamps, values)) is None
+    assert sets.fall_of(sets.Track(TIME, stamps, values)) is None
     values[:, 1] += 6 * ((TIME > release / 2) & (TIME < release))
-    found = sets.fall_of(sets.Course(TIME, stamps, values))
+    found = sets.fall_of(sets.Track(TIME, stamps, values))
     assert found is not None and abs(TIME[found] - release) < 0.06
 
 

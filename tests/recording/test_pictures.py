@@ -12,7 +12,7 @@ from pipeline.recording.build import process
 from pipeline.recording.checks import pictures
 from pipeline.recording.input.images import depth
 from pipeline.recording.input.readings import Picture
-from validation.recordings.bag import Lens, Message, write_bag
+from validation.recordings.bag import Lens, write_bag
 from validation.recordings.small import TRUTH, small_params
 
 LENS = Lens(size=(160, 120), focal=125.0, fps=8)
@@ -57,12 +57,13 @@ def test_what_can_be_decoded_is_read_and_the_rest_is_counted_as_colour(tmp_path)
     assert len(some.clouds.points) + some.clouds.damaged == len(padded.clouds.points)
 
 
-def written(pixels: np.ndarray, factor: float, kind: type, swapped: bool = False) -> Message:
-    """Fields of an Image, of depth in millimetres."""
+def written(pixels: np.ndarray, factor: float, kind: type, swapped: bool = False) -> Picture:
+    """As a driver would send it, of depth in millimetres."""
     values = (pixels * factor).astype(np.dtype(kind).newbyteorder("<"))
     encoding = "16UC1" if kind is np.uint16 else "32FC1"
-    picture = Picture(encoding, "", values.view(np.uint8).ravel(), *pixels.shape, 0, swapped)
-    return replace(picture, step=values.itemsize * pixels.shape[1])
+    height, width = pixels.shape
+    step, data = values.itemsize * width, values.view(np.uint8).ravel()
+    return Picture(encoding, "", data, height, width, step, swapped)
 
 
 @pytest.mark.parametrize(

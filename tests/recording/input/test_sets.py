@@ -186,6 +186,7 @@ def opening(params, **positions: np.ndarray) -> np.ndarray:
     choice = found["gripper"]
     values = [choice.read(payload) for payload in choice.channel.payloads]
     stamps = np.array([one.stamp for one in values])
+    assert choice.convert is not None
     value = choice.convert(stamps, np.array([one.value for one in values], float))
     assert value.shape == (COUNT, 1)
     return value[:, 0] - value[0, 0]

@@ -54,26 +54,27 @@ class Delays:
 def correct_delays(pull: Pull, params: Params) -> tuple[Pull, Delays]:
     """The pull with the stamps that it should have had, and by what they were late.
 
-    Given delays are taken as they are, others as far as the recording shows them.
+    Given delays are taken as they are, when the recording is read; others as far as it shows them.
 
     The camera's is estimated against the pose, after that was corrected. An estimate is applied
     where it is more than three standard deviations: a wrong correction is worse than none.
     """
-    given = params.episode.delays
+    given, late = params.episode.delays, pull.recording.late
     try:
         inertia = estimate_tool_inertia(pull, params.setup.tool)
     except UserError:  # the recording is refused for it later, in its own words
         inertia = None
     pose = _judged(given.pose, lambda: inertia and (inertia.delay, inertia.delay_error))
-    if pose.applied:
-        pull = pull.shifted(pose=pose.value)
+    shift = pose.value - late.get("pose", 0.0) if pose.applied else 0.0
+    if shift:
+        pull = pull.shifted(pose=shift)
     if inertia is not None:
-        left = inertia.delay - (pose.value if pose.applied else 0.0)
+        left = inertia.delay - shift
         sure = abs(left) > SIGMAS * max(inertia.delay_error, LEAST_ERROR)
         inertia = replace(inertia, delay=left if sure else 0.0)
     camera = _judged(given.camera, lambda: camera_delay(pull))
     if camera.applied:
-        pull = pull.shifted(camera=camera.value)
+        pull = pull.shifted(camera=camera.value - late.get("color", 0.0))
     return pull, Delays(pose, camera, inertia)
 
 

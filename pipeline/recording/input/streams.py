@@ -8,7 +8,7 @@ the stamp of another, or, of force and pose, is alone far off those around it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Generic, TypeVar
 
@@ -17,7 +17,7 @@ from scipy.ndimage import median_filter
 
 from pipeline.base.errors import UserError, printable
 from pipeline.recording.input import clocks, pace
-from pipeline.recording.input.decode import Unreadable
+from pipeline.recording.input.decode import Elsewhere, Unreadable
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.input.roles import OPTIONAL, Choice
 from pipeline.recording.input.words import counted, few, shortened
@@ -132,11 +132,14 @@ class Raw:
             self.keep(~which)
 
 
-def streams_of(chosen: dict[str, Choice]) -> tuple[dict[str, Stream[Any]], list[str]]:
+def streams_of(
+    chosen: dict[str, Choice], late: Mapping[str, float] | None = None
+) -> tuple[dict[str, Stream[Any]], list[str]]:
     """All topics on the wrench's clock, and remarks on what costs nothing.
 
     Args:
         chosen: Choices of wrench, pose, color, depth, and of twist and gripper if there are.
+        late: By what the stamps of a role are known to be late [s], which is taken off.
 
     Raises:
         UserError: for a topic that cannot be used, in one line.
@@ -156,7 +159,11 @@ def streams_of(chosen: dict[str, Choice]) -> tuple[dict[str, Stream[Any]], list[
         one.drop(clocks.outliers(one.stamp, one.log), "far off in time")
         _take_bursts_out(one)
     _take_steps_out(raw)
-    _on_one_clock(raw)
+    late = {} if late is None else late
+    for role, seconds in late.items():
+        if role in raw:
+            raw[role].stamp = raw[role].stamp - round(seconds * 1e9)
+    _on_one_clock(raw, late)
     streams = {role: _sorted(one) for role, one in raw.items()}
     origin = int(streams["wrench"].stamp[0])
     first = min(stream.stamp[0] for stream in streams.values())
@@ -173,6 +180,8 @@ def _read(role: str, choice: Choice) -> Raw:
     for log_time, payload in zip(channel.log_times, channel.payloads, strict=True):
         try:
             stamp, frame, value = choice.read(payload)
+        except Elsewhere:
+            continue
         except Unreadable as error:
             lost["damaged"] += 1
             reason = reason or shortened(printable(str(error)), REASON)
@@ -283,7 +292,7 @@ def _agreed(
     return found
 
 
-def _on_one_clock(raw: dict[str, Raw]) -> None:
+def _on_one_clock(raw: dict[str, Raw], late: Mapping[str, float]) -> None:
     wrench = raw["wrench"]
     offsets = {
         role: clocks.offset(one.stamp, one.log, wrench.stamp, wrench.log)
@@ -295,7 +304,7 @@ def _on_one_clock(raw: dict[str, Raw]) -> None:
         worst, off = max(needed.items(), key=lambda one: abs(one[1]))
         raise UserError(
             f"the stamps of {raw[worst].topic} are {off:+.3f} s off the other topics'"
-            " clock, record all topics with one clock"
+            f" clock, record all topics with one clock{_camera_cure(offsets, late)}"
         )
     for role in CORRECTABLE:
         if role in raw and abs(offsets[role]) > clocks.TOLERANCE:
@@ -304,6 +313,17 @@ def _on_one_clock(raw: dict[str, Raw]) -> None:
                 f"on another clock: {offsets[role]:+.3f} s added to its stamps by log_time, good to"
                 " about a millisecond"
             )
+
+
+def _camera_cure(offsets: dict[str, float], late: Mapping[str, float]) -> str:
+    """The delay that puts pictures on the force's clock; "" where the cameras' clocks differ."""
+    pictures = [late.get(one, 0.0) - offsets[one] for one in offsets if one in CAMERAS]
+    if not pictures or np.ptp(pictures) > clocks.TOLERANCE:
+        return ""
+    return (
+        f"; or set episode.delays.camera: {np.mean(pictures):.3f} in params.yaml, by the times of"
+        " receipt, which is good to some hundredths of a second alone"
+    )
 
 
 def _sorted(raw: Raw) -> Stream[Any]:

@@ -19,8 +19,9 @@ from pipeline.base.errors import UserError, printable
 from pipeline.recording.input import clocks, pace
 from pipeline.recording.input.decode import Elsewhere, Unreadable
 from pipeline.recording.input.readings import Picture
+from pipeline.recording.input.remarks import frozen, gaps_of
 from pipeline.recording.input.roles import OPTIONAL, Choice
-from pipeline.recording.input.words import counted, few, shortened
+from pipeline.recording.input.words import counted, shortened
 
 ABSURD = 1e6  # N, m, m/s, rad: nothing here is as large
 # What a lone message may be off the four around it: a knock or a fall lasts for more than one.
@@ -28,12 +29,7 @@ LONE = {"wrench": 30.0, "pose": 0.05}  # N, m
 MOST_LONE = 0.05  # share of the messages that may be alone: more are the sensor's noise, or units
 FASTEST = 2.0  # m/s of the hand
 TIMED = ("gripper",)  # roles for which log_time will do where there are no stamps
-LONG_GAP, LONG_GAP_S = 5.0, 0.02  # periods and seconds from which a gap is named
-ENDS = 0.3  # s by which a topic may start later or stop earlier than the others
-FROZEN = 0.25  # s of one and the same value of a sensor that has noise
-FROZEN_FRAMES = 3  # pictures that are the same, byte for byte
 EVEN = 0.1  # of the period, by which the median way may differ from the mean one
-NAMED = 3  # places named in one line
 REASON = 100  # characters of why a message is damaged
 CAMERAS = ("color", "depth")
 HELD = ("wrench", "pose", "twist")  # roles of which each value is measured anew
@@ -169,8 +165,8 @@ def streams_of(
     first = min(stream.stamp[0] for stream in streams.values())
     last = max(stream.stamp[-1] for stream in streams.values())
     for stream in streams.values():
-        stream.notes.extend(_gaps(stream, origin, first, last))
-    return streams, notes + _frozen(streams, origin)
+        stream.notes.extend(gaps_of(stream, origin, first, last))
+    return streams, notes + frozen(streams, origin)
 
 
 def _read(role: str, choice: Choice) -> Raw:
@@ -371,49 +367,3 @@ def _without_lone(raw: Raw, values: np.ndarray) -> np.ndarray:
 def _words(raw: Raw) -> str:
     words = ", ".join(f"{count} {why}" for why, count in sorted(raw.lost.items()))
     return f"{words}; the first damaged one: {raw.reason}" if raw.reason else words
-
-
-def _gaps(stream: Stream[Any], origin: int, first: int, last: int) -> list[str]:
-    """Long gaps, and ends that lack what the other topics have."""
-    notes, ways = [], np.diff(stream.stamp) * 1e-9
-    late, early = (stream.stamp[0] - first) * 1e-9, (last - stream.stamp[-1]) * 1e-9
-    least = max(ENDS, LONG_GAP * stream.period)
-    if late > least:
-        notes.append(f"starts {late:.2f} s after the others")
-    if early > least:
-        notes.append(f"stops {early:.2f} s before the others")
-    long = np.flatnonzero(ways > max(LONG_GAP * stream.period, LONG_GAP_S))
-    if len(long):
-        at = stream.seconds(origin)
-        named = [f"{ways[i]:.3f} s at {at[i]:.2f} s" for i in long[np.argsort(-ways[long])]]
-        notes.append(f"gap{'s' * (len(long) > 1)} of {few(named, NAMED)}")
-    return notes
-
-
-def _frozen(streams: dict[str, Stream[Any]], origin: int) -> list[str]:
-    """Sensors that repeat themselves, which those with noise do not."""
-    remarks = []
-    for role in ("wrench", "color", "depth"):
-        stream = streams[role]
-        if role == "wrench":
-            same = np.all(np.diff(stream.values, axis=0) == 0, axis=1)
-            least = max(FROZEN_FRAMES, round(FROZEN / stream.period))
-        else:
-            data = [picture.data for picture in stream.values]
-            same = np.array([np.array_equal(a, b) for a, b in zip(data, data[1:], strict=False)])
-            least = FROZEN_FRAMES - 1
-        run = _longest_run(same)
-        if run and run[1] >= least:
-            at = stream.seconds(origin)[run[0]]
-            remarks.append(
-                f"{stream.topic}: the same value {run[1] + 1} times from {at:.2f} s on: was the"
-                " sensor frozen?"
-            )
-    return remarks
-
-
-def _longest_run(same: np.ndarray) -> tuple[int, int] | None:
-    """Start and length of the longest run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]])))
-    starts, lengths = edges[::2], edges[1::2] - edges[::2]
-    return (int(starts[np.argmax(lengths)]), int(lengths.max())) if len(lengths) else None

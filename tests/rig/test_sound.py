@@ -1,0 +1,7 @@
+"""A recording of the rig is sound."""
+
+from pipeline.recording.build import process
+
+
+def test_no_check_fires_on_the_rig(recorded, coarse) -> None:
+    assert process(recorded[0], coarse.bands["band1"], coarse).findings == []

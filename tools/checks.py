@@ -14,9 +14,9 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from pipeline.recording.checks.table import CHECKS  # noqa: E402
+from validation.marked import marks, with_block  # noqa: E402
 
 PAGE = ROOT / "docs" / "faq.md"
-BEGIN, END = "<!-- checks: begin -->\n", "<!-- checks: end -->\n"
 HEADS = ("check", "compares", "uncertainty", "warns", "refuses", "remedy")
 
 
@@ -32,12 +32,12 @@ def table() -> str:
 
 def drawn(page: str) -> str:
     """The page with today's table."""
-    head, _, rest = page.partition(BEGIN)
-    return head + BEGIN + table() + END + rest.partition(END)[2]
+    begin, end = marks("checks")
+    return with_block(page, begin + table() + end)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("--fix", action="store_true", help="write it anew")
     page = PAGE.read_text(encoding="utf-8")
     if parser.parse_args().fix:

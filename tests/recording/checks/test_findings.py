@@ -25,6 +25,7 @@ from pipeline.recording.checks import (
 from pipeline.recording.checks.motion import pause
 from pipeline.recording.checks.table import CHECKS, findings_of
 from pipeline.recording.delays import Estimate
+from pipeline.recording.tips import LensFactor
 from tests.project import DEFAULTS, ROOT, with_
 from tests.recording.checks.made import abouts, with_facts, with_recording, with_results
 from tools import checks
@@ -143,6 +144,15 @@ def test_tips_are_off_from_what_one_component_is_sure_of(checked) -> None:
     assert "hand" in abouts(camera.findings(with_results(checked, tips=away)))
 
 
+@pytest.mark.fires("lens")
+def test_a_lens_that_explains_what_is_off_is_said(checked) -> None:
+    offsets = checked.tips.offsets + [0.02, 0.0, 0.0]
+    for kind in ("depth", "width"):
+        tips = replace(checked.tips, offsets=offsets, lens=LensFactor(kind, 1.02, 0.001))
+        said = [*camera.findings(with_results(checked, tips=tips))]
+        assert abouts(said) == {"lens"} and "1.020 ± 0.001" in said[0].what
+
+
 def test_the_pause_before_the_release(checked, seen) -> None:
     still, change = pause(checked.signals)
     truth = seen[1]
@@ -177,9 +187,16 @@ def test_lost_and_rare_messages_are_said(checked) -> None:
     number = np.arange(len(recording.wrench.stamp))
     as_made = abouts(rates.findings(checked))
     assert said("wrench", (number < 1000) | (number > 1040)) - as_made == {"gap"}
-    assert said("wrench", number % 10 != 3) - as_made == {"missing"}
+    assert said("wrench", number % 15 != 3) - as_made == {"missing"}
     assert said("wrench", number % 2 == 0) - as_made == {"force_rate"}
     assert "picture_rate" in said("depth", number % 2 == 0)
+
+
+@pytest.mark.fires("topics")
+def test_another_topic_that_would_do_is_said(checked) -> None:
+    doubts = {"wrench": "/left/wrench would do as well"}
+    (said,) = roles.findings(with_recording(checked, doubts=doubts))
+    assert said.about == "topics" and said.what.endswith("but /left/wrench would do as well")
 
 
 @pytest.mark.fires("gripper")

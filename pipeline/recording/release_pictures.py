@@ -21,6 +21,7 @@ OUTER, HAND = (
 )  # share of them from which on, and m before the hand until which, is looked
 FEWEST = 30  # points of the drawn band
 SEEN = 0.5  # share of them from which a picture shows it drawn
+FADED = 0.15  # share of the drawn band: a sound picture shows less of it
 EMPTY_AFTER = 0.015  # s after the fall of the force in which the outer fifth is empty
 
 
@@ -55,9 +56,20 @@ class ReleasePictures:
         return (self.latest - self.earliest) / np.sqrt(12)
 
     @property
-    def agree(self) -> bool:
-        """Whether the stamps may be right."""
-        return self.earliest <= 0 <= self.latest
+    def beyond(self) -> float:
+        """By how much the stamps are off for sure [s]; 0 where they may be right."""
+        return max(self.earliest, -self.latest, 0.0)
+
+    @property
+    def frozen(self) -> tuple[float, ...]:
+        """Stamps of pictures that are sent again while the band must move [s]."""
+        late = self.drawn > EMPTY_AFTER
+        return tuple(t for t in self.repeated if t > self.gone or (late and t > 0))
+
+    @property
+    def smeared(self) -> bool:
+        """Whether the drawn band is still seen in part a picture after it is gone."""
+        return max(self.faded[1:3], default=0.0) > FADED
 
 
 def release_pictures(pull: Pull, fork_width: float) -> ReleasePictures | None:
@@ -98,7 +110,7 @@ def release_pictures(pull: Pull, fork_width: float) -> ReleasePictures | None:
         float(a),
         float(b),
         tuple(map(float, later)),
-        tuple(one for one in repeated if one > a - 1e-9 - 0.0),
+        tuple(repeated),
         tuple(map(float, share[first : first + 4])),
     )
 

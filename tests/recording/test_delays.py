@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.recording.camera_delay import camera_delay
-from pipeline.recording.delays import Estimate, correct_delays
+from pipeline.recording.delays import UNSEEN_POSE, Estimate, correct_delays
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.pulls import Pull
@@ -118,7 +118,7 @@ def test_what_is_applied(looked_at, params) -> None:
     recording, geometry = looked_at
     pull = Pull(recording, geometry)
     right, found = correct_delays(pull, params)
-    assert found.pose == Estimate(0.0, None, "not seen", False)
+    assert found.pose == Estimate(left=UNSEEN_POSE)
     assert found.camera.source == "estimated" and not found.camera.applied
     assert right is pull
 

@@ -46,11 +46,8 @@ def recoil_seen(
     shifts = np.arange(-np.floor(reach / STEP), np.floor(reach / STEP) + 1) * STEP
     wanted = np.unique(np.round((since[near][:, None] + shifts) / STEP).astype(int))
     stamps = episode.release_time + wanted * STEP
-    played = interact(
-        sling,
-        replace(episode, cloud_time=stamps, clouds=[episode.clouds[0]] * len(stamps)),
-        parameters,
-    )
+    seen = replace(episode, cloud_time=stamps)
+    played = interact(sling, seen, parameters, until=float(stamps[-1]))
     if played.failure[0]:
         return None
     lines = dict(zip(wanted.tolist(), played.center_line[0], strict=True))

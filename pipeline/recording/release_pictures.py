@@ -22,6 +22,8 @@ OUTER, HAND = (
 FEWEST = 30  # points of the drawn band
 SEEN = 0.5  # share of them from which a picture shows it drawn
 FADED = 0.15  # share of the drawn band: a sound picture shows less of it
+MOVES = 0.002  # s after the fall of the force from which no picture is the one before
+SURELY = 0.1  # s after which every band is gone
 EMPTY_AFTER = 0.015  # s after the fall of the force in which the outer fifth is empty
 
 
@@ -36,6 +38,7 @@ class ReleasePictures:
         again: Stamps of pictures after it that show the drawn band once more.
         repeated: Stamps of pictures around the release that are those before them, pixel by pixel.
         faded: Share of the drawn band that the first pictures after it still show.
+        never: No picture shows the band let go; what is said of the next picture is void.
     """
 
     earliest: float
@@ -45,6 +48,7 @@ class ReleasePictures:
     again: tuple[float, ...]
     repeated: tuple[float, ...]
     faded: tuple[float, ...]
+    never: bool = False
 
     @property
     def middle(self) -> float:
@@ -58,13 +62,12 @@ class ReleasePictures:
     @property
     def beyond(self) -> float:
         """By how much the stamps are off for sure [s]; 0 where they may be right."""
-        return max(self.earliest, -self.latest, 0.0)
+        return 0.0 if self.never else max(self.earliest, -self.latest, 0.0)
 
     @property
     def frozen(self) -> tuple[float, ...]:
         """Stamps of pictures that are sent again while the band must move [s]."""
-        late = self.drawn > EMPTY_AFTER
-        return tuple(t for t in self.repeated if t > self.gone or (late and t > 0))
+        return tuple(time for time in self.repeated if time > MOVES)
 
     @property
     def smeared(self) -> bool:
@@ -99,6 +102,9 @@ def release_pictures(pull: Pull, fork_width: float) -> ReleasePictures | None:
         return None
     share = counts / full
     gone = np.flatnonzero((share < SEEN) & (times > -AROUND))
+    if not len(gone) and np.sum(times > SURELY) > 2:
+        last = float(times[-1])
+        return ReleasePictures(last, last, last, last, (), tuple(repeated), (), never=True)
     if not len(gone) or gone[0] == 0 or gone[0] == len(times) - 1:
         return None
     first = int(gone[0])

@@ -50,10 +50,24 @@ def test_old_pictures_over_the_release_are_refused() -> None:
     assert not list(of_release(held))
     for odd in (
         replace(SOUND, repeated=(0.053,)),
+        replace(SOUND, repeated=(0.01,)),
         replace(SOUND, drawn=0.2, gone=0.23, earliest=0.18, latest=0.23, repeated=(0.1, 0.2)),
     ):
         (said,) = of_release(odd)
         assert said.about == "frozen_pictures" and said.refused
+
+
+def test_a_band_that_is_never_let_go_is_refused(pull, params) -> None:
+    depth = pull.recording.depth
+    since = depth.seconds(pull.recording.origin) - pull.release.time
+    held = depth.values[int(np.searchsorted(since, -0.1))]
+    values = [held if time > -0.1 else one for time, one in zip(since, depth.values, strict=True)]
+    frozen = replace(pull.recording, depth=replace(depth, values=values))
+    found = release_pictures(replace(pull, recording=frozen), params.setup.fork_width)
+    assert found.never and found.beyond == 0 and found.frozen
+    for one in (found, replace(found, repeated=())):
+        (said,) = of_release(one)
+        assert said.refused
 
 
 def test_impossible_and_smeared_pictures_are_said() -> None:

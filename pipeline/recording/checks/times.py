@@ -44,7 +44,7 @@ RELEASED = Check(
     "the last picture of the drawn band and the next one with the fall of the force",
     f"a picture's time, and {1e3 * EMPTY_AFTER:g} ms in which the outer band leaves its place",
     "drawn after the force fell, or let go before it",
-    "",
+    "drawn for 0.4 s after the force fell",
     "stamp pictures when they are exposed, by the force's clock, or set episode.delays.camera",
 )
 CONFLICT = Check(
@@ -112,6 +112,10 @@ def of_release(seen: ReleasePictures) -> Iterator[Finding]:
         first, count = seen.frozen[0], len(seen.frozen)
         what = f"{count} pictures from {1e3 * first:+.0f} ms of the release on are old ones again"
         yield Finding(FROZEN.name, what, FROZEN.remedy, refused=True)
+    elif seen.never:
+        what = f"pictures show the band drawn until {seen.drawn:.2f} s after the force falls"
+        cure = "set episode.delays.camera, or record again with one clock"
+        yield Finding(RELEASED.name, what, cure, refused=True)
     elif seen.again:
         what = (
             f"the band is drawn once more {1e3 * seen.again[0]:.0f} ms after the release, when it"

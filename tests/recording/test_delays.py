@@ -139,15 +139,16 @@ def test_a_late_force_is_a_pose_that_is_early(looked_at, params, seconds) -> Non
     assert found.pose.left < 0.002 and not found.conflict
 
 
-@pytest.mark.parametrize(("value", "conflict"), [(0.012, False), (0.03, True)])
-def test_two_estimates_are_weighed_or_said(looked_at, params, monkeypatch, value, conflict) -> None:
+@pytest.mark.parametrize(("back", "conflict"), [(0.001, False), (0.02, True)])
+def test_two_estimates_are_weighed_or_said(looked_at, params, monkeypatch, back, conflict) -> None:
     """By its inertia the tool is right where the two do not agree."""
-    tool = ToolInertia(1.0, 0.01, value, 0.001)
+    tool = ToolInertia(1.0, 0.01, 0.0, 0.001)
     monkeypatch.setattr(delays, "estimate_tool_inertia", lambda *_: tool)
-    monkeypatch.setattr(delays, "start_back", lambda _: (0.012, 0.001))
+    monkeypatch.setattr(delays, "start_back", lambda _: (back, 0.001))
     found = correct_delays(Pull(*looked_at), params)[1]
-    assert bool(found.conflict) == conflict and found.pose.value == pytest.approx(value)
-    assert found.pose.left == pytest.approx(0.001 if conflict else 0.001 / np.sqrt(2))
+    assert bool(found.conflict) == conflict and not found.pose.applied
+    assert found.pose.value == pytest.approx(0.0 if conflict else back / 2)
+    assert found.pose.error == pytest.approx(0.001 if conflict else 0.001 / np.sqrt(2))
 
 
 def test_given_delays_are_used_as_they_are(looked_at, params) -> None:

@@ -43,7 +43,6 @@ class Tolerances:
         shift, turn: Of the camera's extrinsics [m], [rad].
         bias, drift: Of the tared force, and over the pull [N].
         pose: Of the pose's clock against the force's [s].
-        tied: The camera's clock is known against the pose's, and goes where that goes.
     """
 
     force: float = 0.11
@@ -58,7 +57,6 @@ class Tolerances:
     bias: float = 0.02
     drift: float = 0.02
     pose: float = 5e-4
-    tied: bool = False
 
     @classmethod
     def of(cls, episode: Episode) -> Tolerances:
@@ -67,9 +65,10 @@ class Tolerances:
         delays = about.get("delays") or {}
         told = {name: delays.get(name) or {} for name in ("camera", "pose")}
         left = {name: one.get("left") or one.get("error") for name, one in told.items()}
+        if left["camera"] and told["camera"].get("against", "pose") == "pose":
+            left["camera"] = np.hypot(left["camera"], left["pose"] or 0.0)
         given = {"release": about.get("release_error"), **left}
-        known = {name: float(value) for name, value in given.items() if value}
-        return cls(**known, tied=told["camera"].get("against") == "pose")
+        return cls(**{name: float(value) for name, value in given.items() if value})
 
     @property
     def simulated(self) -> np.ndarray:
@@ -282,7 +281,7 @@ class Likelihood:
         has, known = self.tolerances, residuals.columns()
         sizes = {"force_bias": has.bias, "force_drift": has.drift}
         sizes |= {"cloud_shift": has.shift, "cloud_turn": has.turn}
-        late = known.pop("force_late") + (camera if has.tied else 0.0)
+        late = known.pop("force_late")
         columns = [sizes[name[:-2]] * column for name, column in known.items()]
         columns.append(has.pose * late)
         for frame in np.unique(residuals.frame[residuals.recoils]):

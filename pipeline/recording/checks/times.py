@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from pipeline.recording.checks.finding import Check, Finding
 from pipeline.recording.checks.rates import topics
 from pipeline.recording.processed import Processed
@@ -11,6 +13,7 @@ from pipeline.recording.release_pictures import EMPTY_AFTER, ReleasePictures
 
 SURE = 3.0  # standard errors from which something is more than noise
 DELAY = OPEN = 0.002  # s
+DRIFTED = 0.003  # s over the recording
 AHEAD = 0.01  # s of stamps before the force's, by the times of receipt
 BEHIND, SLOW = 0.02, {"color": 0.1, "depth": 0.1, "gripper": 0.1}  # s after; pictures take a while
 
@@ -71,7 +74,15 @@ SMEARED = Check(
     "",
     "switch temporal filters off, and shorten the exposure",
 )
-CHECKS = (CLOCK, DELAYED, UNKNOWN, RELEASED, CONFLICT, FROZEN, SMEARED)
+DRIFT = Check(
+    "clock_drift",
+    "the growth of log_time less stamp with the force's, over the recording",
+    "scatter of each second's least delay",
+    f"{1e3 * DRIFTED:g} ms, and {SURE:g} standard errors",
+    "",
+    "stamp all topics by one clock (chrony or PTP between computers), and record again",
+)
+CHECKS = (CLOCK, DRIFT, DELAYED, UNKNOWN, RELEASED, CONFLICT, FROZEN, SMEARED)
 
 
 def findings(done: Processed) -> Iterator[Finding]:
@@ -81,6 +92,7 @@ def findings(done: Processed) -> Iterator[Finding]:
         if not -most <= offset <= AHEAD:
             what = f"the stamps of {stream.topic} are {offset:+.3f} s off the force's, judged"
             yield Finding(CLOCK.name, f"{what} by the times of receipt", CLOCK.remedy)
+    yield from of_drift(done)
     for role, delay in (("pose", done.delays.pose), ("camera", done.delays.camera)):
         error = delay.error or 0.0
         value = delay.value if delay.error is not None else 0.0
@@ -104,6 +116,22 @@ def findings(done: Processed) -> Iterator[Finding]:
         yield Finding(CONFLICT.name, done.delays.conflict, CONFLICT.remedy)
     if done.delays.release is not None:
         yield from of_release(done.delays.release)
+
+
+def of_drift(done: Processed) -> Iterator[Finding]:
+    """Of the clocks' rates, by the times of receipt."""
+    force = done.pull.recording.wrench
+    span = (int(force.stamp[-1]) - int(force.stamp[0])) * 1e-9
+    for stream, _ in topics(done):
+        rate = force.drift[0] - stream.drift[0]
+        error = np.hypot(force.drift[1], stream.drift[1])
+        if np.isfinite(error) and abs(rate) * span > max(DRIFTED, SURE * error * span):
+            yield Finding(
+                DRIFT.name,
+                f"the clock of {stream.topic} runs {1e6 * rate:+.0f} ± {1e6 * error:.0f} ppm"
+                f" against the force's, {1e3 * rate * span:+.1f} ms over the recording",
+                DRIFT.remedy,
+            )
 
 
 def of_release(seen: ReleasePictures) -> Iterator[Finding]:

@@ -57,6 +57,7 @@ class Stream(Generic[Values]):
         notes: What was lost or mended, in words.
         bursts: In which the stamps came; None where they were even.
         hold: For how long each value was repeated [s], 0 where it was not: repeats are left out.
+        drift: Growth of log_time - stamp [s/s], and its standard error.
     """
 
     topic: str
@@ -68,6 +69,7 @@ class Stream(Generic[Values]):
     notes: list[str] = field(default_factory=list)
     bursts: pace.Bursts | None = None
     hold: float = 0.0
+    drift: tuple[float, float] = (0.0, np.inf)
 
     def seconds(self, origin: int) -> np.ndarray:
         return (self.stamp - origin) * 1e-9
@@ -332,7 +334,8 @@ def _sorted(raw: Raw) -> Stream[Any]:
     delay = float(np.median(raw.log - raw.stamp)) * 1e-9
     lost = sum(raw.lost.values())
     stream = Stream(raw.topic, raw.frame, raw.stamp, values, delay, lost, raw.notes)
-    return replace(stream, bursts=raw.bursts, hold=(hold or 0.0) * 1e-9)
+    drift = clocks.drift(raw.stamp, raw.log)
+    return replace(stream, bursts=raw.bursts, hold=(hold or 0.0) * 1e-9, drift=drift)
 
 
 def _without_lone(raw: Raw, values: np.ndarray) -> np.ndarray:

@@ -60,7 +60,7 @@ class Case:
             for name, column in self.columns.items()
             if name != "force_late"
         ]
-        linear.append(has.pose * (self.columns["force_late"] + has.tied * self.own[1]))
+        linear.append(has.pose * self.columns["force_late"])
         linear += [
             has.jitter * np.where(self.residuals.of_frame(frame), self.own[1], 0)
             for frame in (8, 9)
@@ -135,12 +135,12 @@ def test_tolerances_are_the_episodes_own_or_as_usual():
     delays = {"camera": {"error": 3e-4}, "pose": {"error": 4e-4}}
     about = {"preprocessing": {"release_error": 5e-4, "delays": delays}}
     told = Tolerances.of(SimpleNamespace(metadata=about))
-    assert (told.release, told.camera, told.pose, told.tied) == (5e-4, 3e-4, 4e-4, False)
-    assert told.simulated == pytest.approx([5e-4, 3e-4, usual.hand])
-    delays = {"camera": {"error": None, "left": 0.01}, "pose": {"error": 4e-4, "left": 1e-3}}
-    delays["camera"]["against"] = "pose"
+    assert (told.release, told.pose) == (5e-4, 4e-4)
+    assert told.simulated == pytest.approx([5e-4, 5e-4, usual.hand])
+    delays = {"camera": {"error": None, "left": 3e-3}, "pose": {"error": 4e-4, "left": 4e-3}}
+    delays["camera"]["against"] = "force"
     told = Tolerances.of(SimpleNamespace(metadata={"preprocessing": {"delays": delays}}))
-    assert (told.camera, told.pose, told.tied) == (0.01, 1e-3, True)
+    assert (told.camera, told.pose) == (3e-3, 4e-3)
     for empty in ({}, {"preprocessing": {"delays": None}}, {"preprocessing": {"delays": {}}}):
         assert Tolerances.of(SimpleNamespace(metadata=empty)) == usual
 

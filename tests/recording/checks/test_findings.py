@@ -119,3 +119,19 @@ def test_a_step_that_fails_refuses_and_is_the_last_finding(checked) -> None:
     short = checked.pull.recording.wrench.between(0, checked.pull.recording.origin + 10**9)
     found = findings_of(with_recording(checked, wrench=short))
     assert found[-1].about == "pull" and found[-1].refused and not found[-1].cure
+
+
+def test_a_clock_that_runs_fast_is_said(checked) -> None:
+    """By the growth of log_time less stamp; one that scatters as much says nothing."""
+    pose = checked.pull.recording.pose
+    for rate, error, said in ((2e-3, 1e-5, True), (2e-3, 1e-3, False), (1e-5, 1e-6, False)):
+        force = replace(checked.pull.recording.wrench, drift=(rate, error))
+        odd = with_recording(checked, wrench=force, pose=replace(pose, drift=(0.0, 1e-6)))
+        words = [one.what for one in times.findings(odd) if one.about == "clock_drift"]
+        assert any(pose.topic in what and "+2000" in what for what in words) == said
+
+
+def test_a_pose_that_nothing_ties_to_the_force_is_said(checked) -> None:
+    for left, said in ((0.003, True), (0.001, False), (None, False)):
+        odd = replace(checked, delays=replace(checked.delays, pose=Estimate(left=left)))
+        assert ("clock_unknown" in abouts(times.findings(odd))) == said

@@ -301,3 +301,13 @@ def test_shifted_puts_late_stamps_right(good) -> None:
     for role, by in (("pose", 4), ("color", -10), ("depth", -10), ("wrench", 0), ("gripper", 0)):
         off = good.streams[role].stamp - found.streams[role].stamp
         np.testing.assert_array_equal(off, by * MS)
+
+
+@pytest.mark.parametrize("rate", [-3e-3, 0.0, 5e-4])
+def test_a_drift_is_told_by_the_least_delays(rate) -> None:
+    for seed in range(5):
+        stamp = np.arange(0, 9 * 10**9, 10**6)
+        waits = np.random.default_rng(seed).exponential(2e5, len(stamp)).astype(np.int64)
+        found, error = clocks.drift((stamp * (1 + rate)).astype(np.int64), stamp + 10**6 + waits)
+        assert abs(found + rate) < 5 * error and error < 1e-5
+    assert clocks.drift(stamp[:1000], stamp[:1000])[1] == np.inf

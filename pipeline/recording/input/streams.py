@@ -331,11 +331,9 @@ def _sorted(raw: Raw) -> Stream[Any]:
         values = values[kept]
     if raw.lost:
         raw.notes.append(f"lost {_words(raw)}")
-    delay = float(np.median(raw.log - raw.stamp)) * 1e-9
-    lost = sum(raw.lost.values())
-    stream = Stream(raw.topic, raw.frame, raw.stamp, values, delay, lost, raw.notes)
-    drift = clocks.drift(raw.stamp, raw.log)
-    return replace(stream, bursts=raw.bursts, hold=(hold or 0.0) * 1e-9, drift=drift)
+    delay, drift = np.median(raw.log - raw.stamp) * 1e-9, clocks.drift(raw.stamp, raw.log)
+    about = sum(raw.lost.values()), raw.notes, raw.bursts, (hold or 0.0) * 1e-9, drift
+    return Stream(raw.topic, raw.frame, raw.stamp, values, float(delay), *about)
 
 
 def _without_lone(raw: Raw, values: np.ndarray) -> np.ndarray:

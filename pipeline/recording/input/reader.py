@@ -21,7 +21,8 @@ from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.container import Container, read_container
 from pipeline.recording.input.frames import TransformTree
 from pipeline.recording.input.readings import Picture
-from pipeline.recording.input.streams import Stream, streams_of
+from pipeline.recording.input.stream import Stream
+from pipeline.recording.input.streams import streams_of
 from pipeline.recording.input.topics import camera_of, choose
 from pipeline.recording.input.transforms import transforms_of
 from pipeline.recording.input.words import shortened

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -19,8 +19,8 @@ from pipeline.base.errors import UserError, printable
 from pipeline.recording.input import clocks, pace
 from pipeline.recording.input.decode import Elsewhere, Unreadable
 from pipeline.recording.input.readings import Picture
-from pipeline.recording.input.remarks import frozen, gaps_of
 from pipeline.recording.input.roles import OPTIONAL, Choice
+from pipeline.recording.input.stream import Stream, frozen, gaps_of
 from pipeline.recording.input.words import counted, shortened
 
 ABSURD = 1e6  # N, m, m/s, rad: nothing here is as large
@@ -29,71 +29,10 @@ LONE = {"wrench": 30.0, "pose": 0.05}  # N, m
 MOST_LONE = 0.05  # share of the messages that may be alone: more are the sensor's noise, or units
 FASTEST = 2.0  # m/s of the hand
 TIMED = ("gripper",)  # roles for which log_time will do where there are no stamps
-EVEN = 0.1  # of the period, by which the median way may differ from the mean one
 REASON = 100  # characters of why a message is damaged
 CAMERAS = ("color", "depth")
 HELD = ("wrench", "pose", "twist")  # roles of which each value is measured anew
 CORRECTABLE = ("pose", "twist", "gripper")  # by log_time, if they have a clock of their own
-
-
-Values = TypeVar("Values", np.ndarray, list[Picture])
-
-
-@dataclass(frozen=True)
-class Stream(Generic[Values]):
-    """One topic, sorted by stamp.
-
-    Attributes:
-        topic: Its name.
-        frame: frame_id of its messages.
-        stamp: header.stamp, ns, shape (S,), strictly increasing.
-        values: One column a quantity, shape (S, C), or `Picture`s, length S.
-        delay: Median of log_time - stamp [s].
-        lost: Messages that are not in it, for whatever reason.
-        notes: What was lost or mended, in words.
-        bursts: In which the stamps came; None where they were even.
-        hold: For how long each value was repeated [s], 0 where it was not: repeats are left out.
-    """
-
-    topic: str
-    frame: str
-    stamp: np.ndarray
-    values: Values
-    delay: float
-    lost: int
-    notes: list[str] = field(default_factory=list)
-    bursts: pace.Bursts | None = None
-    hold: float = 0.0
-
-    def seconds(self, origin: int) -> np.ndarray:
-        return (self.stamp - origin) * 1e-9
-
-    @property
-    def period(self) -> float:
-        """Usual time between messages [s]: the median, or where that is none, the mean."""
-        ways = np.diff(self.stamp)
-        median, mean = float(np.median(ways)), pace.mean_way(ways)
-        return (median if abs(median - mean) < EVEN * mean else mean) * 1e-9
-
-    @property
-    def longest_gap(self) -> float:
-        return float(np.max(np.diff(self.stamp))) * 1e-9
-
-    @property
-    def missing(self) -> int:
-        """Messages that a constant rate would have had in the gaps."""
-        gaps = np.diff(self.stamp) * 1e-9 / self.period
-        return int(np.sum(np.maximum(np.round(gaps) - 1, 0)))
-
-    def between(self, first: int, last: int) -> Stream[Values]:
-        """Messages stamped from `first` to `last` [ns]; the nearest two where there are fewer."""
-        begin = min(int(np.searchsorted(self.stamp, first)), len(self.stamp) - 2)
-        end = max(int(np.searchsorted(self.stamp, last, side="right")), begin + 2)
-        return replace(self, stamp=self.stamp[begin:end], values=self.values[begin:end])
-
-    def shifted(self, seconds: float) -> Stream[Values]:
-        """With `seconds` subtracted from every stamp."""
-        return replace(self, stamp=self.stamp - round(seconds * 1e9)) if seconds else self
 
 
 @dataclass
@@ -345,10 +284,9 @@ def _sorted(raw: Raw) -> Stream[Any]:
         values = values[kept]
     if raw.lost:
         raw.notes.append(f"lost {_words(raw)}")
-    delay = float(np.median(raw.log - raw.stamp)) * 1e-9
-    lost = sum(raw.lost.values())
-    stream = Stream(raw.topic, raw.frame, raw.stamp, values, delay, lost, raw.notes)
-    return replace(stream, bursts=raw.bursts, hold=(hold or 0.0) * 1e-9)
+    delay, drift = np.median(raw.log - raw.stamp) * 1e-9, clocks.drift(raw.stamp, raw.log)
+    about = sum(raw.lost.values()), raw.notes, raw.bursts, (hold or 0.0) * 1e-9, drift
+    return Stream(raw.topic, raw.frame, raw.stamp, values, float(delay), *about)
 
 
 def _without_lone(raw: Raw, values: np.ndarray) -> np.ndarray:

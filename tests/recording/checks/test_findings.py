@@ -33,7 +33,7 @@ from tools import checks
 
 def test_each_check_has_a_test_of_a_recording_on_which_it_fires() -> None:
     marked = set()
-    for file in Path(__file__).parent.glob("test_*.py"):
+    for file in Path(__file__).parents[1].rglob("test_*.py"):
         for text in re.findall(r"@pytest\.mark\.fires\(([^)]*)\)", file.read_text()):
             marked |= set(ast.literal_eval(f"({text},)"))
     assert marked == {check.name for check in CHECKS}
@@ -239,3 +239,28 @@ def test_no_check_fires_on_a_sound_recording(name: str) -> None:
     params = load(DEFAULTS)
     band = BandParams(source="recording", mass=0.0408, diameter=0.010, rest_length=0.52)
     assert process(file, band, params).findings == []
+
+
+@pytest.mark.fires("clock_drift")
+def test_a_clock_that_runs_fast_is_said(checked) -> None:
+    """By the growth of log_time less stamp; one that scatters as much says nothing."""
+    pose = checked.pull.recording.pose
+    for rate, error, said in ((2e-3, 1e-5, True), (2e-3, 1e-3, False), (1e-5, 1e-6, False)):
+        force = replace(checked.pull.recording.wrench, drift=(rate, error))
+        odd = with_recording(checked, wrench=force, pose=replace(pose, drift=(0.0, 1e-6)))
+        words = [one.what for one in times.findings(odd) if one.about == "clock_drift"]
+        assert any(pose.topic in what and "+2000" in what for what in words) == said
+
+
+@pytest.mark.fires("clock_unknown")
+def test_a_pose_that_nothing_ties_to_the_force_is_said(checked) -> None:
+    for left, said in ((0.003, True), (0.001, False), (None, False)):
+        odd = replace(checked, delays=replace(checked.delays, pose=Estimate(left=left)))
+        assert ("clock_unknown" in abouts(times.findings(odd))) == said
+
+
+@pytest.mark.fires("clocks_disagree")
+def test_two_estimates_of_a_delay_that_disagree_are_said(checked) -> None:
+    odd = replace(checked, delays=replace(checked.delays, conflict="one says 3 ms, one -9 ms"))
+    said = [one.what for one in times.findings(odd) if one.about == "clocks_disagree"]
+    assert said == ["one says 3 ms, one -9 ms"]

@@ -325,3 +325,13 @@ def test_a_given_delay_is_taken_off_first(tmp_path, params, good, late) -> None:
         right, said = correct_delays(Pull.of(found, params.setup), given)
         assert said.camera.applied and said.camera.value == camera
         np.testing.assert_array_equal(right.recording.depth.stamp, found.depth.stamp)  # not twice
+
+
+@pytest.mark.parametrize("rate", [-3e-3, 0.0, 5e-4])
+def test_a_drift_is_told_by_the_least_delays(rate) -> None:
+    for seed in range(5):
+        stamp = np.arange(0, 9 * 10**9, 10**6)
+        waits = np.random.default_rng(seed).exponential(2e5, len(stamp)).astype(np.int64)
+        found, error = clocks.drift((stamp * (1 + rate)).astype(np.int64), stamp + 10**6 + waits)
+        assert abs(found + rate) < 5 * error and error < 1e-5
+    assert clocks.drift(stamp[:1000], stamp[:1000])[1] == np.inf

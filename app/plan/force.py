@@ -52,7 +52,8 @@ def read_earlier(path: Path, params: Params) -> Earlier:
     from pipeline.recording.pulls import Pull, pulls_of
     from pipeline.recording.signals import signals_of
 
-    whole = Pull.of(read_recording(Path(path), params.setup), params.setup)
+    recording = read_recording(Path(path), params.setup, params.episode.delays)
+    whole = Pull.of(recording, params.setup)
     base, source = whole.geometry.base, whole.geometry.sources["base_to_fork"]
     frame, problem = whole.recording.pose.frame, None
     try:

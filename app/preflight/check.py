@@ -82,7 +82,7 @@ def look_at(
     )
     recording = None
     try:
-        recording = recording_of(container, params.setup)
+        recording = recording_of(container, params.setup, params.episode.delays)
         report.losses, report.notes = recording.losses, recording.notes
         _add_roles(report.topics, recording)
         pulls = pulls_of(Pull.of(recording, params.setup))

@@ -55,7 +55,7 @@ class Layout:
         Raises UserError where they lie as they once did.
         """
         folder = self.raw(band)
-        split = {part.parent for part in folder.glob("*/*.mcap") if part.parent.name[0] != "."}
+        split = {part.parent for part in folder.glob("*/*.mcap*") if part.parent.name[0] != "."}
         found, old = sorted({*folder.glob("*.mcap"), *split}), folder.parent / f"{band}.mcap"
         if not found and old.is_file():
             raise UserError(

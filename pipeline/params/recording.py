@@ -10,7 +10,7 @@ from pydantic import AfterValidator, model_validator
 
 from pipeline.base.schema import FILLED, Range, Section, refusal
 
-Delay = Annotated[float, Range(-0.5, 0.5)]
+Delay = Annotated[float, Range(-4e9, 4e9)]  # s: clocks may be of other epochs
 
 
 class DelayParams(Section):

@@ -55,7 +55,7 @@ def process_pulls(
     Raises:
         UserError: None can be used: about the first.
     """
-    recording = read_recording(path, params.setup)
+    recording = read_recording(path, params.setup, params.episode.delays)
     usable: list[Checked] = []
     refused: list[UserError] = []
     try:

@@ -14,6 +14,7 @@ from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 from pipeline.params.recording import CloudParams
 from pipeline.recording.blind import why_no_band
+from pipeline.recording.depth_unit import misread
 from pipeline.recording.masks import masker
 from pipeline.recording.view import Frame, View
 
@@ -30,7 +31,8 @@ class Clouds:
         points: Frame O, K arrays of shape (<= points, 3), float32; some may be empty.
         pixels: Masked pixels of each frame before outliers were removed, shape (K,).
         color_counts: Whether the band's colour told it from the arm's.
-        damaged: Frames of the window that could not be decoded.
+        damaged, damaged_colors: Frames of the window that could not be decoded, and those of them
+            whose depth could.
         unpaired: Depth frames of the window without a colour frame.
     """
 
@@ -40,6 +42,7 @@ class Clouds:
     color_counts: bool
     damaged: int
     unpaired: int
+    damaged_colors: int = 0
 
     @property
     def empty(self) -> int:
@@ -75,8 +78,17 @@ def clouds_of(view: View, cloud: CloudParams) -> Clouds:
         getattr(mask, "colors", None) is not None,
         len(view.damaged),
         view.unpaired,
+        sum(role == "color" for role in view.damaged.values()),
     )
+    if not times:
+        raise view.undecoded(view.damaged[0])
     if clouds.empty > MOST_EMPTY * len(times):
+        wrong = misread(view.recording, view.geometry, view.scene)
+        if wrong:
+            raise UserError(
+                f"{path}: {wrong}: publish it as 16UC1 in millimetres or 32FC1 in metres, of the"
+                " byte order that is_bigendian says"
+            )
         cure = "the masks" if cloud.mask == "folder" else "the band's diameter and rest_length"
         why = why_no_band(view) or f"check the camera's extrinsics and {cure}"
         raise UserError(

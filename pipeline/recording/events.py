@@ -10,7 +10,7 @@ from scipy.signal import find_peaks
 
 from pipeline.base.errors import UserError
 
-Opening = tuple[np.ndarray, np.ndarray]  # of the gripper: times [s] and opening [m], both (G,)
+Opening = tuple[np.ndarray, np.ndarray]  # of the gripper: times [s] and opening, both (G,)
 
 MARGIN = 0.05  # s kept clear of the grasp and of the release when means are taken
 SETTLE = 0.4  # s after the release until the hand is free and at rest
@@ -20,7 +20,7 @@ GAP = 3.5  # periods of the force around the release
 SUDDEN = 0.5  # share of the drop that a release takes within a few hundredths of a second
 SLIP = 0.2  # share of the largest drop from which a sudden drop is worth a word
 FREE = 0.3  # share of the held force that a free hand may still feel
-LEAST_STROKE = 0.002  # m: fingers that move less than this did not move
+LEAST_STROKE = 0.002  # m, rad, ...: fingers that move less than this did not move
 OPENS = 0.5  # s by which the gripper's topic may come late
 LEAD_IN = 0.2  # s at least
 LIFT = 0.005  # m
@@ -318,8 +318,9 @@ def _opens(t: np.ndarray, opening: np.ndarray, release: float) -> bool | None:
     """Whether the fingers open when the force drops; None where they were not seen to move."""
     after = (t > release) & (t < release + OPENS)
     held = (t < release) & (t > release - 1.0)
-    if after.sum() < 3 or not held.any() or np.ptp(opening) < LEAST_STROKE:
+    if after.sum() < 3 or not held.any() or not _moved(opening):
         return None
+    opening = _outward(t, opening, release) * opening
     return bool(opening[after].max() > np.median(opening[held]) + 0.2 * np.ptp(opening))
 
 
@@ -327,14 +328,35 @@ def _closed(t: np.ndarray, opening: np.ndarray, release: float) -> float | None:
     """First sample after which the fingers stay within a tenth of their stroke from closed."""
     before = t < release - 0.05
     holding = before & (t > release - 1.0)
-    if not holding.any():
+    if not holding.any() or not _moved(opening):
         return None
+    opening = _outward(t, opening, release) * opening
     closed = np.median(opening[holding])
     stroke = np.max(opening[before]) - closed
     if stroke < LEAST_STROKE:
         return None
     wide = np.flatnonzero(opening[before] > closed + stroke / 10)
     return float(t[wide[-1] + 1]) if wide[-1] + 1 < before.sum() else None
+
+
+def _moved(opening: np.ndarray) -> bool:
+    """Whether fingers moved, in whatever unit they are told."""
+    jitter = 1.4826 * float(np.median(np.abs(np.diff(opening)))) if len(opening) > 1 else 0.0
+    return float(np.ptp(opening)) >= max(LEAST_STROKE, 2 * SIGMAS * jitter)
+
+
+def _outward(t: np.ndarray, opening: np.ndarray, release: float) -> float:
+    """1, or -1 where the numbers grow when the fingers close, as a knuckle's angle does.
+
+    Told by what they last were before they hold; by 1 where they were not seen to close.
+    """
+    before = t < release - 0.05
+    holding = before & (t > release - 1.0)
+    if not holding.any():
+        return 1.0
+    away = opening[before] - np.median(opening[holding])
+    wide = np.flatnonzero(np.abs(away) > 0.2 * np.ptp(opening))
+    return -1.0 if len(wide) and away[wide[-1]] < 0 else 1.0
 
 
 def _rested(t: np.ndarray, path: np.ndarray, grasp: float) -> float:

@@ -130,7 +130,7 @@ class View:
         self.index = [(k, pairs[k]) for k in np.flatnonzero(within & paired).tolist()]
         self.unpaired = int(np.sum(within & ~paired))
         self.times = np.array([times[k] for k, _ in self.index])
-        self.damaged: set[int] = set()
+        self.damaged: dict[int, str] = {}  # which of its two pictures cannot be decoded
         self.window = self._window()
         if any(side.start >= side.stop for side in self.window):
             raise UserError(
@@ -153,7 +153,7 @@ class View:
         for number in range(len(self.index)) if numbers is None else numbers:
             depth, color = self.depth(number), self.color(number)
             if depth is None or color is None:
-                self.damaged.add(number)
+                self.damaged[number] = "depth" if depth is None else "color"
             else:
                 yield number, self.frame_of(number, depth, color, window)
 
@@ -167,6 +167,19 @@ class View:
             return images.color(self.recording.color.values[self.index[number][1]])
         except images.Undecodable:
             return None
+
+    def undecoded(self, role: str) -> UserError:
+        """That no picture of this role could be decoded, with the decoder's reason."""
+        stream = getattr(self.recording, role)
+        reason = "of another size than its camera info"
+        try:
+            getattr(images, role)(stream.values[self.index[0][role == "color"]])
+        except images.Undecodable as error:
+            reason = str(error)
+        return UserError(
+            f"{self.recording.path}: no {'colour' if role == 'color' else role} picture of"
+            f" {stream.topic} between the window's start and end can be decoded: {reason}"
+        )
 
     def stamp(self, number: int) -> int:
         """Of a colour picture's header, as it was recorded [ns]."""

@@ -8,12 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.recording import delays
 from pipeline.recording.camera_delay import camera_delay
 from pipeline.recording.delays import Estimate, correct_delays
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.pulls import Pull
-from pipeline.recording.tool_inertia import estimate_tool_inertia
+from pipeline.recording.tool_inertia import ToolInertia, estimate_tool_inertia
 from tests.recording.played import Played
 from validation.recordings.bag import Truth
 
@@ -118,7 +119,7 @@ def test_what_is_applied(looked_at, params) -> None:
     recording, geometry = looked_at
     pull = Pull(recording, geometry)
     right, found = correct_delays(pull, params)
-    assert found.pose == Estimate(0.0, None, "not seen", False)
+    assert abs(found.pose.value) < 0.001 and not found.pose.applied  # the hand starts back
     assert found.camera.source == "estimated" and not found.camera.applied
     assert right is pull
 
@@ -128,10 +129,32 @@ def test_what_is_applied(looked_at, params) -> None:
     np.testing.assert_allclose((right.depth.stamp - recording.depth.stamp) * 1e-9, 0, atol=1e-3)
 
 
+@pytest.mark.parametrize("seconds", [-0.03, -0.01, 0.012, 0.03])
+def test_a_late_force_is_a_pose_that_is_early(looked_at, params, seconds) -> None:
+    """The hand starts back before the force falls: both pose and camera are put right."""
+    recording, geometry = looked_at
+    changed = replace(late(recording, "wrench", seconds), start=recording.origin)
+    _, found = correct_delays(Pull(changed, geometry), params)
+    assert found.pose.applied and found.pose.value == pytest.approx(-seconds, abs=0.002)
+    assert found.pose.left < 0.002 and not found.conflict
+
+
+@pytest.mark.parametrize(("back", "conflict"), [(0.001, False), (0.02, True)])
+def test_two_estimates_are_weighed_or_said(looked_at, params, monkeypatch, back, conflict) -> None:
+    """By its inertia the tool is right where the two do not agree."""
+    tool = ToolInertia(1.0, 0.01, 0.0, 0.001)
+    monkeypatch.setattr(delays, "estimate_tool_inertia", lambda *_: tool)
+    monkeypatch.setattr(delays, "start_back", lambda _: (back, 0.001))
+    found = correct_delays(Pull(*looked_at), params)[1]
+    assert bool(found.conflict) == conflict and not found.pose.applied
+    assert found.pose.value == pytest.approx(0.0 if conflict else back / 2)
+    assert found.pose.error == pytest.approx(0.001 if conflict else 0.001 / np.sqrt(2))
+
+
 def test_given_delays_are_used_as_they_are(looked_at, params) -> None:
     recording, geometry = looked_at
-    delays = params.episode.delays.model_copy(update={"pose": -0.004, "camera": 0.0})
-    episode = params.episode.model_copy(update={"delays": delays})
+    told = params.episode.delays.model_copy(update={"pose": -0.004, "camera": 0.0})
+    episode = params.episode.model_copy(update={"delays": told})
     given = params.model_copy(update={"episode": episode})
     right, found = correct_delays(Pull(recording, geometry), given)
     assert found.pose == Estimate(-0.004, 0.0, "setup", True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.base.errors import UserError
-from pipeline.recording.events import find_grasp, find_release
+from pipeline.recording.events import find_grasp, find_release, find_releases
 
 DIRECTION = np.array([0.3, -0.8, 0.52])
 
@@ -166,3 +166,23 @@ def test_a_band_that_slips_out_is_noticed() -> None:
     t, opening = gripper(1.0, 99.0)
     with pytest.raises(UserError, match="stays closed"):
         find_grasp((t, opening), resting(t), 7.5)
+
+
+UNITS = {"m": 0.08, "mm": 80.0, "percent": 100.0, "knuckle": -0.8, "steps": -255.0}
+
+
+@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("lead", [0.0, 0.7])  # closed at first, then opened around the band
+def test_grasp_by_a_gripper_of_any_sign_and_unit(unit, lead) -> None:
+    t, force = pull(7.5, 0.002, 0.02, 3)
+    times = np.arange(0, 9, 0.02)
+    open_ = np.interp(times, [lead, lead + 0.1, 1.2, 1.4, 7.5, 7.7], [lead == 0, 1, 1, 0.1, 0.1, 1])
+    noise = np.random.default_rng(4).normal(0, 1e-3, len(times))
+    gripper = times, UNITS[unit] * (open_ + noise) + (0.8 if UNITS[unit] < 0 else 0)
+    release = find_release(t, force, gripper).time
+    path = np.zeros((len(t), 3))
+    assert find_grasp(gripper, (t, path), release) == pytest.approx(1.38, abs=0.05)
+    assert find_releases(t, force, gripper) == pytest.approx([7.5], abs=0.01)
+    slipped = times, np.where(times > 7, gripper[1][340] - 0.05 * UNITS[unit], gripper[1])
+    with pytest.raises(UserError, match="the gripper stays closed"):
+        find_grasp(slipped, (t, path), release)

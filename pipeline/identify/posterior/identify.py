@@ -20,7 +20,7 @@ from pipeline.identify.posterior.coordinates import Coordinates
 from pipeline.identify.posterior.draws import truncated_gaussian
 from pipeline.identify.posterior.fit import Fit, fit
 from pipeline.identify.posterior.launches import Evidence, LaunchLikelihood, without_each
-from pipeline.identify.posterior.likelihood import SIMULATED, Likelihood
+from pipeline.identify.posterior.likelihood import SIMULATED, Failed, Likelihood
 from pipeline.identify.posterior.residuals import BINS, LEAST_POINTS
 from pipeline.identify.results.theta import content_of
 from pipeline.identify.results.units import SI_UNITS
@@ -102,7 +102,13 @@ def fit_posterior(
         setup = replace(evidence.setup, history=recorded_history(sling, episodes[0]))
         launches = LaunchLikelihood(evidence.launches, sling, setup)
     known = {"launches": launches, "workers": workers, "progress": progress}
-    found = fit(recordings, coordinates, coordinates.of(start), **known)
+    begin = coordinates.of(start)
+    nearest = coordinates.parameters(begin[None])
+    try:
+        recordings = [one.aligned(nearest) for one in recordings]
+    except Failed:
+        pass  # the fit says why
+    found = fit(recordings, coordinates, begin, **known)
     for one in found.expansions:
         if not len(one.residuals.frame):
             print(
@@ -215,7 +221,7 @@ def _clocks(found: Identified) -> dict:
         name: {"value": value, "low": value - wide[i], "high": value + wide[i], "unit": "s"}
         for name, value, i in (
             ("release_time", time, release),
-            ("camera_delay", -own[camera], camera),
+            ("camera_delay", -own[camera] - found.recordings[0].moved, camera),
         )
     }
 

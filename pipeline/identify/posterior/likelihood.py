@@ -4,20 +4,22 @@
 
 Nuisances n are what a recording leaves open of its instruments, Gaussian, each recording's own.
 Release and the hand's offset along the pull are simulated, and what another camera's clock sees is
-taken from the same rollouts; bias and drift of the force, the extrinsics and the stamp of each
-picture act linearly on the measured side. For Gaussians the minimum over n is, up to a constant,
-the integral over n.
+taken from the same rollouts; bias and drift of the force, its clock against the pose's, the
+extrinsics and the stamp of each picture act linearly on the measured side. For Gaussians the
+minimum over n is, up to a constant, the integral over n.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.episode.episode import Episode
+from pipeline.identify.posterior.alignment import recoil_seen
 from pipeline.identify.posterior.residuals import Residuals, Rule
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.model import ClampedBand
@@ -40,6 +42,7 @@ class Tolerances:
         jitter: Of one picture's stamp [s].
         shift, turn: Of the camera's extrinsics [m], [rad].
         bias, drift: Of the tared force, and over the pull [N].
+        pose: Of the pose's clock against the force's [s].
     """
 
     force: float = 0.11
@@ -53,15 +56,18 @@ class Tolerances:
     turn: float = 3e-3
     bias: float = 0.02
     drift: float = 0.02
+    pose: float = 5e-4
 
     @classmethod
     def of(cls, episode: Episode) -> Tolerances:
         """From an episode's metadata, or as usual where it says nothing."""
         about = episode.metadata.get("preprocessing", {})
         delays = about.get("delays") or {}
-        camera, pose = ((delays.get(name) or {}).get("error") for name in ("camera", "pose"))
-        camera = None if camera is None else np.hypot(camera, pose or 0.0)
-        given = {"release": about.get("release_error"), "camera": camera}
+        told = {name: delays.get(name) or {} for name in ("camera", "pose")}
+        left = {name: one.get("left") or one.get("error") for name, one in told.items()}
+        if left["camera"] and told["camera"].get("against", "pose") == "pose":
+            left["camera"] = np.hypot(left["camera"], left["pose"] or 0.0)
+        given = {"release": about.get("release_error"), **left}
         return cls(**{name: float(value) for name, value in given.items() if value})
 
     @property
@@ -118,6 +124,11 @@ def opening_time(episode: Episode, sling: ClampedBand, friction: float) -> float
     return float(np.clip(fall * 2 * friction * sling.grip_force / held, 5e-4, 0.05))
 
 
+def _that_count(episode: Episode) -> int:
+    """First pictures beyond which none counts."""
+    return max(Rule().frames(episode), default=-1) + 1
+
+
 class Failed(Exception):
     """A simulation did not reach its end."""
 
@@ -127,6 +138,7 @@ class Likelihood:
 
     Attributes:
         episode, sling, cutoff, tolerances: As given; the sling is that of this episode.
+        moved: What was added to the camera's stamps before the fit [s].
     """
 
     def __init__(
@@ -139,11 +151,26 @@ class Likelihood:
         """`friction` is what the method fixes, of the pads."""
         self.episode, self.cutoff = episode, cutoff
         self.sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
-        self.tolerances = Tolerances.of(episode)
+        self.tolerances, self.moved = Tolerances.of(episode), 0.0
         end = np.searchsorted(episode.time, episode.release_time)
         place = episode.position[max(end - 5, 0) : end].mean(axis=0)
         self._away = place / np.linalg.norm(place)
-        self._frames = max(Rule().frames(episode), default=-1) + 1  # what follows counts nowhere
+        self._frames = _that_count(episode)
+
+    def aligned(self, parameters: Parameters) -> Likelihood:
+        """With the camera's clock where these parameters, one sample, show the recoil best.
+
+        A fit that starts a picture away from there can end in another minimum: a picture from
+        before the release does not change with the camera's clock. Raises Failed.
+        """
+        best = recoil_seen(self.episode, self.tolerances.camera, parameters, self.sling)
+        if best is None:
+            return self
+        moved = copy(self)
+        moved.moved = best
+        moved.episode = replace(self.episode, cloud_time=self.episode.cloud_time + best)
+        moved._frames = _that_count(moved.episode)
+        return moved
 
     def shifted(self, nuisances: np.ndarray) -> Episode:
         """The episode with another release, camera's clock and place of the hand, (3,).
@@ -221,6 +248,8 @@ class Likelihood:
     ) -> Expansion:
         has = self.tolerances
         linear = self._linear(residuals, own[SIMULATED.index("camera")])
+        # Of the camera's clock `moved` was taken beforehand, and belongs to what its prior judges.
+        nuisances = nuisances + self.moved * (np.array(SIMULATED) == "camera")
         weight = 1 / residuals.spread(has.force, has.cloud, has.way)
         count, inner = len(slopes), len(SIMULATED)
         design = np.concatenate([slopes, own, linear]) * weight  # (D + 3 + M, R)
@@ -252,7 +281,9 @@ class Likelihood:
         has, known = self.tolerances, residuals.columns()
         sizes = {"force_bias": has.bias, "force_drift": has.drift}
         sizes |= {"cloud_shift": has.shift, "cloud_turn": has.turn}
+        late = known.pop("force_late")
         columns = [sizes[name[:-2]] * column for name, column in known.items()]
+        columns.append(has.pose * late)
         for frame in np.unique(residuals.frame[residuals.recoils]):
             columns.append(has.jitter * np.where(residuals.of_frame(frame), camera, 0.0))
         return np.array(columns)

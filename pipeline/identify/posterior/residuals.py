@@ -52,17 +52,17 @@ class Rule:
         time = episode.cloud_time - episode.release_time
         held = (time > self.held[0]) & (time < self.held[1])
         hand = episode.position[episode.time <= episode.release_time][-1:]
-        drawn = self._behind(hand)
+        drawn = self.behind(hand)
         recoil = (time > 0) & (time <= self.recoil)
         for frame in np.flatnonzero(recoil):
-            recoil[frame] = self._behind(episode.clouds[frame]) > self.way * drawn
+            recoil[frame] = self.behind(episode.clouds[frame]) > self.way * drawn
         if not recoil.any():
             later = np.flatnonzero(time > 0)
             recoil[later[np.argsort(time[later])[:1]]] = True
         return np.flatnonzero(held | recoil)
 
     @staticmethod
-    def _behind(points: np.ndarray) -> float:
+    def behind(points: np.ndarray) -> float:
         """How far the farthest twentieth of points (P, 3) is behind the fork [m]."""
         return -float(np.quantile(points[:, 1], 0.05)) if len(points) else 0.0
 
@@ -116,7 +116,7 @@ class Residuals:
                 continue
             points = np.asarray(cloud[:: -(-len(cloud) // MOST_POINTS)], float)
             line = reference[number]
-            foot, edge, part = _nearest(points, line)
+            foot, edge, part = nearest(points, line)
             at = place[edge] + part * (place[edge + 1] - place[edge])
             bins = np.minimum((at * BINS).astype(int), BINS - 1)
             count = np.bincount(bins, minlength=BINS)
@@ -131,7 +131,7 @@ class Residuals:
             radius = self.sling.radius * np.sqrt(self._edges / length)
             front = _across(episode.camera - foot, tangent[edge])
             offset = points - foot - VISIBLE * radius[edge, None] * front
-            foot_of_mean, edge_of_mean, _ = _nearest(mean, line)
+            foot_of_mean, edge_of_mean, _ = nearest(mean, line)
             along = tangent[edge_of_mean]
             depth = _across(episode.camera - mean, along)
             seen = np.stack([np.bincount(bins, axis, BINS) for axis in offset.T], 1)[good]
@@ -185,12 +185,14 @@ class Residuals:
     def columns(self) -> dict[str, np.ndarray]:
         """How the residuals change with what moves all measured forces or points alike, (R,) each.
 
-        force_bias_* [N], force_drift_* [N over the pull], cloud_shift_* [m], cloud_turn_* about the
-        camera [rad].
+        force_bias_* [N], force_drift_* [N over the pull], force_late: the force's stamps against
+        the pose's [s], cloud_shift_* [m], cloud_turn_* about the camera [rad].
         """
         count, changes = len(self.samples), {}
         time = self.episode.time[self.samples]
         since = (time - time[0]) / (time[-1] - time[0])
+        rate = np.gradient(self.episode.force, self.episode.time, axis=0)[self.samples]
+        changes["force_late"] = np.concatenate([*rate.T, np.zeros(2 * len(self.frame))])
         arm = self.point - self.episode.camera
         turned = np.cross(arm, self.depth), np.cross(arm, self.side)
         for axis, letter in enumerate("xyz"):
@@ -223,7 +225,7 @@ def _across(towards: np.ndarray, tangent: np.ndarray) -> np.ndarray:
     return towards / np.linalg.norm(towards, axis=-1, keepdims=True)
 
 
-def _nearest(points: np.ndarray, line: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def nearest(points: np.ndarray, line: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Feet (P, 3) of points on a line (L, 3), the edges (P,) they lie on, and where in them."""
     step = np.diff(line, axis=0)
     gap = points[:, None] - line[:-1]

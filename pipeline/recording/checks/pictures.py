@@ -56,7 +56,7 @@ NO_BAND = Check(
 )
 DAMAGED = Check(
     "damaged",
-    "depth pictures with those that can be decoded",
+    "pictures, colour and depth, with those that can be decoded",
     "none: they are counted",
     f"{100 * EMPTY:g} % cannot be",
     "none can be",
@@ -81,9 +81,11 @@ def findings(done: Processed) -> Iterator[Finding]:
         yield Finding(DRAWN.name, what, DRAWN.remedy, refused=True)
         return
     yield from of_coverage(done.coverage)
+    colors, cannot = clouds.damaged_colors, "cannot be decoded"
     for check, count, what in (
         (NO_BAND, clouds.empty, f"{clouds.empty} of {frames} pictures show no band"),
-        (DAMAGED, clouds.damaged, f"{clouds.damaged} depth pictures cannot be decoded"),
+        (DAMAGED, clouds.damaged - colors, f"{clouds.damaged - colors} depth pictures {cannot}"),
+        (DAMAGED, colors, f"{colors} colour pictures {cannot}"),
         (UNPAIRED, clouds.unpaired, f"{clouds.unpaired} depth pictures have no colour picture"),
     ):
         if count > EMPTY * frames:

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.recording.checks.finding import Check, Finding
 from pipeline.recording.input.pace import HELD as SENT
 from pipeline.recording.input.pace import MOST_CLOSE
-from pipeline.recording.input.streams import Stream
+from pipeline.recording.input.stream import Stream
 from pipeline.recording.processed import Processed
 
 GAPS = {"wrench": 0.02, "pose": 0.05, "color": 0.2, "depth": 0.2}  # s

@@ -15,10 +15,21 @@ GRIPPER = Check(
     "neither the fingers nor a lift tell when the band is grasped",
     "record its joint states",
 )
-CHECKS = (GRIPPER,)
+SETS = Check(
+    "topics",
+    "the topics that were chosen with others of their types, by device and by what moves together",
+    "none: another set with a release, or another camera, is named",
+    "another set of topics would do as well",
+    "",
+    "name the topics that are meant in setup.topics of params.yaml",
+)
+CHECKS = (GRIPPER, SETS)
 
 
 def findings(done: Processed) -> Iterator[Finding]:
     if not done.pull.recording.gripper:
         what = "the gripper was not recorded, so the grasp is read from the lift"
         yield Finding(GRIPPER.name, what, GRIPPER.remedy)
+    streams = done.pull.recording.streams
+    for role, doubt in done.pull.recording.doubts.items():
+        yield Finding(SETS.name, f"{streams[role].topic} was taken, but {doubt}", SETS.remedy)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from pipeline.recording.checks.finding import Check, Finding
 from pipeline.recording.checks.rates import topics
 from pipeline.recording.processed import Processed
+from pipeline.recording.release_pictures import EMPTY_AFTER, ReleasePictures
 
 SURE = 3.0  # standard errors from which something is more than noise
-DELAY = 0.002  # s
+DELAY = OPEN = 0.002  # s
+DRIFTED = 0.003  # s over the recording
 AHEAD = 0.01  # s of stamps before the force's, by the times of receipt
 BEHIND, SLOW = 0.02, {"color": 0.1, "depth": 0.1, "gripper": 0.1}  # s after; pictures take a while
 
@@ -30,7 +34,55 @@ DELAYED = Check(
     "",
     "mend them at their driver, or set episode.delays in params.yaml",
 )
-CHECKS = (CLOCK, DELAYED)
+UNKNOWN = Check(
+    "clock_unknown",
+    "the stamps of pose and camera with the force's, where nothing shows their delay",
+    "what pictures of the release and the fit leave open",
+    f"the pose's clock is not known to {1e3 * OPEN:g} ms",
+    "",
+    "record the force from the robot's own clock, or set episode.delays in params.yaml",
+)
+RELEASED = Check(
+    "release_pictures",
+    "the last picture of the drawn band and the next one with the fall of the force",
+    f"a picture's time, and {1e3 * EMPTY_AFTER:g} ms in which the outer band leaves its place",
+    "drawn after the force fell, or let go before it",
+    "drawn for 0.4 s after the force fell",
+    "stamp pictures when they are exposed, by the force's clock, or set episode.delays.camera",
+)
+CONFLICT = Check(
+    "clocks_disagree",
+    "two estimates of one delay",
+    "their standard errors",
+    f"{SURE:g} standard errors",
+    "",
+    "see which clock steps or drifts (chrony or PTP between computers), and record again",
+)
+FROZEN = Check(
+    "frozen_pictures",
+    "each depth picture around the release with the one before, pixel by pixel",
+    "none: a camera's noise never repeats",
+    "",
+    "one is sent again while the band must move",
+    "see whether the driver or the recorder sends old pictures again, and record again",
+)
+SMEARED = Check(
+    "smeared_pictures",
+    "the pictures after the release with the place of the drawn band",
+    "under a hundredth of it on sound recordings",
+    "a sixth of the drawn band is still there a picture later",
+    "",
+    "switch temporal filters off, and shorten the exposure",
+)
+DRIFT = Check(
+    "clock_drift",
+    "the growth of log_time less stamp with the force's, over the recording",
+    "scatter of each second's least delay",
+    f"{1e3 * DRIFTED:g} ms, and {SURE:g} standard errors",
+    "",
+    "stamp all topics by one clock (chrony or PTP between computers), and record again",
+)
+CHECKS = (CLOCK, DRIFT, DELAYED, UNKNOWN, RELEASED, CONFLICT, FROZEN, SMEARED)
 
 
 def findings(done: Processed) -> Iterator[Finding]:
@@ -40,6 +92,7 @@ def findings(done: Processed) -> Iterator[Finding]:
         if not -most <= offset <= AHEAD:
             what = f"the stamps of {stream.topic} are {offset:+.3f} s off the force's, judged"
             yield Finding(CLOCK.name, f"{what} by the times of receipt", CLOCK.remedy)
+    yield from of_drift(done)
     for role, delay in (("pose", done.delays.pose), ("camera", done.delays.camera)):
         error = delay.error or 0.0
         value = delay.value if delay.error is not None else 0.0
@@ -51,3 +104,60 @@ def findings(done: Processed) -> Iterator[Finding]:
                 f" against the force's, which is {taken}",
                 f"mend them at their driver, or set episode.delays.{role} in params.yaml",
             )
+    pose = done.delays.pose
+    if (pose.left or 0.0) > OPEN:
+        yield Finding(
+            UNKNOWN.name,
+            f"the pose's clock against the force's is not known better than"
+            f" ± {1e3 * (pose.left or 0.0):.1f} ms, and each ms is 0.4 % of the modulus",
+            UNKNOWN.remedy,
+        )
+    if done.delays.conflict:
+        yield Finding(CONFLICT.name, done.delays.conflict, CONFLICT.remedy)
+    if done.delays.release is not None:
+        yield from of_release(done.delays.release)
+
+
+def of_drift(done: Processed) -> Iterator[Finding]:
+    """Of the clocks' rates, by the times of receipt."""
+    force = done.pull.recording.wrench
+    span = (int(force.stamp[-1]) - int(force.stamp[0])) * 1e-9
+    for stream, _ in topics(done):
+        rate = force.drift[0] - stream.drift[0]
+        error = np.hypot(force.drift[1], stream.drift[1])
+        if np.isfinite(error) and abs(rate) * span > max(DRIFTED, SURE * error * span):
+            yield Finding(
+                DRIFT.name,
+                f"the clock of {stream.topic} runs {1e6 * rate:+.0f} ± {1e6 * error:.0f} ppm"
+                f" against the force's, {1e3 * rate * span:+.1f} ms over the recording",
+                DRIFT.remedy,
+            )
+
+
+def of_release(seen: ReleasePictures) -> Iterator[Finding]:
+    """Of the pictures around the release, with the camera's stamps as they were."""
+    if seen.frozen:
+        first, count = seen.frozen[0], len(seen.frozen)
+        what = f"{count} pictures from {1e3 * first:+.0f} ms of the release on are old ones again"
+        yield Finding(FROZEN.name, what, FROZEN.remedy, refused=True)
+    elif seen.never:
+        what = f"pictures show the band drawn until {seen.drawn:.2f} s after the force falls"
+        cure = "set episode.delays.camera, or record again with one clock"
+        yield Finding(RELEASED.name, what, cure, refused=True)
+    elif seen.again:
+        what = (
+            f"the band is drawn once more {1e3 * seen.again[0]:.0f} ms after the release, when it"
+            f" was gone at {1e3 * seen.gone:.0f} ms"
+        )
+        yield Finding(RELEASED.name, what, "record again: pictures are old or in disorder")
+    elif seen.beyond > 0:
+        what = (
+            f"a picture of {1e3 * seen.drawn:+.0f} ms after the force falls shows the band drawn,"
+            f" that of {1e3 * seen.gone:+.0f} ms shows it let go, so the camera's stamps are"
+            f" {1e3 * seen.earliest:+.0f} to {1e3 * seen.latest:+.0f} ms late"
+        )
+        yield Finding(RELEASED.name, what, RELEASED.remedy)
+    if seen.smeared:
+        share = 100 * max(seen.faded[1:3])
+        what = f"{share:.0f} % of the drawn band is still seen a picture after it was let go"
+        yield Finding(SMEARED.name, what, SMEARED.remedy)

@@ -10,6 +10,7 @@ import hashlib
 import re
 from collections.abc import Iterable
 from functools import lru_cache
+from os import SEEK_END
 from pathlib import Path
 
 from mcap.opcode import Opcode
@@ -17,8 +18,10 @@ from ruamel.yaml import YAML, YAMLError
 
 from pipeline.base.errors import UserError, printable
 from pipeline.recording.input import records as of
+from pipeline.recording.input.opened import is_mcap, opened
 
 METADATA, SUFFIX = "metadata.yaml", ".mcap"
+PACKED = re.compile(r"\.(zstd?|gz|lz4)$")  # behind it, where the whole file is packed
 NUMBERED = re.compile(r"(.*)_(\d{1,6})")
 GAP = 1.0  # s: a recorder that splits its bag pauses for less, people who record anew for more
 NAMED = 5  # files named in an error
@@ -38,7 +41,7 @@ def parts_of(path: Path) -> list[Path]:
         if path.is_dir():
             return _in_folder(path)
         _expect_file(path)
-        found = NUMBERED.fullmatch(path.stem)
+        found = NUMBERED.fullmatch(_stem(path))
         return (found and _beside(path, found[1])) or [path]
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror})") from error
@@ -48,7 +51,12 @@ def metadata_of(path: Path) -> list[Path]:
     """The file that lists a bag's parts, where there is one."""
     parts = parts_of(path)
     file = parts[0].with_name(METADATA)
-    return [file] if file.is_file() and parts[0].name in _listed(parts[0].parent) else []
+    listed = (
+        [_there(parts[0].with_name(name)) for name in _listed(file.parent)]
+        if file.is_file()
+        else []
+    )
+    return [file] if parts[0] in listed else []
 
 
 def missing_parts(path: Path) -> list[str]:
@@ -56,7 +64,7 @@ def missing_parts(path: Path) -> list[str]:
     parts = parts_of(path)
     if metadata_of(path):
         folder = parts[0].parent
-        gone = [name for name in _listed(folder) if not (folder / name).is_file()]
+        gone = [name for name in _listed(folder) if not _there(folder / name).is_file()]
         return [f"{name}, which {METADATA} lists, is missing" for name in gone]
     numbers = [_number(one) for one in parts]
     if len(parts) < 2:
@@ -82,8 +90,8 @@ def name_of(path: Path) -> str:
     path = Path(path)
     if path.is_dir():
         return path.resolve().name.removesuffix(SUFFIX)
-    found = NUMBERED.fullmatch(path.stem)
-    return found[1] if found and len(parts_of(path)) > 1 else path.stem
+    found = NUMBERED.fullmatch(_stem(path))
+    return found[1] if found and len(parts_of(path)) > 1 else _stem(path)
 
 
 def sha256(path: Path) -> str:
@@ -105,9 +113,9 @@ def _expect_file(path: Path) -> None:
 
 
 def _in_folder(folder: Path) -> list[Path]:
-    files = [file for file in folder.glob(f"*{SUFFIX}") if file.is_file() and file.stat().st_size]
+    files = [file for file in _files(folder) if file.stat().st_size]
     if (folder / METADATA).is_file():
-        listed = [folder / name for name in _listed(folder)]
+        listed = [_there(folder / name) for name in _listed(folder)]
         parts = [file for file in listed if file in files]
         if not parts:
             names = ", ".join(file.name for file in listed[:NAMED]) or "no file"
@@ -122,7 +130,7 @@ def _in_folder(folder: Path) -> list[Path]:
         )
     if len(files) == 1:
         return files
-    stems = {found[1] for file in files if (found := NUMBERED.fullmatch(file.stem))}
+    stems = {found[1] for file in files if (found := NUMBERED.fullmatch(_stem(file)))}
     parts = sorted(files, key=_number)
     if len(stems) == 1 and min(map(_number, files)) >= 0 and _follow(parts):
         return parts
@@ -132,19 +140,41 @@ def _in_folder(folder: Path) -> list[Path]:
 
 def _beside(path: Path, stem: str) -> list[Path] | None:
     """All parts of the split bag that this file is of; None where it is of none."""
-    parts = [file for file in path.parent.glob(f"*{SUFFIX}") if file.is_file()]
-    parts = [one for one in parts if (m := NUMBERED.fullmatch(one.stem)) and m[1] == stem]
+    parts = [
+        one
+        for one in _files(path.parent)
+        if (found := NUMBERED.fullmatch(_stem(one))) and found[1] == stem
+    ]
     if len(parts) < 2:
         return None
-    if (path.parent / METADATA).is_file() and path.name in _listed(path.parent):
+    if (path.parent / METADATA).is_file() and path in [
+        _there(path.with_name(name)) for name in _listed(path.parent)
+    ]:
         return _in_folder(path.parent)
     parts.sort(key=_number)
-    first = path.with_name(f"{stem}_0{SUFFIX}")
-    return parts if first in parts and _follow(parts) else None
+    return parts if _number(parts[0]) == 0 and _follow(parts) else None
+
+
+def _stem(path: Path) -> str:
+    """Its name without what says that it is an MCAP file, and packed."""
+    return PACKED.sub("", path.name).removesuffix(SUFFIX)
+
+
+def _files(folder: Path) -> list[Path]:
+    """MCAP files by their names, each once where it lies packed beside itself."""
+    files = [file for file in folder.glob(f"*{SUFFIX}*") if file.is_file()]
+    files = [file for file in files if PACKED.sub("", file.name).endswith(SUFFIX)]
+    return sorted({_there(file) for file in files})
+
+
+def _there(file: Path) -> Path:
+    """The file, or what was unpacked of it."""
+    plain = file.with_name(PACKED.sub("", file.name))
+    return plain if plain.is_file() else file
 
 
 def _number(file: Path) -> int:
-    found = NUMBERED.fullmatch(file.stem)
+    found = NUMBERED.fullmatch(_stem(file))
     return int(found[2]) if found else -1
 
 
@@ -176,10 +206,10 @@ def _follow(parts: list[Path]) -> bool:
 def _span(part: Path, _written: int) -> tuple[int, int] | None:
     """Log times of the first and of the last message [ns], as its chunks say; None: no MCAP."""
     times: list[int] = []
-    with part.open("rb") as file:
-        if file.read(len(of.MAGIC)) != of.MAGIC:
-            return None
-        for record in of.walk(file, part.stat().st_size):
+    if not is_mcap(part):
+        return None
+    with opened(part) as file:
+        for record in of.walk(file, file.seek(0, SEEK_END)):
             if record.opcode == Opcode.CHUNK and record.content.message_end_time:
                 times += (record.content.message_start_time, record.content.message_end_time)
             elif record.opcode == Opcode.MESSAGE:

@@ -126,7 +126,11 @@ def camera_from(
     if min(camera.matrix[0, 0], camera.matrix[1, 1]) <= 0 or not np.isfinite(numbers).all():
         raise UserError(f"{topic} is not calibrated (focal length 0, or no numbers), calibrate it")
     if not 0 < camera.width * camera.height <= LARGEST:
-        raise UserError(f"{topic} is of {camera.width} x {camera.height} pixels")
+        seen = f", {size[0]} x {size[1]}" if size else ""
+        raise UserError(
+            f"{topic} is of {camera.width} x {camera.height} pixels: publish it with the size of"
+            f" the images on {image}{seen}"
+        )
     if RECTIFIED.search(image) and calibration.rectified[0, 0] > 0:
         camera = replace(camera, matrix=calibration.rectified, distortion=np.zeros(0))
     if not camera.distortion.any():

@@ -40,6 +40,7 @@ FAR = 1.0  # s between a stamp and those around it
 ALONE = 60.0  # s between one or two messages at a topic's end and the rest of it
 DISORDER = 10  # messages that go back, from which no clock was set, but the file has no order
 INTERLEAVED = 6  # how often stamps of two runs alternate that cover the same time
+LEAST_SECONDS = 5  # of least delays for a clock's drift
 TOLERANCE = 0.5  # s between the clocks of two topics
 
 
@@ -171,6 +172,20 @@ def offset(
     if not common:
         return float((log - stamp).min() - (other_log - other_stamp).min()) * 1e-9
     return float(np.median([mine[one] - others[one] for one in common])) * 1e-9
+
+
+def drift(stamp: np.ndarray, log: np.ndarray) -> tuple[float, float]:
+    """By how much the least delays grow [s/s], and its standard error; not known in a few seconds.
+
+    Receipt is on the recorder's clock: only the difference of two topics says something.
+    """
+    least = _least(stamp, log, int(log.min()))
+    if len(least) < LEAST_SECONDS:
+        return 0.0, np.inf
+    time, delay = np.array(list(least), float), np.array(list(least.values())) * 1e-9
+    slope, start = np.polyfit(time, delay, 1)
+    noise = np.sum((delay - start - slope * time) ** 2) / (len(time) - 2)
+    return float(slope), float(np.sqrt(noise / np.sum((time - time.mean()) ** 2)))
 
 
 def _back(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:

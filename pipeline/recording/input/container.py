@@ -21,6 +21,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass, field, replace
+from os import SEEK_END
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -31,12 +32,17 @@ from mcap.opcode import Opcode
 from pipeline.base.errors import UserError, printable
 from pipeline.recording.input import bag
 from pipeline.recording.input import records as of
+from pipeline.recording.input.opened import opened
 from pipeline.recording.input.records import Damaged, Record
+from pipeline.recording.input.standard import guessed
 from pipeline.recording.input.words import counted, few
 
 MOST = 2**30  # bytes of messages that are held at once
 OVERHEAD = 256  # bytes that a message costs beside its payload
-BULKY = re.compile("PointCloud|LaserScan|OccupancyGrid|CompressedVideo")  # counted, not kept
+PLAYS = re.compile(  # types that may play a role; messages of others are counted, not kept
+    "Wrench|Pose|Twist|JointState|FrankaState|FrankaRobotState|Image|Camera(Info|Calibration)"
+    "|FrameTransform|TFMessage"
+)
 IDLE = re.compile(
     r"(?<![a-z])(infra|ir|fisheye|mask|debug)(?![a-z])"
 )  # of cameras that play no role
@@ -48,7 +54,7 @@ NAMED = 5  # places or topics named in one line
 
 @dataclass
 class Channel:
-    """One topic with its raw messages, in the order of the file; bulky ones are left empty."""
+    """One topic with its raw messages, in the order of the file; those of no use are left empty."""
 
     topic: str
     schema: kinds.Schema
@@ -84,10 +90,8 @@ def read_container(path: Path) -> Container:
 def _read(path: Path, part: Path, held: int) -> tuple[Container, int]:
     """A file of the recording at `path`, and how many bytes are held with it, `held` before."""
     try:
-        with part.open("rb") as file:
-            if file.read(len(of.MAGIC)) != of.MAGIC:
-                raise UserError(f"{part}: not an MCAP file (ros2 bag record -s mcap writes one)")
-            contents = _Contents(path, file, part.stat().st_size, held=held)
+        with opened(part) as file:
+            contents = _Contents(path, file, file.seek(0, SEEK_END), held=held)
             return contents.container(), contents.held
     except OSError as error:
         raise UserError(f"{part}: cannot be read ({error.strerror})") from error
@@ -231,9 +235,9 @@ class _Contents:
             return
         known = self.definitions.get(number)
         schema = self.schemas.get(known.schema_id) if known else None
-        bulky = schema and BULKY.search(schema.name)
-        bulky = bulky or (self.shed and known and IDLE.search(known.topic.lower()))
-        payload = b"" if bulky else data[start + of.MESSAGE.size : end]
+        idle = schema and schema.name and not PLAYS.search(schema.name)
+        idle = idle or (self.shed and known and IDLE.search(known.topic.lower()))
+        payload = b"" if idle else data[start + of.MESSAGE.size : end]
         channel = self.channels.setdefault(number, Channel("", NO_SCHEMA, ""))
         channel.log_times.append(log_time)
         channel.payloads.append(payload)
@@ -269,7 +273,8 @@ class _Contents:
             if schema is None and known.schema_id:
                 losses.append(f"{count} of {known.topic} dropped: its schema is missing")
                 continue
-            schema = schema or NO_SCHEMA
+            encoding = known.message_encoding
+            schema = schema or guessed(known.topic, encoding, channel.payloads) or NO_SCHEMA
             key = (known.topic, schema.name, schema.encoding, schema.data, known.message_encoding)
             one = found.setdefault(key, Channel(known.topic, schema, known.message_encoding))
             one.log_times += channel.log_times

@@ -14,6 +14,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from pipeline.base.errors import UserError
+from pipeline.recording.input import standard
 from pipeline.recording.input.container import Channel
 
 Message = Any  # it has the attributes that its schema says, and whoever reads it finds out
@@ -35,6 +36,10 @@ class Unreadable(Exception):
         return cls(str(error).partition("\n")[0] or type(error).__name__)
 
 
+class Elsewhere(Unreadable):
+    """A message of another publisher on the same topic."""
+
+
 def decoder(channel: Channel) -> Decoder:
     """A function from payload to a message with attributes; it raises Unreadable.
 
@@ -42,7 +47,8 @@ def decoder(channel: Channel) -> Decoder:
         UserError: where the encoding is not known or the schema is bad, in one line.
     """
     schema = channel.schema
-    if (schema.encoding, channel.encoding) not in DECODERS:
+    by_name = channel.encoding == "cdr" and _says_nothing(schema)
+    if not by_name and (schema.encoding, channel.encoding) not in DECODERS:
         known = ", ".join(f"{a} with {b}" for a, b in DECODERS)
         what = f"schema {schema.encoding!r}" if schema.encoding else "no schema"
         raise UserError(
@@ -51,7 +57,10 @@ def decoder(channel: Channel) -> Decoder:
         )
     most = LONGEST.get(channel.encoding, USUAL)
     try:
-        read = _compiled(schema.encoding, channel.encoding, schema.name, schema.data)
+        if by_name:
+            read = standard.reader(schema.name)
+        else:
+            read = _compiled(schema.encoding, channel.encoding, schema.name, schema.data)
     except Exception as error:  # the parsers raise many kinds
         reason = Unreadable.by(error)
         raise UserError(f"topic {channel.topic}: bad schema {schema.name} ({reason})") from error
@@ -60,11 +69,20 @@ def decoder(channel: Channel) -> Decoder:
         if len(payload) > most:
             raise Unreadable("a message that is too long")
         try:
-            return read(payload)
+            return read(standard.plain(payload, most) if channel.encoding == "cdr" else payload)
         except Exception as error:  # damaged bytes make the libraries raise anything
             raise Unreadable.by(error) from error
 
     return bounded
+
+
+def _says_nothing(schema: Schema) -> bool:
+    """Whether a schema is no more than the name of a standard type of ROS 2."""
+    if not standard.knows(schema.name):
+        return False
+    if schema.encoding in ("", "omgidl"):  # of DDS, whose names of ROS types are as well known
+        return True
+    return schema.encoding == "ros2msg" and standard.adds_nothing(schema.name, schema.data)
 
 
 def message_reader(decode: Decoder, read: Callable[[Message], Value]) -> Callable[[bytes], Value]:

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import io
 import struct
-import zlib
 
 import cv2
 import numpy as np
-from PIL import Image
 
+from pipeline.recording.input.packed import LARGEST, Undecodable, Unsupported, header, unpacked
 from pipeline.recording.input.readings import Picture
+
+__all__ = ["LARGEST", "Undecodable", "Unsupported"]
 
 # compressed_depth_image_transport: format, depth quantisation A and B
 DEPTH_HEADER = struct.Struct("<iff")
-PNG_CHUNK = struct.Struct(">I4s")  # length, type
 RVL_SIZE = struct.Struct("<II")  # columns, rows
-SCANS = 100  # of a JPEG, of which each asks to go over all its pixels again
 LARGEST_RVL = 2**22  # pixels, whose decoding takes a hundred bytes for each
-LARGEST = 2**24  # pixels; a damaged size must not ask for more memory than this
+PNG = np.frombuffer(b"\x89PNG\r\n\x1a\n", np.uint8)
 COLORS = {
     "rgb8": (3, cv2.COLOR_RGB2BGR),
     "rgba8": (4, cv2.COLOR_RGBA2BGR),
@@ -29,25 +27,22 @@ COLORS = {
     "bgr8": (3, None),
     "8UC3": (3, None),
 }
-DEPTHS = {"16UC1": np.uint16, "mono16": np.uint16, "32FC1": np.float32}
-
-
-class Undecodable(Exception):
-    """An image that cannot be decoded; the message says why."""
-
-
-class Unsupported(Undecodable):
-    """An image of a kind that is not known, so all of its topic are undecodable."""
+MILLIMETRES = {"16UC1": np.uint16, "mono16": np.uint16, "16SC1": np.int16}
+METRES = {"32FC1": np.float32, "64FC1": np.float64}
+DEPTHS = MILLIMETRES | METRES
+NAMED = tuple(kind for kind in DEPTHS if kind != "mono16")  # which may be infrared
+FARTHEST = 1e6  # m or mm: floats beyond it are no depth
+USE = "use 16UC1 (in millimetres) or 32FC1 (in metres)"
 
 
 def is_depth(picture: Picture) -> bool:
     """Whether a picture says that it holds depth; a grey PNG of 16 bits is taken to."""
     if picture.encoding or "compressedDepth" in picture.format:
-        return picture.encoding in ("16UC1", "32FC1") or "compressedDepth" in picture.format
-    if picture.format.startswith(("16UC1", "32FC1")):
+        return picture.encoding in NAMED or "compressedDepth" in picture.format
+    if picture.format.startswith(NAMED):
         return True
     try:
-        return _header(picture.data)[1] == "I;16"
+        return header(picture.data).mode == "I;16"
     except Undecodable:
         return False
 
@@ -57,7 +52,7 @@ def color(picture: Picture) -> np.ndarray:
     if picture.format:
         if "compressedDepth" in picture.format:
             raise Unsupported(f"format {picture.format!r} is depth, not colour")
-        return _unpacked(picture.data, cv2.IMREAD_COLOR, picture.format)
+        return unpacked(picture.data, cv2.IMREAD_COLOR, picture.format)
     if picture.encoding not in COLORS:
         raise Unsupported(f"colour encoding {picture.encoding!r} is not known, use rgb8 or bgr8")
     channels, conversion = COLORS[picture.encoding]
@@ -71,22 +66,27 @@ def depth(picture: Picture) -> np.ndarray:
     """To metres, shape (H, W), float32, 0 where unknown. Raises Undecodable."""
     if not picture.format:
         if picture.encoding not in DEPTHS:
-            raise Unsupported(
-                f"depth encoding {picture.encoding!r} is not known, use 16UC1 or 32FC1"
-            )
+            raise Unsupported(f"depth encoding {picture.encoding!r} is not known, {USE}")
         return _metres(_rows(picture, DEPTHS[picture.encoding], 1))
+    floats = picture.format.startswith("32FC1")
     if "compressedDepth" not in picture.format:
-        if picture.format.startswith("32FC1"):
+        pixels = unpacked(picture.data, cv2.IMREAD_UNCHANGED, picture.format)
+        if floats and pixels.dtype != np.float32:
             raise Unsupported(f"depth format {picture.format!r} is not known, use compressedDepth")
-        return _metres(_unpacked(picture.data, cv2.IMREAD_UNCHANGED, picture.format))
-    if len(picture.data) <= DEPTH_HEADER.size:
+        return _metres(pixels)
+    body = _body(picture.data)
+    if len(body) == len(picture.data) and floats:
+        raise Unsupported(
+            f"depth format {picture.format!r} without the header of {DEPTH_HEADER.size} bytes that"
+            " says how it is quantised: record the raw depth, or as 16UC1"
+        )
+    if not len(body):
         raise Undecodable("compressedDepth without a picture")
-    _, scale, offset = DEPTH_HEADER.unpack_from(picture.data.data)
-    body = picture.data[DEPTH_HEADER.size :]
     is_rvl = "rvl" in picture.format.lower()
-    packed = rvl(body) if is_rvl else _unpacked(body, cv2.IMREAD_UNCHANGED, picture.format)
-    if not picture.format.startswith("32FC1"):
+    packed = rvl(body) if is_rvl else unpacked(body, cv2.IMREAD_UNCHANGED, picture.format)
+    if not floats:
         return _metres(packed)
+    _, scale, offset = DEPTH_HEADER.unpack_from(picture.data.data)
     with np.errstate(all="ignore"):
         quantised = np.where(packed > 0, scale / (packed - np.float32(offset)), 0)
     return _metres(quantised.astype(np.float32))
@@ -95,14 +95,14 @@ def depth(picture: Picture) -> np.ndarray:
 def grey(data: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """A grey PNG of this width and height to uint8, shape (H, W). Raises Undecodable."""
     try:
-        found, mode = _header(data)
+        found, mode, format = header(data)
     except Undecodable as error:
         raise Undecodable(f"is not a grey PNG of 8 bits or 1: {error}") from error
-    if mode not in ("L", "1") or data[0] == 0xFF:
+    if mode not in ("L", "1") or format != "PNG":
         raise Undecodable("is not a grey PNG of 8 bits or 1")
     if found != size:
         raise Undecodable("is of {} x {} pixels, not of {} x {}".format(*found, *size))
-    return _unpacked(data, cv2.IMREAD_GRAYSCALE, "png")
+    return unpacked(data, cv2.IMREAD_GRAYSCALE, "png")
 
 
 def size_of(picture: Picture) -> tuple[int, int] | None:
@@ -111,13 +111,18 @@ def size_of(picture: Picture) -> tuple[int, int] | None:
         return picture.width, picture.height
     data = picture.data
     if "compressedDepth" in picture.format:
-        data = data[DEPTH_HEADER.size :]
+        data = _body(data)
         if "rvl" in picture.format.lower():
             return RVL_SIZE.unpack_from(data.data) if len(data) >= RVL_SIZE.size else None
     try:
-        return _header(data)[0]
+        return header(data).size
     except Undecodable:
         return None
+
+
+def _body(data: np.ndarray) -> np.ndarray:
+    """Of a compressedDepth message what follows on its header, which some writers leave out."""
+    return data if np.array_equal(data[: len(PNG)], PNG) else data[DEPTH_HEADER.size :]
 
 
 def rvl(data: np.ndarray) -> np.ndarray:
@@ -174,73 +179,36 @@ def _within(firsts: list[int], counts: list[int], size: int) -> np.ndarray:
     return np.cumsum(begins - ends)[:size] > 0
 
 
-def _header(data: np.ndarray) -> tuple[tuple[int, int], str]:
-    """Size and Pillow's mode of a JPEG or PNG, by its header alone. Raises Undecodable."""
-    try:
-        with Image.open(io.BytesIO(data.data), formats=("JPEG", "PNG")) as image:
-            return image.size, image.mode
-    except Exception as error:  # damaged bytes make Pillow raise anything
-        kind = type(error).__name__  # its words hold addresses, which differ from run to run
-        raise Undecodable(f"damaged image, or neither JPEG nor PNG ({kind})") from error
-
-
-def _unpacked(data: np.ndarray, flags: int, kind: str) -> np.ndarray:
-    (width, height), _ = _header(data)
-    if width * height > LARGEST:
-        raise Undecodable(f"an image of {width} x {height} pixels ({kind})")
-    if data[0] == 0xFF and b"\xff\xd9" not in data[-4096:].tobytes():
-        raise Undecodable("JPEG is cut off")  # OpenCV would fill it up with grey
-    if data[0] == 0xFF and data.tobytes().count(b"\xff\xda") > SCANS:
-        raise Undecodable(f"JPEG of more than {SCANS} scans")
-    if data[0] != 0xFF and not _chunks_fit(data):
-        raise Undecodable(f"damaged PNG ({kind})")
-    try:
-        image = cv2.imdecode(data, flags)
-    except cv2.error:
-        image = None
-    if image is None:
-        raise Undecodable(f"damaged image ({kind})")
-    return image
-
-
-def _chunks_fit(data: np.ndarray) -> bool:
-    """Whether a PNG's chunks are whole: OpenCV checks no CRC and believes every length."""
-    at = 8
-    while at + PNG_CHUNK.size <= len(data):
-        length, kind = PNG_CHUNK.unpack_from(data.data, at)
-        end = at + PNG_CHUNK.size + length
-        said = int.from_bytes(data[end : end + 4].tobytes(), "big")
-        if end + 4 > len(data) or zlib.crc32(data[at + 4 : end].data) != said:
-            return False
-        if kind == b"IEND":
-            return True
-        at = end + 4
-    return False
-
-
 def _rows(picture: Picture, kind: type, channels: int) -> np.ndarray:
     """Pixels of a raw picture without the padding at the ends of its rows."""
     order = np.dtype(kind).newbyteorder(">" if picture.is_bigendian else "<")
-    used = picture.width * channels * order.itemsize
-    if not 0 < picture.width * picture.height <= LARGEST or picture.step < used:
-        raise Undecodable("raw image of another size than it says")
-    if len(picture.data) != picture.height * picture.step:
+    width, height, step = picture.width, picture.height, picture.step
+    used = width * channels * order.itemsize
+    if not 0 < width * height <= LARGEST:
+        raise Undecodable(f"raw image of {width} x {height} pixels")
+    if step in (0, width, width * channels) and len(picture.data) == height * used:
+        step = used  # drivers leave it out, or count pixels
+    if step < used:
         raise Undecodable(
-            f"raw image of {len(picture.data)} bytes, {picture.height} rows of {picture.step}"
-            " were said"
+            f"raw image with step {step}: a row of {width} pixels of {picture.encoding} takes"
+            f" {used} bytes"
         )
-    rows = picture.data.reshape(picture.height, picture.step)[:, :used]
+    if len(picture.data) != height * step:
+        raise Undecodable(
+            f"raw image of {len(picture.data)} bytes, {height} rows of {step} were said"
+        )
+    rows = picture.data.reshape(height, step)[:, :used]
     pixels = np.ascontiguousarray(rows).view(order).astype(kind, copy=False)
-    return pixels if channels == 1 else pixels.reshape(picture.height, picture.width, channels)
+    return pixels if channels == 1 else pixels.reshape(height, width, channels)
 
 
 def _metres(depth: np.ndarray) -> np.ndarray:
-    """uint16 holds millimetres, floats hold metres."""
+    """Integers of 16 bits hold millimetres, floats hold metres."""
     if depth.ndim != 2:
         raise Unsupported("a picture in colour is no depth image")
-    if depth.dtype == np.uint16:
-        return depth.astype(np.float32) / 1000
-    if depth.dtype != np.float32:
-        raise Unsupported(f"depth image of {depth.dtype}, use 16 bits (mm) or 32FC1 (m)")
-    known = np.isfinite(depth) & (depth > 0)
-    return np.where(known, depth, np.float32(0))
+    if depth.dtype in MILLIMETRES.values():
+        return np.maximum(depth, 0).astype(np.float32) / 1000
+    if depth.dtype not in METRES.values():
+        raise Unsupported(f"depth image of {depth.dtype}, {USE}")
+    known = np.isfinite(depth) & (depth > 0) & (depth < FARTHEST)
+    return np.where(known, depth, 0).astype(np.float32)

@@ -14,13 +14,15 @@ import numpy as np
 
 from pipeline.base.errors import UserError, printable
 from pipeline.params.lab import SetupParams
+from pipeline.params.recording import DelayParams
 from pipeline.recording.input import images
 from pipeline.recording.input.bag import sha256
 from pipeline.recording.input.camera import Camera
 from pipeline.recording.input.container import Container, read_container
 from pipeline.recording.input.frames import TransformTree
 from pipeline.recording.input.readings import Picture
-from pipeline.recording.input.streams import Stream, streams_of
+from pipeline.recording.input.stream import Stream
+from pipeline.recording.input.streams import streams_of
 from pipeline.recording.input.topics import camera_of, choose
 from pipeline.recording.input.transforms import transforms_of
 from pipeline.recording.input.words import shortened
@@ -39,16 +41,19 @@ class Recording:
         wrench: Force [N] in `wrench.frame`, values (S, 3).
         pose: Position [m] and quaternion xyzw in `pose.frame`, values (S, 7).
         twist: Velocity [m/s] and angular velocity [rad/s], values (S, 6); None where not recorded.
-        gripper: Sum of the finger positions [m], values (S, 1); None where not recorded.
+        gripper: Sum of the finger positions, as they are reported [m], values (S, 1); None where
+            not recorded.
         color, depth: `Picture`s, decoded by `pipeline.recording.input.images`.
         color_camera, depth_camera: Their intrinsics.
         transforms: The static tree.
         losses: What was lost of the file or mended in it, in words.
         notes: What else to know of it, which cost nothing.
         choices: Why each role has its topic.
+        doubts: Why a role could have another topic.
         sha256: Hash of the file.
         start: From which seconds count [ns]: the file's first force, also in a part of it; None
             for that of `wrench`.
+        late: By what the stamps of a role were given to be late [s], and are not any more.
     """
 
     path: Path
@@ -65,7 +70,9 @@ class Recording:
     twist: Stream[np.ndarray] | None = None
     notes: list[str] = field(default_factory=list)
     choices: dict[str, str] = field(default_factory=dict)
+    doubts: dict[str, str] = field(default_factory=dict)
     start: int | None = None
+    late: dict[str, float] = field(default_factory=dict)
 
     @property
     def origin(self) -> int:
@@ -102,19 +109,26 @@ class Recording:
         )
 
 
-def read_recording(path: Path, setup: SetupParams) -> Recording:
-    """Read and check a recording. Raises UserError with one line about what is missing or wrong."""
-    return recording_of(read_container(Path(path)), setup)
+def read_recording(path: Path, setup: SetupParams, delays: DelayParams | None = None) -> Recording:
+    """Read and check a recording. Raises UserError with one line about what is missing or wrong.
+
+    Args:
+        delays: By what stamps are known to be late [s]: taken off before clocks are compared.
+    """
+    return recording_of(read_container(Path(path)), setup, delays)
 
 
-def recording_of(container: Container, setup: SetupParams) -> Recording:
+def recording_of(
+    container: Container, setup: SetupParams, delays: DelayParams | None = None
+) -> Recording:
     """As `read_recording`, from a file that was read already."""
     try:
-        chosen = choose(container, setup)
+        transforms = transforms_of(container)
+        chosen = choose(container, setup, transforms.frames)
         color_camera, depth_camera = (camera_of(chosen, role) for role in CAMERAS)
         found = {role: chosen[role] for role in ROLES if role in chosen}
-        streams, remarks = streams_of(found)
-        transforms = transforms_of(container)
+        late = late_by(delays)
+        streams, remarks = streams_of(found, late)
     except UserError as error:
         raise explained(error, container.path, container.losses) from None
     lost = [f"{stream.topic}: {note}" for stream in streams.values() for note in stream.notes]
@@ -132,8 +146,17 @@ def recording_of(container: Container, setup: SetupParams) -> Recording:
         losses=[*container.losses, *lost],
         notes=[*container.notes, *remarks],
         choices={role: choice.why for role, choice in chosen.items()},
+        doubts={role: choice.doubt for role, choice in chosen.items() if choice.doubt},
         sha256=sha256(container.path),
+        late={role: seconds for role, seconds in late.items() if role in streams},
     )
+
+
+def late_by(delays: DelayParams | None) -> dict[str, float]:
+    """Seconds by which the stamps of each role are given to be late; none where nothing is."""
+    given = {"pose": delays and delays.pose, "camera": delays and delays.camera}
+    roles = {"pose": ("pose", "twist"), "camera": CAMERAS}
+    return {role: late for name, late in given.items() if late for role in roles[name]}
 
 
 def explained(error: UserError, path: Path, losses: list[str], pull: str = "") -> UserError:

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.base.errors import printable
-from pipeline.recording.input.decode import Message
+from pipeline.recording.input.decode import Elsewhere, Message
 
 LATEST = 2**62  # ns; a stamp beyond it is damage
 FRANKA_BASE = "franka_base"  # frame of Franka states whose header names none, as franka_ros writes
@@ -60,7 +60,7 @@ class Reading(NamedTuple):
         stamp: Of its header [ns]; None where the type has none.
         frame: frame_id, "" where there is none.
         value: wrench fx fy fz [N]; pose x y z [m] qx qy qz qw; twist vx vy vz [m/s] wx wy wz
-            [rad/s]; gripper: opening [m]; joints: positions [rad, m]; a Picture; a Calibration.
+            [rad/s]; gripper and joints: positions [rad, m]; a Picture; a Calibration.
     """
 
     stamp: int | None
@@ -70,7 +70,7 @@ class Reading(NamedTuple):
 
 def kind_of(schema: str) -> str:
     """The schema's own name: geometry_msgs/msg/PoseStamped, a.b.PoseStamped -> PoseStamped."""
-    kind = re.split(r"[/.:]+", schema)[-1]
+    kind = re.split(r"[/.:]+", schema)[-1].removesuffix("_")  # which DDS adds
     return "WrenchStamped" if kind.endswith("WrenchStamped") else kind
 
 
@@ -141,21 +141,24 @@ def read_state_wrench(message: Message) -> Reading:
     return Reading(stamp_of(message), frame, _vector(wrench.wrench.force))
 
 
-def opening_reader(names: tuple[str, ...]) -> Callable[[Message], Reading]:
-    """Sum of these joints: two fingers that each move half the opening, or one value."""
+def fingers_reader(names: tuple[str, ...]) -> Callable[[Message], Reading]:
+    """Positions of these joints: two fingers that each move half the opening, or one value."""
     read = joints_reader(names, "")
-    return lambda message: _reading(message, (sum(read(message).value),))
+    return lambda message: read(message)._replace(frame=frame_of(message))
 
 
 def joints_reader(names: tuple[str, ...], frame: str) -> Callable[[Message], Reading]:
     """Positions of these joints, in this order, of a robot whose root is `frame`.
 
-    The reader raises ValueError for a message in which one is missing.
+    The reader raises ValueError for a message in which one is missing, Elsewhere for one in which
+    all are: other devices may share the topic.
     """
 
     def read(message: Message) -> Reading:
         joints = joints_of(message)
         missing = [name for name in names if name not in joints]
+        if missing and len(missing) == len(names):
+            raise Elsewhere(f"joint {missing[0]} is missing")
         if missing:
             raise ValueError(f"joint {missing[0]} is missing")
         return Reading(stamp_of(message), frame, tuple(joints[name] for name in names))

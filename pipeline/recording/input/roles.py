@@ -48,14 +48,16 @@ class Choice:
         channel: Raw payloads.
         read: Payload to reading; raises Unreadable.
         why: One phrase.
+        doubt: Why another could be meant, a phrase; "" where none could.
         convert: Sorted stamps [ns], shape (S,), and values, shape (S, C), to what the role asks
-            for, shape (S, 7); None where the values are that already.
+            for, shape (S, 7) or (S, 1); None where the values are that already.
     """
 
     channel: Channel
     read: Callable[[bytes], Reading]
     why: str = ""
     convert: Convert | None = None
+    doubt: str = ""
 
     def typical(self) -> Reading:
         """The first message of the frame and kind that most have. Raises UserError."""
@@ -237,7 +239,7 @@ def _gripper(channel: Channel, decode: Decoder, named: bool) -> Source | None:
         fingers = tuple(name for name in names if _has(FINGERS, name))
         if fingers or by_topic:
             only = tuple(name for name in fingers if "finger" in name.lower())
-            return of.opening_reader(only or fingers or names), None
+            return of.fingers_reader(only or fingers or names), None
     return None
 
 

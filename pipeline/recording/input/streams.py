@@ -8,19 +8,20 @@ the stamp of another, or, of force and pose, is alone far off those around it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import median_filter
 
 from pipeline.base.errors import UserError, printable
 from pipeline.recording.input import clocks, pace
-from pipeline.recording.input.decode import Unreadable
+from pipeline.recording.input.decode import Elsewhere, Unreadable
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.input.roles import OPTIONAL, Choice
-from pipeline.recording.input.words import counted, few, shortened
+from pipeline.recording.input.stream import Stream, frozen, gaps_of
+from pipeline.recording.input.words import counted, shortened
 
 ABSURD = 1e6  # N, m, m/s, rad: nothing here is as large
 # What a lone message may be off the four around it: a knock or a fall lasts for more than one.
@@ -28,76 +29,10 @@ LONE = {"wrench": 30.0, "pose": 0.05}  # N, m
 MOST_LONE = 0.05  # share of the messages that may be alone: more are the sensor's noise, or units
 FASTEST = 2.0  # m/s of the hand
 TIMED = ("gripper",)  # roles for which log_time will do where there are no stamps
-LONG_GAP, LONG_GAP_S = 5.0, 0.02  # periods and seconds from which a gap is named
-ENDS = 0.3  # s by which a topic may start later or stop earlier than the others
-FROZEN = 0.25  # s of one and the same value of a sensor that has noise
-FROZEN_FRAMES = 3  # pictures that are the same, byte for byte
-EVEN = 0.1  # of the period, by which the median way may differ from the mean one
-NAMED = 3  # places named in one line
 REASON = 100  # characters of why a message is damaged
 CAMERAS = ("color", "depth")
 HELD = ("wrench", "pose", "twist")  # roles of which each value is measured anew
 CORRECTABLE = ("pose", "twist", "gripper")  # by log_time, if they have a clock of their own
-
-
-Values = TypeVar("Values", np.ndarray, list[Picture])
-
-
-@dataclass(frozen=True)
-class Stream(Generic[Values]):
-    """One topic, sorted by stamp.
-
-    Attributes:
-        topic: Its name.
-        frame: frame_id of its messages.
-        stamp: header.stamp, ns, shape (S,), strictly increasing.
-        values: One column a quantity, shape (S, C), or `Picture`s, length S.
-        delay: Median of log_time - stamp [s].
-        lost: Messages that are not in it, for whatever reason.
-        notes: What was lost or mended, in words.
-        bursts: In which the stamps came; None where they were even.
-        hold: For how long each value was repeated [s], 0 where it was not: repeats are left out.
-    """
-
-    topic: str
-    frame: str
-    stamp: np.ndarray
-    values: Values
-    delay: float
-    lost: int
-    notes: list[str] = field(default_factory=list)
-    bursts: pace.Bursts | None = None
-    hold: float = 0.0
-
-    def seconds(self, origin: int) -> np.ndarray:
-        return (self.stamp - origin) * 1e-9
-
-    @property
-    def period(self) -> float:
-        """Usual time between messages [s]: the median, or where that is none, the mean."""
-        ways = np.diff(self.stamp)
-        median, mean = float(np.median(ways)), pace.mean_way(ways)
-        return (median if abs(median - mean) < EVEN * mean else mean) * 1e-9
-
-    @property
-    def longest_gap(self) -> float:
-        return float(np.max(np.diff(self.stamp))) * 1e-9
-
-    @property
-    def missing(self) -> int:
-        """Messages that a constant rate would have had in the gaps."""
-        gaps = np.diff(self.stamp) * 1e-9 / self.period
-        return int(np.sum(np.maximum(np.round(gaps) - 1, 0)))
-
-    def between(self, first: int, last: int) -> Stream[Values]:
-        """Messages stamped from `first` to `last` [ns]; the nearest two where there are fewer."""
-        begin = min(int(np.searchsorted(self.stamp, first)), len(self.stamp) - 2)
-        end = max(int(np.searchsorted(self.stamp, last, side="right")), begin + 2)
-        return replace(self, stamp=self.stamp[begin:end], values=self.values[begin:end])
-
-    def shifted(self, seconds: float) -> Stream[Values]:
-        """With `seconds` subtracted from every stamp."""
-        return replace(self, stamp=self.stamp - round(seconds * 1e9)) if seconds else self
 
 
 @dataclass
@@ -132,11 +67,14 @@ class Raw:
             self.keep(~which)
 
 
-def streams_of(chosen: dict[str, Choice]) -> tuple[dict[str, Stream[Any]], list[str]]:
+def streams_of(
+    chosen: dict[str, Choice], late: Mapping[str, float] | None = None
+) -> tuple[dict[str, Stream[Any]], list[str]]:
     """All topics on the wrench's clock, and remarks on what costs nothing.
 
     Args:
         chosen: Choices of wrench, pose, color, depth, and of twist and gripper if there are.
+        late: By what the stamps of a role are known to be late [s], which is taken off.
 
     Raises:
         UserError: for a topic that cannot be used, in one line.
@@ -156,14 +94,18 @@ def streams_of(chosen: dict[str, Choice]) -> tuple[dict[str, Stream[Any]], list[
         one.drop(clocks.outliers(one.stamp, one.log), "far off in time")
         _take_bursts_out(one)
     _take_steps_out(raw)
-    _on_one_clock(raw)
+    late = {} if late is None else late
+    for role, seconds in late.items():
+        if role in raw:
+            raw[role].stamp = raw[role].stamp - round(seconds * 1e9)
+    _on_one_clock(raw, late)
     streams = {role: _sorted(one) for role, one in raw.items()}
     origin = int(streams["wrench"].stamp[0])
     first = min(stream.stamp[0] for stream in streams.values())
     last = max(stream.stamp[-1] for stream in streams.values())
     for stream in streams.values():
-        stream.notes.extend(_gaps(stream, origin, first, last))
-    return streams, notes + _frozen(streams, origin)
+        stream.notes.extend(gaps_of(stream, origin, first, last))
+    return streams, notes + frozen(streams, origin)
 
 
 def _read(role: str, choice: Choice) -> Raw:
@@ -173,6 +115,8 @@ def _read(role: str, choice: Choice) -> Raw:
     for log_time, payload in zip(channel.log_times, channel.payloads, strict=True):
         try:
             stamp, frame, value = choice.read(payload)
+        except Elsewhere:
+            continue
         except Unreadable as error:
             lost["damaged"] += 1
             reason = reason or shortened(printable(str(error)), REASON)
@@ -283,7 +227,7 @@ def _agreed(
     return found
 
 
-def _on_one_clock(raw: dict[str, Raw]) -> None:
+def _on_one_clock(raw: dict[str, Raw], late: Mapping[str, float]) -> None:
     wrench = raw["wrench"]
     offsets = {
         role: clocks.offset(one.stamp, one.log, wrench.stamp, wrench.log)
@@ -295,7 +239,7 @@ def _on_one_clock(raw: dict[str, Raw]) -> None:
         worst, off = max(needed.items(), key=lambda one: abs(one[1]))
         raise UserError(
             f"the stamps of {raw[worst].topic} are {off:+.3f} s off the other topics'"
-            " clock, record all topics with one clock"
+            f" clock, record all topics with one clock{_camera_cure(offsets, late)}"
         )
     for role in CORRECTABLE:
         if role in raw and abs(offsets[role]) > clocks.TOLERANCE:
@@ -304,6 +248,17 @@ def _on_one_clock(raw: dict[str, Raw]) -> None:
                 f"on another clock: {offsets[role]:+.3f} s added to its stamps by log_time, good to"
                 " about a millisecond"
             )
+
+
+def _camera_cure(offsets: dict[str, float], late: Mapping[str, float]) -> str:
+    """The delay that puts pictures on the force's clock; "" where the cameras' clocks differ."""
+    pictures = [late.get(one, 0.0) - offsets[one] for one in offsets if one in CAMERAS]
+    if not pictures or np.ptp(pictures) > clocks.TOLERANCE:
+        return ""
+    return (
+        f"; or set episode.delays.camera: {np.mean(pictures):.3f} in params.yaml, by the times of"
+        " receipt, which is good to some hundredths of a second alone"
+    )
 
 
 def _sorted(raw: Raw) -> Stream[Any]:
@@ -329,10 +284,9 @@ def _sorted(raw: Raw) -> Stream[Any]:
         values = values[kept]
     if raw.lost:
         raw.notes.append(f"lost {_words(raw)}")
-    delay = float(np.median(raw.log - raw.stamp)) * 1e-9
-    lost = sum(raw.lost.values())
-    stream = Stream(raw.topic, raw.frame, raw.stamp, values, delay, lost, raw.notes)
-    return replace(stream, bursts=raw.bursts, hold=(hold or 0.0) * 1e-9)
+    delay, drift = np.median(raw.log - raw.stamp) * 1e-9, clocks.drift(raw.stamp, raw.log)
+    about = sum(raw.lost.values()), raw.notes, raw.bursts, (hold or 0.0) * 1e-9, drift
+    return Stream(raw.topic, raw.frame, raw.stamp, values, float(delay), *about)
 
 
 def _without_lone(raw: Raw, values: np.ndarray) -> np.ndarray:
@@ -351,49 +305,3 @@ def _without_lone(raw: Raw, values: np.ndarray) -> np.ndarray:
 def _words(raw: Raw) -> str:
     words = ", ".join(f"{count} {why}" for why, count in sorted(raw.lost.items()))
     return f"{words}; the first damaged one: {raw.reason}" if raw.reason else words
-
-
-def _gaps(stream: Stream[Any], origin: int, first: int, last: int) -> list[str]:
-    """Long gaps, and ends that lack what the other topics have."""
-    notes, ways = [], np.diff(stream.stamp) * 1e-9
-    late, early = (stream.stamp[0] - first) * 1e-9, (last - stream.stamp[-1]) * 1e-9
-    least = max(ENDS, LONG_GAP * stream.period)
-    if late > least:
-        notes.append(f"starts {late:.2f} s after the others")
-    if early > least:
-        notes.append(f"stops {early:.2f} s before the others")
-    long = np.flatnonzero(ways > max(LONG_GAP * stream.period, LONG_GAP_S))
-    if len(long):
-        at = stream.seconds(origin)
-        named = [f"{ways[i]:.3f} s at {at[i]:.2f} s" for i in long[np.argsort(-ways[long])]]
-        notes.append(f"gap{'s' * (len(long) > 1)} of {few(named, NAMED)}")
-    return notes
-
-
-def _frozen(streams: dict[str, Stream[Any]], origin: int) -> list[str]:
-    """Sensors that repeat themselves, which those with noise do not."""
-    remarks = []
-    for role in ("wrench", "color", "depth"):
-        stream = streams[role]
-        if role == "wrench":
-            same = np.all(np.diff(stream.values, axis=0) == 0, axis=1)
-            least = max(FROZEN_FRAMES, round(FROZEN / stream.period))
-        else:
-            data = [picture.data for picture in stream.values]
-            same = np.array([np.array_equal(a, b) for a, b in zip(data, data[1:], strict=False)])
-            least = FROZEN_FRAMES - 1
-        run = _longest_run(same)
-        if run and run[1] >= least:
-            at = stream.seconds(origin)[run[0]]
-            remarks.append(
-                f"{stream.topic}: the same value {run[1] + 1} times from {at:.2f} s on: was the"
-                " sensor frozen?"
-            )
-    return remarks
-
-
-def _longest_run(same: np.ndarray) -> tuple[int, int] | None:
-    """Start and length of the longest run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]])))
-    starts, lengths = edges[::2], edges[1::2] - edges[::2]
-    return (int(starts[np.argmax(lengths)]), int(lengths.max())) if len(lengths) else None

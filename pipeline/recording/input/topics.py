@@ -3,40 +3,57 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.params.lab import SetupParams
 from pipeline.recording.input import images
 from pipeline.recording.input import readings as of
 from pipeline.recording.input.camera import Camera, camera_from
+from pipeline.recording.input.company import Company
 from pipeline.recording.input.container import Channel, Container
-from pipeline.recording.input.decode import decoder, message_reader
-from pipeline.recording.input.readings import Picture
-from pipeline.recording.input.roles import OPTIONAL, ROLES, Candidate, Choice, readable, source_of
+from pipeline.recording.input.decode import Unreadable, decoder, message_reader
+from pipeline.recording.input.roles import (
+    OPTIONAL,
+    ROLES,
+    TRIES,
+    Candidate,
+    Choice,
+    readable,
+    source_of,
+)
 from pipeline.recording.input.words import few
 
 SHOWN = 12  # topics named in a message
+COLOUR = {"color": "colour", "depth": "depth"}
+PICTURES = tuple(COLOUR)
+VIDEO = ("FFMPEGPacket", "CompressedVideo")
 
 
-def choose(container: Container, setup: SetupParams) -> dict[str, Choice]:
+def choose(
+    container: Container, setup: SetupParams, frames: Collection[str] = ()
+) -> dict[str, Choice]:
     """Role to channel, for every role of ROLES that the file has.
 
     Args:
         container: What was read.
         setup: params.setup: topics (a topic's name for a role, or None), urdf, tip_link,
             start_pose.
+        frames: Those that /tf_static knows.
 
     Raises:
         UserError: for a role that nothing can play, with what the file has and how to mend it.
     """
-    chooser = _Chooser(container, setup)
+    chooser = _Chooser(container, setup, frames)
     chosen: dict[str, Choice] = {}
     for role in ROLES:
         choice = chooser.choice(role, chosen)
         if choice is not None:
-            chosen[role] = choice
+            gripper = role == "gripper"
+            chosen[role] = chooser.company.opened(choice, chosen["wrench"]) if gripper else choice
         elif role not in OPTIONAL:
             raise chooser.lacking(role)
     return chosen
@@ -52,28 +69,49 @@ def camera_of(chosen: dict[str, Choice], role: str) -> Camera:
 class _Chooser:
     """Goes through the channels of one file, role by role."""
 
-    def __init__(self, container: Container, setup: SetupParams) -> None:
+    def __init__(
+        self, container: Container, setup: SetupParams, frames: Collection[str] = ()
+    ) -> None:
         self.container, self.setup = container, setup
         self.problems: list[str] = []  # why channels of the right type could not be used
+        self.fitting: dict[str, tuple[list[Candidate], list[str]]] = {}
+        self.company = Company(self._fitting, frames)
 
     def choice(self, role: str, chosen: dict[str, Choice]) -> Choice | None:
         self.problems = []
         name = getattr(self.setup.topics, role)
         if name is not None:
             return self._named(role, name)
-        found = [self._candidate(role, channel) for channel in self.container.channels]
-        found = [one for one in found if one is not None and self._suits(role, one)]
+        found = self._fitting(role)
         if role.endswith("_info"):
             return self._info(found, role.removesuffix("_info"), chosen)
         if role == "twist":  # a command is not a measurement
             found = [one for one in found if not one.doubts]
-        if not found:
+        best, doubt = self.company.best(role, found, chosen)
+        if best is None:
+            self.problems[:0] = [doubt] if doubt else []
             return None
-        best = max(found, key=Candidate.merit)
-        return replace(best.choice, why=_why(best, found))
+        return replace(best.choice, why=_why(best, found), doubt=doubt)
+
+    def _fitting(self, role: str) -> list[Candidate]:
+        """Those that could play the role by what they are, asked for once."""
+        if role not in self.fitting:
+            self.problems = []
+            found = [self._candidate(role, channel) for channel in self.container.channels]
+            suiting = [one for one in found if one is not None and self._suits(role, one)]
+            self.fitting[role] = suiting, self.problems
+        found, problems = self.fitting[role]
+        self.problems = [*problems]
+        return found
 
     def lacking(self, role: str) -> UserError:
         what = ROLES[role].what
+        if role in PICTURES:
+            self.problems += [
+                f"{c.topic} is video ({of.kind_of(_type(c))}): record images"
+                for c in self.container.channels
+                if of.kind_of(_type(c)) in VIDEO
+            ]
         if self.problems:
             return UserError(f"no {what}; {'; or '.join(self.problems[:2])}")
         if not self.container.channels:
@@ -99,10 +137,8 @@ class _Chooser:
         if found is None:
             problem = (self.problems or [f"{name} has no messages, or fingers only"])[0]
             raise UserError(f"{where}: {problem}")
-        if role in ("color", "depth"):
-            problem = _unsupported(role, found.typical.value)
-            if problem:
-                raise UserError(f"{where}: {name}: {problem}")
+        if role in PICTURES and (problem := undecodable(role, found.choice)):
+            raise UserError(f"{where}: {name}: {problem}")
         return replace(found.choice, why=f"setup.topics.{role}")
 
     def _candidate(self, role: str, channel: Channel, named: bool = False) -> Candidate | None:
@@ -123,14 +159,16 @@ class _Chooser:
 
     def _suits(self, role: str, candidate: Candidate) -> bool:
         """Pictures: whether they are colour or depth, and of a kind that can be decoded."""
-        if role not in ("color", "depth"):
+        if role not in PICTURES:
             return True
-        picture = candidate.typical.value
-        deep = images.is_depth(picture)
-        deep |= picture.encoding == "mono16" and "depth" in candidate.topic.lower()
+        picture, named = candidate.typical.value, "depth" in candidate.topic.lower()
+        deep = images.is_depth(picture) or (picture.encoding == "mono16" and named)
         if deep != (role == "depth"):
+            if named and role == "depth" and picture.encoding:
+                what = f"encoding {picture.encoding!r} is no depth, {images.USE}"
+                self.problems.append(f"{candidate.topic}: {what}")
             return False
-        problem = _unsupported(role, picture)
+        problem = undecodable(role, candidate.choice)
         if problem:
             self.problems.append(f"{candidate.topic}: {problem}")
         return problem is None
@@ -181,15 +219,19 @@ def _size(image: Choice) -> tuple[int, int] | None:
     return known.most_common(1)[0][0] if known else None
 
 
-def _unsupported(role: str, picture: Picture) -> str | None:
-    """Why pictures like this cannot be decoded; None where they can, or this one is damaged."""
-    try:
-        getattr(images, role)(picture)
-    except images.Unsupported as error:
-        return str(error)
-    except images.Undecodable:
-        pass
-    return None
+def undecodable(role: str, choice: Choice) -> str | None:
+    """Why none of some pictures of a topic can be decoded; None where one can."""
+    payloads, reasons = choice.channel.payloads, Counter()
+    for k in np.unique(np.linspace(0, len(payloads) - 1, min(TRIES, len(payloads))).astype(int)):
+        try:
+            getattr(images, role)(choice.read(payloads[k]).value)
+        except images.Unsupported as error:
+            reasons[str(error)] += 1
+        except (images.Undecodable, Unreadable) as error:
+            reasons[f"its {COLOUR[role]} pictures cannot be decoded: {error}"] += 1
+        else:
+            return None
+    return reasons.most_common(1)[0][0]
 
 
 def _beside(info: str, image: str) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from pipeline.base.errors import UserError
 from pipeline.recording.masks.hand import REACH, Colors, Shape
 from pipeline.recording.view import Frame, Scene, View, length
 
@@ -47,7 +46,7 @@ class RidgeMask:
         every = range(0, len(view), max(1, len(view) // LEARNING_FRAMES))
         depths = [depth[view.window] for k in every if (depth := view.depth(k)) is not None]
         if not depths:
-            raise UserError(f"{view.recording.path}: no camera frame in the window can be decoded")
+            raise view.undecoded("depth")
         self.background, self.noise = _background(np.stack(depths))
         scene = self.scene
 

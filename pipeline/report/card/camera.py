@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.base.layout import NotMade
 from pipeline.episode.episode import Episode
 from pipeline.params.lab import SetupParams
+from pipeline.params.recording import DelayParams
 from pipeline.recording.geometry import EpisodeGeometry
 from pipeline.recording.input import images
 from pipeline.recording.input.camera import Camera
@@ -46,9 +47,9 @@ class Pictures:
         if not path.is_file():
             raise NotMade(path)
         geometry = EpisodeGeometry.of_episode(episode.metadata, episode.band)
-        delay = (episode.metadata["preprocessing"].get("delays") or {}).get("camera") or {}
-        late = delay["value"] if delay.get("applied") else 0.0
-        color = read_recording(path, setup).color.shifted(late)
+        late = _applied(episode, "camera")
+        delays = DelayParams(pose=_applied(episode, "pose"), camera=late)
+        color = read_recording(path, setup, delays).color
         time = color.seconds(episode.metadata["input"]["start_ns"])
         return cls(time, geometry.camera, geometry.camera_to_fork, color.values)
 
@@ -70,3 +71,9 @@ class Pictures:
         ahead = seen[:, 2] > CLOSEST
         pixels[ahead] = self.camera.project(seen[ahead])
         return pixels
+
+
+def _applied(episode: Episode, name: str) -> float:
+    """By what the stamps of pose or camera were late that became the episode's [s]."""
+    delay = (episode.metadata["preprocessing"].get("delays") or {}).get(name) or {}
+    return delay["value"] if delay.get("applied") else 0.0

@@ -11,6 +11,7 @@ PHI, INNER, FORCES, BINS = 4, 3, 15, 12
 FRAME = np.repeat([7, 8, 9], 4)
 NAMES = [f"{name}_{axis}" for axis in "xyz" for name in ("force_bias", "force_drift")]
 NAMES += [f"{name}_{axis}" for axis in "xyz" for name in ("cloud_shift", "cloud_turn")]
+NAMES += ["force_late"]
 
 
 class Case:
@@ -24,7 +25,7 @@ class Case:
         self.residuals = SimpleNamespace(
             frame=FRAME,
             recoils=FRAME > 7,
-            columns=lambda: self.columns,
+            columns=lambda: dict(self.columns),
             of_frame=lambda number: np.concatenate(
                 [np.zeros(3 * FORCES, bool), FRAME == number, FRAME == number]
             ),
@@ -40,7 +41,7 @@ class Case:
 
     def expanded(self):
         recording = object.__new__(Likelihood)
-        recording.tolerances = self.tolerances
+        recording.tolerances, recording.moved = self.tolerances, 0.0
         return recording._eliminated(
             self.residuals, self.gap, self.slopes, self.own, self.nuisances
         )
@@ -54,7 +55,12 @@ class Case:
             "cloud_shift": has.shift,
             "cloud_turn": has.turn,
         }
-        linear = [sizes[name[:-2]] * column for name, column in self.columns.items()]
+        linear = [
+            sizes[name[:-2]] * column
+            for name, column in self.columns.items()
+            if name != "force_late"
+        ]
+        linear.append(has.pose * self.columns["force_late"])
         linear += [
             has.jitter * np.where(self.residuals.of_frame(frame), self.own[1], 0)
             for frame in (8, 9)
@@ -113,7 +119,7 @@ def test_the_misfit_has_the_linear_ones_at_their_best_and_the_simulated_as_they_
     np.testing.assert_allclose(found.left, left[:size] * sigma, rtol=1e-6, atol=1e-12)
 
 
-NAMED = "force cloud way release camera hand jitter shift turn bias drift".split()
+NAMED = "force cloud way release camera hand jitter shift turn bias drift pose".split()
 
 
 @pytest.mark.parametrize("name", NAMED)
@@ -129,8 +135,12 @@ def test_tolerances_are_the_episodes_own_or_as_usual():
     delays = {"camera": {"error": 3e-4}, "pose": {"error": 4e-4}}
     about = {"preprocessing": {"release_error": 5e-4, "delays": delays}}
     told = Tolerances.of(SimpleNamespace(metadata=about))
-    assert told.release == 5e-4 and told.camera == pytest.approx(5e-4)
+    assert (told.release, told.pose) == (5e-4, 4e-4)
     assert told.simulated == pytest.approx([5e-4, 5e-4, usual.hand])
+    delays = {"camera": {"error": None, "left": 3e-3}, "pose": {"error": 4e-4, "left": 4e-3}}
+    delays["camera"]["against"] = "force"
+    told = Tolerances.of(SimpleNamespace(metadata={"preprocessing": {"delays": delays}}))
+    assert (told.camera, told.pose) == (3e-3, 4e-3)
     for empty in ({}, {"preprocessing": {"delays": None}}, {"preprocessing": {"delays": {}}}):
         assert Tolerances.of(SimpleNamespace(metadata=empty)) == usual
 

@@ -1,5 +1,6 @@
 """Sound recordings, changed in one thing."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from pipeline.recording.build import Checked
@@ -26,5 +27,5 @@ def with_facts(done: Checked, **facts) -> Checked:
     return with_results(done, signals=signals)
 
 
-def abouts(findings: list[Finding]) -> set[str]:
+def abouts(findings: Iterable[Finding]) -> set[str]:
     return {one.about for one in findings}

@@ -1,15 +1,47 @@
 """What the checks find in recordings that are changed in one thing, and in sound ones nothing."""
 
+import ast
+import re
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from pipeline.recording.checks import camera, container, force, frames, motion, pictures, times
+from pipeline.params import BandParams, load
+from pipeline.recording.build import process
+from pipeline.recording.checks import (
+    camera,
+    container,
+    force,
+    frames,
+    motion,
+    pictures,
+    rates,
+    roles,
+    times,
+)
 from pipeline.recording.checks.motion import pause
 from pipeline.recording.checks.table import CHECKS, findings_of
 from pipeline.recording.delays import Estimate
+from pipeline.recording.tips import LensFactor
+from tests.project import DEFAULTS, ROOT, with_
 from tests.recording.checks.made import abouts, with_facts, with_recording, with_results
+from tools import checks
+
+
+def test_each_check_has_a_test_of_a_recording_on_which_it_fires() -> None:
+    marked = set()
+    for file in Path(__file__).parents[1].rglob("test_*.py"):
+        for text in re.findall(r"@pytest\.mark\.fires\(([^)]*)\)", file.read_text()):
+            marked |= set(ast.literal_eval(f"({text},)"))
+    assert marked == {check.name for check in CHECKS}
+
+
+def test_the_page_has_the_table() -> None:
+    page = checks.PAGE.read_text(encoding="utf-8")
+    assert checks.drawn(page) == page, "run `python tools/checks.py --fix`"
 
 
 def test_names_are_of_rows(checked) -> None:
@@ -19,6 +51,7 @@ def test_names_are_of_rows(checked) -> None:
     assert {"picture_rate"} == abouts(checked.findings) - {"pause"}  # as it was made
 
 
+@pytest.mark.fires("checksums", "losses")
 def test_what_is_lost_is_said_once(checked) -> None:
     note = "no checksums in the file: damage to its messages would not be noticed"
     odd = with_recording(checked, notes=[note], losses=["a chunk is damaged", "another is"])
@@ -27,6 +60,7 @@ def test_what_is_lost_is_said_once(checked) -> None:
     assert said[1].what == "2 things were lost or mended, first of all: a chunk is damaged"
 
 
+@pytest.mark.fires("noise", "drift", "release", "slip", "turn", "lead_in")
 def test_facts_of_the_signals_tell(checked) -> None:
     facts = {"drift": [0.0, 1.0, 0.0], "release_error": 0.004, "slips": [1.5], "noise": 2.0}
     assert not abouts(force.findings(checked))
@@ -38,6 +72,7 @@ def test_facts_of_the_signals_tell(checked) -> None:
     assert "lead_in" in abouts(motion.findings(with_results(checked, signals=early)))
 
 
+@pytest.mark.fires("delay")
 def test_delays_that_the_recording_shows_are_said(checked) -> None:
     for late, error, said in ((0.012, 0.001, True), (0.012, 0.005, False), (0.001, 1e-4, False)):
         pose = Estimate(late, error, "estimated", applied=True)
@@ -45,6 +80,7 @@ def test_delays_that_the_recording_shows_are_said(checked) -> None:
         assert ("delay" in abouts(times.findings(odd))) == said
 
 
+@pytest.mark.fires("clock")
 def test_times_of_receipt_tell_of_another_clock(checked) -> None:
     """A picture may come late, by a slow driver, and not before it was taken."""
     recording = checked.pull.recording
@@ -60,6 +96,7 @@ def test_times_of_receipt_tell_of_another_clock(checked) -> None:
             assert len(words) == said and all(f"{offset:+.3f} s" in what for what in words)
 
 
+@pytest.mark.fires("empty", "damaged", "unpaired", "coverage")
 def test_pictures_without_a_band_are_said(checked) -> None:
     none = [np.zeros((0, 3), np.float32)] * 20
     points = [*checked.clouds.points[:-20], *none]
@@ -70,12 +107,14 @@ def test_pictures_without_a_band_are_said(checked) -> None:
     assert abouts(pictures.of_coverage(low)) == {"coverage", "unseen"}
 
 
+@pytest.mark.fires("unseen")
 def test_a_camera_that_stops_before_the_release_is_said(checked) -> None:
     rows = [row for row in checked.coverage if row.phase in ("hanging", "held", "drawn")]
     said = [one.what for one in pictures.of_coverage(rows) if one.about == "unseen"]
     assert said == [f"no picture shows how the band {how}" for how in ("recoils", "swings")]
 
 
+@pytest.mark.fires("drawn")
 def test_a_band_that_is_never_taut_refuses(checked) -> None:
     long = replace(checked, band=checked.band.model_copy(update={"rest_length": 1.2}))
     last = findings_of(long)[-1]
@@ -83,6 +122,7 @@ def test_a_band_that_is_never_taut_refuses(checked) -> None:
     assert "drawn taut at a rest length of 1.2 m: check" in str(last)
 
 
+@pytest.mark.fires("sensor")
 def test_a_sensor_that_tf_static_does_not_know_is_said(checked) -> None:
     assert not list(frames.findings(checked))
     wrench = replace(checked.pull.recording.wrench, frame="elsewhere")
@@ -90,6 +130,7 @@ def test_a_sensor_that_tf_static_does_not_know_is_said(checked) -> None:
     assert said.about == "sensor" and "'elsewhere'" in said.what
 
 
+@pytest.mark.fires("extrinsics", "hand")
 def test_tips_are_off_from_what_one_component_is_sure_of(checked) -> None:
     assert not abouts(camera.findings(checked))
     assert "extrinsics" in abouts(camera.findings(with_results(checked, tips=None)))
@@ -101,6 +142,15 @@ def test_tips_are_off_from_what_one_component_is_sure_of(checked) -> None:
         assert ("extrinsics" in abouts(camera.findings(with_results(checked, tips=tips)))) == said
     away = replace(checked.tips, hand=np.array([0.0, 0.05, 0.0]))
     assert "hand" in abouts(camera.findings(with_results(checked, tips=away)))
+
+
+@pytest.mark.fires("lens")
+def test_a_lens_that_explains_what_is_off_is_said(checked) -> None:
+    offsets = checked.tips.offsets + [0.02, 0.0, 0.0]
+    for kind in ("depth", "width"):
+        tips = replace(checked.tips, offsets=offsets, lens=LensFactor(kind, 1.02, 0.001))
+        said = [*camera.findings(with_results(checked, tips=tips))]
+        assert abouts(said) == {"lens"} and "1.020 ± 0.001" in said[0].what
 
 
 def test_the_pause_before_the_release(checked, seen) -> None:
@@ -115,7 +165,102 @@ def test_the_pause_before_the_release(checked, seen) -> None:
     assert pause(rising)[1] == pytest.approx(0.5 * 0.2 / middle, rel=0.1)
 
 
+@pytest.mark.fires("pull")
 def test_a_step_that_fails_refuses_and_is_the_last_finding(checked) -> None:
     short = checked.pull.recording.wrench.between(0, checked.pull.recording.origin + 10**9)
     found = findings_of(with_recording(checked, wrench=short))
     assert found[-1].about == "pull" and found[-1].refused and not found[-1].cure
+
+
+@pytest.mark.fires("gap", "missing", "force_rate", "picture_rate")
+def test_lost_and_rare_messages_are_said(checked) -> None:
+    recording = checked.pull.recording
+
+    def said(role: str, kept: np.ndarray) -> set[str]:
+        stream = getattr(recording, role)
+        kept = kept[: len(stream.stamp)]
+        values = stream.values
+        values = [values[i] for i in np.flatnonzero(kept)] if role == "depth" else values[kept]
+        thinned = replace(stream, stamp=stream.stamp[kept], values=values)
+        return abouts(rates.findings(with_recording(checked, **{role: thinned})))
+
+    number = np.arange(len(recording.wrench.stamp))
+    as_made = abouts(rates.findings(checked))
+    assert said("wrench", (number < 1000) | (number > 1040)) - as_made == {"gap"}
+    assert said("wrench", number % 15 != 3) - as_made == {"missing"}
+    assert said("wrench", number % 2 == 0) - as_made == {"force_rate"}
+    assert "picture_rate" in said("depth", number % 2 == 0)
+
+
+@pytest.mark.fires("topics")
+def test_another_topic_that_would_do_is_said(checked) -> None:
+    doubts = {"wrench": "/left/wrench would do as well"}
+    (said,) = roles.findings(with_recording(checked, doubts=doubts))
+    assert said.about == "topics" and said.what.endswith("but /left/wrench would do as well")
+
+
+@pytest.mark.fires("gripper")
+def test_a_gripper_that_was_not_recorded_is_said(checked) -> None:
+    assert not list(roles.findings(checked))
+    assert abouts(roles.findings(with_recording(checked, gripper=None))) == {"gripper"}
+
+
+@pytest.mark.fires("max_force", "pause", "rest")
+def test_what_the_hand_should_not_do_is_said(checked) -> None:
+    weak = with_(checked.params, "setup", max_force=1.0)
+    assert "max_force" in abouts(force.findings(replace(checked, params=weak)))
+    signals = checked.signals
+    rising = replace(signals, force=signals.force * (1 + 0.2 * signals.time[:, None]))
+    assert "pause" in abouts(motion.findings(with_results(checked, signals=rising)))
+    second = replace(checked, pull=replace(checked.pull, number=2, count=2))
+    assert "rest" in abouts(motion.findings(second))
+
+
+@pytest.mark.fires("off_plane")
+def test_points_of_the_arm_are_said(checked) -> None:
+    rows = [replace(row, off_plane=0.05) for row in checked.coverage if row.phase == "hanging"]
+    assert "off_plane" in abouts(pictures.of_coverage(rows))
+
+
+@pytest.mark.fires("loop")
+def test_a_loop_of_poses_that_does_not_close_is_said(checked) -> None:
+    loop = SimpleNamespace(closed=False)
+    geometry = replace(checked.pull.geometry, loop=loop)
+    open_ = replace(checked, pull=replace(checked.pull, geometry=geometry))
+    assert "loop" in abouts(frames.findings(open_))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["orange", "orange_2", "orange_3"])
+def test_no_check_fires_on_a_sound_recording(name: str) -> None:
+    file = ROOT.parent / "shared/recordings" / f"{name}.mcap"
+    if not file.exists():
+        pytest.skip("the recordings of the orange band are not beside the project")
+    params = load(DEFAULTS)
+    band = BandParams(source="recording", mass=0.0408, diameter=0.010, rest_length=0.52)
+    assert process(file, band, params).findings == []
+
+
+@pytest.mark.fires("clock_drift")
+def test_a_clock_that_runs_fast_is_said(checked) -> None:
+    """By the growth of log_time less stamp; one that scatters as much says nothing."""
+    pose = checked.pull.recording.pose
+    for rate, error, said in ((2e-3, 1e-5, True), (2e-3, 1e-3, False), (1e-5, 1e-6, False)):
+        force = replace(checked.pull.recording.wrench, drift=(rate, error))
+        odd = with_recording(checked, wrench=force, pose=replace(pose, drift=(0.0, 1e-6)))
+        words = [one.what for one in times.findings(odd) if one.about == "clock_drift"]
+        assert any(pose.topic in what and "+2000" in what for what in words) == said
+
+
+@pytest.mark.fires("clock_unknown")
+def test_a_pose_that_nothing_ties_to_the_force_is_said(checked) -> None:
+    for left, said in ((0.003, True), (0.001, False), (None, False)):
+        odd = replace(checked, delays=replace(checked.delays, pose=Estimate(left=left)))
+        assert ("clock_unknown" in abouts(times.findings(odd))) == said
+
+
+@pytest.mark.fires("clocks_disagree")
+def test_two_estimates_of_a_delay_that_disagree_are_said(checked) -> None:
+    odd = replace(checked, delays=replace(checked.delays, conflict="one says 3 ms, one -9 ms"))
+    said = [one.what for one in times.findings(odd) if one.about == "clocks_disagree"]
+    assert said == ["one says 3 ms, one -9 ms"]

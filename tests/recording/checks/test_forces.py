@@ -38,6 +38,7 @@ def test_a_sound_force_is_left(checked) -> None:
     assert not found(checked)
 
 
+@pytest.mark.fires("direction")
 @pytest.mark.parametrize("axis", ["x", "z"])
 @pytest.mark.parametrize("degrees", [-28, -15, -6, 6, 15, 28])
 def test_a_turned_sensor(checked, axis, degrees) -> None:
@@ -47,6 +48,7 @@ def test_a_turned_sensor(checked, axis, degrees) -> None:
     assert way[degrees > 0] in said[0].what
 
 
+@pytest.mark.fires("range")
 @pytest.mark.parametrize("share", [0.3, 0.7, 0.95])
 def test_a_range_that_ends(checked, share) -> None:
     peak = share * np.linalg.norm(checked.signals.facts.hold_force)
@@ -64,6 +66,7 @@ def test_a_range_that_ends(checked, share) -> None:
     assert "its range ends" in said[0].what
 
 
+@pytest.mark.fires("units")
 def test_units(checked) -> None:
     for newtons, name, refused in (
         (1e-3, "millinewtons", True),
@@ -76,6 +79,7 @@ def test_units(checked) -> None:
         _ = with_force(checked, lambda _, values: values / 1e3).pull.release
 
 
+@pytest.mark.fires("filter")
 @pytest.mark.parametrize("count", [10, 20, 40])
 def test_a_filtered_force(checked, count) -> None:
     """A moving average: its release is unsure by what it delays."""
@@ -89,6 +93,7 @@ def test_a_filtered_force(checked, count) -> None:
     assert odd.pull.release.error > late / 2
 
 
+@pytest.mark.fires("zeroed", "zero", "jump")
 def test_zeros_are_named(checked) -> None:
     release = checked.pull.release.time
     zero = with_force(checked, lambda t, values: values - 3.0 * (t > 0.4)[:, None])
@@ -102,6 +107,7 @@ def test_zeros_are_named(checked) -> None:
     assert "jump" in abouts(force.findings(with_facts(checked, jumps=[0.1])))
 
 
+@pytest.mark.fires("bursts", "held")
 def test_bursts_and_held_values_are_said(checked) -> None:
     wrench, pose = checked.pull.recording.wrench, checked.pull.recording.pose
     bursts = replace(wrench, bursts=Bursts(16, 16e6, True, 3e5))

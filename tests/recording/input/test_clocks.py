@@ -12,8 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.base.errors import UserError
+from pipeline.recording.delays import correct_delays
 from pipeline.recording.input import clocks
 from pipeline.recording.input.reader import Recording, read_recording
+from pipeline.recording.pulls import Pull
 from validation.recordings.bag import START, blind_bag, edit, head
 
 MS = 1_000_000
@@ -301,3 +303,35 @@ def test_shifted_puts_late_stamps_right(good) -> None:
     for role, by in (("pose", 4), ("color", -10), ("depth", -10), ("wrench", 0), ("gripper", 0)):
         off = good.streams[role].stamp - found.streams[role].stamp
         np.testing.assert_array_equal(off, by * MS)
+
+
+@pytest.mark.parametrize("late", [-2.8, 0.66, 1000.0])
+def test_a_given_delay_is_taken_off_first(tmp_path, params, good, late) -> None:
+    """The refusal says which, to some hundredths of a second."""
+    path = blind_bag(tmp_path, change=shift("color", "depth", by=late))
+    with pytest.raises(UserError, match=r"episode\.delays\.camera: (\S+) in params") as caught:
+        read_recording(path, params.setup)
+    told = float(str(caught.value).partition("camera: ")[2].split()[0])
+    assert told == pytest.approx(late, abs=0.05)
+    for camera in (late, told):
+        delays = params.episode.delays.model_copy(update={"camera": camera})
+        found = read_recording(path, params.setup, delays)
+        assert found.late == {"color": camera, "depth": camera}
+        off = found.depth.stamp - good.depth.stamp
+        np.testing.assert_allclose(off * 1e-9, late - camera, atol=1e-9)
+        given = params.model_copy(
+            update={"episode": params.episode.model_copy(update={"delays": delays})}
+        )
+        right, said = correct_delays(Pull.of(found, params.setup), given)
+        assert said.camera.applied and said.camera.value == camera
+        np.testing.assert_array_equal(right.recording.depth.stamp, found.depth.stamp)  # not twice
+
+
+@pytest.mark.parametrize("rate", [-3e-3, 0.0, 5e-4])
+def test_a_drift_is_told_by_the_least_delays(rate) -> None:
+    for seed in range(5):
+        stamp = np.arange(0, 9 * 10**9, 10**6)
+        waits = np.random.default_rng(seed).exponential(2e5, len(stamp)).astype(np.int64)
+        found, error = clocks.drift((stamp * (1 + rate)).astype(np.int64), stamp + 10**6 + waits)
+        assert abs(found + rate) < 5 * error and error < 1e-5
+    assert clocks.drift(stamp[:1000], stamp[:1000])[1] == np.inf

@@ -25,7 +25,7 @@ from pipeline.recording.input.records import MAGIC
 
 ROOT = Path(__file__).parents[3]
 START = 10**18
-SCHEMA = kinds.Schema(id=1, data=b"float64 x", encoding="ros2msg", name="pkg/msg/X")
+SCHEMA = kinds.Schema(id=1, data=b"float64 x", encoding="ros2msg", name="pkg/msg/Pose")
 ANY = settings(
     max_examples=150,
     deadline=None,

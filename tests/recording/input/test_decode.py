@@ -7,6 +7,7 @@ import struct
 from types import SimpleNamespace
 
 import pytest
+import zstandard
 from foxglove import messages as fox
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.records import Schema
@@ -15,8 +16,9 @@ from rosbags.typesys import Stores, get_typestore
 
 from pipeline.base.errors import UserError
 from pipeline.recording.input.container import Channel
-from pipeline.recording.input.decode import decoder
+from pipeline.recording.input.decode import Unreadable, decoder
 from pipeline.recording.input.readings import read_wrench
+from pipeline.recording.input.standard import guessed
 
 NAME = "geometry_msgs/msg/WrenchStamped"
 MSG = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(NAME, ros_version=2)[0]
@@ -127,7 +129,13 @@ NESTED = b"p/A[5000] x\n" + b"=" * 80 + b"\nMSG: p/A\nuint8[5000] y\n"  # 25 mil
 @pytest.mark.parametrize(
     ("name", "encoding", "data", "messages", "words"),
     [
-        (NAME, "omgidl", b"", "cdr", "schema 'omgidl' with messages 'cdr' cannot be read, record"),
+        (
+            "lab/X",
+            "omgidl",
+            b"",
+            "cdr",
+            "schema 'omgidl' with messages 'cdr' cannot",
+        ),
         (NAME, "ros2msg", MSG.encode(), "json", "cannot be read"),
         ("lab.Wrench", "flatbuffer", b"", "flatbuffer", "ros2msg with cdr.*jsonschema with json"),
         ("", "", b"", "json", "no schema with messages 'json'"),
@@ -148,3 +156,47 @@ def test_what_cannot_be_read_is_one_line_with_the_topic(
     with pytest.raises(UserError, match=words) as caught:
         decoder(channel(name, encoding, data, messages))
     assert "topic /ft" in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name, encoding, data",
+    [
+        (NAME, "", b""),
+        (NAME, "ros2msg", b""),
+        (NAME, "ros2msg", NAME.encode()),
+        (NAME, "ros2msg", MSG.split(LINE)[0].encode()),  # without the types within
+        ("geometry_msgs::msg::dds_::WrenchStamped_", "omgidl", b"module geometry_msgs { };"),
+    ],
+)
+def test_a_standard_type_needs_no_schema(name, encoding, data) -> None:
+    found = reading(channel(name, encoding, data, "cdr"), cdr())
+    assert found.value == (1.5, -2.0, 3.25) and found.frame == "sensor"
+
+
+def test_types_of_others_do() -> None:
+    for name, encoding, data in (
+        ("lab_msgs/msg/WrenchStamped", "", b""),
+        ("lab_msgs/msg/WrenchStamped", "omgidl", b""),
+        (NAME, "ros2msg", b"std_msgs/Header header\nfloat32 all_else\n"),  # of another version
+    ):
+        with pytest.raises(UserError):
+            decoder(channel(name, encoding, data, "cdr"))
+
+
+def test_without_any_schema_bytes_tell_the_type() -> None:
+    assert guessed("/ft", "cdr", [cdr()] * 3).name == NAME
+    assert guessed("/twist", "cdr", [cdr()] * 3).name == "geometry_msgs/msg/TwistStamped"
+    assert guessed("/ft", "cdr", [cdr(), cdr() + bytes(8), cdr()]) is None
+    assert guessed("/ft", "json", [b"{}"]) is None and guessed("/ft", "cdr", []) is None
+    assert guessed("/ft", "cdr", [b"\0\1\0\0" + bytes(7)] * 3) is None
+
+
+def test_messages_that_are_packed_one_by_one() -> None:
+    one = channel(NAME, "ros2msg", MSG.encode(), "cdr")
+    assert reading(one, zstandard.compress(cdr())).value == (1.5, -2.0, 3.25)
+    with pytest.raises(Unreadable):
+        decoder(one)(zstandard.compress(cdr())[:-20])
+    with pytest.raises(Unreadable, match="too long"):
+        decoder(one)(zstandard.compress(bytes(2**28)))
+    with pytest.raises(Unreadable, match="in XCDR2"):
+        decoder(one)(b"\0\7\0\0" + cdr()[4:])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -218,12 +219,12 @@ def test_what_a_whole_topic_cannot_be_is_told_from_damage() -> None:
     bomb = jpeg[:place] + struct.pack(">HH", 65500, 65500) + jpeg[place + 4 :]  # of 12 GB
     place = png(MILLIMETRES).index(b"IDAT") - 4
     long = png(MILLIMETRES)[:place] + b"\x7f" + png(MILLIMETRES)[place + 1 :]  # a chunk of 2 GB
-    tiff = cv2.imencode(".tiff", BGR)[1].tobytes()
+    gif = cv2.imencode(".gif", BGR)[1].tobytes()
     whole = raw("rgb8", BGR)
     for read, picture in (
         (color, packed("jpeg", b"")),
         (color, packed("jpeg", jpeg[: len(jpeg) // 2])),
-        (color, packed("tiff", tiff)),
+        (color, packed("gif", gif)),
         (color, packed("jpeg", bomb)),
         (depth, packed("png", long)),
         (depth, packed("16UC1; compressedDepth png", bytes(12) + long)),
@@ -244,3 +245,70 @@ def test_depth_is_told_from_color() -> None:
     assert is_depth(packed("16UC1; compressedDepth", b""))
     assert not is_depth(packed("rgb8; jpeg compressed bgr8", b""))
     assert not is_depth(packed("png", png(BGR[..., 0])))
+
+
+SMOOTH = np.full((96, 64, 3), (200, 120, 40), np.uint8)
+
+
+@pytest.mark.parametrize("kind", [".webp", ".tiff", ".bmp", ".jp2", ".avif"])
+def test_what_else_opencv_unpacks(kind) -> None:
+    data = cv2.imencode(kind, SMOOTH)[1].tobytes()
+    picture = packed(kind[1:], data)
+    assert size_of(picture) == (64, 96) and not is_depth(picture)
+    np.testing.assert_allclose(color(picture).astype(int), SMOOTH, atol=6)
+    for cut in (data[: len(data) // 2], data[:30]):
+        with pytest.raises(Undecodable):
+            color(packed(kind[1:], cut))
+
+
+@pytest.mark.parametrize("quality", [20, 101])  # lossy, lossless
+def test_the_size_of_webp_is_its_header(quality) -> None:
+    data = cv2.imencode(".webp", SMOOTH, [cv2.IMWRITE_WEBP_QUALITY, quality])[1].tobytes()
+    assert size_of(packed("webp", data)) == (64, 96)
+    with io.BytesIO() as file:  # the extended format
+        Image.fromarray(SMOOTH).convert("RGBA").save(file, "WEBP", exif=b"Exif\0\0")
+        assert size_of(packed("webp", file.getvalue())) == (64, 96)
+
+
+def test_depth_in_tiff() -> None:
+    for pixels in (MILLIMETRES, DEPTH):
+        picture = packed("tiff", cv2.imencode(".tiff", pixels)[1].tobytes())
+        metres = pixels if pixels.dtype == np.float32 else pixels / 1000
+        np.testing.assert_allclose(depth(picture), metres, rtol=1e-6)
+
+
+@QUICK
+@given(st.binary(max_size=6000), st.booleans())
+@example(bytes(5000), False)
+@example(b"\xff\xd9" * 9, True)
+@example(b"\xff\xd8\xff\xe0" * 50, False)
+def test_what_follows_on_a_jpeg_does_not_matter(behind, progressive) -> None:
+    flags = [cv2.IMWRITE_JPEG_PROGRESSIVE, int(progressive), cv2.IMWRITE_JPEG_RST_INTERVAL, 1]
+    data = cv2.imencode(".jpg", BGR, flags)[1].tobytes()
+    wanted = color(packed("jpeg", data))
+    np.testing.assert_array_equal(color(packed("jpeg", data + behind)), wanted)
+    with pytest.raises(Undecodable, match="cut off"):
+        color(packed("jpeg", data[: len(data) * 3 // 4] + bytes(5000)))
+
+
+def test_depth_of_other_encodings_and_without_what_drivers_leave_out() -> None:
+    signed = MILLIMETRES.astype(np.int16)
+    signed[0, 0] = -1
+    found = depth(raw("16SC1", signed))
+    assert found[0, 0] == 0 and found[1, 1] == np.float32(MILLIMETRES[1, 1] / 1000)
+    np.testing.assert_allclose(depth(raw("64FC1", DEPTH.astype(float))), DEPTH)
+    assert is_depth(raw("16SC1", signed)) and is_depth(raw("64FC1", DEPTH.astype(float)))
+    bare = packed("16UC1; compressedDepth", png(MILLIMETRES))  # no header
+    assert size_of(bare) == (5, 6)
+    np.testing.assert_allclose(depth(bare), MILLIMETRES / 1000, rtol=1e-6)
+    with pytest.raises(Unsupported, match="without the header of 12 bytes"):
+        depth(packed("32FC1; compressedDepth png", png(MILLIMETRES)))
+    whole = raw("16UC1", MILLIMETRES)
+    for step in (0, 5):  # in pixels
+        np.testing.assert_array_equal(depth(replace(whole, step=step)), depth(whole))
+    with pytest.raises(Undecodable, match="step 7: a row of 5 pixels of 16UC1 takes 10 bytes"):
+        depth(replace(whole, step=7))
+    with pytest.raises(Undecodable, match="raw image of 0 x 6 pixels"):
+        depth(replace(whole, width=0))
+    with pytest.raises(Unsupported, match="'8UC1' is not known, use 16UC1"):
+        depth(raw("8UC1", MILLIMETRES.astype(np.uint8)))

@@ -1,0 +1,198 @@
+"""The best topic for a role beside those that were chosen already: a set, of one device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import replace
+from functools import cached_property
+
+from pipeline.recording.input import sets
+from pipeline.recording.input.roles import COMMANDS, Candidate, Choice
+
+DEVICE = ("wrench", "pose", "twist", "gripper")  # of one arm
+LEAST_FOLLOWS = 0.1  # share of the force's steps below which no hand is told by them
+MOST_TOPICS = 60  # for a role, whose names are compared
+
+
+class Company:
+    """What is known of all candidates together.
+
+    Args:
+        fitting: The candidates for a role.
+        frames: Those that /tf_static knows.
+    """
+
+    def __init__(self, fitting: Callable[[str], list[Candidate]], frames: Collection[str]) -> None:
+        self.fitting, self.frames = fitting, frames
+        self.courses: dict[str, sets.Track | None] = {}
+
+    def best(
+        self, role: str, found: list[Candidate], chosen: dict[str, Choice]
+    ) -> tuple[Candidate | None, str]:
+        """The candidate, and in words what speaks against it; None where nothing fits `chosen`."""
+        if role not in DEVICE:
+            return self._camera(role, found, chosen)
+        own = [one for one in found if not self._apart(one, chosen)]
+        if found and not own:
+            one, (other, of) = found[0], next(iter(self._strangers(found[0], chosen)))
+            return None, f"{one.topic} is of another device than the {other}'s topic {of}"
+        if not own:
+            return None, ""
+        live = own
+        if len(own) > 1:
+            live = [one for one in own if self._alive(one)] or own
+        meant = [one for one in live if not set(one.doubts) & set(COMMANDS)] or live
+        if role == "wrench" and len(meant) > 1:
+            meant = [one for one in meant if self._falls(one)] or meant
+        elif role == "pose" and len(meant) > 1:
+            meant = self._followed(meant, chosen["wrench"])
+        elif role == "gripper" and len(meant) > 1:
+            meant = [one for one in meant if self._opens(one, chosen["wrench"])] or meant
+        best = max(meant, key=Candidate.merit)
+        return best, self._tie(best, chosen) if role == "pose" else ""
+
+    def opened(self, gripper: Choice, wrench: Choice) -> Choice:
+        """The gripper's topic as one opening, of the fingers that let go of what the force felt."""
+
+        def fall() -> int | None:
+            course = sets.course_of(wrench.channel, wrench.read)
+            k = course and sets.fall_of(course)
+            return int(course.stamp[k]) or None if course and k else None
+
+        return replace(
+            gripper, convert=lambda stamps, values: sets.opening_of(values, stamps, fall)
+        )
+
+    # Names
+
+    @cached_property
+    def sides(self) -> list[set[str]]:
+        topics = [
+            (one.topic, one.kind) for role in DEVICE for one in self.fitting(role)[:MOST_TOPICS]
+        ]
+        return sets.sides_of(dict.fromkeys(topics))
+
+    def _apart(self, one: Candidate, chosen: dict[str, Choice]) -> bool:
+        return any(True for _ in self._strangers(one, chosen))
+
+    def _strangers(self, one: Candidate, chosen: dict[str, Choice]) -> Iterator[tuple[str, str]]:
+        """Roles and topics that were chosen of another device."""
+        mine = one.topic, one.typical.frame
+        for role, other in chosen.items():
+            topic = other.channel.topic
+            if sets.apart(mine, (topic, other.typical().frame), self.sides):
+                yield role, topic
+
+    # What they say
+
+    def _course(self, one: Candidate | Choice) -> sets.Track | None:
+        choice = one.choice if isinstance(one, Candidate) else one
+        topic = choice.channel.topic
+        if topic not in self.courses:
+            self.courses[topic] = sets.course_of(choice.channel, choice.read)
+        return self.courses[topic]
+
+    def _alive(self, one: Candidate) -> bool:
+        return sets.alive(one.choice.channel, one.choice.read)
+
+    def _falls(self, one: Candidate) -> bool:
+        course = self._course(one)
+        return course is not None and sets.fall_of(course) is not None
+
+    def _followed(self, hands: list[Candidate], wrench: Choice) -> list[Candidate]:
+        """Those whose steps the force follows about as well as any's."""
+        force = self._course(wrench)
+        if force is None:
+            return hands
+        shares = []
+        for one in hands:
+            course = (
+                None if one.choice.convert else sets.course_of(one.choice.channel, one.choice.read)
+            )
+            shares.append(sets.follows(force, course) if course else None)
+        most = max([share for share in shares if share is not None], default=0.0)
+        if most < LEAST_FOLLOWS:
+            return hands
+        return [
+            one
+            for one, share in zip(hands, shares, strict=True)
+            if share is None or share >= sets.FOLLOWS * most
+        ]
+
+    def _opens(self, one: Candidate, wrench: Choice) -> bool:
+        """Whether its fingers move when the force falls."""
+        force, fingers = self._course(wrench), self._course(one)
+        if force is None or fingers is None:
+            return False
+        k = sets.fall_of(force)
+        return k is not None and sets.moves_at(fingers, float(force.time[k]))
+
+    def _tie(self, pose: Candidate, chosen: dict[str, Choice]) -> str:
+        """In words, another force and hand that would do as well."""
+        wrench = chosen["wrench"]
+        mine = (wrench.channel.topic, pose.topic, pose.typical.frame, wrench.typical().frame)
+        for force in self.fitting("wrench"):
+            if not sets.apart((force.topic, force.typical.frame), mine, self.sides):
+                continue
+            if set(force.doubts) & set(COMMANDS) or not self._falls(force):
+                continue
+            for hand in self.fitting("pose"):
+                names = hand.topic, hand.typical.frame
+                if not sets.apart(names, mine, self.sides) or not self._alive(hand):
+                    continue
+                if not sets.apart(names, (force.topic, force.typical.frame), self.sides):
+                    return f"{force.topic} with {hand.topic} shows a release too"
+        return ""
+
+    # Cameras
+
+    def _camera(
+        self, role: str, found: list[Candidate], chosen: dict[str, Choice]
+    ) -> tuple[Candidate | None, str]:
+        if len(found) < 2:
+            return (found[0] if found else None), ""
+        live = [one for one in found if self._alive(one)] or found
+        placed = [one for one in live if one.typical.frame in self.frames] or live
+        if role == "depth":
+            color = chosen["color"]
+            topic, frame = color.channel.topic, color.typical().frame
+            near = {id(one): self._near(one, topic, frame) for one in placed}
+            most = max(near.values())
+            return max((o for o in placed if near[id(o)] == most), key=Candidate.merit), ""
+        depths = self.fitting("depth")
+        paired = [one for one in placed if self._partner(one, depths)]
+        best = max(paired or placed, key=Candidate.merit)
+        return best, self._other_camera(best, paired, depths)
+
+    def _near(self, depth: Candidate, topic: str, frame: str) -> int:
+        """How many folders a depth's topic shares with a colour's; all where they share a frame."""
+        return 99 if frame and depth.typical.frame == frame else _shared(depth.topic, topic)
+
+    def _partner(self, color: Candidate, depths: list[Candidate]) -> bool:
+        nearest = [self._near(d, color.topic, color.typical.frame) for d in depths]
+        return max(nearest, default=0) > 0 or all(len(_folders(d.topic)) < 2 for d in depths)
+
+    def _other_camera(self, best: Candidate, colors: list[Candidate], depths: list[Candidate]):
+        """In words, another camera with colour and depth of its own that would do as well."""
+        for one in colors:
+            if len(one.doubts) > len(best.doubts) or one.topic == best.topic:
+                continue
+            for depth in depths:
+                own = self._near(depth, one.topic, one.typical.frame)
+                if own > self._near(depth, best.topic, best.typical.frame) and self._alive(depth):
+                    return f"{one.topic} with {depth.topic} is a camera too"
+        return ""
+
+
+def _folders(topic: str) -> list[str]:
+    return topic.strip("/").split("/")[:-1]
+
+
+def _shared(topic: str, other: str) -> int:
+    """How many folders two topics have in common from the first on."""
+    count = 0
+    for a, b in zip(_folders(topic), _folders(other), strict=False):
+        if a != b:
+            break
+        count += 1
+    return count

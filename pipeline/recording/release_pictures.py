@@ -1,0 +1,147 @@
+"""The camera's delay against the force, by the pictures of the release: within a picture or so.
+
+The outer fifth of the drawn band is empty within some milliseconds after the force falls. The last
+picture that shows it there was taken before, the next one after that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.recording.pulls import Pull
+
+AROUND = 0.4  # s before and after the release
+HELD = 12  # pictures before that, of which it is learned how the drawn band is seen
+NEAR = 0.025  # m around the straight lines from the tips to the hand
+OUTER, HAND = (
+    0.78,
+    0.05,
+)  # share of them from which on, and m before the hand until which, is looked
+FEWEST = 30  # points of the drawn band
+SEEN = 0.5  # share of them from which a picture shows it drawn
+FADED = 0.15  # share of the drawn band: a sound picture shows less of it
+MOVES = 0.002  # s after the fall of the force from which no picture is the one before
+SURELY = 0.1  # s after which every band is gone
+EMPTY_AFTER = 0.015  # s after the fall of the force in which the outer fifth is empty
+
+
+@dataclass(frozen=True)
+class ReleasePictures:
+    """What the pictures around the release show.
+
+    Attributes:
+        earliest, latest: The camera's stamps are late against the force's by between both [s].
+        drawn, gone: Stamps of the last picture of the drawn band and of the next one, from the
+            release [s].
+        again: Stamps of pictures after it that show the drawn band once more.
+        repeated: Stamps of pictures around the release that are those before them, pixel by pixel.
+        faded: Share of the drawn band that the first pictures after it still show.
+        never: No picture shows the band let go; what is said of the next picture is void.
+    """
+
+    earliest: float
+    latest: float
+    drawn: float
+    gone: float
+    again: tuple[float, ...]
+    repeated: tuple[float, ...]
+    faded: tuple[float, ...]
+    never: bool = False
+
+    @property
+    def middle(self) -> float:
+        return (self.earliest + self.latest) / 2
+
+    @property
+    def error(self) -> float:
+        """Standard deviation of a delay that is anywhere between both [s]."""
+        return (self.latest - self.earliest) / np.sqrt(12)
+
+    @property
+    def beyond(self) -> float:
+        """By how much the stamps are off for sure [s]; 0 where they may be right."""
+        return 0.0 if self.never else max(self.earliest, -self.latest, 0.0)
+
+    @property
+    def frozen(self) -> tuple[float, ...]:
+        """Stamps of pictures that are sent again while the band must move [s]."""
+        return tuple(time for time in self.repeated if time > MOVES)
+
+    @property
+    def smeared(self) -> bool:
+        """Whether the drawn band is still seen in part a picture after it is gone."""
+        return max(self.faded[1:3], default=0.0) > FADED
+
+
+def release_pictures(pull: Pull, fork_width: float) -> ReleasePictures | None:
+    """None where the pictures do not show the drawn band, or not until it is gone."""
+    recording, release = pull.recording, pull.release.time
+    since = recording.depth.seconds(recording.origin) - release
+    around = np.flatnonzero(np.abs(since) < AROUND)
+    before = np.flatnonzero((since < -AROUND) & (since > pull.grasp - release))[-HELD:]
+    if len(before) < 3 or len(around) < 3:
+        return None
+    hand = pull.motion.position(release - 0.02)
+    tips = np.array([[-0.5, 0, 0], [0.5, 0, 0]]) * fork_width
+    rays, last = recording.depth_camera.rays().astype(np.float32), None
+    counts, times, repeated = [], [], []
+    for k in (*before, *around):
+        depth = recording.depth_picture(int(k))
+        if depth is None:
+            continue
+        if last is not None and np.array_equal(depth, last):
+            repeated.append(float(since[k]))
+        last = depth
+        counts.append(_points(pull, rays, depth, tips, hand))
+        times.append(float(since[k]))
+    times, counts = np.array(times), np.array(counts, float)
+    full = np.median(counts[times < -AROUND]) if (times < -AROUND).any() else 0.0
+    if full < FEWEST:
+        return None
+    share = counts / full
+    gone = np.flatnonzero((share < SEEN) & (times > -AROUND))
+    if not len(gone) and np.sum(times > SURELY) > 2:
+        last = float(times[-1])
+        return ReleasePictures(last, last, last, last, (), tuple(repeated), (), never=True)
+    if not len(gone) or gone[0] == 0 or gone[0] == len(times) - 1:
+        return None
+    first = int(gone[0])
+    a, b = times[first - 1], times[first]
+    later = times[first:][share[first:] > SEEN]
+    return ReleasePictures(
+        float(a - EMPTY_AFTER),
+        float(b),
+        float(a),
+        float(b),
+        tuple(map(float, later)),
+        tuple(repeated),
+        tuple(map(float, share[first : first + 4])),
+    )
+
+
+def _points(
+    pull: Pull, rays: np.ndarray, depth: np.ndarray, tips: np.ndarray, hand: np.ndarray
+) -> int:
+    """How many points of a depth picture (H, W) lie where the drawn band's outer fifth is."""
+    camera, pose = pull.recording.depth_camera, pull.geometry.camera
+    ends = [tip + share * (hand - tip) for tip in tips for share in (OUTER, 1.0)]
+    seen = pose.inverse().apply(np.array(ends))
+    if (seen[:, 2] < NEAR).any():
+        return 0
+    margin = NEAR * camera.matrix[0, 0] / seen[:, 2].min()
+    pixels, size = camera.project(seen), np.array([camera.width, camera.height])
+    low = np.clip(pixels.min(axis=0) - margin, 0, size).astype(int)
+    high = np.clip(pixels.max(axis=0) + margin, 0, size).astype(int)
+    window = slice(low[1], high[1]), slice(low[0], high[0])
+    depth = depth[window]
+    points = pose.apply((rays[window] * depth[..., None])[depth > 0].astype(float))
+    found = np.zeros(len(points), bool)
+    for tip in tips:
+        length = np.linalg.norm(hand - tip)
+        way, from_tip = (hand - tip) / length, points - tip
+        along = from_tip @ way
+        off = np.linalg.norm(from_tip - along[:, None] * way, axis=1)
+        found |= (off < NEAR) & (along > OUTER * length) & (along < length - HAND)
+    return int(found.sum())

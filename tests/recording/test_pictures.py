@@ -1,0 +1,102 @@
+"""Pictures that cannot be decoded, or are of another unit, stop with that reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.base.errors import UserError
+from pipeline.recording.build import process
+from pipeline.recording.checks import pictures
+from pipeline.recording.input.images import depth
+from pipeline.recording.input.readings import Picture
+from validation.recordings.bag import Lens, write_bag
+from validation.recordings.small import TRUTH, small_params
+
+LENS = Lens(size=(160, 120), focal=125.0, fps=8)
+PARAMS = small_params()
+
+
+def looked_at(folder, change):
+    """What becomes of a small recording with these pictures."""
+    path = folder / "my.mcap"
+    write_bag(path, TRUTH, rate=200, pose_rate=50, lens=LENS, change=change)
+    return process(path, PARAMS.bands["band1"], PARAMS)
+
+
+def of_color(edit):
+    """A `change` that edits the bytes of the colour pictures, by number."""
+    numbers = iter(range(10_000))
+
+    def change(kind: str, stamp: int, message):
+        if kind == "color":
+            message.data = edit(next(numbers), message.data)
+        return message
+
+    return change
+
+
+def test_colour_that_cannot_be_decoded_stops_before_an_episode(tmp_path) -> None:
+    for edit, reason in (
+        (lambda k, data: data[: len(data) // 2] + bytes(3000), "JPEG is cut off"),
+        (lambda k, data: b"no picture", "damaged image"),
+    ):
+        with pytest.raises(UserError) as caught:
+            looked_at(tmp_path, of_color(edit))
+        assert "its colour pictures cannot be decoded: " + reason in str(caught.value)
+
+
+def test_what_can_be_decoded_is_read_and_the_rest_is_counted_as_colour(tmp_path) -> None:
+    padded = looked_at(tmp_path, of_color(lambda k, data: data + bytes(3000)))
+    assert padded.clouds.damaged == padded.clouds.damaged_colors == 0
+    some = looked_at(tmp_path, of_color(lambda k, data: data[: len(data) // (1 + (k % 4 == 0))]))
+    said = [one.what for one in pictures.findings(some) if one.about == "damaged"]
+    assert said == [f"{some.clouds.damaged_colors} colour pictures cannot be decoded"]
+    assert len(some.clouds.points) + some.clouds.damaged == len(padded.clouds.points)
+
+
+def written(pixels: np.ndarray, factor: float, kind: type, swapped: bool = False) -> Picture:
+    """As a driver would send it, of depth in millimetres."""
+    values = (pixels * factor).astype(np.dtype(kind).newbyteorder("<"))
+    encoding = "16UC1" if kind is np.uint16 else "32FC1"
+    height, width = pixels.shape
+    step, data = values.itemsize * width, values.view(np.uint8).ravel()
+    return Picture(encoding, "", data, height, width, step, swapped)
+
+
+@pytest.mark.parametrize(
+    "factor, kind, swapped, said",
+    [
+        (10, np.uint16, False, "the depth is 10 times what it must be .*, as of unit 0.1 mm"),
+        (4, np.uint16, False, "the depth is 4 times"),
+        (0.1, np.uint16, False, "the depth is 0.1 times"),
+        (1, np.float32, False, "the depth is 1000 times"),
+        (1, np.uint16, True, "is_bigendian is 1, but the depth's bytes are the other way round"),
+        (0.001, np.float32, True, "is_bigendian is 1, but"),
+        (1, np.uint16, False, None),
+        (0.001, np.float32, False, None),
+    ],
+)
+def test_depth_of_another_unit_or_order(tmp_path, monkeypatch, factor, kind, swapped, said) -> None:
+    """What a driver would send is put in the place of what the recording holds."""
+    from pipeline.recording import build
+    from pipeline.recording.input.reader import Recording
+
+    read = build.read_recording
+
+    def driver(*arguments) -> Recording:
+        recording = read(*arguments)
+        values = [
+            written(np.round(1000 * depth(one)), factor, kind, swapped)
+            for one in recording.depth.values
+        ]
+        return replace(recording, depth=replace(recording.depth, values=values))
+
+    monkeypatch.setattr(build, "read_recording", driver)
+    if said is None:
+        assert looked_at(tmp_path, lambda kind, stamp, message: message).clouds.empty == 0
+        return
+    with pytest.raises(UserError, match=said):
+        looked_at(tmp_path, lambda kind, stamp, message: message)

@@ -1,0 +1,81 @@
+"""Which picture is the first without the drawn band, and what that says of the camera's clock."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.recording.checks.times import of_release
+from pipeline.recording.delays import correct_delays
+from pipeline.recording.input.reader import read_recording
+from pipeline.recording.pulls import Pull
+from pipeline.recording.release_pictures import ReleasePictures, release_pictures
+
+SOUND = ReleasePictures(-0.03, 0.02, -0.015, 0.02, (), (), (0.0, 0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def pull(seen, params) -> Pull:
+    return Pull.of(read_recording(seen[0], params.setup), params.setup)
+
+
+@pytest.mark.parametrize("late", [-0.2, -0.06, 0.0, 0.06, 0.2])
+def test_the_delay_is_between_both_ends(pull, params, late) -> None:
+    found = release_pictures(pull.shifted(camera=-late), params.setup.fork_width)
+    assert found.earliest <= late <= found.latest
+    assert found.latest - found.earliest < 1.3 * pull.recording.depth.period + 0.02
+    if abs(late) < 0.001:
+        assert found.beyond == 0
+        assert not list(of_release(replace(found, repeated=())))
+    if abs(late) > 0.1:
+        assert found.beyond > 0
+        assert [one.about for one in of_release(found)][-1:] == ["release_pictures"]
+
+
+def test_what_the_pictures_show_goes_before_the_hand(pull, params) -> None:
+    """A camera that is 0.2 s late is nearly right after the correction, or said to be unclear."""
+    moved, found = correct_delays(pull.shifted(camera=-0.2), params)
+    left = (moved.recording.depth.stamp - pull.recording.depth.stamp) * 1e-9
+    assert abs(left).max() < 3 * (found.camera.left or 0.0) + 1e-9
+    assert found.camera.applied
+
+
+def test_black_pictures_show_nothing(blind, params) -> None:
+    dark = Pull.of(read_recording(blind[0], params.setup), params.setup)
+    assert release_pictures(dark, params.setup.fork_width) is None
+
+
+@pytest.mark.fires("frozen_pictures")
+def test_old_pictures_over_the_release_are_refused() -> None:
+    held = replace(SOUND, repeated=(-0.2, -0.1, -0.015))  # of a scene without noise
+    assert not list(of_release(held))
+    for odd in (
+        replace(SOUND, repeated=(0.053,)),
+        replace(SOUND, repeated=(0.01,)),
+        replace(SOUND, drawn=0.2, gone=0.23, earliest=0.18, latest=0.23, repeated=(0.1, 0.2)),
+    ):
+        (said,) = of_release(odd)
+        assert said.about == "frozen_pictures" and said.refused
+
+
+def test_a_band_that_is_never_let_go_is_refused(pull, params) -> None:
+    depth = pull.recording.depth
+    since = depth.seconds(pull.recording.origin) - pull.release.time
+    held = depth.values[int(np.searchsorted(since, -0.1))]
+    values = [held if time > -0.1 else one for time, one in zip(since, depth.values, strict=True)]
+    frozen = replace(pull.recording, depth=replace(depth, values=values))
+    found = release_pictures(replace(pull, recording=frozen), params.setup.fork_width)
+    assert found.never and found.beyond == 0 and found.frozen
+    for one in (found, replace(found, repeated=())):
+        (said,) = of_release(one)
+        assert said.refused
+
+
+@pytest.mark.fires("release_pictures", "smeared_pictures")
+def test_impossible_and_smeared_pictures_are_said() -> None:
+    late = replace(SOUND, drawn=0.06, gone=0.09, earliest=0.045, latest=0.09)
+    again = replace(SOUND, again=(0.15,))
+    smeared = replace(SOUND, faded=(0.4, 0.3, 0.1))
+    said = [one.about for odd in (late, again, smeared) for one in of_release(odd)]
+    assert said == ["release_pictures", "release_pictures", "smeared_pictures"]
+    assert not list(of_release(SOUND)) and np.isclose(SOUND.error, 0.05 / np.sqrt(12))

@@ -1,0 +1,50 @@
+"""The table of all checks of a recording in docs/faq.md.
+
+python tools/checks.py          # exit status 1 if the page is out of date
+python tools/checks.py --fix    # write it anew
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from pipeline.recording.checks.table import CHECKS  # noqa: E402
+from validation.marked import marks, with_block  # noqa: E402
+
+PAGE = ROOT / "docs" / "faq.md"
+HEADS = ("check", "compares", "uncertainty", "warns", "refuses", "remedy")
+
+
+def table() -> str:
+    """All rows as Markdown."""
+    rows = [HEADS, ("---",) * len(HEADS)]
+    rows += [
+        (f"`{one.name}`", one.compares, one.uncertainty, one.warns, one.refuses, one.remedy)
+        for one in CHECKS
+    ]
+    return "".join(f"| {' | '.join(cell or '–' for cell in row)} |\n" for row in rows)
+
+
+def drawn(page: str) -> str:
+    """The page with today's table."""
+    begin, end = marks("checks")
+    return with_block(page, begin + table() + end)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
+    parser.add_argument("--fix", action="store_true", help="write it anew")
+    page = PAGE.read_text(encoding="utf-8")
+    if parser.parse_args().fix:
+        PAGE.write_text(drawn(page), encoding="utf-8")
+        return 0
+    return int(drawn(page) != page)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,297 @@
+"""What becomes of the faults that labs report: corrected, reported, or silently wrong.
+
+    python -m validation.campaigns.field --orange FOLDER
+    python -m validation.campaigns.field --page     # the report's table into docs/recording.md
+
+Each fault of validation/recordings/faults.py is done to orange_2 in FOLDER and to a recording of
+the rig, in three sizes. What the checks say of it is kept; where no check of the fault's own
+concern speaks, the band is identified as if nothing were wrong, from the sound recording's values
+on, and compared with them. All sound recordings are checked too: each finding there is a false
+alarm. Results are lines of results.jsonl in --work: a run that was killed goes on from there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from collections import Counter
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import sling2sim2real as s2s
+from pipeline.base import errors
+from pipeline.base.environment import environment
+from pipeline.base.errors import UserError
+from pipeline.base.files import write_json, write_text
+from pipeline.base.layout import made
+from pipeline.params import Params, load
+from validation import orange
+from validation.campaigns import runner
+from validation.campaigns.runner import ResultLines, plain, result_of
+from validation.marked import marks, with_block
+from validation.recordings.faults import FAULTS
+from validation.rubbers import DEVELOP, SEALED, rubbers, with_rubbers
+
+WORK, REPORT = Path("data/field"), Path("reports/validation/field.json")
+PAGE, BLOCK = Path("docs/recording.md"), "field"
+SOUND = "none"  # the fault of a sound recording
+FAULTY = "orange_2", "band1_1001"  # what faults are done to
+ORANGE = "orange", "orange_2", "orange_3"
+RIG = tuple(f"band{band}_{seed}" for seed in (1001, 1002) for band in (1, 2, 3))
+RUBBERS = {name: seed for seed in (DEVELOP, SEALED) for name in rubbers(seed)}
+MODULUS, DAMPING = 0.025, 1.6  # share of E, factor of s·d, within which a value is right
+CORRECT, CAUTIONED, REFUSED = "correct", "cautioned", "refused"
+MISNAMED, SILENT = "misnamed", "silently wrong"
+OUTCOMES = CORRECT, CAUTIONED, REFUSED, MISNAMED, SILENT
+
+
+@dataclass(frozen=True)
+class Faulty:
+    """One recording with one fault; a sound one has no size."""
+
+    recording: str
+    fault: str
+    size: float
+
+
+def params_of(recording: str) -> tuple[Params, str]:
+    """Everything about a recording, and its band's name."""
+    if recording in ORANGE:
+        return orange.with_orange(load()), orange.NAME
+    band, _, seed = recording.partition("_")
+    if band in RUBBERS:
+        return with_rubbers(load(), RUBBERS[band], 0), band
+    params = load()
+    return params.model_copy(
+        update={"rig": params.rig.model_copy(update={"seed": int(seed)})}
+    ), band
+
+
+def recorded(recording: str, work: Path, folder: Path | None) -> Path:
+    """The file of a sound recording, which the rig records where it is missing."""
+    if recording in ORANGE:
+        if folder is None:
+            raise UserError(f"{recording}: give its folder, --orange")
+        return folder / f"{recording}.mcap"
+    path = work / f"{recording}.mcap"
+    if not path.exists():
+        from rig.recorder.record import record
+
+        params, band = params_of(recording)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        record(params, band, path)
+    return path
+
+
+def checked(path: Path, recording: str) -> tuple[list[dict], s2s.Episode | None]:
+    """What the checks find, each with its concern, and the episode where there is one."""
+    from pipeline.recording.build import episode_of, process_pull
+    from pipeline.recording.checks.table import CONCERNS
+    from pipeline.recording.input.reader import read_recording
+    from pipeline.recording.pulls import Pull
+
+    params, band = params_of(recording)
+    concern = {
+        check.name: one.__name__.rpartition(".")[2] for one in CONCERNS for check in one.CHECKS
+    }
+    try:
+        pull = Pull.of(read_recording(path, params.setup), params.setup)
+        done = process_pull(pull, params.bands[band], params)
+    except UserError as error:
+        text = str(error).removeprefix(f"{path}: ")
+        return [{"about": "", "concern": "", "what": text, "refused": True}], None
+    found = [
+        {"about": one.about, "concern": concern[one.about], "what": one.what, "refused": False}
+        for one in done.findings
+    ]
+    return found, episode_of(done, band, params)
+
+
+def identified(episode: s2s.Episode, recording: str, start: s2s.Model | None) -> s2s.Identification:
+    params, name = params_of(recording)
+    about = params.bands[name]
+    band = s2s.Band(about.mass, about.diameter, about.rest_length, name)
+    settings = s2s.Settings.default(setup=params.setup.model_dump())
+    return s2s.identify([episode], band, settings=settings, start=start)
+
+
+def told(found: s2s.Identification) -> dict:
+    """E [Pa] and s·d [s] with their intervals, and whether the fit converged."""
+    names = {"modulus": "youngs_modulus", "damping": "damping_product"}
+    values = {key: found.intervals[name] for key, name in names.items()}
+    return {key: [one.value, one.low, one.high] for key, one in values.items()} | {
+        "settled": found.settled
+    }
+
+
+def start_of(recording: str, episode: s2s.Episode | None, work: Path, folder: Path | None):
+    """The sound recording's identification, which is kept."""
+    path = work / f"{recording}.json"
+    if not path.exists():
+        if episode is None:
+            episode = checked(recorded(recording, work, folder), recording)[1]
+        assert episode is not None
+        path.parent.mkdir(parents=True, exist_ok=True)
+        identified(episode, recording, None).save(path)
+    return s2s.Identification.load(path)
+
+
+def tried(case: Faulty, work: Path, folder: Path | None) -> dict:
+    """What came of one recording."""
+    whole = recorded(case.recording, work, folder)
+    if case.fault == SOUND:
+        found, episode = checked(whole, case.recording)
+        if case.recording in FAULTY:
+            start_of(case.recording, episode, work, folder)
+        return {"findings": found}
+    from validation.recordings.streams import Bag
+
+    fault = FAULTS[case.fault]
+    with tempfile.TemporaryDirectory() as temporary:
+        path = Path(temporary) / "faulty.mcap"
+        bag = Bag.read(whole)
+        fault.make(bag, case.size)
+        bag.write(path)
+        del bag
+        found, episode = checked(path, case.recording)
+    if episode is None:
+        return {"findings": found, "outcome": REFUSED}
+    if any(one["concern"] in fault.concerns for one in found):
+        return {"findings": found, "outcome": CAUTIONED}
+    sound = start_of(case.recording, None, work, folder)
+    try:
+        values = told(identified(episode, case.recording, sound))
+    except UserError as error:
+        return {"findings": found, "outcome": REFUSED, "identification": str(error)}
+    right = is_right(told(sound), values)
+    outcome = CORRECT if right else MISNAMED if found else SILENT
+    return {"findings": found, "outcome": outcome, "values": values} | errors_of(sound, values)
+
+
+def is_right(sound: dict, values: dict) -> bool:
+    """Whether E and s·d are those of the sound recording, and their intervals hold them."""
+    near = abs(values["modulus"][0] / sound["modulus"][0] - 1) <= MODULUS
+    factor = values["damping"][0] / sound["damping"][0]
+    held = all(values[n][1] <= sound[n][0] <= values[n][2] for n in ("modulus", "damping"))
+    return near and 1 / DAMPING <= factor <= DAMPING and held
+
+
+def errors_of(sound: s2s.Identification, values: dict) -> dict:
+    right = told(sound)
+    return {
+        "modulus_error": values["modulus"][0] / right["modulus"][0] - 1,
+        "damping_factor": values["damping"][0] / right["damping"][0],
+    }
+
+
+def work_on(case: Faulty, work: Path, folder: Path | None) -> dict:
+    return result_of(case, partial(tried, case, work, folder))
+
+
+def cases_of(recordings: list[str], sound: list[str], faults: list[str]) -> list[Faulty]:
+    """Middle sizes first, then all sound recordings, then the largest and the smallest sizes."""
+
+    def of_size(place: int) -> list[Faulty]:
+        return [Faulty(r, name, FAULTS[name].sizes[place]) for r in recordings for name in faults]
+
+    whole = [Faulty(one, SOUND, 0.0) for one in dict.fromkeys([*recordings, *sound])]
+    return [*whole[:5], *of_size(1), *whole[5:], *of_size(2), *of_size(0)]
+
+
+def report(args: argparse.Namespace, cases: list[Faulty]) -> None:
+    """Write what the results in the work folder say."""
+    there = ResultLines(args.work / "results.jsonl").of(Faulty)
+    results: list[dict] = [there[case] for case in cases if case in there]
+    sound = [one for one in results if one["fault"] == SOUND]
+    faulty = [one for one in results if one["fault"] != SOUND]
+    if not results:
+        raise UserError(f"{args.work}: holds no result")
+    alarms = [
+        {"recording": one["recording"], **finding} for one in sound for finding in one["findings"]
+    ]
+    families = dict.fromkeys(one.family for one in FAULTS.values())
+    content = {
+        "kind": "virtual",
+        "asked": "What becomes of the faults that labs report: corrected, reported, or not.",
+        "settings": {"modulus_within": MODULUS, "damping_factor_within": DAMPING},
+        "cases": len(cases),
+        "done": len(results),
+        "sound_recordings": len(sound),
+        "false_alarms": alarms,
+        "counts": _counts(faulty),
+        "families": {name: _family(faulty, name) for name in families},
+        "results": results,
+        **environment("cpu", "python -m validation.campaigns.field --orange FOLDER"),
+    }
+    write_json(args.report, plain(content, 5))
+    print(f"{args.report}: {len(results)} of {len(cases)}, {content['counts']}", flush=True)
+    print(f"{len(alarms)} false alarms on {len(sound)} sound recordings")
+
+
+def _counts(results: list[dict]) -> dict[str, int]:
+    counted = Counter(one.get("outcome", "failed") for one in results)
+    return {
+        name: counted[name] for name in (*OUTCOMES, "failed") if counted[name] or name == SILENT
+    }
+
+
+def _family(results: list[dict], family: str) -> dict:
+    """Counts of a class, and the largest errors that nothing of its concern told of."""
+    own = [one for one in results if FAULTS[str(one["fault"])].family == family]
+    passed = [one for one in own if "modulus_error" in one]
+    factors = [max(one["damping_factor"], 1 / one["damping_factor"]) for one in passed]
+    return _counts(own) | {
+        "largest_modulus_error": max((abs(one["modulus_error"]) for one in passed), default=None),
+        "largest_damping_factor": max(factors, default=None),
+    }
+
+
+def block(content: dict) -> str:
+    """What docs/recording.md has between its marks, of a report's content."""
+    begin, end = marks(BLOCK)
+    rows = [
+        "| class | tried | corrected | reported | wrong, another check spoke | silently wrong |"
+        " largest undetected error of E, s·d |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name, one in content["families"].items():
+        tried = sum(one.get(outcome, 0) for outcome in (*OUTCOMES, "failed"))
+        counts = one.get(CORRECT, 0), one.get(CAUTIONED, 0) + one.get(REFUSED, 0)
+        counts += one.get(MISNAMED, 0), one.get(SILENT, 0)
+        error, factor = one["largest_modulus_error"], one["largest_damping_factor"]
+        largest = "–" if error is None else f"{100 * error:.1f} %, {factor:.2g} times"
+        if tried:
+            rows.append(f"| {name} | {tried} | {' | '.join(map(str, counts))} | {largest} |")
+    alarms = len(content["false_alarms"])
+    rows += ["", f"False alarms on {content['sound_recordings']} sound recordings: {alarms}."]
+    return begin + "\n".join(rows) + "\n" + end
+
+
+def main() -> None:
+    parser = runner.parser(str(__doc__), REPORT, WORK)
+    parser.add_argument("--orange", type=Path, help="folder of its recordings")
+    parser.add_argument("--report-only", action="store_true", help="of what is there")
+    parser.add_argument("--page", action="store_true", help=f"only write its table into {PAGE}")
+    parser.add_argument("--faults", nargs="+", default=[*FAULTS], help="(default: all)")
+    parser.add_argument("--minutes", type=float, default=1e4, help="at most (default: all of it)")
+    args = parser.parse_args()
+    if args.page:
+        content = json.loads(made(args.report).read_text(encoding="utf-8"))
+        write_text(PAGE, with_block(PAGE.read_text(encoding="utf-8"), block(content)))
+        return
+    faulty = [one for one in FAULTY if args.orange or one not in ORANGE]
+    sound = [*(ORANGE if args.orange else ()), *RIG, *(f"{name}_0" for name in RUBBERS)]
+    cases = cases_of(faulty, sound, args.faults)
+    if not args.report_only:
+        for recording in faulty:  # whose identification the others start from
+            start_of(recording, None, args.work, args.orange)
+        work = partial(work_on, work=args.work, folder=args.orange)
+        results = ResultLines(args.work / "results.jsonl")
+        runner.run(work, cases, results, args.workers, args.minutes)
+    report(args, cases)
+
+
+if __name__ == "__main__":
+    errors.run(main)

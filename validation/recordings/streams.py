@@ -1,0 +1,110 @@
+"""A ROS 2 recording as messages that can be changed, and written again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from rosbags.typesys import Stores, get_typestore
+
+from pipeline.base.files import replacing
+
+STORE = get_typestore(Stores.ROS2_HUMBLE)
+FORCE, POSE, GRIPPER = "WrenchStamped", "PoseStamped", "JointState"
+IMAGE, INFO, FRAMES = "CompressedImage", "CameraInfo", "TFMessage"
+
+
+@dataclass
+class Message:
+    """One message, decoded; times in ns."""
+
+    topic: str
+    type: str
+    log: int
+    content: Any
+
+    @property
+    def stamp(self) -> int:
+        at = self.content.header.stamp
+        return at.sec * 10**9 + at.nanosec
+
+    @stamp.setter
+    def stamp(self, value: int) -> None:
+        at = self.content.header.stamp
+        at.sec, at.nanosec = int(value // 10**9), int(value % 10**9)
+
+
+@dataclass
+class Bag:
+    """All messages of a file in which one arm pulls one band before one camera."""
+
+    messages: list[Message] = field(default_factory=list)
+
+    @classmethod
+    def read(cls, path: Path) -> Bag:
+        found = []
+        with path.open("rb") as file:
+            for schema, channel, one in make_reader(file).iter_messages(log_time_order=False):
+                assert schema is not None
+                content = STORE.deserialize_cdr(one.data, schema.name)
+                found.append(Message(channel.topic, schema.name, one.log_time, content))
+        return cls(found)
+
+    def write(self, path: Path) -> None:
+        with replacing(path) as temporary, temporary.open("wb") as file:
+            writer, channels = Writer(file), {}
+            writer.start("ros2", "validation")
+            for one in sorted(self.messages, key=lambda message: message.log):
+                if (one.topic, one.type) not in channels:
+                    definition = STORE.generate_msgdef(one.type)[0].encode()
+                    schema = writer.register_schema(one.type, "ros2msg", definition)
+                    channel = writer.register_channel(one.topic, "cdr", schema)
+                    channels[one.topic, one.type] = channel
+                data = bytes(STORE.serialize_cdr(one.content, one.type))
+                writer.add_message(channels[one.topic, one.type], one.log, data, one.log)
+            writer.finish()
+
+    def of(self, kind: str, word: str = "") -> list[Message]:
+        """Of a type, on topics that hold a word, by stamp."""
+        found = [m for m in self.messages if m.type.endswith(f"/{kind}") and word in m.topic]
+        return found if kind == FRAMES else sorted(found, key=lambda message: message.stamp)
+
+    @property
+    def robot(self) -> list[Message]:
+        return [*self.of(FORCE), *self.of(POSE), *self.of(GRIPPER)]
+
+    @property
+    def camera(self) -> list[Message]:
+        return [*self.of(IMAGE), *self.of(INFO)]
+
+    @property
+    def start(self) -> int:
+        """The first force's stamp [ns]."""
+        return self.of(FORCE)[0].stamp
+
+    def seconds(self, messages: list[Message]) -> np.ndarray:
+        """Stamps since the first force [s], shape (S,)."""
+        return 1e-9 * np.array([one.stamp - self.start for one in messages])
+
+    @property
+    def force(self) -> np.ndarray:
+        """Shape (S, 3) [N]."""
+        told = [one.content.wrench.force for one in self.of(FORCE)]
+        return np.array([[force.x, force.y, force.z] for force in told])
+
+    @force.setter
+    def force(self, values: np.ndarray) -> None:
+        for one, value in zip(self.of(FORCE), values, strict=True):
+            force = one.content.wrench.force
+            force.x, force.y, force.z = map(float, value)
+
+    @property
+    def release(self) -> float:
+        """When the force falls fastest [s]."""
+        size = np.linalg.norm(self.force - self.force[:200].mean(axis=0), axis=1)
+        fall = size[:-20] - size[20:]
+        return float(self.seconds(self.of(FORCE))[int(fall.argmax()) + 10])

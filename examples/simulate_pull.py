@@ -18,7 +18,7 @@ THETA = s2s.Theta(
     elasticity_damping=2.4e-3,  # s
     dynamic_friction=0.7,
     damping_scale=0.6,
-    mooney_share=0.3,  # these two make the material a rubber, which relaxes while it is held
+    mooney_share=0.3,  # with one of these the material is a rubber, which relaxes while it is held
     relaxation=0.02,
 )
 

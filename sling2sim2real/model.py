@@ -109,6 +109,10 @@ class Theta:
     def __post_init__(self) -> None:
         for one in fields(self):
             object.__setattr__(self, one.name, _plain(getattr(self, one.name)))
+        if self.law == RUBBER:  # what is not given of it is none
+            for name in ADDED:
+                if getattr(self, name) is None:
+                    object.__setattr__(self, name, 0.0)
         try:
             ThetaFile.model_validate(self.content("band", LaunchHistory(1.0, 0.0)))
         except ValidationError as error:

@@ -109,7 +109,12 @@ def test_says_the_pull_and_pause_that_rubber_takes_for_granted(root) -> None:
     """The recording's, but for what params.yaml asks of a launch."""
     file = root / "data/theta/toy/none.json"
     before = file.read_text()
-    theta = json.loads(before)["theta"] | {"mooney_share": 0.3, "relaxation": 0.02}
+    theta = json.loads(before)["theta"] | {
+        "mooney_share": 0.3,
+        "upturn": 0.0,
+        "softening": 0.0,
+        "relaxation": 0.02,
+    }
     history = {"pull_time": 4.0, "pause": 2.0}
     rubber = {"band": "toy", "law": "rubber", "theta": theta, "history": history}
     plain = shoot(root, 1.925)

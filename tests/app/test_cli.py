@@ -249,7 +249,7 @@ def test_launch_prints_one_json_object(tmp_path: Path, sling: Callable) -> None:
     broken = json.loads(done.stdout)
     assert broken["landing_y_m"] is None
     assert "N, more than" in broken["failure"]
-    more = {"mooney_share": 0.3, "relaxation": 0.02}
+    more = {"mooney_share": 0.3, "upturn": 0.0, "softening": 0.0, "relaxation": 0.02}
     history = {"pull_time": 3.5, "pause": 2.0}
     rubber = {"band": "band1", "law": "rubber", "theta": SOFT | more, "history": history}
     theta.write_text(json.dumps(rubber))

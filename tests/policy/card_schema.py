@@ -40,7 +40,12 @@ FIVE = {
     "dynamic_friction": NOT_NEGATIVE,
     "damping_scale": {**NOT_NEGATIVE, "maximum": 1},
 }
-RUBBER = {"mooney_share": NUMBER, "relaxation": NOT_NEGATIVE}
+RUBBER = {
+    "mooney_share": NUMBER,
+    "upturn": NOT_NEGATIVE,
+    "softening": NOT_NEGATIVE,
+    "relaxation": NOT_NEGATIVE,
+}
 SECOND = {"type": ["number", "null"]}
 HAND = exactly(pull_time_s=POSITIVE, pause_s=NOT_NEGATIVE, second_more_m=SECOND)
 READ_BETWEEN = exactly(draws=COUNT, mean_error_m=ERROR, max_error_m=ERROR)

@@ -132,11 +132,12 @@ def test_history_of_a_recording():
     position = np.outer(way, [0.0, -0.4, -0.1])
     position[time < 1.5] = [0.0, -0.1, -0.3]
     position[time > 8] = [0.0, -0.5, -0.1]
-    episode = SimpleNamespace(time=time, position=position, release_time=8.0)
+    episode = SimpleNamespace(time=time, position=position, grasp_time=1.0, release_time=8.0)
     episode.band = "test"
     found = launch_history(episode)
     assert found["pull_time"] == pytest.approx(4.0, abs=0.1)
     assert found["pause"] == pytest.approx(2.0, abs=0.1)
+    assert found["deepest"] == pytest.approx(np.hypot(0.4, 0.1), abs=1e-6)
     assert launch_history(SimpleNamespace(**vars(episode) | {"release_time": 1e6}))["pause"] <= 1e5
     for release in (-1.0, 8.0):
         still = vars(episode) | {"release_time": release, "position": 0 * position}

@@ -59,13 +59,16 @@ def test_the_drag_comes_back(tmp_path: Path) -> None:
 
 
 def test_the_law_rubber_names_its_parameters(tmp_path: Path) -> None:
-    file, rubber = tmp_path / "theta.json", {"mooney_share": 0.3, "relaxation": 0.02}
-    history = {"pull_time": 4.0, "pause": 2.0}
+    file, rubber = (
+        tmp_path / "theta.json",
+        {"mooney_share": 0.3, "upturn": 0.0, "softening": 0.1, "relaxation": 0.02},
+    )
+    history = {"pull_time": 4.0, "pause": 2.0, "deepest": 0.3}
     whole = {"band": "red", "law": "rubber", "theta": SOFT | rubber, "history": history}
     file.write_text(json.dumps(whole))
     content = load_theta(file, "red")
     found = parameters_of(content)
-    assert found.values.tolist() == [[*SOFT.values(), 0.3, 0.02, 0.0, 0.0, 1.0]]
+    assert found.values.tolist() == [[*SOFT.values(), 0.3, 0.0, 0.1, 0.02, 0.0, 0.0, 1.0]]
     assert found.theta.tolist() == [list(SOFT.values())]
     written = content_of(found, LaunchHistory(**history))
     assert (written["law"], written["theta"], written["history"]) == (

@@ -18,7 +18,7 @@ START = {"mooney_share": 0.2, "upturn": 0.05, "softening": 0.1, "relaxation": 0.
 
 
 @dataclass(frozen=True)
-class Fit:
+class CurveFit:
     """Values by name; what is left of the stress over its peak, shape (n,)."""
 
     values: dict[str, float]
@@ -45,7 +45,7 @@ def history(stretch: np.ndarray, time: np.ndarray, values: dict[str, float]) -> 
     return total
 
 
-def shape_of(curve: Curve, slack: float = 0.0) -> Fit:
+def shape_of(curve: Curve, slack: float = 0.0) -> CurveFit:
     """Modulus, share, upturn and up to `slack` of the stretch, of a pull without a history."""
     peak = curve.stress.max()
     low = [1e-6 * peak, REACH["mooney_share"][0], REACH["upturn"][0], 0.0]
@@ -58,7 +58,7 @@ def shape_of(curve: Curve, slack: float = 0.0) -> Fit:
     begin = [peak / 2, START["mooney_share"], START["upturn"], slack / 2]
     found = least_squares(left, begin, bounds=(low, high), x_scale=[peak, 0.1, 0.05, 0.01])
     names = "shear_modulus", "mooney_share", "upturn", "slack"
-    return Fit(dict(zip(names, map(float, found.x), strict=True)), found.fun)
+    return CurveFit(dict(zip(names, map(float, found.x), strict=True)), found.fun)
 
 
 def noise_of(curve: Curve) -> float:
@@ -67,7 +67,7 @@ def noise_of(curve: Curve) -> float:
     return float(100 * np.sqrt(np.mean(bent**2) / 6) / curve.stress.max())
 
 
-def memory_of(curves: list[Curve], names: tuple[str, ...] = NAMES) -> list[Fit]:
+def memory_of(curves: list[Curve], names: tuple[str, ...] = NAMES) -> list[CurveFit]:
     """One modulus and one value of each of `names` for histories of one material."""
     peak = max(curve.stress.max() for curve in curves)
 
@@ -89,7 +89,7 @@ def memory_of(curves: list[Curve], names: tuple[str, ...] = NAMES) -> list[Fit]:
         x_scale=[peak, *(0.1 for _ in names)],
     )
     told = {"shear_modulus": float(found.x[0]), **{k: float(v) for k, v in values(found.x).items()}}
-    return [Fit(told, one) for one in left(found.x)]
+    return [CurveFit(told, one) for one in left(found.x)]
 
 
 def biaxial(rows: np.ndarray, shape: tuple[float, float]) -> np.ndarray:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from pipeline.params import Params
-from pipeline.params.identification import ParameterBoxes, parameter_names
+from pipeline.params.identification import LAWS, ParameterBoxes, parameter_names
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN
 
@@ -46,9 +46,9 @@ class SearchBox:
 
         A method's `bounds` take the place of a parameter's own, and say those of what its law adds.
         """
-        own, bounds = dict(boxes), bounds or {}
-        names = parameter_names(law)
-        ends = [bounds[n] if n in bounds else (own[n].low, own[n].high) for n in names]
+        own, names = dict(boxes), parameter_names(law)
+        ends = LAWS[law] | {n: (one.low, one.high) for n, one in boxes} | dict(bounds or {})
+        ends = [ends[name] for name in names]
         low, high = np.array(ends, float).T
         log = np.array([name in own and own[name].scale == "log" for name in names])
         return cls(names, low, high, log, law, dict(fixed or {}))

@@ -81,9 +81,9 @@ class ThetaFile(JsonRecord):
     @model_validator(mode="after")
     def _keys_of_its_law(self) -> ThetaFile:
         wanted, given = set(LAWS[self.law]), self.theta.model_fields_set - {*THETA}
-        if not given <= wanted:
+        if wanted != given:
             names = ", ".join((*THETA, *LAWS[self.law]))
-            raise refusal(f"theta: of the law {self.law} it has {names}, and nothing else")
+            raise refusal(f"theta: of the law {self.law} it must have exactly {names}")
         if self.law == RUBBER and self.history is None:
             raise refusal("history: {pull_time, pause} is missing, which the law rubber needs")
         return self

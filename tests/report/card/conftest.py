@@ -29,7 +29,9 @@ THETA = {
     "dynamic_friction": 0.7,
     "damping_scale": 0.6,
     "mooney_share": 0.2,
-    "relaxation": 0.02,
+    "upturn": 0.05,
+    "softening": 0.0,
+    "relaxation": 0.04,
 }
 POINT = {**THETA, "air_drag": 0.3, "turn_damping": 0.2, "returned_share": 1.0}
 SPREAD = {"youngs_modulus": 0.02, "elasticity_damping": 0.3, "returned_share": 0.015}

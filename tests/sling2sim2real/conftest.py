@@ -22,7 +22,7 @@ def band() -> Band:
 
 @pytest.fixture(scope="session")
 def world(band, settings) -> Model:
-    theta = Theta(2.2e5, 0.47, 2.4e-3, 0.7, 0.6, mooney_share=0.3, relaxation=0.01)
+    theta = Theta(2.2e5, 0.47, 2.4e-3, 0.8, 0.6, mooney_share=0.3, relaxation=0.01)
     return Model(band, theta, settings=settings)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.optimize import least_squares
 
@@ -32,6 +31,7 @@ from validation.simulator.experiment import (
 )
 from validation.simulator.finding import Bench, Measure, Theme, off
 from validation.simulator.reference import ReferenceRod
+from validation.simulator.rubber_string import integral, left_of, relaxed_share, slope, stress
 
 SHAPES = (-0.3, 0.2), (0.3, 0.0), (0.9, 0.05)  # Mooney's share and the upturn
 BOX = {
@@ -62,33 +62,6 @@ def own(
     """Parameters that the law has of its own."""
     names = "mooney_share", "upturn", "softening", "relaxation"
     return dict(zip(names, (*shape, softening, relaxation), strict=True))
-
-
-def stress(stretch, shape: tuple[float, float]):
-    """Biderman (1958), over the shear modulus, incompressible: C10, C01 and C20."""
-    share, upturn = shape
-    first = stretch**2 + 2 / stretch - 3
-    c10, c01, c20 = (1 - share) / 2, share / 2, upturn / 4
-    return 2 * (stretch - stretch**-2) * (c10 + 2 * c20 * first + c01 / stretch)
-
-
-def slope(stretch: float, shape: tuple[float, float]) -> float:
-    step = 1e-5
-    return float(stress(stretch + step, shape) - stress(stretch - step, shape)) / (2 * step)
-
-
-def left_of(stretch: float, most: float, shape: tuple[float, float], softening: float) -> float:
-    """Share of `stress` that is left after a stretch of `most`, by works that are integrated."""
-    done, worst = (quad(stress, 1, one, args=(shape,))[0] for one in (stretch, most))
-    gap = 1 - done / worst
-    return 1 - 2.05 * softening * gap**2 / (gap**2 + gap + 0.05)
-
-
-def relaxed_share(relaxation: float) -> tuple[float, float]:
-    """What never relaxes of Young's modulus, and a branch's share of that."""
-    weight = relaxation * np.log10(1e4 / 3e-3) / 7
-    left = 1 - weight * sum(np.exp(-10 / time) for time in TIMES)
-    return left, weight / left
 
 
 def _string(bench: Bench, lighter: float = 1.0) -> ClampedBand:
@@ -159,24 +132,6 @@ def cycle(bench: Bench, most: float = 1.8, softening: float = SOFTENING) -> list
     ]
 
 
-def integral(history, time: float, shape: tuple[float, float]) -> float:
-    """Relaxed stress and what eight branches add of its rates: the hereditary integral."""
-    left, weight = relaxed_share(RELAXATION)
-
-    def rate(then: float) -> float:
-        step = 1e-6
-        return (stress(history(then + step), shape) - stress(history(then - step), shape)) / (
-            2 * step
-        )
-
-    def kernel(then: float) -> float:
-        return rate(then) * np.exp((then - time) / TIMES).sum()
-
-    corners = [one for one in (0.2, 0.5) if one < time]
-    added = quad(kernel, 0, time, points=corners, limit=400, epsabs=1e-7)[0]
-    return left * (stress(history(time), shape) + weight * added)
-
-
 def relaxation(bench: Bench, shape=SHAPE, most: float = 1.6) -> list[Measure]:
     """A step of 0.2 s held for 3 s, and a loop out and back in 1 s."""
     ramp, turn = 0.2, 0.5
@@ -191,7 +146,7 @@ def relaxation(bench: Bench, shape=SHAPE, most: float = 1.6) -> list[Measure]:
         beside = own(shape, softening=0.0)
         got, at = drawn_across(bench, _string(bench, 10.0), stretch, times, **beside)
         chosen = np.flatnonzero((at > first) & (stretch[1:] > 1.05))[::40]
-        told = np.array([integral(history, at[k], shape) for k in chosen])
+        told = np.array([integral(history, at[k], shape, RELAXATION) for k in chosen])
         worst = 100 * np.abs(got[chosen] - told).max() / told.max()
         checks.append(
             Measure(

@@ -150,7 +150,7 @@ class Laboratory:
 
 @pytest.mark.slow
 def test_each_number_changes_what_it_should(params, tmp_path, monkeypatch) -> None:
-    rough = {"edges": 8, "tolerance": 1e-2}
+    rough = {"edges": 8, "tolerance": 1e-2, "draws": {}}  # of draws: test_draw.py
     eyes = {"drop_rate": 0.3, "dropout": 0.01}  # few frames, few pixels: let chance have its way
     rough["camera"] = params.rig.camera.model_copy(update=eyes)
     rough["bands"] = {"band1": params.rig.bands["band1"].model_copy(update=RUBBER)}

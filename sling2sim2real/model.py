@@ -45,7 +45,7 @@ class Band:
         diameter: Unstretched [m].
         rest_length: Between the clamps, without force [m].
         name: Stands in messages and in episodes.
-        preconditioned: Its largest draw before it was recorded [m]; True: as far as the arm goes.
+        preconditioned: Its largest draw before it was recorded [m]; True: farther than any since.
     """
 
     mass: float

@@ -61,7 +61,7 @@ def add_band(
         "rest_length": rest_length,
     }
     known = name in before.bands
-    if known and before.bands[name].model_dump() != band:
+    if known and before.bands[name].model_dump(include={*band}) != band:
         raise UserError(
             f"{params_path}: bands.{name} is there already with other values: choose another name,"
             f" or correct it (`sling fit --name {name} --mass ...`)"

@@ -13,6 +13,7 @@ from pipeline.simulator import tetrahedra
 from pipeline.simulator.rubber import NEO_HOOKEAN
 
 GRAVITY = 9.81
+FAR = 1.0  # m, farther than a band is drawn
 CYLINDER_DRAG = 1.1  # across the wind, at Reynolds numbers of 1e3 to 1e4 (Wieselsberger 1921)
 ROD, TETRAHEDRA = "rod", "tetrahedra"  # meshes: rod.h, tetrahedra.h
 
@@ -20,8 +21,7 @@ ROD, TETRAHEDRA = "rod", "tetrahedra"  # meshes: rod.h, tetrahedra.h
 class BandSizes(Protocol):
     """What a scale and a ruler say of a band: mass between the clamps, diameter, length [kg, m].
 
-    `preconditioned`: its largest draw before it was recorded [m], or that it was drawn as far as
-    the arm draws it.
+    `preconditioned`: its largest draw before it was recorded [m], or True for farther than any.
     """
 
     @property
@@ -177,10 +177,8 @@ class ClampedBand:
             law=law,
         )
         before = band.preconditioned
-        if isinstance(before, bool):
-            reach = np.hypot(np.abs(setup.draw_y).max(), np.abs(setup.draw_z).max())
-            before = before * float(reach)
-        return replace(made, stretched=float(made.drawn(np.array(before))))
+        drawn = FAR * before if isinstance(before, bool) else before
+        return replace(made, stretched=float(made.drawn(np.array(drawn))))
 
     def drawn(self, distance: np.ndarray) -> np.ndarray:
         """Stretch (...) of straight halves that are drawn so far from the fork [m], 1 if slack."""

@@ -23,9 +23,9 @@ def test_the_sets_fill_the_box_of_each_law(bench) -> None:
     sets = random_parameters.random_sets(bench, RUBBER, 500)
     points = np.stack([sets.column(name) for name in parameter_names(RUBBER)], axis=1)
     boxes = [(box.low, box.high) for _, box in bench.params.parameters]
-    boxes += [(-0.3, 0.9), (0.0, 0.05)]
+    boxes += [(-0.3, 0.9), (0.0, 0.3), (0.0, 0.6), (0.0, 0.1)]
     low, high = np.array(boxes).T
-    assert points.shape == (500, 7)
+    assert points.shape == (500, 9)
     assert ((low <= points) & (points <= high)).all()
     assert (np.ptp(points[:, 5:], axis=0) > 0.9 * (high - low)[5:]).all()
     assert len(random_parameters.random_sets(bench, NEO_HOOKEAN, 3)) == 3

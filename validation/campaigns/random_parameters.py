@@ -3,8 +3,8 @@
     python -m validation.campaigns.random_parameters --count 10000
     python -m validation.campaigns.random_parameters --count 100000 --device cuda:0
 
-The sets fill the box of params.yaml, and for the law `rubber` the bounds of our method. Half of the
-rollouts have pads that hold anything, half those of the setup; as many launches go with them.
+The sets fill the box of params.yaml, and of the law `rubber` that of the simulator's checks. Half
+of the rollouts have pads that hold anything, half those of the setup; as many launches go with them.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from pipeline.params.identification import LAWS
 from pipeline.simulator.parameters import Parameters
 from pipeline.simulator.rubber import NEO_HOOKEAN, RUBBER
 from validation.benchmarks.timing import timed
-from validation.campaigns.runner import OURS
 from validation.simulator.agreement import random_thetas
 from validation.simulator.experiment import band_of
 from validation.simulator.finding import Bench
 from validation.simulator.robustness import HELD_FAST, SEED, survey, survey_launches
+from validation.simulator.rubber import BOX
 
 BATCH = 2_000
 REPORT = "reports/validation/random-parameters-{}.json"
@@ -36,8 +36,7 @@ REPORT = "reports/validation/random-parameters-{}.json"
 
 def random_sets(bench: Bench, law: str, count: int) -> Parameters:
     """`count` random ones of the box."""
-    bounds = bench.params.methods[OURS].bounds  # of the law `rubber`
-    boxes = np.array([bounds[name] for name in LAWS[law]]).reshape(-1, 2)
+    boxes = np.array([BOX[name] for name in LAWS[law]]).reshape(-1, 2)
     own = np.random.default_rng(SEED).uniform(*boxes.T, (count, len(boxes)))
     others = dict(zip(LAWS[law], own.T, strict=True))
     return Parameters.of(law, random_thetas(bench, count, SEED), **others)

@@ -4,7 +4,7 @@
     python -m validation.campaigns.random_parameters --count 100000 --device cuda:0
 
 The sets fill the box of params.yaml, and of the law `rubber` that of the simulator's checks. Half
-of the rollouts have pads that hold anything, half those of the setup; as many launches go with them.
+of the rollouts have pads that hold anything, half those of the setup; as many launches go along.
 """
 
 from __future__ import annotations

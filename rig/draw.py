@@ -6,30 +6,37 @@ recording draws its pads, clocks and camera errors anew, and no assumption can b
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from pipeline.base.schema import Section
     from pipeline.params import Params
 
-Part = TypeVar("Part", bound="Section")
 STREAM = 7  # of the seed, apart from those of noise
 OF_LAUNCHES = ("projectile_drag",)
 
 
 def drawn(params: Params, band: str, *, launching: bool = False) -> Params:
     """`params` with the numbers of a band's recording, or its launches, each within its range."""
-    rig = params.rig
+    rig, values = params.rig, {}
     for key, (low, high) in rig.draws.items():
         if (key in OF_LAUNCHES) == launching:
             rng = np.random.default_rng([rig.seed, STREAM, *band.encode(), *key.encode()])
-            rig = _with(rig, key.split("."), float(f"{rng.uniform(low, high):.4g}"))
-    return params.model_copy(update={"rig": rig})
+            values[f"rig.{key}"] = float(f"{rng.uniform(low, high):.4g}")
+    return cast("Params", _Overlaid(params, values))
 
 
-def _with(section: Part, path: list[str], value: float) -> Part:
-    name, *rest = path
-    inner = _with(getattr(section, name), rest, value) if rest else value
-    return section.model_copy(update={name: inner})
+class _Overlaid:
+    """A section with some other values; it reads of what is below no more than is asked for."""
+
+    def __init__(self, section: object, values: dict[str, float], path: str = "") -> None:
+        self._section, self._values, self._path = section, values, path
+
+    def __getattr__(self, name: str) -> Any:
+        below, path = getattr(self._section, name), f"{self._path}{name}"
+        if path in self._values:
+            return self._values[path]
+        if any(key.startswith(f"{path}.") for key in self._values):
+            return _Overlaid(below, self._values, f"{path}.")
+        return below

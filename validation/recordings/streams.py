@@ -88,7 +88,8 @@ class Bag:
 
     def seconds(self, messages: list[Message]) -> np.ndarray:
         """Stamps since the first force [s], shape (S,)."""
-        return 1e-9 * np.array([one.stamp - self.start for one in messages])
+        start = self.start
+        return 1e-9 * np.array([one.stamp - start for one in messages])
 
     @property
     def force(self) -> np.ndarray:

@@ -159,9 +159,10 @@ def depth_scaled(bag: Bag, factor: float) -> None:
 
 def focal_off(bag: Bag, percent: float) -> None:
     for one in bag.of(INFO):
-        for matrix, places in ((one.content.k, (0, 4)), (one.content.p, (0, 5))):
-            for place in places:
-                matrix[place] *= 1 + percent / 100
+        for name, places in (("k", (0, 4)), ("p", (0, 5))):
+            matrix = np.array(getattr(one.content, name))
+            matrix[list(places)] *= 1 + percent / 100
+            setattr(one.content, name, matrix)
 
 
 def camera_moved(bag: Bag, mm: float) -> None:

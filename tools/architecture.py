@@ -6,7 +6,6 @@ python tools/architecture.py --fix    # draw it anew
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -16,9 +15,9 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from pipeline.base.code import CODE, concern, imports  # noqa: E402
+from validation.marked import compared_or_fixed, marks, with_block  # noqa: E402
 
 PAGE = ROOT / "docs" / "architecture.md"
-BEGIN, END = "<!-- imports: begin -->\n", "<!-- imports: end -->\n"
 WHOLE = (
     "stages",
     "app",
@@ -66,19 +65,9 @@ def name(folder: str) -> str:
 
 def drawn(page: str) -> str:
     """The page with today's diagram."""
-    head, _, rest = page.partition(BEGIN)
-    return head + BEGIN + diagram() + END + rest.partition(END)[2]
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--fix", action="store_true", help="draw it anew")
-    page = PAGE.read_text(encoding="utf-8")
-    if parser.parse_args().fix:
-        PAGE.write_text(drawn(page), encoding="utf-8")
-        return 0
-    return int(drawn(page) != page)
+    begin, end = marks("imports")
+    return with_block(page, begin + diagram() + end)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(compared_or_fixed(PAGE, drawn, __doc__))

@@ -6,7 +6,6 @@ python tools/checks.py --fix    # write it anew
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -14,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from pipeline.recording.checks.table import CHECKS  # noqa: E402
-from validation.marked import marks, with_block  # noqa: E402
+from validation.marked import compared_or_fixed, marks, with_block  # noqa: E402
 
 PAGE = ROOT / "docs" / "faq.md"
 HEADS = ("check", "compares", "uncertainty", "warns", "refuses", "remedy")
@@ -36,15 +35,5 @@ def drawn(page: str) -> str:
     return with_block(page, begin + table() + end)
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
-    parser.add_argument("--fix", action="store_true", help="write it anew")
-    page = PAGE.read_text(encoding="utf-8")
-    if parser.parse_args().fix:
-        PAGE.write_text(drawn(page), encoding="utf-8")
-        return 0
-    return int(drawn(page) != page)
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(compared_or_fixed(PAGE, drawn, __doc__))

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 import re
+from collections.abc import Callable
+from pathlib import Path
 
 from pipeline.base.errors import UserError
 
@@ -24,3 +27,19 @@ def with_block(page: str, block: str) -> str:
         raise UserError(f"the page has not one {begin.strip()} and one {end.strip()}")
     head, rest = page.split(begin)
     return head + block + rest.split(end)[1]
+
+
+def compared_or_fixed(page: Path, drawn: Callable[[str], str], about: str | None) -> int:
+    """The command of a page with a drawn block: exit status 1 if it is out of date, or `--fix`.
+
+    Args:
+        drawn: The page's text with today's block.
+        about: The script's docstring.
+    """
+    parser = argparse.ArgumentParser(description=str(about).partition("\n")[0])
+    parser.add_argument("--fix", action="store_true", help="write it anew")
+    text = page.read_text(encoding="utf-8")
+    if parser.parse_args().fix:
+        page.write_text(drawn(text), encoding="utf-8")
+        return 0
+    return int(drawn(text) != text)

@@ -195,10 +195,20 @@ class Gripper(Section):
         return self
 
 
+class Dip(Section):
+    """The drawn band is let back by some way and drawn again, which shows how it unloads."""
+
+    at: Annotated[float, Range(0.1, 1)]  # share of the draw where it begins and ends
+    depth: Annotated[float, Range(0.01, 1)]  # way back towards the fork
+    out_time: Annotated[float, Range(0.05, 20)]
+    back_time: Annotated[float, Range(0.05, 20)]
+
+
 class PlanParams(Section):
-    """What it asks of the episode is checked by `sling plan`, which alone reads it."""
+    """How a robot records a band: read by `sling plan`, and by the virtual rig for its dips."""
 
     draw: Annotated[tuple[DrawY, DrawZ], LIST]
+    dips: Annotated[tuple[Dip, ...], LIST]
     max_speed: Speed
     pull_speed: Speed
     max_acceleration: Annotated[float, Range(0.05, 30)]

@@ -91,7 +91,7 @@ def found(
         best = identified.evaluations.best()
         told = {"loss": {name: best[name] for name in (*TERMS, "total")}}
         return Calibrated(sling, setup, identified.theta), told
-    told = posterior.confidence(density, params.parameters)
+    told = posterior.confidence(density)
     return Calibrated(sling, setup, density.mode, density.parameters), told
 
 

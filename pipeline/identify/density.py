@@ -34,6 +34,6 @@ def evaluated_mode(
 def estimate_of(params: Params, density: Identified, explored: History) -> dict:
     """The entries of the θ file that no table of evaluations holds."""
     return theta_entries(density) | {
-        "confidence": confidence(density, params.parameters),
+        "confidence": confidence(density),
         "rollouts": len(explored.total) + density.rollouts,
     }

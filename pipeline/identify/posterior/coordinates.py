@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import truncnorm
 
 from pipeline.params import Params
 from pipeline.params.identification import LAWS
@@ -24,6 +25,12 @@ from pipeline.simulator.parameters import THETA, Parameters
 YOUNG, POISSON, DAMPING, FRICTION, SCALE = range(5)
 LOGS = "log_youngs_modulus", "log_loss_factor"  # of Pa
 RETURNED = "log_returned_share"
+SHOWN_BY = {  # coordinates of parameters that have another name
+    "youngs_modulus": LOGS[0],
+    "elasticity_damping": LOGS[1],
+    "damping_product": LOGS[1],
+    "returned_share": RETURNED,
+}
 STEPS = {  # of finite differences
     "log_youngs_modulus": 0.005,
     "log_loss_factor": 0.05,
@@ -35,13 +42,15 @@ STEPS = {  # of finite differences
     "turn_damping": 0.1,
     "log_returned_share": 0.01,
 }
+# Of 9 in 10 natural and silicone rubbers at 10 to 100 Hz, by
+# https://materialmap.github.io/rubber_damping_reference.html.
+# A band with both ends held swings at pi c/L, where its damping s d makes tan delta = pi s d c/L.
+TAN_DELTA = 0.05, 0.30
 MOST_DRAG, MOST_LOST = 8.0, 0.3  # 1/s, of a logarithm
 PRIORS = {  # mean and standard deviation of Gaussians
-    "log_loss_factor": (
-        np.log(0.06),
-        0.35,
-    ),  # of the rubbers that validation/rubbers.py DEVELOPs on
-    "softening": (0.1, 0.1),  # gum to filled: Diani et al., 10.1016/j.eurpolymj.2008.11.017
+    "log_loss_factor": (np.log(np.sqrt(np.prod(TAN_DELTA)) / np.pi), np.log(6) / 2 / 1.645),
+    # a half-normal, from gum to filled: Diani et al., 10.1016/j.eurpolymj.2008.11.017
+    "softening": (0.0, 0.15),
     "air_drag": (0.0, 1.0),  # a half-normal: little beside the cylinder's drag
     "log_returned_share": (0.0, 0.015),  # the law's discrepancy, common to a band's launches
 }
@@ -93,6 +102,21 @@ class Coordinates:
     def steps(self) -> np.ndarray:
         """Of finite differences, shape (D,)."""
         return np.array([STEPS[name] for name in self.names])
+
+    def prior(self, level: float) -> np.ndarray:
+        """Ends of the central `level` of each coordinate's prior, shape (2, D)."""
+        parts = np.array([[1 - level], [1 + level]]) / 2
+        ends = self.low + parts * (self.high - self.low)
+        known = self.precision > 0
+        mean, spread = self.expected[known], self.precision[known] ** -0.5
+        low, high = ((end[known] - mean) / spread for end in (self.low, self.high))
+        ends[:, known] = truncnorm.ppf(parts, low, high, mean, spread)
+        return ends
+
+    def shows(self, name: str) -> int | None:
+        """Number of the coordinate that a parameter shows; None: it is fixed."""
+        coordinate = SHOWN_BY.get(name, name)
+        return self.names.index(coordinate) if coordinate in self.names else None
 
     def parameters(self, phi: np.ndarray) -> Parameters:
         """N parameters of coordinates (N, D)."""

@@ -16,6 +16,7 @@ from pipeline.identify.posterior.coordinates import PRIORS
 
 LOGS = "youngs_modulus", "elasticity_damping", "returned_share"  # whose logarithms are Gaussian
 HALF_NORMAL = 1 - 2 / np.pi  # its variance, of a normal's
+HALF = "air_drag", "softening"  # are not below 0
 LEAST = 1e-9  # of a column that the samples vary
 
 
@@ -100,6 +101,7 @@ class LandingModel:
         directions = {  # of the coordinates' priors in the unknowns
             "log_loss_factor": {"elasticity_damping": 1.0, "youngs_modulus": 0.5},
             "log_returned_share": {"returned_share": 1.0},
+            "softening": {"softening": 1.0},
             "air_drag": {"air_drag": 1.0},
         }
         for name, parts in directions.items():
@@ -108,7 +110,7 @@ class LandingModel:
             direction = np.zeros(len(self.names))
             for part, weight in parts.items():
                 direction[place(part)] = weight
-            variance = PRIORS[name][1] ** 2 * (HALF_NORMAL if name == "air_drag" else 1.0)
+            variance = PRIORS[name][1] ** 2 * (HALF_NORMAL if name in HALF else 1.0)
             precision += np.outer(direction, direction) / variance
         if "turn_damping" in self.names:  # even between 0 and 1
             precision[place("turn_damping"), place("turn_damping")] += 12.0

@@ -25,14 +25,14 @@ from pipeline.identify.posterior.residuals import BINS, LEAST_POINTS
 from pipeline.identify.results.theta import content_of
 from pipeline.identify.results.units import SI_UNITS
 from pipeline.params import Params
-from pipeline.params.identification import ParameterBoxes, parameter_names
+from pipeline.params.identification import parameter_names
 from pipeline.simulator.model import ClampedBand, LaunchHistory
 from pipeline.simulator.parameters import EXTRA, Parameters
 from pipeline.simulator.rubber import RUBBER
 
 LEVEL = 0.9
 SAMPLES = 200
-FILLS = 2 / 3  # of the box: an interval as wide tells nothing
+FILLS = 2 / 3  # of the prior's interval: one as wide tells nothing
 
 
 @dataclass(frozen=True)
@@ -153,30 +153,29 @@ def theta_entries(found: Identified) -> dict:
     return content_of(found.mode, recorded_history(recording.sling, recording.episode))
 
 
-def confidence(found: Identified, boxes: ParameterBoxes) -> dict:
+def confidence(found: Identified) -> dict:
     """What a θ file says under `confidence`, ready for JSON.
 
-    Args:
-        boxes: params.yaml's `parameters`.
+    A parameter is identifiable if its interval is less than FILLS of its prior's, as the
+    coordinate that shows it has them.
     """
     samples, mode, parameters = found.parameters, found.mode.sample(), {}
     columns = {name: samples.column(name) for name in samples.names}
-    for name in parameter_names(samples.law):
-        low, high = interval(columns[name], mode[name])
-        fixed = name in found.coordinates.fixed
-        entry = {"low": low, "high": high, "identifiable": not fixed}
-        if fixed:
-            entry["fixed"] = True
-        elif box := getattr(boxes, name, None):
-            ends = np.array([low, high, box.low, box.high])
-            ends = np.log(ends) if box.scale == "log" else ends
-            entry["identifiable"] = bool(ends[1] - ends[0] < FILLS * LEVEL * (ends[3] - ends[2]))
-        parameters[name] = entry
     product = "damping_product"
     columns[product] = columns["elasticity_damping"] * columns["damping_scale"]
     mode[product] = mode["elasticity_damping"] * mode["damping_scale"]
+    priors = _priors(found)
+    for name in parameter_names(samples.law):
+        low, high = interval(columns[name], mode[name])
+        entry = {"low": low, "high": high, "identifiable": name in priors}
+        if name in priors:
+            entry |= priors[name]
+        else:
+            entry["fixed"] = True
+        parameters[name] = entry
     derived = {
-        name: _told(columns[name], mode[name], SI_UNITS.get(name, "")) for name in (*EXTRA, product)
+        name: _told(columns[name], mode[name], SI_UNITS.get(name, "")) | priors[name]
+        for name in (*EXTRA, product)
     }
     derived |= _clocks(found)
     matrix = np.corrcoef(found.samples.T + 1e-12 * np.arange(SAMPLES))
@@ -191,6 +190,27 @@ def confidence(found: Identified, boxes: ParameterBoxes) -> dict:
         "steps": found.fit.steps,
         "settled": found.fit.settled,
     }
+
+
+def _priors(found: Identified) -> dict[str, dict]:
+    """Of what is not fixed: the prior's interval, all else as at the mode; whether it is told."""
+    coordinates, result = found.coordinates, {}
+    ends = coordinates.prior(LEVEL)
+    widths = np.ptp(np.quantile(found.samples, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0), axis=0)
+    for name in (*parameter_names(coordinates.law), *EXTRA, "damping_product"):
+        axis = coordinates.shows(name)
+        if axis is None:
+            continue
+        phi = np.repeat(found.fit.phi[None], 2, axis=0)
+        phi[:, axis] = ends[:, axis]
+        at = coordinates.parameters(phi)
+        if name == "damping_product":
+            values = at.column("elasticity_damping") * at.column("damping_scale")
+        else:
+            values = at.column(name)
+        told = bool(widths[axis] < FILLS * np.ptp(ends[:, axis]))
+        result[name] = {"prior": values.tolist(), "identifiable": told}
+    return result
 
 
 def interval(samples: np.ndarray, mode: float) -> tuple[float, float]:

@@ -185,14 +185,16 @@ class Residuals:
     def columns(self) -> dict[str, np.ndarray]:
         """How the residuals change with what moves all measured forces or points alike, (R,) each.
 
-        force_bias_* [N], force_drift_* [N over the pull], force_late: the force's stamps against
-        the pose's [s], cloud_shift_* [m], cloud_turn_* about the camera [rad].
+        force_bias_* [N], force_drift_* [N over the pull], force_gain: a share of the force,
+        force_late: the force's stamps against the pose's [s], cloud_shift_* [m], cloud_turn_* about
+        the camera [rad].
         """
         count, changes = len(self.samples), {}
         time = self.episode.time[self.samples]
         since = (time - time[0]) / (time[-1] - time[0])
         rate = np.gradient(self.episode.force, self.episode.time, axis=0)[self.samples]
-        changes["force_late"] = np.concatenate([*rate.T, np.zeros(2 * len(self.frame))])
+        for name, course in (("late", rate), ("gain", self.episode.force[self.samples])):
+            changes[f"force_{name}"] = np.append(course.T.ravel(), np.zeros(2 * len(self.frame)))
         arm = self.point - self.episode.camera
         turned = np.cross(arm, self.depth), np.cross(arm, self.side)
         for axis, letter in enumerate("xyz"):

@@ -19,6 +19,7 @@ class ParameterInterval(JsonRecord):
     low: float
     high: float
     identifiable: bool
+    prior: Annotated[tuple[float, float], LIST] | None = None
 
 
 class DerivedQuantity(JsonRecord):

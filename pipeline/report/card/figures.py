@@ -103,7 +103,10 @@ def values(shown: list[ShownValue], boxes: dict[str, SearchedRange]) -> Figure:
         box, factor = boxes[one.name], QUANTITIES[one.name].factor
         box = SearchedRange(factor * box.low, factor * box.high, box.scale)
         begin, end = box.place(one.low), box.place(one.high)
-        ax.barh(row, 1, height=0.52, color="0.93", zorder=1)
+        ax.barh(row, 1, height=0.52, color="0.95", zorder=1)
+        if one.prior:
+            before = np.sort([box.place(end) for end in one.prior])
+            ax.barh(row, np.ptp(before), left=before[0], height=0.52, color="0.86", zorder=1)
         ax.barh(row, end - begin, left=begin, height=0.52, color=BARS, alpha=0.55, zorder=2)
         ax.plot([box.place(one.value)] * 2, [row - 0.26, row + 0.26], color=INK, lw=2, zorder=3)
         words = {"va": "center", "fontsize": 8, "color": "0.45"}
@@ -117,7 +120,7 @@ def values(shown: list[ShownValue], boxes: dict[str, SearchedRange]) -> Figure:
     ax.grid(False)
     for side in ax.spines.values():
         side.set_visible(False)
-    title = "How well are the values known? Bars: 90 % intervals, within what was thought possible"
+    title = "How well are the values known? Bars: 90 % intervals; grey: without the recording"
     figure.suptitle(title, **TITLE)
     return figure
 

@@ -116,10 +116,13 @@ def _listed(sentences: list[str], bullet: str) -> str:
 
 
 def _values(shown: list[ShownValue]) -> str:
-    lines = ["| | value | 90 % interval |", "| --- | --- | --- |"]
+    lines = ["| | value | 90 % interval | without the recording |", "| --- | --- | --- | --- |"]
     for one in (one for one in shown if not one.fixed):
         interval = "not known" if one.low is None else f"{one.low:g} to {one.high:g}"
-        lines.append(f"| {one.label} | {f'{one.value:g} {one.unit}'.strip()} | {interval} |")
+        prior = f"{one.prior[0]:g} to {one.prior[1]:g}" if one.prior else "–"
+        prior += "" if one.told else ": **not identified**"
+        value = f"{one.value:g} {one.unit}".strip()
+        lines.append(f"| {one.label} | {value} | {interval} | {prior} |")
     fixed = ", ".join(f"{one.label} {one.value:g}" for one in shown if one.fixed)
     told = f"\nFixed, for no pull shows them: {fixed}.\n" if fixed else ""
     return "\n".join(lines) + "\n" + told

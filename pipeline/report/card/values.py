@@ -15,7 +15,13 @@ from pipeline.simulator.parameters import EXTRA
 
 @dataclass(frozen=True)
 class ShownValue:
-    """One value in its quantity's unit; `low` and `high` are None where no interval is known."""
+    """One value in its quantity's unit.
+
+    Attributes:
+        low, high: None where no interval is known.
+        prior: Interval of what is known without the recording; None where it is not.
+        told: The recording says more than that.
+    """
 
     name: str
     label: str
@@ -24,6 +30,8 @@ class ShownValue:
     low: float | None
     high: float | None
     fixed: bool
+    prior: tuple[float, float] | None = None
+    told: bool = True
 
 
 def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
@@ -46,7 +54,11 @@ def values(theta: dict, fixed: dict[str, float]) -> list[ShownValue]:
         still = name in fixed
         ends = (None if still else known.get(end) for end in ("low", "high"))
         low, high = (None if x is None else rounded(quantity.factor * x) for x in ends)
-        found.append(ShownValue(name, quantity.label, quantity.unit, value, low, high, still))
+        prior, told = known.get("prior"), known.get("identifiable", True)
+        if prior:
+            prior = rounded(quantity.factor * prior[0]), rounded(quantity.factor * prior[1])
+        about = quantity.label, quantity.unit, value, low, high, still, prior, told
+        found.append(ShownValue(name, *about))
     return found
 
 

@@ -57,7 +57,7 @@ def both(exact):
 
 
 def told_of(found) -> dict:
-    return identify.confidence(found, PARAMS.parameters)
+    return identify.confidence(found)
 
 
 def test_the_truth_is_found_where_no_prior_pulls(exact, monkeypatch):

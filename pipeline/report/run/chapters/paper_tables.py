@@ -61,8 +61,8 @@ FLOOR = """\
 least sensitive to them, launched with errors as in the trials. No method has seen them.
 """
 DOUBT = """\
-In brackets: 90 % intervals, of methods that have a density; *not identifiable*: the data say hardly
-more than the box; *fixed*: not searched.
+In brackets: 90 % intervals, of methods that have a density; *prior*: without the recording; *not
+identifiable*: the recording says hardly more than that; *fixed*: not searched.
 [docs/identification.md](../docs/identification.md) says what such an interval is and is not.
 """
 REPEATED = f"""\

@@ -22,6 +22,7 @@ from pipeline.simulator.parameters import THETA
 from pipeline.simulator.rubber import RUBBER
 
 NAMES = (*THETA, *LAWS[RUBBER])
+PRIOR = "prior"
 RECORDED = {"rig": "virtual", "recording": "measured"}
 
 
@@ -30,8 +31,8 @@ class Value:
     """A parameter: what the search found, and what the posterior says [SI].
 
     Attributes:
-        state: "identified", "not identifiable", "fixed" (the method does not search it) or
-            "" where no confidence is known.
+        state: "identified", "not identifiable", "fixed" (the method does not search it), "prior"
+            (no value, but what is known without a recording) or "" where no confidence is known.
         low, high: Of the 90 % interval; NaN where there is none.
         at_edge: The search ended at a side of its box.
     """
@@ -63,6 +64,8 @@ def identified(results: Results, params: Params) -> list[IdentifiedRow]:
             names = (name for name in NAMES if name in result.theta["theta"])
             values = {name: _value(params, result, name) for name in names}
             rows.append(IdentifiedRow(band, method, source, values, printed_loss(result)))
+            if priors := _priors(result):
+                rows.append(IdentifiedRow(band, method, PRIOR, priors, math.nan))
             if cells := paper.THETA.get((band, method)):
                 *numbers, loss = cells
                 theirs = {str(n): Value(one) for n, one in zip(THETA, numbers, strict=True)}
@@ -87,6 +90,13 @@ def _value(params: Params, result: Result, name: str) -> Value:
         return Value(value, at_edge=edge)
     state = "identified" if about["identifiable"] else "not identifiable"
     return Value(value, state, about["low"], about["high"], edge)
+
+
+def _priors(result: Result) -> dict[str, Value]:
+    """What a density's method knows of each parameter without the recording."""
+    about = result.confidence.get("parameters", {})
+    known = {name: one["prior"] for name, one in about.items() if one.get("prior")}
+    return {name: Value(math.nan, PRIOR, *ends) for name, ends in known.items()}
 
 
 def at_edge(value: float, name: str, box: SearchBox) -> bool:
@@ -121,6 +131,8 @@ def _shown(rows: list[IdentifiedRow]) -> list[str]:
 
 
 def _cell(name: str, one: Value) -> str:
+    if one.state == PRIOR:
+        return _between(name, one.low, one.high)
     shown = _physical(name, one.value) + (" ⚠" if one.at_edge else "")
     if one.state != "identified":
         return f"{shown}, {one.state}" if one.state else shown

@@ -40,7 +40,7 @@ MOVES = "loading", "unloading", "reloading"
 NO_UNLOADING = "no unloading"
 
 
-class Held(Protocol):
+class HandSignals(Protocol):
     """A hand that holds a band: an `Episode`, or the signals of one that is to be."""
 
     @property
@@ -102,7 +102,7 @@ def phases(episode: Episode) -> list[Phase]:
     ]  # fmt: skip
 
 
-def phases_of_hand(held: Held) -> list[Phase]:
+def phases_of_hand(held: HandSignals) -> list[Phase]:
     """From grasp to release, by time."""
     taut = taut_samples(held)
     if not taut.any():
@@ -123,7 +123,7 @@ def phases_of_hand(held: Held) -> list[Phase]:
             deepest = max([slack, *(phase.stop for phase in found)])
             part = slice(first, until + 1)
             found += _named(one, names[first], time[part], drawn[part], deepest)
-    return found
+    return _joined(found)
 
 
 SLACK, RESTS = -2, -1  # beside the numbers of ways
@@ -137,7 +137,8 @@ def _names(time: np.ndarray, drawn: np.ndarray, slack: float) -> np.ndarray:
     size = max(3, 2 * round(SPEED / period / 2) + 1)
     if len(drawn) < size:
         return names
-    slow = np.abs(savgol_filter(drawn, size, 1, deriv=1, delta=period)) < STILL
+    speed = np.asarray(savgol_filter(drawn, size, 1, deriv=1, delta=period))
+    slow = np.abs(speed) < STILL
     slow &= names != SLACK
     edges = np.flatnonzero(np.diff(np.concatenate([[0], slow, [0]])))
     for first, last in edges.reshape(-1, 2):
@@ -164,6 +165,18 @@ def _named(
         at = float(time[np.argmax(drawn >= deepest)])
         yield Phase("reloading", one.begin, at, one.start, deepest)
         yield Phase("loading", at, one.end, deepest, one.stop)
+
+
+def _joined(found: list[Phase]) -> list[Phase]:
+    """Pauses that only jerks part are one."""
+    joined: list[Phase] = []
+    for one in found:
+        last = joined[-1] if joined else one
+        if joined and last.kind == one.kind == "pause":
+            joined[-1] = Phase("pause", last.begin, one.end, last.start, one.stop)
+        else:
+            joined.append(one)
+    return joined
 
 
 def turns(way: np.ndarray, least: float = TURN) -> list[int]:
@@ -199,7 +212,7 @@ def unseen(found: Sequence[Phase]) -> dict[str, str]:
     }
 
 
-def taut_samples(held: Held) -> np.ndarray:
+def taut_samples(held: HandSignals) -> np.ndarray:
     """Which samples (T,) show a force on the hand beyond the band's weight, until the release."""
     size = np.linalg.norm(held.force, axis=1)
     during = (held.time > held.grasp_time) & (held.time < held.release_time)

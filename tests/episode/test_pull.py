@@ -37,7 +37,7 @@ def test_a_pull_that_never_turns_is_as_ever(noise) -> None:
         (led.ON_THE_WAY, 3.3, 1.5),
         (led.CYCLES, 3.0, 2.0),
         ((*led.DIP[:-1], (8.2, 0.25), (9.2, 0.4), (10.7, 0.4)), 4.0, 1.5),  # two dips
-        (((1.2, 0.0), (4.2, 0.4), (5.2, 0.35), (7.2, 0.35)), 3.0, 2.0),  # let go less drawn
+        (((1.2, 0.0), (4.2, 0.4), (5.2, 0.35), (7.2, 0.35)), 2.5, 2.0),  # let go less drawn
     ],
 )
 def test_dips_and_cycles(knots, pull_time, pause) -> None:

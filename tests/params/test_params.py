@@ -158,6 +158,7 @@ REFUSED = [
     ("sling.mesh", "wedge", "sling.mesh: must be 'rod' or 'tetrahedra'"),
     ("loss.median_window", 6, "loss: median_window must be odd"),
     ("episode.tail", 59.0, "episode: tail must be less"),
+    ("episode.longest", 8.0, "episode: longest must be at least duration"),
     ("trials.targets", [0.5], "trials.targets: 0.5 lies outside policy.targets"),
     ("trials.targets", [1.5, 2.6], "trials.targets: 2.6 lies outside"),
     ("bands", {"measured": CONTENT["bands"]["band1"]}, "bands.measured: data/trials/measured"),

@@ -56,7 +56,7 @@ class HandSignals(Protocol):
 
 
 @dataclass(frozen=True)
-class Phase:
+class InteractionPhase:
     """A part of an interaction.
 
     Attributes:
@@ -86,7 +86,7 @@ class Phase:
         return self.way / max(self.duration, 1e-9)
 
 
-def phases(episode: Episode) -> list[Phase]:
+def phases(episode: Episode) -> list[InteractionPhase]:
     """All of an episode, by time; gaps are slack. None of them where the force never rises."""
     found = phases_of_hand(episode)
     if not found:
@@ -98,11 +98,11 @@ def phases(episode: Episode) -> list[Phase]:
     over = float(min([release + LONGEST_RECOIL, *episode.cloud_time[after]]))
     end = float(max([episode.time[-1] + episode.sample_period / 2, *episode.cloud_time, over]))
     return [
-        *found, Phase("recoil", release, over, drawn, 0.0), Phase("swing", over, end, 0.0, 0.0)
+        *found, InteractionPhase("recoil", release, over, drawn, 0.0), InteractionPhase("swing", over, end, 0.0, 0.0)
     ]  # fmt: skip
 
 
-def phases_of_hand(held: HandSignals) -> list[Phase]:
+def phases_of_hand(held: HandSignals) -> list[InteractionPhase]:
     """From grasp to release, by time."""
     taut = taut_samples(held)
     if not taut.any():
@@ -114,12 +114,14 @@ def phases_of_hand(held: HandSignals) -> list[Phase]:
     drawn = np.maximum(drawn, slack)
     names = _names(time, drawn, slack)
     ends = np.flatnonzero(np.diff(names)) + 1
-    found: list[Phase] = []
+    found: list[InteractionPhase] = []
     for first, last in zip([0, *ends], [*ends, len(time)], strict=True):
         until = last if last < len(time) else last - 1
         end = float(time[until]) if last < len(time) else held.release_time
         if names[first] != SLACK:
-            one = Phase("", float(time[first]), end, float(drawn[first]), float(drawn[until]))
+            one = InteractionPhase(
+                "", float(time[first]), end, float(drawn[first]), float(drawn[until])
+            )
             deepest = max([slack, *(phase.stop for phase in found)])
             part = slice(first, until + 1)
             found += _named(one, names[first], time[part], drawn[part], deepest)
@@ -148,32 +150,32 @@ def _names(time: np.ndarray, drawn: np.ndarray, slack: float) -> np.ndarray:
 
 
 def _named(
-    one: Phase, name: int, time: np.ndarray, drawn: np.ndarray, deepest: float
-) -> Iterator[Phase]:
+    one: InteractionPhase, name: int, time: np.ndarray, drawn: np.ndarray, deepest: float
+) -> Iterator[InteractionPhase]:
     """A run of samples as a phase, or as reloading and loading where it does both."""
     if name == RESTS:
-        yield Phase("pause", one.begin, one.end, one.start, one.stop)
+        yield InteractionPhase("pause", one.begin, one.end, one.start, one.stop)
     elif one.way < TURN / 2:
         return
     elif one.stop < one.start:
-        yield Phase("unloading", one.begin, one.end, one.start, one.stop)
+        yield InteractionPhase("unloading", one.begin, one.end, one.start, one.stop)
     elif one.stop < deepest + TURN / 2:
-        yield Phase("reloading", one.begin, one.end, one.start, one.stop)
+        yield InteractionPhase("reloading", one.begin, one.end, one.start, one.stop)
     elif one.start > deepest - TURN / 2:
-        yield Phase("loading", one.begin, one.end, one.start, one.stop)
+        yield InteractionPhase("loading", one.begin, one.end, one.start, one.stop)
     else:
         at = float(time[np.argmax(drawn >= deepest)])
-        yield Phase("reloading", one.begin, at, one.start, deepest)
-        yield Phase("loading", at, one.end, deepest, one.stop)
+        yield InteractionPhase("reloading", one.begin, at, one.start, deepest)
+        yield InteractionPhase("loading", at, one.end, deepest, one.stop)
 
 
-def _joined(found: list[Phase]) -> list[Phase]:
+def _joined(found: list[InteractionPhase]) -> list[InteractionPhase]:
     """Pauses that only jerks part are one."""
-    joined: list[Phase] = []
+    joined: list[InteractionPhase] = []
     for one in found:
         last = joined[-1] if joined else one
         if joined and last.kind == one.kind == "pause":
-            joined[-1] = Phase("pause", last.begin, one.end, last.start, one.stop)
+            joined[-1] = InteractionPhase("pause", last.begin, one.end, last.start, one.stop)
         else:
             joined.append(one)
     return joined
@@ -195,7 +197,7 @@ def turns(way: np.ndarray, least: float = TURN) -> list[int]:
     return [*found, len(way) - 1]
 
 
-def unseen(found: Sequence[Phase]) -> dict[str, str]:
+def unseen(found: Sequence[InteractionPhase]) -> dict[str, str]:
     """What a recording with these phases lacks, and what therefore keeps its prior."""
     moves = [one.speed for one in found if one.kind in MOVES and one.way >= LEAST_WAY]
     back = any(one.kind == "unloading" and one.way >= BACK for one in found)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pipeline.base.errors import UserError
 from pipeline.episode.phases import (
     NO_UNLOADING,
-    Phase,
+    InteractionPhase,
     phases,
     phases_of_hand,
     taut_frames,
@@ -38,7 +38,7 @@ def recoil(y) -> dict:
     return {"clouds": clouds, "cloud_time": RELEASE + 0.02 * np.arange(len(y))}
 
 
-def kinds(found: list[Phase]) -> list[str]:
+def kinds(found: list[InteractionPhase]) -> list[str]:
     return [one.kind for one in found]
 
 

@@ -97,9 +97,8 @@ def phases(episode: Episode) -> list[InteractionPhase]:
     after[recoil] = False
     over = float(min([release + LONGEST_RECOIL, *episode.cloud_time[after]]))
     end = float(max([episode.time[-1] + episode.sample_period / 2, *episode.cloud_time, over]))
-    return [
-        *found, InteractionPhase("recoil", release, over, drawn, 0.0), InteractionPhase("swing", over, end, 0.0, 0.0)
-    ]  # fmt: skip
+    last = ("recoil", release, over, drawn, 0.0), ("swing", over, end, 0.0, 0.0)
+    return [*found, *(InteractionPhase(*one) for one in last)]
 
 
 def phases_of_hand(held: HandSignals) -> list[InteractionPhase]:

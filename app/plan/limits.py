@@ -94,10 +94,10 @@ def check_window(
 ) -> tuple[float, float]:
     """Grasp to release fits the episode. Returns what it takes, and what there is for it [s]."""
     taken = trajectory.start_of("release") - trajectory.start_of("grasp")
-    most = episode.duration - episode.tail - LEAD
+    most = episode.longest - episode.tail - LEAD
     over = taken - most
     if over > ROUNDING:
-        advice = f"raise episode.duration to {np.ceil(10 * (episode.duration + over)) / 10:g}"
+        advice = f"raise episode.longest to {np.ceil(10 * (episode.longest + over)) / 10:g}"
         size = float(np.linalg.norm(plan.draw))
         time = trajectory.start_of("pause") - trajectory.start_of("pull") - over
         if time > 0:
@@ -105,8 +105,8 @@ def check_window(
             if speed <= plan.max_speed and np.sqrt(8 * size / plan.max_acceleration) <= time:
                 advice = f"raise plan.pull_speed to {speed:g}, or {advice.removeprefix('raise ')}"
         raise UserError(
-            f"from grasp to release it takes {taken:.2f} s, {over:.2f} s more than episode.duration"
-            f" {episode.duration:g} less episode.tail {episode.tail:g} and {LEAD:g} s leave:"
+            f"from grasp to release it takes {taken:.2f} s, {over:.2f} s more than episode.longest"
+            f" {episode.longest:g} less episode.tail {episode.tail:g} and {LEAD:g} s leave:"
             f" {advice}"
         )
     return taken, most

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from app.plan.trajectory import Phase, Trajectory, leg_time
+from pipeline.episode.window import LEAD
 from pipeline.params.lab import BandParams, PlanParams, SetupParams
 from pipeline.params.recording import EpisodeParams
 from pipeline.recording.pulls import CALM
@@ -88,7 +89,9 @@ def trajectory_of(
     pull += [Phase("swing", drawn, _ticks(wait), wide), retreat]
     # The next pull's window begins so long before its tail, and the band is to hang calm by then.
     between = wait + retreat.duration + back.duration + taken
-    rest = max(plan.lead_in, CALM + SPARE + episode.duration - episode.tail - between)
+    held = taken - pull[0].duration - pull[-1].duration  # from the grasp to the release
+    window = max(episode.duration - episode.tail, held + LEAD)
+    rest = max(plan.lead_in, CALM + SPARE + window - between)
     again = [back, Phase("lead-in", start, _ticks(rest), wide), *pull]
     phases = [Phase("lead-in", start, _ticks(plan.lead_in), wide), *pull, *(pulls - 1) * again]
     return Trajectory.through(start, wide, [phase for phase in phases if phase.duration > 0])

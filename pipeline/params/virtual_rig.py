@@ -32,6 +32,8 @@ LAWS = {  # ranges of each law's constants; rig/physics/elasticity.py says what 
     "gent": ((15, 1e4),),
     "arruda_boyce": ((6, 1e4),),
     "extended_tube": ((1e-3, 0.25), (0.01, 1), (0, 100)),
+    "carroll": ((0, 10), (0, 1e-2), (0, 10)),
+    "lopez_pamies": ((0, 10), (0.1, 10), (0, 10), (0.1, 10)),
 }
 
 
@@ -55,8 +57,9 @@ class RigFlow(Section):
 
 
 class RigSoftening(Section):
-    """By the largest energy so far; `energy` is over Young's modulus."""
+    """By the largest energy so far; `energy` is over Young's modulus, or a strain."""
 
+    form: Literal["energy", "strain"] = "energy"
     damage: Annotated[float, Range(1, 100)]
     energy: Annotated[float, Range(1e-3, 100)]
     growth: Annotated[float, Range(0, 10)]
@@ -71,7 +74,7 @@ class RigBand(Section):
     relaxation: Annotated[tuple[Relaxation, ...], LIST]
     viscosity: Annotated[float, Range(1e-4, 0.1)]
     color: Annotated[tuple[Share, Share, Share], LIST]
-    law: Literal["ogden", "gent", "arruda_boyce", "extended_tube"]
+    law: Literal["ogden", "gent", "arruda_boyce", "extended_tube", "carroll", "lopez_pamies"]
     constants: Annotated[tuple[Annotated[float, Range(-100, 1e4)], ...], LIST]
     spectrum: RigSpectrum | None
     flow: RigFlow | None

@@ -4,7 +4,7 @@ Each is one function of a stretch l and the law's constants: energy [MJ/m3] (the
 stress from 1 to l), nominal stress P and dP/dl [MPa]. A new one also stands in LAWS and `at`.
 
 Of a law only the shape matters: a band's own factor (`Rubber.scale`) multiplies it. The constants
-of Gent's law, of the eight chains and of the tubes are fitted as Ogden's are, to Treloar's points;
+of all laws but Ogden's are fitted as Ogden's are, to Treloar's points;
 they are not those of the papers that are named, none of which we could open.
 """
 
@@ -105,11 +105,48 @@ def extended_tube(stretch: float, constants: Sequence[float]) -> Point:
     return chains[0] + tube[0], chains[1] + tube[1], chains[2] + tube[2]
 
 
+@compiled
+def carroll(stretch: float, constants: Sequence[float]) -> Point:
+    """W = A I1 + B I1^4 + C I2^(1/2): Carroll, J. Elast. 103 (2011) 173, which we could not open.
+
+    Constants: A, B, C [MPa].
+    """
+    a, b, c = constants[0], constants[1], constants[2]
+    inverse = 1 / stretch
+    i1, i2 = stretch**2 + 2 * inverse, 2 * stretch + inverse**2
+    root = np.sqrt(i2)
+    first = of_invariant(
+        stretch, a * (i1 - 3) + b * (i1**4 - 81), 2 * (a + 4 * b * i1**3), 24 * b * i1**2
+    )
+    across = 1 - inverse**3  # half of dI2/dl
+    slope = c * (3 * inverse**4 / root - across**2 / root**3)
+    return first[0] + c * (root - np.sqrt(3.0)), first[1] + c * across / root, first[2] + slope
+
+
+@compiled
+def lopez_pamies(stretch: float, constants: Sequence[float]) -> Point:
+    """W = sum_i 3^(1-a_i)/(2 a_i) mu_i (I1^a_i - 3^a_i): Lopez-Pamies, C. R. Mec. 338 (2010) 3.
+
+    We could not open the paper. Constants: mu_1 [MPa], a_1, mu_2 [MPa], a_2.
+    """
+    i1 = stretch**2 + 2 / stretch
+    energy = factor = change = 0.0
+    for i in (0, 2):
+        mu, a = constants[i], constants[i + 1]
+        part = 3 ** (1 - a) * mu * i1 ** (a - 1)
+        energy += (part * i1 - 3 * mu) / (2 * a)
+        factor += part
+        change += (a - 1) * part / i1
+    return of_invariant(stretch, energy, factor, change)
+
+
 LAWS = {  # and their constants by Treloar's points
     "ogden": (4.38677e-02, 3.153406, 1.91199e-10, 12.467417, -5.25868, -0.134005),
     "gent": (94.1, 0.301),
     "arruda_boyce": (27.6, 0.298),
     "extended_tube": (0.0954, 0.331, 1.111, 0.195),
+    "carroll": (0.13575, 3.3398e-07, 0.22564),
+    "lopez_pamies": (0.37814, 0.71078, 2.6963e-03, 2.8197),
 }
 NUMBERS = {name: number for number, name in enumerate(LAWS)}
 
@@ -123,7 +160,11 @@ def at(number: int, stretch: float, constants: Sequence[float]) -> Point:
         return gent(stretch, constants)
     if number == 2:
         return eight_chain(stretch, constants)
-    return extended_tube(stretch, constants)
+    if number == 3:
+        return extended_tube(stretch, constants)
+    if number == 4:
+        return carroll(stretch, constants)
+    return lopez_pamies(stretch, constants)
 
 
 @compiled

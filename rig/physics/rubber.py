@@ -83,26 +83,35 @@ def flow_speed(stress: float, strain: float, flow: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class Softening:
-    """Mullins' effect by Ogden and Roxburgh, Proc. R. Soc. Lond. A 455 (1999) 2861.
+    """Mullins' effect, in two forms; h is 1 while the law's energy W is the largest so far.
 
-    h = 1 - erf((W_max - W)/(energy E + growth W_max))/damage, with W the law's energy: 1 while W is
-    the largest so far. We could not open the paper: the formula is written from memory. W_max
-    follows W within `lag`, so that its rate is continuous.
+    By energy, Ogden and Roxburgh, Proc. R. Soc. Lond. A 455 (1999) 2861, written from memory:
+        h = 1 - erf((W_max - W)/(energy E + growth W_max))/damage
+    By strain, an exponential as in Zuniga and Beatty, ZAMP 53 (2002) 794, but towards an end:
+        h = 1 - (1 - exp((x - x_max)/energy))/damage,    x = sqrt(2 W/E)
+    We could open neither paper. W_max follows W within `lag`, so that its rate is continuous.
 
     Attributes:
         damage: r >= 1, the less the softer.
-        energy: m over E, Young's modulus of the law.
-        growth: beta.
+        energy: m over E, Young's modulus of the law; by strain, a strain.
+        growth: beta, by energy alone.
         lag: [s].
+        strain: 1 by strain, 0 by energy.
     """
 
     damage: float
     energy: float
     growth: float
     lag: float = 1e-3
+    strain: float = 0.0
 
     def stored(self, energy: np.ndarray, worst: np.ndarray, modulus: float) -> np.ndarray:
         """The integral of h from 0 to `energy` [MJ/m3]: what an unloading gives back."""
+        if self.strain:
+            m, most = self.energy, np.sqrt(2 * worst / modulus)
+            x = np.minimum(np.sqrt(2 * energy / modulus), most)
+            back = m * np.exp(-most / m) * (x * np.exp(x / m) - m * np.expm1(x / m))
+            return energy - modulus * (x**2 / 2 - back) / self.damage
         width = self.energy * modulus + self.growth * worst
         part = lambda x: x * erf(x) + np.exp(-(x**2)) / np.sqrt(np.pi)  # noqa: E731
         below = np.minimum(energy, worst)
@@ -113,6 +122,9 @@ class Softening:
 @compiled
 def kept(energy: float, worst: float, modulus: float, softening: np.ndarray) -> float:
     """h of an energy and the largest so far [MJ/m3]; `softening` as in `Softening`."""
+    if softening[4]:
+        short = math.sqrt(2 * worst / modulus) - math.sqrt(2 * min(energy, worst) / modulus)
+        return 1 + math.expm1(-short / softening[1]) / softening[0]
     width = softening[1] * modulus + softening[2] * worst
     return 1 - math.erf(max(worst - energy, 0.0) / width) / softening[0]
 

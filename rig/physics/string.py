@@ -48,6 +48,7 @@ class ElasticString:
         rubber: The material.
         payload: Extra mass that the middle node carries [kg].
         damping: Of the motion, by mass [1/s]; 0 but for coming to rest.
+        worst: Stretch to which the band was drawn before [1].
     """
 
     edges: int
@@ -59,6 +60,7 @@ class ElasticString:
     rubber: Rubber
     payload: float = 0.0
     damping: float = 0.0
+    worst: float = 1.0
 
     @property
     def nodes(self) -> int:
@@ -144,6 +146,9 @@ class ElasticString:
         y[:, :3] = x
         if len(ratios):
             y[:-1, 6:] = self.rubber.remembering(self.stretch(x), ratios)
+        if self.rubber.softening is not None:
+            before = self.rubber.law.energy(np.array(self.worst))
+            y[:-1, -1] = np.maximum(y[:-1, -1], before)
         return y
 
     def stretch(self, x: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -14,13 +15,16 @@ from rig.physics.string import ElasticString
 
 if TYPE_CHECKING:
     from pipeline.params import BandParams, Params
-    from pipeline.params.virtual_rig import RigBand
+    from pipeline.params.virtual_rig import RigBand, RigSoftening
 
 HISTORY_STEP = 0.01
 
 
 def string_of(params: Params, band_name: str) -> ElasticString:
-    """The band, its modulus such that the recorded pull peaks at `rig.bands.<band>.peak_force`."""
+    """The band, its modulus such that a virgin one's pull peaks at `rig.bands.<band>.peak_force`.
+
+    A band that is `preconditioned` was drawn so far before, or as far as for the recording.
+    """
     rig, setup = params.rig, params.setup
     return _string_of(
         params.bands[band_name],  # pyright: ignore[reportArgumentType]
@@ -62,7 +66,10 @@ def _string_of(
     drawn = bent_at(guess, path[peak])
     y = guess.at_rest(drawn, tolerance, held=True, memory=memory[peak] / relaxed[peak])
     force = guess.at_middle(y)[1]
-    return with_scale(guess.rubber.scale * hidden.peak_force / force)
+    made = with_scale(guess.rubber.scale * hidden.peak_force / force)
+    before = band.preconditioned
+    drawn = PULL_LENGTH * before if isinstance(before, bool) else before
+    return replace(made, worst=float(straight(made, np.array([0.0, -drawn, 0.0]))))
 
 
 def rubber_of(hidden: RigBand, scale: float) -> Rubber:
@@ -75,8 +82,13 @@ def rubber_of(hidden: RigBand, scale: float) -> Rubber:
         hidden.viscosity,
         law_of(hidden.law, hidden.constants),
         None if flow is None else Flow(**dict(flow)),
-        None if softening is None else Softening(**dict(softening)),
+        None if softening is None else softening_of(softening),
     )
+
+
+def softening_of(hidden: RigSoftening) -> Softening:
+    by_strain = float(hidden.form == "strain")
+    return Softening(hidden.damage, hidden.energy, hidden.growth, strain=by_strain)
 
 
 def pulled(
@@ -98,6 +110,7 @@ def pulled(
     path = np.multiply.outer(pull_history(HISTORY_STEP, *times), drawn)
     stretch = straight(string, path)
     worst = float(straight(string, np.array([0.0, -PULL_LENGTH, 0.0]))) if again else 1.0
+    worst = max(worst, string.worst)
     return path, stretch, *string.rubber.history(stretch, HISTORY_STEP, worst)
 
 

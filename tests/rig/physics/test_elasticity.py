@@ -90,7 +90,7 @@ def test_derivatives(law: Law) -> None:
 
 
 def test_moduli_are_the_textbooks() -> None:
-    """3/2 sum mu a; 3 G; 3 G (1 + 3/(5 N) + 99/(175 N^2) + ...); 3 (Gc (1 - 2 e^2) + Ge)."""
+    """3/2 sum mu a; 3 G; 3 G (1 + 3/(5 N) + 99/(175 N^2) + ...); 3 (Gc (1 - 2 e^2) + Ge); 6 W'."""
     assert np.isclose(law_of("ogden", JONES).modulus, 1.5 * np.dot(JONES[::2], JONES[1::2]))
     assert np.isclose(law_of("gent", (30.0, 0.4)).modulus, 1.2)
     chain, n = law_of("arruda_boyce", (50.0, 0.4)), 50.0
@@ -98,6 +98,9 @@ def test_moduli_are_the_textbooks() -> None:
     assert np.isclose(chain.modulus, 1.2 * series, rtol=2e-3)
     tube = law_of("extended_tube", (0.1, 0.3, 0.8, 0.2))
     assert np.isclose(tube.modulus, 3 * (0.2 * (1 - 2 * 0.01) + 0.16))
+    carroll = law_of("carroll", (0.2, 1e-3, 0.1))  # dW/dI1 + dW/dI2 at rest
+    assert np.isclose(carroll.modulus, 6 * (0.2 + 4e-3 * 27 + 0.1 / (2 * np.sqrt(3))))
+    assert np.isclose(law_of("lopez_pamies", (0.2, 0.6, 0.1, 3.0)).modulus, 3 * 0.3)
 
 
 def test_gent_is_neo_hookean_far_from_its_limit_and_stiff_near_it() -> None:

@@ -24,6 +24,8 @@ ITERATIONS = 14  # at most
 BINNED = 4  # of them sort the points into bins anew; then the density keeps its form
 LONGEST = 20.0  # of a step, in those of the finite differences
 STILL = 0.2  # of a last step, in standard deviations: no interval is 2 % wider by as much
+FLAT = 0.2  # of -2 log p: so little that a step which changes it by less tells nothing apart
+NEAR = 1.0  # standard deviations that such a step may go
 LEAST = 1e-12  # of a precision
 DAMP, HARDER, EASIER, HARDEST = 1e-3, 10.0, 0.2, 1e4  # Levenberg's, relative to the diagonal
 
@@ -61,6 +63,7 @@ def fit(
     coordinates: Coordinates,
     start: np.ndarray,
     *,
+    nuisances: np.ndarray | None = None,
     launches: LaunchLikelihood | None = None,
     workers: int | None = None,
     progress: Callable[[Fit], None] = lambda fit: None,
@@ -68,13 +71,15 @@ def fit(
     """Fit coordinates from `start` (D,). Raises NoFit.
 
     Args:
+        nuisances: Of the recordings at the start, (N, 3); None: 0.
         launches: That are evidence too.
         workers: Threads; they change no result.
         progress: Is told of each expansion that is nearer.
     """
-    phi, nuisances = np.array(start, float), np.zeros((len(recordings), 3))
+    phi = np.array(start, float)
+    nuisances = np.zeros((len(recordings), 3)) if nuisances is None else nuisances
     best: Fit | None = None
-    damp, new = DAMP, [None] * len(recordings)
+    damp, gone, new = DAMP, np.inf, [None] * len(recordings)
     with ThreadPoolExecutor(workers) as pool:
         for steps in range(1, ITERATIONS + 1):
             bins = [one.residuals for one in best.expansions] if best and steps > BINNED else new
@@ -98,10 +103,13 @@ def fit(
                 best, damp = trial, damp * EASIER
                 progress(best)
             else:
+                if trial and best and trial.misfit < best.misfit + FLAT and gone < NEAR:
+                    return replace(best, settled=True, steps=steps)
                 damp *= HARDER
             assert best is not None  # else NoFit
             step = _step(best, coordinates, damp)
-            if _size(best, step) < STILL or damp > HARDEST:
+            gone = _size(best, step)
+            if gone < STILL or damp > HARDEST:
                 # Damping makes any step short, also where the fit is stuck.
                 free = _step(best, coordinates, min(damp, DAMP))
                 return replace(best, settled=_size(best, free) < STILL, steps=steps)

@@ -27,6 +27,7 @@ from pipeline.simulator.model import ClampedBand
 from pipeline.simulator.parameters import Parameters
 
 SIMULATED = "release", "camera", "hand"
+UNLIKE = 0.05  # an autocorrelation that is none
 NUDGE = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
 
 
@@ -106,10 +107,32 @@ class Expansion:
         return float(np.sqrt(np.mean(parts[part] ** 2))) if parts[part].size else 0.0
 
     @property
+    def discrepancy(self) -> float:
+        """Standard deviation of a sample of the force [N], were samples independent.
+
+        Of what is left of it along the axis where that is most: the root mean square times the root
+        of the number of samples in which it repeats itself (integrated autocorrelation time). What
+        a law gets wrong of a pull lasts for seconds.
+        """
+        count = len(self.residuals.samples)
+        return max(_repeated(axis) for axis in self.left[: 3 * count].reshape(3, count))
+
+    @property
     def pictures(self) -> list[float]:
         """When the recoil is seen, from the release [s]."""
         seen, episode = self.residuals.frame[self.residuals.recoils], self.residuals.episode
         return (episode.cloud_time[np.unique(seen)] - episode.release_time).tolist()
+
+
+def _repeated(left: np.ndarray) -> float:
+    """Root mean square of samples (S,), times the root of their autocorrelation time in samples."""
+    size = left @ left
+    if not size:
+        return 0.0
+    alike = np.correlate(left, left, "full")[len(left) :] / size
+    ends = np.flatnonzero(alike < UNLIKE)
+    time = 1 + 2 * alike[: ends[0] if len(ends) else len(alike)].sum()
+    return float(np.sqrt(size / len(left) * time))
 
 
 def opening_time(episode: Episode, sling: ClampedBand, friction: float) -> float:
@@ -174,6 +197,13 @@ class Likelihood:
         moved.episode = replace(self.episode, cloud_time=self.episode.cloud_time + best)
         moved._frames = _that_count(moved.episode)
         return moved
+
+    def told_by(self, expansion: Expansion) -> Likelihood:
+        """With the force as sure as the law can follow it, by what a fit left of it."""
+        wider = copy(self)
+        spread = max(self.tolerances.force, expansion.discrepancy)
+        wider.tolerances = replace(self.tolerances, force=spread)
+        return wider
 
     def shifted(self, nuisances: np.ndarray) -> Episode:
         """The episode with another release, camera's clock and place of the hand, (3,).

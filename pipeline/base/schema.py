@@ -168,7 +168,8 @@ def _closest(path: Sequence[str | int], model: type[Section]) -> str:
     kind: Any = model
     for part in path[:-1]:
         is_section = isinstance(kind, type) and issubclass(kind, BaseModel)
-        kind = kind.model_fields[str(part)].annotation if is_section else get_args(kind)[-1]
+        inner = [one for one in get_args(kind) if one is not Ellipsis]  # of a list, or a mapping
+        kind = kind.model_fields[str(part)].annotation if is_section else inner[-1]
         if isinstance(kind, UnionType):  # a section, or null
             kind = get_args(kind)[0]
     known = list(kind.model_fields)

@@ -124,6 +124,7 @@ def test_exact_lines() -> None:
     assert missing == "params.yaml: optimizer.k_top: is missing"
 
 
+DIP = {"at": 1.0, "depth": 0.1, "out_time": 1.0, "back_time": 1.0}
 REFUSED = [
     ("run.rig", [], "run.rig: must list"),
     ("run.bands", ["band1", "other"], "run.bands: other is not one of band1"),
@@ -143,6 +144,11 @@ REFUSED = [
     ("rig.bands.band1_dip.like", "band2_dip", "band2_dip is itself like band2: name that"),
     ("rig.bands.band1_dip.viscosity", 0.1, "has the rubber of band1: leave out viscosity"),
     ("rig.bands.band1_dip.pull", "long", "rig.bands.band1_dip.pull: must be 'paper' or 'info"),
+    (
+        "plan.dips",
+        [DIP | {"deep": 1}],
+        "plan.dips.0.deep: unknown key, the closest known one is dep",
+    ),
     ("rig.pull", "long", "rig.pull: must be 'paper' or 'informative'"),
     ("bands.band1_dip.mass", 0.1, "bands.band1_dip.mass: must be that of band1, which rig.bands"),
     ("run.dips", ["band1"], "run: dips: band1 is one of run.bands already"),

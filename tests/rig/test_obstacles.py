@@ -19,12 +19,12 @@ from tests.project import with_
 
 FIVE = [1.86e5, 0.47, 2e-3, 0.5, 1.0]  # holds a draw of 0.43 m as the rig's band1 does
 BAND = Parameters.of("neo_hookean", FIVE)
-LOW, HEAVY = {"fork_height": 0.1}, {"projectile_mass": 0.5}
+LOW, HEAVY, STRONG = {"fork_height": 0.1}, {"projectile_mass": 0.5}, {"max_force": 80.0}
 CASES = [
     ({}, (-0.40, 0.00), None),
-    ({}, (-0.60, -0.50), None),  # deep, and just above the floor
+    (STRONG, (-0.60, -0.50), None),  # deep, and just above the floor
     ({}, (-0.05, 0.40), None),  # launched downwards, over the foot
-    ({}, (-0.30, -0.53), DRAGGED),
+    (STRONG, (-0.30, -0.53), DRAGGED),
     ({}, (-0.90, -0.40), "holding takes"),
     ({}, (-0.15, -0.05), SLACK),
     (LOW, (-0.32, 0.00), None),

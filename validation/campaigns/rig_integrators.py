@@ -40,7 +40,7 @@ FLOW = {"share": 0.3, "rate": 1000.0, "power": 5.0, "chain": -0.7, "offset": 0.0
 RUBBERS: dict[str, dict[str, Any]] = {  # what of rig.bands is otherwise
     "band1": {},
     "soft": {"peak_force": 4.06},
-    "extended tube that flows": {"law": "extended_tube", "flow": FLOW},
+    "extended tube that flows": {"law": "extended_tube", "constants": [], "flow": FLOW},
 }
 TIGHT, TIGHTER = 1e-8, 1e-9  # relative tolerances: LSODA's, CVODE's second
 DRAWS = np.array([(-0.27, -0.20), (-0.30, -0.15), (-0.33, -0.17)])  # (y, z) [m]

@@ -36,7 +36,7 @@ def run(tmp_path: Path, monkeypatch):
 def test_a_target_out_of_reach_has_no_floor(run, capsys) -> None:
     both = run()
     assert both["failed"] == 0 and capsys.readouterr().err == ""
-    near = run(draw_y=[-0.30, -0.25], draw_z=[-0.15, -0.10])
+    near = run(draw_y=[-0.32, -0.25], draw_z=[-0.15, -0.10])
     said = capsys.readouterr()
     assert near["targets"]["1.6"]["mean_error_m"] is not None
     far = near["targets"]["2.3"]

@@ -10,7 +10,7 @@ from rig.oracle.world import World
 from rig.physics.launch import launch
 from tests.project import DEFAULTS
 
-DRAW = np.array([-0.30, -0.15])
+DRAW = np.array([-0.31, -0.16])
 
 
 @pytest.fixture

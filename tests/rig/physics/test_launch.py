@@ -70,7 +70,7 @@ def test_a_low_flight_hits_the_forks_foot(coarse: Params) -> None:
     low = np.array([-0.2, floor + 0.03]), np.array([3.0, 0.0])
     assert fly(*low, floor, 0.0) > 0 > fly(*low, floor + ROD, 0.0)
     table = with_(coarse, "setup", fork_height=0.1)
-    trial = launch("band1", table, (-0.27, 0.0), None)
+    trial = launch("band1", table, (-0.29, 0.0), None)
     assert trial.failure.startswith("hits the fork") and np.isnan(trial.landing_y)
     assert (trial.flight[:, 0] < 0).all()  # it ends there
     short = launch("band1", table, (-0.24, 0.0), None)

@@ -7,14 +7,15 @@ import math
 import numpy as np
 
 from app.plan.force import Held, Prediction
-from app.plan.trajectory import Trajectory
+from app.plan.pull import BACK, DRAWS, LEAD, SLACKEN, STRETCH
+from app.plan.trajectory import Trajectory, leg_time
 from pipeline.base.errors import UserError
+from pipeline.episode.planned import PULL
 from pipeline.params.lab import BandParams, PlanParams, SetupParams
 from pipeline.params.recording import EpisodeParams
 
 ROUNDING = 1e-6  # relative
 LEAST_STRETCH = 1.10  # below it the drawn band shows little of its rubber
-LEAD = 0.1  # s of the lead-in that the episode holds at least
 MOST_ASKEW = 60.0  # degrees between the fingers and the way to the fork
 
 
@@ -60,19 +61,31 @@ def check_hand(plan: PlanParams, band: BandParams, axis: np.ndarray, drawn: np.n
         )
 
 
+def check_dips(plan: PlanParams) -> None:
+    """Each dip stays between the fork and the draw."""
+    size = math.hypot(*plan.draw)
+    for number, dip in enumerate(plan.dips):
+        if dip.depth >= dip.at * size:
+            raise UserError(
+                f"plan.dips: dip {number + 1} lets the band back by {dip.depth:g} m from"
+                f" {dip.at * size:.3g} m, and would pass the fork: make it less deep"
+            )
+
+
 def check_motion(trajectory: Trajectory, plan: PlanParams) -> None:
     """Largest speed and acceleration of every phase."""
     speeds, accelerations = trajectory.peaks(1), trajectory.peaks(2)
     for phase, speed, acceleration in zip(trajectory.phases, speeds, accelerations, strict=True):
-        name = "pull_speed" if phase.name == "pull" else "max_speed"
+        name = "pull_speed" if phase.name in DRAWS else "max_speed"
+        where = " (plan.dips)" if phase.name in BACK else ""
         for value, limit, key, unit in (
             (speed, getattr(plan, name), name, "m/s"),
             (acceleration, plan.max_acceleration, "max_acceleration", "m/s^2"),
         ):
             if value > limit * (1 + ROUNDING):
                 raise UserError(
-                    f"the {phase.name} reaches {value:.3g} {unit}, {value - limit:.3g} more than"
-                    f" plan.{key} {limit:g}: give it more than {phase.duration:.3g} s"
+                    f"the {phase.name}{where} reaches {value:.3g} {unit}, {value - limit:.3g} more"
+                    f" than plan.{key} {limit:g}: give it more than {phase.duration:.3g} s"
                 )
 
 
@@ -93,20 +106,27 @@ def check_window(
     trajectory: Trajectory, plan: PlanParams, episode: EpisodeParams
 ) -> tuple[float, float]:
     """Grasp to release fits the episode. Returns what it takes, and what there is for it [s]."""
-    taken = trajectory.start_of("release") - trajectory.start_of("grasp")
-    most = episode.duration - episode.tail - LEAD
+    lasts = trajectory.until("release")
+    outside = sum(lasts[name] for name in (STRETCH, SLACKEN))
+    taken = trajectory.start_of("release") - trajectory.start_of("grasp") - outside
+    longest = getattr(episode, "longest", episode.duration)
+    most = longest - episode.tail - LEAD
     over = taken - most
     if over > ROUNDING:
-        advice = f"raise episode.duration to {np.ceil(10 * (episode.duration + over)) / 10:g}"
-        size = float(np.linalg.norm(plan.draw))
-        time = trajectory.start_of("pause") - trajectory.start_of("pull") - over
+        key = "longest" if hasattr(episode, "longest") else "duration"
+        advice = f"raise episode.{key} to {np.ceil(10 * (longest + over)) / 10:g}"
+        if plan.dips:
+            advice = f"take shorter plan.dips, or --pull paper, or {advice}"
+        size, time = float(np.linalg.norm(plan.draw)), lasts[PULL] - over
         if time > 0:
             speed = np.ceil(1000 * 2 * size / time) / 1000
-            if speed <= plan.max_speed and np.sqrt(8 * size / plan.max_acceleration) <= time:
+            legs = np.diff(sorted({0.0, 1.0, *(dip.at for dip in plan.dips)})) * size
+            needs = sum(leg_time(leg, speed, plan.max_acceleration) for leg in legs)
+            if speed <= plan.max_speed and needs <= time + ROUNDING:
                 advice = f"raise plan.pull_speed to {speed:g}, or {advice.removeprefix('raise ')}"
         raise UserError(
-            f"from grasp to release it takes {taken:.2f} s, {over:.2f} s more than episode.duration"
-            f" {episode.duration:g} less episode.tail {episode.tail:g} and {LEAD:g} s leave:"
+            f"from grasp to release it takes {taken:.2f} s, {over:.2f} s more than episode.{key}"
+            f" {longest:g} less episode.tail {episode.tail:g} and {LEAD:g} s leave:"
             f" {advice}"
         )
     return taken, most

@@ -191,8 +191,8 @@ def setup(arguments: argparse.Namespace) -> Done:
     ),
     flag(
         "--pull",
-        choices=("informative", "paper", "designed"),
-        default="informative",
+        choices=kinds.PULLS,
+        default=kinds.PULLS[0],
         help="with plan.dips (the default), without, or with dips that are searched for this band",
     ),
     flag(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.plan.trajectory import Trajectory, leg_time
+from app.plan.trajectory import Trajectory
 from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 from pipeline.episode.planned import PULL
@@ -134,7 +134,8 @@ def designed_pull(
             " trials.targets"
         )
     limits = PullLimits(
-        lambda length: leg_time(length, plan.max_speed, plan.max_acceleration),
+        plan.max_speed,
+        plan.max_acceleration,
         min(LONGEST, longest) - sum(lasts[name] for name in ("grasp", "lift", PULL, "pause")),
     )
     count = 0

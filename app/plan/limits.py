@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from app.plan.force import Held, Prediction
-from app.plan.pull import BACK, DRAWS, LEAD, SLACKEN, STRETCH
-from app.plan.trajectory import Trajectory, leg_time
+from app.plan.pull import BACK, DRAWS, LEAD
+from app.plan.trajectory import Trajectory
 from pipeline.base.errors import UserError
-from pipeline.episode.planned import PULL
+from pipeline.episode.planned import leg_time
 from pipeline.params.lab import BandParams, PlanParams, SetupParams
 from pipeline.params.recording import EpisodeParams
 
@@ -103,12 +103,11 @@ def check_floor(trajectory: Trajectory, setup: SetupParams, plan: PlanParams) ->
 
 
 def check_window(
-    trajectory: Trajectory, plan: PlanParams, episode: EpisodeParams
+    trajectory: Trajectory, plan: PlanParams, episode: EpisodeParams, precondition: int = 0
 ) -> tuple[float, float]:
     """Grasp to release fits the episode. Returns what it takes, and what there is for it [s]."""
     lasts = trajectory.until("release")
-    outside = sum(lasts[name] for name in (STRETCH, SLACKEN))
-    taken = trajectory.start_of("release") - trajectory.start_of("grasp") - outside
+    taken = trajectory.start_of("release") - trajectory.start_of("grasp")
     longest = getattr(episode, "longest", episode.duration)
     most = longest - episode.tail - LEAD
     over = taken - most
@@ -116,13 +115,16 @@ def check_window(
         key = "longest" if hasattr(episode, "longest") else "duration"
         advice = f"raise episode.{key} to {np.ceil(10 * (longest + over)) / 10:g}"
         if plan.dips:
-            advice = f"take shorter plan.dips, or --pull paper, or {advice}"
-        size, time = float(np.linalg.norm(plan.draw)), lasts[PULL] - over
+            advice = f"take --pull paper, or shorter plan.dips, or {advice}"
+        if precondition:
+            advice = f"take a smaller --precondition, or {advice}"
+        shares = np.diff(sorted({0.0, 1.0, *(dip.at for dip in plan.dips)}))
+        legs = np.append(shares, np.ones(precondition)) * np.linalg.norm(plan.draw)
+        time = sum(lasts[name] for name in DRAWS) - over
         if time > 0:
-            speed = np.ceil(1000 * 2 * size / time) / 1000
-            legs = np.diff(sorted({0.0, 1.0, *(dip.at for dip in plan.dips)})) * size
-            needs = sum(leg_time(leg, speed, plan.max_acceleration) for leg in legs)
-            if speed <= plan.max_speed and needs <= time + ROUNDING:
+            speed = np.ceil(1000 * 2 * legs.sum() / time) / 1000
+            least = sum(leg_time(leg, speed, plan.max_acceleration) for leg in legs)
+            if speed <= plan.max_speed and least <= time + ROUNDING:
                 advice = f"raise plan.pull_speed to {speed:g}, or {advice.removeprefix('raise ')}"
         raise UserError(
             f"from grasp to release it takes {taken:.2f} s, {over:.2f} s more than episode.{key}"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from app.arguments import PULLS
 from app.plan import limits, messages
 from app.plan.force import Earlier, Held, Prediction, predict, read_earlier
 from app.plan.hand import along_pull, quaternion
@@ -32,7 +33,7 @@ RATES = (1.0, 10_000.0)  # Hz of the CSV
 if TYPE_CHECKING:
     from app.plan.design import DesignedPull
 
-INFORMATIVE, PAPER, DESIGNED = PULLS = ("informative", "paper", "designed")
+INFORMATIVE, PAPER, DESIGNED = PULLS
 MOST_PULLS = 10  # a file of them is half a gigabyte
 NO_BASE = (
     "nothing says where it stands in the robot's base, so all is in frame O, which no robot knows:"
@@ -111,7 +112,7 @@ class Plan:
             "duration_s": round(self.trajectory.duration, 6),
             "grasp_s": round(self.trajectory.start_of("grasp"), 6),
             "release_s": round(self.trajectory.start_of("release"), 6),
-            "pulls": sum(phase.name == "pull" for phase in self.trajectory.phases),
+            "pulls": sum(phase.name == "release" for phase in self.trajectory.phases),
             "held_s": round(self.held_time, 6),
             "held_most_s": round(self.most_time, 6),
             "pull": self.pull,
@@ -254,8 +255,6 @@ def plan_recording(
         UserError: in one line, where a limit is broken or something is not known.
     """
     expect_known(params, "band", band)
-    if pull not in PULLS:
-        raise UserError(f"--pull: must be one of {', '.join(PULLS)}, got {pull!r}")
     if precondition > MOST_PULLS:
         raise UserError(f"--precondition: at most {MOST_PULLS}, got {precondition}")
     if pulls > MOST_PULLS:
@@ -281,7 +280,7 @@ def plan_recording(
         way = trajectory_of(plan, setup, params.episode, about, axis, pulls, precondition)
         limits.check_motion(way, plan)
         limits.check_floor(way, setup, plan)
-        return way, limits.check_window(way, plan, params.episode)
+        return way, limits.check_window(way, plan, params.episode, precondition)
 
     dips, design = settings.dips if pull == INFORMATIVE else (), None
     trajectory, (held_time, most_time) = through(dips)

@@ -12,8 +12,8 @@ from typing import cast
 import numpy as np
 from scipy.optimize import brentq
 
-from app.plan.trajectory import Phase, Trajectory, leg_time
-from pipeline.episode.planned import LET_BACK, PULL, REDRAW, legs_of
+from app.plan.trajectory import Phase, Trajectory
+from pipeline.episode.planned import LET_BACK, PULL, REDRAW, leg_time, legs_of
 from pipeline.params.lab import BandParams, PlanParams, SetupParams
 from pipeline.params.recording import EpisodeParams
 from pipeline.recording.pulls import CALM

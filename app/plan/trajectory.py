@@ -20,11 +20,6 @@ from scipy.interpolate import CubicHermiteSpline
 KNOTS, PLACES, SPEEDS = (0.25, 0.75, 1.0), (1 / 12, 11 / 12, 1.0), (1.0, 1.0, 0.0)
 
 
-def leg_time(length: float, speed: float, acceleration: float) -> float:
-    """Shortest time of a leg [s] that stays within a speed [m/s] and an acceleration [m/s^2]."""
-    return max(2 * length / speed, float(np.sqrt(8 * length / acceleration)))
-
-
 @dataclass(frozen=True)
 class Phase:
     """One leg, or a rest where the path is there already.

@@ -44,6 +44,14 @@ def legs_of(dips: Sequence[Dip], length: float) -> list[Leg]:
     return legs if reached == 1 else [*legs, Leg(PULL, 1.0, None)]
 
 
+def leg_time(length: float, speed: float, acceleration: float) -> float:
+    """Shortest time of a leg [s] that stays within a speed [m/s] and an acceleration [m/s^2].
+
+    Of a robot that follows app/plan/trajectory.py.
+    """
+    return max(2 * length / speed, float(np.sqrt(8 * length / acceleration)))
+
+
 def planned_pull(
     params: EpisodeParams,
     band: str,

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from pipeline.episode.episode import Episode
-from pipeline.episode.planned import planned_pull
+from pipeline.episode.planned import leg_time, planned_pull
 from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.posterior.coordinates import LOGS, Coordinates
 from pipeline.identify.posterior.gain import HALF_NORMAL
@@ -55,12 +55,17 @@ class PullLimits:
     """What the arm allows.
 
     Attributes:
-        shortest: Time [s] of a leg of a length [m].
+        speed, acceleration: Of the hand [m/s, m/s^2].
         spare: For all dips together [s].
     """
 
-    shortest: Callable[[float], float]
+    speed: float
+    acceleration: float
     spare: float
+
+    def shortest(self, length: float) -> float:
+        """Time [s] of a leg of a length [m]."""
+        return leg_time(length, self.speed, self.acceleration)
 
 
 @dataclass(frozen=True)

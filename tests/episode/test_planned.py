@@ -25,7 +25,7 @@ DIPS = st.lists(
 
 @given(DIPS)
 def test_legs_lead_from_the_fork_to_the_draw(dips) -> None:
-    """The pull's own parts are the draw together, in order; each dip comes back to where it began."""
+    """The pull's own parts make the draw together; each dip comes back to where it began."""
     legs = legs_of(dips, 0.4)
     pulled = [leg.share for leg in legs if leg.time is None]
     assert pulled[-1] == 1 and np.all(np.diff([0, *pulled]) > 0)

@@ -21,7 +21,7 @@ from scipy.optimize import minimize
 
 from pipeline.episode.episode import Episode
 from pipeline.episode.planned import leg_time, planned_pull
-from pipeline.episode.signal import cutoff_hz
+from pipeline.episode.signal import average
 from pipeline.identify.posterior.coordinates import LOGS, Coordinates
 from pipeline.identify.posterior.gain import HALF_NORMAL
 from pipeline.identify.posterior.likelihood import Tolerances
@@ -33,7 +33,6 @@ from pipeline.simulator.initial import hanging_guess
 from pipeline.simulator.interaction import interact
 from pipeline.simulator.launch import launch
 from pipeline.simulator.model import ClampedBand, LaunchHistory, LaunchSetup
-from pipeline.simulator.replay import recorded_force
 from pipeline.simulator.rubber import RUBBER, uniaxial
 
 DRAWS = 20  # of the prior
@@ -157,12 +156,12 @@ class PullDesign:
         return (g @ covariance * g).sum(axis=2).mean(axis=0)
 
     def episode(self, dips: Sequence[Dip]) -> Episode:
-        """The planned pull, without pictures."""
+        """The planned pull, with one picture, of the hanging band."""
         hanging = hanging_guess(self.sling)[self.sling.middle, 2]
         pull_time, pause = self.times
         about = {"pull_time": pull_time, "pause": pause, "dips": dips}
         made = planned_pull(self.params.episode, "planned", hanging, self.draw, **about)
-        return replace(made, cloud_time=made.cloud_time[:0], clouds=[])
+        return replace(made, cloud_time=made.cloud_time[:1], clouds=made.clouds[:1])
 
     def information(self, dips: Sequence[Dip]) -> np.ndarray:
         """J' S^-1 J of the force of a pull, at each draw, shape (N, D, D).
@@ -182,9 +181,13 @@ class PullDesign:
             workers=self.workers,
         )
         failed = np.array([why is not None for why in done.failure]).reshape(count, size)
-        has = self.params.force
-        force = recorded_force(done, episode, cutoff_hz(has.cutoff, has.cutoff_unit))
-        force = force[:, Rule().samples(episode), 1:].reshape(count, size, -1, 2)  # none along x
+        along = np.moveaxis(
+            done.force[..., 1:].astype(float), 1, 0
+        )  # none across the pull, along x
+        sampling = episode.time[0] - episode.sample_period / 2, episode.sample_period
+        # without the recorded force's low-pass, which a leg of 0.2 s passes unchanged
+        force = average(done.times, along, *sampling, len(episode.time))
+        force = np.moveaxis(force[Rule().samples(episode)], 0, 1).reshape(count, size, -1, 2)
         told = np.zeros((count, len(steps), len(steps)))
         for one, bad, at in zip(force, failed, told, strict=True):
             if not bad.any():

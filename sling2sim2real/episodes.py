@@ -12,6 +12,7 @@ from scipy.signal import savgol_filter
 from pipeline.base.errors import UserError
 from pipeline.episode import signal
 from pipeline.episode.episode import Episode
+from pipeline.episode.window import window_of
 from sling2sim2real.model import Band, known
 from sling2sim2real.settings import Settings
 
@@ -120,14 +121,9 @@ def episode_from_arrays(
             f"time: the arrays end at {last:.2f} s; record until {about.tail:g} s"
             f" (episode.tail) after the release at {release_time:.2f} s"
         )
-    period = about.duration / about.samples
-    start = max(first, release_time + about.tail - about.duration)
-    count = min(about.samples, int((last - start) / period + 1e-6))
-    if start > grasp_time:
-        raise UserError(
-            f"grasp_time: {grasp_time:g} s is before the window, which begins at {start:.2f} s;"
-            f" record from before it on, or set a longer episode.duration than {about.duration:g} s"
-        )
+    window = window_of(about, first, grasp_time, release_time)
+    start, period = window.start, window.period
+    count = min(window.samples, int((last - start) / period + 1e-6))
 
     def means(times: np.ndarray, values: np.ndarray) -> np.ndarray:
         return signal.average(times, values, start, period, count)

@@ -108,12 +108,10 @@ def check_window(
     """Grasp to release fits the episode. Returns what it takes, and what there is for it [s]."""
     lasts = trajectory.until("release")
     taken = trajectory.start_of("release") - trajectory.start_of("grasp")
-    longest = getattr(episode, "longest", episode.duration)
-    most = longest - episode.tail - LEAD
+    most = episode.longest - episode.tail - LEAD
     over = taken - most
     if over > ROUNDING:
-        key = "longest" if hasattr(episode, "longest") else "duration"
-        advice = f"raise episode.{key} to {np.ceil(10 * (longest + over)) / 10:g}"
+        advice = f"raise episode.longest to {np.ceil(10 * (episode.longest + over)) / 10:g}"
         if plan.dips:
             advice = f"take --pull paper, or shorter plan.dips, or {advice}"
         if precondition:
@@ -127,8 +125,8 @@ def check_window(
             if speed <= plan.max_speed and least <= time + ROUNDING:
                 advice = f"raise plan.pull_speed to {speed:g}, or {advice.removeprefix('raise ')}"
         raise UserError(
-            f"from grasp to release it takes {taken:.2f} s, {over:.2f} s more than episode.{key}"
-            f" {longest:g} less episode.tail {episode.tail:g} and {LEAD:g} s leave:"
+            f"from grasp to release it takes {taken:.2f} s, {over:.2f} s more than episode.longest"
+            f" {episode.longest:g} less episode.tail {episode.tail:g} and {LEAD:g} s leave:"
             f" {advice}"
         )
     return taken, most

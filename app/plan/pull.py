@@ -14,12 +14,12 @@ from scipy.optimize import brentq
 
 from app.plan.trajectory import Phase, Trajectory
 from pipeline.episode.planned import LET_BACK, PULL, REDRAW, leg_time, legs_of
+from pipeline.episode.window import LEAD
 from pipeline.params.lab import BandParams, PlanParams, SetupParams
 from pipeline.params.recording import EpisodeParams
 from pipeline.recording.pulls import CALM
 
 TICK = 0.001  # s: phases last whole ticks
-LEAD = 0.1  # s of the lead-in that the episode holds at least
 STRETCH, SLACKEN = "stretch", "slacken"  # a preconditioning pull, and back to the fork
 BACK = LET_BACK, REDRAW
 DRAWS = PULL, STRETCH  # at plan.pull_speed

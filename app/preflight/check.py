@@ -6,10 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from app.preflight.facts import BandFacts, CloudFacts, DelayFacts, ExtrinsicFacts, SignalSummary
+from app.preflight.facts import (
+    BandFacts,
+    CloudFacts,
+    DelayFacts,
+    ExtrinsicFacts,
+    MotionPhase,
+    SignalSummary,
+)
 from app.preflight.report import CheckReport, Chosen, Topic
 from app.sizes import DIAMETER, MASS, REST_LENGTH, band_to_come
 from pipeline.base.errors import UserError
+from pipeline.episode.phases import phases_of_hand, unseen
 from pipeline.params import Params, expect_known
 from pipeline.params.lab import BandParams
 from pipeline.recording.build import Checked
@@ -129,6 +137,9 @@ def _look_at_pull(report: CheckReport, done: Checked) -> Look:
     report.problem = _without(recording.path, refusal) if refusal else None
     try:
         report.signals = SignalSummary.of(done)
+        phases = phases_of_hand(done.signals)
+        report.motion = [MotionPhase.of(one, done.start) for one in phases]
+        report.keeps_prior = unseen(phases)
         if refusal and refusal.about == UNDERSTOOD.name:
             return Look(report, recording)
         report.cloud = CloudFacts.of(done)

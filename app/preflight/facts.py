@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.episode.phases import Phase
 from pipeline.recording.checks.camera import camera_to_fork
 from pipeline.recording.delays import Delays
 from pipeline.recording.processed import Processed
@@ -66,6 +67,30 @@ class SignalSummary:
             draw_m=signals.hand(signals.release_time).tolist(),
             stretch=scene.stretch(signals.release_time - 1e-3),
         )
+
+
+@dataclass(frozen=True)
+class MotionPhase:
+    """What the hand does with the drawn band: drawn distance [m], [s since the first force]."""
+
+    kind: str
+    begin_s: float
+    end_s: float
+    from_m: float
+    to_m: float
+    speed_m_s: float
+
+    @classmethod
+    def of(cls, phase: Phase, start: float) -> MotionPhase:
+        """Of a phase of a window that begins at `start` [s]."""
+        times = start + phase.begin, start + phase.end
+        return cls(phase.kind, *times, phase.start, phase.stop, phase.speed)
+
+    def __str__(self) -> str:
+        if self.kind == "pause":
+            return f"pause {self.end_s - self.begin_s:.1f} s"
+        way = f"{100 * self.from_m:.0f} to {100 * self.to_m:.0f} cm"
+        return f"{self.kind} {way} at {self.speed_m_s:.2f} m/s"
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,19 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 
-from app.preflight.facts import BandFacts, CloudFacts, DelayFacts, ExtrinsicFacts, SignalSummary
+from app.preflight.facts import (
+    BandFacts,
+    CloudFacts,
+    DelayFacts,
+    ExtrinsicFacts,
+    MotionPhase,
+    SignalSummary,
+)
 from pipeline.base.errors import printable
 from pipeline.recording.checks.finding import Finding
 from pipeline.recording.coverage import PhaseLine, PictureLine
+
+MOST_PHASES = 9  # in a line
 
 
 @dataclass(frozen=True)
@@ -89,6 +98,8 @@ class CheckReport:
         notes: What else to know of it, which cost nothing.
         frames: Where each transform comes from.
         signals, delays, cloud, phases, coverage: None and empty where the pull is not understood.
+        motion: What the hand does with the drawn band, by time.
+        keeps_prior: What that does not show, and so nothing but a prior tells, by what is missing.
         extrinsics: None where it cannot be told.
         cautions: What costs accuracy, and what to do.
         written: Files that were drawn of it, in words.
@@ -107,6 +118,8 @@ class CheckReport:
     cloud: CloudFacts | None = None
     phases: list[PhaseLine] = field(default_factory=list)
     coverage: list[PictureLine] = field(default_factory=list)
+    motion: list[MotionPhase] = field(default_factory=list)
+    keeps_prior: dict[str, str] = field(default_factory=dict)
     extrinsics: ExtrinsicFacts | None = None
     cautions: list[Finding] = field(default_factory=list)
     written: list[str] = field(default_factory=list)
@@ -162,6 +175,11 @@ class CheckReport:
                 f"  force: at most {told.peak_force_n:.1f} N, at {told.stretch:.2f} times the"
                 f" rest length; release known to ± {1e3 * told.release_error_s:.1f} ms"
             ]
+        if self.motion:
+            lines.append(f"  motion: {_motion(self.motion)}")
+        if self.keeps_prior:
+            kept = (f"{keeps} ({what})" for what, keeps in self.keeps_prior.items())
+            lines.append(f"  not in it, so known by a prior alone: {'; '.join(kept)}")
         if seen:
             shown = seen.frames - seen.empty
             covered = seen.taut_coverage
@@ -181,6 +199,15 @@ class CheckReport:
         heads = "".join(f"{name:>13}" for name in ("grasp [s]", "release [s]", "peak [N]"))
         about = f"pull {self.pull} of {len(self.pulls)}: {self.verdict}"
         return [about, *cautions, "", f"{'pull':>6}{heads}", *map(str, self.pulls)]
+
+
+def _motion(phases: list[MotionPhase]) -> str:
+    """In the order of time; of many, the first and the last ones."""
+    told = list(map(str, phases))
+    if len(told) > MOST_PHASES:
+        left = len(told) - MOST_PHASES
+        told[MOST_PHASES - 3 : -3] = [f"{left} more"]
+    return ", ".join(told)
 
 
 def _topics(topics: list[Topic]) -> list[str]:

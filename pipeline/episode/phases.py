@@ -1,45 +1,217 @@
-"""Parts of an episode: slack, taut, recoil, swing; and blocks of the pull that a fit leaves out."""
+"""Phases of an interaction, as its motion and force show them, not as anybody planned it.
+
+The drawn distance is the hand's from the fork's middle. While the band is slack nothing is a phase.
+From it and the force's rise follow
+
+    loading     the hand draws the band further than ever before
+    unloading   it lets the drawn band back
+    reloading   it draws again what was drawn before
+    pause       it rests, and the band relaxes
+    recoil      the hand let go, until a picture shows the band's middle past the fork
+    swing       after that
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
 import numpy as np
+from scipy.signal import savgol_filter
 
 from pipeline.base.errors import UserError
 from pipeline.episode.episode import Episode
 
+# Hands that hold a drawn band wander: by 2 mm at most in the recordings that we have. Tracking is
+# as good, so that a way back of five times as much is meant.
+TURN = 0.01  # m
+STILL, REST = 0.01, 0.3  # m/s, and s: a hand that is slower for so long pauses
+SPEED = 0.15  # s over which a speed is taken
 MIDDLE = 0.03  # the middle of the band: points this near the plane x = 0 [m]
 LONGEST_RECOIL = 0.2  # after the release [s]; soft bands cross the fork plane within 0.1
 TAUT = 0.05  # of the peak force, above the band's weight: below it the band is slack
-SETTLED = 1e-3  # what is left of a pulse in the low-pass when its reach ends
+# What a recording must hold to tell a property of the rubber apart from its prior.
+BACK = 0.02  # m of unloading
+PAUSE = 0.5  # s
+OTHER_SPEED = 2.0  # times another speed of the hand
+LEAST_WAY = 0.03  # m on which a speed tells
+MOVES = "loading", "unloading", "reloading"
+NO_UNLOADING = "no unloading"
 
 
-def phases(episode: Episode) -> dict[str, tuple[float, float]]:
-    """Begin and end [s] of slack, taut (until the release), recoil, swing; each ends as one begins.
+class Held(Protocol):
+    """A hand that holds a band: an `Episode`, or the signals of one that is to be."""
 
-    The recoil ends with the first frame that shows the middle past the fork plane. Raises UserError
-    where the hand's force never rises.
+    @property
+    def time(self) -> np.ndarray: ...
+    @property
+    def position(self) -> np.ndarray: ...
+    @property
+    def force(self) -> np.ndarray: ...
+    @property
+    def grasp_time(self) -> float: ...
+    @property
+    def release_time(self) -> float: ...
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A part of an interaction.
+
+    Attributes:
+        kind: As the table above has it.
+        begin, end: [s].
+        start, stop: Drawn distance at both [m], of the band's middle after the release.
     """
+
+    kind: str
+    begin: float
+    end: float
+    start: float
+    stop: float
+
+    @property
+    def duration(self) -> float:
+        return self.end - self.begin
+
+    @property
+    def way(self) -> float:
+        """[m], never negative."""
+        return abs(self.stop - self.start)
+
+    @property
+    def speed(self) -> float:
+        """In the mean [m/s]."""
+        return self.way / max(self.duration, 1e-9)
+
+
+def phases(episode: Episode) -> list[Phase]:
+    """All of an episode, by time; gaps are slack. None of them where the force never rises."""
+    found = phases_of_hand(episode)
+    if not found:
+        return []
+    drawn, release = found[-1].stop, episode.release_time
     recoil = np.flatnonzero(taut_frames(episode))
-    after = episode.cloud_time > episode.release_time
+    after = episode.cloud_time > release
     after[recoil] = False
-    latest = episode.release_time + LONGEST_RECOIL
-    bounds = [
-        float(episode.time[0] - episode.sample_period / 2),
-        taut_time(episode),
-        episode.release_time,
-        float(min([latest, *episode.cloud_time[after]])),
-        float(max(episode.time[-1] + episode.sample_period / 2, episode.cloud_time[-1])),
-    ]
-    names = ("slack", "taut", "recoil", "swing")
-    return dict(zip(names, zip(bounds[:-1], bounds[1:], strict=True), strict=True))
+    over = float(min([release + LONGEST_RECOIL, *episode.cloud_time[after]]))
+    end = float(max([episode.time[-1] + episode.sample_period / 2, *episode.cloud_time, over]))
+    return [
+        *found, Phase("recoil", release, over, drawn, 0.0), Phase("swing", over, end, 0.0, 0.0)
+    ]  # fmt: skip
+
+
+def phases_of_hand(held: Held) -> list[Phase]:
+    """From grasp to release, by time."""
+    taut = taut_samples(held)
+    if not taut.any():
+        return []
+    during = (held.time > held.grasp_time) & (held.time < held.release_time)
+    time = held.time[during]
+    drawn = np.linalg.norm(held.position[during], axis=1)
+    slack = drawn[np.argmax(taut[during])]  # a slack band's middle is nowhere further
+    drawn = np.maximum(drawn, slack)
+    names = _names(time, drawn, slack)
+    ends = np.flatnonzero(np.diff(names)) + 1
+    found: list[Phase] = []
+    for first, last in zip([0, *ends], [*ends, len(time)], strict=True):
+        until = last if last < len(time) else last - 1
+        end = float(time[until]) if last < len(time) else held.release_time
+        if names[first] != SLACK:
+            one = Phase("", float(time[first]), end, float(drawn[first]), float(drawn[until]))
+            deepest = max([slack, *(phase.stop for phase in found)])
+            part = slice(first, until + 1)
+            found += _named(one, names[first], time[part], drawn[part], deepest)
+    return found
+
+
+SLACK, RESTS = -2, -1  # beside the numbers of ways
+
+
+def _names(time: np.ndarray, drawn: np.ndarray, slack: float) -> np.ndarray:
+    """Of each sample (T,): which of the hand's ways it belongs to, RESTS or SLACK."""
+    names = np.searchsorted(turns(drawn)[1:-1], np.arange(len(drawn)), side="right")
+    names[drawn <= slack] = SLACK
+    period = (time[-1] - time[0]) / max(len(time) - 1, 1)
+    size = max(3, 2 * round(SPEED / period / 2) + 1)
+    if len(drawn) < size:
+        return names
+    slow = np.abs(savgol_filter(drawn, size, 1, deriv=1, delta=period)) < STILL
+    slow &= names != SLACK
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], slow, [0]])))
+    for first, last in edges.reshape(-1, 2):
+        if (last - first) * period >= REST:
+            names[first:last] = RESTS
+    return names
+
+
+def _named(
+    one: Phase, name: int, time: np.ndarray, drawn: np.ndarray, deepest: float
+) -> Iterator[Phase]:
+    """A run of samples as a phase, or as reloading and loading where it does both."""
+    if name == RESTS:
+        yield Phase("pause", one.begin, one.end, one.start, one.stop)
+    elif one.way < TURN / 2:
+        return
+    elif one.stop < one.start:
+        yield Phase("unloading", one.begin, one.end, one.start, one.stop)
+    elif one.stop < deepest + TURN / 2:
+        yield Phase("reloading", one.begin, one.end, one.start, one.stop)
+    elif one.start > deepest - TURN / 2:
+        yield Phase("loading", one.begin, one.end, one.start, one.stop)
+    else:
+        at = float(time[np.argmax(drawn >= deepest)])
+        yield Phase("reloading", one.begin, at, one.start, deepest)
+        yield Phase("loading", at, one.end, deepest, one.stop)
+
+
+def turns(way: np.ndarray, least: float = TURN) -> list[int]:
+    """Samples at which a way (T,) turns by `least` or more, with the first and the last one.
+
+    It grows at first.
+    """
+    found, extreme, sign = [0], 0, 1.0
+    for i, place in enumerate(way):
+        further = sign * (place - way[extreme])
+        if further >= 0:
+            extreme = i
+        elif -further > least:
+            found.append(extreme)
+            extreme, sign = i, -sign
+    return [*found, len(way) - 1]
+
+
+def unseen(found: Sequence[Phase]) -> dict[str, str]:
+    """What a recording with these phases lacks, and what therefore keeps its prior."""
+    moves = [one.speed for one in found if one.kind in MOVES and one.way >= LEAST_WAY]
+    back = any(one.kind == "unloading" and one.way >= BACK for one in found)
+    pauses = any(one.kind == "pause" and one.duration >= PAUSE for one in found)
+    speeds = bool(moves) and max(moves) > OTHER_SPEED * min(moves)
+    return {
+        what: keeps
+        for shown, what, keeps in (
+            (back, NO_UNLOADING, "softening and hysteresis, so the energy that a launch gets back"),
+            (pauses, f"no pause of {PAUSE:g} s", "slow relaxation"),
+            (speeds, "one speed alone", "how the force hangs on speed"),
+        )
+        if not shown
+    }
+
+
+def taut_samples(held: Held) -> np.ndarray:
+    """Which samples (T,) show a force on the hand beyond the band's weight, until the release."""
+    size = np.linalg.norm(held.force, axis=1)
+    during = (held.time > held.grasp_time) & (held.time < held.release_time)
+    if not during.any():
+        return during
+    peak, weight = size[during].max(), np.median(size[during][:30])
+    return during & (size > TAUT * peak + min(1.5 * weight, 0.2 * peak))
 
 
 def taut_time(episode: Episode) -> float:
     """When the hand's force begins to rise [s]. Raises UserError where it never does."""
-    size = np.linalg.norm(episode.force, axis=1)
-    held = (episode.time > episode.grasp_time) & (episode.time < episode.release_time)
-    peak, weight = size[held].max(), np.median(size[held][:30])
-    taut = held & (size > TAUT * peak + min(1.5 * weight, 0.2 * peak))
+    taut = taut_samples(episode)
     if not taut.any():
         raise UserError(f"episode of {episode.band}: the hand's force never rises")
     return float(episode.time[np.argmax(taut)])
@@ -63,45 +235,3 @@ def taut_frames(episode: Episode) -> np.ndarray:
             break
         taut[frame] = True
     return taut
-
-
-def reach(period: float, cutoff: float, median_window: int) -> float:
-    """How far a recorded moment reaches into the samples around it [s].
-
-    Through the zero-phase Butterworth, until SETTLED is left (its poles decay at cutoff · 2π/√2),
-    the mean over a sample, and the median filter.
-    """
-    lowpass = np.log(1 / SETTLED) / (np.sqrt(2) * np.pi * cutoff)
-    return float(lowpass + (median_window // 2 + 1) * period)
-
-
-def held_out_blocks(episode: Episode, blocks: int, length: float, guard: float) -> np.ndarray:
-    """Begin and end [s] of blocks that a fit leaves out, shape (blocks, 2).
-
-    Each lies in the middle of an equal share of the time from grasp to release. The recoil is never
-    among them: its few frames are all that shows the damping, so a fit without them is another
-    question, not a check of this one.
-
-    Args:
-        length: Of each block [s].
-        guard: Left out on each side of a block as well [s].
-
-    Raises:
-        UserError: Less than half of the pull would be left for the fit.
-    """
-    begin, end = episode.grasp_time, episode.release_time
-    lost = blocks * (length + 2 * guard)
-    if lost > (end - begin) / 2:
-        raise UserError(
-            f"loss.held_out: {blocks} blocks of {length:g} s with guards of {guard:.2f} s leave out"
-            f" {lost:.1f} s of the {end - begin:.1f} s from grasp to release of {episode.band};"
-            " at most half may be left out, take fewer or shorter ones"
-        )
-    middle = begin + (np.arange(blocks) + 0.5) * (end - begin) / max(blocks, 1)
-    return np.stack([middle - length / 2, middle + length / 2], axis=1)
-
-
-def within(times: np.ndarray, intervals: np.ndarray, margin: float = 0.0) -> np.ndarray:
-    """Which times (T,) lie in one of the intervals (B, 2) widened by a margin, shape (T,)."""
-    low, high = intervals.T
-    return ((times[:, None] > low - margin) & (times[:, None] < high + margin)).any(axis=1)

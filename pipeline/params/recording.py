@@ -21,13 +21,16 @@ class DelayParams(Section):
 class EpisodeParams(Section):
     samples: Annotated[int, Range(30, 10_000)]
     duration: Annotated[float, Range(1, 120)]
+    longest: Annotated[float, Range(1, 120)]
     tail: Annotated[float, Range(0.1, 60)]
     delays: DelayParams
 
     @model_validator(mode="after")
-    def _tail_within(self) -> EpisodeParams:
+    def _within(self) -> EpisodeParams:
         if self.tail >= self.duration:
             raise refusal("tail must be less than duration")
+        if self.longest < self.duration:
+            raise refusal("longest must be at least duration")
         return self
 
 

@@ -54,7 +54,7 @@ class Processed:
     @cached_property
     def view(self) -> View:
         """Raises UserError."""
-        duration = self.params.episode.duration
+        duration = self.signals.duration
         return View(self.pull.recording, self.pull.geometry, self.scene, duration)
 
     @cached_property

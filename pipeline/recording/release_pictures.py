@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.recording.pulls import Pull
 
 AROUND = 0.4  # s before and after the release
+THERE = 0.01  # m: while the hand is further from where it lets go, it dips or draws
 HELD = 12  # pictures before that, of which it is learned how the drawn band is seen
 NEAR = 0.025  # m around the straight lines from the tips to the hand
 OUTER, HAND = (
@@ -78,12 +79,14 @@ class ReleasePictures:
 def release_pictures(pull: Pull, fork_width: float) -> ReleasePictures | None:
     """None where the pictures do not show the drawn band, or not until it is gone."""
     recording, release = pull.recording, pull.release.time
-    since = recording.depth.seconds(recording.origin) - release
-    around = np.flatnonzero(np.abs(since) < AROUND)
-    before = np.flatnonzero((since < -AROUND) & (since > pull.grasp - release))[-HELD:]
+    stamps = recording.depth.seconds(recording.origin)
+    since, hand = stamps - release, pull.motion.position(release - 0.02)
+    there = np.linalg.norm(pull.motion.position(stamps) - hand, axis=1) < THERE
+    there |= since > 0
+    around = np.flatnonzero((np.abs(since) < AROUND) & there)
+    before = np.flatnonzero((since < -AROUND) & (since > pull.grasp - release) & there)[-HELD:]
     if len(before) < 3 or len(around) < 3:
         return None
-    hand = pull.motion.position(release - 0.02)
     tips = np.array([[-0.5, 0, 0], [0.5, 0, 0]]) * fork_width
     rays, last = recording.depth_camera.rays().astype(np.float32), None
     counts, times, repeated = [], [], []

@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.episode import signal
+from pipeline.episode.window import Window, window_of
 from pipeline.params import Params
 from pipeline.params.lab import Tool
 from pipeline.params.recording import EpisodeParams
@@ -91,6 +92,7 @@ class Signals:
 
     Attributes:
         origin: The window's start on the recording's clock [ns].
+        duration: Of the window [s].
         time: Middle of each sample, shape (T,).
         position, velocity, force: Shape (T, 3).
         opening: Shape (T,), NaN where it was not recorded.
@@ -100,6 +102,7 @@ class Signals:
     """
 
     origin: int
+    duration: float
     time: np.ndarray
     position: np.ndarray
     velocity: np.ndarray
@@ -147,12 +150,12 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
         raw = raw - inertia.force(motion, pull.geometry, t, release.time)
     band = band_force(t, raw, motion, pull.geometry, tool, grasp, release)
 
-    start = _start(pull, episode)
-    gaps = _gaps(pull, start, start + episode.duration)
-    period = episode.duration / episode.samples
+    window = _window(pull, episode)
+    start, period = window.start, window.period
+    gaps = _gaps(pull, start, start + window.duration)
 
     def means(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-        return signal.average(times, values, start, period, episode.samples)
+        return signal.average(times, values, start, period, window.samples)
 
     rate = 1 / recording.wrench.period
     cutoff = signal.cutoff_hz(params.force.cutoff, params.force.cutoff_unit)
@@ -188,11 +191,12 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
     )
     return Signals(
         origin=recording.origin + round(start * 1e9),
-        time=(np.arange(episode.samples) + 0.5) * period,
+        duration=window.duration,
+        time=(np.arange(window.samples) + 0.5) * period,
         position=means(pose_grid, position),
         velocity=means(pose_grid, velocity),
         force=means(grid, smooth),
-        opening=means(*pull.opening) if pull.opening else np.full(episode.samples, np.nan),
+        opening=means(*pull.opening) if pull.opening else np.full(window.samples, np.nan),
         grasp_time=grasp - start,
         release_time=release.time - start,
         facts=facts,
@@ -202,15 +206,15 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
     )
 
 
-def _start(pull: Pull, episode: EpisodeParams) -> float:
-    """Of the window [s]: as much lead-in as the tail after the release leaves room for."""
+def _window(pull: Pull, episode: EpisodeParams) -> Window:
+    """Of the pull, all of which must have been recorded."""
     recording, grasp, release = pull.recording, pull.grasp, pull.release.time
     t, pose_t = pull.force_time, pull.motion.time
     first, last = max(t[0], pose_t[0]), min(t[-1], pose_t[-1])
     ends = recording.wrench.topic if t[-1] < pose_t[-1] else recording.pose.topic
-    start = max(first, release + episode.tail - episode.duration)
+    window = window_of(episode, first, grasp, release, MARGIN)
     slack = 1.5 * max(recording.wrench.period, recording.pose.period)
-    if start + episode.duration > last + slack:
+    if window.start + window.duration > last + slack:
         if last < release + episode.tail:
             side = "after" if last >= release else "before"
             raise UserError(
@@ -221,12 +225,7 @@ def _start(pull: Pull, episode: EpisodeParams) -> float:
             f"it is {last - first:.2f} s long, episode.duration asks for {episode.duration} s:"
             " record for longer"
         )
-    if start > grasp - MARGIN:
-        raise UserError(
-            f"from grasp to release it takes {release - grasp:.2f} s, more than episode.duration"
-            f" {episode.duration} s less episode.tail {episode.tail} s: pull faster, or set them"
-        )
-    return start
+    return window
 
 
 def _gaps(pull: Pull, start: float, end: float) -> dict[str, float]:

@@ -1,18 +1,28 @@
-"""Parts of an episode, and blocks that are held out of the pull."""
+"""Phases of interactions whose hand is led along known knots."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.base.errors import UserError
-from pipeline.episode.phases import held_out_blocks, phases, reach, taut_frames, within
-from pipeline.episode.signal import average, lowpass
+from pipeline.episode.phases import (
+    NO_UNLOADING,
+    Phase,
+    phases,
+    phases_of_hand,
+    taut_frames,
+    taut_time,
+    turns,
+    unseen,
+)
+from tests.episode import led
 from tests.identify.search import toy
 
 RELEASE = 2.4
+OFTEN = [(0.0, 0.0), (2e-4, 0.0), (2e-4, 0.002), (0.001, 0.0)]  # noise and wander of hands
 
 
 def pull(**changes):
@@ -28,24 +38,31 @@ def recoil(y) -> dict:
     return {"clouds": clouds, "cloud_time": RELEASE + 0.02 * np.arange(len(y))}
 
 
-def test_phases_of_a_pull() -> None:
-    """Taut from 0.6 + 0.45 N on (of its peak and its weight); the recoil until y = 0."""
+def kinds(found: list[Phase]) -> list[str]:
+    return [one.kind for one in found]
+
+
+def test_the_force_rises_beyond_the_bands_weight() -> None:
+    """From 0.6 + 0.45 N on: of its peak and its weight."""
+    assert taut_time(pull()) == pytest.approx(1.545)
+
+
+def test_a_recoil_ends_as_the_band_passes_the_fork() -> None:
     found = phases(pull(**recoil([-0.4, -0.3, -0.1, 0.02, 0.1, -0.05])))
-    assert list(found) == ["slack", "taut", "recoil", "swing"]
-    bounds = [*(begin for begin, _ in found.values()), found["swing"][1]]
-    np.testing.assert_allclose(bounds, [0, 1.545, 2.4, 2.46, 3.6], atol=1e-9)
-    assert [end for _, end in found.values()] == bounds[1:]
+    assert kinds(found)[-2:] == ["recoil", "swing"]
+    np.testing.assert_allclose([found[-2].begin, found[-2].end, found[-1].end], [2.4, 2.46, 3.6])
 
 
 def test_a_recoil_that_no_frame_ends() -> None:
     """Soft or unseen, it is over after 0.2 s."""
-    unseen = pull(cloud_time=np.array([0.5]), clouds=[toy.facing()])
-    assert phases(unseen)["recoil"] == pytest.approx((2.4, 2.6))
+    unseen_recoil = pull(cloud_time=np.array([0.5]), clouds=[toy.facing()])
+    assert phases(unseen_recoil)[-2].end == pytest.approx(2.6)
 
 
-def test_a_hand_that_feels_nothing_is_refused() -> None:
+def test_a_hand_that_feels_nothing_has_no_phases() -> None:
+    assert phases(toy.episode()) == []
     with pytest.raises(UserError, match="never rises"):
-        phases(toy.episode())
+        taut_time(toy.episode())
 
 
 def test_recoil_with_frames_that_do_not_show_the_middle() -> None:
@@ -56,47 +73,64 @@ def test_recoil_with_frames_that_do_not_show_the_middle() -> None:
     np.testing.assert_array_equal(taut_frames(pull(**content)), [0, 1, 1, 1, 0])
 
 
-@given(st.integers(1, 8), st.floats(0.5, 2.0), st.floats(0, 0.3), st.floats(2.0, 20.0))
-def test_blocks_and_their_guards_lie_apart_within_the_pull(blocks, length, guard, pull) -> None:
-    assume(blocks * (length + 2 * guard) <= pull / 2)
-    episode = toy.episode(grasp_time=0.9, release_time=0.9 + pull)
-    low, high = held_out_blocks(episode, blocks, length, guard).T
-    np.testing.assert_allclose(high - low, length)
-    assert len(low) == blocks
-    assert np.all(low[1:] - high[:-1] > 2 * guard)
-    assert low[0] - guard >= 0.9
-    assert high[-1] + guard <= episode.release_time + 1e-9
+@pytest.mark.parametrize(("noise", "wander"), OFTEN)
+@pytest.mark.parametrize(
+    ("knots", "expected"),
+    [
+        (led.MONOTONE, "loading pause"),
+        (led.DIP, "loading unloading reloading pause"),
+        (led.FAST, "loading unloading reloading pause"),
+        (led.ON_THE_WAY, "loading unloading reloading loading pause"),
+        (led.CYCLES, "loading unloading reloading unloading reloading pause"),
+        (((1.2, 0.0), (3, 0.4), (4, 0.4), (5, 0.3), (6, 0.3), (7, 0.4)),
+         "loading pause unloading pause reloading"),
+        (((1.2, 0.0), (3, 0.4), (4, 0.35), (6, 0.35)), "loading unloading pause"),
+        (((1.2, 0.0), (3, 0.3), (5, 0.3), (6, 0.4), (7, 0.4)), "loading pause loading pause"),
+    ],
+)  # fmt: skip
+def test_what_the_hand_does_is_told_from_its_path(knots, expected, noise, wander) -> None:
+    assert kinds(phases_of_hand(led.episode(knots, noise, wander))) == expected.split()
 
 
-def test_no_blocks() -> None:
-    blocks = held_out_blocks(toy.episode(), 0, 0.6, 0.1)
-    assert blocks.shape == (0, 2)
-    assert not within(np.arange(5.0), blocks, 1.0).any()
+def test_times_ways_and_speeds_of_a_dip() -> None:
+    loading, back, again, pause = phases_of_hand(led.episode(led.DIP, 2e-4))
+    assert loading.start == pytest.approx(led.TAUT, abs=0.02)
+    np.testing.assert_allclose([loading.stop, again.stop, pause.stop], 0.4, atol=2e-3)
+    assert back.stop == again.start == pytest.approx(0.3, abs=2e-3)
+    for found, begin in ((back, 5.2), (again, 6.2), (pause, 7.2)):
+        assert found.begin == pytest.approx(begin, abs=0.12)
+    assert back.speed == pytest.approx(0.1, rel=0.15)
+    assert pause.end == 9.2
 
 
-def test_half_of_the_pull_stays_for_the_fit() -> None:
-    episode = toy.episode(grasp_time=1.0, release_time=5.0)
-    held_out_blocks(episode, 2, 0.6, 0.15)  # 1.8 s
-    with pytest.raises(UserError, match=r"held_out: 3 blocks .* leave out 2.7 s of the 4.0 s"):
-        held_out_blocks(episode, 3, 0.6, 0.15)
+@given(st.floats(0.02, 0.15), st.floats(0.2, 2.0), st.floats(0.2, 2.0), st.floats(0.4, 3.0))
+def test_any_dip_of_two_centimetres_is_seen(depth, out, back, pause) -> None:
+    low, again = 4.2 + out, 4.2 + out + back
+    knots = ((1.2, 0.0), (4.2, 0.4), (low, 0.4 - depth), (again, 0.4), (again + pause, 0.4))
+    found = phases_of_hand(led.episode(knots, 2e-4, 0.001))
+    (unloading,) = [one for one in found if one.kind == "unloading"]
+    assert unloading.way == pytest.approx(depth, abs=4e-3)
+    ends = [one.begin for one in found[1:]]
+    assert ends == pytest.approx([one.end for one in found[:-1]])  # no gap, no overlap
 
 
-@pytest.mark.parametrize("cutoff", [8.0, 35.65, 200.0])
-def test_nothing_of_a_block_reaches_beyond_its_guard(cutoff: float) -> None:
-    """Whatever 1 N the force does within the block, a thousandth of it is left beyond the guard."""
-    period, samples, window = 0.03, 200, 7
-    time = period * (np.arange(samples) + 0.5)
-    block = np.array([[2.5, 3.5]])
-    times = np.arange(0, 6.0, 1e-3)
-    inside = within(times, block)
-    beyond = ~within(time, block, reach(period, cutoff, window))
-    near = ~within(time, block)
-    rng = np.random.default_rng(0)
-    for raw in (np.ones(len(times)), np.sign(rng.normal(size=len(times)))):
-        record = average(times, lowpass(raw * inside, 1000.0, cutoff), 0.0, period, samples)
-        # A sample beyond takes part in no median with samples that the block has changed.
-        changed = np.flatnonzero(np.abs(record) > 1e-3)
-        medians = np.abs(np.flatnonzero(beyond)[:, None] - changed) <= window // 2
-        assert not medians.any()
-        assert np.abs(record[beyond]).max() < 1e-3
-    assert np.abs(record[near]).max() > 1e-3 or cutoff > 100  # it is the guard that keeps it out
+def test_what_a_recording_does_not_show() -> None:
+    assert [what.split()[1] for what in unseen(phases_of_hand(led.episode(led.MONOTONE)))] == [
+        "unloading", "speed",
+    ]  # fmt: skip
+    assert NO_UNLOADING not in unseen(phases_of_hand(led.episode(led.DIP)))
+    assert not unseen(phases_of_hand(led.episode(led.FAST)))
+    short = ((1.2, 0.0), (4.2, 0.4), (4.5, 0.4))
+    assert "no pause of 0.5 s" in unseen(phases_of_hand(led.episode(short)))
+    assert len(unseen([])) == 3
+
+
+@given(st.lists(st.floats(0.02, 0.3), min_size=1, max_size=7), st.integers(0, 2**32 - 1))
+def test_turns_are_those_of_a_zigzag(steps, seed) -> None:
+    """A zigzag, finely sampled and with noise of a tenth of what counts."""
+    ends = np.concatenate([[0], np.cumsum(np.array(steps) * (-1.0) ** np.arange(len(steps)))])
+    way = np.interp(np.arange(0, len(steps) + 1e-9, 0.02), np.arange(len(ends)), ends)
+    way += np.random.default_rng(seed).uniform(-1e-3, 1e-3, len(way))
+    found = turns(way)
+    assert len(found) == len(ends)
+    np.testing.assert_allclose(way[found], ends, atol=2e-3)

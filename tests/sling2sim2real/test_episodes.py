@@ -69,7 +69,7 @@ def test_large_clouds_are_thinned_and_episodes_are_kept(tmp_path) -> None:
         ({"camera": [1.0, 2.0]}, "camera: must have shape"),
         ({"grasp_time": 4.5}, "must be after grasp_time"),
         ({"release_time": 4.5}, "record until 0.7 s"),
-        ({"grasp_time": -1.0}, "is before the window"),
+        ({"grasp_time": -1.0}, "too late for the grasp at -1.00 s"),
     ],
 )
 def test_wrong_arrays_are_refused_by_name(wrong: dict, said: str) -> None:

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.base.errors import UserError
+from pipeline.episode.blocks import held_out_blocks, reach, within
 from pipeline.episode.episode import Episode
-from pipeline.episode.phases import held_out_blocks, reach, within
 from pipeline.episode.signal import cutoff_hz, recording_matrix
 from pipeline.identify.objective.chamfer import Chamfer, CloudDistance
 from pipeline.identify.objective.device_terms import DeviceTerms

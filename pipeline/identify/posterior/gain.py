@@ -87,6 +87,12 @@ class LandingModel:
         told = self.covariance[:, which]
         return self.covariance - told @ np.linalg.solve(told[which], told.T)
 
+    def told(self, name: str, spread: float) -> np.ndarray:
+        """Covariance after an unknown was told to a standard deviation."""
+        place = self.names.index(name)
+        told = self.covariance[:, place]
+        return self.covariance - np.outer(told, told) / (told[place] + spread**2)
+
     def pulled(self, pulls: int = 1) -> np.ndarray:
         """Covariance after another pull that tells as much as each of the `pulls` did."""
         prior = self._prior()

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from pipeline.episode.episode import Episode
+from pipeline.episode.phases import NO_UNLOADING, phases_of_hand, unseen
 from pipeline.launching.trials.spread import LEVEL
 from pipeline.params import Params
 from pipeline.report.card.inputs import CardInputs
@@ -77,6 +78,7 @@ def findings(inputs: CardInputs, force: np.ndarray | None = None) -> Findings:
         surprising=sum(abs(z) > OUTSIDE for z in unlikely if z is not None),
         carried=None if force is None else carried(inputs.episode, force),
         density=_density(inputs.params, inputs.band),
+        unloaded=any(NO_UNLOADING not in unseen(phases_of_hand(one)) for one in inputs.episodes),
     )
 
 

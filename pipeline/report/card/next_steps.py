@@ -11,17 +11,21 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.episode.episode import Episode
+from pipeline.episode.phases import TURN
 from pipeline.identify.posterior.gain import LandingModel
 from pipeline.identify.posterior.launches import TAPE
 from pipeline.report.card.verdict import Reason
 
 LEAST = 0.05  # share of an interval: less is no help
+# To which a dip of 10 cm tells the softening, beside stiffness, relaxation and the sensor's bias.
+DIP = "softening", 0.02
 MOST = 5  # sentences
 LAUNCHES = 5
 EARLY, LATE = (0.75, 0.5), (0.4, 0.15)  # s before the release, between which the force must be
 STILL = 0.01  # still to this share of it
 RECOIL = "elasticity_damping", "air_drag", "turn_damping"  # what only pictures of the recoil show
 PULL = "youngs_modulus", "mooney_share", "relaxation"  # what the force shows
+A_DIP = "Record a pull with a dip (`sling plan` writes it): it shows how the band unloads"
 
 
 class Gain(NamedTuple):
@@ -39,6 +43,8 @@ def next_steps(
     episodes: Sequence[Episode],
     launches: int = 0,
     question: str = "",
+    *,
+    unloaded: bool = True,
 ) -> list[str]:
     """Sentences, the most helpful first; one that says so where nothing helps.
 
@@ -47,16 +53,20 @@ def next_steps(
         targets: Of the landings [m], shape (T,).
         episodes, launches: Pulls, and the number of launches, that are evidence already.
         question: About the band's mass and size; comes first.
+        unloaded: Whether any pull shows how the band unloads.
     """
     cures = [question, *(reason.cure for reason in reasons)]
     found = list(dict.fromkeys(filter(None, cures)))
     mended_first = any(reason.against and reason.cure for reason in reasons)
+    if not (unloaded or launches or mended_first or (model and DIP[0] in model.names)):
+        found.append(f"{A_DIP}, which a launch depends on.")
     if model is not None and not mended_first:
         aim = len(targets) // 2
         before = model.half_width[aim]
         words = {"band": band, "a": "another" if launches else "a"}
         words |= {"at": f"at {targets[aim]:g} m", "before": f"±{_cm(before)} cm"}
-        for gain in sorted(_gains(model, aim, episodes), key=lambda gain: gain.width):
+        gains = _gains(model, aim, episodes, unloaded)
+        for gain in sorted(gains, key=lambda gain: gain.width):
             if gain.width < (1 - LEAST) * before:
                 found.append(gain.text.format(**words, after=f"±{_cm(gain.width)} cm"))
     if not found:
@@ -64,13 +74,20 @@ def next_steps(
     return found[:MOST]
 
 
-def _gains(model: LandingModel, aim: int, episodes: Sequence[Episode]) -> Iterator[Gain]:
+def _gains(
+    model: LandingModel, aim: int, episodes: Sequence[Episode], unloaded: bool
+) -> Iterator[Gain]:
     one, more = (model.after(model.launched(aim, TAPE, count))[aim] for count in (1, LAUNCHES))
     yield Gain(
         "Measure {a} launch and tell it with `sling observe --band {band}`: {before} {at} become"
         f" {{after}}, with {LAUNCHES} launches ±{_cm(more)} cm.",
         one,
     )
+    if not unloaded and DIP[0] in model.names:
+        yield Gain(
+            f"{A_DIP}: {{before}} {{at}} become about {{after}}.",
+            model.after(model.told(*DIP))[aim],
+        )
     yield Gain(
         "Record another pull like those that you have: {before} {at} become about {after}.",
         model.after(model.pulled(len(episodes)))[aim],
@@ -96,7 +113,11 @@ def relaxing(episode: Episode) -> bool:
     """Whether the force of the drawn band still fell shortly before the release."""
     before = episode.release_time - episode.time
     size = np.linalg.norm(episode.force, axis=1)
-    early, late = (size[(before < begin) & (before > end)].mean() for begin, end in (EARLY, LATE))
+    away = np.linalg.norm(episode.position - episode.position[before > 0][-1], axis=1)
+    windows = [(before < begin) & (before > end) for begin, end in (EARLY, LATE)]
+    if any(away[window].max(initial=np.inf) > TURN for window in windows):
+        return False  # the hand draws, or comes back from a dip
+    early, late = (size[window].mean() for window in windows)
     return bool(early - late > STILL * late)
 
 

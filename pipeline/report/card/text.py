@@ -27,6 +27,11 @@ def reasons_of(found: Findings, reasons: list[Reason]) -> list[str]:
     ]
     if found.scores:
         told.append(inside(found))
+    if not found.unloaded:
+        told.append(
+            "No recording lets the drawn band back, so that softening keeps its prior: launches"
+            " tell what it leaves."
+        )
     if found.observed == 1:
         told.append("One launch is part of the evidence; one is not many.")
     return told

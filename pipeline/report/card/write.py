@@ -43,7 +43,7 @@ def write(params: Params, band: str, method: str, root: str | Path = ".") -> dic
         model = LandingModel.of(samples.names, samples.values, *landings)
     launches = len(inputs.confidence.get("launches", []))
     evidence = inputs.episodes, launches, question(found)
-    steps = next_steps(band, against, model, aims.target, *evidence)
+    steps = next_steps(band, against, model, aims.target, *evidence, unloaded=found.unloaded)
     card = content(inputs, verdict, reasons, shown, steps)
     text = inputs, found, verdict, reasons, shown, steps
 

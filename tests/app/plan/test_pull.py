@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from app.plan.pull import LEAD, SPARE, TICK, catenary_sag, hanging_middle, trajectory_of
+from app.plan.pull import SPARE, TICK, catenary_sag, hanging_middle, trajectory_of
 from pipeline.episode.planned import leg_time
+from pipeline.episode.window import LEAD
 from pipeline.params import PlanParams, load
 from pipeline.params.lab import Dip
 from pipeline.recording.pulls import CALM

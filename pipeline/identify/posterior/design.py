@@ -316,10 +316,16 @@ def searched(
         tried = [(*best, dip) for dip in candidates(size, limits)]
         tried = [dips for dips in tried if lasts(dips) <= limits.spare]
         best = min([best, *tried], key=value)
+
+    def height(x: np.ndarray) -> float:
+        dips = _of_unit(x, size, limits)
+        late = lasts(dips) - limits.spare
+        return np.log(value(dips)) if late <= 0 else np.log(value(best)) + late
+
     if best:
         start = np.concatenate([_unit(dip, size, limits) for dip in best])
         minimize(
-            lambda x: np.log(value(_of_unit(x, size, limits))),
+            height,
             start,
             method="COBYLA",
             bounds=[(0, 1)] * len(start),

@@ -15,7 +15,7 @@ from pipeline.identify.posterior.likelihood import Tolerances
 from pipeline.params import load
 from pipeline.params.lab import Dip
 from pipeline.simulator.launch import launch
-from pipeline.simulator.model import LaunchSetup
+from pipeline.simulator.model import LaunchHistory, LaunchSetup
 from tests.project import DEFAULTS
 
 PARAMS = load(DEFAULTS)
@@ -70,11 +70,11 @@ def test_prior_draws_have_the_priors_distributions(small) -> None:
 
 
 def test_the_bands_hold_the_force_that_is_told(small) -> None:
-    """By the simulator, which bends and sags; at the draw, relaxed and virgin."""
-    relaxed = LaunchSetup.of(PARAMS.setup, PARAMS.sling, None)
-    relaxed = replace(relaxed, arm_stiffness=None, duration=0.001)
+    """By the simulator, whose band bends, sags and relaxes."""
+    paused = LaunchSetup.of(PARAMS.setup, PARAMS.sling, LaunchHistory(4.0, 2.0))
+    paused = replace(paused, arm_stiffness=None, duration=0.001)
     parameters = small.coordinates.parameters(small.phi)
-    held = launch(small.sling, relaxed, parameters, np.array([small.draw])).hold_force
+    held = launch(small.sling, paused, parameters, np.array([small.draw])).hold_force
     np.testing.assert_allclose(held, 13.0, rtol=0.12)
 
 

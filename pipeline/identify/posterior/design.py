@@ -38,8 +38,7 @@ from pipeline.simulator.rubber import RUBBER, uniaxial
 DRAWS = 20  # of the prior
 PLACES = 9  # of a draw that are tried for the targets
 SOFTENING = "softening", (0.0, 0.6)  # free, whatever the method fixes, and its bounds
-FELT = (*LOGS, *LAWS[RUBBER])  # coordinates that a pull's force shows
-COARSE = {"hold_step": 0.04, "grip_step": 0.01}  # which change no choice
+FELT = (*LOGS, *LAWS[RUBBER])  # what a pull's force shows
 MOST_DIPS = 3
 FIRST, SHALLOW, DEEPEST = 0.5, 0.05, 0.9  # shares: where a dip may begin, and how deep it may go
 SLOWER, SLOWEST = 2.0, 4.0  # s of a leg: of the coarse set, and at most
@@ -119,12 +118,7 @@ class PullDesign:
                 "bounds": {name: bounds} | dict(about.bounds),
             }
         )
-        params = params.model_copy(
-            update={
-                "methods": dict(params.methods) | {method: about},
-                "sling": params.sling.model_copy(update=COARSE),
-            }
-        )
+        params = params.model_copy(update={"methods": dict(params.methods) | {method: about}})
         sling = ClampedBand.of(params.bands[band], params.setup, params.sling, law=RUBBER)
         coordinates = Coordinates.of_method(params, method, sling)
         rng = np.random.default_rng(params.optimizer.seed)
@@ -169,7 +163,7 @@ class PullDesign:
         None at draws at which a simulation does not reach its end.
         """
         episode, steps = self.episode(dips), self.coordinates.steps
-        felt = [self.coordinates.names.index(name) for name in FELT]
+        felt = [i for i, name in enumerate(self.coordinates.names) if name in FELT]
         moved = np.vstack([0 * steps, np.diag(steps)[felt]])
         count, size = len(self.phi), len(moved)
         around = (self.phi[:, None] + moved).reshape(count * size, -1)

@@ -18,8 +18,13 @@ OF_LAUNCHES = ("projectile_drag",)
 
 
 def drawn(params: Params, band: str, *, launching: bool = False) -> Params:
-    """`params` with the numbers of a band's recording, or its launches, each within its range."""
+    """`params` with the numbers of a band's recording, or its launches, each within its range.
+
+    Launches are of the rubber: bands that are `like` one another land alike.
+    """
     rig, values = params.rig, {}
+    if launching:
+        band = rig.bands[band].like or band
     for key, (low, high) in rig.draws.items():
         if (key in OF_LAUNCHES) == launching:
             rng = np.random.default_rng([rig.seed, STREAM, *band.encode(), *key.encode()])

@@ -97,7 +97,7 @@ def _defaults() -> dict:
     with as_file(files("sling2sim2real") / "params.yaml") as path:
         content = load(path).model_dump()
     content["bands"] = {"band": NO_BAND}
-    content["run"] |= {"bands": ["band"], "rig": []}
+    content["run"] |= {"bands": ["band"], "rig": [], "dips": []}
     content["run"]["ablations"] |= {"bands": [], "rig": []}
     return content
 

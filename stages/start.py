@@ -102,7 +102,7 @@ def remedy(error: NotMade) -> str:
     if known is None:
         return ""
     folder, band, method = known
-    if folder == "raw" and band not in load().run.rig:
+    if folder == "raw" and band not in (*load().run.rig, *load().run.dips):
         return f"`sling add-recording --band {band} FILE.mcap` puts a recording there"
     params = load()
     step = MAKERS.get(folder, folder)
@@ -127,6 +127,7 @@ def stage_of(params: Params, step: str, band: str, method: str | None = None) ->
     for group, bands, methods in (
         ("", asked.bands, asked.methods),
         ("own_", asked.own, asked.methods[:1]),
+        ("dip_", asked.dips, asked.methods[:1]),
         ("ablation_", asked.ablations.bands, asked.ablations.methods),
     ):
         if band in bands and method in (None, *methods):
@@ -136,7 +137,7 @@ def stage_of(params: Params, step: str, band: str, method: str | None = None) ->
 
 def ungrouped(step: str) -> str:
     """The step of a stage's, without what stage_of puts before it."""
-    return step.removeprefix("ablation_").removeprefix("own_")
+    return step.removeprefix("ablation_").removeprefix("own_").removeprefix("dip_")
 
 
 def unmounted(params: Params, band: str, root: str | Path = ".") -> list[str]:

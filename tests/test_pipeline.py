@@ -159,9 +159,9 @@ def test_each_stage_lists_the_parameters_that_it_reads(project: Copy) -> None:
         "methods.least_squares",
     }
     keys -= {
-        f"run.{key}" for key in ("rig", "own", "steps", "own_steps", "ablations")
+        f"run.{key}" for key in ("rig", "own", "dips", "steps", "own_steps", "ablations")
     }  # dvc.yaml's
-    keys -= {key for key in keys if key.startswith("plan.")}  # read by `sling plan` alone
+    keys -= {key for key in keys if key.startswith("plan.")}  # read by `sling plan`, and the rig
     keys -= {f"bands.{name}" for name in content["bands"]} - {"bands.band1"}  # those that run
     # read for other recordings, or with another mask: tests/recording shows what they do
     keys -= {*OF_OTHER_RECORDINGS, "cloud.sam3"}

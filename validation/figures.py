@@ -11,14 +11,15 @@ from __future__ import annotations
 import json
 import re
 import subprocess
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from pipeline.base.code import CODE, ROOT, digest, digests
 from pipeline.base.errors import UserError
 from pipeline.base.fingerprint import fingerprint
-from pipeline.params import load
+from pipeline.params import Params, load
+from stages.start import stage_of
 
 TODAY, OLDER = "today", "older code"
 UNKNOWN = "unknown: written before digests"
@@ -72,13 +73,15 @@ def listed(
     if not files:
         raise UserError(f"{reports}: no figures; run this in the project's folder")
     at = root / "params.yaml"
-    own = load(at).run.own if at.is_file() else ()
-    names = {stage for file in files if (stage := _stage(file, root, own))}
+    params = load(at) if at.is_file() else None
+    names = {stage for file in files if (stage := _stage(file, root, params))}
     states = {None: NOT_TOLD, True: OLDER, False: TODAY}
     stages = (
         {name: states[old] for name, old in outdated(root, names, CODE).items()} if names else {}
     )
-    return [_figures(file, root, code, stages.get(_stage(file, root, own) or "")) for file in files]
+    return [
+        _figures(file, root, code, stages.get(_stage(file, root, params) or "")) for file in files
+    ]
 
 
 def shown(figures: list[CommittedFigures]) -> str:
@@ -163,11 +166,12 @@ def _parts(content: dict, code: Path) -> list[str]:
     return [*PARTS]
 
 
-def _stage(file: Path, root: Path, own: Collection[str]) -> str | None:
-    """The stage that writes a file, if one does; `own` are the bands of run.own."""
+def _stage(file: Path, root: Path, params: Params | None) -> str | None:
+    """The stage that writes a file, if one does."""
     parts = file.relative_to(root / "reports").parts
     if parts == ("summary.json",):
         return "report"
     if parts[0] != "bands":
         return None
-    return f"{'own_' if parts[1] in own else ''}card@{parts[1]}"
+    known = stage_of(params, "card", parts[1]) if params else None
+    return known or f"card@{parts[1]}"

@@ -100,6 +100,7 @@ def run_of(
         "run.rig": [*bands],
         "run.methods": [*methods],
         "run.steps": methods_by_step(methods, known),
+        "run.dips": [],
         "run.own_steps": methods_by_step(methods[:1], known),
         "run.ablations": further | {"steps": methods_by_step(ablations, known)},
     }

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.episode.phases import Phase
+from pipeline.episode.phases import InteractionPhase
 from pipeline.recording.checks.camera import camera_to_fork
 from pipeline.recording.delays import Delays
 from pipeline.recording.processed import Processed
@@ -81,7 +81,7 @@ class MotionPhase:
     speed_m_s: float
 
     @classmethod
-    def of(cls, phase: Phase, start: float) -> MotionPhase:
+    def of(cls, phase: InteractionPhase, start: float) -> MotionPhase:
         """Of a phase of a window that begins at `start` [s]."""
         times = start + phase.begin, start + phase.end
         return cls(phase.kind, *times, phase.start, phase.stop, phase.speed)

@@ -40,7 +40,7 @@ MOVES = "loading", "unloading", "reloading"
 NO_UNLOADING = "no unloading"
 
 
-class Held(Protocol):
+class HandSignals(Protocol):
     """A hand that holds a band: an `Episode`, or the signals of one that is to be."""
 
     @property
@@ -56,7 +56,7 @@ class Held(Protocol):
 
 
 @dataclass(frozen=True)
-class Phase:
+class InteractionPhase:
     """A part of an interaction.
 
     Attributes:
@@ -86,7 +86,7 @@ class Phase:
         return self.way / max(self.duration, 1e-9)
 
 
-def phases(episode: Episode) -> list[Phase]:
+def phases(episode: Episode) -> list[InteractionPhase]:
     """All of an episode, by time; gaps are slack. None of them where the force never rises."""
     found = phases_of_hand(episode)
     if not found:
@@ -97,12 +97,11 @@ def phases(episode: Episode) -> list[Phase]:
     after[recoil] = False
     over = float(min([release + LONGEST_RECOIL, *episode.cloud_time[after]]))
     end = float(max([episode.time[-1] + episode.sample_period / 2, *episode.cloud_time, over]))
-    return [
-        *found, Phase("recoil", release, over, drawn, 0.0), Phase("swing", over, end, 0.0, 0.0)
-    ]  # fmt: skip
+    last = ("recoil", release, over, drawn, 0.0), ("swing", over, end, 0.0, 0.0)
+    return [*found, *(InteractionPhase(*one) for one in last)]
 
 
-def phases_of_hand(held: Held) -> list[Phase]:
+def phases_of_hand(held: HandSignals) -> list[InteractionPhase]:
     """From grasp to release, by time."""
     taut = taut_samples(held)
     if not taut.any():
@@ -114,16 +113,18 @@ def phases_of_hand(held: Held) -> list[Phase]:
     drawn = np.maximum(drawn, slack)
     names = _names(time, drawn, slack)
     ends = np.flatnonzero(np.diff(names)) + 1
-    found: list[Phase] = []
+    found: list[InteractionPhase] = []
     for first, last in zip([0, *ends], [*ends, len(time)], strict=True):
         until = last if last < len(time) else last - 1
         end = float(time[until]) if last < len(time) else held.release_time
         if names[first] != SLACK:
-            one = Phase("", float(time[first]), end, float(drawn[first]), float(drawn[until]))
+            one = InteractionPhase(
+                "", float(time[first]), end, float(drawn[first]), float(drawn[until])
+            )
             deepest = max([slack, *(phase.stop for phase in found)])
             part = slice(first, until + 1)
             found += _named(one, names[first], time[part], drawn[part], deepest)
-    return found
+    return _joined(found)
 
 
 SLACK, RESTS = -2, -1  # beside the numbers of ways
@@ -137,7 +138,8 @@ def _names(time: np.ndarray, drawn: np.ndarray, slack: float) -> np.ndarray:
     size = max(3, 2 * round(SPEED / period / 2) + 1)
     if len(drawn) < size:
         return names
-    slow = np.abs(savgol_filter(drawn, size, 1, deriv=1, delta=period)) < STILL
+    speed = np.asarray(savgol_filter(drawn, size, 1, deriv=1, delta=period))
+    slow = np.abs(speed) < STILL
     slow &= names != SLACK
     edges = np.flatnonzero(np.diff(np.concatenate([[0], slow, [0]])))
     for first, last in edges.reshape(-1, 2):
@@ -147,23 +149,35 @@ def _names(time: np.ndarray, drawn: np.ndarray, slack: float) -> np.ndarray:
 
 
 def _named(
-    one: Phase, name: int, time: np.ndarray, drawn: np.ndarray, deepest: float
-) -> Iterator[Phase]:
+    one: InteractionPhase, name: int, time: np.ndarray, drawn: np.ndarray, deepest: float
+) -> Iterator[InteractionPhase]:
     """A run of samples as a phase, or as reloading and loading where it does both."""
     if name == RESTS:
-        yield Phase("pause", one.begin, one.end, one.start, one.stop)
+        yield InteractionPhase("pause", one.begin, one.end, one.start, one.stop)
     elif one.way < TURN / 2:
         return
     elif one.stop < one.start:
-        yield Phase("unloading", one.begin, one.end, one.start, one.stop)
+        yield InteractionPhase("unloading", one.begin, one.end, one.start, one.stop)
     elif one.stop < deepest + TURN / 2:
-        yield Phase("reloading", one.begin, one.end, one.start, one.stop)
+        yield InteractionPhase("reloading", one.begin, one.end, one.start, one.stop)
     elif one.start > deepest - TURN / 2:
-        yield Phase("loading", one.begin, one.end, one.start, one.stop)
+        yield InteractionPhase("loading", one.begin, one.end, one.start, one.stop)
     else:
         at = float(time[np.argmax(drawn >= deepest)])
-        yield Phase("reloading", one.begin, at, one.start, deepest)
-        yield Phase("loading", at, one.end, deepest, one.stop)
+        yield InteractionPhase("reloading", one.begin, at, one.start, deepest)
+        yield InteractionPhase("loading", at, one.end, deepest, one.stop)
+
+
+def _joined(found: list[InteractionPhase]) -> list[InteractionPhase]:
+    """Pauses that only jerks part are one."""
+    joined: list[InteractionPhase] = []
+    for one in found:
+        last = joined[-1] if joined else one
+        if joined and last.kind == one.kind == "pause":
+            joined[-1] = InteractionPhase("pause", last.begin, one.end, last.start, one.stop)
+        else:
+            joined.append(one)
+    return joined
 
 
 def turns(way: np.ndarray, least: float = TURN) -> list[int]:
@@ -182,7 +196,7 @@ def turns(way: np.ndarray, least: float = TURN) -> list[int]:
     return [*found, len(way) - 1]
 
 
-def unseen(found: Sequence[Phase]) -> dict[str, str]:
+def unseen(found: Sequence[InteractionPhase]) -> dict[str, str]:
     """What a recording with these phases lacks, and what therefore keeps its prior."""
     moves = [one.speed for one in found if one.kind in MOVES and one.way >= LEAST_WAY]
     back = any(one.kind == "unloading" and one.way >= BACK for one in found)
@@ -199,7 +213,7 @@ def unseen(found: Sequence[Phase]) -> dict[str, str]:
     }
 
 
-def taut_samples(held: Held) -> np.ndarray:
+def taut_samples(held: HandSignals) -> np.ndarray:
     """Which samples (T,) show a force on the hand beyond the band's weight, until the release."""
     size = np.linalg.norm(held.force, axis=1)
     during = (held.time > held.grasp_time) & (held.time < held.release_time)

@@ -51,8 +51,8 @@ def window_of(
         return Window(start, about.duration, about.samples)
     if first > grasp - margin:
         raise UserError(
-            f"the recording begins at {first:.2f} s, too late for the grasp at {grasp:.2f} s: record"
-            " from before it on"
+            f"the recording begins at {first:.2f} s, too late for the grasp at {grasp:.2f} s:"
+            " record from before it on"
         )
     period, end = about.duration / about.samples, release + about.tail
     most = int(about.longest / period + ROUNDING)

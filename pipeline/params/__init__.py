@@ -72,6 +72,7 @@ class Params(Section):
         for key, names, known in (
             ("bands", self.run.bands, self.bands),
             ("own", self.run.own, self.bands),
+            ("dips", self.run.dips, self.bands),
             ("methods", self.run.methods, self.methods),
             ("ablations.methods", self.run.ablations.methods, self.methods),
         ):
@@ -82,6 +83,9 @@ class Params(Section):
         for band in self.run.own:
             if self.bands[band].source == "rig":
                 raise refusal(f"run.own: {band} has source: rig, so it belongs under run.bands")
+        for band in self.run.dips:
+            if self.bands[band].source == "recording":
+                raise refusal(f"run.dips: {band} has source: recording: put it under run.own")
         first = self.run.methods[:1]
         for key, steps, whose, methods in (
             ("run.steps", self.run.steps, "run.methods", self.run.methods),
@@ -106,7 +110,7 @@ class Params(Section):
                     f"{key}.rig: must list those of {key}.bands that have source: rig, in the same"
                     f" order: [{', '.join(rig)}]"
                 )
-        for name in self.run.rig:
+        for name in (*self.run.rig, *self.run.dips):
             if name not in self.rig.bands:
                 raise refusal(f"rig.bands: lacks {name}, which the rig is to record")
         return self
@@ -144,6 +148,19 @@ class Params(Section):
                     f"bands.{name}.rest_length: {band.rest_length:g} must be longer than"
                     f" setup.fork_width, {self.setup.fork_width:g}"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _likes_have_one_size(self) -> Params:
+        for name, band in self.rig.bands.items():
+            if band.like is None or not {name, band.like} <= self.bands.keys():
+                continue
+            for what in ("mass", "diameter", "rest_length"):
+                if getattr(self.bands[name], what) != getattr(self.bands[band.like], what):
+                    raise refusal(
+                        f"bands.{name}.{what}: must be that of {band.like}, which"
+                        f" rig.bands.{name} is like"
+                    )
         return self
 
     @model_validator(mode="after")

@@ -71,6 +71,7 @@ class RunParams(Section):
     bands: Annotated[Names, FILLED]
     rig: Names
     own: Names
+    dips: Names
     methods: Annotated[Names, FILLED]
     steps: StepParams
     own_steps: StepParams
@@ -94,6 +95,9 @@ class RunParams(Section):
         for band in self.own:
             if band in self.bands:
                 raise refusal(f"own: {band} is one of run.bands already")
+        for band in self.dips:
+            if band in self.bands:
+                raise refusal(f"dips: {band} is one of run.bands already")
         return self
 
 

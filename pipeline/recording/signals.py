@@ -8,18 +8,20 @@ import numpy as np
 
 from pipeline.base.errors import UserError
 from pipeline.episode import signal
+from pipeline.episode.phases import TURN
 from pipeline.episode.window import Window, window_of
 from pipeline.params import Params
 from pipeline.params.lab import Tool
 from pipeline.params.recording import EpisodeParams
 from pipeline.recording.events import MARGIN
 from pipeline.recording.geometry import turned
-from pipeline.recording.motion import VELOCITY_WINDOW, expect_dense
+from pipeline.recording.motion import VELOCITY_WINDOW, Motion, expect_dense
 from pipeline.recording.pulls import Pull
 from pipeline.recording.tare import band_force
 from pipeline.recording.tool_inertia import ToolInertia
 
 MOST_TURN = np.deg2rad(5.0)  # of the hand; beyond it the tool's weight has to be known
+LATE = 0.1  # s
 MOST_GAP = 0.3  # s over which force and pose may be interpolated
 
 
@@ -184,7 +186,11 @@ def signals_of(pull: Pull, params: Params, inertia: ToolInertia | None = None) -
         release_resolution=release.resolution,
         release_spread=release.spread,
         filtered=release.filtered,
-        slips=[time - start for time in release.slips if time >= grasp - MARGIN],
+        slips=[
+            time - start
+            for time in release.slips
+            if time >= grasp - MARGIN and not _lets_back(motion, time)
+        ],
         jumps=[time - start for time in release.slips if time < grasp - MARGIN],
         velocity_window=VELOCITY_WINDOW,
         twist_difference=_twist_difference(pull, pose_grid, velocity),
@@ -242,6 +248,15 @@ def _gaps(pull: Pull, start: float, end: float) -> dict[str, float]:
             )
         found[stream.topic] = gap
     return found
+
+
+def _lets_back(motion: Motion, time: float) -> bool:
+    """Whether the hand goes towards the fork about then, so that the force falls by itself.
+
+    Its stamps may be late by as much as the times around `time` are apart.
+    """
+    before, after = motion.position(time + np.array([-LATE, LATE]))
+    return bool(np.linalg.norm(before) - np.linalg.norm(after) > TURN / 2)
 
 
 def _tool_facts(tool: Tool | ToolInertia | None, source: str) -> ToolFacts | None:

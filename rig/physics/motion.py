@@ -6,14 +6,19 @@ with rest at both ends; smooth wander is added to what is commanded. An arm with
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from pipeline.base.errors import UserError
 from rig.physics.compiled import compiled
 
-# Seconds from the start of the recording.
+if TYPE_CHECKING:
+    from pipeline.params.lab import Dip
+
+# Seconds from the start of a recording without dips, which delay what comes after them.
 START = 0.4  # the hand leaves its place
 REACHED, GRASP = 0.8, 1.0  # it is there and its fingers close; they hold the band
 PULL, PULLED = 2.0, 6.0  # the middle is at the tips' height; it is drawn
@@ -85,10 +90,14 @@ class HandMotion:
         path: Of the tool centre point.
         opening: From the first motion of the fingers until they press no more [s], and the power of
             the part of it that is left by which the pads' force falls.
+        opens: When the fingers begin to open [s].
+        end: Of the recording [s].
     """
 
     path: Path
     opening: tuple[float, float]
+    opens: float
+    end: float
 
     @classmethod
     def through(
@@ -97,23 +106,32 @@ class HandMotion:
         tracking_error: float,
         opening: tuple[float, float],
         rng: np.random.Generator,
+        dips: Sequence[Dip] = (),
     ) -> HandMotion:
         """Grasp the middle where it hangs (3,), lift it to the tips, pull, let go, retreat.
 
         Args:
             tracking_error: Standard deviation of the wander of each axis [m].
+            dips: Of the pull.
+
+        Raises:
+            UserError: A dip leads beyond the fork.
         """
         back = np.array([0.0, -1.0, 0.0])
+        pull = pull_legs(dips)
+        late = pull[-1][0] - PULLED
         drawn = PULL_LENGTH * back
         start = hanging + APPROACH_LENGTH * back
         end = drawn + RETREAT_LENGTH * back
-        times = np.array([0.0, START, REACHED, GRASP, PULL, PULLED, RETREAT, RETREATED, END])
-        points = np.array([start, start, hanging, hanging, 0 * back, drawn, drawn, end, end])
+        after = [time + late for time in (RETREAT, RETREATED, END)]
+        times = np.array([0.0, START, REACHED, GRASP, *(time for time, _ in pull), *after])
+        points = [start, start, hanging, hanging, *(way * back for _, way in pull), drawn, end, end]
         amplitude = rng.normal(size=(WANDER_TONES, 3))
         amplitude *= tracking_error * np.sqrt(2 / np.sum(amplitude**2, axis=0))
         frequency = rng.uniform(*WANDER_BAND, (WANDER_TONES, 1))
         phase = rng.uniform(0, 2 * np.pi, (WANDER_TONES, 3))
-        return cls(Path(times, points, amplitude, frequency, phase), opening)
+        path = Path(times, np.array(points), amplitude, frequency, phase)
+        return cls(path, opening, OPEN + late, END + late)
 
     def position(self, time: np.ndarray | float, derivative: int = 0) -> np.ndarray:
         """Position, or a derivative of it by time, at times (...) [s], shape (..., 3)."""
@@ -123,19 +141,52 @@ class HandMotion:
     def grip(self, time: np.ndarray | float) -> np.ndarray:
         """How firmly the closed pads press, from 1 to 0 as the fingers begin to open."""
         duration, shape = self.opening
-        return np.clip(1 - (np.asarray(time) - OPEN) / duration, 0.0, 1.0) ** shape
+        return np.clip(1 - (np.asarray(time) - self.opens) / duration, 0.0, 1.0) ** shape
 
     def finger(self, time: np.ndarray) -> np.ndarray:
         """Position of each finger joint [m]."""
-        turns = [REACHED, REACHED + TRAVEL_TIME, OPEN, OPEN + TRAVEL_TIME]
+        turns = [REACHED, REACHED + TRAVEL_TIME, self.opens, self.opens + TRAVEL_TIME]
         closed = np.interp(time, turns, [0.0, 1.0, 1.0, 0.0])
         return FINGER_OPEN + (FINGER_CLOSED - FINGER_OPEN) * closed
+
+
+def pull_legs(dips: Sequence[Dip]) -> list[tuple[float, float]]:
+    """When each leg of the pull ends [s], and how far the band is drawn then [m].
+
+    A dip on the way splits the pull, whose own legs take as long as without it; dips at one place
+    come in the order given. Raises UserError where one leads beyond the fork.
+    """
+    ends, reached = [(PULL, 0.0)], 0.0
+
+    def go(way: float, duration: float) -> None:
+        ends.append((ends[-1][0] + duration, way))
+
+    def pull_to(share: float) -> None:
+        nonlocal reached
+        if share > reached:
+            go(share * PULL_LENGTH, (share - reached) * (PULLED - PULL))
+            reached = share
+
+    for dip in sorted(dips, key=lambda dip: dip.at):
+        drawn = dip.at * PULL_LENGTH
+        if dip.depth > drawn:
+            raise UserError(
+                f"plan.dips: a dip of {dip.depth:g} m leads beyond the fork where the band is"
+                f" drawn by {drawn:g} m; lower its depth or raise its at"
+            )
+        pull_to(dip.at)
+        go(drawn - dip.depth, dip.out_time)
+        go(drawn, dip.back_time)
+    pull_to(1.0)
+    return ends
 
 
 def pull_history(
     step: float, pull_time: float | None = None, pause: float | None = None
 ) -> np.ndarray:
     """Drawn distance, 0 to 1, every `step` seconds from the start of the pull to the release.
+
+    Without dips: a rubber does not hang on how it is recorded.
 
     Args:
         pull_time, pause: Of the hand [s]; None: as it records a band.

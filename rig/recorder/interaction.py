@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.base.errors import UserError
-from rig.physics.motion import END, GRASP, OPEN, HandMotion
+from rig.physics.motion import GRASP, HandMotion
 from rig.physics.servo import Servo
 from rig.physics.string import ElasticString
 from rig.physics.world import bent_at
@@ -59,7 +59,7 @@ def pull_and_release(
 
     Args:
         hanging: Where the band hangs, shape (nodes, 3).
-        sensor_times, camera_times: To report at [s], ascending, between 0 and END.
+        sensor_times, camera_times: To report at [s], ascending, within the motion.
 
     Raises:
         UserError: The pads cannot hold the band.
@@ -74,7 +74,7 @@ def pull_and_release(
 
     y = string.state(hanging)
     y[string.middle, :6] = np.concatenate([motion.position(GRASP), motion.position(GRASP, 1)])
-    last = OPEN + motion.opening[0]
+    last = motion.opens + motion.opening[0]
     wanted = np.union1d(sensor_times, camera_times)
     during = wanted[(wanted > GRASP) & (wanted < last)]
     held_times, held = string.integrate(
@@ -82,7 +82,7 @@ def pull_and_release(
     )
     held_times, held = held_times[1:], held[1:]  # the first shows the jolt of the grasp alone
     slip = float(held_times[-1])
-    if slip < OPEN:
+    if slip < motion.opens:
         raise UserError(
             f"rig.pads.friction: {rig.pads.friction:g} lets the band slip out at {slip:.2f} s,"
             f" before the fingers open; raise it or rig.pads.force"
@@ -90,7 +90,8 @@ def pull_and_release(
     progress(f"held from {GRASP:.2f} s, slipped free at {slip:.4f} s")
 
     after = wanted[wanted > slip]
-    free = string.integrate(held[-1], np.concatenate([[slip], after, [END]]), rig.tolerance)[1]
+    ends = np.concatenate([[slip], after, [motion.end]])
+    free = string.integrate(held[-1], ends, rig.tolerance)[1]
     hand = follow.alone(held[-1, string.middle, :6], np.concatenate([[slip], after]), rig.tolerance)
     hand = hand[1:]  # (x, v) after the slip
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.base.files import replacing
 from rig.draw import drawn
-from rig.physics.motion import END, HandMotion
+from rig.physics.motion import HandMotion
 from rig.physics.robot import SENSOR_LEVER, Robot
 from rig.physics.scene import arm, joined, room, tube
 from rig.physics.string import ElasticString
@@ -63,10 +63,12 @@ def record(
     hanging = hang(string, rig.tolerance)
     middle = hanging[string.middle]
     opening = rig.pads.opening_time, rig.pads.shape
-    motion = HandMotion.through(middle, rig.tracking_error, opening, motion_rng)
-    times = np.arange(round(END * SENSOR_RATE)) / SENSOR_RATE
+    pulls = {"paper": (), "informative": params.plan.dips}
+    dips = pulls[rig.bands[band_name].pull or rig.pull]
+    motion = HandMotion.through(middle, rig.tracking_error, opening, motion_rng, dips)
+    times = np.arange(round(motion.end * SENSOR_RATE)) / SENSOR_RATE
     phase = camera_rng.random()  # a camera's clock knows nothing of the hand's
-    frames = (phase + np.arange(int(END * eye.RATE - phase))) / eye.RATE
+    frames = (phase + np.arange(int(motion.end * eye.RATE - phase))) / eye.RATE
     frames = frames[camera_rng.random(len(frames)) >= rig.camera.drop_rate]
     shutter = rig.camera.exposure * np.linspace(-0.5, 0.5, INSTANTS)
     seen = np.unique(frames[:, None] + shutter)
@@ -165,7 +167,7 @@ def add_frames(bag: BagWriter, robot: Robot, believed: VirtualCamera) -> None:
 
 
 def add_gripper(bag: BagWriter, clock: Clock, motion: HandMotion) -> None:
-    for i in range(round(END * GRIPPER_RATE)):
+    for i in range(round(motion.end * GRIPPER_RATE)):
         time = i / GRIPPER_RATE
         stamp, received = clock(time)
         fingers, velocity, effort = motion.finger(np.array(time)), np.zeros(2), np.zeros(2)

@@ -1,4 +1,4 @@
-"""Bands of one's own: a chain of stages each, and none of them the run's."""
+"""Bands of one's own, and the rig's with dips: a chain of stages each, none of them the run's."""
 
 import pytest
 
@@ -65,21 +65,33 @@ def is_of(stage: str, band: str) -> bool:
     return stage.partition("@")[2].partition("-")[0] == band
 
 
-def test_an_own_stage_is_its_namesake_but_for_the_band(project: ProjectCopy) -> None:
-    """The same command, code and parameters; nothing of the rig."""
+@pytest.mark.parametrize(("kind", "band", "count"), [("own_", "mine", 9), ("dip_", "dipped", 11)])
+def test_such_a_stage_is_its_namesake_but_for_the_band(
+    project: ProjectCopy, kind: str, band: str, count: int
+) -> None:
+    """The same command, code and parameters; of one's own nothing of the rig."""
     from dvc.repo import Repo
 
     project.set(run_of(["band1"], ["least_squares"]) | {"run.own": []})
-    add(project, "mine")
+    if kind == "own_":
+        add(project, band)
+    else:
+        sizes = {"mass": 0.023, "diameter": 0.010, "rest_length": 0.52}
+        project.set({f"bands.{band}": {"source": "rig", **sizes}, "run.dips": [band]})
+        project.set({f"rig.bands.{band}": {"like": "band1", "pull": "informative"}})
+        params = load(project.folder / "params.yaml")
+        assert stage_of(params, "launches", band, "least_squares") == (
+            f"dip_launches@{band}-least_squares"
+        )
     with Repo(str(project.folder)) as repo:
         known = {stage.name: stage for stage in repo.index.stages}
-    own = [name for name in known if name.startswith("own_")]
-    assert len(own) == 9
+    own = [name for name in known if name.startswith(kind)]
+    assert len(own) == count
 
     def read(name: str, band: str) -> set[str]:
         return {f"{dep}".replace(band, "BAND") for dep in known[name].deps}
 
     for name in own:
-        rigs = name.removeprefix("own_").replace("@mine", "@band1")
-        assert read(name, "mine") == read(rigs, "band1")
-        assert known[name].cmd == known[rigs].cmd.replace("band1", "mine")
+        rigs = name.removeprefix(kind).replace(f"@{band}", "@band1")
+        assert read(name, band) == read(rigs, "band1")
+        assert known[name].cmd == known[rigs].cmd.replace("band1", band)

@@ -139,6 +139,14 @@ REFUSED = [
     ("rig.bands.band1.constants", [0.4, 2.0, 0.1], "rig.bands.band1: constants: ogden has pairs"),
     ("rig.bands.band1.constants", [0.4, -2.0], "rig.bands.band1: constants: ogden has pairs"),
     ("rig.bands.band1.spectrum", {"weight": 0.1}, "rig.bands.band1.spectrum.times: is missing"),
+    ("rig.bands.band1_dip.like", "band9", "rig: bands.band1_dip.like: band9 is not one of band1"),
+    ("rig.bands.band1_dip.like", "band2_dip", "band2_dip is itself like band2: name that"),
+    ("rig.bands.band1_dip.viscosity", 0.1, "has the rubber of band1: leave out viscosity"),
+    ("rig.bands.band1_dip.pull", "long", "rig.bands.band1_dip.pull: must be 'paper' or 'info"),
+    ("rig.pull", "long", "rig.pull: must be 'paper' or 'informative'"),
+    ("bands.band1_dip.mass", 0.1, "bands.band1_dip.mass: must be that of band1, which rig.bands"),
+    ("run.dips", ["band1"], "run: dips: band1 is one of run.bands already"),
+    ("run.dips", ["other"], "run.dips: other is not one of band1"),
     ("bands", {"band-1": CONTENT["bands"]["band1"]}, "bands.band-1: a name has"),
     ("bands.band1.source", "bag", "bands.band1.source: must be 'recording' or 'rig'"),
     ("parameters.youngs_modulus.low", 1e8, "parameters.youngs_modulus: low must be less"),
@@ -158,6 +166,7 @@ REFUSED = [
     ("sling.mesh", "wedge", "sling.mesh: must be 'rod' or 'tetrahedra'"),
     ("loss.median_window", 6, "loss: median_window must be odd"),
     ("episode.tail", 59.0, "episode: tail must be less"),
+    ("episode.longest", 8.0, "episode: longest must be at least duration"),
     ("trials.targets", [0.5], "trials.targets: 0.5 lies outside policy.targets"),
     ("trials.targets", [1.5, 2.6], "trials.targets: 2.6 lies outside"),
     ("bands", {"measured": CONTENT["bands"]["band1"]}, "bands.measured: data/trials/measured"),
@@ -219,6 +228,8 @@ def test_bands_of_ones_own_are_recorded_and_have_a_list() -> None:
     )
     content["bands"]["band3"]["source"] = "recording"
     assert check(content).run.own == ("band3",)
+    content["run"]["own"], content["run"]["dips"] = [], ["band3"]
+    assert "run.dips: band3 has source: recording: put it under run.own" in refusal(content)
     del content["run"]["own"]
     assert "run: lacks `own` and `own_steps`" in refusal(content)
     assert "from run.bands to run.own" in refusal(content)

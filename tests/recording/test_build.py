@@ -72,7 +72,7 @@ def test_recordings_that_cannot_be_used(tmp_path, params, truth, words) -> None:
 
 def test_a_window_that_is_too_long_or_too_short(blind, params) -> None:
     for duration, words in ((8.0, "record for longer"), (1.5, "pull faster")):
-        episode = params.episode.model_copy(update={"duration": duration})
+        episode = params.episode.model_copy(update={"duration": duration, "longest": duration})
         with pytest.raises(UserError, match=words):
             signals(blind[0], params.model_copy(update={"episode": episode}))
 

@@ -13,10 +13,12 @@ from rig.recorder.interaction import Interaction
 from tests.project import ROOT
 
 STAGES = YAML(typ="safe").load(ROOT / "dvc.yaml")["stages"]
-WORLD = {"record", "launches", "ablation_launches", "floor"}
-CARDS = {"card", "own_card"}
+WORLD = {"record", "dip_record", "launches", "ablation_launches", "dip_launches", "floor"}
+CARDS = {"card", "own_card", "dip_card"}
 SHOWN = ("data/trials/$", "data/floor")  # what came of launches on the rig
-JUDGES = WORLD - {"record"} | {"trials", "ablation_trials", "own_trials", "report", *CARDS}
+RECORDS = {"record", "dip_record"}
+TRIALS = {"trials", "ablation_trials", "own_trials", "dip_trials"}
+JUDGES = WORLD - RECORDS | TRIALS | {"report", *CARDS}
 
 
 class Hidden:
@@ -48,7 +50,7 @@ def test_no_launch_reaches_what_is_identified() -> None:
         assert name in {"report", *CARDS} or not any(dep.startswith(SHOWN) for dep in data)
         # Beside a policy lie its launches on the rig.
         assert name in JUDGES or not any(dep.startswith("data/policies") for dep in data)
-        assert name != "record" or not data
+        assert name not in RECORDS or not data
 
 
 def test_a_recording_holds_no_truth(recorded: tuple[Path, Interaction]) -> None:

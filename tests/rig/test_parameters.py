@@ -10,10 +10,12 @@ import pytest
 from mcap.reader import make_reader
 
 from pipeline.params import Params, Section
+from pipeline.params.lab import Dip
 from pipeline.params.virtual_rig import RigFlow, RigSoftening, RigSpectrum
 from rig.physics import motion
 from rig.physics.launch import launch
-from rig.recorder import camera, interaction, record
+from rig.recorder import camera, record
+from tests.project import with_
 
 TF, GRIPPER = "/tf_static", "/franka_gripper/joint_states"
 POSE, WRENCH = "/franka_robot_state_broadcaster/current_pose", "/ft_sensor/wrench"
@@ -24,6 +26,7 @@ CAMERA = PICTURE | {COLOR_INFO, DEPTH_INFO}
 FELT = {POSE, WRENCH}  # what moves the hand; whether a pixel changes too is left open
 EVERYTHING = CAMERA | {TF, GRIPPER, POSE, WRENCH}
 LANDING = {"landing"}
+DIPS = (Dip(at=0.5, depth=0.05, out_time=0.1, back_time=0.1),)
 
 HASTE = {"PULL": 1.2, "PULLED": 2, "OPEN": 2.4, "RETREAT": 2.45, "RETREATED": 2.5, "END": 2.55}
 CHANGES = {  # the longest prefix of a number's name counts
@@ -111,9 +114,8 @@ class Laboratory:
         monkeypatch.setattr(record, "SENSOR_RATE", 100)
         monkeypatch.setattr(record, "PIXELS_APART", 0.1)
         monkeypatch.setattr(camera, "RATE", 5.0)
-        for module in (motion, interaction, record):
-            for name in HASTE.keys() & vars(module).keys():
-                monkeypatch.setattr(module, name, HASTE[name])
+        for name, value in HASTE.items():
+            monkeypatch.setattr(motion, name, value)
         monkeypatch.setattr(record, "pull_and_release", self.remembered)
         monkeypatch.setattr(record, "hang", self.hanging)
 
@@ -128,7 +130,7 @@ class Laboratory:
         """Integrate anew only where something that goes in is new."""
         world = {name: getattr(params.rig, name) for name in ("pads", "arm", "tolerance")}
         path = motion.path
-        arrays = hanging, path.amplitude, path.frequency, path.phase, camera_times
+        arrays = hanging, path.times, path.amplitude, path.frequency, path.phase, camera_times
         key = id(string), repr(world), *(array.tobytes() for array in arrays)
         if key not in self.done:
             seen = SimpleNamespace(rig=SimpleNamespace(**world), setup=params.setup)
@@ -148,13 +150,34 @@ class Laboratory:
         return topics
 
 
+def rough(params: Params) -> Params:
+    """Few frames and few pixels, so that chance has its way; of draws: test_draw.py."""
+    bands = {"band1": params.rig.bands["band1"].model_copy(update=RUBBER)}
+    eyes = {"drop_rate": 0.3, "dropout": 0.01}
+    camera = params.rig.camera.model_copy(update=eyes)
+    values = {"edges": 8, "tolerance": 1e-2, "draws": {}, "camera": camera, "bands": bands}
+    return with_(params, "rig", **values)
+
+
+@pytest.mark.slow
+def test_a_pull_with_dips_is_longer_and_another(params, tmp_path, monkeypatch) -> None:
+    """By `rig.pull`, or by the band's own; what is not pulled so does not hang on the dips."""
+    world = with_(rough(params), "plan", dips=DIPS)
+    laboratory = Laboratory(tmp_path / "band1.mcap", monkeypatch)
+    plain, dipped = laboratory(world), laboratory(with_(world, "rig", pull="informative"))
+    assert {topic for topic in plain if plain[topic] != dipped[topic]} == EVERYTHING - {TF}
+    assert len(dipped[WRENCH]) == len(plain[WRENCH]) + 20  # 0.2 s
+    band = world.rig.bands["band1"]
+    its = {"band1": band.model_copy(update={"pull": "informative"})}
+    assert laboratory(with_(world, "rig", bands=its)) == dipped
+    assert laboratory(with_(world, "plan", dips=())) == plain
+    its = {"band1": band.model_copy(update={"pull": "paper"})}
+    assert laboratory(with_(world, "rig", bands=its, pull="informative")) == plain
+
+
 @pytest.mark.slow
 def test_each_number_changes_what_it_should(params, tmp_path, monkeypatch) -> None:
-    rough = {"edges": 8, "tolerance": 1e-2, "draws": {}}  # of draws: test_draw.py
-    eyes = {"drop_rate": 0.3, "dropout": 0.01}  # few frames, few pixels: let chance have its way
-    rough["camera"] = params.rig.camera.model_copy(update=eyes)
-    rough["bands"] = {"band1": params.rig.bands["band1"].model_copy(update=RUBBER)}
-    rig = params.rig.model_copy(update=rough)
+    rig = rough(params).rig
     laboratory = Laboratory(tmp_path / "band1.mcap", monkeypatch)
 
     def everything(rig: Section, fly: bool) -> dict[str, Any]:

@@ -42,7 +42,7 @@ DEMO = (  # `make demo` in a clone of its own, where nothing has run
 )
 CHANGES = ("PYTHONPATH", "VIRTUAL_ENV", "UV_CACHE_DIR", "PIP_CACHE_DIR", "WARP_CACHE_PATH")
 STAGE = re.compile(r"^([a-z]+)(?:@[\w-]+)? \| done \((?:(\d+) min )?([\d.]+) s\)$", re.MULTILINE)
-GROUP = re.compile("^(ablation|own)_", re.MULTILINE)
+GROUP = re.compile("^(ablation|own|dip)_", re.MULTILINE)
 STAGES = "record episode mounting clamps evidence history clusters cma density de bo adam search"
 STAGES = (STAGES + " theta policy launches trials floor card report").split()  # order of columns
 

@@ -29,7 +29,7 @@ from pipeline.params import Params, load
 from rig.physics import forces
 from rig.physics.forces import NEAR
 from rig.physics.launch import launch_from
-from rig.physics.motion import END, HandMotion
+from rig.physics.motion import HandMotion
 from rig.physics.string import ElasticString
 from rig.physics.world import string_of
 from rig.recorder.interaction import Interaction, hang, pull_and_release
@@ -136,7 +136,9 @@ def pulled(string: ElasticString, hanging: np.ndarray, params: Params) -> Intera
     pads = params.rig.pads
     opening = pads.opening_time, pads.shape
     motion = HandMotion.through(hanging[string.middle], params.rig.tracking_error, opening, rng)
-    sensed, seen = (np.arange(round(END * rate)) / rate for rate in (SENSOR_RATE, CAMERA_RATE))
+    sensed, seen = (
+        np.arange(round(motion.end * rate)) / rate for rate in (SENSOR_RATE, CAMERA_RATE)
+    )
     return pull_and_release(string, hanging, motion, sensed, seen, params)
 
 

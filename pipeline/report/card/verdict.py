@@ -48,8 +48,8 @@ SIZES = (
 )
 # A band that softens when it is drawn returns less than its pull shows.
 UNSEEN = (
-    "no recording lets the drawn band back: what it softens, and so what a launch gets back, is only"
-    " what other rubbers have. Of the virtual ones that we tried, those that soften landed a"
+    "no recording lets the drawn band back: what it softens, and so what a launch gets back, is"
+    " only what other rubbers have. Of the virtual ones that we tried, those that soften landed a"
     " quarter short."
 )
 ODD_LAUNCH = 0.05  # of an evidence launch that the density leaves: a draw's error is some 2 %

@@ -228,12 +228,8 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
         ("plan", {"floor_clearance": 0.4}, "0.318 m above the floor, 0.082 m less than plan.floor"),
         ("plan", {"orientation": (0.5, 0.5, 0.5, -0.5)}, "plan.orientation: the fingers (z) would"),
         ("bands", None, "plan.gripper.open: 0.08 m is no wider than the band, 0.09 m thick"),
-        ("episode", {"duration": 7.0}, "it takes 7.71 s, 1.51 s more than episode.duration 7 less"),
-        (
-            "plan",
-            {"pull_speed": 0.15},
-            "raise plan.pull_speed to 0.179, or episode.duration to ",
-        ),
+        ("episode", {"longest": 7.0}, "it takes 7.71 s, 1.51 s more than episode.longest 7 less"),
+        ("plan", {"pull_speed": 0.05}, "raise plan.pull_speed to 0.052, or episode.longest to "),
     ],
 )
 def test_what_is_refused_and_how_it_is_said(params, section, values, expected) -> None:
@@ -249,9 +245,9 @@ def test_what_is_refused_and_how_it_is_said(params, section, values, expected) -
 
 def test_the_advice_of_a_refusal_is_enough(params) -> None:
     """With what the line says, and nothing else changed, the plan is accepted."""
-    plan_recording(with_(params, "plan", pull_speed=0.179), "band1")
-    slow = with_(params, "plan", pull_speed=0.15)
-    plan_recording(with_(slow, "episode", duration=9.9), "band1")
+    plan_recording(with_(params, "plan", pull_speed=0.052), "band1")
+    slow = with_(params, "plan", pull_speed=0.05)
+    plan_recording(with_(slow, "episode", longest=20.6), "band1")
     with pytest.raises(UserError, match=r"draw by 0.251 m at least, not 0.200 m"):
         plan_recording(params, "band1", draw=(-0.2, 0.0))
     plan_recording(params, "band1", draw=(-0.252, 0.0))

@@ -17,7 +17,7 @@ GOOD = Findings(
     stretch=1.5, recorded_stretch=1.6, hold_force=9.0, max_force=30.0, failures=(), converged=True,
     miss=0.004, half_width=0.1, outside=1, scores=15, off=0.03, bias=-0.01, bias_error=0.01,
     bias_of_half=-0.2, kind="virtual", left=0.01, observed=0, surprising=0,
-    carried=1.1, density=1e3,
+    carried=1.1, density=1e3, unloaded=True,
 )  # fmt: skip
 CASES = [
     ({"cautions": (("In pull 1 of a.mcap, the force drifts.", "Warm up."),)}, CARE, "force drifts"),
@@ -46,7 +46,12 @@ CASES = [
     ({"scores": 1, "outside": 1, "off": 0.3}, CARE, "30 cm off"),
     ({"scores": 1, "outside": 1, "off": 1.2}, NO, "120 cm off"),
     ({"recoil": 0.0, "recoil_seen": False}, CARE, "No picture shows the recoil"),
-    ({"outside": 0, "scores": 0}, CARE, "No launch was measured"),
+    ({"outside": 0, "scores": 0}, CARE, "No launch was measured."),
+    (
+        {"outside": 0, "scores": 0, "unloaded": False},
+        CARE,
+        "No launch was measured, and no recording lets the drawn band back",
+    ),
     ({"bias": -0.02, "bias_error": 0.004, "bias_of_half": -0.5}, CARE, "landed 2.0 % short"),
     ({"bias": 0.03, "bias_error": 0.004, "bias_of_half": 0.6}, CARE, "landed 3.0 % long"),
     ({"observed": 1, "surprising": 1}, CARE, "1 of 1 launch used as evidence landed outside"),
@@ -59,6 +64,7 @@ NO_REASON = [
     {"scores": 4, "outside": 0, "bias": -0.02, "bias_error": 0.004, "bias_of_half": -0.5},  # few
     {"observed": 5, "surprising": 1},  # of five, nine of ten inside
     {"carried": None},
+    {"unloaded": False},  # launches tell
 ]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.params import Params
-from rig.physics.motion import END, HandMotion
+from rig.physics.motion import HandMotion
 from rig.physics.servo import Servo
 
 MASS, STIFFNESS, DAMPING = 5.0, 12000.0, 200.0
@@ -20,7 +20,7 @@ def test_it_swings_back_like_an_oscillator(motion: HandMotion) -> None:
     """Let go 1 mm off its path, at rest: the textbook's damped cosine."""
     follow = Servo(MASS, STIFFNESS, DAMPING, motion.path)
     start, offset = 9.4, np.array([1e-3, 2e-3, -1e-3])
-    times = np.linspace(start, END, 50)
+    times = np.linspace(start, motion.end, 50)
     place = motion.position(start)
     found = follow.alone(np.concatenate([place + offset, np.zeros(3)]), times, 1e-9)
     decay = DAMPING / (2 * MASS)

@@ -1,0 +1,97 @@
+"""The hand's path with dips: where it is when, against the dips themselves."""
+
+import numpy as np
+import pytest
+
+from pipeline.base.errors import UserError
+from pipeline.params import Params
+from pipeline.params.lab import Dip
+from rig.draw import drawn
+from rig.physics.launch import launch
+from rig.physics.motion import OPEN, PULL, PULLED, HandMotion
+from rig.physics.world import string_of
+from rig.recorder.interaction import hang, pull_and_release
+from tests.project import with_
+
+HALFWAY = Dip(at=0.5, depth=0.05, out_time=0.25, back_time=0.5)
+TWICE = (Dip(at=1.0, depth=0.1, out_time=1.0, back_time=1.5), HALFWAY)
+DRAW = (-0.30, -0.15)
+
+
+def motion_of(*dips: Dip) -> HandMotion:
+    rng = np.random.default_rng(0)
+    return HandMotion.through(np.array([0.0, 0.0, -0.2]), 0.0, (0.004, 1.0), rng, dips)
+
+
+def deep(dip: Dip, depth: float) -> Dip:
+    return dip.model_copy(update={"depth": depth})
+
+
+def drawn_by(motion: HandMotion, *times: float) -> np.ndarray:
+    """How far from the fork [m]."""
+    return -motion.position(np.array(times))[:, 1]
+
+
+def test_a_dip_leads_back_and_forth_where_it_says() -> None:
+    """The pull's own legs take 4 s together; the earlier dip comes first, in whatever order."""
+    motion = motion_of(*TWICE)
+    ends = PULL + np.cumsum([0.0, 2.0, 0.25, 0.5, 2.0, 1.0, 1.5])
+    np.testing.assert_allclose(drawn_by(motion, *ends), [0, 0.2, 0.15, 0.2, 0.4, 0.3, 0.4])
+    assert np.abs(motion.position(ends, 1)).max() < 1e-12  # each leg begins and ends at rest
+    middle = (ends[1:] + ends[:-1]) / 2
+    np.testing.assert_allclose(drawn_by(motion, *middle), [0.1, 0.175, 0.175, 0.3, 0.35, 0.35])
+
+
+def test_all_that_follows_is_later_by_the_dips() -> None:
+    plain, dipped = motion_of(), motion_of(*TWICE)
+    late = 0.75 + 2.5
+    assert (plain.opens, plain.end) == (8.0, 10.0)
+    assert (dipped.opens, dipped.end) == (8.0 + late, 10.0 + late)
+    after = np.linspace(PULLED, plain.end, 50)
+    np.testing.assert_allclose(plain.position(after), dipped.position(after + late), atol=1e-12)
+    for state in ("grip", "finger"):
+        opening = np.linspace(OPEN - 0.01, OPEN + 0.2, 50)
+        found = getattr(dipped, state)(opening + late)
+        np.testing.assert_allclose(found, getattr(plain, state)(opening), atol=1e-9)
+
+
+def test_dips_at_one_place_come_as_they_are_given() -> None:
+    motion = motion_of(HALFWAY, deep(HALFWAY, 0.1))
+    ends = PULL + 2.0 + np.cumsum([0.25, 0.5, 0.25, 0.5, 2.0])
+    np.testing.assert_allclose(drawn_by(motion, *ends), [0.15, 0.2, 0.1, 0.2, 0.4])
+
+
+def test_a_dip_beyond_the_fork_is_refused() -> None:
+    motion_of(deep(HALFWAY, 0.2))
+    with pytest.raises(UserError, match=r"plan\.dips: a dip of 0\.21 m leads beyond the fork"):
+        motion_of(deep(HALFWAY, 0.21))
+
+
+def test_the_band_follows_a_dip_and_pulls_less_there(coarse: Params) -> None:
+    """It slips after the dip's fingers open; pads that are too weak are told with dips too."""
+    string = string_of(coarse, "band1")
+    hanging = hang(string, 1e-4)
+    dip = Dip(at=1.0, depth=0.1, out_time=1.0, back_time=1.0)
+    motion = motion_of(dip)
+    at = [0.0, dip.out_time, dip.out_time + dip.back_time, 4.1, 4.2, 4.3]
+    times = PULLED + np.array(at)
+    happened = pull_and_release(string, hanging, motion, times, np.array([1.5]), coarse)
+    pull = np.linalg.norm(happened.force, axis=1)
+    assert pull[1] < 0.7 * pull[0] and pull[1] < 0.7 * pull[2] < 0.7 * pull[0]
+    np.testing.assert_allclose(-happened.hand[:3, 1], [0.4, 0.3, 0.4], atol=2e-3)
+    assert motion.opens < happened.slip_time < motion.opens + 0.004 and not pull[3:].any()
+    weak = with_(coarse, "rig.pads", force=5.0)
+    with pytest.raises(UserError, match="lets the band slip out at"):
+        pull_and_release(string, hanging, motion, times, np.array([1.5]), weak)
+
+
+def test_a_band_like_another_has_its_rubber_and_launches_but_other_draws(coarse: Params) -> None:
+    """What a recording draws is its own, what launches draw is the rubber's."""
+    drawing = with_(coarse, "rig", draws={"pads.force": (30, 44), "projectile_drag": (0, 1e-3)})
+    one, other = (string_of(drawing, name).rubber for name in ("band1", "band1_dip"))
+    assert (one.scale, one.law, one.viscosity) == (other.scale, other.law, other.viscosity)
+    assert (one.relaxation == other.relaxation).all()
+    landed = [launch(name, drawing, DRAW, 3) for name in ("band1", "band1_dip")]
+    assert landed[0] == landed[1] and np.isfinite(landed[0].landing_y)
+    forces = [drawn(drawing, name).rig.pads.force for name in ("band1", "band1_dip")]
+    assert forces[0] != forces[1]

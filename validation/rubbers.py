@@ -59,6 +59,8 @@ def _rubber(kind: str, law: str, rng: np.random.Generator) -> tuple[dict, dict]:
     mass = near(np.pi / 4 * diameter**2 * 0.52 * 750, 0.3)
     constants, share = LAWS[law]
     about = {
+        "like": None,
+        "pull": None,
         "peak_force": between(10.0, 17.0),
         "relaxation": [],
         "viscosity": between(0.0005, 0.0025, log=True),

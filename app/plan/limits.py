@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from app.plan.force import Held, Prediction
-from app.plan.pull import BACK, DRAWS, LEAD
+from app.plan.pull import BACK, DRAWS
 from app.plan.trajectory import Trajectory
 from pipeline.base.errors import UserError
 from pipeline.episode.planned import leg_time
@@ -16,6 +16,7 @@ from pipeline.params.recording import EpisodeParams
 
 ROUNDING = 1e-6  # relative
 LEAST_STRETCH = 1.10  # below it the drawn band shows little of its rubber
+LEAD = 0.1  # s of the lead-in that the episode holds at least
 MOST_ASKEW = 60.0  # degrees between the fingers and the way to the fork
 
 

@@ -13,9 +13,9 @@ from pipeline.episode.window import LEAD
 from pipeline.params import PlanParams, load
 from pipeline.params.lab import Dip
 from pipeline.recording.pulls import CALM
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, with_
 
-PARAMS = load(DEFAULTS)
+PARAMS = with_(load(DEFAULTS), "plan", dips=())
 AHEAD = np.array([0.0, 1.0, 0.0])
 
 

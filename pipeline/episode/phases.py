@@ -91,7 +91,7 @@ def phases(episode: Episode) -> list[InteractionPhase]:
     found = phases_of_hand(episode)
     if not found:
         return []
-    drawn, release = found[-1].stop, episode.release_time
+    drawn, release = found[-1].stop, float(episode.release_time)
     recoil = np.flatnonzero(taut_frames(episode))
     after = episode.cloud_time > release
     after[recoil] = False
@@ -116,7 +116,7 @@ def phases_of_hand(held: HandSignals) -> list[InteractionPhase]:
     found: list[InteractionPhase] = []
     for first, last in zip([0, *ends], [*ends, len(time)], strict=True):
         until = last if last < len(time) else last - 1
-        end = float(time[until]) if last < len(time) else held.release_time
+        end = float(time[until]) if last < len(time) else float(held.release_time)
         if names[first] != SLACK:
             one = InteractionPhase(
                 "", float(time[first]), end, float(drawn[first]), float(drawn[until])

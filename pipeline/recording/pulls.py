@@ -75,7 +75,11 @@ class Pull:
 
     @cached_property
     def _zeroed(self) -> tuple[np.ndarray, list[NewZero]]:
-        return zeroed(self.force_time, self.recording.wrench.values)
+        try:
+            hand = self.motion.position
+        except UserError:  # which is said where the motion is needed
+            hand = None
+        return zeroed(self.force_time, self.recording.wrench.values, hand)
 
     @cached_property
     def opening(self) -> Opening | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,9 @@ LEAST_STEP = 0.03  # of the largest sudden change: less may be a hand that start
 SIGMAS = 6.0  # of a mean: what is less sudden than this is noise
 INSTANT = 0.7  # share of a lasting change that comes at once
 MATCH = 0.4  # share of a step by which the zeros before and after it may differ otherwise
+MOST_TOOL = 3.0  # kg that a sensor carries
+APART = 0.05  # s of second differences of the hand's path
+RESTS = 0.002  # m by which a hand at rest may wander meanwhile
 FREE = 0.5  # s at each end, at most, of which the zero is taken
 BLOCK = 0.05  # s: means over so long are independent of one another
 LEAST_BLOCKS = 6
@@ -31,15 +35,23 @@ class NewZero:
     size: np.ndarray
 
 
-def zeroed(t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, list[NewZero]]:
+Hand = Callable[[np.ndarray], np.ndarray]  # times (T,) [s] to its places (T, 3) [m]
+
+
+def zeroed(
+    t: np.ndarray, force: np.ndarray, hand: Hand | None = None
+) -> tuple[np.ndarray, list[NewZero]]:
     """The force with the zero that it has at the end, and when that was set.
 
     A sudden change that lasts is another zero where the free hand at the end feels that much more
-    than the free hand at the start. A band that slips or is let go leaves both as they are.
+    than the free hand at the start. A band that slips or is let go leaves both as they are. A hand
+    that starts or stops makes such changes too, by the inertia of its tool, and the zero may have
+    drifted as much meanwhile.
 
     Args:
         t: Times [s], shape (S,).
         force: A frame that is fixed to the sensor [N], shape (S, 3).
+        hand: None where its motion is not known.
     """
     try:
         near, far = reach(t)
@@ -58,11 +70,25 @@ def zeroed(t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, list[NewZero]]
     for k, step in steps:
         begin = min(k, int(np.searchsorted(t, t[0] + FREE)))
         end = max(k, int(np.searchsorted(t, t[-1] - FREE)))
-        change = values[end:].mean(axis=0) - values[:begin].mean(axis=0)
-        if np.linalg.norm(change - step) < MATCH * np.linalg.norm(step):
+        # Medians, for the hand may have begun to move by then.
+        change = np.median(values[end:], axis=0) - np.median(values[:begin], axis=0)
+        size = float(np.linalg.norm(step))
+        if np.linalg.norm(change - step) < MATCH * size and not (
+            hand and size < MOST_TOOL * _jerk(hand, float(t[k]))
+        ):
             values[:k] += step
             found.append(NewZero(float(t[k]), step))
     return (values, sorted(found, key=lambda one: one.time)) if found else (force, [])
+
+
+def _jerk(hand: Hand, time: float) -> float:
+    """By how much the hand's acceleration changes about then [m/s^2]; 0 of one that rests."""
+    at = time + np.arange(-2 * APART, 2 * APART + 1e-9, APART / 5)
+    places = hand(at)
+    if np.linalg.norm(places - places[0], axis=1).max() < RESTS:
+        return 0.0
+    bend = (places[10:] - 2 * places[5:-5] + places[:-10]) / APART**2
+    return float(np.linalg.norm(bend[:, None] - bend[None], axis=-1).max())
 
 
 def _step_at(

@@ -38,6 +38,25 @@ def test_a_band_that_slips_and_a_hand_that_jerks_are_left() -> None:
             assert zeroed(T, one) == (one, [])
 
 
+@pytest.mark.parametrize("mass", [0.3, 1.0, 2.0])
+def test_a_hand_that_stops_is_no_new_zero(mass) -> None:
+    """A dip's last way, 10 cm in a second, ends at 7 s; the zero drifts by as much as it jerks."""
+    part = np.clip(T - 6, 0, 1)
+    way = 0.1 * part**2 * (3 - 2 * part)
+    path = way[:, None] * WAY + 1e-4 * np.sin(9 * T)[:, None]
+    speeds_up = 0.6 * (1 - 2 * part) * ((T > 6) & (T < 7))
+    step = -mass * 0.6 * WAY
+    force = made() - mass * speeds_up[:, None] * WAY + (T / 10)[:, None] * step
+
+    def hand(times: np.ndarray) -> np.ndarray:
+        return np.stack([np.interp(times, T, axis) for axis in path.T], axis=1)
+
+    assert zeroed(T, force, hand)[1] == []
+    assert bool(zeroed(T, force)[1]) == (mass > 0.5)  # as it looks without the path
+    at_rest = force + (T > 7.6)[:, None] * (4 * step)
+    assert [one.time for one in zeroed(T, at_rest, hand)[1]] == [pytest.approx(7.6, abs=0.002)]
+
+
 def course(shape) -> tuple:
     force = made() + shape(T)[:, None] * WAY
     return drift_of(T, force, T < 0.95, T > 8.4, 14.0)

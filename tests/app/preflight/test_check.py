@@ -54,8 +54,10 @@ def test_the_verdict_and_its_cautions_come_first(looked) -> None:
         assert lines[2:4] == [verdict, "  - the force has a gap: record it again"]
         basis = lines.index("it rests on")
         assert lines[basis + 1].startswith("  force: at most ")
-        assert lines[basis + 2].startswith("  pictures: the band is in ")
-        assert lines[basis + 3].endswith(f"0.52 m long, {ASSUMED}")
+        assert lines[basis + 2].startswith("  motion: loading 25 to 38 cm at 0.23 m/s, pause ")
+        assert lines[basis + 3].startswith("  not in it, so known by a prior alone: softening and")
+        assert lines[basis + 4].startswith("  pictures: the band is in ")
+        assert lines[basis + 5].endswith(f"0.52 m long, {ASSUMED}")
         assert basis < lines.index("signals") < lines.index("chosen")
     pulls = [replace(looked.report.row, number=number) for number in (1, 2)]
     lines = replace(looked.report, pulls=pulls, cautions=cautions).to_text().splitlines()

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from app import arguments as kinds
-from app.command_line import JSON, REFUSED, Done, Refusal, command, execute, flag, parser
+from app.command_line import JSON, REFUSED, Done, Refusal, command, execute, flag, parser, say
 from app.sizes import DIAMETER, REST_LENGTH
 from pipeline.base.layout import Layout
 from pipeline.export import ENGINES
@@ -189,6 +189,19 @@ def setup(arguments: argparse.Namespace) -> Done:
     flag(
         "--recording", type=Path, metavar="FILE.mcap", help="for base and force; default: its own"
     ),
+    flag(
+        "--pull",
+        choices=kinds.PULLS,
+        default=kinds.PULLS[0],
+        help="with plan.dips (the default), without, or with dips that are searched for this band",
+    ),
+    flag(
+        "--precondition",
+        type=kinds.count,
+        default=0,
+        metavar="N",
+        help="stretch the band to the draw so often first, in the same grasp",
+    ),
     flag("--pulls", type=kinds.count, default=1, metavar="N", help="in one recording; default 1"),
     flag("--out", type=Path, metavar="FOLDER", help="default data/plans/<band>"),
     flag("--rate", type=kinds.rate, default=100.0, metavar="HZ", help="of the CSV; default 100"),
@@ -206,7 +219,10 @@ def plan(arguments: argparse.Namespace) -> Done:
         draw=arguments.draw,
         theta=arguments.theta,
         recording=arguments.recording,
+        pull=arguments.pull,
+        precondition=arguments.precondition,
         pulls=arguments.pulls,
+        told=say,
     )
     files = plan.write(arguments.out or Layout().plans(band), arguments.rate)
     return plan.to_json(files) if arguments.json else plan.to_text(files)

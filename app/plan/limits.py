@@ -7,8 +7,10 @@ import math
 import numpy as np
 
 from app.plan.force import Held, Prediction
+from app.plan.pull import BACK, DRAWS
 from app.plan.trajectory import Trajectory
 from pipeline.base.errors import UserError
+from pipeline.episode.planned import leg_time
 from pipeline.params.lab import BandParams, PlanParams, SetupParams
 from pipeline.params.recording import EpisodeParams
 
@@ -60,19 +62,31 @@ def check_hand(plan: PlanParams, band: BandParams, axis: np.ndarray, drawn: np.n
         )
 
 
+def check_dips(plan: PlanParams) -> None:
+    """Each dip stays between the fork and the draw."""
+    size = math.hypot(*plan.draw)
+    for number, dip in enumerate(plan.dips):
+        if dip.depth >= dip.at * size:
+            raise UserError(
+                f"plan.dips: dip {number + 1} lets the band back by {dip.depth:g} m from"
+                f" {dip.at * size:.3g} m, and would pass the fork: make it less deep"
+            )
+
+
 def check_motion(trajectory: Trajectory, plan: PlanParams) -> None:
     """Largest speed and acceleration of every phase."""
     speeds, accelerations = trajectory.peaks(1), trajectory.peaks(2)
     for phase, speed, acceleration in zip(trajectory.phases, speeds, accelerations, strict=True):
-        name = "pull_speed" if phase.name == "pull" else "max_speed"
+        name = "pull_speed" if phase.name in DRAWS else "max_speed"
+        where = " (plan.dips)" if phase.name in BACK else ""
         for value, limit, key, unit in (
             (speed, getattr(plan, name), name, "m/s"),
             (acceleration, plan.max_acceleration, "max_acceleration", "m/s^2"),
         ):
             if value > limit * (1 + ROUNDING):
                 raise UserError(
-                    f"the {phase.name} reaches {value:.3g} {unit}, {value - limit:.3g} more than"
-                    f" plan.{key} {limit:g}: give it more than {phase.duration:.3g} s"
+                    f"the {phase.name}{where} reaches {value:.3g} {unit}, {value - limit:.3g} more"
+                    f" than plan.{key} {limit:g}: give it more than {phase.duration:.3g} s"
                 )
 
 
@@ -90,19 +104,26 @@ def check_floor(trajectory: Trajectory, setup: SetupParams, plan: PlanParams) ->
 
 
 def check_window(
-    trajectory: Trajectory, plan: PlanParams, episode: EpisodeParams
+    trajectory: Trajectory, plan: PlanParams, episode: EpisodeParams, precondition: int = 0
 ) -> tuple[float, float]:
     """Grasp to release fits the episode. Returns what it takes, and what there is for it [s]."""
+    lasts = trajectory.until("release")
     taken = trajectory.start_of("release") - trajectory.start_of("grasp")
     most = episode.longest - episode.tail - LEAD
     over = taken - most
     if over > ROUNDING:
         advice = f"raise episode.longest to {np.ceil(10 * (episode.longest + over)) / 10:g}"
-        size = float(np.linalg.norm(plan.draw))
-        time = trajectory.start_of("pause") - trajectory.start_of("pull") - over
+        if plan.dips:
+            advice = f"take --pull paper, or shorter plan.dips, or {advice}"
+        if precondition:
+            advice = f"take a smaller --precondition, or {advice}"
+        shares = np.diff(sorted({0.0, 1.0, *(dip.at for dip in plan.dips)}))
+        legs = np.append(shares, np.ones(precondition)) * np.linalg.norm(plan.draw)
+        time = sum(lasts[name] for name in DRAWS) - over
         if time > 0:
-            speed = np.ceil(1000 * 2 * size / time) / 1000
-            if speed <= plan.max_speed and np.sqrt(8 * size / plan.max_acceleration) <= time:
+            speed = np.ceil(1000 * 2 * legs.sum() / time) / 1000
+            least = sum(leg_time(leg, speed, plan.max_acceleration) for leg in legs)
+            if speed <= plan.max_speed and least <= time + ROUNDING:
                 advice = f"raise plan.pull_speed to {speed:g}, or {advice.removeprefix('raise ')}"
         raise UserError(
             f"from grasp to release it takes {taken:.2f} s, {over:.2f} s more than episode.longest"

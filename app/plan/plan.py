@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from app.arguments import PULLS
 from app.plan import limits, messages
 from app.plan.force import Earlier, Held, Prediction, predict, read_earlier
 from app.plan.hand import along_pull, quaternion
@@ -22,11 +25,15 @@ from pipeline.base.errors import UserError
 from pipeline.base.files import replacing, write_json, write_text
 from pipeline.base.layout import Layout
 from pipeline.params import Params, expect_known
-from pipeline.params.lab import Gripper
+from pipeline.params.lab import Dip, Gripper
 from pipeline.recording.geometry import FORK
 from pipeline.recording.input.frames import Transform
 
 RATES = (1.0, 10_000.0)  # Hz of the CSV
+if TYPE_CHECKING:
+    from app.plan.design import DesignedPull
+
+INFORMATIVE, PAPER, DESIGNED = PULLS
 MOST_PULLS = 10  # a file of them is half a gigabyte
 NO_BASE = (
     "nothing says where it stands in the robot's base, so all is in frame O, which no robot knows:"
@@ -52,6 +59,9 @@ class Plan:
         grip_force: Of each finger [N].
         held_time, most_time: From grasp to release, and what the episode leaves for it [s].
         hanging_source: Where the height of the hanging middle came from.
+        pull: Of PULLS.
+        dips: How many the pull has.
+        design: How they were found, where this plan did.
     """
 
     band: str
@@ -68,6 +78,9 @@ class Plan:
     held_time: float
     most_time: float
     hanging_source: str
+    pull: str
+    dips: int
+    design: DesignedPull | None = None
 
     def rows(self) -> list[dict]:
         """One row a phase, numbers in SI units."""
@@ -99,9 +112,12 @@ class Plan:
             "duration_s": round(self.trajectory.duration, 6),
             "grasp_s": round(self.trajectory.start_of("grasp"), 6),
             "release_s": round(self.trajectory.start_of("release"), 6),
-            "pulls": sum(phase.name == "pull" for phase in self.trajectory.phases),
+            "pulls": sum(phase.name == "release" for phase in self.trajectory.phases),
             "held_s": round(self.held_time, 6),
             "held_most_s": round(self.most_time, 6),
+            "pull": self.pull,
+            "dips": self.dips,
+            **({"design": self.design.content()} if self.design else {}),
             "stretch": self.stretch,
             "hold_force_n": self.force.force,
             "hold_force_source": self.force.source,
@@ -141,16 +157,19 @@ class Plan:
             "hand": f"{' '.join(f'{v:+.4f}' for v in self.hand)} (x y z w in {self.frame})",
             "fork": f"in {self.frame} by {self.base_source}" if self.base_source else NO_BASE,
             "middle": self.hanging_source,
+            "pull": f"{self.pull}, with {self.dips} dip{'s' * (self.dips != 1)}",
             "window": f"grasp to release {self.held_time:.2f} s of {self.most_time:.2f} s",
             "stretch": f"{self.stretch:.2f} of the rest length",
             "force": known,
         }
         lines += ["", *(f"{name:<10}{value}" for name, value in facts.items())]
+        if self.design:
+            lines += ["", self.design.to_text()]
         lines += ["", *(f"wrote {path}" for path in files)]
         return "\n".join(lines)
 
     def write(self, folder: Path, rate: float) -> list[Path]:
-        """Write trajectory.csv, waypoints.json, gripper.json and plan.png into a folder.
+        """Write trajectory.csv, waypoints.json, gripper.json, plan.png, design.png into a folder.
 
         Everything is made before the first file is written. Raises UserError.
         """
@@ -163,14 +182,18 @@ class Plan:
         gripper = messages.gripper_commands(self.trajectory, self.gripper.command, self.grip_force)
         picture = io.BytesIO()
         messages.draw_picture(self.trajectory, picture)
-        names = ("trajectory.csv", "waypoints.json", "gripper.json", "plan.png")
+        pictures = {"plan.png": picture.getvalue()}
+        if self.design:
+            pictures["design.png"] = self.design.picture()
+        names = ("trajectory.csv", "waypoints.json", "gripper.json", *pictures)
         files = [Path(folder, name) for name in names]
         try:
             write_text(files[0], table)
             write_json(files[1], waypoints)
             write_json(files[2], gripper)
-            with replacing(files[3]) as temporary:
-                temporary.write_bytes(picture.getvalue())
+            for file, content in zip(files[3:], pictures.values(), strict=True):
+                with replacing(file) as temporary:
+                    temporary.write_bytes(content)
         except OSError as error:
             raise UserError(f"{folder}: cannot be written ({error.strerror})") from error
         return files
@@ -206,8 +229,11 @@ def plan_recording(
     draw: tuple[float, float] | None = None,
     theta: Path | None = None,
     recording: Path | None = None,
+    pull: str = INFORMATIVE,
+    precondition: int = 0,
     pulls: int = 1,
     root: str | Path = ".",
+    told: Callable[[str], None] = lambda line: None,
 ) -> Plan:
     """Plan the recording of a band of params.yaml and check it against every limit.
 
@@ -219,13 +245,18 @@ def plan_recording(
         theta: θ file that says what holding the draw takes.
         recording: Earlier one of this rig and of this band, which also tells the force; None: the
             first of the band's in the project that can be read.
+        pull: INFORMATIVE with plan.dips, PAPER without, DESIGNED with dips that are searched now.
+        precondition: How often the band is stretched to the draw first, in the first grasp.
         pulls: How many in one recording; between two the hand returns and grasps again.
         root: Folder of the project.
+        told: Of a search, a line now and then.
 
     Raises:
         UserError: in one line, where a limit is broken or something is not known.
     """
     expect_known(params, "band", band)
+    if precondition > MOST_PULLS:
+        raise UserError(f"--precondition: at most {MOST_PULLS}, got {precondition}")
     if pulls > MOST_PULLS:
         raise UserError(f"--pulls: at most {MOST_PULLS} in one recording, got {pulls}")
     setup, about = params.setup, params.bands[band]
@@ -240,12 +271,28 @@ def plan_recording(
     hand = _orientation(settings.orientation, base, drawn)
     axis = (base.rotation.inv() * hand).apply([0.0, 0.0, 1.0])
     limits.check_hand(settings, about, axis, drawn)
-    trajectory = trajectory_of(settings, setup, params.episode, about, axis, pulls)
-    limits.check_motion(trajectory, settings)
-    limits.check_floor(trajectory, setup, settings)
-    held_time, most_time = limits.check_window(trajectory, settings, params.episode)
     prediction = predict(params, band, drawn, theta, earlier)
+
+    def through(dips: tuple[Dip, ...]) -> tuple[Trajectory, tuple[float, float]]:
+        """The way with these dips, its time in the window, and what there is for it [s]."""
+        plan = settings.model_copy(update={"dips": dips})
+        limits.check_dips(plan)
+        way = trajectory_of(plan, setup, params.episode, about, axis, pulls, precondition)
+        limits.check_motion(way, plan)
+        limits.check_floor(way, setup, plan)
+        return way, limits.check_window(way, plan, params.episode, precondition)
+
+    dips, design = settings.dips if pull == INFORMATIVE else (), None
+    trajectory, (held_time, most_time) = through(dips)
     limits.check_force(setup, held, drawn, prediction)
+    if pull == DESIGNED:
+        from app.plan.design import designed_pull  # the simulator, which takes a second
+
+        design = designed_pull(
+            params, band, settings, trajectory, most_time, prediction.force, told
+        )
+        dips = design.dips
+        trajectory, (held_time, most_time) = through(dips)
     below = -hanging_middle(settings, setup, about)[2]
     by = "as a string's catenary" if settings.hanging is None else "plan.hanging"
     return Plan(
@@ -263,6 +310,9 @@ def plan_recording(
         held_time=held_time,
         most_time=most_time,
         hanging_source=f"hangs {below:.3f} m below the tips ({by})",
+        pull=pull,
+        dips=len(dips),
+        design=design,
     )
 
 

@@ -1,6 +1,7 @@
 """The phases of a recording: rest, grasp the hanging middle, lift, pull, pause, let go, wait.
 
-For several pulls in one recording the hand returns to where it began and does it all again.
+A pull has dips, in which the band is let back and drawn again: they show how it unloads. For
+several pulls in one recording the hand returns to where it began and does it all again.
 """
 
 from __future__ import annotations
@@ -11,13 +12,17 @@ from typing import cast
 import numpy as np
 from scipy.optimize import brentq
 
-from app.plan.trajectory import Phase, Trajectory, leg_time
+from app.plan.trajectory import Phase, Trajectory
+from pipeline.episode.planned import LET_BACK, PULL, REDRAW, leg_time, legs_of
 from pipeline.episode.window import LEAD
 from pipeline.params.lab import BandParams, PlanParams, SetupParams
 from pipeline.params.recording import EpisodeParams
 from pipeline.recording.pulls import CALM
 
 TICK = 0.001  # s: phases last whole ticks
+STRETCH, SLACKEN = "stretch", "slacken"  # a preconditioning pull, and back to the fork
+BACK = LET_BACK, REDRAW
+DRAWS = PULL, STRETCH  # at plan.pull_speed
 SPARE = 0.5  # s beyond what the episode asks for, since nobody starts a recorder on the tick
 
 
@@ -52,6 +57,7 @@ def trajectory_of(
     band: BandParams,
     axis: np.ndarray,
     pulls: int = 1,
+    precondition: int = 0,
 ) -> Trajectory:
     """The whole recording, frame O.
 
@@ -59,6 +65,7 @@ def trajectory_of(
         plan, setup, episode, band: Those sections of params.
         axis: Unit vector along which the fingers point, shape (3,); they come and go along it.
         pulls: How many, one after the other.
+        precondition: How often the first grasp stretches the band to the draw before its pull.
     """
     middle = hanging_middle(plan, setup, band)
     level = np.zeros(3)
@@ -72,14 +79,21 @@ def trajectory_of(
 
     retreat = leg("retreat", drawn, end, plan.max_speed, wide)
     back = leg("return", end, start, plan.max_speed, wide)
-    pull = [
-        leg("approach", start, middle, plan.max_speed, wide),
+    way, place = [], level
+    for name, share, time in legs_of(plan.dips, float(np.linalg.norm(drawn))):
+        to = share * drawn
+        own = leg(name, place, to, plan.pull_speed, closed)
+        way.append(own if time is None else Phase(name, to, _ticks(time), closed))
+        place = to
+    approach = leg("approach", start, middle, plan.max_speed, wide)
+    held = [
         Phase("grasp", middle, _ticks(plan.finger_time), closed),
         leg("lift", middle, level, plan.max_speed, closed),
-        leg("pull", level, drawn, plan.pull_speed, closed),
+        *way,
         Phase("pause", drawn, _ticks(plan.pause), closed),
-        Phase("release", drawn, _ticks(plan.finger_time), wide),
     ]
+    release = Phase("release", drawn, _ticks(plan.finger_time), wide)
+    pull = [approach, *held, release]
     taken = sum(phase.duration for phase in pull)
     wait = max(
         plan.wait,
@@ -88,11 +102,15 @@ def trajectory_of(
     )
     pull += [Phase("swing", drawn, _ticks(wait), wide), retreat]
     # The next pull's window begins so long before its tail, and the band is to hang calm by then.
+    before = max(episode.duration - episode.tail, LEAD + sum(one.duration for one in held))
     between = wait + retreat.duration + back.duration + taken
-    held = taken - pull[0].duration - pull[-1].duration  # from the grasp to the release
-    window = max(episode.duration - episode.tail, held + LEAD)
-    rest = max(plan.lead_in, CALM + SPARE + window - between)
+    rest = max(plan.lead_in, CALM + SPARE + before - between)
     again = [back, Phase("lead-in", start, _ticks(rest), wide), *pull]
+    first = [
+        leg(STRETCH, level, drawn, plan.pull_speed, closed),
+        leg(SLACKEN, drawn, level, plan.max_speed, closed),
+    ]
+    pull[3:3] = precondition * first  # after approach, grasp and lift
     phases = [Phase("lead-in", start, _ticks(plan.lead_in), wide), *pull, *(pulls - 1) * again]
     return Trajectory.through(start, wide, [phase for phase in phases if phase.duration > 0])
 

@@ -9,7 +9,8 @@ acceleration are continuous and begin and end at zero, as robots ask for:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,11 +18,6 @@ from scipy.interpolate import CubicHermiteSpline
 
 # Of a leg of length 1 in time 1: knots, and place and speed there.
 KNOTS, PLACES, SPEEDS = (0.25, 0.75, 1.0), (1 / 12, 11 / 12, 1.0), (1.0, 1.0, 0.0)
-
-
-def leg_time(length: float, speed: float, acceleration: float) -> float:
-    """Shortest time of a leg [s] that stays within a speed [m/s] and an acceleration [m/s^2]."""
-    return max(2 * length / speed, float(np.sqrt(8 * length / acceleration)))
 
 
 @dataclass(frozen=True)
@@ -86,6 +82,15 @@ class Trajectory:
             if phase.name == name:
                 return float(time)
         raise KeyError(name)
+
+    def until(self, name: str) -> Mapping[str, float]:
+        """Time by names of phases before the first called `name` begins [s]; 0 of any other."""
+        lasts: defaultdict[str, float] = defaultdict(float)
+        for phase in self.phases:
+            if phase.name == name:
+                break
+            lasts[phase.name] += phase.duration
+        return lasts
 
     def position(self, time: np.ndarray | float, derivative: int = 0) -> np.ndarray:
         """Position, or a derivative of it by time, at times (...) [s], shape (..., 3).

@@ -25,6 +25,7 @@ SETTLE = 10  # tenths of a second that it gets for that
 READY = [0.0, -0.3, 0.0, -2.2, 0.0, 3.47, 2.356]  # rad: the hand looks ahead, far from any limit
 TURNED = -0.785  # joint 7 with --half-turn
 SLOW = 0.05  # of the robot's own limits, on the way to where the plan begins
+ONCE = "stretch", "slacken", "let back", "redraw"  # of a recording alone, not of a launch
 NO_ROBOT = "fork"  # the frame of a plan that knows no robot
 
 
@@ -108,6 +109,8 @@ def aimed(legs: list[Leg], aim: Path) -> list[Leg]:
     times = answer.get("pull_and_pause_s") or [None, None]
     done = []
     for leg in legs[: release + 2]:
+        if leg.name in ONCE or (leg.name == "pull" and done[-1].name == "pull"):
+            continue
         if leg.name == "lift":
             leg = replace(leg, quaternion=turn)
         elif leg.name in ("pull", "pause", "release", "swing"):

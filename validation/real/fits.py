@@ -30,11 +30,17 @@ class CurveFit:
         return float(100 * np.sqrt(np.mean(self.left**2)))
 
 
-def history(stretch: np.ndarray, time: np.ndarray, values: dict[str, float]) -> np.ndarray:
-    """Nominal stress over the shear modulus along a history (n,) that starts virgin and relaxed."""
+def history(
+    stretch: np.ndarray, time: np.ndarray, values: dict[str, float], worst: float = 1.0
+) -> np.ndarray:
+    """Nominal stress over the shear modulus along a history (n,) that starts relaxed.
+
+    `worst` is the largest stretch before it.
+    """
     shape = values["mooney_share"], values["upturn"]
     virgin, done = uniaxial(stretch, *shape), work(stretch, *shape)
-    eta = softened(done, np.maximum.accumulate(done), values["softening"])
+    most = np.maximum(np.maximum.accumulate(done), work(np.array(worst), *shape))
+    eta = softened(done, most, values["softening"])
     left, weight = relaxed(values["relaxation"])
     forget, follow = update(np.diff(time))
     over, total = np.zeros(len(TIMES)), np.empty(len(stretch))

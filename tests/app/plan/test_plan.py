@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from ruamel.yaml import YAML
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
@@ -18,7 +19,7 @@ from app.plan.plan import plan_recording, with_band
 from app.plan.trajectory import Phase, Trajectory
 from pipeline.base.errors import UserError
 from pipeline.params import Params, load, parse
-from pipeline.params.lab import Gripper
+from pipeline.params.lab import Dip, Gripper
 from tests.project import DEFAULTS, with_
 
 pytestmark = pytest.mark.usefixtures("nowhere")
@@ -28,12 +29,17 @@ FORK_IN_BASE = (0.7, 0.1, 0.4, 0.0, 0.0, -(0.5**0.5), 0.5**0.5)  # the target al
 
 @pytest.fixture(scope="module")
 def params() -> Params:
-    return with_(load(DEFAULTS), "setup", base_to_fork=FORK_IN_BASE)
+    """Without dips, of which tests bring their own."""
+    return with_(with_(load(DEFAULTS), "setup", base_to_fork=FORK_IN_BASE), "plan", dips=())
 
 
 @pytest.fixture(scope="module")
 def plan(params):
     return plan_recording(params, "band1", draw=(-0.35, -0.1))
+
+
+def dip(**values: float) -> Dip:
+    return Dip(**({"at": 1.0, "depth": 0.1, "out_time": 1.0, "back_time": 1.0} | values))
 
 
 def table(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
@@ -230,6 +236,14 @@ def test_nothing_is_written_where_it_cannot_be(plan, tmp_path) -> None:
         ("bands", None, "plan.gripper.open: 0.08 m is no wider than the band, 0.09 m thick"),
         ("episode", {"longest": 7.0}, "it takes 7.71 s, 1.51 s more than episode.longest 7 less"),
         ("plan", {"pull_speed": 0.05}, "raise plan.pull_speed to 0.052, or episode.longest to "),
+        ("plan", {"dips": (dip(depth=0.4),)}, "dip 1 lets the band back by 0.4 m from 0.4 m, and"),
+        ("plan", {"dips": (dip(at=0.5, depth=0.3),)}, "from 0.2 m, and would pass the fork"),
+        ("plan", {"dips": (dip(out_time=0.4),)}, "the let back (plan.dips) reaches 0.5 m/s, 0.1"),
+        (
+            "plan",
+            {"dips": (dip(back_time=15.0),)},
+            "take --pull paper, or shorter plan.dips, or raise",
+        ),
     ],
 )
 def test_what_is_refused_and_how_it_is_said(params, section, values, expected) -> None:
@@ -251,6 +265,55 @@ def test_the_advice_of_a_refusal_is_enough(params) -> None:
     with pytest.raises(UserError, match=r"draw by 0.251 m at least, not 0.200 m"):
         plan_recording(params, "band1", draw=(-0.2, 0.0))
     plan_recording(params, "band1", draw=(-0.252, 0.0))
+
+
+def test_the_advice_with_dips_and_preconditioning_is_enough(params) -> None:
+    """The speed that the line names is that of all draws, and is accepted."""
+    dips = with_(params, "plan", dips=(dip(), dip(at=0.7)))
+    with pytest.raises(UserError, match="take a smaller --precondition, or take --pull") as error:
+        plan_recording(dips, "band1", precondition=2)
+    told = float(str(error.value).split("raise plan.pull_speed to ")[1].split(",")[0])
+    plan_recording(with_(dips, "plan", pull_speed=told), "band1", precondition=2)
+    with pytest.raises(UserError, match="--precondition: at most 10, got 11"):
+        plan_recording(dips, "band1", precondition=11)
+
+
+def test_the_informative_pull_is_the_default(params, tmp_path) -> None:
+    dips = with_(params, "plan", dips=(dip(), dip(at=0.7)))
+    plan, paper = (plan_recording(dips, "band1", pull=pull) for pull in ("informative", "paper"))
+    assert plan_recording(dips, "band1").content() == plan.content()
+    assert paper.content() == {**plan_recording(params, "band1").content(), "pull": "paper"}
+    names = [row["phase"] for row in plan.rows()]
+    assert (names.count("let back"), names.count("redraw"), plan.dips) == (2, 2, 2)
+    assert plan.held_time == pytest.approx(paper.held_time + 4.0, abs=1e-6)
+    assert "informative, with 2 dips" in plan.to_text([])
+    assert "paper, with 0 dips" in paper.to_text([])
+    assert len(plan.write(tmp_path, 100.0)) == 4  # and no design.png
+
+
+def test_a_designed_pull_says_what_it_is_worth(params, tmp_path, monkeypatch) -> None:
+    """Three bands, one dip, little refinement: the real search takes a minute."""
+    from pipeline.identify.posterior import design
+
+    monkeypatch.setattr(design, "DRAWS", 3)
+    monkeypatch.setattr(design, "MOST_DIPS", 1)
+    monkeypatch.setattr(design, "REFINED", 6)
+    told = []
+    plan = plan_recording(params, "band1", pull="designed", told=told.append)
+    assert plan.dips == 1 and told[0].startswith("pull 1: 0 dips, ±")
+    widths = plan.content()["design"]["half_width_m"]
+    assert widths["paper"] == widths["plan.dips"]  # which are none here
+    assert all(a > 1.5 * b for a, b in zip(widths["paper"], widths["designed"], strict=True))
+    text = plan.to_text(plan.write(tmp_path, 100.0))
+    assert (tmp_path / "design.png").stat().st_size > 10_000
+    pasted = "plan:\n" + text[text.index("  dips:") : text.index("\n\nwrote")]
+    (found,) = YAML(typ="safe").load(pasted)["plan"]["dips"]
+    again = plan_recording(with_(params, "plan", dips=(Dip(**found),)), "band1")
+    np.testing.assert_array_equal(again.trajectory.path.c, plan.trajectory.path.c)
+
+    other = {name: one for name, one in params.methods.items() if name != "least_squares"}
+    with pytest.raises(UserError, match="no method has search: least_squares and law: rubber"):
+        plan_recording(params.model_copy(update={"methods": other}), "band1", pull="designed")
 
 
 def test_speed_and_acceleration_of_any_trajectory(params) -> None:

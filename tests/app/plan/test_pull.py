@@ -8,11 +8,14 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from app.plan.pull import SPARE, TICK, catenary_sag, hanging_middle, trajectory_of
+from pipeline.episode.planned import leg_time
+from pipeline.episode.window import LEAD
 from pipeline.params import PlanParams, load
+from pipeline.params.lab import Dip
 from pipeline.recording.pulls import CALM
-from tests.project import DEFAULTS
+from tests.project import DEFAULTS, with_
 
-PARAMS = load(DEFAULTS)
+PARAMS = with_(load(DEFAULTS), "plan", dips=())
 AHEAD = np.array([0.0, 1.0, 0.0])
 
 
@@ -57,10 +60,24 @@ def number(low: float, high: float):
     return st.floats(low, high)
 
 
+def whole(content: dict) -> dict:
+    """With a pull no faster than the hand, and its dips within speed, acceleration and range."""
+    dips, size = [], float(np.linalg.norm(content["draw"]))
+    for at, part, slower in content["dips"]:
+        depth = part * at * size
+        time = slower * leg_time(depth, content["max_speed"], content["max_acceleration"])
+        if depth >= 0.01 and depth <= 1 and 0.05 <= time <= 20:
+            dips.append({"at": at, "depth": depth, "out_time": time, "back_time": time})
+    return {**content, "dips": dips, "pull_speed": min(content["pull_speed"], content["max_speed"])}
+
+
 PLANS = st.fixed_dictionaries(
     {
         "draw": st.lists(number(-2, -0.05), min_size=1, max_size=1).flatmap(
             lambda y: number(-2, 1).map(lambda z: [y[0], z])
+        ),
+        "dips": st.lists(
+            st.tuples(number(0.1, 1) | st.just(1.0), number(0.05, 0.95), number(1, 5)), max_size=3
         ),
         "max_speed": number(0.005, 3),
         "pull_speed": number(0.005, 3),
@@ -77,7 +94,7 @@ PLANS = st.fixed_dictionaries(
         "orientation": st.none(),
         "frame": st.just("base"),
     }
-).map(lambda one: {**one, "pull_speed": min(one["pull_speed"], one["max_speed"])})
+).map(whole)
 
 
 @settings(deadline=None, max_examples=100)
@@ -86,25 +103,30 @@ PLANS = st.fixed_dictionaries(
     pulls=st.integers(1, 3),
     duration=number(1, 120),
     share=number(0.01, 0.9),
+    precondition=st.integers(0, 2),
 )
 def test_each_of_several_pulls_is_the_first_again_and_finds_the_band_calm(
-    content, pulls, duration, share
+    content, pulls, duration, share, precondition
 ) -> None:
     """What the next pull's window shows begins when the last swing is over."""
     plan = PlanParams.model_validate(content)
     episode = PARAMS.episode.model_copy(update={"duration": duration, "tail": share * duration})
     rest = PARAMS.setup, episode, PARAMS.bands["band1"], AHEAD
-    one, way = trajectory_of(plan, *rest), trajectory_of(plan, *rest, pulls)
+    one, way = (trajectory_of(plan, *rest, count, precondition) for count in (1, pulls))
     np.testing.assert_array_equal(way.times[: len(one.times)], one.times)
-    starts = dict.fromkeys(("lead-in", "grasp", "pull", "release"), ())
+    starts = dict.fromkeys(("lead-in", "grasp", "pause", "release"), ())
     for phase, start in zip(way.phases, way.times, strict=False):
         if phase.name in starts:
             starts[phase.name] += (start,)
     assert {len(times) for times in starts.values()} == {pulls}
-    lead, grasp, pull, release = map(np.array, starts.values())
-    for times in (grasp, pull):
-        np.testing.assert_allclose(release - times, release[0] - times[0], atol=1e-6)
+    lead, grasp, pause, release = map(np.array, starts.values())
+    np.testing.assert_allclose(release - pause, release[0] - pause[0], atol=1e-6)
+    held = (release - grasp)[1:]
+    stretched = one.until("release")
+    first = release[0] - grasp[0] - stretched["stretch"] - stretched["slacken"]
+    np.testing.assert_allclose(held, first, atol=1e-6)
     calm = release[1:] + episode.tail - episode.duration - release[:-1]
+    calm = np.minimum(calm, grasp[1:] - LEAD - release[:-1])
     assert np.all(calm >= CALM - TICK) and np.all(lead[1:] + plan.lead_in <= grasp[1:] + TICK)
     for begin in lead:
         np.testing.assert_allclose(way.position(begin), way.position(0.0), atol=1e-9)
@@ -118,9 +140,10 @@ def test_any_plan_rests_in_time_and_within_its_limits(content, angle, duration, 
     axis = np.array([0.0, np.cos(angle), np.sin(angle)])
     way = trajectory_of(plan, PARAMS.setup, episode, PARAMS.bands["band1"], axis)
     names = [phase.name for phase in way.phases]
-    speeds = dict(zip(names, way.peaks(1), strict=True))
-    assert speeds.pop("pull") <= plan.pull_speed * (1 + 1e-6)
-    assert max(speeds.values()) <= plan.max_speed * (1 + 1e-6)
+    pulling = np.array([name == "pull" for name in names])
+    speeds = way.peaks(1)
+    assert speeds[pulling].max() <= plan.pull_speed * (1 + 1e-6)
+    assert speeds[~pulling].max() <= plan.max_speed * (1 + 1e-6)
     assert way.peaks(2).max() <= plan.max_acceleration * (1 + 1e-6)
     ticks = way.times / TICK
     np.testing.assert_allclose(ticks, np.round(ticks), atol=1e-6)
@@ -135,3 +158,44 @@ def test_any_plan_rests_in_time_and_within_its_limits(content, angle, duration, 
     held = way.opening(np.linspace(grasp + plan.finger_time + TICK, release, 9))
     np.testing.assert_allclose(held, 0.0, atol=1e-9)
     assert way.opening(0.0) == way.opening(way.duration) == 0.08
+
+
+def test_a_dip_lets_the_band_back_and_draws_it_again() -> None:
+    """One on the way and one at the draw; the parts of the pull keep to its speed."""
+    halfway = Dip(at=0.5, depth=0.05, out_time=0.4, back_time=0.6)
+    deep = Dip(at=1.0, depth=0.3, out_time=2.0, back_time=3.0)
+    settings = PARAMS.plan.model_copy(update={"dips": (deep, halfway)})
+    rest = PARAMS.setup, PARAMS.episode, PARAMS.bands["band1"], AHEAD
+    way = trajectory_of(settings, *rest)
+    names = [phase.name for phase in way.phases]
+    first = names.index("pull")
+    assert names[first : first + 7] == [
+        "pull", "let back", "redraw", "pull", "let back", "redraw", "pause",
+    ]  # fmt: skip
+    times = way.times[first : first + 7]
+    np.testing.assert_allclose(np.diff(times), [2.0, 0.4, 0.6, 2.0, 2.0, 3.0], atol=1e-9)
+    reached = [0, -0.2, -0.15, -0.2, -0.4, -0.1, -0.4]
+    np.testing.assert_allclose(way.position(times)[:, 1], reached, atol=1e-12)
+    np.testing.assert_allclose(way.position(times, 1), 0, atol=1e-12)
+    assert set(way.openings[first : first + 8]) == {PARAMS.plan.gripper.closed}
+
+
+def test_preconditioning_is_full_pulls_of_the_first_grasp() -> None:
+    rest = PARAMS.setup, PARAMS.episode, PARAMS.bands["band1"], AHEAD
+    plain = trajectory_of(PARAMS.plan, *rest)
+    way = trajectory_of(PARAMS.plan, *rest, 2, 3)
+    names = [phase.name for phase in way.phases]
+    assert names[:11] == [
+        "lead-in",
+        "approach",
+        "grasp",
+        "lift",
+        *3 * ["stretch", "slacken"],
+        "pull",
+    ]
+    assert names.count("stretch") == 3
+    ends = np.array([phase.to for phase in way.phases[3:10]])
+    np.testing.assert_allclose(ends[:, 1], [0, -0.4, 0, -0.4, 0, -0.4, 0], atol=1e-12)
+    assert set(way.openings[3:11]) == {PARAMS.plan.gripper.closed}
+    after = [phase.name for phase in plain.phases[4:]]
+    assert names[10 : 10 + len(after)] == after

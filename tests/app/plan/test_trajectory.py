@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from app.plan.trajectory import Phase, Trajectory, leg_time
+from app.plan.trajectory import Phase, Trajectory
+from pipeline.episode.planned import leg_time
 
 COORDINATE = st.floats(-1, 1).map(lambda x: round(x, 4))
 POINT = st.tuples(COORDINATE, COORDINATE, COORDINATE).map(np.array)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from pipeline.base.errors import UserError
@@ -28,7 +30,7 @@ def launch_history(episode: Episode) -> dict[str, float]:
             f"episode of {episode.band}: the hand lets go at the fork, so that no pull tells what"
             " the law rubber remembers; take neo_hookean, or a recording of a pull"
         )
-    deepest = float(np.linalg.norm(place[time >= episode.grasp_time], axis=1).max())
+    deepest = deepest_draw([episode])
     way = place @ place[-1] / (place[-1] @ place[-1])
     first = float(max([*time[way < EDGES[0]], time[0]]))
     since = time > first
@@ -55,3 +57,12 @@ def _from_fork(first: float, time: np.ndarray, way: np.ndarray, bends: list[int]
             lost += time[until] - time[top]
     late = time[arrived - 1] if arrived else first
     return float(np.clip((late - first - lost) / (PARTS[1] - PARTS[0]), 0.01, 1000))
+
+
+def deepest_draw(episodes: Iterable[Episode]) -> float:
+    """How far from the fork hands held a band at most [m]."""
+    held = [
+        one.position[(one.time >= one.grasp_time) & (one.time <= one.release_time)]
+        for one in episodes
+    ]
+    return float(np.linalg.norm(np.concatenate(held), axis=1).max())

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from pipeline.recording.checks.finding import Check, Finding
 from pipeline.recording.checks.rates import topics
+from pipeline.recording.input.clocks import DRIFTED, SURE
 from pipeline.recording.processed import Processed
 from pipeline.recording.release_pictures import EMPTY_AFTER, ReleasePictures
 
-SURE = 3.0  # standard errors from which something is more than noise
 DELAY = OPEN = 0.002  # s
-DRIFTED = 0.003  # s over the recording
 AHEAD = 0.01  # s of stamps before the force's, by the times of receipt
 BEHIND, SLOW = 0.02, {"color": 0.1, "depth": 0.1, "gripper": 0.1}  # s after; pictures take a while
 
@@ -77,8 +74,8 @@ SMEARED = Check(
 DRIFT = Check(
     "clock_drift",
     "the growth of log_time less stamp with the force's, over the recording",
-    "scatter of each second's least delay",
-    f"{1e3 * DRIFTED:g} ms, and {SURE:g} standard errors",
+    "scatter of each second's least delay; messages that pile up all along look like a slow clock",
+    f"{1e3 * DRIFTED:g} ms over the recording, and {SURE:g} standard errors",
     "",
     "stamp all topics by one clock (chrony or PTP between computers), and record again",
 )
@@ -93,17 +90,7 @@ def findings(done: Processed) -> Iterator[Finding]:
             what = f"the stamps of {stream.topic} are {offset:+.3f} s off the force's, judged"
             yield Finding(CLOCK.name, f"{what} by the times of receipt", CLOCK.remedy)
     yield from of_drift(done)
-    for role, delay in (("pose", done.delays.pose), ("camera", done.delays.camera)):
-        error = delay.error or 0.0
-        value = delay.value if delay.error is not None else 0.0
-        if delay.source != "setup" and abs(value) > max(DELAY, SURE * error):
-            taken = "taken out" if delay.applied else "not taken out"
-            yield Finding(
-                DELAYED.name,
-                f"the stamps of the {role} are {1e3 * value:+.1f} ± {1e3 * error:.1f} ms late"
-                f" against the force's, which is {taken}",
-                f"mend them at their driver, or set episode.delays.{role} in params.yaml",
-            )
+    yield from of_delays(done)
     pose = done.delays.pose
     if (pose.left or 0.0) > OPEN:
         yield Finding(
@@ -118,20 +105,39 @@ def findings(done: Processed) -> Iterator[Finding]:
         yield from of_release(done.delays.release)
 
 
+def of_delays(done: Processed) -> Iterator[Finding]:
+    """Of pose and camera, beside what was given of them."""
+    for role, delay in (("pose", done.delays.pose), ("camera", done.delays.camera)):
+        error, late = delay.error or 0.0, delay.value - (delay.given or 0.0)
+        if abs(late) <= max(DELAY, SURE * error):
+            continue
+        what = (
+            f"the stamps of the {role} are {1e3 * late:+.1f} ± {1e3 * error:.1f} ms late against"
+            " the force's"
+        )
+        cure = f"mend them at their driver, or set episode.delays.{role} in params.yaml"
+        if delay.given is not None:
+            what += f" beside the {delay.given:g} s that episode.delays.{role} says"
+            cure = f"set it to {delay.value:.4f}, or to null"
+        what += f", which is {'taken out' if delay.applied else 'not taken out'}"
+        if delay.alone:
+            what += "; only the hand that starts back shows it, as a robot's own motion would"
+            cure = f"set episode.delays.{role} to what it is (0 where it is the robot's own motion)"
+        yield Finding(DELAYED.name, what, cure)
+
+
 def of_drift(done: Processed) -> Iterator[Finding]:
     """Of the clocks' rates, by the times of receipt."""
-    force = done.pull.recording.wrench
-    span = (int(force.stamp[-1]) - int(force.stamp[0])) * 1e-9
     for stream, _ in topics(done):
-        rate = force.drift[0] - stream.drift[0]
-        error = np.hypot(force.drift[1], stream.drift[1])
-        if np.isfinite(error) and abs(rate) * span > max(DRIFTED, SURE * error * span):
-            yield Finding(
-                DRIFT.name,
-                f"the clock of {stream.topic} runs {1e6 * rate:+.0f} ± {1e6 * error:.0f} ppm"
-                f" against the force's, {1e3 * rate * span:+.1f} ms over the recording",
-                DRIFT.remedy,
+        drift = stream.drift
+        if drift.matters:
+            taken = "taken out" if drift.taken_out else "not known well enough to be taken out"
+            rate = f"{1e6 * drift.rate:+.0f} ± {1e6 * drift.error:.0f} ppm"
+            what = (
+                f"the clock of {stream.topic} runs {rate} against the force's,"
+                f" {1e3 * drift.rate * drift.span:+.1f} ms over the recording, which is {taken}"
             )
+            yield Finding(DRIFT.name, what, DRIFT.remedy)
 
 
 def of_release(seen: ReleasePictures) -> Iterator[Finding]:

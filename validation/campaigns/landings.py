@@ -62,12 +62,12 @@ SETS = {
 }
 
 
-def jobs(name: str) -> list[OneRecording]:
-    """Recordings of a set, the first ones of all bands first; worn bands are recorded once."""
+def jobs(name: str, most: int = TEN) -> list[OneRecording]:
+    """At most so many recordings of each band of a set, worn ones once, by their number."""
     seed, bands, count, states = SETS[name]
     return [
         OneRecording(seed, band, pull, worn, number)
-        for number in range(count)
+        for number in range(min(count, most))
         for worn in states
         for pull in PULLS
         for band in bands
@@ -152,10 +152,10 @@ def main() -> int:
     parser.add_argument("--work", type=Path, default=Path(".checkpoints/landings"))
     parser.add_argument("--workers", type=int, default=cores())
     parser.add_argument("--minutes", type=float, default=1e4, help="then it ends; again: goes on")
-    parser.add_argument("--only", type=int, default=None, help="so many jobs, to try it")
+    parser.add_argument("--recordings", type=int, default=TEN, help="of each band, at most")
     arguments = parser.parse_args()
     work = arguments.work.resolve() / arguments.set
-    results, todo = ResultLines(work / "results.jsonl"), jobs(arguments.set)[: arguments.only]
+    results, todo = ResultLines(work / "results.jsonl"), jobs(arguments.set, arguments.recordings)
     runner.run(partial(performed, work=work), todo, results, arguments.workers, arguments.minutes)
     done = results.of(OneRecording)
     lines = [done[job] for job in todo if job in done]

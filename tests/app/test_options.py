@@ -88,6 +88,8 @@ CASES = {
     "plan --draw": (PLAN, f"{PLAN} --draw=-0.30,-0.1"),
     "plan --theta": (PLAN, f"{PLAN} --theta none.json"),
     "plan --recording": (PLAN, f"{PLAN} --recording none.mcap"),
+    "plan --pull": (PLAN, f"{PLAN} --pull paper"),
+    "plan --precondition": (PLAN, f"{PLAN} --precondition 1"),
     "plan --pulls": (PLAN, f"{PLAN} --pulls 2"),
     "plan --out": (PLAN, f"{PLAN} --out there"),
     "plan --rate": (PLAN, f"{PLAN} --rate 50"),

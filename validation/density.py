@@ -80,7 +80,7 @@ def found(
     box = SearchBox.of_method(params, method)
     loss = EpisodeLoss.of(params, method, episodes[0], sling)
     evaluate = Evaluator(episodes[0], sling, loss, box, workers=WORKERS, devices=devices)
-    history = posterior.recorded_history(sling, episodes[0])
+    history = posterior.recorded_history(sling, episodes)
     setup = LaunchSetup.of(params.setup, params.sling, history)
     evidence = Evidence(observed, setup)
     identified = identify(

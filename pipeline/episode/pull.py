@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from pipeline.base.errors import UserError
@@ -30,5 +32,14 @@ def launch_history(episode: Episode) -> dict[str, float]:
     first, last = (max([*time[way < edge], time[0]]) for edge in EDGES)
     pull_time = np.clip((last - first) / (PARTS[1] - PARTS[0]), 0.01, 1000)
     pause = np.clip(episode.release_time - last - (1 - PARTS[1]) * pull_time, 0, 1e5)
-    deepest = float(np.linalg.norm(place[time >= episode.grasp_time], axis=1).max())
+    deepest = deepest_draw([episode])
     return {"pull_time": float(pull_time), "pause": float(pause), "deepest": deepest}
+
+
+def deepest_draw(episodes: Iterable[Episode]) -> float:
+    """How far from the fork hands held a band at most [m]."""
+    held = [
+        one.position[(one.time >= one.grasp_time) & (one.time <= one.release_time)]
+        for one in episodes
+    ]
+    return float(np.linalg.norm(np.concatenate(held), axis=1).max())

@@ -111,8 +111,8 @@ def launch(
     distance = np.linalg.norm(draws, axis=1, keepdims=True)
     direction = np.column_stack([np.zeros(count), -draws / np.maximum(distance, 1e-9)])
     if setup.history is not None:
-        before = max(band.stretched, float(band.drawn(np.array(setup.history.deepest))))
-        band = replace(band, stretched=before)
+        before = band.drawn(np.array(setup.history.deepest))
+        band = replace(band, stretched=np.maximum(band.stretched, before))
     slings = Slings.of(
         band, parameters, drawn_guess(band, draws), direction=direction,
         payload=setup.projectile_mass, unrelaxed=unrelaxed(band, setup.history, parameters, draws),

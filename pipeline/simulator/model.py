@@ -34,6 +34,12 @@ class BandSizes(Protocol):
     def preconditioned(self) -> float | bool: ...
 
 
+def first_draw(band: BandSizes) -> float:
+    """Largest draw of a band before it was recorded [m], 0 of a new one."""
+    before = band.preconditioned
+    return FAR * before if isinstance(before, bool) else before
+
+
 class ClampValues(Protocol):
     """How a band leaves its clamps, a unit vector, and its flexural rigidity [N m^2]."""
 
@@ -48,12 +54,13 @@ class LaunchHistory:
     Attributes:
         pull_time: That the way takes, a cubic in time [s].
         pause: From there to the release [s].
-        deepest: Largest draw that the band has seen before, which softened it [m].
+        deepest: Largest draw that the band has seen before, which softened it [m]; one, or one of
+            each launch, shape (N,).
     """
 
     pull_time: float
     pause: float
-    deepest: float = 0.0
+    deepest: float | np.ndarray = 0.0
 
 
 @dataclass(frozen=True)
@@ -115,7 +122,8 @@ class ClampedBand:
         air_density: For the drag of a cylinder across the wind [kg/m^3], which tetrahedra do not
             feel.
         law: NEO_HOOKEAN, or RUBBER (rubber.h), which the rod alone knows.
-        stretched: Largest stretch that the band has seen before, which softened it.
+        stretched: Largest stretch that the band has seen before, which softened it; one, or one of
+            each in a batch, shape (N,).
         mesh: ROD, or TETRAHEDRA: a solid cylinder, whose edges are equally long. What of the band
             is inside the clamps does not deform there, so that the mesh ends at them.
     """
@@ -135,7 +143,7 @@ class ClampedBand:
     mesh: str = ROD
     air_density: float = 0.0
     law: str = NEO_HOOKEAN
-    stretched: float = 1.0
+    stretched: float | np.ndarray = 1.0
 
     @classmethod
     def of(
@@ -176,9 +184,7 @@ class ClampedBand:
             mesh=mesh,
             law=law,
         )
-        before = band.preconditioned
-        drawn = FAR * before if isinstance(before, bool) else before
-        return replace(made, stretched=float(made.drawn(np.array(drawn))))
+        return replace(made, stretched=float(made.drawn(np.array(first_draw(band)))))
 
     def drawn(self, distance: np.ndarray) -> np.ndarray:
         """Stretch (...) of straight halves that are drawn so far from the fork [m], 1 if slack."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.episode.episode import Episode
-from pipeline.episode.pull import launch_history
+from pipeline.episode.pull import deepest_draw, launch_history
 from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.posterior.coordinates import Coordinates
 from pipeline.identify.posterior.draws import truncated_gaussian
@@ -87,7 +87,8 @@ def fit_posterior(
         method: Of params.yaml, one that searches by least squares.
         episodes: Of the band's recordings, at least one.
         start: One sample: the nearest that an exploration found.
-        evidence: Launches, drawn as the first recording was.
+        evidence: Launches, drawn as the first recording was, one after the other, after all
+            recordings.
 
     Raises:
         NoFit: Simulations fail at the start.
@@ -99,7 +100,7 @@ def fit_posterior(
     coordinates = Coordinates.of_method(params, method, sling)
     launches = None
     if evidence and evidence.launches:
-        setup = replace(evidence.setup, history=recorded_history(sling, episodes[0]))
+        setup = replace(evidence.setup, history=recorded_history(sling, episodes))
         launches = LaunchLikelihood(evidence.launches, sling, setup)
     known = {"launches": launches, "workers": workers, "progress": progress}
     begin = coordinates.of(start)
@@ -125,9 +126,15 @@ def fit_posterior(
     return Identified(coordinates, found, birge, samples, recordings, launches)
 
 
-def recorded_history(sling: ClampedBand, episode: Episode) -> LaunchHistory | None:
-    """What a band remembers that is launched as it was recorded; None for a law without memory."""
-    return LaunchHistory(**launch_history(episode)) if sling.law == RUBBER else None
+def recorded_history(sling: ClampedBand, episodes: Sequence[Episode]) -> LaunchHistory | None:
+    """What a band remembers that is launched as it was first recorded, after all recordings.
+
+    None for a law without memory.
+    """
+    if sling.law != RUBBER:
+        return None
+    own = launch_history(episodes[0])
+    return LaunchHistory(own["pull_time"], own["pause"], deepest_draw(episodes))
 
 
 def disagreement(found: Fit) -> float:
@@ -148,9 +155,12 @@ def disagreement(found: Fit) -> float:
 
 
 def theta_entries(found: Identified) -> dict:
-    """What a θ file holds of the mode."""
-    recording = found.recordings[0]
-    return content_of(found.mode, recorded_history(recording.sling, recording.episode))
+    """What a θ file holds of the mode: of the band after its recordings and launches."""
+    episodes = [one.episode for one in found.recordings]
+    history = recorded_history(found.recordings[0].sling, episodes)
+    if history and found.launches:
+        history = replace(history, deepest=found.launches.after)
+    return content_of(found.mode, history)
 
 
 def confidence(found: Identified, boxes: ParameterBoxes) -> dict:

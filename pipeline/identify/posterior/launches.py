@@ -10,7 +10,7 @@ the returned share, a coordinate of the density.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -58,7 +58,10 @@ class LaunchLikelihood:
     """Launches of one band.
 
     Attributes:
-        setup: With the history that the launches had.
+        setup: With the history that the first launch had.
+        deepest: What the band had seen before each launch [m], of a law with memory, shape (N,): as
+            the history says, or an earlier launch. Rubber softens up to its largest stretch.
+        after: The same after all of them.
         left: Of each, log of measured over simulated landing at the last expansion; NaN where the
             simulated launch fails, which then counts for nothing.
         gap, design: Of each, `left` and its change with the D coordinates, shape (D, N), both in
@@ -72,6 +75,9 @@ class LaunchLikelihood:
         self.draws = np.array([one.draw for one in observed], float).reshape(-1, 2)
         self.errors = np.array([one.error for one in observed], float)
         self.landings = np.array([one.landing for one in observed], float)
+        first = setup.history.deepest if setup.history else 0.0
+        seen = np.maximum.accumulate(np.append(first, np.linalg.norm(self.draws, axis=1)))
+        self.deepest, self.after = seen[:-1], float(seen[-1])
         self.left = np.full(len(self.draws), np.nan)
         self.gap, self.design = self.left, np.zeros((0, len(self.draws)))
 
@@ -80,14 +86,19 @@ class LaunchLikelihood:
     ) -> tuple[float, np.ndarray, np.ndarray]:
         """Misfit, Hessian (D, D) and gradient (D,) at coordinates (D,), as of an `Expansion`."""
         around = parameters_of(phi + np.vstack([0 * steps, np.diag(steps)]))
+        number = np.arange(len(self.draws))
         here, gradient = landing_gradient(
-            lambda draws: self._simulated(around[:1], draws), self.draws
+            lambda draws: self._simulated(
+                around[:1], draws, number.repeat(len(draws) // len(number))
+            ),
+            self.draws,
         )
         slope = np.linalg.norm(gradient, axis=1)
         count = len(steps)
         moved = self._simulated(
             around[np.repeat(1 + np.arange(count), len(self.draws))],
             np.tile(self.draws, (count, 1)),
+            np.tile(number, count),
         ).reshape(count, -1)
         self.left = np.log(self.landings / here)
         changes = (np.log(moved) - np.log(here)) / steps[:, None]  # (D, N)
@@ -97,9 +108,18 @@ class LaunchLikelihood:
         gap, design = self.gap[good], self.design[:, good]
         return float(gap @ gap), design @ design.T, design @ gap
 
-    def _simulated(self, parameters: Parameters, draws: np.ndarray) -> np.ndarray:
-        """Landings [m] of N parameters from draws (N, 2), NaN where a launch fails."""
-        done = launch(self.sling, self.setup, parameters, draws, workers=2)
+    def _simulated(
+        self, parameters: Parameters, draws: np.ndarray, number: np.ndarray
+    ) -> np.ndarray:
+        """Landings [m] of N parameters from draws (N, 2), NaN where a launch fails.
+
+        Args:
+            number: Of the launch whose history each has, shape (N,).
+        """
+        setup, history = self.setup, self.setup.history
+        if history:
+            setup = replace(setup, history=replace(history, deepest=self.deepest[number]))
+        done = launch(self.sling, setup, parameters, draws, workers=2)
         failed = np.array([why is not None for why in done.failure])
         return np.where(failed, np.nan, done.landing_y)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +13,17 @@ from app.flow import child
 from app.flow.disk import expect_ready
 from app.launch import expect_above_floor, interval_90
 from app.safety import Hazard
+from app.stretched import further
 from pipeline.base.errors import UserError
-from pipeline.base.layout import Layout
+from pipeline.base.layout import Layout, NotMade
+from pipeline.episode.episode import Episode
+from pipeline.episode.pull import deepest_draw
 from pipeline.identify.results.theta import load_samples, load_theta, parameters_of
 from pipeline.launching.surface.simulator import simulator
 from pipeline.launching.trials.spread import LEVEL
 from pipeline.params import Params, expect_known
 from pipeline.params.identification import LEAST_SQUARES
+from pipeline.simulator.rubber import RUBBER
 from stages.start import stage_of
 
 
@@ -62,6 +66,8 @@ def observe(
     answer["measured_m"] = landing
     answer["before"] = known(params, band, method, draw, layout.root, error)
     doubts = list(doubted(answer["before"], landing, answer["file"]))
+    earlier = evidence.read(layout.evidence / f"{band}.csv")[:-1]
+    doubts += softened(params, band, method, draw, layout, [one[:2] for one in earlier])
     safety.tell(doubts)
     ran = _run(stage, layout)
     answer["after"] = known(params, band, method, draw, layout.root, error) if ran else None
@@ -126,6 +132,33 @@ def doubted(before: dict | None, landing: float, file: str) -> Iterator[Hazard]:
             f"{landing:g} m lies outside the predicted interval, {low:.3f} to {high:.3f} m: if draw"
             f" or landing was mistaken, take its row out of {file}",
         )
+
+
+def softened(
+    params: Params,
+    band: str,
+    method: str,
+    draw: tuple[float, float],
+    layout: Layout,
+    launches: Sequence[tuple[float, float]],
+) -> Iterator[Hazard]:
+    """A draw (y, z) [m] further than the recordings' and those of `launches` before it."""
+    try:
+        recorded = deepest_draw(Episode.load_all(layout.episodes(band)))
+    except NotMade:
+        return
+    before = max([recorded, *(float(np.hypot(*one)) for one in launches)])
+    if not further(params.bands[band], params.setup, before, float(np.hypot(*draw))):
+        return
+    about = params.methods[method]
+    told = "the launches after it count as of the softened band"
+    if about.law != RUBBER or about.fixed.get("softening") == 0:
+        told = f"{method} leaves that out, a new recording and `sling drift` tell by how much"
+    yield Hazard(
+        "stretch",
+        f"this launch drew {band} to {np.hypot(*draw):.3f} m, {before:.3f} m was the most before:"
+        f" rubber softens up to its largest stretch; {told}",
+    )
 
 
 def known(

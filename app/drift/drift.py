@@ -12,6 +12,7 @@ from app.drift.picture import over_time
 from app.drift.recordings import COMPARED, IdentifiedRecording, identified, in_time
 from app.flow.disk import expect_writable
 from app.sizes import DIAMETER, REST_LENGTH
+from app.stretched import further
 from pipeline.base.environment import environment
 from pipeline.base.errors import UserError
 from pipeline.base.files import write_json
@@ -54,7 +55,7 @@ def drift(settings: Settings, band: str, root: Path | str = ".") -> dict:
         )
     expect_writable(written, written.with_suffix(".png"))
     about, sizes = environment("cpu", f"sling drift {band}"), settings.bands[band]
-    own = Band(sizes.mass, sizes.diameter, sizes.rest_length, band)
+    own = Band(sizes.mass, sizes.diameter, sizes.rest_length, band, sizes.preconditioned)
     found = identified(files, own, settings, about["code"], written)
     dated = in_time(found)
     found = dated or found
@@ -69,9 +70,12 @@ def drift(settings: Settings, band: str, root: Path | str = ".") -> dict:
         replace(one, earlier=settled[one.earlier], later=settled[one.later])
         for one in changes(values)
     ]
-    new = newest(changed)
-    verdict = [_changed(band, one, found, bool(dated)) for one in _first(changed)] or [SAME]
+    deeper = _stretched_further(own, settings, found)
+    new = max([newest(changed), *deeper])
     fresh = [layout.raw(band) / one.file for one in found[new:] if one.settled]
+    verdict = [_changed(band, one, found, bool(dated)) for one in _first(changed)]
+    verdict += [_softened(band, found, number, before) for number, before in deeper.items()]
+    verdict = verdict or [SAME]
     content = about | {
         "band": band,
         "method": METHOD,
@@ -82,10 +86,12 @@ def drift(settings: Settings, band: str, root: Path | str = ".") -> dict:
         ],
         "false_alarm": FALSE_ALARM,
         "changes": [asdict(one) for one in changed],
+        "stretched_further": [{"later": i, "before_m": before} for i, before in deeper.items()],
         "verdict": verdict,
-        "next": anew(own, fresh) if changed else None,
+        "next": anew(own, fresh) if new and fresh else None,
     }
     titles = [f"{QUANTITIES[one.quantity].symbol} {_percent(one)}" for one in _first(changed)]
+    titles += ["stretched further"] * bool(deeper)
     title = f"{band}: {', '.join(titles or [SAME])}"
     over_time(written.with_suffix(".png"), found, bool(dated), changed, new, title)
     write_json(written, content)
@@ -111,6 +117,26 @@ def _changed(
         f"{quantity.symbol} of {band} changed: {_interval(one, name)} {quantity.unit} {before},"
         f" {_interval(other, name)} {after}: {_percent(change)};"
         f" it {BECAME[name][change.ratio > 1]}"
+    )
+
+
+def _stretched_further(
+    band: Band, settings: Settings, found: Sequence[IdentifiedRecording]
+) -> dict[int, float]:
+    """Numbers of recordings that stretch a band further than all before, and those' draw [m]."""
+    result, before = {}, found[0].deepest
+    for number, one in enumerate(found):
+        if number and further(band, settings.setup, before, one.deepest):
+            result[number] = before
+        before = max(before, one.deepest)
+    return result
+
+
+def _softened(band: str, found: Sequence[IdentifiedRecording], number: int, before: float) -> str:
+    one = found[number]
+    return (
+        f"{one.file} draws {band} to {one.deepest:.3f} m, recordings before it to {before:.3f} m at"
+        f" most: rubber softens up to its largest stretch, so take {band} as changed"
     )
 
 

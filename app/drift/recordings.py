@@ -14,6 +14,7 @@ from app.drift.change import ValueOfRecording
 from pipeline.base.fingerprint import fingerprint
 from pipeline.base.layout import NotMade
 from pipeline.base.schema import JsonRecord, read_json
+from pipeline.episode.pull import deepest_draw
 from pipeline.recording.input.bag import sha256
 from sling2sim2real.episodes import read_mcap
 from sling2sim2real.identification import Identification, identify
@@ -34,6 +35,7 @@ class IdentifiedRecording(JsonRecord):
         begin, end: Of its pulls' windows, by its own stamps [ns].
         pulls: That could be used.
         settled: Whether the fit has converged.
+        deepest: How far it draws the band [m].
         values: Of COMPARED, by name.
     """
 
@@ -43,6 +45,7 @@ class IdentifiedRecording(JsonRecord):
     end: int
     pulls: int
     settled: bool
+    deepest: float
     values: dict[str, ValueOfRecording]
 
     @property
@@ -95,6 +98,7 @@ def _alone(file: Path, key: str, band: Band, settings: Settings) -> IdentifiedRe
         end=begins[-1] + int(1e9 * episodes[-1].sample_period * len(episodes[-1].time)),
         pulls=len(episodes),
         settled=found.settled,
+        deepest=deepest_draw(episodes),
         values=values_of(found),
     )
 

@@ -3,6 +3,7 @@
 import json
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from app import cli, observe
@@ -134,6 +135,38 @@ def test_a_launch_that_fails_in_simulation_is_told(put, monkeypatch, capsys) -> 
     (warning,) = put.run()["warnings"]
     assert warning["about"] == "failure" and "counts for nothing" in warning["what"]
     assert capsys.readouterr().err == f"warning: {warning['what']}\n"
+
+
+def test_a_draw_deeper_than_any_before_is_told_once(put, params, monkeypatch, capsys) -> None:
+    """Recorded to 0.35 m; then launches in the order of the table; 2 mm are no news."""
+    place = np.array([[0.0, -0.1, 0.0], [0.0, -0.35, 0.0]])
+    episode = SimpleNamespace(time=np.arange(2.0), position=place, grasp_time=0.0, release_time=1.0)
+    monkeypatch.setattr(observe.Episode, "load_all", lambda folder: [episode])
+    draws = (-0.30, 0), (-0.352, 0), (-0.40, 0), (-0.38, 0), (-0.402, 0), (-0.45, 0)
+    told = [put.run(draw, 2.0 + i, run=False)["warnings"] for i, draw in enumerate(draws)]
+    assert [len(one) for one in told] == [0, 0, 1, 0, 0, 1]
+    first, second = (one[0]["what"] for one in told if one)
+    assert "drew band1 to 0.400 m, 0.352 m was the most before" in first
+    assert "least_squares leaves that out" in first and "0.402 m was the most" in second
+    assert capsys.readouterr().err == f"warning: {first}\nwarning: {second}\n"
+
+    bands = params.bands | {
+        "band1": params.bands["band1"].model_copy(update={"preconditioned": True})
+    }
+    known = params.model_copy(update={"bands": bands})
+    softens = known.methods["least_squares"].model_copy(update={"fixed": {}})
+    for whole, draw, words in (
+        (known, (-0.6, 0.0), None),
+        (with_method(params, softens), (-0.7, 0.0), "count as of the softened band"),
+    ):
+        answer = observe.observe(
+            whole, "band1", "least_squares", draw, 3.0, run=False, again=True, root=put.layout.root
+        )
+        assert [words in one["what"] for one in answer["warnings"]] == ([True] if words else [])
+
+
+def with_method(params, method):
+    return params.model_copy(update={"methods": params.methods | {"least_squares": method}})
 
 
 def test_what_is_said_before_and_after() -> None:

@@ -74,6 +74,18 @@ def test_softening_takes_from_what_was_stretched(rubber, launch_setup):
     np.testing.assert_array_equal(none.landing_y, plain.landing_y)
 
 
+def test_each_launch_of_a_batch_has_what_its_band_had_seen(rubber, launch_setup):
+    def launched(deepest, softening: float = 0.4):
+        setup = replace(launch_setup, history=LaunchHistory(2.0, 1.0, deepest))
+        return launch(rubber, setup, gum(softening=softening), [DRAW] * np.size(deepest)).landing_y
+
+    seen = np.array([0.30, 0.30, 0.42, 0.55])
+    together = launched(seen)
+    np.testing.assert_array_equal(together, [launched(float(one))[0] for one in seen])
+    assert together[0] > 1.01 * together[2] > 1.01 * together[3]
+    np.testing.assert_array_equal(launched(seen, 0.0), launched(0.30, 0.0)[0])
+
+
 def test_every_theta_may_have_its_own_parameters(rubber, launch_setup):
     own = {
         "mooney_share": np.array([0.0, 0.5, -0.2]),

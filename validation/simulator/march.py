@@ -14,6 +14,21 @@ SMALL = 1e-30  # imaginary step: derivatives without cancellation
 
 
 @dataclass(frozen=True)
+class Driven:
+    """Nodes that hands lead, and how all begin.
+
+    Attributes:
+        nodes: Their numbers, shape (n,).
+        places: At the end of each step [m], shape (S, n, 3).
+        rates: Of all sections at the start, shape (L, 9).
+    """
+
+    nodes: np.ndarray
+    places: np.ndarray
+    rates: np.ndarray
+
+
+@dataclass(frozen=True)
 class March:
     """States x and rates v after each step, shape (S, L, 9), the force on the hand (S, 3), and
     what the branches of the law `rubber` carry (S, E, 8) [Pa].
@@ -33,23 +48,28 @@ def march(
     friction: float = np.inf,
     direction=(0, 0, 0),
     unrelaxed=np.zeros(len(TIMES)),  # noqa: B008 (nobody writes it)
+    driven: Driven | None = None,
+    exact: float = 1e-11,
 ) -> March:
-    """Step `start` (L, 9), at rest, through a schedule's records (S,).
+    """Step `start` (L, 9), at rest where nothing is `driven`, through a schedule's records (S,).
 
     Args:
         friction: 2 times the coefficient of friction: with the normal force what two pads can hold.
         direction: Of the pull that opening pads resist, until a held step says, shape (3,).
         unrelaxed: What share of a stress at rest the branches carry besides, shape (8,).
+        exact: Newton's change below which a step is done [m].
     """
     middle, weight = rod.sling.middle, rod.branch
     x1 = x2 = np.array(start, float)
-    v1 = v2 = np.zeros_like(x1)
+    v1 = v2 = np.zeros_like(x1) if driven is None else driven.rates
+    drag = rod.value("air_drag") * replace(rod, payload=0.0).mass
+    drag[:, 3:] = 0
     offset, pull, direction = None, 0.0, np.asarray(direction, float)
     xs, vs, forces, carried = [], [], [], []
     overstress = np.zeros((rod.sling.edges, len(TIMES)))
     stress = rod.uniaxial(rod.stretch(rod.columns(x1)))  # at the last step's end
     worst = np.broadcast_to(rod.worst, rod.sling.edges)
-    for step in steps:
+    for number, step in enumerate(steps):
         h, past, grip, target = (step[name] for name in ("h", "past", "grip", "target"))
         bh = step["beta"] * h
         forget, follow = step["forget"], step["follow"]
@@ -71,6 +91,9 @@ def march(
             free[middle, :3] = False
         else:
             offset = None
+        if driven is not None:
+            at[driven.nodes, :3] = driven.places[number]
+            free[driven.nodes, :3] = False
         y = x1 + past * (x1 - x2)
         inertial = y + bh * (v1 + past * (v1 - v2))
         inertial[:, 2] -= bh**2 * rod.gravity
@@ -80,11 +103,12 @@ def march(
         def residual(
             x, band=band, at=at, y=y, inertial=inertial, bh=bh, held_back=capacity * direction
         ):
-            force = band.mass * (x - inertial) / bh**2 + band.internal(x, (x - y) / bh, at)
+            rate = (x - y) / bh
+            force = band.mass * (x - inertial) / bh**2 + drag * rate + band.internal(x, rate, at)
             force[..., middle, :3] += held_back
             return force
 
-        x = solve(residual, at, free)
+        x = solve(residual, at, free, exact)
         force = -residual(x)[middle, :3]
         if grip == Grip.HELD:
             pull = np.linalg.norm(force)
@@ -112,22 +136,26 @@ def _free(rod: ReferenceRod) -> np.ndarray:
     return free
 
 
-def solve(residual, start: np.ndarray, free: np.ndarray) -> np.ndarray:
+def solve(residual, start: np.ndarray, free: np.ndarray, exact: float = 1e-11) -> np.ndarray:
     """Newton's method from `start` on the `free` ones, down the step's potential.
 
     A residual is that potential's gradient. Where the Hessian is not positive, its diagonal is
     raised until it is; a step past the bottom, to where it is steeper than before, is halved.
     """
     x = start
+    slope = residual(x)[free]
     for _ in range(100):
-        slope = residual(x)[free]
         step = np.zeros(x.shape)
         step[free] = _downhill(jacobian(residual, x)[free][:, free], slope)
         steep, scale = slope @ step[free], 1.0
-        while -residual(x - scale * step)[free] @ step[free] > steep and scale > 1e-4:
+        while True:
+            after = x - scale * step
+            slope = residual(after)[free]
+            if not (-slope @ step[free] > steep and scale > 1e-4):
+                break
             scale /= 2
-        x = x - scale * step
-        if np.abs(step).max() < 1e-11:  # the next one would be rounding
+        x = after
+        if np.abs(step).max() < exact:  # the next one would be rounding
             return x
     raise ArithmeticError("the reference's Newton method did not converge")
 

@@ -12,6 +12,7 @@ and the twist of a joint, which is linear about it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -81,16 +82,20 @@ class ReferenceRod:
     following: float = 0.0
     worst: np.ndarray | float = 0.0
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[float, ...]:
         """mu, lam, d, s of state.h."""
         return material(self.sling, self.theta)[0].tolist()[:4]
 
+    @cached_property
+    def _values(self) -> dict[str, float]:
+        return self.theta.sample()
+
     def value(self, name: str) -> float:
         """Of a parameter; 0 where the law has none."""
-        return self.theta.sample().get(name, 0.0)
+        return self._values.get(name, 0.0)
 
-    @property
+    @cached_property
     def branch(self) -> float:
         """Weight of each, over what never relaxes."""
         left, weight = relaxed(self.value("relaxation"))
@@ -234,10 +239,14 @@ class ReferenceRod:
 
     # ---- joints: between neighbouring frames; one that does not move has no length
 
+    @cached_property
+    def _fixed(self) -> np.ndarray:
+        return fixed_frames(self.sling)
+
     def _frames(self, x: np.ndarray, fixed: float) -> np.ndarray:
         """Pairs a, b along the band, those of clamps (and fingers) times `fixed` among them."""
         pairs = x[..., :-1, 3:].reshape(*x.shape[:-2], self.sling.edges, 2, 3)
-        first, last, fingers = fixed * fixed_frames(self.sling)
+        first, last, fingers = fixed * self._fixed
         middle = self.sling.middle
         hand = [np.broadcast_to(fingers, (*x.shape[:-2], 1, 2, 3))] if self.gripped else []
         ends = [np.broadcast_to(end, (*x.shape[:-2], 1, 2, 3)) for end in (first, last)]
@@ -245,6 +254,7 @@ class ReferenceRod:
             [ends[0], pairs[..., :middle, :, :], *hand, pairs[..., middle:, :, :], ends[1]], axis=-3
         )
 
+    @cached_property
     def _stiffness(self) -> tuple[np.ndarray, np.ndarray]:
         """Of each joint in bending and in twist [N m], shape (joints,)."""
         sling, middle = self.sling, self.sling.middle
@@ -258,7 +268,7 @@ class ReferenceRod:
     def _joint_forces(self, x, rate, at, bounded: bool) -> np.ndarray:
         """On the directors of the edges, shape (..., E, 2, 3), the twist linear about `at`."""
         _, _, d, s = self.parameters
-        bend, torsion = self._stiffness()
+        bend, torsion = self._stiffness
         near, moving, turn = (self._frames(at, 1), self._frames(x, 1), self._frames(rate, 0))
         after, before = _spin(near[..., :-1, :, :]) / 2, -_spin(near[..., 1:, :, :]) / 2
         twist = _sum(after * moving[..., 1:, :, :] + before * moving[..., :-1, :, :])
@@ -287,7 +297,7 @@ class ReferenceRod:
             stretch = self.stretch(f)
             density += self.stored(stretch) - self.uniaxial(stretch, -1, shape=(0.0, 0.0))
         edges = (density * self.sling.area * self.sling.edge_lengths).sum(-1)
-        bend, torsion = self._stiffness()
+        bend, torsion = self._stiffness
         frames = self._frames(x, 1)
         twist = _sum(frames[..., 1:, :, :] * _spin(frames[..., :-1, :, :])) / 2
         joints = bend * _sum(np.diff(frames, axis=-3) ** 2) - 2 * (bend - torsion) * twist**2
@@ -310,7 +320,7 @@ class ReferenceRod:
         """Viscous forces alone; `rate` times them is the dissipated power [W]."""
         return self.internal(at, rate, at) - self.internal(at, np.zeros_like(rate), at)
 
-    @property
+    @cached_property
     def mass(self) -> np.ndarray:
         """Inertia of each degree of freedom, shape (L, 9): halves of edges, and directors."""
         sling, ds = self.sling, self.sling.edge_lengths

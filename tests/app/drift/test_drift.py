@@ -94,10 +94,10 @@ def test_a_softened_band_is_told_and_one_that_keeps_is_not(lab) -> None:
     assert told[-2] == f"identify it anew with the newer recordings: {content['next']}"
 
 
-def recorded(file: str, begin: int, end: int) -> IdentifiedRecording:
+def recorded(file: str, begin: int, end: int, deepest: float = 0.4) -> IdentifiedRecording:
     value = ValueOfRecording(value=1.0, low=0.9, high=1.1, deviation=0.06)
     values = dict.fromkeys(recordings.COMPARED, value)
-    about = {"key": file, "pulls": 1, "settled": True, "values": values}
+    about = {"key": file, "pulls": 1, "settled": True, "deepest": deepest, "values": values}
     return IdentifiedRecording(file=file, begin=begin, end=end, **about)
 
 
@@ -109,7 +109,7 @@ def test_stamps_order_recordings_unless_they_are_a_simulations() -> None:
 
 
 def files(root: Path, names: str) -> None:
-    (root / "data/raw/mine").mkdir(parents=True)
+    (root / "data/raw/mine").mkdir(parents=True, exist_ok=True)
     for name in names:
         (root / f"data/raw/mine/{name}.mcap").write_text(name)
 
@@ -141,6 +141,30 @@ def test_what_had_not_settled_is_left_out(settings, tmp_path, monkeypatch, capsy
     (tmp_path / "data/raw/mine/c.mcap").unlink()
     with pytest.raises(UserError, match="fewer than two"):
         drift(settings, "mine", tmp_path)
+
+
+def test_a_recording_that_stretched_it_further_is_a_change(settings, tmp_path, monkeypatch) -> None:
+    """Values alone are the same; 2 mm further are no news."""
+    depths = {"a": 0.40, "b": 0.402, "c": 0.44, "d": 0.43}
+    said = {
+        name: recorded(f"{name}.mcap", MAY + i * DAY, MAY + i * DAY + SECOND, depth)
+        for i, (name, depth) in enumerate(depths.items())
+    }
+    monkeypatch.setattr(recordings, "_alone", lambda file, *rest: said[file.stem])
+    files(tmp_path, "ab")
+    assert drift(settings, "mine", tmp_path)["verdict"] == [SAME]
+    files(tmp_path, "cd")
+    content = drift(settings, "mine", tmp_path)
+    (line,) = content["verdict"]
+    assert line.startswith("c.mcap draws mine to 0.440 m, recordings before it to 0.402 m at most")
+    assert content["stretched_further"] == [{"later": 2, "before_m": 0.402}]
+    assert content["changes"] == []
+    assert [one["new"] for one in content["recordings"]] == [False, False, True, True]
+    assert content["next"].split()[2:4] == [f"{tmp_path}/data/raw/mine/{x}.mcap" for x in "cd"]
+    for before, silent in ((0.42, False), (0.438, True), (True, True)):
+        sizes = settings.bands["mine"].model_dump() | {"preconditioned": before}
+        known = settings.changed(bands={"mine": sizes})
+        assert (drift(known, "mine", tmp_path)["verdict"] == [SAME]) == silent
 
 
 def test_the_command_names_sizes_that_are_not_the_usual_ones() -> None:

@@ -1,5 +1,6 @@
 """The evidence of launches in a toy whose landings are a closed form."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,8 +9,10 @@ import pytest
 from pipeline.base.errors import UserError
 from pipeline.identify.posterior import launches
 from pipeline.identify.posterior.launches import TAPE, LaunchLikelihood, Observed, without_each
+from pipeline.simulator.model import LaunchHistory, LaunchSetup
 
 STEPS = np.array([1e-3, 1e-3])
+FORGETFUL = LaunchSetup(0.05, 1.0, 0.0, None, 1e-3, 1.0)
 
 
 def toy(sling, setup, theta: np.ndarray, draws: np.ndarray, workers: int) -> SimpleNamespace:
@@ -26,7 +29,7 @@ def closed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def expanded(*observed: Observed, phi=(0.0, 0.0)):
-    evidence = LaunchLikelihood(observed, None, None)
+    evidence = LaunchLikelihood(observed, None, FORGETFUL)
     return evidence, *evidence.expand(lambda phi: phi, np.array(phi), STEPS)
 
 
@@ -63,6 +66,35 @@ def test_a_launch_that_fails_in_simulation_counts_for_nothing() -> None:
     assert np.isnan(both[0].left[1])
     for index in (1, 2, 3):
         np.testing.assert_allclose(both[index], alone[index])
+
+
+def test_each_launch_is_of_the_band_that_the_launches_before_it_left(monkeypatch) -> None:
+    """A toy that flies shorter by what was drawn before; the order of the table is that of time."""
+    recorded = replace(FORGETFUL, history=LaunchHistory(1.0, 0.5, 0.45))
+
+    def softened(sling, setup, theta, draws, workers) -> SimpleNamespace:
+        done = toy(sling, setup, theta, draws, workers)
+        return SimpleNamespace(
+            landing_y=done.landing_y * np.exp(-np.array(setup.history.deepest)),
+            failure=done.failure,
+        )
+
+    monkeypatch.setattr(launches, "launch", softened)
+    draws = [(-0.3, -0.4), (-0.4, -0.1), (-0.6, -0.1), (-0.4, -0.2)]  # 0.5, 0.41, 0.61, 0.45 m
+    observed = [Observed(draw, 0.001, 0.3) for draw in draws]
+    found = LaunchLikelihood(observed, None, recorded)
+    misfit, hessian, gradient = found.expand(lambda phi: phi, np.zeros(2), STEPS)
+    seen = [0.45, 0.5, 0.5, np.hypot(0.6, 0.1)]
+    assert found.deepest == pytest.approx(seen) and found.after == pytest.approx(seen[-1])
+    each = []
+    for one, before in zip(observed, seen, strict=True):
+        setup = replace(recorded, history=LaunchHistory(1.0, 0.5, before))
+        each.append(LaunchLikelihood([one], None, setup))
+        each[-1].expand(lambda phi: phi, np.zeros(2), STEPS)
+    np.testing.assert_allclose(found.left, np.concatenate([one.left for one in each]))
+    np.testing.assert_allclose(found.design, np.hstack([one.design for one in each]), rtol=1e-9)
+    assert misfit == pytest.approx(sum(float(one.gap @ one.gap) for one in each))
+    assert np.ptp(found.left) > 0.1
 
 
 def test_at_the_truth_nothing_pulls() -> None:

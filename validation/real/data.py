@@ -88,3 +88,15 @@ def acrylic(folder: Path) -> list[Curve]:
             table = np.array([[float(cell) for cell in row] for row in list(csv.reader(lines))[1:]])
         found.append(Curve(file.stem, table[:, 1], table[:, 2], table[:, 0]))
     return found
+
+
+def ropes(folder: Path) -> dict[str, list[np.ndarray]]:
+    """Of each rope its runs in the order of their names: markers (T, M, 3) [m].
+
+    100 frames a second. Two robots move the ends; Chen et al., CoRL 2024, `deform_dlo_mocap`.
+    """
+    found: dict[str, list[np.ndarray]] = {}
+    for file in sorted((folder / "deform_dlo_mocap").glob("DLO*.npy")):
+        run = np.load(file, allow_pickle=False).astype(float)
+        found.setdefault(file.stem.partition("_")[0], []).append(run.transpose(0, 2, 1))
+    return found

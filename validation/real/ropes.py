@@ -114,7 +114,9 @@ def swing(
     """
     rope = rope_of(chords, parts, values["bending_length"], setup)
     theta = Parameters.of(
-        NEO_HOOKEAN, [YOUNG, POISSON, values["damping"], 0.0, 1.0], air_drag=values["drag"]
+        NEO_HOOKEAN,
+        np.array([YOUNG, POISSON, values["damping"], 0.0, 1.0]),
+        air_drag=values["drag"],
     )
     time = np.arange(len(run)) / RATE
     fine = np.arange((len(run) - 1) * refine + 1) / (RATE * refine)
@@ -129,7 +131,7 @@ def swing(
         start,
         friction=0.0,
         driven=Driven(nodes[list(LED)], led[1:], rates),
-        exact=1e-8,
+        exact=EXACT,
     )
     states = np.concatenate([start[None], done.x[refine - 1 :: refine]])
     return states[:, nodes, :3]
@@ -147,8 +149,12 @@ def fitted(
     """NAMES of a run, by least squares of the markers that nobody leads."""
 
     def left(logs: np.ndarray) -> np.ndarray:
-        values = dict(zip(NAMES, np.exp(logs).tolist(), strict=True))
-        return (inner(swing(run, chords, values, setup, parts=parts)) - inner(run)).ravel()
+        values: dict[str, float] = dict(zip(NAMES, np.exp(logs).tolist(), strict=True))
+        try:
+            told = swing(run, chords, values, setup, parts=parts)
+        except ArithmeticError:  # steps that do not converge: as far off as a rope is long
+            told = run + chords.sum()
+        return (inner(told) - inner(run)).ravel()
 
     low, high = np.log([REACH[name] for name in NAMES]).T
     begin = np.log([start[name] for name in NAMES])

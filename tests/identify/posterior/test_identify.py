@@ -10,11 +10,13 @@ from pipeline.base.errors import UserError
 from pipeline.episode.signal import cutoff_hz
 from pipeline.identify.posterior import coordinates, identify
 from pipeline.identify.posterior.coordinates import Coordinates
+from pipeline.identify.posterior.launches import LaunchLikelihood, Observed
 from pipeline.identify.posterior.likelihood import Likelihood
 from pipeline.identify.posterior.residuals import Residuals, Rule
 from pipeline.identify.results.theta import load_theta
 from pipeline.params.identification import parameter_names
 from pipeline.simulator.interaction import interact
+from pipeline.simulator.model import LaunchSetup
 from tests import once
 from tests.identify.objective.pulls import PARAMS, pulled, sling_of
 from validation.synthetic import own_law_episode
@@ -104,6 +106,21 @@ def test_what_is_written_is_a_theta_file(first, tmp_path):
     names = first.parameters.names
     assert names == (*content["theta"], "air_drag", "turn_damping", "returned_share")
     assert first.parameters.values.shape == (identify.SAMPLES, len(names))
+
+
+def test_the_theta_file_is_of_the_band_after_all_that_stretched_it(first):
+    """The deepest recording, or a launch that went deeper."""
+    episode = first.recordings[0].episode
+    deeper = replace(episode, position=1.1 * episode.position)
+    one = identify.recorded_history(SLING, [episode])
+    assert identify.theta_entries(first)["history"] == vars(one)
+    for two in ([episode, deeper], [deeper, episode]):
+        assert identify.recorded_history(SLING, two).deepest == pytest.approx(1.1 * one.deepest)
+    setup = LaunchSetup.of(PARAMS.setup, PARAMS.sling, one)
+    for draw, deepest in (((-0.1, -0.1), one.deepest), ((-0.6, -0.3), np.hypot(0.6, 0.3))):
+        launches = LaunchLikelihood([Observed(draw, 0.001, 3.0)], SLING, setup)
+        written = identify.theta_entries(replace(first, launches=launches))
+        assert written["history"] == vars(replace(one, deepest=float(deepest)))
 
 
 def test_workers_change_no_byte(exact, first):

@@ -204,7 +204,7 @@ def test_what_the_error_of_a_landing_is_made_of(tmp_path, progress, record) -> N
     project = copy_of_the_project(tmp_path / "project")
     params = load(project / "params.yaml")
     figures = {}
-    for band in (name for name, about in params.bands.items() if about.source == "rig"):
+    for band in params.run.rig:
         for stage in ("record", "episode", "clamps", "evidence"):
             run(project, "python", "-m", f"stages.{stage}", band)
         for method in METHODS:

@@ -12,7 +12,8 @@ The rules, written before any of these sealed rubbers was run:
   the same recordings; else the paper's. bias is the mean error without launch noise of nine
   targets, as validation/density.py scores it.
 - `sling plan` writes a dip by default, if over the develop rubbers and the rig's bands both the
-  mean of |bias| and the median width of the intervals are less with it than with the paper's pull.
+  mean of |bias| and the median width of the intervals are less with it than with the paper's pull;
+  and three searched dips (validation/campaigns/pulls.py) instead, if both are less with these.
 """
 
 from __future__ import annotations

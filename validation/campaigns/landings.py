@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import shutil
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -62,14 +63,14 @@ SETS = {
 }
 
 
-def jobs(name: str, most: int = TEN) -> list[OneRecording]:
-    """At most so many recordings of each band of a set, worn ones once, by their number."""
+def jobs(name: str, most: int = TEN, pulls: Sequence[str] = PULLS) -> list[OneRecording]:
+    """At most so many recordings of each band of a set by each pull, worn ones once."""
     seed, bands, count, states = SETS[name]
     return [
         OneRecording(seed, band, pull, worn, number)
         for number in range(min(count, most))
         for worn in states
-        for pull in PULLS
+        for pull in pulls
         for band in bands
         if not (worn and number)
     ]
@@ -152,11 +153,18 @@ def main() -> int:
     parser.add_argument("--work", type=Path, default=Path(".checkpoints/landings"))
     parser.add_argument("--workers", type=int, default=cores())
     parser.add_argument("--minutes", type=float, default=1e4, help="then it ends; again: goes on")
+    parser.add_argument("--pulls", nargs="+", choices=PULLS, default=PULLS)
+    parser.add_argument("--report", action="store_true", help="of what is there; nothing runs")
     parser.add_argument("--recordings", type=int, default=TEN, help="of each band, at most")
     arguments = parser.parse_args()
     work = arguments.work.resolve() / arguments.set
-    results, todo = ResultLines(work / "results.jsonl"), jobs(arguments.set, arguments.recordings)
-    runner.run(partial(performed, work=work), todo, results, arguments.workers, arguments.minutes)
+    results, todo = (
+        ResultLines(work / "results.jsonl"),
+        jobs(arguments.set, arguments.recordings, arguments.pulls),
+    )
+    if not arguments.report:
+        limits = arguments.workers, arguments.minutes
+        runner.run(partial(performed, work=work), todo, results, *limits)
     done = results.of(OneRecording)
     lines = [done[job] for job in todo if job in done]
     command = f"python -m validation.campaigns.landings {arguments.set}"

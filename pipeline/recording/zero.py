@@ -17,7 +17,7 @@ SIGMAS = 6.0  # of a mean: what is less sudden than this is noise
 INSTANT = 0.7  # share of a lasting change that comes at once
 MATCH = 0.4  # share of a step by which the zeros before and after it may differ otherwise
 MOST_TOOL = 3.0  # kg that a sensor carries
-APART = 0.05  # s of second differences of the hand's path
+AROUND = 0.1  # s of the hand's path on either side of where its acceleration may jump
 RESTS = 0.002  # m by which a hand at rest may wander meanwhile
 FREE = 0.5  # s at each end, at most, of which the zero is taken
 BLOCK = 0.05  # s: means over so long are independent of one another
@@ -74,21 +74,23 @@ def zeroed(
         change = np.median(values[end:], axis=0) - np.median(values[:begin], axis=0)
         size = float(np.linalg.norm(step))
         if np.linalg.norm(change - step) < MATCH * size and not (
-            hand and size < MOST_TOOL * _jerk(hand, float(t[k]))
+            hand and size < MOST_TOOL * _jump(hand, float(t[k]))
         ):
             values[:k] += step
             found.append(NewZero(float(t[k]), step))
     return (values, sorted(found, key=lambda one: one.time)) if found else (force, [])
 
 
-def _jerk(hand: Hand, time: float) -> float:
-    """By how much the hand's acceleration changes about then [m/s^2]; 0 of one that rests."""
-    at = time + np.arange(-2 * APART, 2 * APART + 1e-9, APART / 5)
-    places = hand(at)
+def _jump(hand: Hand, time: float) -> float:
+    """By how much the hand's acceleration jumps then [m/s^2]; 0 of one that rests."""
+    since = np.linspace(-AROUND, AROUND, 41)
+    places = hand(time + since)
     if np.linalg.norm(places - places[0], axis=1).max() < RESTS:
         return 0.0
-    bend = (places[10:] - 2 * places[5:-5] + places[:-10]) / APART**2
-    return float(np.linalg.norm(bend[:, None] - bend[None], axis=-1).max())
+    before, after = (  # of cubics through either side
+        2 * np.polyfit(since[side], places[side], 3)[1] for side in (slice(21), slice(20, None))
+    )
+    return float(np.linalg.norm(after - before))
 
 
 def _step_at(

@@ -80,7 +80,6 @@ def steps(recording: Path | None, mass: float) -> list[MeasuredStep]:
         ("setup", "`make setup`, nothing downloaded yet", ("make", "setup"), "", (".venv",)),
         ("run", "`make run`, after set-up", ("make", "run"), "[1-9][0-9]* ran", made, "setup"),
         ("again", "`sling flow`, nothing stale", (sling, "flow"), "are fresh", (), "run"),
-        ("drift", "`sling drift`, one recording", (sling, "drift", *mine), "", (), "run"),
         ("aim", "`sling aim`", aim, "", (), "run"),
         ("launch", "`sling launch`", (sling, "launch", *mine, draw), "", (), "run"),
         ("observe", "`sling observe`", observe, "", (), "run"),

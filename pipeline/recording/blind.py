@@ -1,21 +1,41 @@
-"""Why no band is seen: depth in another unit, intrinsics of another picture, or extrinsics."""
+"""Why no band is seen: depth in another unit or byte order, or a camera_info of other pictures.
+
+How far the hand is from the camera is known. The way of reading by which the pictures say so too is
+how they were written.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import numpy as np
 
+from pipeline.recording.input import images
 from pipeline.recording.view import View
 
-LOOKS = 15  # pictures
+LOOKS, LEAST = 15, 3  # pictures that are looked at, and of which the hand must be known
 AROUND = 4  # pixels to each side of the hand
 FITS = 1.3  # by which factor the hand's depth may be off for what covers it
 ALIKE = 0.1  # of it, by which it differs from picture to picture
-FACTORS = np.array([0.001, 0.01, 0.1, 0.2, 0.25, 0.5, 2.0, 4.0, 5.0, 10.0, 100.0, 1000.0])
 OFF_CENTER = 0.2  # of a picture's size: a lens is before its middle
+UNITS = {  # by which what is read is too large, and the unit that was written
+    1000.0: "32FC1 in millimetres",
+    100.0: "32FC1 in centimetres",
+    10.0: "0.1 mm",
+    8.0: "0.125 mm",
+    5.0: "0.2 mm",
+    4.0: "0.25 mm",
+    2.0: "0.5 mm",
+    0.256: "1/256 m",
+    0.1: "cm",
+    0.001: "m",
+}
+CURE = "publish it as 16UC1 in millimetres or 32FC1 in metres, of the byte order that it says"
 
 
 def why_no_band(view: View) -> str:
-    """What of the camera does not go with what is known of hand and fork, "" where all does."""
+    """What of the camera does not go with what is known of the hand, "" where all does."""
     camera = view.recording.depth_camera
     size = np.array([camera.width, camera.height])
     center = camera.matrix[[0, 1], 2]
@@ -25,34 +45,58 @@ def why_no_band(view: View) -> str:
             f"the depth camera's principal point is at {at} of {whole} pixels: its camera_info is"
             " of another resolution"
         )
-    seen = _depth_of_hand(view)
-    if len(seen) < 3:
+    said, swapped = (_factor(view, other) for other in (False, True))
+    if said == 1.0 or (said is None and swapped is None):
         return ""
+    reasons = []
+    if said is None or swapped == 1.0:
+        flag = int(view.recording.depth.values[0].is_bigendian)
+        reasons.append(f"is_bigendian is {flag}, but the depth's bytes are the other way round")
+        said = swapped
+    if said is not None and said != 1.0:
+        unit = f", as of unit {UNITS[said]}" if said in UNITS else ""
+        reasons.append(f"the depth is {said:g} times what it must be at the hand{unit}")
+    return f"{', and '.join(reasons)}: {CURE}"
+
+
+def _factor(view: View, swapped: bool) -> float | None:
+    """By which the hand's depth is too large: 1, one of UNITS, or another.
+
+    None where it differs from picture to picture, or too few show it.
+
+    Args:
+        swapped: With the pixels' bytes the other way round than they say.
+    """
+    seen = np.array([*_hand(view, swapped)])
+    if len(seen) < LEAST:
+        return None
     factor = float(np.median(seen))
-    if 1 / FITS < factor < FITS or np.median(np.abs(seen / factor - 1)) > ALIKE:
-        return ""
-    near = FACTORS[np.argmin(np.abs(np.log(FACTORS / factor)))]
-    said = f"{near:g}" if abs(np.log(factor / near)) < np.log(FITS) else f"{factor:.2g}"
-    return (
-        f"the hand is {said} times as far from the camera in the depth pictures as by its pose:"
-        " their unit is another than millimetres (16UC1) or metres (32FC1)"
-    )
+    if np.median(np.abs(seen / factor - 1)) > ALIKE:
+        return None
+    near = min((1.0, *UNITS), key=lambda one: abs(np.log(factor / one)))
+    return near if 1 / FITS < factor / near < FITS else float(f"{factor:.2g}")
 
 
-def _depth_of_hand(view: View) -> np.ndarray:
+def _hand(view: View, swapped: bool) -> Iterator[float]:
     """Depth where the hand must be, over what it must be, of pictures in which both are known."""
     camera, place = view.recording.depth_camera, view.geometry.camera.inverse()
-    found = []
     for number in np.linspace(0, len(view) - 1, LOOKS).astype(int):
-        depth = view.depth(int(number))
         hand = place.apply(view.scene.signals.hand(view.times[number])[None])
-        if depth is None or hand[0, 2] <= 0:
+        if hand[0, 2] <= 0:
             continue
         u, v = np.round(camera.project(hand)[0]).astype(int)
         if not (AROUND <= u < camera.width - AROUND and AROUND <= v < camera.height - AROUND):
             continue
+        picture = view.recording.depth.values[view.index[number][0]]
+        if swapped and not picture.encoding:
+            return  # packed pictures have their own order
+        try:
+            depth = images.depth(replace(picture, is_bigendian=picture.is_bigendian ^ swapped))
+        except images.Undecodable:
+            continue
+        if depth.shape != (camera.height, camera.width):
+            continue
         near = depth[v - AROUND : v + AROUND + 1, u - AROUND : u + AROUND + 1]
         near = near[near > 0]
         if len(near):
-            found.append(float(np.median(near)) / hand[0, 2])
-    return np.array(found)
+            yield float(np.median(near)) / hand[0, 2]

@@ -14,7 +14,6 @@ from pipeline.base.errors import UserError
 from pipeline.base.machine import cores
 from pipeline.params.recording import CloudParams
 from pipeline.recording.blind import why_no_band
-from pipeline.recording.depth_unit import misread
 from pipeline.recording.masks import masker
 from pipeline.recording.view import Frame, View
 
@@ -83,12 +82,6 @@ def clouds_of(view: View, cloud: CloudParams) -> Clouds:
     if not times:
         raise view.undecoded(view.damaged[0])
     if clouds.empty > MOST_EMPTY * len(times):
-        wrong = misread(view.recording, view.geometry, view.scene)
-        if wrong:
-            raise UserError(
-                f"{path}: {wrong}: publish it as 16UC1 in millimetres or 32FC1 in metres, of the"
-                " byte order that is_bigendian says"
-            )
         cure = "the masks" if cloud.mask == "folder" else "the band's diameter and rest_length"
         why = why_no_band(view) or f"check the camera's extrinsics and {cure}"
         raise UserError(

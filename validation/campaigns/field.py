@@ -191,13 +191,13 @@ def work_on(case: Faulty, work: Path, folder: Path | None) -> dict:
 
 
 def cases_of(recordings: list[str], sound: list[str], faults: list[str]) -> list[Faulty]:
-    """Middle sizes first, then all sound recordings, then the largest and the smallest sizes."""
+    """Middle sizes first, then the largest and the smallest sizes, then the sound recordings."""
 
     def of_size(place: int) -> list[Faulty]:
         return [Faulty(r, name, FAULTS[name].sizes[place]) for r in recordings for name in faults]
 
     whole = [Faulty(one, SOUND, 0.0) for one in dict.fromkeys([*recordings, *sound])]
-    return [*whole[:5], *of_size(1), *whole[5:], *of_size(2), *of_size(0)]
+    return [*whole[:5], *of_size(1), *of_size(2), *of_size(0), *whole[5:]]
 
 
 def report(args: argparse.Namespace, cases: list[Faulty]) -> None:

@@ -10,6 +10,10 @@
 Inertia and hand are looked for where the hand moves freely, or draws the band: the events are found
 first, with the stamps as they were recorded. That they are off by such a delay does no harm, for
 what is close to them is left out. Of a pull with other stamps, motion and grasp are estimated anew.
+
+A robot that starts back by itself, shortly before or after the release, looks like a late or early
+pose. The camera, tied to the pose by the hand and to the force by the pictures of the release,
+tells some of them apart; a delay that was given does; else both stay possible, which is said.
 """
 
 from __future__ import annotations
@@ -34,6 +38,7 @@ MOST_ERROR = 0.003  # s: what is not known better counts as not seen
 LEAST_ERROR = 0.0005  # s: what no scatter shows
 AT_ONCE = 0.04  # s: a hand that starts later does so by itself, not because the band lets it go
 UNSEEN_POSE, UNSEEN_CAMERA = 0.003, 0.02  # s: standard deviations where nothing tells
+GIVEN_POSE, GIVEN_CAMERA = 0.002, 0.005  # s: of what was given
 
 
 @dataclass(frozen=True)
@@ -42,11 +47,14 @@ class Estimate:
 
     Attributes:
         value: Against the force's [s].
-        error: Standard deviation [s]; 0 where it was given, None where nothing was seen.
+        error: Standard deviation of what the recording shows [s], or of what was given where it
+            shows nothing; None where nothing was seen or given.
         source: "setup", "estimated" or "not seen".
         applied: Whether the stamps are corrected by it.
-        left: Standard deviation of what the stamps may still be late [s]; None where it was given.
+        left: Standard deviation of what the stamps may still be late [s].
         against: Whose stamps the estimate is against, "force" or "pose".
+        given: What was given of it [s]; None where nothing was.
+        alone: Only the hand that starts back tells it, as a motion of the robot's own would.
     """
 
     value: float = 0.0
@@ -55,14 +63,35 @@ class Estimate:
     applied: bool = False
     left: float | None = None
     against: str = "force"
+    given: float | None = None
+    alone: bool = False
 
     @classmethod
-    def seen(cls, value: float, error: float, against: str = "force") -> Estimate:
-        """Applied where it is sure; else it is what may be left."""
+    def unseen(cls, given: float | None, error: float, left: float) -> Estimate:
+        """Where nothing shows it: as it was given, which is good to `error`, or else `left`."""
+        if given is None:
+            return cls(left=left)
+        return cls(given, error, "setup", given != 0, error, given=given)
+
+    @classmethod
+    def seen(
+        cls, rest: float, error: float, against: str = "force", given: float | None = None
+    ) -> Estimate:
+        """What the recording shows beside what was given, applied where it is sure.
+
+        Else it is what may be left.
+        """
         error = max(error, LEAST_ERROR)
-        applied = abs(value) > SIGMAS * error
-        left = error if applied else float(np.hypot(error, value))
-        return cls(value, error, "estimated", applied, left, against)
+        sure = abs(rest) > SIGMAS * error
+        left = error if sure else float(np.hypot(error, rest))
+        if given is None or sure:
+            return cls(rest + (given or 0.0), error, "estimated", sure, left, against, given)
+        return cls(given, error, "setup", given != 0, left, against, given)
+
+    @property
+    def rest(self) -> float:
+        """By what the stamps are corrected beside what was given [s]."""
+        return self.value - (self.given or 0.0) if self.applied else 0.0
 
 
 @dataclass(frozen=True)
@@ -86,55 +115,83 @@ class Delays:
 def correct_delays(pull: Pull, params: Params) -> tuple[Pull, Delays]:
     """The pull with the stamps that it should have had, and by what they were late.
 
-    Given delays are taken as they are, when the recording is read; others as far as it shows them.
+    Given delays are taken off first, when the recording is read; what it shows of the rest is
+    estimated as where none was given.
 
     The camera's is estimated against the pose, after that was corrected, then against the release.
     An estimate is applied where it is more than three standard deviations, or where the pictures of
     the release cannot be without it: a wrong correction is worse than none.
     """
-    given, late = params.episode.delays, pull.recording.late
+    given, off = params.episode.delays, pull.recording.late
+    pull = _put_right(pull, (given.pose or 0.0) - off.get("pose", 0.0))
+    pull = _put_right(pull, camera=(given.camera or 0.0) - off.get("color", 0.0))
     inertia = _or_none(lambda: estimate_tool_inertia(pull, params.setup.tool))
-    conflict = ""
-    if given.pose is not None:
-        pose = Estimate(given.pose, 0.0, "setup", given.pose != 0)
-    else:
-        pose, conflict = _of_pose(pull, inertia)
-    shift = pose.value - late.get("pose", 0.0) if pose.applied else 0.0
-    if shift:
-        pull = pull.shifted(pose=shift)
+    pose, conflict = _of_pose(pull, inertia, given.pose)
+    pull = _put_right(pull, pose.rest)
     if inertia is not None:
-        left = inertia.delay - shift
+        left = inertia.delay - pose.rest
         sure = abs(left) > SIGMAS * max(inertia.delay_error, LEAST_ERROR)
         inertia = replace(inertia, delay=left if sure else 0.0)
-    if given.camera is not None:
-        camera = Estimate(given.camera, 0.0, "setup", given.camera != 0)
-        if camera.applied:
-            pull = pull.shifted(camera=camera.value - late.get("color", 0.0))
-        release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
-        return pull, Delays(pose, camera, inertia, release, conflict)
-    camera = Estimate(left=UNSEEN_CAMERA)
+    camera = Estimate.unseen(given.camera, GIVEN_CAMERA, UNSEEN_CAMERA)
     found = _or_none(lambda: camera_delay(pull))
-    if found is not None and found[1] <= MOST_ERROR:
-        camera = Estimate.seen(*found, against="pose")
-    if camera.applied:
-        pull = pull.shifted(camera=camera.value)
+    if found is not None and found[1] > MOST_ERROR:
+        found = None
+    if found is not None:
+        camera = Estimate.seen(*found, against="pose", given=given.camera)
+    pull = _put_right(pull, camera=camera.rest)
     release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
-    if release is not None and release.beyond > SIGMAS * (camera.error or 0.0):
-        if camera.source == "estimated":
-            off = f"{1e3 * release.middle:+.0f} ± {1e3 * release.error:.0f} ms"
+    allowed = 0.0 if found is None else SIGMAS * (camera.error or 0.0)
+    if pose.alone and release is not None:
+        own = _by_itself(pose.rest, found and found[0], camera.rest, release, allowed)
+        pose = replace(pose, alone=own is None)
+        if own and found is not None:
+            pull = _put_right(pull, -pose.rest, -camera.rest)
+            rest = found[0] - pose.rest
+            camera = Estimate.seen(rest, found[1], against="pose", given=given.camera)
+            pose = Estimate(left=UNSEEN_POSE)
+            pull = _put_right(pull, camera=camera.rest)
+            release = _or_none(lambda: release_pictures(pull, params.setup.fork_width))
+    if release is not None and release.beyond > allowed:
+        if found is not None:
+            after = f"{1e3 * release.middle:+.0f} ± {1e3 * release.error:.0f} ms"
             conflict = conflict or (
-                f"the hand in the pictures goes with the pose, but the band is let go {off} after"
+                f"the hand in the pictures goes with the pose, but the band is let go {after} after"
                 " the force falls"
             )
-        value = release.middle + (camera.value if camera.applied else 0.0)
-        camera = Estimate(value, release.error, "estimated", True, release.error)
-        pull = pull.shifted(camera=release.middle)
-    elif release is not None and camera.source != "estimated":
-        camera = replace(camera, left=float(np.hypot(release.middle, release.error)))
+        pull = _put_right(pull, camera=release.middle)
+        value, error = (given.camera or 0.0) + camera.rest + release.middle, release.error
+        camera = Estimate(value, error, "estimated", True, error, given=given.camera)
+    elif release is not None and found is None:
+        left = float(np.hypot(release.middle, release.error))
+        camera = replace(camera, left=left if given.camera is None else min(left, GIVEN_CAMERA))
     return pull, Delays(pose, camera, inertia, release, conflict)
 
 
-def _of_pose(pull: Pull, inertia: ToolInertia | None) -> tuple[Estimate, str]:
+def _put_right(pull: Pull, pose: float = 0.0, camera: float = 0.0) -> Pull:
+    """The pull itself where nothing is late."""
+    return pull.shifted(pose, camera) if pose or camera else pull
+
+
+def _by_itself(
+    late: float, camera: float | None, taken: float, release: ReleasePictures, allowed: float
+) -> bool | None:
+    """Whether the hand starts back `late` [s] by itself, not by the pose's clock; None: who knows.
+
+    Args:
+        camera: Its delay [s] against a pose that is put right by `late`; None where no hand tells.
+        taken: What of it the stamps are corrected by [s].
+        release: With these stamps.
+        allowed: By which a delay may be outside of what `release` allows [s].
+    """
+    if release.never:
+        return None
+    if camera is None:  # a force's clock that is off explains both
+        return False if release.beyond and not release.off(late) else None
+    clock, own = (release.off(camera - taken - one) <= allowed for one in (0.0, late))
+    return own if own != clock else None
+
+
+def _of_pose(pull: Pull, inertia: ToolInertia | None, given: float | None) -> tuple[Estimate, str]:
     """The pose's delay, and the conflict of the two that tell it."""
     found = []
     if inertia is not None and max(inertia.delay_error, LEAST_ERROR) <= MOST_ERROR:
@@ -143,7 +200,7 @@ def _of_pose(pull: Pull, inertia: ToolInertia | None) -> tuple[Estimate, str]:
     if back is not None and abs(back[0]) < AT_ONCE and back[1] <= MOST_ERROR:
         found.append(back)
     if not found:
-        return Estimate(left=UNSEEN_POSE), ""
+        return Estimate.unseen(given, GIVEN_POSE, UNSEEN_POSE), ""
     if len(found) == 2:
         (one, its), (other, others) = found
         if abs(one - other) > SIGMAS * np.hypot(its, others):
@@ -151,10 +208,20 @@ def _of_pose(pull: Pull, inertia: ToolInertia | None) -> tuple[Estimate, str]:
                 f"the pose is {1e3 * one:+.1f} ± {1e3 * its:.1f} ms late by the tool's inertia, but"
                 f" {1e3 * other:+.1f} ± {1e3 * others:.1f} ms by the hand that starts back"
             )
-            return Estimate.seen(one, its), words
+            return Estimate.seen(one, its, given=given), words
+    elif given is not None and back is not None and back in found:
+        if abs(back[0]) > SIGMAS * np.hypot(back[1], GIVEN_POSE):
+            words = (
+                f"with episode.delays.pose {given:g} s the hand starts back"
+                f" {1e3 * back[0]:+.1f} ± {1e3 * back[1]:.1f} ms after the force falls: it moves by"
+                " itself, or that delay is wrong"
+            )
+            return Estimate.unseen(given, GIVEN_POSE, UNSEEN_POSE), words
     weights = np.array([error**-2.0 for _, error in found])
     value = float(weights @ [value for value, _ in found] / weights.sum())
-    return Estimate.seen(value, float(weights.sum() ** -0.5)), ""
+    estimate = Estimate.seen(value, float(weights.sum() ** -0.5), given=given)
+    alone = found == [back] and estimate.rest != 0 and given is None
+    return replace(estimate, alone=alone), ""
 
 
 def _or_none(estimate: Callable[[], Found | None]) -> Found | None:

@@ -62,7 +62,11 @@ class ReleasePictures:
     @property
     def beyond(self) -> float:
         """By how much the stamps are off for sure [s]; 0 where they may be right."""
-        return 0.0 if self.never else max(self.earliest, -self.latest, 0.0)
+        return 0.0 if self.never else self.off(0.0)
+
+    def off(self, late: float) -> float:
+        """How far a delay is outside of what the pictures allow [s]; 0 within."""
+        return max(self.earliest - late, late - self.latest, 0.0)
 
     @property
     def frozen(self) -> tuple[float, ...]:

@@ -14,6 +14,7 @@ from pipeline.recording.delays import Estimate, correct_delays
 from pipeline.recording.geometry import geometry_of
 from pipeline.recording.input.reader import read_recording
 from pipeline.recording.pulls import Pull
+from pipeline.recording.release_pictures import ReleasePictures
 from pipeline.recording.tool_inertia import ToolInertia, estimate_tool_inertia
 from tests.recording.played import Played
 from validation.recordings.bag import Truth
@@ -151,14 +152,85 @@ def test_two_estimates_are_weighed_or_said(looked_at, params, monkeypatch, back,
     assert found.pose.error == pytest.approx(0.001 if conflict else 0.001 / np.sqrt(2))
 
 
-def test_given_delays_are_used_as_they_are(looked_at, params) -> None:
-    recording, geometry = looked_at
-    told = params.episode.delays.model_copy(update={"pose": -0.004, "camera": 0.0})
+def given(params, **delays):
+    told = params.episode.delays.model_copy(update=delays)
     episode = params.episode.model_copy(update={"delays": told})
-    given = params.model_copy(update={"episode": episode})
-    right, found = correct_delays(Pull(recording, geometry), given)
-    assert found.pose == Estimate(-0.004, 0.0, "setup", True)
-    assert found.camera == Estimate(0.0, 0.0, "setup", False)
-    moved = right.recording
-    assert np.all(moved.pose.stamp - recording.pose.stamp == 4_000_000)
-    assert np.all(moved.depth.stamp == recording.depth.stamp)
+    return params.model_copy(update={"episode": episode})
+
+
+def test_given_delays_that_are_right_are_kept(looked_at, params) -> None:
+    """To the digit, with an error of their own where nothing ties them better."""
+    recording, geometry = looked_at
+    changed = late(late(recording, "pose", -0.012), "depth", 0.3)
+    told = given(params, pose=-0.012, camera=0.3)
+    right, found = correct_delays(Pull(late(changed, "color", 0.3), geometry), told)
+    assert (found.pose.value, found.camera.value) == (-0.012, 0.3)
+    assert found.pose.source == found.camera.source == "setup" and not found.conflict
+    assert 0 < found.pose.left < 0.003 and 0 < found.camera.left < 0.002
+    for role in ("pose", "depth", "color"):
+        assert np.all(getattr(right.recording, role).stamp == getattr(recording, role).stamp)
+
+
+def test_a_given_delay_that_the_recording_does_not_show(looked_at, params, monkeypatch) -> None:
+    """It has the error of a given number, and is taken off."""
+    for name in ("camera_delay", "start_back", "release_pictures"):
+        monkeypatch.setattr(delays, name, lambda *_: None)
+    _, found = correct_delays(Pull(*looked_at), given(params, pose=-0.004, camera=0.0))
+    assert found.pose == Estimate(-0.004, 0.002, "setup", True, 0.002, given=-0.004)
+    assert found.camera == Estimate(0.0, 0.005, "setup", False, 0.005, given=0.0)
+
+
+@pytest.mark.parametrize("told", [0.0, 0.03])
+def test_a_given_delay_that_is_wrong_is_put_right(looked_at, params, told) -> None:
+    """The camera is 12 ms late, whatever was given."""
+    recording, geometry = looked_at
+    pull = Pull(late(late(recording, "depth", 0.012), "color", 0.012), geometry)
+    right, found = correct_delays(pull, given(params, camera=told))
+    assert found.camera.value == pytest.approx(0.012, abs=0.001) and found.camera.applied
+    assert found.camera.rest == pytest.approx(0.012 - told, abs=0.001)
+    assert found.camera.left < 0.002
+    off = (right.recording.depth.stamp - recording.depth.stamp) * 1e-9
+    np.testing.assert_allclose(off, 0, atol=1e-3)
+
+
+def test_a_given_delay_tells_a_clock_from_the_robots_own_motion(looked_at, params) -> None:
+    recording, geometry = looked_at
+    early = Pull(late(recording, "pose", 0.02), geometry)
+    _, found = correct_delays(early, given(params, pose=0.0))
+    assert found.pose.value == 0.0 and found.pose.left == 0.002
+    assert "moves by itself" in found.conflict
+    _, found = correct_delays(early, given(params, pose=0.015))
+    assert found.pose.value == pytest.approx(0.02, abs=0.002) and not found.conflict
+
+
+@pytest.mark.parametrize(
+    ("window", "own", "alone"),
+    [((-0.01, 0.035), False, True), ((-0.01, 0.015), True, False), ((0.01, 0.035), False, False)],
+)
+def test_the_camera_tells_a_late_pose_from_a_late_start(
+    looked_at, params, monkeypatch, window, own, alone
+) -> None:
+    """The hand starts 20 ms late: by its pictures as the pose says, by those of the release not.
+
+    Args:
+        window: Of the camera's delay against the force, as the pictures of the release show it.
+        own: Whether the robot started so by itself.
+        alone: Whether both are possible.
+    """
+
+    def pictures(pull: Pull, _):
+        taken = (looked_at[0].depth.stamp[0] - pull.recording.depth.stamp[0]) * 1e-9
+        low, high = (one - taken for one in window)
+        return ReleasePictures(low, high, low + 0.015, high, (), (), ())
+
+    def by_hand(pull: Pull):
+        """The camera goes with the pose that was recorded."""
+        return (looked_at[0].pose.stamp[0] - pull.recording.pose.stamp[0]) * 1e-9, 0.0005
+
+    monkeypatch.setattr(delays, "start_back", lambda _: (0.02, 0.001))
+    monkeypatch.setattr(delays, "camera_delay", by_hand)
+    monkeypatch.setattr(delays, "release_pictures", pictures)
+    _, found = correct_delays(Pull(*looked_at), params)
+    assert found.pose.applied != own and found.pose.alone == alone and not found.conflict
+    assert found.camera.value == pytest.approx(0.0 if own else 0.02)
+    assert found.pose.left == pytest.approx(0.003 if own else 0.001)

@@ -93,17 +93,7 @@ def findings(done: Processed) -> Iterator[Finding]:
             what = f"the stamps of {stream.topic} are {offset:+.3f} s off the force's, judged"
             yield Finding(CLOCK.name, f"{what} by the times of receipt", CLOCK.remedy)
     yield from of_drift(done)
-    for role, delay in (("pose", done.delays.pose), ("camera", done.delays.camera)):
-        error = delay.error or 0.0
-        value = delay.value if delay.error is not None else 0.0
-        if delay.source != "setup" and abs(value) > max(DELAY, SURE * error):
-            taken = "taken out" if delay.applied else "not taken out"
-            yield Finding(
-                DELAYED.name,
-                f"the stamps of the {role} are {1e3 * value:+.1f} ± {1e3 * error:.1f} ms late"
-                f" against the force's, which is {taken}",
-                f"mend them at their driver, or set episode.delays.{role} in params.yaml",
-            )
+    yield from of_delays(done)
     pose = done.delays.pose
     if (pose.left or 0.0) > OPEN:
         yield Finding(
@@ -116,6 +106,27 @@ def findings(done: Processed) -> Iterator[Finding]:
         yield Finding(CONFLICT.name, done.delays.conflict, CONFLICT.remedy)
     if done.delays.release is not None:
         yield from of_release(done.delays.release)
+
+
+def of_delays(done: Processed) -> Iterator[Finding]:
+    """Of pose and camera, beside what was given of them."""
+    for role, delay in (("pose", done.delays.pose), ("camera", done.delays.camera)):
+        error, late = delay.error or 0.0, delay.value - (delay.given or 0.0)
+        if abs(late) <= max(DELAY, SURE * error):
+            continue
+        what = (
+            f"the stamps of the {role} are {1e3 * late:+.1f} ± {1e3 * error:.1f} ms late against"
+            " the force's"
+        )
+        cure = f"mend them at their driver, or set episode.delays.{role} in params.yaml"
+        if delay.given is not None:
+            what += f" beside the {delay.given:g} s that episode.delays.{role} says"
+            cure = f"set it to {delay.value:.4f}, or to null"
+        what += f", which is {'taken out' if delay.applied else 'not taken out'}"
+        if delay.alone:
+            what += "; only the hand that starts back shows it, as a robot's own motion would"
+            cure = f"set episode.delays.{role} to what it is (0 where it is the robot's own motion)"
+        yield Finding(DELAYED.name, what, cure)
 
 
 def of_drift(done: Processed) -> Iterator[Finding]:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from pipeline.recording.checks.finding import Check, Finding
 from pipeline.recording.checks.rates import topics
+from pipeline.recording.input.clocks import DRIFTED, SURE
 from pipeline.recording.processed import Processed
 from pipeline.recording.release_pictures import EMPTY_AFTER, ReleasePictures
 
-SURE = 3.0  # standard errors from which something is more than noise
 DELAY = OPEN = 0.002  # s
-DRIFTED = 0.003  # s over the recording
 AHEAD = 0.01  # s of stamps before the force's, by the times of receipt
 BEHIND, SLOW = 0.02, {"color": 0.1, "depth": 0.1, "gripper": 0.1}  # s after; pictures take a while
 
@@ -77,8 +74,8 @@ SMEARED = Check(
 DRIFT = Check(
     "clock_drift",
     "the growth of log_time less stamp with the force's, over the recording",
-    "scatter of each second's least delay",
-    f"{1e3 * DRIFTED:g} ms, and {SURE:g} standard errors",
+    "scatter of each second's least delay; messages that pile up all along look like a slow clock",
+    f"{1e3 * DRIFTED:g} ms over the recording, and {SURE:g} standard errors",
     "",
     "stamp all topics by one clock (chrony or PTP between computers), and record again",
 )
@@ -131,18 +128,16 @@ def of_delays(done: Processed) -> Iterator[Finding]:
 
 def of_drift(done: Processed) -> Iterator[Finding]:
     """Of the clocks' rates, by the times of receipt."""
-    force = done.pull.recording.wrench
-    span = (int(force.stamp[-1]) - int(force.stamp[0])) * 1e-9
     for stream, _ in topics(done):
-        rate = force.drift[0] - stream.drift[0]
-        error = np.hypot(force.drift[1], stream.drift[1])
-        if np.isfinite(error) and abs(rate) * span > max(DRIFTED, SURE * error * span):
-            yield Finding(
-                DRIFT.name,
-                f"the clock of {stream.topic} runs {1e6 * rate:+.0f} ± {1e6 * error:.0f} ppm"
-                f" against the force's, {1e3 * rate * span:+.1f} ms over the recording",
-                DRIFT.remedy,
+        drift = stream.drift
+        if drift.matters:
+            taken = "taken out" if drift.taken_out else "not known well enough to be taken out"
+            rate = f"{1e6 * drift.rate:+.0f} ± {1e6 * drift.error:.0f} ppm"
+            what = (
+                f"the clock of {stream.topic} runs {rate} against the force's,"
+                f" {1e3 * drift.rate * drift.span:+.1f} ms over the recording, which is {taken}"
             )
+            yield Finding(DRIFT.name, what, DRIFT.remedy)
 
 
 def of_release(seen: ReleasePictures) -> Iterator[Finding]:

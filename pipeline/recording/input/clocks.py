@@ -21,6 +21,10 @@ A whole topic on another clock than the wrench's can be tied to it by log_time o
 two transports' least delays agree: about a millisecond for what a controller publishes (pose,
 twist, gripper), which is put right, but tens of milliseconds for pictures, where a millisecond
 costs 25 % of the damping: they are refused.
+
+Delays of receipt do not grow by themselves, so where a topic's least delays change against the
+wrench's all through the recording, its clock runs at another rate. That is taken out where it is
+known to a millisecond over the recording; how late the stamps were at the first one is not told.
 """
 
 from __future__ import annotations
@@ -41,7 +45,46 @@ ALONE = 60.0  # s between one or two messages at a topic's end and the rest of i
 DISORDER = 10  # messages that go back, from which no clock was set, but the file has no order
 INTERLEAVED = 6  # how often stamps of two runs alternate that cover the same time
 LEAST_SECONDS = 5  # of least delays for a clock's drift
+SURE = 3.0  # standard errors from which a clock drifts
+DRIFTED = 0.003  # s over the recording from which it matters
+KNOWN = 0.001  # s over the recording, to which a rate must be known to be taken out
 TOLERANCE = 0.5  # s between the clocks of two topics
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A clock's rate against another's.
+
+    Attributes:
+        rate, error: By how much more time passes on it, and the standard error [s/s].
+        span: Of the recording [s].
+    """
+
+    rate: float = 0.0
+    error: float = np.inf
+    span: float = 0.0
+
+    @classmethod
+    def of(cls, growth: tuple[float, float], reference: tuple[float, float], span: float) -> Drift:
+        """Of what `drift` says of both topics."""
+        rate = (1 - growth[0]) / (1 - reference[0]) - 1
+        return cls(rate, float(np.hypot(growth[1], reference[1])), span)
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is sure, and more than nothing over the recording."""
+        least = max(DRIFTED, SURE * self.error * self.span)
+        return bool(np.isfinite(self.error)) and abs(self.rate) * self.span > least
+
+    @property
+    def taken_out(self) -> bool:
+        """Whether it is known well enough to be better taken out."""
+        return self.matters and self.error * self.span < KNOWN
+
+    def without(self, stamp: np.ndarray) -> np.ndarray:
+        """Stamps [ns] at the other clock's rate, as they were at the first one."""
+        since = (stamp - stamp.min()) * (self.rate / (1 + self.rate))
+        return stamp - np.round(since).astype(np.int64)
 
 
 @dataclass(frozen=True)
@@ -186,6 +229,15 @@ def drift(stamp: np.ndarray, log: np.ndarray) -> tuple[float, float]:
     slope, start = np.polyfit(time, delay, 1)
     noise = np.sum((delay - start - slope * time) ** 2) / (len(time) - 2)
     return float(slope), float(np.sqrt(noise / np.sum((time - time.mean()) ** 2)))
+
+
+def of_one_clock(found: list[tuple[float, float]]) -> tuple[float, float]:
+    """The mean of what topics say whose messages travel together, as `drift` has it."""
+    least = min(error for _, error in found)
+    weights = [max(error, 1e-9) ** -2.0 for _, error in found]
+    if not np.isfinite(least):
+        return 0.0, np.inf
+    return float(np.average([rate for rate, _ in found], weights=weights)), least
 
 
 def _back(stamp: np.ndarray, log: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from pipeline.recording.input import pace
+from pipeline.recording.input.clocks import Drift
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.input.words import few
 
@@ -35,7 +36,7 @@ class Stream(Generic[Values]):
         notes: What was lost or mended, in words.
         bursts: In which the stamps came; None where they were even.
         hold: For how long each value was repeated [s], 0 where it was not: repeats are left out.
-        drift: Growth of log_time - stamp [s/s], and its standard error.
+        drift: Of its clock against the wrench's, by the times of receipt.
     """
 
     topic: str
@@ -47,7 +48,7 @@ class Stream(Generic[Values]):
     notes: list[str] = field(default_factory=list)
     bursts: pace.Bursts | None = None
     hold: float = 0.0
-    drift: tuple[float, float] = (0.0, np.inf)
+    drift: Drift = Drift()
 
     def seconds(self, origin: int) -> np.ndarray:
         return (self.stamp - origin) * 1e-9

@@ -50,6 +50,7 @@ class Raw:
     notes: list[str] = field(default_factory=list)
     late: int = 0  # how often the stamps go back
     bursts: pace.Bursts | None = None
+    drift: clocks.Drift = clocks.Drift()
 
     @property
     def topic(self) -> str:
@@ -99,6 +100,7 @@ def streams_of(
         if role in raw:
             raw[role].stamp = raw[role].stamp - round(seconds * 1e9)
     _on_one_clock(raw, late)
+    _at_one_rate(raw)
     streams = {role: _sorted(one) for role, one in raw.items()}
     origin = int(streams["wrench"].stamp[0])
     first = min(stream.stamp[0] for stream in streams.values())
@@ -250,6 +252,18 @@ def _on_one_clock(raw: dict[str, Raw], late: Mapping[str, float]) -> None:
             )
 
 
+def _at_one_rate(raw: dict[str, Raw]) -> None:
+    """The other topics' clocks against the wrench's; colour and depth have one."""
+    found = {role: clocks.drift(one.stamp, one.log) for role, one in raw.items()}
+    found |= dict.fromkeys(CAMERAS, clocks.of_one_clock([found[role] for role in CAMERAS]))
+    reference, span = found.pop("wrench"), float(np.ptp(raw["wrench"].stamp)) * 1e-9
+    for role, growth in found.items():
+        one = raw[role]
+        one.drift = clocks.Drift.of(growth, reference, span)
+        if one.drift.taken_out:
+            one.stamp = one.drift.without(one.stamp)
+
+
 def _camera_cure(offsets: dict[str, float], late: Mapping[str, float]) -> str:
     """The delay that puts pictures on the force's clock; "" where the cameras' clocks differ."""
     pictures = [late.get(one, 0.0) - offsets[one] for one in offsets if one in CAMERAS]
@@ -284,8 +298,8 @@ def _sorted(raw: Raw) -> Stream[Any]:
         values = values[kept]
     if raw.lost:
         raw.notes.append(f"lost {_words(raw)}")
-    delay, drift = np.median(raw.log - raw.stamp) * 1e-9, clocks.drift(raw.stamp, raw.log)
-    about = sum(raw.lost.values()), raw.notes, raw.bursts, (hold or 0.0) * 1e-9, drift
+    delay = np.median(raw.log - raw.stamp) * 1e-9
+    about = sum(raw.lost.values()), raw.notes, raw.bursts, (hold or 0.0) * 1e-9, raw.drift
     return Stream(raw.topic, raw.frame, raw.stamp, values, float(delay), *about)
 
 

@@ -16,7 +16,7 @@ from pipeline.recording.delays import correct_delays
 from pipeline.recording.input import clocks
 from pipeline.recording.input.reader import Recording, read_recording
 from pipeline.recording.pulls import Pull
-from validation.recordings.bag import START, blind_bag, edit, head
+from validation.recordings.bag import START, Truth, blind_bag, edit, head
 
 MS = 1_000_000
 
@@ -335,3 +335,32 @@ def test_a_drift_is_told_by_the_least_delays(rate) -> None:
         found, error = clocks.drift((stamp * (1 + rate)).astype(np.int64), stamp + 10**6 + waits)
         assert abs(found + rate) < 5 * error and error < 1e-5
     assert clocks.drift(stamp[:1000], stamp[:1000])[1] == np.inf
+
+
+@pytest.mark.parametrize("roles", [("wrench",), ("color", "depth"), ("pose",)])
+@pytest.mark.parametrize("rate", [-3e-3, 1.5e-3])
+def test_a_clock_that_drifts_is_put_at_the_forces_rate(tmp_path, params, roles, rate) -> None:
+    """And stays as late as it was at its first message."""
+    truth = Truth(end=9.0)
+
+    def drifts(stamp: int, message) -> None:
+        late = round((stamp - START) * rate)
+        message.header = head(stamp + late, message.header.frame_id)
+
+    sound = read_recording(blind_bag(tmp_path, truth), params.setup)
+    change = edit(**dict.fromkeys(roles, drifts))
+    odd = read_recording(blind_bag(tmp_path, truth, change=change), params.setup)
+    by_force = rate * ("wrench" in roles)  # whose clock counts
+    for role, stream in odd.streams.items():
+        moves = role != "wrench" and (role in roles or "wrench" in roles)
+        assert stream.drift.taken_out == moves and not sound.streams[role].drift.matters
+        time = sound.streams[role].seconds(sound.origin)
+        np.testing.assert_allclose(stream.seconds(odd.origin), (1 + by_force) * time, atol=2e-3)
+
+
+def test_topics_of_one_clock_are_weighed() -> None:
+    both = [(1e-3, 1e-5), (2e-3, 1e-4)]
+    rate, error = clocks.of_one_clock(both)
+    assert 1e-3 < rate < 1.02e-3 and error == 1e-5
+    assert clocks.of_one_clock([both[0], (0.0, np.inf)]) == (1e-3, 1e-5)
+    assert clocks.of_one_clock([(0.0, np.inf)] * 2)[1] == np.inf

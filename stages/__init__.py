@@ -6,10 +6,15 @@ cores. Our own threads, which change no bit, are as many as SLING_WORKERS says.
 
 import gc
 import os
+import sys
 
 from pipeline.base import home
+from pipeline.base.errors import UserError
 
 gc.set_threshold(100_000)  # while torch loads, a tenth or more of the time looked for garbage
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # NumPy's and SciPy's; read when they are imported
-home.settle()
+try:
+    home.settle()
+except UserError as error:
+    sys.exit(f"error: {error}")

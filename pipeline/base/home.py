@@ -12,13 +12,19 @@ import shutil
 import tempfile
 from pathlib import Path
 
+from pipeline.base.errors import UserError
+
 PROJECT = Path(__file__).parents[2]
 ROOM = 50_000_000  # bytes, of compiled kernels and of lists of fonts
 DVC = "/var/tmp/dvc"  # where DVC keeps what it knows of files, unless DVC_SITE_CACHE_DIR is set
 
 
 def settle() -> None:
-    """See to it in our environment, and so in that of all that we start; once is enough."""
+    """See to it in our environment, and so in that of all that we start; once is enough.
+
+    Raises:
+        UserError: No folder at all takes files.
+    """
     if not os.path.isabs(os.path.expanduser("~")):
         os.environ["HOME"] = str(_elsewhere())
     own = os.environ.get("XDG_CACHE_HOME", "")
@@ -39,7 +45,13 @@ def _elsewhere() -> Path:
     """The project's .cache, else a temporary folder that is the user's alone."""
     if (PROJECT / "params.yaml").is_file() and _has_room(PROJECT / ".cache"):
         return PROJECT / ".cache"
-    folder = Path(tempfile.gettempdir(), f"sling2sim2real-{os.getuid()}")
+    try:
+        folder = Path(tempfile.gettempdir(), f"sling2sim2real-{os.getuid()}")
+    except FileNotFoundError:
+        raise UserError(
+            "neither your home, nor the project, nor a temporary folder can be written: set TMPDIR"
+            " to a folder that can"
+        ) from None
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
         about = folder.lstat()

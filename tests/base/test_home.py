@@ -74,3 +74,19 @@ def test_a_folder_of_that_name_that_others_may_read_is_not_taken(tmp_path: Path)
     Path(found["HOME"]).chmod(0o777)
     other = settled(tmp_path, "--no-name", "--no-project")
     assert other["HOME"] != found["HOME"] and Path(other["HOME"]).parent == tmp_path
+
+
+def test_where_nothing_can_be_written_one_line_says_so(tmp_path: Path) -> None:
+    code = """
+import sys, tempfile
+from pathlib import Path
+from pipeline.base import home
+home.PROJECT = Path("/proc/none")
+def nowhere():
+    raise FileNotFoundError(2, "No usable temporary directory found")
+tempfile.gettempdir = nowhere
+import stages
+"""
+    done = python("-c", code, folder=tmp_path, HOME="/proc/none", XDG_CACHE_HOME="")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert done.stderr.startswith("error: neither your home") and "TMPDIR" in done.stderr

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.recording.events import MARGIN, sample_noise
+from pipeline.recording.events import MARGIN
 from pipeline.recording.pulls import Pull
 
 WINDOW = 0.05  # s in which noise is looked for
 LEAST_SAMPLES = 20  # in it
+LONGEST = 0.3  # s of so many samples, in which the hand moves: then only equal values tell
 QUIET = 0.25  # share of the free hand's noise, below which there is none
 NEAR_TOP = 0.05  # of an axis' way to its extreme value
 
@@ -40,12 +41,11 @@ def flat_top(pull: Pull) -> FlatTop | None:
     count = max(LEAST_SAMPLES, round(WINDOW / pull.recording.wrench.period))
     if free.sum() < count or until.sum() < 2 * count:
         return None
-    noise = np.array([sample_noise(axis) for axis in raw[free].T])
-    x = raw[until]
-    windows = len(x) // count
-    parts = x[: windows * count].reshape(windows, count, 3)
+    noise = _scatter(_windows(raw[free], count)).min(axis=0)  # while it rests
+    parts = _windows(raw[until], count)
     change = np.diff(parts, axis=1)
-    still = np.std(change, axis=1) / np.sqrt(2) < QUIET * noise
+    quick = count * pull.recording.wrench.period < LONGEST
+    still = _scatter(parts) <= (QUIET if quick else 0.0) * noise
     rest = raw[free].mean(axis=0)
     far = np.abs(parts.mean(axis=1) - rest)
     top = far > (1 - NEAR_TOP) * far.max(axis=0)
@@ -59,3 +59,14 @@ def flat_top(pull: Pull) -> FlatTop | None:
     value = float(np.median(parts[found, :, axis]))
     frozen = bool(np.all(change[found] == 0))
     return FlatTop(axis, value, float(begin), float(end), frozen)
+
+
+def _windows(x: np.ndarray, count: int) -> np.ndarray:
+    """Samples (S, 3) in windows, shape (W, count, 3)."""
+    whole = len(x) // count
+    return x[: whole * count].reshape(whole, count, 3)
+
+
+def _scatter(windows: np.ndarray) -> np.ndarray:
+    """Of single samples in each window, (W, 3), beside what changes steadily."""
+    return np.std(np.diff(windows, axis=1), axis=1) / np.sqrt(2)

@@ -12,6 +12,7 @@ from pipeline.recording.checks import force, hold, rates
 from pipeline.recording.checks.finding import Finding
 from pipeline.recording.input.pace import Bursts
 from pipeline.recording.processed import Processed
+from pipeline.recording.sensor import flat_top
 from pipeline.recording.tare import sensor_turns
 from tests.recording.checks.made import abouts, with_facts, with_recording
 
@@ -64,6 +65,17 @@ def test_a_range_that_ends(checked, share) -> None:
     said = found(with_force(checked, clipped))
     assert [one.about for one in said if one.refused][0] == "range"
     assert "its range ends" in said[0].what
+
+
+@pytest.mark.parametrize("every", [1, 20])
+def test_a_hand_that_moves_before_the_pull_is_no_noise(checked, every) -> None:
+    """A filter leaves little noise, and little of it is left while the tool is shaken."""
+    wrench, t = checked.pull.recording.wrench, checked.pull.force_time
+    smooth = lfilter(np.ones(30) / 30, 1, wrench.values - wrench.values[0], axis=0)
+    shaken = 2.0 * np.sin(25 * t) * ((t > 0.1) & (t < 0.4))
+    values = wrench.values[0] + smooth + shaken[:, None]
+    changed = replace(wrench, stamp=wrench.stamp[::every], values=values[::every])
+    assert flat_top(with_recording(checked, wrench=changed).pull) is None
 
 
 @pytest.mark.fires("units")

@@ -248,7 +248,7 @@ def test_a_clock_that_runs_fast_is_said(checked) -> None:
     pose = checked.pull.recording.pose
     for rate, error, said in (
         (2e-3, 1e-5, "taken out"),
-        (2e-3, 3e-4, "not known well enough"),
+        (2e-3, 3e-4, "not steady enough"),
         (2e-3, 1e-3, ""),
         (1e-5, 1e-6, ""),
     ):

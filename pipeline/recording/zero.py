@@ -23,7 +23,7 @@ FREE = 0.5  # s at each end, at most, of which the zero is taken
 BLOCK = 0.05  # s: means over so long are independent of one another
 LEAST_BLOCKS = 6
 SURE = 4.0  # standard errors
-MATTERS = 0.02  # of the drop, from which a drift's course is looked at
+MATTERS = 0.01  # of the drop, from which a drift's course is looked at
 OTHER = 0.5  # of a steady drift, by which its slope in a window may differ
 
 

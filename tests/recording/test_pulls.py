@@ -136,7 +136,7 @@ def test_where_none_can_be_used_the_first_says_why(blind, tmp_path, params) -> N
         process_pulls(path, params.bands["band1"], params)
 
 
-@pytest.mark.parametrize("delay", [None, 0.004])
+@pytest.mark.parametrize("delay", [None, 0.001])
 def test_one_recording_is_read_and_understood_once(seen, params, monkeypatch, delay) -> None:
     """One motion for the stamps as recorded, one more where the pose's are corrected."""
     calls: Counter[str] = Counter()

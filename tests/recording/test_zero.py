@@ -76,3 +76,9 @@ def test_a_zero_that_warms_up_or_does_not_return_is_no_drift(size) -> None:
         found = course(shape)
         assert not found.steady and not found.rate.any()
         assert np.linalg.norm(found.change) == pytest.approx(size, rel=0.35)
+
+
+def test_a_small_return_error_is_no_drift_either() -> None:
+    """1.7 % of what was held, which would make a modulus 2 % too small."""
+    assert not course(lambda t: 0.24 * (t > 8)).steady
+    assert course(lambda t: 0.24 * t / 10).steady

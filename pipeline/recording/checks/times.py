@@ -131,7 +131,7 @@ def of_drift(done: Processed) -> Iterator[Finding]:
     for stream, _ in topics(done):
         drift = stream.drift
         if drift.matters:
-            taken = "taken out" if drift.taken_out else "not known well enough to be taken out"
+            taken = "taken out" if drift.taken_out else "not steady enough to be taken out"
             rate = f"{1e6 * drift.rate:+.0f} ± {1e6 * drift.error:.0f} ppm"
             what = (
                 f"the clock of {stream.topic} runs {rate} against the force's,"

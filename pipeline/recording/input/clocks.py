@@ -52,7 +52,7 @@ TOLERANCE = 0.5  # s between the clocks of two topics
 
 
 @dataclass(frozen=True)
-class Drift:
+class ClockRate:
     """A clock's rate against another's.
 
     Attributes:
@@ -65,7 +65,9 @@ class Drift:
     span: float = 0.0
 
     @classmethod
-    def of(cls, growth: tuple[float, float], reference: tuple[float, float], span: float) -> Drift:
+    def of(
+        cls, growth: tuple[float, float], reference: tuple[float, float], span: float
+    ) -> ClockRate:
         """Of what `drift` says of both topics."""
         rate = (1 - growth[0]) / (1 - reference[0]) - 1
         return cls(rate, float(np.hypot(growth[1], reference[1])), span)

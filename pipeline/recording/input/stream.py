@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from pipeline.recording.input import pace
-from pipeline.recording.input.clocks import Drift
+from pipeline.recording.input.clocks import ClockRate
 from pipeline.recording.input.readings import Picture
 from pipeline.recording.input.words import few
 
@@ -48,7 +48,7 @@ class Stream(Generic[Values]):
     notes: list[str] = field(default_factory=list)
     bursts: pace.Bursts | None = None
     hold: float = 0.0
-    drift: Drift = Drift()
+    drift: ClockRate = ClockRate()
 
     def seconds(self, origin: int) -> np.ndarray:
         return (self.stamp - origin) * 1e-9

@@ -50,7 +50,7 @@ class Raw:
     notes: list[str] = field(default_factory=list)
     late: int = 0  # how often the stamps go back
     bursts: pace.Bursts | None = None
-    drift: clocks.Drift = clocks.Drift()
+    drift: clocks.ClockRate = clocks.ClockRate()
 
     @property
     def topic(self) -> str:
@@ -259,7 +259,7 @@ def _at_one_rate(raw: dict[str, Raw]) -> None:
     reference, span = found.pop("wrench"), float(np.ptp(raw["wrench"].stamp)) * 1e-9
     for role, growth in found.items():
         one = raw[role]
-        one.drift = clocks.Drift.of(growth, reference, span)
+        one.drift = clocks.ClockRate.of(growth, reference, span)
         if one.drift.taken_out:
             one.stamp = one.drift.without(one.stamp)
 

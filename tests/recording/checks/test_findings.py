@@ -25,7 +25,7 @@ from pipeline.recording.checks import (
 from pipeline.recording.checks.motion import pause
 from pipeline.recording.checks.table import CHECKS, findings_of
 from pipeline.recording.delays import Estimate
-from pipeline.recording.input.clocks import Drift
+from pipeline.recording.input.clocks import ClockRate
 from pipeline.recording.tips import LensFactor
 from tests.project import DEFAULTS, ROOT, with_
 from tests.recording.checks.made import abouts, with_facts, with_recording, with_results
@@ -248,11 +248,11 @@ def test_a_clock_that_runs_fast_is_said(checked) -> None:
     pose = checked.pull.recording.pose
     for rate, error, said in (
         (2e-3, 1e-5, "taken out"),
-        (2e-3, 3e-4, "not known well enough"),
+        (2e-3, 3e-4, "not steady enough"),
         (2e-3, 1e-3, ""),
         (1e-5, 1e-6, ""),
     ):
-        odd = with_recording(checked, pose=replace(pose, drift=Drift(rate, error, 4.0)))
+        odd = with_recording(checked, pose=replace(pose, drift=ClockRate(rate, error, 4.0)))
         words = [one.what for one in times.findings(odd) if one.about == "clock_drift"]
         assert any(pose.topic in what and "+2000" in what for what in words) == bool(said)
         assert all(said in what for what in words)

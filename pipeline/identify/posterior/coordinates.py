@@ -24,6 +24,7 @@ from pipeline.simulator.parameters import THETA, Parameters
 
 YOUNG, POISSON, DAMPING, FRICTION, SCALE = range(5)
 LOGS = "log_youngs_modulus", "log_loss_factor"  # of Pa
+LOSS = 1  # place of the loss factor among the coordinates
 RETURNED = "log_returned_share"
 SHOWN_BY = {  # coordinates of parameters that have another name
     "youngs_modulus": LOGS[0],

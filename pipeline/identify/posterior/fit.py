@@ -63,7 +63,6 @@ def fit(
     coordinates: Coordinates,
     start: np.ndarray,
     *,
-    nuisances: np.ndarray | None = None,
     launches: LaunchLikelihood | None = None,
     workers: int | None = None,
     progress: Callable[[Fit], None] = lambda fit: None,
@@ -71,13 +70,11 @@ def fit(
     """Fit coordinates from `start` (D,). Raises NoFit.
 
     Args:
-        nuisances: Of the recordings at the start, (N, 3); None: 0.
         launches: That are evidence too.
         workers: Threads; they change no result.
         progress: Is told of each expansion that is nearer.
     """
-    phi = np.array(start, float)
-    nuisances = np.zeros((len(recordings), 3)) if nuisances is None else nuisances
+    phi, nuisances = np.array(start, float), np.zeros((len(recordings), 3))
     best: Fit | None = None
     damp, gone, new = DAMP, np.inf, [None] * len(recordings)
     with ThreadPoolExecutor(workers) as pool:

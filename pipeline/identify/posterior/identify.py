@@ -117,7 +117,7 @@ def fit_posterior(
         for one, wide in zip(recordings, follows, strict=True)
     ):
         recordings, first = follows, found
-        found = fit(recordings, coordinates, first.phi, nuisances=first.nuisances, **known)
+        found = fit(recordings, coordinates, first.phi, **known)
         found = replace(found, steps=first.steps + found.steps)
     for one in found.expansions:
         if not len(one.residuals.frame):

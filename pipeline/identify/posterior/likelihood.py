@@ -21,6 +21,7 @@ import numpy as np
 
 from pipeline.episode.episode import Episode
 from pipeline.identify.posterior.alignment import recoil_seen
+from pipeline.identify.posterior.coordinates import LOSS
 from pipeline.identify.posterior.residuals import Residuals, Rule
 from pipeline.simulator.interaction import Rollouts, interact
 from pipeline.simulator.model import ClampedBand
@@ -268,8 +269,11 @@ class Likelihood:
         vectors = residuals(first)
         moved = np.concatenate([residuals(one) for one in (released, later, led)])
         gap = vectors[0]
-        slopes = ((vectors[1:] - gap) / steps[:, None], (moved - gap) / NUDGE[:, None])
-        return self._eliminated(residuals, gap, *slopes, nuisances)
+        slopes = (vectors[1:] - gap) / steps[:, None]
+        # A law that lacks a rubber's slow hysteresis would take damping, which the recoil shows, for it.
+        slopes[LOSS, : 3 * len(residuals.samples)] = 0.0
+        own = (moved - gap) / NUDGE[:, None]
+        return self._eliminated(residuals, gap, slopes, own, nuisances)
 
     def _eliminated(
         self,

@@ -270,7 +270,7 @@ class Likelihood:
         moved = np.concatenate([residuals(one) for one in (released, later, led)])
         gap = vectors[0]
         slopes = (vectors[1:] - gap) / steps[:, None]
-        # A law that lacks a rubber's slow hysteresis would take damping, which the recoil shows, for it.
+        # The recoil shows damping. A law that lacks slow hysteresis would take it for that.
         slopes[LOSS, : 3 * len(residuals.samples)] = 0.0
         own = (moved - gap) / NUDGE[:, None]
         return self._eliminated(residuals, gap, slopes, own, nuisances)

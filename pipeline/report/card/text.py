@@ -82,8 +82,8 @@ def card_text(
     note = "A band of the **virtual rig**: its recording and its landings are virtual.\n\n"
     animation = (
         "![The release, recorded and simulated, 50 times slower](animation.webp)\n\n"
-        "*The release, 50 times slower. Left: the camera's picture and the simulated band in it."
-        " Right: the camera's points and the simulated band.*\n"
+        "*The release, 50 times slower: the simulated band in the camera's pictures (left) and among"
+        " its points (right).*\n"
     )
     meanings = f"\n[What each of them is]({GLOSSARY}).\n"
     return f"""\
@@ -121,11 +121,11 @@ def _listed(sentences: list[str], bullet: str) -> str:
 
 
 def _values(shown: list[ShownValue]) -> str:
-    lines = ["| | value | 90 % interval | without the recording |", "| --- | --- | --- | --- |"]
+    lines = ["| | value | 90 % interval | prior |", "| --- | --- | --- | --- |"]
     for one in (one for one in shown if not one.fixed):
-        interval = "not known" if one.low is None else f"{one.low:g} to {one.high:g}"
-        prior = f"{one.prior[0]:g} to {one.prior[1]:g}" if one.prior else "–"
-        prior += "" if one.told else ": **not identified**"
+        interval = "not known" if one.low is None else f"{one.low:g}–{one.high:g}"
+        prior = f"{one.prior[0]:g}–{one.prior[1]:g}" if one.prior else "–"
+        prior += "" if one.told else " (**not identified**)"
         value = f"{one.value:g} {one.unit}".strip()
         lines.append(f"| {one.label} | {value} | {interval} | {prior} |")
     fixed = ", ".join(f"{one.label} {one.value:g}" for one in shown if one.fixed)

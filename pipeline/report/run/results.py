@@ -68,6 +68,19 @@ class Result:
 
 
 @dataclass(frozen=True)
+class InformativePull:
+    """Another recording of a band of the rig, by the informative pull (`run.dips`).
+
+    Attributes:
+        band: The one of `run.bands` whose name its own begins with, or itself.
+        trials: As of a `Result`, by the first method.
+    """
+
+    band: str
+    trials: pd.DataFrame
+
+
+@dataclass(frozen=True)
 class Results:
     """All that ran: `episodes` by band, `methods` by band and then method, in the order of run.
 
@@ -79,6 +92,7 @@ class Results:
     methods: dict[str, dict[str, Result]]
     floors: dict[str, dict]
     unused: dict[str, int] = field(default_factory=dict)
+    dips: dict[str, InformativePull] = field(default_factory=dict)
 
     @property
     def least(self) -> dict[str, float]:
@@ -107,7 +121,14 @@ def gather(params: Params, root: str | Path = ".") -> Results:
         methods[band] = {method: _result(params, layout, band, method) for method in ran}
     floors = {band: load_floor(layout.floor(band)) for band in params.run.rig}
     unused = {band: _unused(layout, band, methods[band]) for band in methods}
-    return Results(episodes, methods, floors, {band: n for band, n in unused.items() if n})
+    dips = {
+        name: InformativePull(
+            next((one for one in params.run.bands if name.startswith(f"{one}_")), name),
+            pd.read_parquet(made(layout.trials(name, params.run.methods[0]))),
+        )
+        for name in params.run.dips
+    }
+    return Results(episodes, methods, floors, {band: n for band, n in unused.items() if n}, dips)
 
 
 def _unused(layout: Layout, band: str, methods: Collection[str]) -> int:

@@ -81,7 +81,7 @@ def trials() -> pd.DataFrame:
 def make(root: Path) -> None:
     yaml = YAML()
     content = yaml.load(DEFAULTS)
-    content["run"].update(bands=[BAND], rig=[])
+    content["run"].update(bands=[BAND], rig=[], dips=[])
     content["run"]["ablations"].update(bands=[], rig=[])
     set_methods(content, [METHOD])
     band = {"source": "recording", "mass": 0.03, "diameter": 0.01, "rest_length": 0.52}

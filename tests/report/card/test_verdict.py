@@ -29,7 +29,7 @@ CASES = [
     ({"recoil": 8e-3}, CARE, "recoil: 8 mm off"),
     ({"recoil": 0.03}, NO, "does not meet the recoil"),
     ({"disagreement": 2.6, "odd": "pull 2 of b.mcap"}, CARE, "pull 2 of b.mcap"),
-    ({"at_sides": (("relaxation", "upper side of its box, 0 to 10 %"),)}, CARE, "relaxation"),
+    ({"at_sides": (("relaxation", "upper side of its box, 0 to 20 %"),)}, CARE, "relaxation"),
     ({"stretch": 1.7}, CARE, "1.70 times its length, the recording only to 1.60"),
     ({"stretch": 2.2}, NO, "2.20 times"),
     ({"hold_force": 28.0}, CARE, "28.0 N"),
@@ -153,7 +153,7 @@ def test_findings_tell_what_was_odd_of_a_recording(told) -> None:
 
 def test_findings_see_a_bad_score_a_side_and_odd_evidence(told) -> None:
     rows = trials().assign(landing_y=[1.5, 2.1])
-    theta = dict(told.theta, theta=told.theta["theta"] | {"relaxation": 0.0998})
+    theta = dict(told.theta, theta=told.theta["theta"] | {"relaxation": 0.1996})
     launches = [{"left": None, "z_without_it": None}, {"left": -0.07, "z_without_it": -1.8}]
     recordings = [
         {"force_rms": force, "held_rms": 0, "recoil_rms": 0, "pictures": []}
@@ -169,5 +169,5 @@ def test_findings_see_a_bad_score_a_side_and_odd_evidence(told) -> None:
     assert found.density == pytest.approx(told.params.bands[told.band].density)
     assert found.odd == "pull 3 of `0.3.mcap`"
     assert found.at_sides == [
-        ("stress relaxation per decade of time", "upper side of its box, 0 to 10 %")
+        ("stress relaxation per decade of time", "upper side of its box, 0 to 20 %")
     ]

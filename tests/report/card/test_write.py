@@ -55,7 +55,7 @@ def test_a_program_reads_the_same(folder) -> None:
     assert young["value"] == pytest.approx(THETA["youngs_modulus"] / 1000)
     assert (young["low"], young["high"]) == pytest.approx((285, 315)) and young["unit"] == "kPa"
     fixed = {one["name"] for one in card["values"] if one["fixed"]}
-    assert fixed == {"poissons_ratio", "dynamic_friction", "damping_scale", "softening"}
+    assert fixed == {"poissons_ratio", "dynamic_friction", "damping_scale"}
     assert (card["recordings"], card["pulls"], card["launches"]) == (1, 1, 0)
     assert all(sentence.endswith(".") for sentence in card["reasons"] + card["next"])
 

@@ -122,7 +122,7 @@ def template(tmp_path_factory) -> Path:
     """A project folder with params.yaml and everything that the report reads."""
     root, yaml = tmp_path_factory.mktemp("report"), YAML()
     content = yaml.load(DEFAULTS)
-    content["run"].update(bands=[BAND], rig=[])
+    content["run"].update(bands=[BAND], rig=[], dips=[])
     content["run"]["ablations"].update(bands=[], rig=[])
     set_methods(content, [METHOD])
     band = {"source": "recording", "mass": 0.04, "diameter": 0.01, "rest_length": 0.52}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pandas as pd
+
 from pipeline.report.run.chapters.findings import doubts, findings
 from pipeline.report.run.figures.landings import misses
 from pipeline.report.run.report import Report
@@ -26,6 +28,9 @@ The *actuation floor* is what even an oracle's draws miss by, for errors of draw
 VIRTUAL = """\
 *Virtual* launches are those of a rig in software, whose rubber follows another law than the
 simulator."""
+DIPS = """\
+*Pull with a dip*: the same rubber recorded once more by the informative pull of `sling plan`, which
+shows how it unloads; by the first method alone."""
 NOTHING = """\
 Nothing was launched in this run, so no landing error is known. The cards say where to draw. Put
 measured landings into `data/trials/measured/<band>.csv` and run `dvc repro` to compare them with
@@ -41,6 +46,7 @@ def outcome(report: Report) -> str:
     if table:
         virtual = (results.trials.kind == "virtual").any()
         words = [COLUMNS, *([FLOOR] if results.floors else []), *([VIRTUAL] if virtual else [])]
+        words += [DIPS] if results.dips else []
         text += [markdown(table), "\n".join(words) + "\n"]
         text += _picture(report)
     else:
@@ -64,13 +70,18 @@ def _picture(report: Report) -> list[str]:
 
 
 def _cards(report: Report) -> str:
-    bands, lines = report.params.bands, []
-    for band in report.results.methods:
+    bands, lines, results = report.params.bands, [], report.results
+
+    def trials_of(band: str) -> pd.DataFrame:
+        dip = results.dips.get(band)
+        return dip.trials if dip else results.methods[band][report.main].trials
+
+    for band in (*report.results.methods, *report.results.dips):
         about = bands[band]
         sizes = f"{about.mass * 1e3:g} g, {about.rest_length * 100:g} cm between the clamps"
         sizes += f", {about.diameter * 1e3:g} mm thick"
         whose = "the virtual rig" if about.source == "rig" else "a robot"
-        launched = report.results.methods[band][report.main].trials.kind.isin(LAUNCHED).any()
+        launched = trials_of(band).kind.isin(LAUNCHED).any()
         whose += "" if launched else "; no launch yet"
         lines.append(f"- [{band}](bands/{band}/README.md): {sizes}; recorded by {whose}")
     return "\n".join(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pandas as pd
 
 from pipeline.report.drawing.styles import Styles
@@ -32,14 +34,14 @@ def outcome(results: Results, references: tuple[str, ...], styles: Styles) -> Ta
         None where nothing was launched.
     """
     rows = []
-    for band, methods in results.methods.items():
+    for name, band, trials in _launched(results, references):
         for kind in LAUNCHED:
             floor = results.least.get(band) if kind == "virtual" else None
-            trials = [of_kind(methods[method].trials, kind) for method in references]
-            if trials[0].empty:
+            some = [of_kind(one, kind) for one in trials]
+            if some[0].empty:
                 continue
-            found = [_errors(some) for some in trials]
-            parts, ranges = prediction_error(trials[0])["all"], intervals(trials[0]) or {}
+            found = [_errors(one) for one in some] + [None] * (len(references) - len(some))
+            parts, ranges = prediction_error(some[0])["all"], intervals(some[0]) or {}
             cells = [number(100 * one.mean, ".1f", "N/A") if one else NONE for one in found]
             own = found[0].mean if found[0] else None
             cells += [number(floor and 100 * floor, ".1f")]
@@ -47,12 +49,23 @@ def outcome(results: Results, references: tuple[str, ...], styles: Styles) -> Ta
             failed = [str(one.failed) for one in found if one]
             cells += [" · ".join(failed) or NONE]
             cells += [number(100 * parts.mean, ".1f"), number(100 * parts.bias, "+.1f")]
-            rows.append([band, f"{len(trials[0])} {kind}", *cells, coverage(ranges.get("all"))])
+            rows.append([name, f"{len(some[0])} {kind}", *cells, coverage(ranges.get("all"))])
     names = [styles[method].name for method in references]
     heads = ["band", "launches", *(f"{name} [cm]" for name in names)]
     heads += ["actuation floor [cm]", f"{names[0]}, in floors", f"failed: {' · '.join(names)}"]
     heads += ["prediction off by [%]", "bias [%]", "in the 90 % interval"]
     return without_empty((heads, rows)) if rows else None
+
+
+def _launched(
+    results: Results, references: tuple[str, ...]
+) -> Iterator[tuple[str, str, list[pd.DataFrame]]]:
+    """What a row is called, its band, and trials of the references; of a dip the first alone."""
+    for band, methods in results.methods.items():
+        yield band, band, [methods[method].trials for method in references]
+        for dip in results.dips.values():
+            if dip.band == band:
+                yield f"{band}, pull with a dip", band, [dip.trials]
 
 
 def _errors(trials: pd.DataFrame) -> LandingErrors | None:

@@ -82,7 +82,7 @@ def card_text(
     note = "A band of the **virtual rig**: its recording and its landings are virtual.\n\n"
     animation = (
         "![The release, recorded and simulated, 50 times slower](animation.webp)\n\n"
-        "*The release, 50 times slower: the simulated band in the camera's pictures (left) and among"
+        "*The release, 50 times slower: the simulated band in the camera's pictures (left) and"
         " its points (right).*\n"
     )
     meanings = f"\n[What each of them is]({GLOSSARY}).\n"

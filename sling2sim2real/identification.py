@@ -239,7 +239,7 @@ def identify(
     ).density
     assert density is not None  # of a search by least squares there is one
     content = {"band": band.name, **posterior.theta_entries(density)}
-    told = posterior.confidence(density, settings.parameters)
+    told = posterior.confidence(density)
     file = ThetaFile.model_validate(content)
     return Identification(
         band=band,

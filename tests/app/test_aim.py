@@ -20,6 +20,7 @@ PARAMS = SimpleNamespace(
         methods=["none", "other"],
         own=[],
         ablations=SimpleNamespace(bands=[], methods=[]),
+        dips=[],
     ),
     methods={"none": None, "other": None},
     policy=SimpleNamespace(targets=(1.425, 2.425)),

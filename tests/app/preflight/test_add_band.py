@@ -53,7 +53,7 @@ def test_a_band_is_added_and_nothing_else_changes(project, seen, blind) -> None:
         "    rest_length: 0.52",
     ]
     where = next(i for i, line in enumerate(after) if line.lstrip().startswith("red:"))
-    assert after[where - 1].lstrip().startswith("band3:") and after[where + 5] == ""
+    assert after[where - 1].lstrip().startswith("band3_dip:") and after[where + 5] == ""
     params = load(project / "params.yaml")
     assert params.run.own == ("red",)
     band = params.bands["red"]

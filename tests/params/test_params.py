@@ -11,6 +11,7 @@ from ruamel.yaml import YAML
 from pipeline.base.errors import UserError
 from pipeline.base.schema import Section
 from pipeline.params import Params, check, load, parse
+from pipeline.params.identification import LAWS
 from pipeline.simulator.parameters import THETA
 from tests.project import DEFAULTS, set_methods
 
@@ -97,7 +98,7 @@ def test_no_model_has_a_default() -> None:
     assert len(ours) > 30
     for model in ours:
         optional = {name for name, field in model.model_fields.items() if not field.is_required()}
-        assert optional <= {"preconditioned"}, model  # a band is new unless it says more
+        assert optional <= {"preconditioned", "form"}, model  # new, and softens by energy
 
 
 def test_a_rigs_law_has_constants_of_its_own() -> None:
@@ -248,7 +249,7 @@ def test_what_a_method_leaves_out_is_as_the_defaults_say() -> None:
     assert (about.settings, about.fixed, about.bounds) == ({}, {}, {})
     other = check(changed(("method_defaults", "bounds"), {"poissons_ratio": [0.4, 0.49]})).methods
     assert other["no_work"].bounds == {"poissons_ratio": (0.4, 0.49)}
-    assert set(other["least_squares"].bounds) == {"mooney_share", "upturn", "relaxation"}
+    assert set(other["least_squares"].bounds) == {*LAWS["rubber"]}
     without = {key: value for key, value in CONTENT.items() if key != "method_defaults"}
     assert refusal(without) == "params.yaml: method_defaults: is missing"
     assert refusal(changed(("method_defaults", "k_top"), 0)).startswith(

@@ -233,12 +233,12 @@ def _priors(found: Identified) -> dict[str, dict]:
 
 
 def interval(samples: np.ndarray, mode: float) -> tuple[float, float]:
-    """The central LEVEL of samples (M,), or at a bound that from the mode on."""
-    if mode <= samples.min():
-        return mode, float(np.quantile(samples, LEVEL))
-    if mode >= samples.max():
-        return float(np.quantile(samples, 1 - LEVEL)), mode
+    """The central LEVEL of samples (M,); from the end on beside which the mode lies, if it does."""
     low, high = np.quantile(samples, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    if mode < low:
+        low, high = min(mode, samples.min()), np.quantile(samples, LEVEL)
+    elif mode > high:
+        low, high = np.quantile(samples, 1 - LEVEL), max(mode, samples.max())
     return float(low), float(high)
 
 

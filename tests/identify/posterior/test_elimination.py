@@ -5,7 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.identify.posterior.likelihood import Likelihood, Tolerances, opening_time
+from pipeline.identify.posterior.likelihood import (
+    Likelihood,
+    Tolerances,
+    _repeated,
+    opening_time,
+)
 
 PHI, INNER, FORCES, BINS = 4, 3, 15, 12
 FRAME = np.repeat([7, 8, 9], 4)
@@ -165,3 +170,13 @@ def test_pads_that_open_linearly_let_the_force_fall_as_recorded():
     assert opening_time(held(None), sling, friction) == 0.004
     assert opening_time(held(1e-6), sling, friction) == 5e-4
     assert opening_time(held(1.0), sling, friction) == 0.05
+
+
+def test_what_repeats_itself_counts_as_fewer_samples() -> None:
+    """White noise as it is; each value k times over as sqrt(k): the triangle of its correlation."""
+    noise = np.random.default_rng(3).normal(0, 0.1, 4000)
+    assert _repeated(noise) == pytest.approx(0.1, rel=0.1)
+    for count in (5, 20):
+        slow = np.repeat(noise[: 4000 // count], count)
+        assert _repeated(slow) == pytest.approx(0.1 * np.sqrt(count), rel=0.25)
+    assert _repeated(np.zeros(10)) == 0.0

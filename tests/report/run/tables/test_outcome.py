@@ -1,10 +1,13 @@
 """The run in one table, by hand."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from pipeline.report.drawing.styles import styles
+from pipeline.report.run.results import InformativePull
+from pipeline.report.run.tables.cells import NONE
 from pipeline.report.run.tables.outcome import outcome, values
 from tests.report.run.conftest import confidence
 from tests.report.run.tables.toy_results import floor, launches, result, results
@@ -38,6 +41,20 @@ def test_a_row_a_band_with_errors_predictions_and_failures() -> None:
         "bias [%]": "-2.0",
         "in the 90 % interval": "6 of 6, median width 10 %",
     }
+
+
+def test_the_pull_with_a_dip_has_a_row_below_its_band() -> None:
+    ran = results(
+        result("band1", MAIN, launches([[0.03, -0.01]] * 3)),
+        result("band1", THEIRS, launches([[0.1] * 5] * 3)),
+        floors={"band1": floor((0.01,) * 3, (0.01,) * 3)},
+    )
+    dip = InformativePull("band1", launches([[0.01, -0.01]] * 3))
+    heads, (first, second) = outcome(replace(ran, dips={"band1_dip": dip}), (MAIN, THEIRS), NAMED)
+    told = dict(zip(heads, second, strict=True))
+    assert first[0] == "band1" and second[0] == "band1, pull with a dip"
+    assert (told["ours [cm]"], told["Sling2Sim2Real [cm]"]) == ("1.0", NONE)
+    assert (told["actuation floor [cm]"], told["ours, in floors"]) == ("1.0", "1.0")
 
 
 def test_measured_launches_without_a_target_have_predictions_alone() -> None:

@@ -8,7 +8,7 @@ help:                 # this list
 setup: .venv/ready    # .venv with everything that is needed
 
 demo: setup           # one virtual band from recording to card, as `sling fit` does it
-	@PATH="$(CURDIR)/.venv/bin:$$PATH" sling fit --name band1
+	@PATH="$(CURDIR)/.venv/bin:$$PATH" sling fit --name band1_dip
 
 .venv/ready: pyproject.toml constraints.txt tools/setup.sh
 	@bash tools/setup.sh

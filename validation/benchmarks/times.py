@@ -38,7 +38,7 @@ BEGIN, END = marks("times")
 BAND = "timed"  # of the recording
 DEMO = (  # `make demo` in a clone of its own, where nothing has run
     "clone=$PWD && rm -rf ../demo && git clone -q . ../demo && cd ../demo"
-    ' && PATH="$clone/.venv/bin:$PATH" sling fit --name band1'
+    ' && PATH="$clone/.venv/bin:$PATH" sling fit --name band1_dip'
 )
 CHANGES = ("PYTHONPATH", "VIRTUAL_ENV", "UV_CACHE_DIR", "PIP_CACHE_DIR", "WARP_CACHE_PATH")
 STAGE = re.compile(r"^([a-z]+)(?:@[\w-]+)? \| done \((?:(\d+) min )?([\d.]+) s\)$", re.MULTILINE)

@@ -104,5 +104,7 @@ def test_priors_are_even_or_as_published():
     i = place("log_loss_factor")
     np.testing.assert_allclose(np.pi * np.exp([low[i], high[i]]), TAN_DELTA, rtol=1e-3)
     i = place("softening")
-    np.testing.assert_allclose([low[i], high[i]], 0.15 * norm.ppf([0.525, 0.975]), rtol=1e-3)
+    ends = norm.cdf([0.0, 2.0])  # of a half-normal of 0.3 that is cut off at 0.6
+    parts = ends[0] + np.array([0.05, 0.95]) * (ends[1] - ends[0])
+    np.testing.assert_allclose([low[i], high[i]], 0.3 * norm.ppf(parts), rtol=1e-6)
     assert OURS.shows("youngs_modulus") == 0 and OURS.shows("dynamic_friction") is None

@@ -107,13 +107,16 @@ class Coordinates:
 
     def prior(self, level: float) -> np.ndarray:
         """Ends of the central `level` of each coordinate's prior, shape (2, D)."""
-        parts = np.array([[1 - level], [1 + level]]) / 2
-        ends = self.low + parts * (self.high - self.low)
+        return self.quantiles(np.repeat([[1 - level], [1 + level]], len(self.names), axis=1) / 2)
+
+    def quantiles(self, parts: np.ndarray) -> np.ndarray:
+        """Of each coordinate's prior, even or a Gaussian within its bounds, at parts (N, D)."""
+        found = self.low + parts * (self.high - self.low)
         known = self.precision > 0
         mean, spread = self.expected[known], self.precision[known] ** -0.5
         low, high = ((end[known] - mean) / spread for end in (self.low, self.high))
-        ends[:, known] = truncnorm.ppf(parts, low, high, mean, spread)
-        return ends
+        found[:, known] = truncnorm.ppf(parts[:, known], low, high, mean, spread)
+        return found
 
     def shows(self, name: str) -> int | None:
         """Number of the coordinate that a parameter shows; None: it is fixed."""

@@ -198,7 +198,6 @@ def drawn(
     Gaussian where a prior is given, else even. Each is drawn in `count` equal parts, in an order of
     its own (Latin hypercube), so that few draws are spread as many would be.
     """
-    from scipy.stats import truncnorm
     from scipy.stats.qmc import LatinHypercube
 
     even = LatinHypercube(len(coordinates.names), rng=rng).random(count)
@@ -208,12 +207,7 @@ def drawn(
     precision[flat] = 1 / (UNIFORM * (high - low)[flat] ** 2)
     if "air_drag" in coordinates.names:
         precision[coordinates.names.index("air_drag")] /= HALF_NORMAL
-    phi = low + even * (high - low)
-    for i in np.flatnonzero(~flat):
-        mean, spread = coordinates.expected[i], coordinates.precision[i] ** -0.5
-        ends = (low[i] - mean) / spread, (high[i] - mean) / spread
-        phi[:, i] = truncnorm.ppf(even[:, i], *ends, mean, spread)
-    return phi, precision
+    return coordinates.quantiles(even), precision
 
 
 def modulus(

@@ -14,7 +14,7 @@ From it and the force's rise follow
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -26,7 +26,7 @@ from pipeline.episode.episode import Episode
 # Hands that hold a drawn band wander: by 2 mm at most in the recordings that we have. Tracking is
 # as good, so that a way back of five times as much is meant.
 TURN = 0.01  # m
-STILL, REST = 0.01, 0.3  # m/s, and s: a hand that is slower for so long pauses
+STILL, REST = 0.008, 0.3  # m/s, and s: a hand that is slower for so long pauses
 SPEED = 0.15  # s over which a speed is taken
 MIDDLE = 0.03  # the middle of the band: points this near the plane x = 0 [m]
 LONGEST_RECOIL = 0.2  # after the release [s]; soft bands cross the fork plane within 0.1
@@ -123,7 +123,11 @@ def phases_of_hand(held: HandSignals) -> list[InteractionPhase]:
             )
             deepest = max([slack, *(phase.stop for phase in found)])
             part = slice(first, until + 1)
-            found += _named(one, names[first], time[part], drawn[part], deepest)
+            named = list(_named(one, names[first], time[part], drawn[part], deepest))
+            if not named and found and found[-1].end == one.begin:  # a jerk ends what it follows
+                last_one = found.pop()
+                named = [replace(last_one, end=one.end, stop=one.stop)]
+            found += named
     return _joined(found)
 
 

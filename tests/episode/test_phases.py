@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from pipeline.base.errors import UserError
@@ -104,6 +104,8 @@ def test_times_ways_and_speeds_of_a_dip() -> None:
 
 
 @given(st.floats(0.02, 0.15), st.floats(0.2, 2.0), st.floats(0.2, 2.0), st.floats(0.4, 3.0))
+@example(0.0234375, 2.0, 0.21875, 1.0)  # turns while it creeps
+@example(0.02, 2.0, 1.0, 1.0)  # as slow as a dip here may be
 def test_any_dip_of_two_centimetres_is_seen(depth, out, back, pause) -> None:
     low, again = 4.2 + out, 4.2 + out + back
     knots = ((1.2, 0.0), (4.2, 0.4), (low, 0.4 - depth), (again, 0.4), (again + pause, 0.4))

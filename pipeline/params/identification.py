@@ -99,6 +99,7 @@ class HeldOut(Section):
 class LossParams(Section):
     chamfer: Literal["symmetric", "measured", "clouds"]
     median_window: Annotated[int, Range(1, 101)]
+    late_decay: Annotated[float, Range(1e-3, 100)] | None  # 1/sample
     held_out: HeldOut
 
     @model_validator(mode="after")

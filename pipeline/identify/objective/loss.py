@@ -52,6 +52,7 @@ class EpisodeLoss:
         cutoff: float,
         median_window: int = 7,
         chamfer: str = "symmetric",
+        late_decay: float | None = None,
         held_out: np.ndarray | None = None,
     ) -> None:
         """Prepare the recorded side.
@@ -63,6 +64,9 @@ class EpisodeLoss:
             median_window: Samples of the median filter on forces and velocity, odd.
             chamfer: "symmetric": between the cloud and the tube both ways; "measured": measured to
                 simulated alone; "clouds": between two clouds, as the paper prints it.
+            late_decay: By which the geometry's weight falls after the release [1/sample], as
+                1 / (1 + exp(late_decay (t - t_open))), which the paper's source has commented out;
+                None: all frames weigh the same.
             held_out: Begin and end [s] of blocks that are not fitted, shape (B, 2). Samples nearer
                 to them than the force's filters reach count nowhere; clouds pass no filter.
 
@@ -89,6 +93,10 @@ class EpisodeLoss:
         self.fitted_samples = ~within(self.time, blocks, guard)
         self.held_samples = within(self.time, blocks)
         self.fitted_frames = ~within(episode.cloud_time, blocks) & seen
+        self.frame_weights = np.ones(len(seen))
+        if late_decay is not None:  # a tanh, which does not overflow
+            late = (episode.cloud_time - episode.release_time) / self.period
+            self.frame_weights = (1 - np.tanh(late_decay * late / 2)) / 2
         self.held_frames = within(episode.cloud_time, blocks) & seen
         pull = np.array([[episode.grasp_time, episode.release_time - guard]])
         self._pull = within(self.time, pull), within(episode.cloud_time, pull)
@@ -98,7 +106,7 @@ class EpisodeLoss:
             velocity=self.velocity,
             window=median_window,
             sample_weights=np.stack([_mean(self.fitted_samples), self._trapezoids()]),
-            frame_weights=100 * _mean(self.fitted_frames),
+            frame_weights=100 * _mean(self.fitted_frames) * self.frame_weights,
         )
         if not self.fitted_frames.any():
             raise UserError(f"episode of {episode.band}: no camera frame shows the band")
@@ -117,6 +125,7 @@ class EpisodeLoss:
             cutoff=cutoff,
             median_window=params.loss.median_window,
             chamfer=params.loss.chamfer,
+            late_decay=params.loss.late_decay,
             held_out=held_out_blocks(episode, held.blocks, held.length, guard),
         )
 
@@ -147,7 +156,7 @@ class EpisodeLoss:
         both = self.fitted_samples[:-1] & self.fitted_samples[1:]  # ends of a trapezoid
         work = (power[:, :-1] + power[:, 1:]).compress(both, axis=1).sum(axis=1)
         return {
-            "geom": self._centimetres(frames, self.fitted_frames),
+            "geom": self._centimetres(frames * self.frame_weights, self.fitted_frames),
             "force": self._newtons(gap, self.fitted_samples),
             "work": np.abs(work) / 2 * self.period,
         }

@@ -61,9 +61,10 @@ def loss_of(episode, **options) -> EpisodeLoss:
         {"chamfer": "measured", "median_window": 1},
         {"chamfer": "clouds"},
         {"median_window": 5},
+        {"late_decay": 0.5},
         {"held_out": np.array([[1.2, 1.3]])},
     ],
-    ids=("plain", "measured", "clouds", "narrow median", "held out"),
+    ids=("plain", "measured", "clouds", "narrow median", "late", "held out"),
 )
 def test_terms_are_those_of_numpy(options: dict) -> None:
     episode, rollouts = recoiling()

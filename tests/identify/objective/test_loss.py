@@ -33,6 +33,19 @@ def test_a_perfect_simulation_costs_nothing_and_one_unit_reads_one() -> None:
         assert terms["work"][0] == pytest.approx(abs(force[1]) * 0.1 * duration, abs=1e-9)
 
 
+def test_late_pictures_weigh_less_where_asked() -> None:
+    """1 cm off everywhere: the mean weight, by the formula."""
+    episode = toy.episode(samples=200, release_time=3.0)
+    shifted = toy.rollouts(episode, shift=(0, 0, -0.01))
+    late = (episode.cloud_time - 3.0) / toy.PERIOD
+    expected = np.mean(1 / (1 + np.exp(0.5 * late)))
+    all_of_it, part = (
+        loss_of(episode, late_decay=decay).terms(shifted)["geom"][0] for decay in (None, 0.5)
+    )
+    assert part / all_of_it == pytest.approx(expected, rel=1e-3)
+    assert 0.4 < expected < 0.6
+
+
 def test_work_cancels_where_force_does_not() -> None:
     """+1 N on the way out and -1 N on the way back at the same speed: no net work."""
     episode = toy.episode()

@@ -5,7 +5,8 @@ import pytest
 
 from pipeline.identify.search.build import build
 from pipeline.identify.search.loop import latin_hypercube
-from validation.campaigns.ablations import FIRST, LAST, PAPER, Job, jobs_of, summary
+from validation.campaigns.ablations import FIRST, PAPER, Job, jobs_of, summary
+from validation.campaigns.variants import LAST
 from validation.paired import compared, holm, mean_interval
 
 

@@ -2,6 +2,7 @@
 
     python -m validation.campaigns.ablations --record          # episodes; needs Open3D
     python -m validation.campaigns.ablations --workers 16      # identifications, then the report
+    python -m validation.campaigns.ablations --preset large --work FOLDER --report FILE
 
 Recordings have rig seeds from 1001 on, which took part in no choice. Every method identifies each
 with one search seed, and the first of each band with five. What it found is aimed at the targets of
@@ -33,12 +34,12 @@ from pipeline.params.identification import MethodParams
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import aimed, errors_on_the_rig, identified, recorded
 from validation.campaigns.runner import PAPER, ResultLines, plain, result_of
+from validation.campaigns.variants import LAST, SETTINGS, WEIGHTS, of_job, spent, with_variants
 from validation.paired import LEVEL, compared, mean_interval
 
 WORK = Path("data/ablations")
 REPORT = Path("reports/validation/ablations.json")
 FIRST, SEEDS = 1001, 5  # rig seed of the first recording; search seeds on it
-LAST = "plain_bo"  # takes as long as all others
 
 
 @dataclass(frozen=True)
@@ -51,43 +52,23 @@ class Job:
     seed: int
 
 
-def with_variants(params: Params) -> Params:
-    """params.yaml's methods, and the paper's with one thing plain or left out."""
-    one, optimizer = params.methods[PAPER], params.optimizer
-    names = ("generations", "delta", "cma_population", "recombination")
-    starts = {name: getattr(optimizer, name) for name in names}
-    low, high = optimizer.mutation
-    starts |= {"mutation_low": low, "mutation_high": high}
-
-    def variant(kind: str, **settings):
-        search = f"validation.searches:{kind}"
-        return one.model_copy(update={"search": search, "settings": settings})
-
-    methods = dict(params.methods.items()) | {
-        "no_covariance_plain": variant("PlainStarts", k_top=optimizer.k_top, **starts),
-        "no_covariance_no_multistart_plain": variant("PlainStarts", k_top=1, **starts),
-        LAST: variant("SmallBatches"),
-        "plain_adam": variant("PlainAdam"),
-        "no_clamp_calibration": one.model_copy(update={"mounting": False}),
-    }
-    return params.model_copy(update={"methods": methods})
-
-
-def jobs_of(bands: Sequence[str], methods: Sequence[str], recordings: int, seeds: int) -> list[Job]:
+def jobs_of(
+    bands: Sequence[str], methods: Sequence[str], recordings: int, seeds: int, first: int = FIRST
+) -> list[Job]:
     """Every identification, those first that tell most and cost least."""
-    first = [
-        Job(band, FIRST + number, method, 1)
+    singles = [
+        Job(band, first + number, method, 1)
         for number in range(recordings)
         for method in methods
         for band in bands
     ]
     spread = [
-        Job(band, FIRST, method, seed)
+        Job(band, first, method, seed)
         for seed in range(2, seeds + 1)
         for method in methods
         for band in bands
     ]
-    return sorted(first + spread, key=lambda job: job.method == LAST)
+    return sorted(singles + spread, key=lambda job: job.method == LAST)
 
 
 def place(work: Path, band: str, recording: int) -> Path:
@@ -103,13 +84,14 @@ def record(where: tuple[str, int], work: Path) -> None:
 
 
 @cache  # in each process
-def _params() -> Params:
-    return with_variants(load())
+def _params(method: str, preset: str | None) -> Params:
+    return with_variants(of_job(load(), method, preset))
 
 
 def aimed_and_launched(job: Job, params: Params, folder: Path) -> dict:
     """What one identification found of the episode in `folder`, and where its launches land."""
-    one = identified(params, job.band, job.method, job.seed, folder)
+    pads = job.method != "nominal_pads"
+    one = identified(params, job.band, job.method, job.seed, folder, recorded_pads=pads)
     draws = aimed(one.outcome, params, params.trials.targets)
     return {
         "theta": one.theta,
@@ -120,10 +102,10 @@ def aimed_and_launched(job: Job, params: Params, folder: Path) -> dict:
     }
 
 
-def work_on(job: Job, work: Path) -> dict:
+def work_on(job: Job, work: Path, preset: str | None) -> dict:
     """The result of a job."""
     folder = place(work, job.band, job.recording)
-    make = partial(aimed_and_launched, job, _params(), folder)
+    make = partial(aimed_and_launched, job, _params(job.method, preset), folder)
     return result_of(job, make, processor=processor())
 
 
@@ -155,7 +137,8 @@ def summary(results: list[dict], bands: Sequence[str], methods: Sequence[str]) -
         return [by.get((band, rec, method, seed), {"failed": "not run"}) for rec, seed in keys]
 
     single = sorted({(r["recording"], r["seed"]) for r in results if r["seed"] == 1})
-    spread = [(FIRST, seed) for seed in sorted({r["seed"] for r in results})]
+    first = min(r["recording"] for r in results)
+    spread = [(first, seed) for seed in sorted({r["seed"] for r in results})]
     figures = {}
     for band in [*bands, "all"]:
         of = bands if band == "all" else [band]
@@ -212,13 +195,15 @@ def mean_of(values) -> float:
 
 def report(args: argparse.Namespace, params: Params) -> None:
     """Write what the results in the work folder say."""
-    wanted = set(jobs_of(args.bands, args.methods, args.recordings, args.seeds))
+    wanted = set(jobs_of(args.bands, args.methods, args.recordings, args.seeds, args.first))
     results = [one for job, one in lines_in(args.work).of(Job).items() if job in wanted]
     if not results:
         raise UserError(f"{args.work}: holds no result of these bands and methods")
     same = [name for name in args.methods if _of_one_loss(params.methods[name], params)]
     command = "python -m validation.campaigns.ablations"
     command += f" --workers {args.workers} --recordings {args.recordings} --seeds {args.seeds}"
+    if args.preset:
+        command += f" --preset {args.preset} --report {args.report}"
     content = {
         "kind": "virtual",
         "asked": "What each part of the paper's method, and each baseline, changes in the distance"
@@ -231,7 +216,11 @@ def report(args: argparse.Namespace, params: Params) -> None:
                 for band in args.bands
             },
             "search_seeds_on_the_first": sorted({one["seed"] for one in results}),
-            "optimizer": params.optimizer.model_dump(),
+            "preset": args.preset,
+            "optimizer": of_job(params, PAPER, args.preset).optimizer.model_dump(),
+            "rollouts": {
+                name: spent(of_job(params, name, args.preset), name) for name in args.methods
+            },
             "methods": {name: params.methods[name].model_dump() for name in args.methods},
             "intervals": f"{100 * LEVEL:.0f} %, percentile bootstrap over recordings (or seeds)",
             "tests": f"Wilcoxon signed-rank, two-sided, against {PAPER} on the same recordings;"
@@ -256,23 +245,27 @@ def run(args: argparse.Namespace) -> None:
     results, there = lines_in(args.work), lines_in(args.work).of(Job)
     jobs = [
         job
-        for job in jobs_of(args.bands, args.methods, args.recordings, args.seeds)
+        for job in jobs_of(args.bands, args.methods, args.recordings, args.seeds, args.first)
         if (place(args.work, job.band, job.recording) / "mounting.json").exists()
         and job not in there
     ]
     print(f"{len(jobs)} identifications on {args.workers} processes", flush=True)
-    work, end = partial(work_on, work=args.work), time.monotonic() + 60 * args.minutes
+    work = partial(work_on, work=args.work, preset=args.preset)
+    end = time.monotonic() + 60 * args.minutes
     runner.run(work, jobs[:1], results, 1)  # compiles, once
     runner.run(work, jobs[1:], results, args.workers, (end - time.monotonic()) / 60)
 
 
 def main() -> None:
     params = with_variants(load())
+    usual = [name for name in params.methods if name not in SETTINGS.keys() | WEIGHTS.keys()]
     parser = runner.parser(__doc__, REPORT, WORK)
     parser.add_argument("--record", action="store_true", help="make the episodes, nothing else")
     parser.add_argument("--report-only", action="store_true", help="of what is there")
+    parser.add_argument("--preset", help="of presets/, its keys of `optimizer`")
     parser.add_argument("--bands", nargs="+", default=list(params.run.rig))
-    parser.add_argument("--methods", nargs="+", default=list(params.methods))
+    parser.add_argument("--methods", nargs="+", default=usual)
+    parser.add_argument("--first", type=int, default=FIRST, help="rig seed of the first recording")
     parser.add_argument("--recordings", type=int, default=10, help="a band (default: 10)")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="on the first (default: 5)")
     parser.add_argument("--minutes", type=float, default=1e4, help="then stop and report")
@@ -283,7 +276,7 @@ def main() -> None:
     if PAPER not in args.methods:
         raise UserError(f"--methods: {PAPER} must be among them, all are compared with it")
     if args.record:
-        numbers = range(FIRST, FIRST + args.recordings)
+        numbers = range(args.first, args.first + args.recordings)
         every = [(band, number) for number in numbers for band in args.bands]
         for _ in runner.each(partial(record, work=args.work), every, args.workers):
             pass

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from pipeline.episode.episode import Episode
 from pipeline.identify.clamps import calibrate_clamps
 from pipeline.identify.objective.box import SearchBox
 from pipeline.identify.posterior.launches import Observed
+from pipeline.identify.posterior.likelihood import opening_time
 from pipeline.identify.results.mounting import Mounting
 from pipeline.launching.surface.landing_map import LandingMap
 from pipeline.launching.trials.spread import landing_intervals
@@ -27,7 +28,7 @@ from pipeline.simulator.model import ClampedBand
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.world import World
 from rig.physics.launch import launch
-from validation.campaigns.runner import made_once, plain
+from validation.campaigns.runner import OURS, made_once, plain
 from validation.density import Calibrated, found
 
 TARGETS = np.linspace(1.525, 2.325, 9)  # m
@@ -83,13 +84,27 @@ class RigIdentification:
 
 
 def identified(
-    params: Params, band: str, method: str, seed: int, folder: Path
+    params: Params,
+    band: str,
+    method: str,
+    seed: int,
+    folder: Path,
+    recorded_pads: bool = False,
 ) -> RigIdentification:
-    """Identify the episode in `folder` with a seed of the search. Raises UserError."""
+    """Identify the episode in `folder` with a seed of the search. Raises UserError.
+
+    Args:
+        recorded_pads: Every method has the pads open as fast as the recorded force fell; else only
+            the density has, and searches have the lab's nominal time.
+    """
     optimizer = params.optimizer.model_copy(update={"seed": seed})
     params = params.model_copy(update={"optimizer": optimizer})
     sling, start = sling_of(params, band, method, folder), time.perf_counter()
-    outcome, told = found(params, method, sling, [Episode.load(folder / "episode")])
+    episode = Episode.load(folder / "episode")
+    if recorded_pads:
+        friction = params.methods[OURS].fixed["dynamic_friction"]
+        sling = replace(sling, finger_opening_time=opening_time(episode, sling, friction))
+    outcome, told = found(params, method, sling, [episode])
     seconds, names = time.perf_counter() - start, SearchBox.of_method(params, method).names
     theta = {name: outcome.identified[name] for name in names}
     return RigIdentification(outcome, told, theta, seconds)

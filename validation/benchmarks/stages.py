@@ -142,7 +142,9 @@ def main() -> None:
     project = Project(arguments.project.resolve())
     if not (project.folder / "dvc.lock").is_file():
         raise UserError(f"{arguments.project}: no dvc.lock here; give a copy with a run's data")
-    found: dict = {"commit": commit(project.folder), "again_s": again(project)}
+    found: dict = {"commit": commit(project.folder)}
+    if not arguments.steps:  # else the other stages may be stale
+        found["again_s"] = again(project)
     if not arguments.idle:
         found["steps"] = profile(project, arguments.steps)
     command = f"python -m validation.benchmarks.stages --project FOLDER --as {arguments.side}"

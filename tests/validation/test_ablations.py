@@ -3,11 +3,22 @@
 import numpy as np
 import pytest
 
+from pipeline.identify.posterior import coordinates
 from pipeline.identify.search.build import build
 from pipeline.identify.search.loop import latin_hypercube
+from pipeline.params import load
 from validation.campaigns.ablations import FIRST, PAPER, Job, jobs_of, summary
-from validation.campaigns.variants import LAST
+from validation.campaigns.variants import (
+    BESIDE,
+    LAST,
+    PRIOR_CHANGES,
+    of_job,
+    priors_of,
+    spent,
+    with_variants,
+)
 from validation.paired import compared, holm, mean_interval
+from validation.projects import DEFAULTS
 
 
 def test_holm_is_the_textbook_one() -> None:
@@ -109,3 +120,23 @@ def test_jobs_are_distinct_and_the_slow_ones_last() -> None:
     jobs = jobs_of(["band1", "band2"], [LAST, PAPER], 10, 5)
     assert len({*jobs}) == len(jobs) == 2 * 2 * (10 + 4)
     assert all(job.method == LAST for job in jobs[28:])
+
+
+def test_each_variant_changes_what_its_name_says_and_nothing_stays_changed() -> None:
+    default = load(DEFAULTS)
+    usual, large = (with_variants(of_job(default, PAPER, preset)) for preset in (None, "large"))
+    for name in BESIDE - PRIOR_CHANGES.keys() - {"nominal_pads"}:
+        changed = with_variants(of_job(default, name, None))
+        assert (changed.methods[name], changed.optimizer, changed.loss) != (
+            usual.methods[PAPER], usual.optimizer, usual.loss
+        ), name  # fmt: skip
+    assert [spent(one, PAPER) for one in (usual, large)] == [600, 5760]
+    assert spent(with_variants(of_job(default, "bo", "large")), "bo") == 2400
+    before = dict(coordinates.PRIORS)
+    for name, (width, factor) in PRIOR_CHANGES.items():
+        with priors_of(name):
+            mean, spread = coordinates.PRIORS["log_loss_factor"]
+            assert mean - before["log_loss_factor"][0] == pytest.approx(np.log(factor))
+            assert spread / before["log_loss_factor"][1] == pytest.approx(width)
+            assert coordinates.PRIORS["softening"][1] == width * before["softening"][1]
+        assert before == coordinates.PRIORS

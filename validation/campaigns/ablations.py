@@ -34,7 +34,7 @@ from pipeline.params.identification import MethodParams
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import aimed, errors_on_the_rig, identified, recorded
 from validation.campaigns.runner import PAPER, ResultLines, plain, result_of
-from validation.campaigns.variants import LAST, SETTINGS, WEIGHTS, of_job, spent, with_variants
+from validation.campaigns.variants import BESIDE, LAST, of_job, priors_of, spent, with_variants
 from validation.paired import LEVEL, compared, mean_interval
 
 WORK = Path("data/ablations")
@@ -91,7 +91,8 @@ def _params(method: str, preset: str | None) -> Params:
 def aimed_and_launched(job: Job, params: Params, folder: Path) -> dict:
     """What one identification found of the episode in `folder`, and where its launches land."""
     pads = job.method != "nominal_pads"
-    one = identified(params, job.band, job.method, job.seed, folder, recorded_pads=pads)
+    with priors_of(job.method):
+        one = identified(params, job.band, job.method, job.seed, folder, recorded_pads=pads)
     draws = aimed(one.outcome, params, params.trials.targets)
     return {
         "theta": one.theta,
@@ -258,7 +259,7 @@ def run(args: argparse.Namespace) -> None:
 
 def main() -> None:
     params = with_variants(load())
-    usual = [name for name in params.methods if name not in SETTINGS.keys() | WEIGHTS.keys()]
+    usual = [name for name in params.methods if name not in BESIDE]
     parser = runner.parser(__doc__, REPORT, WORK)
     parser.add_argument("--record", action="store_true", help="make the episodes, nothing else")
     parser.add_argument("--report-only", action="store_true", help="of what is there")

@@ -1,14 +1,19 @@
-"""Variants of the paper's method for campaigns: one thing plain, left out or set otherwise."""
+"""Variants of methods for campaigns: one thing plain, left out or set otherwise."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
 from ruamel.yaml import YAML
 
 from pipeline.base.code import ROOT
+from pipeline.identify.posterior import coordinates
 from pipeline.identify.search.explore import rollouts_of
 from pipeline.params import Params
 from pipeline.params.identification import Weights
-from validation.campaigns.runner import PAPER
+from validation.campaigns.runner import OURS, PAPER
 
 PRESETS = ROOT / "presets"
 LAST = "plain_bo"  # takes as long as all others
@@ -27,6 +32,15 @@ WEIGHTS = {
     "force_fourfold": {"geom": 1.0, "force": 4.0, "work": 1.0},
     "work_fourfold": {"geom": 1.0, "force": 1.0, "work": 4.0},
 }
+# The density with its priors' standard deviations times a factor, and the loss factor's mean too.
+PRIOR_CHANGES = {
+    "prior_half": (0.5, 1.0),
+    "prior_twice": (2.0, 1.0),
+    "prior_loss_up": (1.0, 1.4),
+    "prior_loss_down": (1.0, 0.6),
+}
+LAW_CHANGES = "search_rubber", "density_neo_hookean"
+BESIDE = {*SETTINGS, *WEIGHTS, *PRIOR_CHANGES, *LAW_CHANGES}  # what no campaign runs unasked
 # Gaussian processes of thousands of points cost more than the simulations: a large budget is less.
 BAYES, BAYES_LARGE = (
     ("bo", "package_si"),
@@ -56,6 +70,13 @@ def with_variants(params: Params) -> Params:
     for name, weights in WEIGHTS.items():
         methods[name] = one.model_copy(update={"weights": Weights(**weights)})
     methods |= dict.fromkeys(SETTINGS, one)
+    density = params.methods[OURS]
+    methods |= dict.fromkeys(PRIOR_CHANGES, density)
+    rubber, plain = ({"law": one.law, "bounds": one.bounds} for one in (density, methods[PAPER]))
+    methods |= {
+        "search_rubber": methods[PAPER].model_copy(update=rubber),
+        "density_neo_hookean": density.model_copy(update=plain),
+    }
     return params.model_copy(update={"methods": methods})
 
 
@@ -74,6 +95,20 @@ def of_job(params: Params, method: str, preset: str | None) -> Params:
         if name in changes
     }
     return params.model_copy(update=sections)
+
+
+@contextmanager
+def priors_of(method: str) -> Iterator[None]:
+    """Within it the density has the priors that a method's name stands for."""
+    before = dict(coordinates.PRIORS)
+    width, factor = PRIOR_CHANGES.get(method, (1.0, 1.0))
+    for name, (mean, spread) in before.items():
+        shift = np.log(factor) if name == coordinates.LOGS[coordinates.LOSS] else 0.0
+        coordinates.PRIORS[name] = mean + shift, width * spread
+    try:
+        yield
+    finally:
+        coordinates.PRIORS.update(before)
 
 
 def spent(params: Params, method: str) -> int:

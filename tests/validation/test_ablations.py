@@ -14,7 +14,7 @@ from validation.campaigns.variants import (
     PRIOR_CHANGES,
     of_job,
     priors_of,
-    spent,
+    rollouts_of_search,
     with_variants,
 )
 from validation.paired import compared, holm, mean_interval
@@ -130,8 +130,8 @@ def test_each_variant_changes_what_its_name_says_and_nothing_stays_changed() -> 
         assert (changed.methods[name], changed.optimizer, changed.loss) != (
             usual.methods[PAPER], usual.optimizer, usual.loss
         ), name  # fmt: skip
-    assert [spent(one, PAPER) for one in (usual, large)] == [600, 5760]
-    assert spent(with_variants(of_job(default, "bo", "large")), "bo") == 2400
+    assert [rollouts_of_search(one, PAPER) for one in (usual, large)] == [600, 5760]
+    assert rollouts_of_search(with_variants(of_job(default, "bo", "large")), "bo") == 2400
     before = dict(coordinates.PRIORS)
     for name, (width, factor) in PRIOR_CHANGES.items():
         with priors_of(name):

@@ -34,7 +34,14 @@ from pipeline.params.identification import MethodParams
 from validation.campaigns import runner
 from validation.campaigns.rig_scores import aimed, errors_on_the_rig, identified, recorded
 from validation.campaigns.runner import PAPER, ResultLines, plain, result_of
-from validation.campaigns.variants import BESIDE, LAST, of_job, priors_of, spent, with_variants
+from validation.campaigns.variants import (
+    BESIDE,
+    LAST,
+    of_job,
+    priors_of,
+    rollouts_of_search,
+    with_variants,
+)
 from validation.paired import LEVEL, compared, mean_interval
 
 WORK = Path("data/ablations")
@@ -220,7 +227,8 @@ def report(args: argparse.Namespace, params: Params) -> None:
             "preset": args.preset,
             "optimizer": of_job(params, PAPER, args.preset).optimizer.model_dump(),
             "rollouts": {
-                name: spent(of_job(params, name, args.preset), name) for name in args.methods
+                name: rollouts_of_search(of_job(params, name, args.preset), name)
+                for name in args.methods
             },
             "methods": {name: params.methods[name].model_dump() for name in args.methods},
             "intervals": f"{100 * LEVEL:.0f} %, percentile bootstrap over recordings (or seeds)",

@@ -24,8 +24,8 @@ SETTINGS: dict[str, dict] = {
     "nominal_pads": {},
     "cma_8": {"optimizer": {"cma_population": 8}},
     "cma_32": {"optimizer": {"cma_population": 32}},
-    "de_storn": {"optimizer": {"mutation": [0.8, 0.8], "recombination": 0.9}},
-    "de_half": {"optimizer": {"mutation": [0.5, 0.5], "recombination": 0.9}},
+    "de_storn": {"optimizer": {"mutation": [0.7, 0.9], "recombination": 0.9}},
+    "de_half": {"optimizer": {"mutation": [0.4, 0.6], "recombination": 0.9}},
 }
 WEIGHTS = {
     "geom_quarter": {"geom": 0.25, "force": 1.0, "work": 1.0},
@@ -111,7 +111,7 @@ def priors_of(method: str) -> Iterator[None]:
         coordinates.PRIORS.update(before)
 
 
-def spent(params: Params, method: str) -> int:
+def rollouts_of_search(params: Params, method: str) -> int:
     """Rollouts that a method's whole search may have."""
     both = params.methods[method].search == "multistart"
     return rollouts_of(params, method) + (params.optimizer.cma_rollouts if both else 0)

@@ -126,9 +126,9 @@ def test_each_variant_changes_what_its_name_says_and_nothing_stays_changed() -> 
     default = load(DEFAULTS)
     usual, large = (with_variants(of_job(default, PAPER, preset)) for preset in (None, "large"))
     for name in BESIDE - PRIOR_CHANGES.keys() - {"nominal_pads"}:
-        changed = with_variants(of_job(default, name, None))
+        changed = with_variants(of_job(default, name, "large"))
         assert (changed.methods[name], changed.optimizer, changed.loss) != (
-            usual.methods[PAPER], usual.optimizer, usual.loss
+            large.methods[PAPER], large.optimizer, large.loss
         ), name  # fmt: skip
     assert [rollouts_of_search(one, PAPER) for one in (usual, large)] == [600, 5760]
     assert rollouts_of_search(with_variants(of_job(default, "bo", "large")), "bo") == 2400

@@ -173,7 +173,7 @@ def test_the_python_of_the_readme_runs(project: Copy) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     code = text.split("```python\n")[1].split("```")[0].replace("band1_dip", "band1")
     said = project("python", "-c", code).splitlines()
-    assert " Pa, nine of ten from " in said[0]
+    assert " Pa, 90 % interval " in said[0]
     assert float(said[1]) > 0 and len(said[2].strip("()").split(",")) == 2
 
 

@@ -37,7 +37,7 @@ def animate(
     path: Path, episode: Episode, simulated: Simulated, pictures: Pictures, fork_width: float
 ) -> None:
     """Write the animation."""
-    drawn = _Animation(episode, simulated, pictures, fork_width)
+    drawn = ReleaseFrames(episode, simulated, pictures, fork_width)
     times = np.arange(BEGIN, END + STEP / 2, STEP) + simulated.release
     # the moment of each new picture comes in too, so that it is compared with its own state
     taken = pictures.time + simulated.camera
@@ -56,11 +56,20 @@ def animate(
 
 
 @dataclass
-class _Animation:
+class ReleaseFrames:
+    """Frames of a pull at any moment: its latest picture beside the simulated band.
+
+    Attributes:
+        begin: From which moment on the band lies in the cut of the pictures [s]; None: its release.
+        pace: Of time, in the line above.
+    """
+
     episode: Episode
     simulated: Simulated
     pictures: Pictures
     fork_width: float
+    begin: float | None = None
+    pace: str = f"{SLOWER} times slower"
 
     def __post_init__(self) -> None:
         self._taken = self.pictures.time + self.simulated.camera
@@ -70,7 +79,7 @@ class _Animation:
 
     @cached_property
     def _view(self) -> CameraView:
-        return CameraView.of(self.pictures, self.simulated, (WIDE, TALL))
+        return CameraView.of(self.pictures, self.simulated, (WIDE, TALL), self.begin)
 
     def frame(self, time: float) -> Image.Image:
         canvas = self._background.copy()
@@ -92,9 +101,9 @@ class _Animation:
         image = Image.fromarray(canvas[..., ::-1])
         draw, release = ImageDraw.Draw(image), self.simulated.release
         clock = f"t = {_milliseconds(time - release)}"
-        draw.text((2 * WIDE - 12, 8), clock, fill=INK, font=_font(19, bold=True), anchor="ra")
+        draw.text((2 * WIDE - 12, 8), clock, fill=INK, font=font(19, bold=True), anchor="ra")
         told = f"picture of {_milliseconds(self._taken[number] - release)}"
-        draw.text((10, HEAD + TALL - 24), told, fill="white", font=_font(13))
+        draw.text((10, HEAD + TALL - 24), told, fill="white", font=font(13))
         return image
 
     @staticmethod
@@ -106,11 +115,11 @@ class _Animation:
     def _background(self) -> np.ndarray:
         """What keeps still: titles, fork, axes."""
         image = Image.new("RGB", (2 * WIDE, TALL + HEAD), "white")
-        draw, title, small = ImageDraw.Draw(image), _font(19, bold=True), _font(13)
+        draw, title, small = ImageDraw.Draw(image), font(19, bold=True), font(13)
         draw.text((10, 8), "recording", fill=INK, font=title)
         draw.text((10, 31), "camera picture, simulated band drawn in", fill=GREY, font=small)
         draw.text((WIDE + 12, 8), "simulation", fill=SIMULATED, font=title)
-        text = f"dots: the camera's points; {SLOWER} times slower"
+        text = f"dots: the camera's points; {self.pace}"
         draw.text((WIDE + 12, 31), text, fill=GREY, font=small)
         half = self.fork_width / 2
         above, side = (_scaled([[0, -half, 0], [0, half, 0]]), _scaled([[0, 0, 0]]))
@@ -132,6 +141,8 @@ class _Animation:
 
 def _milliseconds(since: float) -> str:
     sign = "−" if since < -5e-5 else "+"
+    if abs(since) >= 1:
+        return f"{sign}{abs(since):.1f} s"
     return f"{sign}{abs(1000 * since):.1f} ms"
 
 
@@ -160,7 +171,7 @@ def _scaled(places: list) -> tuple[np.ndarray, np.ndarray]:
 
 
 @lru_cache
-def _font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
+def font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
     """The one that matplotlib brings."""
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     return ImageFont.truetype(str(Path(matplotlib.get_data_path(), "fonts", "ttf", name)), size)

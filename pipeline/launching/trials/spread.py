@@ -23,7 +23,7 @@ class Spread:
     Attributes:
         centres: With each sample of θ, or with θ alone [m], shape (N, M); NaN where one fails.
         slope: Standard deviation by the error of the draw [m], shape (N,).
-        interval: Central 90 % [m], shape (N, 2); NaN where launches fail.
+        interval: The shortest that holds 90 % [m], shape (N, 2); NaN where launches fail.
     """
 
     centres: np.ndarray
@@ -69,9 +69,32 @@ def landing_spread(
     for row, (centre, width) in enumerate(zip(centres, spread, strict=True)):
         good = centre[np.isfinite(centre)]
         if len(good) >= 0.9 * len(centre) and np.isfinite(width):
-            all_of_them = (good[:, None] + width * ERRORS).ravel()
-            result[row] = np.quantile(all_of_them, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+            centre, kernel = smoothed(good)
+            result[row] = shortest((centre[:, None] + np.hypot(width, kernel) * ERRORS).ravel())
     return Spread(centres, spread, result)
+
+
+def smoothed(values: np.ndarray) -> tuple[np.ndarray, float]:
+    """Values (N,) drawn together, and the Gaussian kernel that keeps mean and variance with them.
+
+    The smoothed bootstrap of Silverman and Young (1987, 10.1093/biomet/74.3.469), by the normal
+    reference rule: the shortest interval of a few bare values is too short.
+    """
+    share = min(1.06 * len(values) ** -0.2, 1.0)
+    return values.mean() + (values - values.mean()) * np.sqrt(1 - share**2), share * values.std()
+
+
+def shortest(values: np.ndarray, level: float = LEVEL) -> np.ndarray:
+    """The shortest interval that holds a share `level` of equally likely values (N,), shape (2,).
+
+    It is the region of highest density (Hyndman 1996, 10.1080/00031305.1996.10474359). A central
+    interval would leave out the likeliest landings where a parameter lies at the end of its range,
+    as that of a rubber which does not soften.
+    """
+    values = np.sort(values)
+    inside = int(np.ceil(level * len(values))) - 1
+    first = int(np.argmin(values[inside:] - values[: len(values) - inside]))
+    return values[[first, first + inside]]
 
 
 def _landing(launched: Launched) -> np.ndarray:

@@ -35,7 +35,7 @@ SCHEMA = pa.schema(
         ("draw_y", pa.float64()),  # m, as commanded
         ("draw_z", pa.float64()),
         ("predicted_y", pa.float64()),  # m, by the calibrated simulator; null where it fails
-        ("predicted_low", pa.float64()),  # m, central 90 % by what is known of theta, law and draw
+        ("predicted_low", pa.float64()),  # m, shortest 90 % by what is known of theta, law and draw
         ("predicted_high", pa.float64()),
         ("predicted_failure", pa.string()),
         ("predicted_leave_y", pa.float64()),  # m, where the simulated projectile leaves the pouch

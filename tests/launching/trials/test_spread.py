@@ -3,8 +3,10 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
+from scipy.stats import norm
 
-from pipeline.launching.trials.spread import MOST, landing_intervals
+from pipeline.launching.trials.spread import MOST, landing_intervals, shortest, smoothed
 from pipeline.simulator.launch import CROSS
 from tests.policy import toy
 
@@ -35,6 +37,23 @@ def test_nine_landings_of_ten_lie_inside() -> None:
             landing = toy.launch(draw + rng.normal(0, error, (4000, 2))).landing_y
             landing = landing * (1 + known * STIFFNESS * rng.normal(size=4000))
             assert 0.85 < ((landing > low) & (landing < high)).mean() < 0.94
+
+
+def test_an_interval_holds_the_likely_end_of_a_one_sided_parameter() -> None:
+    """As of a rubber that does not soften: a central interval leaves it out."""
+    theta = samples()
+    theta[:, 0] = 1 - STIFFNESS * np.abs(np.random.default_rng(1).normal(size=len(theta)))
+    likeliest = toy.launch(DRAWS).landing_y
+    low, high = landing_intervals(launcher, DRAWS, theta, 0.0).T
+    assert (low < likeliest).all() and (likeliest < high).all()
+
+
+def test_a_shortest_interval_and_a_kernel_are_those_of_the_normal() -> None:
+    values = norm.ppf((np.arange(2000) + 0.5) / 2000, 3.0, 2.0)
+    np.testing.assert_allclose(shortest(values), 3 + 2 * norm.ppf([0.05, 0.95]), atol=0.05)
+    inner, kernel = smoothed(values[::20])
+    assert inner.mean() == pytest.approx(values[::20].mean())
+    assert np.hypot(inner.std(), kernel) == pytest.approx(values[::20].std())
 
 
 def test_an_exact_draw_of_a_known_band_has_no_width() -> None:

@@ -1,4 +1,4 @@
-"""index.html of a card: its text, and a replay to turn and to play. One file, no request."""
+"""index.html of a card: its text, and a replay of pull and launches. One file, no request."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from string import Template
 
 import numpy as np
+import pandas as pd
 
 from pipeline.base.files import write_text
 from pipeline.episode.episode import Episode
@@ -15,6 +16,7 @@ from pipeline.params.lab import SetupParams
 from pipeline.report.card.camera_view import SIMULATED
 from pipeline.report.card.simulated import Simulated, smooth
 from pipeline.report.drawing.page import page
+from pipeline.simulator.model import GRAVITY
 
 HERE = Path(__file__).parent
 NODES = 61  # of a line
@@ -24,10 +26,21 @@ MILLIMETRES = 1000
 
 
 def write_page(
-    folder: Path, text: str, title: str, episode: Episode, simulated: Simulated, setup: SetupParams
+    folder: Path,
+    text: str,
+    title: str,
+    episode: Episode,
+    simulated: Simulated,
+    setup: SetupParams,
+    launches: list[dict],
 ) -> None:
-    """Write index.html into `folder`, where the text's pictures lie. Raises UserError."""
-    data = json.dumps(content(episode, simulated, setup), separators=(",", ":"))
+    """Write index.html into `folder`, where the text's pictures lie. Raises UserError.
+
+    Args:
+        launches: As `launched` has them.
+    """
+    shown = content(episode, simulated, setup) | {"launches": launches}
+    data = json.dumps(shown, separators=(",", ":"))
     section = Template((HERE / "replay.html").read_text("utf-8")).substitute(
         color=SIMULATED,
         data=data.replace("</", "<\\/"),
@@ -61,12 +74,58 @@ def content(episode: Episode, simulated: Simulated, setup: SetupParams) -> dict:
         "stamps": _seconds(stamps),
         "counts": [len(cloud) for cloud in clouds],
         "cloud": packed(np.concatenate(clouds)),
+        "hand": packed(episode.position),
+        "moved": _seconds(episode.time - release),
+        "grasp": round(float(episode.grasp_time - release), 5),
         "fork": MILLIMETRES * setup.fork_width,
         "height": MILLIMETRES * setup.fork_height,
         "centre": np.round(MILLIMETRES * (low + high) / 2).tolist(),
         "size": round(0.75 * MILLIMETRES * float(np.linalg.norm(high - low))),
         "color": SIMULATED,
     }
+
+
+def launched(trials: pd.DataFrame, intervals: np.ndarray) -> list[dict]:
+    """Launches by target, for replay.js; places (y, z) in whole millimetres, frame O.
+
+    A measured launch has no flight, and one that failed before it flew has no landing either.
+
+    Args:
+        trials: As the stage `trials` has them.
+        intervals: Of the landing at each target in turn [m], shape (T, 2).
+    """
+    found = []
+    by_target = trials.groupby("target", sort=False)
+    for (target, rows), ends in zip(by_target, intervals, strict=True):
+        ways = [
+            np.stack([row.flight_y, row.flight_z], axis=1)
+            for row in rows.itertuples()
+            if row.flight_y is not None
+        ]
+        ends_of_ways = [way[-1, 0] for way in ways]
+        landings = ends_of_ways or rows.landing_y.dropna().tolist()
+        found.append(
+            {
+                "target": _whole(target),
+                "draw": _whole(rows[["draw_y", "draw_z"]].iloc[0].to_numpy(float)),
+                "interval": _whole(ends) if np.isfinite(ends).all() else None,
+                "step": float(np.median([step(way) for way in ways])) if ways else 0.0,
+                "flights": [_whole(way.ravel()) for way in ways],
+                "landings": _whole(np.array(landings)),
+                "kind": str(rows.kind.iloc[0]),
+            }
+        )
+    return found
+
+
+def step(way: np.ndarray) -> float:
+    """Time between the points of a flight (K, 2), which are even in time, by its fall [s]."""
+    fall = -np.median(np.diff(way[:, 1], 2)) if len(way) > 2 else 0.0
+    return round(float(np.sqrt(max(fall, 0.0) / GRAVITY)), 5)
+
+
+def _whole(lengths: object) -> object:
+    return np.round(MILLIMETRES * np.asarray(lengths, float)).astype(int).tolist()
 
 
 def _seconds(times: np.ndarray) -> list[float]:

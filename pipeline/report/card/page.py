@@ -98,9 +98,9 @@ def launched(trials: pd.DataFrame, intervals: np.ndarray) -> list[dict]:
     by_target = trials.groupby("target", sort=False)
     for (target, rows), ends in zip(by_target, intervals, strict=True):
         ways = [
-            np.stack([row.flight_y, row.flight_z], axis=1)
-            for row in rows.itertuples()
-            if row.flight_y is not None
+            np.stack([y, z], axis=1)
+            for y, z in zip(rows.flight_y, rows.flight_z, strict=True)
+            if y is not None
         ]
         ends_of_ways = [way[-1, 0] for way in ways]
         landings = ends_of_ways or rows.landing_y.dropna().tolist()

@@ -17,6 +17,7 @@ from pipeline.report.drawing.canvas import key, mark, picture
 from pipeline.report.drawing.styles import INK
 from pipeline.report.quantities import QUANTITIES, rounded
 
+WIDTH = 6.4  # inches: words are read on a phone too
 CUT = (520, 470)  # pixels of each camera picture
 MOVED = 0.005  # s after the release: in a picture from then on the band has left the hand
 MOST_SPAN = 1.5  # m of landings on which targets find room for their names
@@ -45,8 +46,10 @@ def camera(episode: Episode, simulated: Simulated, pictures: Pictures) -> Figure
     """Three camera pictures with the simulated band drawn in."""
     view = CameraView.of(pictures, simulated, CUT, begin=0.0)
     chosen = moments(episode, simulated, pictures)
-    figure, axes = plt.subplots(1, len(chosen), figsize=(11, 3.95))
-    for ax, (name, number) in zip(axes, chosen.items(), strict=True):
+    figure, axes = plt.subplots(2, 2, figsize=(7, 7))
+    axes[0, 1].set_axis_off()  # two by two, so that a phone shows them large
+    places = axes[0, 0], axes[1, 0], axes[1, 1]
+    for ax, (name, number) in zip(places, chosen.items(), strict=True):
         image = view.picture(number)
         ax.imshow(image[..., ::-1], interpolation="antialiased")
         line = simulated.line(pictures.time[number] + simulated.camera)
@@ -54,7 +57,14 @@ def camera(episode: Episode, simulated: Simulated, pictures: Pictures) -> Figure
         ax.set_axis_off()
         ax.set_title(name, fontsize=10)
         ax.set(xlim=(-0.5, CUT[0] - 0.5), ylim=(CUT[1] - 0.5, -0.5))
-    figure.suptitle("Does the simulated band (magenta) lie on the recorded one?", **TITLE)
+    axes[0, 1].text(
+        0.5,
+        0.5,
+        "Does the simulated\nband (magenta) lie\non the recorded one?",
+        ha="center",
+        va="center",
+        **TITLE,
+    )
     return figure
 
 
@@ -62,7 +72,7 @@ def camera(episode: Episode, simulated: Simulated, pictures: Pictures) -> Figure
 def force(episode: Episode, simulated: Simulated) -> Figure:
     """Force on the gripper and what is left of it, over time, the release magnified."""
     figure, axes = plt.subplots(
-        2, 2, figsize=(9.6, 4.6), width_ratios=(1.9, 1), height_ratios=(2, 1), sharex="col",
+        2, 2, figsize=(WIDTH, 4.6), width_ratios=(1.6, 1), height_ratios=(2, 1), sharex="col",
         sharey="row",
     )  # fmt: skip
     for top, bottom in axes.T:
@@ -78,18 +88,18 @@ def force(episode: Episode, simulated: Simulated) -> Figure:
             ax.axvline(simulated.release, color="0.6", lw=0.8, zorder=0)
     axes[0, 0].set_ylabel("force on the hand [N]")
     axes[1, 0].set_ylabel("measured −\nsimulated [N]")
-    axes[1, 0].set(xlabel="time [s] (grey line: release)", xlim=episode.time[[0, -1]])
+    axes[1, 0].set(xlabel="time [s], grey: release", xlim=episode.time[[0, -1]])
     around = np.add(simulated.release, AROUND)
-    axes[1, 1].set(xlabel="around the release [s]", xlim=around)
+    axes[1, 1].set(xlabel="around it [s]", xlim=around)
     figure.align_ylabels(axes[:, 0])
-    figure.suptitle("Does the simulated force (magenta) follow the measured one (black)?", **TITLE)
+    figure.suptitle("Does the simulated force follow the measured one?", **TITLE)
     entries = {
         "measured": mark(color=INK, lw=2.4),
         "simulated": mark(color=SIMULATED),
         "residual y": mark(color=INK, lw=1.1),
         "residual z": mark(color=INK, lw=1.1, ls=":"),
     }
-    key(figure, entries.items())
+    key(figure, entries.items(), columns=2)
     return figure
 
 
@@ -97,30 +107,29 @@ def force(episode: Episode, simulated: Simulated) -> Figure:
 def values(shown: list[ShownValue], boxes: dict[str, SearchedRange]) -> Figure:
     """Each searched value's interval as a bar within its box, which is given by name."""
     rows = [one for one in shown if one.name in boxes and one.low is not None]
-    figure, ax = plt.subplots(figsize=(9.6, 0.5 * max(len(rows), 1) + 1.1))
+    figure, ax = plt.subplots(figsize=(WIDTH, 0.62 * max(len(rows), 1) + 0.9))
     for row, one in enumerate(rows):
         assert one.low is not None and one.high is not None  # both are known, or neither is
         box, factor = boxes[one.name], QUANTITIES[one.name].factor
         box = SearchedRange(factor * box.low, factor * box.high, box.scale)
         begin, end = box.place(one.low), box.place(one.high)
-        ax.barh(row, 1, height=0.52, color="0.95", zorder=1)
+        ax.barh(row, 1, height=0.3, color="0.95", zorder=1)
         if one.prior:
             before = np.sort([box.place(end) for end in one.prior])
-            ax.barh(row, np.ptp(before), left=before[0], height=0.52, color="0.86", zorder=1)
-        ax.barh(row, end - begin, left=begin, height=0.52, color=BARS, alpha=0.55, zorder=2)
-        ax.plot([box.place(one.value)] * 2, [row - 0.26, row + 0.26], color=INK, lw=2, zorder=3)
-        words = {"va": "center", "fontsize": 8, "color": "0.45"}
-        ax.text(-0.01, row, f"{rounded(box.low):.6g}", ha="right", **words)
-        ax.text(1.01, row, f"{rounded(box.high):.6g}", ha="left", **words)
-        text = f"{one.value:g}  ({one.low:g} to {one.high:g}) {one.unit}"
-        ax.text(1.12, row, text, va="center", fontsize=9)
-    ax.set_yticks(range(len(rows)), [one.label for one in rows])
-    ax.tick_params(axis="y", length=0, pad=32)
-    ax.set(xlim=(0, 1.55), xticks=[], ylim=(len(rows) - 0.4, -0.6))
+            ax.barh(row, np.ptp(before), left=before[0], height=0.3, color="0.86", zorder=1)
+        ax.barh(row, end - begin, left=begin, height=0.3, color=BARS, alpha=0.55, zorder=2)
+        ax.plot([box.place(one.value)] * 2, [row - 0.15, row + 0.15], color=INK, lw=2, zorder=3)
+        for side, bound in ((0, box.low), (1, box.high)):
+            at = side + 0.02 * (2 * side - 1), row
+            words = {"fontsize": 8, "color": "0.45", "va": "center"}
+            ax.text(*at, f"{rounded(bound):.6g}", ha=("right", "left")[side], **words)
+        text = f"{one.label}: {one.value:g} ({one.low:g} to {one.high:g}) {one.unit}"
+        ax.text(0, row - 0.22, text, va="bottom", fontsize=9)
+    ax.set(xlim=(-0.1, 1.12), xticks=[], yticks=[], ylim=(len(rows) - 0.7, -0.75))
     ax.grid(False)
     for side in ax.spines.values():
         side.set_visible(False)
-    title = "How well are the values known? Bars: 90 % intervals; grey: without the recording"
+    title = "How well are the values known?\nBars: 90 % intervals; grey: without the recording"
     figure.suptitle(title, **TITLE)
     return figure
 
@@ -129,7 +138,7 @@ def values(shown: list[ShownValue], boxes: dict[str, SearchedRange]) -> Figure:
 def landings(inputs: CardInputs) -> Figure:
     """Predicted landings with their intervals, and where launches landed."""
     aims, launched = inputs.aims, inputs.launched
-    figure, ax = plt.subplots(figsize=(9.6, 3.6))
+    figure, ax = plt.subplots(figsize=(WIDTH, 3.8))
     entries = {}
     for kind, (marker, name) in KINDS.items():
         rows = launched.loc[launched.kind == kind]
@@ -139,6 +148,8 @@ def landings(inputs: CardInputs) -> Figure:
         bars = (rows[["predicted_low", "predicted_high"]].to_numpy().T - x) * 100
         unaimed = ~np.isclose(x[:, None], aims.landing, atol=1e-6).any(axis=1)
         _bars(ax, x[unaimed], bars[:, unaimed], color="0.75", lw=3)
+        if unaimed.any():
+            entries["90 % interval of other draws"] = mark(color="0.75", lw=3)
         style = {"marker": marker, "ms": 5, "mfc": "none", "mec": INK, "ls": ""}
         ax.plot(x, 100 * off, **style, zorder=4)
         entries[f"landed ({name})"] = mark(**style)
@@ -149,7 +160,7 @@ def landings(inputs: CardInputs) -> Figure:
     question = "Do launches land inside the predicted intervals?"
     alone = "Where launches should land: predictions of the simulator; nothing was measured"
     figure.suptitle(question if len(launched) else alone, **TITLE)
-    key(figure, entries.items())
+    key(figure, entries.items(), columns=2)
     return figure
 
 

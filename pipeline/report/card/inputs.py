@@ -29,7 +29,7 @@ class Aims:
     Attributes:
         target, landing, hold_force: [m], [m], [N], shape (T,); a landing is NaN where it fails.
         draw: (y, z) [m], shape (T, 2).
-        interval: Central 90 % of the landings [m], shape (T, 2); NaN where not known.
+        interval: Of 90 % of the landings, the shortest [m], shape (T, 2); NaN where not known.
         failure: None, or why a launch fails, length T.
         stretch: Of the drawn band, shape (T,).
         slope: Standard deviation of a landing by the error of the draw [m], shape (T,).

@@ -14,6 +14,7 @@ from pipeline.base.files import write_text
 from pipeline.episode.episode import Episode
 from pipeline.params.lab import SetupParams
 from pipeline.report.card.camera_view import SIMULATED
+from pipeline.report.card.inputs import Aims
 from pipeline.report.card.simulated import Simulated, smooth
 from pipeline.report.drawing.page import page
 from pipeline.simulator.model import GRAVITY
@@ -85,34 +86,33 @@ def content(episode: Episode, simulated: Simulated, setup: SetupParams) -> dict:
     }
 
 
-def launched(trials: pd.DataFrame, intervals: np.ndarray) -> list[dict]:
+def launched(trials: pd.DataFrame, aims: Aims) -> list[dict]:
     """Launches by target, for replay.js; places (y, z) in whole millimetres, frame O.
 
     A measured launch has no flight, and one that failed before it flew has no landing either.
 
     Args:
         trials: As the stage `trials` has them.
-        intervals: Of the landing at each target in turn [m], shape (T, 2).
     """
     found = []
-    by_target = trials.groupby("target", sort=False)
-    for (target, rows), ends in zip(by_target, intervals, strict=True):
+    for target, draw, ends in zip(aims.target, aims.draw, aims.interval, strict=True):
+        if not np.isfinite(draw).all():
+            continue
+        rows = trials.loc[np.isclose(trials.target, target)]
+        flown = rows.loc[rows.flight_y.notna()]
         ways = [
-            np.stack([y, z], axis=1)
-            for y, z in zip(rows.flight_y, rows.flight_z, strict=True)
-            if y is not None
+            np.stack([y, z], axis=1) for y, z in zip(flown.flight_y, flown.flight_z, strict=True)
         ]
-        ends_of_ways = [way[-1, 0] for way in ways]
-        landings = ends_of_ways or rows.landing_y.dropna().tolist()
+        landings = [way[-1, 0] for way in ways] or rows.landing_y.dropna().tolist()
         found.append(
             {
                 "target": _whole(target),
-                "draw": _whole(rows[["draw_y", "draw_z"]].iloc[0].to_numpy(float)),
+                "draw": _whole(draw),
                 "interval": _whole(ends) if np.isfinite(ends).all() else None,
                 "step": float(np.median([step(way) for way in ways])) if ways else 0.0,
                 "flights": [_whole(way.ravel()) for way in ways],
                 "landings": _whole(np.array(landings)),
-                "kind": str(rows.kind.iloc[0]),
+                "kind": str(rows.kind.iloc[0]) if len(rows) else "predicted",
             }
         )
     return found

@@ -56,7 +56,7 @@ def write(params: Params, band: str, method: str, root: str | Path = ".") -> dic
         write_text(folder / "README.md", card_text(*text))
         write_json(folder / "card.json", card)
         page = card_text(*text, animated=False)
-        launches = launched(inputs.trials, aims.interval)
+        launches = launched(inputs.trials, aims)
         write_page(folder, page, f"{band}: {verdict}", episode, simulated, setup, launches)
     return card
 

@@ -74,6 +74,7 @@ def trials() -> pd.DataFrame:
     """Two measured launches, both inside their intervals."""
     return pd.DataFrame(
         {"kind": "measured", "landing_y": [1.9, 2.1], "predicted_y": [1.92, 2.08]}
+        | {"target": np.nan, "flight_y": None, "flight_z": None}
         | {"predicted_low": [1.8, 2.0], "predicted_high": [2.0, 2.2], "stretch": 1.4}
     )
 

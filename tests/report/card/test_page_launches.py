@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pipeline.report.card.inputs import Aims
 from pipeline.report.card.page import launched, step
 
 GRAVITY = 9.81
@@ -22,12 +23,22 @@ def test_the_time_between_points_is_that_of_the_fall() -> None:
 
 def test_flights_landings_and_intervals_by_target() -> None:
     way = flight(3.0, 0.7)
-    row = {"draw_y": -0.3, "draw_z": -0.15, "kind": "virtual"}
+    row = {"kind": "virtual"}
     flown = row | {"flight_y": way[:, 0], "flight_z": way[:, 1], "landing_y": way[-1, 0]}
     measured = row | {"flight_y": None, "flight_z": None, "landing_y": 1.9, "kind": "measured"}
     trials = pd.DataFrame([{"target": 2.0, **flown}, {"target": 1.7, **measured}])
-    intervals = np.array([[1.9, 2.1], [np.nan, np.nan]])
-    first, second = launched(trials, intervals)
+    aims = Aims(
+        target=np.array([2.0, 1.7, 9.0]),
+        draw=np.array([[-0.3, -0.15], [-0.29, -0.15], [np.nan, np.nan]]),
+        interval=np.array([[1.9, 2.1], [np.nan, np.nan], [np.nan, np.nan]]),
+        landing=np.zeros(3),
+        hold_force=np.zeros(3),
+        stretch=np.zeros(3),
+        slope=np.zeros(3),
+        samples=np.zeros((3, 0)),
+        failure=[None, None, "out of reach"],
+    )
+    first, second = launched(trials, aims)
     assert (first["target"], first["draw"], first["interval"]) == (2000, [-300, -150], [1900, 2100])
     np.testing.assert_allclose(np.reshape(first["flights"][0], (-1, 2)), 1000 * way, atol=0.5)
     assert first["landings"] == [2000]

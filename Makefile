@@ -8,7 +8,9 @@ help:                 # this list
 setup: .venv/ready    # .venv with everything that is needed
 
 demo: setup           # one virtual band from recording to card, as `sling fit` does it
+	@echo "One virtual band: recorded, identified, a policy trained, launched. About three minutes on two cores."
 	@PATH="$(CURDIR)/.venv/bin:$$PATH" sling fit --name band1_dip
+	@echo "Next: source .venv/bin/activate, then sling aim --band band1_dip --target 1.925"
 
 .venv/ready: pyproject.toml constraints.txt tools/setup.sh
 	@bash tools/setup.sh

@@ -4,6 +4,9 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
+started=$SECONDS
+echo "Setting up .venv: one to three minutes, most of it downloads; 4 GB of disk."
+
 fail() { echo "error: $*" >&2; exit 1; }
 
 # apt WHY PACKAGE...: install packages where we may, else print the command and stop.
@@ -66,3 +69,5 @@ if needs_libraries; then
     ! needs_libraries || fail "$(tail -n 1 .venv/open3d.log)"
 fi
 touch .venv/ready
+took=$((SECONDS - started)) size=$(du -sh .venv | cut -f 1)
+echo "Done in $((took / 60)) min $((took % 60)) s, .venv is $size. Next: make demo, or source .venv/bin/activate"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 
 def shown(card: dict) -> str:
     """Verdict, values, three draws, what would help, and where the card lies.
@@ -13,11 +15,12 @@ def shown(card: dict) -> str:
     lines = [f"{card['band']}: {card['verdict']}", *reasons, ""]
     width = max(len(one["label"]) for one in card["values"])
     lines += [f"  {one['label']:{width}}  {_value(one)}" for one in card["values"]]
-    lines += ["", "  target     draw (y, z)           lands at   nine of ten         force"]
+    lines += ["", "  target     draw (y, z)           lands at   90 % interval       force"]
     lines += [_draw(one) for one in card["draws"]]
     if card["next"]:
         lines += ["", "What would help most:", *(f"  - {one}" for one in card["next"])]
-    return "\n".join([*lines, "", f"Card: {card['card']}"])
+    page = Path(card["card"]).with_name("index.html").resolve()
+    return "\n".join([*lines, "", f"Card: {card['card']}", f"Page with a replay: {page.as_uri()}"])
 
 
 def _value(about: dict) -> str:

@@ -1,6 +1,7 @@
 """`sling fit`: what it brings in, what it asks DVC for, what it refuses, and its screen."""
 
 import json
+import re
 import shutil
 from types import SimpleNamespace
 
@@ -199,7 +200,11 @@ def test_the_screen() -> None:
     assert "  Poisson's ratio  0.47, fixed" in lines
     assert any("1.725 m" in one and "1.600 to 1.900 m" in one and "9.1 N" in one for one in lines)
     assert any("fails in simulation" in one for one in lines)
-    assert lines[-1] == "Card: reports/bands/mine/README.md" and len(lines) < 25
+    assert lines[-2] == "Card: reports/bands/mine/README.md" and len(lines) < 25
+    page = re.fullmatch(
+        r"Page with a replay: file://(/.*/reports/bands/mine/index\.html)", lines[-1]
+    )
+    assert page
 
 
 def test_the_countdown_tells_each_stage_and_falls(capsys, monkeypatch) -> None:

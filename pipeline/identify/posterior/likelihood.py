@@ -29,6 +29,7 @@ from pipeline.simulator.parameters import Parameters
 
 SIMULATED = "release", "camera", "hand"
 UNLIKE = 0.05  # an autocorrelation that is none
+TOLD = 3e-5  # s of the release, against a clock that it tells itself
 NUDGE = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
 
 
@@ -69,10 +70,13 @@ class Tolerances:
         about = episode.metadata.get("preprocessing", {})
         delays = about.get("delays") or {}
         told = {name: delays.get(name) or {} for name in ("camera", "pose")}
-        left = {name: one.get("left") or one.get("error") for name, one in told.items()}
-        if left["camera"] and told["camera"].get("against", "pose") == "pose":
-            left["camera"] = np.hypot(left["camera"], left["pose"] or 0.0)
-        given = {"release": about.get("release_error"), **left}
+        given = {name: one.get("left") or one.get("error") for name, one in told.items()}
+        given["release"] = about.get("release_error")
+        if given["camera"] and told["camera"].get("against", "pose") == "pose":
+            given["camera"] = np.hypot(given["camera"], given["pose"] or 0.0)
+            if told["pose"].get("against") == "release":  # no matter when the force's stamps have it
+                given["release"], late = TOLD, given["release"] or 0.0
+                given["pose"] = np.hypot(given["pose"] or 0.0, late)
         return cls(**{name: float(value) for name, value in given.items() if value})
 
     @property

@@ -120,8 +120,8 @@ def main() -> None:
     lines = [done[job] for job in todo if job in done]
     report = environment("cpu", "python -m validation.campaigns.camera_clock") | {
         "kind": "virtual",
-        "asked": "At most 0.3 ms rms over 30 recordings of the rig, and the stated error true within"
-        " a factor of 1.5.",
+        "asked": "At most 0.3 ms rms over 30 recordings of the rig, and the stated error true"
+        " within a factor of 1.5.",
         "jobs": [len(lines), len(todo)],
         "settings": {"reach_s": REACH, "plan.dips": [dict(d) for d in load(DEFAULTS).plan.dips]},
         "figures": figures(lines),

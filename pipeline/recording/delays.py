@@ -82,10 +82,9 @@ class Estimate:
         Else it is what may be left.
         """
         error = max(error, LEAST_ERROR)
-        sure = given is None or abs(rest) > SIGMAS * error
-        left = error if sure else float(np.hypot(error, rest))
-        if sure:
-            return cls(rest + (given or 0.0), error, "estimated", sure, left, against, given)
+        if given is None or abs(rest) > SIGMAS * error:
+            return cls(rest + (given or 0.0), error, "estimated", True, error, against, given)
+        left = float(np.hypot(error, rest))
         return cls(given, error, "setup", given != 0, left, against, given)
 
     @property

@@ -52,7 +52,9 @@ def start_back(pull: Pull) -> tuple[float, float] | None:
     return late, float(np.hypot(np.hypot(spread, floor), sudden / 4))
 
 
-def _begin(at: np.ndarray, place: np.ndarray, powers: tuple[int, ...]) -> tuple[float, float, float]:
+def _begin(
+    at: np.ndarray, place: np.ndarray, powers: tuple[int, ...]
+) -> tuple[float, float, float]:
     """When a path (N,) [m] at times (N,) is bent [s], the standard error, and what is left of it.
 
     Args:
@@ -66,7 +68,7 @@ def _begin(at: np.ndarray, place: np.ndarray, powers: tuple[int, ...]) -> tuple[
         gap = place - design @ np.linalg.lstsq(design, place, rcond=None)[0]
         left.append(gap @ gap)
     left = np.array(left)
-    noise = max(left.min() / (len(at) - design.shape[1] - 1), 1e-14)
+    noise = max(left.min() / (len(at) - SLOW - len(powers) - 2), 1e-14)
     weight = np.exp(-(left - left.min()) / (2 * noise))
     weight /= weight.sum()
     begin = float(weight @ begins)

@@ -106,7 +106,7 @@ def figures(lines: list[dict]) -> dict:
             "stated_over_rms": told / rms,
             "met": bool(rms <= MOST and 1 / FACTOR <= told / rms <= FACTOR),
         }
-    return plain(result, 4)
+    return result
 
 
 def main() -> None:
@@ -124,7 +124,7 @@ def main() -> None:
         " within a factor of 1.5.",
         "jobs": [len(lines), len(todo)],
         "settings": {"reach_s": REACH, "plan.dips": [dict(d) for d in load(DEFAULTS).plan.dips]},
-        "figures": figures(lines),
+        "figures": plain(figures(lines), 4),
         "recordings": plain(lines, 5),
     }
     write_json(args.report, report)

@@ -66,7 +66,7 @@ def figures(lines: list[dict]) -> dict:
             "ranks": ranks,
             "met": all(HELD[0] <= one["coverage"] <= HELD[1] for one in ranks.values()),
         }
-    return plain(result, 4)
+    return result
 
 
 def main() -> None:
@@ -86,7 +86,7 @@ def main() -> None:
         "asked": "90 % intervals of each coordinate and of a launch hold 85 to 95 % of 200 truths"
         " that are drawn from the priors, with all nuisances.",
         "jobs": [len(lines), len(todo)],
-        "figures": figures(lines),
+        "figures": plain(figures(lines), 4),
         "episodes": plain(lines, 4),
     }
     write_json(args.report, report)

@@ -2,8 +2,8 @@
 
 The first band of params.yaml is grasped where it hangs, lifted, drawn back 0.35 m, held, and let go
 at 8.1 of 9 s. As a yardstick on a fresh clone, a loss compares with one simulated band: its
-filtered force, and points on its ridge. Of the simulator's own law, with a recorder's noise and
-errors, an episode is truth for an identification without an error of the model.
+filtered force, and points on its ridge. Of the simulator's own law, an episode is truth for an
+identification without an error of the model.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pipeline.episode.episode import Episode
 from pipeline.episode.signal import average, lowpass, uniform
@@ -172,36 +171,3 @@ def visible(
     distance = np.linalg.norm(ray, axis=1, keepdims=True)
     points = points + ray / distance * rng.normal(0, noise, distance.shape) * distance**2
     return rng.permutation(points)[:POINTS].astype(np.float32)
-
-
-def disturbed(
-    episode: Episode,
-    rng: np.random.Generator,
-    *,
-    release: float,
-    camera: float,
-    shift: float,
-    turn: float,
-    bias: float,
-) -> Episode:
-    """The episode with the errors that a recorder makes; its metadata tell their size.
-
-    Args:
-        release, camera: Standard deviation of the release's time and of the camera's clock [s].
-        shift, turn: Of the camera's extrinsics, each axis [m], [rad].
-        bias: Of the tared force, each axis [N].
-    """
-    rotation = Rotation.from_rotvec(rng.normal(0, turn, 3))
-    moved = rng.normal(0, shift, 3) + episode.camera
-    clouds = [rotation.apply(cloud - episode.camera) + moved for cloud in episode.clouds]
-    late = rng.normal(0, 1, 2) * [release, camera]
-    return replace(
-        episode,
-        force=episode.force + rng.normal(0, bias, 3),
-        clouds=[cloud.astype(np.float32) for cloud in clouds],
-        release_time=episode.release_time + late[0],
-        cloud_time=episode.cloud_time + late[1],
-        metadata={
-            "preprocessing": {"release_error": release, "delays": {"camera": {"error": camera}}}
-        },
-    )

@@ -16,7 +16,7 @@ from pipeline.recording.pulls import Pull
 from pipeline.recording.tool_inertia import LONGEST
 
 BLOCKS = 8  # of time, for errors by leaving one out
-FRAMES = 48  # pictures looked at
+FRAMES = 144  # pictures looked at
 REST = 4  # pictures with the slowest hand, at each end of the way
 PALM, REACH = 0.08, 0.13  # m: what is looked at around a point so far behind the tool centre point
 FINGERTIPS = 0.015  # m behind the tool centre point that are left to the band

@@ -3,8 +3,8 @@
 | | seen in | good to |
 |---|---|---|
 | pose | the tool's inertia, where the sensor feels it | 1 ms |
-| pose | the hand that starts back when the band lets it go | 1 ms |
-| camera, against the pose | the hand in the pictures | 0.5 ms |
+| pose, against the release | the hand that starts back when the band lets it go | 0.2 ms |
+| camera, against the pose | the hand in the pictures | 0.2 ms |
 | camera | which picture is the first without the drawn band | a third of a picture's time |
 
 Inertia and hand are looked for where the hand moves freely, or draws the band: the events are found
@@ -35,7 +35,7 @@ from pipeline.recording.tool_inertia import ToolInertia, estimate_tool_inertia
 Found = TypeVar("Found")
 SIGMAS = 3.0  # what is less sure than this is not corrected
 MOST_ERROR = 0.003  # s: what is not known better counts as not seen
-LEAST_ERROR = 0.0005  # s: what no scatter shows
+LEAST_ERROR = 0.00005  # s: what no scatter shows
 AT_ONCE = 0.04  # s: a hand that starts later does so by itself, not because the band lets it go
 UNSEEN_POSE, UNSEEN_CAMERA = 0.003, 0.02  # s: standard deviations where nothing tells
 GIVEN_POSE, GIVEN_CAMERA = 0.002, 0.005  # s: of what was given
@@ -52,7 +52,7 @@ class Estimate:
         source: "setup", "estimated" or "not seen".
         applied: Whether the stamps are corrected by it.
         left: Standard deviation of what the stamps may still be late [s].
-        against: Whose stamps the estimate is against, "force" or "pose".
+        against: What the estimate is against: "force"; "release", as the force shows it; or "pose".
         given: What was given of it [s]; None where nothing was.
         alone: Only the hand that starts back tells it, as a motion of the robot's own would.
     """
@@ -77,15 +77,14 @@ class Estimate:
     def seen(
         cls, rest: float, error: float, against: str = "force", given: float | None = None
     ) -> Estimate:
-        """What the recording shows beside what was given, applied where it is sure.
+        """What the recording shows, applied; beside what was given only where it is sure.
 
         Else it is what may be left.
         """
         error = max(error, LEAST_ERROR)
-        sure = abs(rest) > SIGMAS * error
-        left = error if sure else float(np.hypot(error, rest))
-        if given is None or sure:
-            return cls(rest + (given or 0.0), error, "estimated", sure, left, against, given)
+        if given is None or abs(rest) > SIGMAS * error:
+            return cls(rest + (given or 0.0), error, "estimated", True, error, against, given)
+        left = float(np.hypot(error, rest))
         return cls(given, error, "setup", given != 0, left, against, given)
 
     @property
@@ -119,8 +118,7 @@ def correct_delays(pull: Pull, params: Params) -> tuple[Pull, Delays]:
     estimated as where none was given.
 
     The camera's is estimated against the pose, after that was corrected, then against the release.
-    An estimate is applied where it is more than three standard deviations, or where the pictures of
-    the release cannot be without it: a wrong correction is worse than none.
+    Where the pictures of the release are off, the hand is looked for from there on.
     """
     given, off = params.episode.delays, pull.recording.late
     pull = _put_right(pull, (given.pose or 0.0) - off.get("pose", 0.0))
@@ -133,9 +131,7 @@ def correct_delays(pull: Pull, params: Params) -> tuple[Pull, Delays]:
         sure = abs(left) > SIGMAS * max(inertia.delay_error, LEAST_ERROR)
         inertia = replace(inertia, delay=left if sure else 0.0)
     camera = Estimate.unseen(given.camera, GIVEN_CAMERA, UNSEEN_CAMERA)
-    found = _or_none(lambda: camera_delay(pull))
-    if found is not None and found[1] > MOST_ERROR:
-        found = None
+    found = _by_hand(pull, params.setup.fork_width)
     if found is not None:
         camera = Estimate.seen(*found, against="pose", given=given.camera)
     pull = _put_right(pull, camera=camera.rest)
@@ -165,6 +161,14 @@ def correct_delays(pull: Pull, params: Params) -> tuple[Pull, Delays]:
         left = float(np.hypot(release.middle, release.error))
         camera = replace(camera, left=left if given.camera is None else min(left, GIVEN_CAMERA))
     return pull, Delays(pose, camera, inertia, release, conflict)
+
+
+def _by_hand(pull: Pull, fork_width: float) -> tuple[float, float] | None:
+    """The camera's delay against the pose and its standard error [s]; None where nothing tells."""
+    release = _or_none(lambda: release_pictures(pull, fork_width))
+    near = release.middle if release is not None and release.beyond else 0.0
+    found = _or_none(lambda: camera_delay(_put_right(pull, camera=near)))
+    return (near + found[0], found[1]) if found and found[1] <= MOST_ERROR else None
 
 
 def _put_right(pull: Pull, pose: float = 0.0, camera: float = 0.0) -> Pull:
@@ -203,7 +207,7 @@ def _of_pose(pull: Pull, inertia: ToolInertia | None, given: float | None) -> tu
         return Estimate.unseen(given, GIVEN_POSE, UNSEEN_POSE), ""
     if len(found) == 2:
         (one, its), (other, others) = found
-        if abs(one - other) > SIGMAS * np.hypot(its, others):
+        if abs(one - other) > SIGMAS * np.linalg.norm([its, others, pull.release.error]):
             words = (
                 f"the pose is {1e3 * one:+.1f} ± {1e3 * its:.1f} ms late by the tool's inertia, but"
                 f" {1e3 * other:+.1f} ± {1e3 * others:.1f} ms by the hand that starts back"
@@ -219,8 +223,9 @@ def _of_pose(pull: Pull, inertia: ToolInertia | None, given: float | None) -> tu
             return Estimate.unseen(given, GIVEN_POSE, UNSEEN_POSE), words
     weights = np.array([error**-2.0 for _, error in found])
     value = float(weights @ [value for value, _ in found] / weights.sum())
-    estimate = Estimate.seen(value, float(weights.sum() ** -0.5), given=given)
-    alone = found == [back] and estimate.rest != 0 and given is None
+    error, against = float(weights.sum() ** -0.5), "release" if back in found else "force"
+    estimate = Estimate.seen(value, error, against, given)
+    alone = found == [back] and abs(value) > SIGMAS * error and given is None
     return replace(estimate, alone=alone), ""
 
 

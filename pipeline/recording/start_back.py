@@ -1,9 +1,13 @@
 """The pose's delay against the force, by the hand that starts back when the band lets it go.
 
 An arm under impedance control gives way to a drawn band and swings back from the moment at which
-the force falls; some robots retreat at once. The path is bent at that moment: a line before it, a
-cubic after it. A hand that starts back by itself some time after the release looks late, before it
-early; so a motion that goes on is believed as far as it is near the release.
+the force falls. It has mass, so its speed does not jump: what bends its path begins with the square
+of the time since. Some robots retreat at once, at a speed that jumps; then the moment is known less
+well. A hand that starts back by itself some time after the release looks late, before it early; so
+a motion that goes on is believed as far as it is near the release.
+
+The release is as the force shows it, whose samples may be a millisecond apart. The path tells the
+moment better than that; an error of the release's time is the same in what is found here.
 """
 
 from __future__ import annotations
@@ -17,10 +21,12 @@ SPAN = 0.02  # s over which the path's second difference is taken
 QUIET = 0.25  # s before REACH, which tells how still a hand is
 SIGMAS = 8.0  # of that, by which the path must bend
 LEAST = 3e-5  # m by which it must bend
-BEFORE, AFTER = 0.05, 0.03  # s of the path around its bend that are fitted
-STEP = 2e-4  # s
-FLOOR = 1e-3  # s: standard error, by what the swing of an arm is not a cubic
-DEGREE = 3
+BEFORE, AFTER = 0.05, 0.04  # s of the path around its bend that are fitted
+STEP = 1e-4  # s
+SLOW = 2  # degree of what the hand does besides
+SWINGS, JUMPS = (2, 3, 4), (1, 2, 3)  # powers of the time since the bend
+FLOOR, JUMPED = 1e-4, 1e-3  # s: standard errors, by what a path is not such a polynomial
+CLEARLY = 4.0  # times less left of the path, or it does not jump
 
 
 def start_back(pull: Pull) -> tuple[float, float] | None:
@@ -34,24 +40,39 @@ def start_back(pull: Pull) -> tuple[float, float] | None:
     if around is None:
         return None
     near = (time > around - BEFORE) & (time <= around + AFTER)
-    fitted = 2 + DEGREE
-    if near.sum() < 3 * fitted:
+    if near.sum() < 3 * (SLOW + len(SWINGS) + 1):
         return None
     at, place = time[near] - around, away[near] - away[near].mean()
+    begin, spread, left = _begin(at, place, SWINGS)
+    floor, jump = FLOOR, _begin(at, place, JUMPS)
+    if CLEARLY * jump[2] < left:
+        (begin, spread, _), floor = jump, JUMPED
+    sudden = max(pull.release.fall - pull.release.resolution, 0.0)  # within a sample it is at once
+    late = around + begin - (release + sudden / 2)
+    return late, float(np.hypot(np.hypot(spread, floor), sudden / 4))
+
+
+def _begin(
+    at: np.ndarray, place: np.ndarray, powers: tuple[int, ...]
+) -> tuple[float, float, float]:
+    """When a path (N,) [m] at times (N,) is bent [s], the standard error, and what is left of it.
+
+    Args:
+        powers: Of the time since.
+    """
+    slow = np.vander(at / AFTER, SLOW + 1)
     begins, left = np.arange(-SPAN, SPAN, STEP), []
     for begin in begins:
         since = np.clip(at - begin, 0, None) / AFTER
-        columns = [np.ones_like(at), at / AFTER, *(since**k for k in range(1, DEGREE + 1))]
-        design = np.stack(columns, axis=1)
+        design = np.column_stack([slow, *(since**k for k in powers)])
         gap = place - design @ np.linalg.lstsq(design, place, rcond=None)[0]
         left.append(gap @ gap)
     left = np.array(left)
-    noise = max(left.min() / (near.sum() - fitted - 1), 1e-14)
+    noise = max(left.min() / (len(at) - SLOW - len(powers) - 2), 1e-14)
     weight = np.exp(-(left - left.min()) / (2 * noise))
     weight /= weight.sum()
     begin = float(weight @ begins)
-    spread = float(np.sqrt(weight @ (begins - begin) ** 2))
-    return around + begin - release, float(np.hypot(spread, FLOOR))
+    return begin, float(np.sqrt(weight @ (begins - begin) ** 2)), float(left.min())
 
 
 def _bend(time: np.ndarray, away: np.ndarray, release: float) -> float | None:

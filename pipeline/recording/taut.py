@@ -13,6 +13,8 @@ from pipeline.recording.view import Scene
 PULLED = 1.1  # least stretch: a band that is drawn less sags
 CLEAR = (0.015, 0.045)  # m of each line left out at its tip (the clamp) and at the hand (fingers)
 WITHIN = 3.5  # diameters from the line: what is further off is no band
+FAST = 0.4  # m/s of the hand, from which the band swings, and a millisecond is half a millimetre
+SPAN = 0.02  # s before and after a picture that tell its hand's speed
 CELL = 0.01  # m of the hand's path whose frames count as one: they share their errors
 LEAST_FRAMES, LEAST_POINTS, MOST_POINTS = 5, 20, 150
 HUNG = 4.0  # cells of the drawn band that the hanging band counts as
@@ -71,7 +73,9 @@ def samples_of(
     for time, cloud in zip(times, clouds, strict=True):
         if not (scene.taut(time) and scene.stretch(time) > PULLED and len(cloud)):
             continue
-        hand = signals.hand(time)
+        before, hand, after = (signals.hand(time + late) for late in (-SPAN, 0.0, SPAN))
+        if np.linalg.norm(after - before) > 2 * SPAN * FAST:
+            continue
         ways = hand - scene.tips
         lengths = np.linalg.norm(ways, axis=1)
         both = np.linalg.norm((ways / lengths[:, None]).sum(axis=0))

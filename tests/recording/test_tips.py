@@ -1,5 +1,6 @@
 """The measured calibration against clouds and recordings that are misplaced by known amounts."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -151,6 +152,11 @@ def test_too_little_of_the_drawn_band_says_nothing() -> None:
     assert measure_tips(scene, times[:3], clouds[:3], EYE, DOWN) is None
     empty = [np.zeros((0, 3), np.float32)] * len(times)
     assert measure_tips(scene, times, empty, EYE, DOWN) is None
+
+    # A hand that is sixteen times faster.
+    slow, fast = scene.signals, SimpleNamespace(**vars(scene.signals))
+    fast.time, fast.hand = slow.time / 16, lambda time: slow.hand(16 * time)
+    assert measure_tips(replace(scene, signals=fast), times / 16, clouds, EYE, DOWN) is None
 
 
 def misplaced(shift: np.ndarray, turn: np.ndarray):

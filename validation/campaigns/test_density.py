@@ -1,4 +1,4 @@
-"""One density: landings of the rig's bands, of rubbers that nobody chose, and of its own law.
+"""One density: landings of the rig's bands, and of rubbers that nobody chose.
 
 Recordings and scores are kept in .checkpoints/density (SLING_DENSITY names another folder), from
 which a campaign that was cut off goes on. validation/rubbers.py says which rubbers took part in
@@ -24,7 +24,7 @@ from pipeline.recording.build import build_episodes
 from validation import density
 from validation.campaigns import rig_scores
 from validation.campaigns.rig_scores import calibrated_clamps, result, sling_of, summary
-from validation.campaigns.runner import OURS, PAPER, each, made_once
+from validation.campaigns.runner import OURS, PAPER, each
 from validation.orange import landings, with_orange
 from validation.projects import DEFAULTS
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
@@ -35,7 +35,6 @@ METHODS = OURS, PAPER
 BANDS, FIVE = ("band1", "band2", "band3"), 5
 FOLDER = Path(os.environ.get("SLING_DENSITY", ROOT / ".checkpoints/density"))
 CODE = fingerprint(json.dumps(digests(Path(rig_scores.__file__))))[:12]  # of what scores hang on
-EPISODES = 240
 RECORDINGS_OF_ORANGE = ROOT.parent / "shared/recordings"
 
 
@@ -226,40 +225,3 @@ def orange_episode(params: Params, name: str) -> Episode:
     if not (folder / "mounting.json").exists():
         calibrated_clamps(params, "orange", build_episodes(path, "orange", params)[0][0], folder)
     return Episode.load(folder / "episode")
-
-
-def own_law(number: int) -> dict:
-    return density.own_law(load(DEFAULTS), OURS, number)
-
-
-def test_episodes_of_its_own_law(progress, record) -> None:
-    def make() -> list[dict]:
-        done = dict(each(own_law, range(EPISODES), cores()))
-        return [done[number] for number in range(EPISODES)]
-
-    found = made_once(FOLDER / CODE / "own-law.json", make)
-    young, loss = (np.abs([each[name] for each in found]) for name in ("E", "loss_factor"))
-    inside = [each["low"] <= each["landing"] <= each["high"] for each in found]
-    width = [(each["high"] - each["low"]) / each["landing"] for each in found]
-    progress(f"  own law: {np.mean(inside):.3f} of the launches lie inside")
-    record(
-        "density-own-law",
-        asked="Intervals of a single launch hold 85 to 95 % of own-law launches drawn from the"
-        " priors; E within 0.05 % and damping within 1 % in the median.",
-        met=bool(
-            0.85 <= np.mean(inside) <= 0.95 and np.median(young) <= 5e-4 and np.median(loss) <= 0.01
-        ),
-        settings={"episodes": EPISODES, "flaws": density.FLAWS, "made_on": made_on()},
-        figures={
-            "coverage": np.mean(inside),
-            "median_width": np.median(width),
-            "young_error": np.quantile(young, [0.5, 0.9, 1.0]),
-            "loss_factor_error": np.quantile(loss, [0.5, 0.9, 1.0]),
-            "parameters": {
-                name: np.mean([each["covers"][name] for each in found])
-                for name in found[0]["covers"]
-            },
-            "settled": np.mean([each["settled"] for each in found]),
-        },
-    )
-    assert 0.85 <= np.mean(inside) <= 0.95

@@ -29,6 +29,7 @@ from pipeline.simulator.parameters import Parameters
 
 SIMULATED = "release", "camera", "hand"
 UNLIKE = 0.05  # an autocorrelation that is none
+TOLD = 3e-5  # s: of the release, where the clocks are told by it
 NUDGE = np.array([1e-4, 2e-4, 5e-4])  # of finite differences [s, s, m]
 
 
@@ -40,7 +41,8 @@ class Tolerances:
         force: Of a sample of the force [N]. Its low-pass repeats a sample's error in some 14, and
             so does what the law gets wrong of the pull: 30 mN each are worth 30 sqrt(14) alone.
         cloud, way: Of a bin of a picture [m], and of the recoil as a share of the way gone.
-        release, camera: Of the release and of the camera's clock against the force's [s].
+        release, camera: Of the release and of the camera's clock against the force's [s]. A camera
+            whose clock is told by the release has all of it.
         hand: Of the hand's place along the pull [m].
         jitter: Of one picture's stamp [s].
         shift, turn: Of the camera's extrinsics [m], [rad].
@@ -69,10 +71,13 @@ class Tolerances:
         about = episode.metadata.get("preprocessing", {})
         delays = about.get("delays") or {}
         told = {name: delays.get(name) or {} for name in ("camera", "pose")}
-        left = {name: one.get("left") or one.get("error") for name, one in told.items()}
-        if left["camera"] and told["camera"].get("against", "pose") == "pose":
-            left["camera"] = np.hypot(left["camera"], left["pose"] or 0.0)
-        given = {"release": about.get("release_error"), **left}
+        given = {name: one.get("left") or one.get("error") for name, one in told.items()}
+        given["release"] = about.get("release_error")
+        if given["camera"] and told["camera"].get("against", "pose") == "pose":
+            given["camera"] = np.hypot(given["camera"], given["pose"] or 0.0)
+            if told["pose"].get("against") == "release":  # and so is the camera's, by the pose
+                given["pose"] = np.hypot(given["pose"] or 0.0, given["release"] or 0.0)
+                given["release"] = TOLD
         return cls(**{name: float(value) for name, value in given.items() if value})
 
     @property
@@ -284,7 +289,7 @@ class Likelihood:
         nuisances: np.ndarray,
     ) -> Expansion:
         has = self.tolerances
-        linear = self._linear(residuals, own[SIMULATED.index("camera")])
+        linear = self._linear(residuals, gap, own[SIMULATED.index("camera")])
         # Of the camera's clock `moved` was taken beforehand, and belongs to what its prior judges.
         nuisances = nuisances + self.moved * (np.array(SIMULATED) == "camera")
         weight = 1 / residuals.spread(has.force, has.cloud, has.way)
@@ -313,9 +318,9 @@ class Likelihood:
             left=(left - solved @ design[rest]) / weight,
         )
 
-    def _linear(self, residuals: Residuals, camera: np.ndarray) -> np.ndarray:
+    def _linear(self, residuals: Residuals, gap: np.ndarray, camera: np.ndarray) -> np.ndarray:
         """Columns of the linear nuisances, each in units of its tolerance, shape (M, R)."""
-        has, known = self.tolerances, residuals.columns()
+        has, known = self.tolerances, residuals.columns(gap)
         sizes = {"force_bias": has.bias, "force_drift": has.drift}
         sizes |= {"force_gain": has.gain, "force_late": has.pose}
         sizes |= {"cloud_shift": has.shift, "cloud_turn": has.turn}

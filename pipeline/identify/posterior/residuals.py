@@ -182,18 +182,22 @@ class Residuals:
         bins = np.hypot(cloud, way * np.where(self.recoils, gone, 0.0))
         return np.concatenate([np.full(3 * len(self.samples), force), bins, bins])
 
-    def columns(self) -> dict[str, np.ndarray]:
+    def columns(self, left: np.ndarray) -> dict[str, np.ndarray]:
         """How the residuals change with what moves all measured forces or points alike, (R,) each.
 
         force_bias_* [N], force_drift_* [N over the pull], force_gain: a share of the force,
         force_late: the force's stamps against the pose's [s], cloud_shift_* [m], cloud_turn_* about
         the camera [rad].
+
+        Args:
+            left: Residuals (R,) of the rollout whose force a gain or a delay is of. With the
+                measured one a gain would explain a part of its noise, at the modulus's expense.
         """
         count, changes = len(self.samples), {}
         time = self.episode.time[self.samples]
         since = (time - time[0]) / (time[-1] - time[0])
-        rate = np.gradient(self.episode.force, self.episode.time, axis=0)[self.samples]
-        for name, course in (("late", rate), ("gain", self.episode.force[self.samples])):
+        force = self.episode.force[self.samples] - left[: 3 * count].reshape(3, count).T
+        for name, course in (("late", np.gradient(force, time, axis=0)), ("gain", force)):
             changes[f"force_{name}"] = np.append(course.T.ravel(), np.zeros(2 * len(self.frame)))
         arm = self.point - self.episode.camera
         turned = np.cross(arm, self.depth), np.cross(arm, self.side)

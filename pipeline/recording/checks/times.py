@@ -26,7 +26,7 @@ CLOCK = Check(
 DELAYED = Check(
     "delay",
     "the stamps of pose and camera with the force's, by what the recording shows",
-    "standard error of the estimate, 0.5 ms or more",
+    "standard error of the estimate, some 0.1 ms",
     f"{SURE:g} standard errors and {1e3 * DELAY:g} ms",
     "",
     "mend them at their driver, or set episode.delays in params.yaml",

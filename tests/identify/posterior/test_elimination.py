@@ -30,7 +30,7 @@ class Case:
         self.residuals = SimpleNamespace(
             frame=FRAME,
             recoils=FRAME > 7,
-            columns=lambda: dict(self.columns),
+            columns=lambda left: dict(self.columns),
             of_frame=lambda number: np.concatenate(
                 [np.zeros(3 * FORCES, bool), FRAME == number, FRAME == number]
             ),
@@ -146,6 +146,11 @@ def test_tolerances_are_the_episodes_own_or_as_usual():
     delays["camera"]["against"] = "force"
     told = Tolerances.of(SimpleNamespace(metadata={"preprocessing": {"delays": delays}}))
     assert (told.camera, told.pose) == (3e-3, 4e-3)
+    delays = {"camera": {"left": 3e-4}, "pose": {"left": 4e-4, "against": "release"}}
+    told = Tolerances.of(
+        SimpleNamespace(metadata={"preprocessing": {"release_error": 3e-4, "delays": delays}})
+    )
+    assert (told.camera, told.pose) == pytest.approx((5e-4, 5e-4)) and told.release < 1e-4
     for empty in ({}, {"preprocessing": {"delays": None}}, {"preprocessing": {"delays": {}}}):
         assert Tolerances.of(SimpleNamespace(metadata=empty)) == usual
 

@@ -147,7 +147,8 @@ def test_bias_and_shift_move_the_residuals_by_their_columns(exact):
     episode = exact[0]
     rollouts = interact(SLING, episode, TRUTH)
     base = Residuals(episode, SLING, CUTOFF, rollouts.center_line[0])
-    columns, bias, shift = base.columns(), np.array([0.02, -0.05, 0.1]), [3e-4, -2e-4, 4e-4]
+    left, bias, shift = base(rollouts)[0], np.array([0.02, -0.05, 0.1]), [3e-4, -2e-4, 4e-4]
+    columns = base.columns(left)
     moved = replace(
         episode,
         force=episode.force + bias,
@@ -157,6 +158,9 @@ def test_bias_and_shift_move_the_residuals_by_their_columns(exact):
     force = Residuals(moved, SLING, CUTOFF, rollouts.center_line[0])(rollouts)[0]
     expected = np.tensordot(bias, [columns[f"force_bias_{axis}"] for axis in "xyz"], 1)
     np.testing.assert_allclose((force - base(rollouts)[0])[:count], expected[:count], atol=1e-9)
+    # a gain is of the simulated force: what is measured besides is not to explain itself
+    gain = Residuals(moved, SLING, CUTOFF, rollouts.center_line[0]).columns(force)["force_gain"]
+    np.testing.assert_allclose(gain, columns["force_gain"], atol=1e-9)
     # the same bins seen from their new place: the mean points move, the line does not
     cloud = base(rollouts)[0][count:]
     base.point = base.point + shift

@@ -1,0 +1,100 @@
+"""Simulation-based calibration of the density: are its intervals true where its model is?
+
+    python -m validation.campaigns.own_law
+    python -m validation.campaigns.own_law --report-only   # of what is there
+
+Coordinates and nuisances are drawn from the density's own priors, an episode of EPISODES by each
+pull is simulated from them with the density's own noise (validation/own_law.py), and identified by
+the default method. Ranks of the truth are even, and 90 % intervals hold 90 %, where all is right.
+Results are lines of results.jsonl in --work: a run that was killed goes on from there. It writes
+reports/validation/density-own-law.json.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.base import errors
+from pipeline.base.environment import environment
+from pipeline.base.files import write_json
+from pipeline.params import load
+from validation.campaigns import runner
+from validation.campaigns.runner import OURS, ResultLines, plain, result_of
+from validation.own_law import ranked
+from validation.projects import DEFAULTS
+from validation.ranks import told
+
+WORK, REPORT = Path(".checkpoints/own-law"), Path("reports/validation/density-own-law.json")
+PULLS, EPISODES = ("informative", "paper"), 200
+HELD = 0.85, 0.95  # of each coordinate's and of the landings' 90 % intervals
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """An episode of the density's own model."""
+
+    pull: str
+    number: int
+
+
+def performed(job: Drawn) -> dict:
+    params = load(DEFAULTS)
+    dips = params.plan.dips if job.pull == "informative" else ()
+    seed = [19, PULLS.index(job.pull), job.number]
+    return result_of(job, lambda: ranked(params, OURS, dips, seed))
+
+
+def figures(lines: list[dict]) -> dict:
+    """By pull: what the ranks of each coordinate and of the landings say."""
+    result = {}
+    for pull in PULLS:
+        some = [one for one in lines if one["pull"] == pull]
+        good = [one for one in some if "failed" not in one]
+        if not good:
+            continue
+        parts = {
+            name: np.array([one["below"][name] for one in good], float) for name in good[0]["below"]
+        }
+        ranks = {name: told(one[np.isfinite(one)]) for name, one in parts.items()}
+        result[pull] = {
+            "episodes": len(good),
+            "refused": [one["failed"] for one in some if "failed" in one],
+            "settled": sum(one["settled"] for one in good),
+            "ranks": ranks,
+            "met": all(HELD[0] <= one["coverage"] <= HELD[1] for one in ranks.values()),
+        }
+    return result
+
+
+def main() -> None:
+    parser = runner.parser(str(__doc__), REPORT, WORK)
+    parser.add_argument("--minutes", type=float, default=1e4, help="then it ends; again: goes on")
+    parser.add_argument("--episodes", type=int, default=EPISODES, help="of each pull, at most")
+    parser.add_argument("--report-only", action="store_true", help="of what is there")
+    args = parser.parse_args()
+    todo = [Drawn(pull, number) for number in range(args.episodes) for pull in PULLS]
+    results = ResultLines(args.work.resolve() / "results.jsonl")
+    if not args.report_only:
+        runner.run(performed, todo, results, args.workers, args.minutes)
+    done = results.of(Drawn)
+    lines = [done[job] for job in todo if job in done]
+    report = environment("cpu", "python -m validation.campaigns.own_law") | {
+        "kind": "virtual",
+        "asked": "90 % intervals of each coordinate and of a launch hold 85 to 95 % of 200 truths"
+        " that are drawn from the priors, with all nuisances.",
+        "jobs": [len(lines), len(todo)],
+        "figures": plain(figures(lines), 4),
+        "episodes": plain(lines, 4),
+    }
+    write_json(args.report, report)
+    for pull, about in report["figures"].items():
+        print(f"{pull}: {about['episodes']} episodes, {about['settled']} settled")
+        for name, one in about["ranks"].items():
+            print(f"  {name}: {one}")
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
+from pipeline.base.errors import OF_THE_EXTRA
 from tests.project import ROOT
 
 OURS = {
@@ -109,7 +111,7 @@ def distributions(package: str) -> set[str]:
 
 def test_what_is_imported_is_declared_for_who_imports_it() -> None:
     """What a stage or a command imports comes by `make setup`, or by an extra that it names."""
-    everybody, used = declared(), set()
+    everybody, used = declared() | declared("run"), set()
     for file in sorted(file for top in OURS for file in (ROOT / top).rglob("*.py")):
         name = file.relative_to(ROOT).as_posix()
         if name.startswith(ELSEWHERE):
@@ -123,3 +125,39 @@ def test_what_is_imported_is_declared_for_who_imports_it() -> None:
     extras = set().union(*map(declared, PROJECT["optional-dependencies"]))
     idle = (everybody | extras) - used - INDIRECT.keys()
     assert not idle, "declared, and imported by nobody"
+
+
+LIGHT = """
+import sys
+absent = set({absent!r})
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in absent:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Absent())
+import app.aim, app.export, app.launch, app.plan, app.preflight
+import sling2sim2real as s2s
+s2s.identify, s2s.aim, s2s.launch, s2s.read_mcap
+from app.cli import main
+sys.argv = ["sling", *{words!r}]
+main()
+"""
+
+
+def light(*words: str) -> subprocess.CompletedProcess:
+    """`sling` in a Python without what the extra `run` brings."""
+    script = LIGHT.format(absent=sorted(OF_THE_EXTRA), words=words)
+    return subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
+
+
+def test_a_light_install_suffices_and_says_what_it_lacks() -> None:
+    brought = {name for one in OF_THE_EXTRA for name in distributions(one)}
+    assert declared("run") <= brought
+    assert not declared() & brought
+    assert light("--help").returncode == 0
+    lacking = light("flow")
+    assert lacking.returncode == 1
+    assert re.fullmatch(
+        r"error: \w+ is not installed: make setup, or pip install 'sling2sim2real\[run\]'\n",
+        lacking.stderr,
+    )

@@ -55,6 +55,21 @@ def _whose(path: str) -> str:
     return f": {what} is user {owner}'s, you are {us}; have it yours (chown), or copy the project"
 
 
+# What the extra `run` of pyproject.toml brings, as it is imported.
+OF_THE_EXTRA = frozenset(
+    "botorch dvc fastapi gpytorch markdown_it networkx numba onnx onnxscript prefect psutil"
+    " rsl_rl sksundae tensordict torch".split()
+)
+
+
+def absent(error: ModuleNotFoundError) -> str | None:
+    """How to get a package that a light install lacks; None for any other."""
+    name = str(error.name).partition(".")[0]
+    if name not in OF_THE_EXTRA:
+        return None
+    return f"{name} is not installed: make setup, or pip install 'sling2sim2real[run]'"
+
+
 def run(main: Callable[[], int | None]) -> None:
     """Run a command: a UserError, or what a disk refuses, is one line on stderr, exit status 1.
 
@@ -68,6 +83,11 @@ def run(main: Callable[[], int | None]) -> None:
         sys.stdout.flush()
     except UserError as error:
         print(f"error: {printable(str(error))}", file=sys.stderr)
+        sys.exit(1)
+    except ModuleNotFoundError as error:
+        if not (line := absent(error)):
+            raise
+        print(f"error: {line}", file=sys.stderr)
         sys.exit(1)
     except BrokenPipeError:  # the reader, such as head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

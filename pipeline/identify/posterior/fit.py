@@ -28,6 +28,7 @@ FLAT = 0.2  # of -2 log p: so little that a step which changes it by less tells 
 NEAR = 1.0  # standard deviations that such a step may go
 LEAST = 1e-12  # of a precision
 DAMP, HARDER, EASIER, HARDEST = 1e-3, 10.0, 0.2, 1e4  # Levenberg's, relative to the diagonal
+HALF = 1.0  # at least, after a step that went wrong: it halves the next one
 
 
 class NoFit(UserError):
@@ -102,7 +103,7 @@ def fit(
             else:
                 if trial and best and trial.misfit < best.misfit + FLAT and gone < NEAR:
                     return replace(best, settled=True, steps=steps)
-                damp *= HARDER
+                damp = max(damp * HARDER, HALF)
             assert best is not None  # else NoFit
             step = _step(best, coordinates, damp)
             gone = _size(best, step)
@@ -113,7 +114,7 @@ def fit(
             phi = best.phi + step
             nuisances = np.array(
                 [
-                    own + one.nuisances[0] + one.nuisances[1] @ step
+                    own + one.nuisances[0] / (1 + damp) + one.nuisances[1] @ step
                     for own, one in zip(best.nuisances, best.expansions, strict=True)
                 ]
             )

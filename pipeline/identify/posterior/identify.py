@@ -128,8 +128,10 @@ def fit_posterior(
             )
     birge = disagreement(found)
     precision = found.hessian / birge**2
-    centre = found.phi + np.linalg.solve(found.hessian, found.gradient)
     box = coordinates.low, coordinates.high
+    # Elsewhere a gradient is what a settled fit left of its last step, which did not lead further.
+    outward = np.where(found.gradient < 0, found.phi <= box[0], found.phi >= box[1])
+    centre = found.phi + np.linalg.solve(found.hessian, found.gradient * outward)
     rng = np.random.default_rng(params.optimizer.seed)
     samples = truncated_gaussian(centre, precision, *box, SAMPLES, rng)
     return Identified(coordinates, found, birge, samples, recordings, launches)

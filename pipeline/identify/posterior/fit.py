@@ -27,7 +27,7 @@ STILL = 0.2  # of a last step, in standard deviations: no interval is 2 % wider 
 FLAT = 0.2  # of -2 log p: so little that a step which changes it by less tells nothing apart
 NEAR = 1.0  # standard deviations that such a step may go
 LEAST = 1e-12  # of a precision
-DAMP, HARDER, EASIER, HARDEST = 1e-3, 10.0, 0.2, 1e4  # Levenberg's, relative to the diagonal
+DAMP, HARDER, EASIER, HARDEST = 1e-3, 10.0, 0.05, 1e4  # Levenberg's, relative to the diagonal
 HALF = 1.0  # at least, after a step that went wrong: it halves the next one
 
 

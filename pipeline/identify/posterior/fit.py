@@ -24,6 +24,7 @@ ITERATIONS = 14  # at most
 BINNED = 4  # of them sort the points into bins anew; then the density keeps its form
 LONGEST = 20.0  # of a step, in those of the finite differences
 STILL = 0.2  # of a last step, in standard deviations: no interval is 2 % wider by as much
+SHORT = 0.25  # of that: a damped step where the fit is stuck
 FLAT = 0.2  # of -2 log p: so little that a step which changes it by less tells nothing apart
 NEAR = 1.0  # standard deviations that such a step may go
 LEAST = 1e-12  # of a precision
@@ -107,10 +108,10 @@ def fit(
             assert best is not None  # else NoFit
             step = _step(best, coordinates, damp)
             gone = _size(best, step)
-            if gone < STILL or damp > HARDEST:
-                # Damping makes any step short, also where the fit is stuck.
-                free = _step(best, coordinates, min(damp, DAMP))
-                return replace(best, settled=_size(best, free) < STILL, steps=steps)
+            # Damping makes any step short, also where the fit is stuck.
+            settled = _size(best, _step(best, coordinates, min(damp, DAMP))) < STILL
+            if settled or gone < SHORT * STILL or damp > HARDEST:
+                return replace(best, settled=settled, steps=steps)
             phi = best.phi + step
             nuisances = np.array(
                 [

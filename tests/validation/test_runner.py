@@ -1,6 +1,7 @@
 """What campaigns share: a run that was killed goes on, and a failure is a result."""
 
 import os
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,10 +49,17 @@ def test_a_run_that_was_killed_goes_on(tmp_path) -> None:
     assert ResultLines(path).where(number=-1) == [{"number": -1, "failed": "no square"}]
 
 
-def test_nothing_begins_when_the_time_is_over(tmp_path, capsys) -> None:
-    lines = ResultLines(tmp_path / "results.jsonl")
-    run(work_on, [Square(n) for n in range(50)], lines, 1, minutes=0.0)
-    assert len(lines.lines) < 50 and "the time is over" in capsys.readouterr().out
+def slow(job: Square) -> dict:
+    time.sleep(60)
+    return work_on(job)
+
+
+def test_a_run_ends_when_the_time_is_over(tmp_path, capsys) -> None:
+    """Also what is under way."""
+    lines, begin = ResultLines(tmp_path / "results.jsonl"), time.monotonic()
+    run(slow, [Square(n) for n in range(50)], lines, 1, minutes=0.02)
+    assert time.monotonic() - begin < 50
+    assert not lines.lines and "the time is over" in capsys.readouterr().out
 
 
 def broken(job: Square) -> dict:

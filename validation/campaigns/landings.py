@@ -7,8 +7,9 @@
 Each band is recorded by the paper's pull and by the informative one (`plan.dips`), virgin and as it
 is after an earlier pull, and identified by the default method from that one recording; nine targets
 are scored without launch noise (bias), and one launch each with it (coverage). Results are lines of
-results.jsonl in --work: a run that was killed goes on from there. It writes
-reports/validation/landings-<set>.json.
+results.jsonl in --work: a run that was killed, or whose --minutes were over, goes on from there. It
+writes reports/validation/landings-<set>.json. With --keep the episodes stay in --work: what comes
+after them is repeated without the recording, once results.jsonl is gone.
 """
 
 from __future__ import annotations
@@ -76,8 +77,12 @@ def jobs(name: str, most: int = TEN, pulls: Sequence[str] = PULLS) -> list[OneRe
     ]
 
 
-def identified(job: OneRecording, work: Path) -> dict:
-    """Scores of the default method by one recording, and what it says of itself."""
+def identified(job: OneRecording, work: Path, keep: bool = False) -> dict:
+    """Scores of the default method by one recording, and what it says of itself.
+
+    Args:
+        keep: The episode, in a folder of `work`; one that is there is taken as it is.
+    """
     params, begin = job.params, time.process_time()
     folder = work / f"{job.band}-{job.pull}-{'worn' if job.worn else 'virgin'}-{job.number}"
     episode = recorded(params, job.band, folder)
@@ -86,7 +91,8 @@ def identified(job: OneRecording, work: Path) -> dict:
     seconds = time.process_time() - start
     with World(job.band, saved(params, folder / "params.yaml"), workers=1) as world:
         scores = scored(outcome, params, world, seed=job.number)
-    shutil.rmtree(folder)
+    if not keep:
+        shutil.rmtree(folder)
     kept = {name: told[name] for name in ("parameters", "derived", "settled", "steps")}
     return plain(
         {
@@ -99,8 +105,8 @@ def identified(job: OneRecording, work: Path) -> dict:
     )
 
 
-def performed(job: OneRecording, work: Path) -> dict:
-    return result_of(job, partial(identified, job, work))
+def performed(job: OneRecording, work: Path, keep: bool) -> dict:
+    return result_of(job, partial(identified, job, work, keep))
 
 
 def figures(lines: list[dict]) -> dict:
@@ -154,6 +160,7 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=cores())
     parser.add_argument("--minutes", type=float, default=1e4, help="then it ends; again: goes on")
     parser.add_argument("--pulls", nargs="+", choices=PULLS, default=PULLS)
+    parser.add_argument("--keep", action="store_true", help="the episodes, and take those kept")
     parser.add_argument("--report", action="store_true", help="of what is there; nothing runs")
     parser.add_argument("--recordings", type=int, default=TEN, help="of each band, at most")
     arguments = parser.parse_args()
@@ -164,7 +171,7 @@ def main() -> int:
     )
     if not arguments.report:
         limits = arguments.workers, arguments.minutes
-        runner.run(partial(performed, work=work), todo, results, *limits)
+        runner.run(partial(performed, work=work, keep=arguments.keep), todo, results, *limits)
     done = results.of(OneRecording)
     lines = [done[job] for job in todo if job in done]
     command = f"python -m validation.campaigns.landings {arguments.set}"

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import fields
+from multiprocessing import active_children
 from pathlib import Path
 from threading import Lock
 from typing import TypeVar
@@ -81,7 +82,8 @@ def each(
 ) -> Iterator[tuple[Job, Result | None]]:
     """Jobs and what `work` makes of them as they are done, one a process with one thread.
 
-    Ends early, and says so, when the time is over. Raises what `work` raises.
+    Ends early, and says so, when the time is over: what is under way then is lost. Raises what
+    `work` raises.
     """
     with single_threaded(), Pool(workers=workers) as pool:
         waiting = {pool.submit(work, job): job for job in jobs}
@@ -91,6 +93,8 @@ def each(
                 yield waiting[done], done.result()
         except TimeoutError:
             print("the time is over; run it again to go on", flush=True)
+            for process in active_children():
+                process.terminate()
         finally:  # after an error too, nothing else begins
             pool.shutdown(wait=False, cancel_futures=True)
 

@@ -40,7 +40,7 @@ STEPS = {  # of finite differences
     "softening": 0.02,
     "relaxation": 0.004,
     "air_drag": 0.25,
-    "turn_damping": 0.1,
+    "turn_damping": 0.5,
     "log_returned_share": 0.01,
 }
 # Of 9 in 10 natural and silicone rubbers at 10 to 100 Hz, by

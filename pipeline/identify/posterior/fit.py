@@ -24,10 +24,12 @@ ITERATIONS = 14  # at most
 BINNED = 4  # of them sort the points into bins anew; then the density keeps its form
 LONGEST = 20.0  # of a step, in those of the finite differences
 STILL = 0.2  # of a last step, in standard deviations: no interval is 2 % wider by as much
+SHORT = 0.25  # of that: a damped step where the fit is stuck
 FLAT = 0.2  # of -2 log p: so little that a step which changes it by less tells nothing apart
 NEAR = 1.0  # standard deviations that such a step may go
 LEAST = 1e-12  # of a precision
-DAMP, HARDER, EASIER, HARDEST = 1e-3, 10.0, 0.2, 1e4  # Levenberg's, relative to the diagonal
+DAMP, HARDER, EASIER, HARDEST = 1e-3, 10.0, 0.05, 1e4  # Levenberg's, relative to the diagonal
+HALF = 1.0  # at least, after a step that went wrong: it halves the next one
 
 
 class NoFit(UserError):
@@ -102,18 +104,18 @@ def fit(
             else:
                 if trial and best and trial.misfit < best.misfit + FLAT and gone < NEAR:
                     return replace(best, settled=True, steps=steps)
-                damp *= HARDER
+                damp = max(damp * HARDER, HALF)
             assert best is not None  # else NoFit
             step = _step(best, coordinates, damp)
             gone = _size(best, step)
-            if gone < STILL or damp > HARDEST:
-                # Damping makes any step short, also where the fit is stuck.
-                free = _step(best, coordinates, min(damp, DAMP))
-                return replace(best, settled=_size(best, free) < STILL, steps=steps)
+            # Damping makes any step short, also where the fit is stuck.
+            settled = _size(best, _step(best, coordinates, min(damp, DAMP))) < STILL
+            if settled or gone < SHORT * STILL or damp > HARDEST:
+                return replace(best, settled=settled, steps=steps)
             phi = best.phi + step
             nuisances = np.array(
                 [
-                    own + one.nuisances[0] + one.nuisances[1] @ step
+                    own + one.nuisances[0] / (1 + damp) + one.nuisances[1] @ step
                     for own, one in zip(best.nuisances, best.expansions, strict=True)
                 ]
             )

@@ -127,12 +127,26 @@ def fit_posterior(
                 file=sys.stderr,
             )
     birge = disagreement(found)
-    precision = found.hessian / birge**2
-    centre = found.phi + np.linalg.solve(found.hessian, found.gradient)
-    box = coordinates.low, coordinates.high
     rng = np.random.default_rng(params.optimizer.seed)
-    samples = truncated_gaussian(centre, precision, *box, SAMPLES, rng)
+    samples = samples_around(found, coordinates, birge, rng)
     return Identified(coordinates, found, birge, samples, recordings, launches)
+
+
+def samples_around(
+    found: Fit, coordinates: Coordinates, widened: float, rng: np.random.Generator
+) -> np.ndarray:
+    """SAMPLES of the Gaussian around a mode, within bounds, shape (SAMPLES, D).
+
+    A gradient counts where it leads out of the bounds. Elsewhere it is what a settled fit left of
+    a step that led no further, and would move the samples away from the mode.
+
+    Args:
+        widened: By what the density's standard deviations are multiplied.
+    """
+    box = coordinates.low, coordinates.high
+    outward = np.where(found.gradient < 0, found.phi <= box[0], found.phi >= box[1])
+    centre = found.phi + np.linalg.solve(found.hessian, found.gradient * outward)
+    return truncated_gaussian(centre, found.hessian / widened**2, *box, SAMPLES, rng)
 
 
 def recorded_history(sling: ClampedBand, episodes: Sequence[Episode]) -> LaunchHistory | None:

@@ -36,8 +36,9 @@ class Rule:
     Attributes:
         force_until: Samples of the force from the grasp until then.
         held: Pictures of the drawn band.
-        recoil: Pictures of the recoil until then; where none is, the first one after it.
-        way: Share of the draw by which the band must still be behind the fork in those.
+        recoil: Pictures of the recoil until then: in later ones a slack band swings about.
+        way: Share of the draw by which the band must still be behind the fork in those; where it is
+            in none, the first one counts.
         bins: Of the recoil, first and end: nearer the clamps the band folds.
     """
 
@@ -53,13 +54,10 @@ class Rule:
         held = (time > self.held[0]) & (time < self.held[1])
         hand = episode.position[episode.time <= episode.release_time][-1:]
         drawn = self.behind(hand)
-        recoil = (time > 0) & (time <= self.recoil)
-        for frame in np.flatnonzero(recoil):
-            recoil[frame] = self.behind(episode.clouds[frame]) > self.way * drawn
-        if not recoil.any():
-            later = np.flatnonzero(time > 0)
-            recoil[later[np.argsort(time[later])[:1]]] = True
-        return np.flatnonzero(held | recoil)
+        after = np.flatnonzero((time > 0) & (time <= self.recoil))
+        far = [k for k in after if self.behind(episode.clouds[k]) > self.way * drawn]
+        recoil = far or after[np.argsort(time[after])[:1]].tolist()
+        return np.union1d(np.flatnonzero(held), recoil).astype(int)
 
     @staticmethod
     def behind(points: np.ndarray) -> float:

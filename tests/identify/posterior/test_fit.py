@@ -1,5 +1,6 @@
 """The fit finds SciPy's bounded minimum on curves that need no simulator."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from pipeline.identify.posterior import fit as module
 from pipeline.identify.posterior.fit import BINNED, NoFit, fit
-from pipeline.identify.posterior.identify import disagreement, without
+from pipeline.identify.posterior.identify import disagreement, samples_around, without
 from tests.identify.posterior.toy import SIZE, Curve, curve, least, space
 
 TRUE = np.array([8.0, 9.0, 3.0]) * SIZE
@@ -45,6 +46,21 @@ def test_a_bound_holds_the_mode_and_the_others_give_way(monkeypatch):
     assert all(np.all(phi >= 0) for phi in seen[0].asked)
 
 
+def test_samples_lie_around_the_mode_and_fall_off_from_a_bound():
+    """What a settled fit left of its last step moves none; what leads out of bounds does."""
+    box, found = space(), fit(curves(1), space(), START)
+
+    def drawn(phi: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+        at = replace(found, phi=phi, gradient=gradient)
+        return samples_around(at, box, 1.0, np.random.default_rng(0))
+
+    left = np.sqrt(np.diag(found.hessian))
+    np.testing.assert_array_equal(drawn(found.phi, left), drawn(found.phi, 0 * left))
+    ends = found.phi * [1, 1, 0], np.array([0, 0, -4]) * left
+    flat, steep = (drawn(ends[0], slope)[:, 2].mean() for slope in (0 * left, ends[1]))
+    assert 0 < steep < flat / 2
+
+
 def test_a_prior_pulls_as_far_as_scipy_says():
     seen, box = curves(1, sigma=1.0), space(expected=np.array([8.0, 15.0, 3.0]), spread=0.5)
     found, free = fit(seen, box, START), fit(seen, space(), START)
@@ -78,6 +94,8 @@ def test_a_step_into_failure_is_taken_shorter():
     found = fit(seen, space(), START)
     assert away(found, least(seen, space(), START)) < 0.05
     assert np.allclose(seen[0].asked[1], first) and len(seen[0].asked) > len(free[0].asked) - 1
+    went, goes = (np.linalg.norm((seen[0].asked[k] - START) / SIZE) for k in (1, 2))
+    assert goes < 0.8 * went  # at once, not by and by
 
 
 def test_a_start_that_fails_says_so():

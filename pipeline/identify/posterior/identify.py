@@ -32,7 +32,7 @@ from pipeline.simulator.rubber import RUBBER
 
 LEVEL = 0.9
 SAMPLES = 200
-WIDER = 1.2  # times the usual spread of the force: less changes no interval by much
+WIDER = 1.2  # times the usual spread: less changes no interval by much
 FILLS = 2 / 3  # of the prior's interval: one as wide tells nothing
 
 
@@ -113,8 +113,9 @@ def fit_posterior(
     found = fit(recordings, coordinates, begin, **known)
     follows = [one.told_by(it) for one, it in zip(recordings, found.expansions, strict=True)]
     if any(
-        wide.tolerances.force > WIDER * one.tolerances.force
+        getattr(wide.tolerances, what) > WIDER * getattr(one.tolerances, what)
         for one, wide in zip(recordings, follows, strict=True)
+        for what in ("force", "way")
     ):
         recordings, first = follows, found
         found = fit(recordings, coordinates, first.phi, **known)

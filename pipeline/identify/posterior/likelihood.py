@@ -124,6 +124,20 @@ class Expansion:
         return max(_repeated(axis) for axis in self.left[: 3 * count].reshape(3, count))
 
     @property
+    def recoil_discrepancy(self) -> float:
+        """The same of the recoil, as a share of the way gone; that of the picture where it is most.
+
+        What a law gets wrong of a recoil moves all of a picture's points together.
+        """
+        seen, count = self.residuals, len(self.left) - 2 * len(self.residuals.frame)
+        bins, gone = self.left[count:].reshape(2, -1), seen.gone()
+        pictures = [seen.frame == frame for frame in np.unique(seen.frame[seen.recoils])]
+        return max(
+            (_repeated(bins[axis, one]) / gone[one][0] for one in pictures for axis in (0, 1)),
+            default=0.0,
+        )
+
+    @property
     def pictures(self) -> list[float]:
         """When the recoil is seen, from the release [s]."""
         seen, episode = self.residuals.frame[self.residuals.recoils], self.residuals.episode
@@ -205,10 +219,11 @@ class Likelihood:
         return moved
 
     def told_by(self, expansion: Expansion) -> Likelihood:
-        """With the force as sure as the law can follow it, by what a fit left of it."""
+        """With force and recoil as sure as the law can follow them, by what a fit left of them."""
         wider = copy(self)
-        spread = max(self.tolerances.force, expansion.discrepancy)
-        wider.tolerances = replace(self.tolerances, force=spread)
+        force = max(self.tolerances.force, expansion.discrepancy)
+        way = max(self.tolerances.way, expansion.recoil_discrepancy)
+        wider.tolerances = replace(self.tolerances, force=force, way=way)
         return wider
 
     def shifted(self, nuisances: np.ndarray) -> Episode:

@@ -175,10 +175,13 @@ class Residuals:
             force: Of a sample [N].
             cloud, way: Of a bin [m], and as a share of the way that the middle has gone.
         """
-        drawn = self.reference[self.rule.frames(self.episode)[0], self.sling.middle]
-        gone = np.linalg.norm(self.reference[self.frame, self.sling.middle] - drawn, axis=1)
-        bins = np.hypot(cloud, way * np.where(self.recoils, gone, 0.0))
+        bins = np.hypot(cloud, way * np.where(self.recoils, self.gone(), 0.0))
         return np.concatenate([np.full(3 * len(self.samples), force), bins, bins])
+
+    def gone(self) -> np.ndarray:
+        """Way of the band's middle from where it was drawn, as each bin saw it [m], shape (M,)."""
+        drawn = self.reference[self.rule.frames(self.episode)[0], self.sling.middle]
+        return np.linalg.norm(self.reference[self.frame, self.sling.middle] - drawn, axis=1)
 
     def columns(self, left: np.ndarray) -> dict[str, np.ndarray]:
         """How the residuals change with what moves all measured forces or points alike, (R,) each.

@@ -59,6 +59,22 @@ def both(exact):
     return found_of(*exact)
 
 
+def test_what_moves_a_whole_picture_of_the_recoil_counts_as_one_error(first) -> None:
+    """A constant repeats itself in all bins, alternating signs in none."""
+    (one,) = first.fit.expansions
+    seen, count = one.residuals, len(one.left) - 2 * len(one.residuals.frame)
+    frame = seen.frame[seen.recoils][0]
+    bins = np.flatnonzero(seen.frame == frame)
+    gone = seen.gone()[bins[0]]
+    for signs, repeated in ((1.0, np.sqrt(len(bins))), ((-1.0) ** np.arange(len(bins)), 1.0)):
+        left = np.zeros_like(one.left)
+        left[count + bins] = 2e-3 * signs
+        found = replace(one, left=left).recoil_discrepancy
+        assert found == pytest.approx(2e-3 / gone * repeated, rel=0.25)
+        wider = first.recordings[0].told_by(replace(one, left=left)).tolerances
+        assert wider.way == max(first.recordings[0].tolerances.way, found)
+
+
 def told_of(found) -> dict:
     return identify.confidence(found)
 

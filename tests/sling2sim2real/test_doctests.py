@@ -3,6 +3,7 @@
 import doctest
 import importlib
 import inspect
+import json
 import pkgutil
 
 import pytest
@@ -50,10 +51,19 @@ def test_functions_say_what_they_take_and_raise() -> None:
             assert not lacking, f"{name}: {lacking}"
 
 
-def test_the_page_of_it_runs(tmp_path, monkeypatch, capsys) -> None:
+def test_the_page_of_it_and_the_notebook_run(tmp_path, monkeypatch, capsys) -> None:
     page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    code = page.split("```python\n")[1].split("```")[0]
+    notebook = json.loads((ROOT / "examples" / "from_python.ipynb").read_text(encoding="utf-8"))
+    cells = [one for one in notebook["cells"] if one["cell_type"] == "code"]
+    assert [line for one in cells for line in "".join(one["source"]).splitlines() if line] == [
+        line for line in code.splitlines() if line
+    ]
+    assert not any(one["outputs"] for one in cells)
     monkeypatch.chdir(tmp_path)
-    exec(page.split("```python\n")[1].split("```")[0], {})
+    names: dict = {}
+    for one in cells:
+        exec("".join(one["source"]), names)
     stiffness, aimed = capsys.readouterr().out.splitlines()
     assert float(stiffness.split()[0]) == pytest.approx(2.2e5, rel=0.1)
     assert "has not converged" not in aimed and (tmp_path / "my_band.json").exists()

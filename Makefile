@@ -1,5 +1,5 @@
 # Each target works first on a fresh clone: it sets up .venv where that is missing or out of date.
-.PHONY: help setup demo run large paper ui test lint validate clean
+.PHONY: help setup demo run large paper ui test lint docs validate clean
 .DEFAULT_GOAL := run
 
 help:                 # this list
@@ -35,6 +35,10 @@ lint: setup           # ruff: rules and format; basedpyright: types; codespell
 	.venv/bin/ruff format --check .
 	.venv/bin/basedpyright
 	.venv/bin/codespell
+
+docs: setup           # the pages as a site, build/site/index.html; broken links fail
+	@.venv/bin/pip install --disable-pip-version-check -q -e '.[docs]' -c constraints.txt
+	@.venv/bin/python tools/site.py
 
 validate: setup       # slow campaigns, and tests by other engines and readers; results are committed
 	.venv/bin/pip install --disable-pip-version-check -q -e '.[dev,validation]' -c constraints.txt

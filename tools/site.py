@@ -1,0 +1,68 @@
+"""Build the pages as a site: `make docs`. Links and anchors are checked; a broken one fails.
+
+    python tools/site.py    # build/site/index.html; needs the extra `docs`
+
+Pages link to files all over the project, so the source of the site is a copy of it. The reference
+is made from the docstrings of what `import sling2sim2real` has.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+import sling2sim2real  # noqa: E402
+from pipeline.base import errors  # noqa: E402
+from pipeline.base.errors import UserError  # noqa: E402
+
+SOURCE = ROOT / "build" / "site-source"
+LEFT_OUT = "tests/", ".dvc/", "dvc.lock"
+# In a docstring, up to an empty line or the end.
+EXAMPLE = re.compile(r'^( +)>>> .*\n(?:\1(?!""").*\n)*', re.MULTILINE)
+
+
+def lay_out(folder: Path) -> None:
+    """Copy what Git has into `folder`, and write the page of the reference."""
+    shutil.rmtree(folder, ignore_errors=True)
+    listed = subprocess.run(
+        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    for name in listed.stdout.splitlines():
+        if not name.startswith(LEFT_OUT) and (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(ROOT / name, folder / name)
+    for file in (folder / "sling2sim2real").glob("*.py"):
+        file.write_text(EXAMPLE.sub(_headed, file.read_text("utf-8")), encoding="utf-8")
+    names = "\n\n".join(f"::: sling2sim2real.{name}" for name in sling2sim2real.__all__)
+    (folder / "reference.md").write_text(f"# Reference\n\n{names}\n", encoding="utf-8")
+
+
+def _headed(example: re.Match) -> str:
+    """An example under the heading by which the reference knows one."""
+    lines = "".join(f"    {line}\n" for line in example[0].splitlines())
+    return f"{example[1]}Examples:\n{lines}"
+
+
+def main() -> int:
+    try:
+        import mkdocs  # noqa: F401
+    except ModuleNotFoundError as error:
+        raise UserError("mkdocs is not installed: make docs installs it") from error
+    lay_out(SOURCE)
+    build = [sys.executable, "-m", "mkdocs", "build", "--clean", "--quiet"]
+    quiet = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    status = subprocess.run(build, cwd=ROOT, env=quiet).returncode
+    if not status:
+        print(f"{(ROOT / 'build/site/index.html').resolve().as_uri()}")
+    return status
+
+
+if __name__ == "__main__":
+    errors.run(main)

@@ -9,12 +9,12 @@ from pipeline.base.errors import UserError
 from tests.app.flow.toy import Toy, stage
 from validation.benchmarks import stages as bench
 
-# It imports one module of pandas' size, lazily, and works for about half a second.
+# It imports one module of pandas' size, lazily, and works for two seconds.
 WORK = """
 import pathlib, sys, time
 def work():
     import heavy
-    end = time.process_time() + 0.5
+    end = time.process_time() + 2.0
     while time.process_time() < end:
         pass
 work()
@@ -33,7 +33,7 @@ def test_imports_are_told_from_work(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     found = bench.profile(project, ["one"])
     assert [*found] == ["one"] and found["one"]["heavy"] == ["heavy"]
     one = found["one"]
-    assert one["imports_s"] >= 0.4 and one["work_s"] >= 0.4 and one["dvc_s"] > 0.1
+    assert one["imports_s"] >= 0.4 and one["work_s"] >= 1.5 and one["dvc_s"] > 0.1
     assert 0 < one["interpreter_s"]
     with pytest.raises(UserError, match="--steps three: there are one, two"):
         bench.profile(project, ["three"])

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +27,15 @@ from pipeline.base.layout import Layout, made  # noqa: E402
 from pipeline.episode.episode import Episode  # noqa: E402
 from pipeline.identify.results.theta import load_theta  # noqa: E402
 from pipeline.params import load  # noqa: E402
-from pipeline.report.card.animation import HEAD, TALL, WIDE, ReleaseFrames, font  # noqa: E402
+from pipeline.report.card.animation import (  # noqa: E402
+    HEAD,
+    SLOWER,
+    STEP,
+    TALL,
+    WIDE,
+    ReleaseFrames,
+    font,
+)
 from pipeline.report.card.camera import Pictures  # noqa: E402
 from pipeline.report.card.simulated import simulate  # noqa: E402
 from pipeline.report.drawing.styles import INK  # noqa: E402
@@ -36,11 +43,12 @@ from pipeline.report.drawing.styles import INK  # noqa: E402
 PAGE = ROOT / "docs" / "hero.webp"
 OURS, PAPER = "least_squares", "sling2sim2real"
 PULL_STEP, PULL_SHOWN = 0.24, 80  # s between frames of the pull, and ms for each
-SLOW_STEP, SLOWER, LOOK = 2.5e-3, 50, 600  # s between frames of the release; times; ms a picture
+LOOK = 600  # ms for which a new picture is looked at
 BEFORE, AFTER = -0.02, 0.05  # of the release [s]
 FLIGHT_SHOWN, HOLD = 50, 2500  # ms for each point of a flight, and for the last frame
 QUALITY = 40
-Y, Z = (-0.5, 2.5), (-0.56, 0.16)  # m that a row of launches shows
+Y, LOW = (-0.5, 2.5), -0.56  # m that a row of launches shows, and its lower edge
+ROW = (HEAD + TALL) // 2  # pixels of its height
 GREY, PALE, OUR, THEIR = "#8a8a8a", "#d5d5d5", "#e0007a", "#0072b2"
 Frame = tuple[Image.Image, int]  # and how long it is shown [ms]
 
@@ -59,15 +67,16 @@ class LaunchRow:
     top: int
     trials: pd.DataFrame
 
-    @cached_property
-    def height(self) -> float:
-        return (HEAD + TALL) / 2
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Of 90 % of the landings [m]."""
+        first = self.trials.iloc[0]
+        return first.predicted_low, first.predicted_high
 
     def place(self, y: float, z: float) -> tuple[float, float]:
         """Pixels of a point (y, z) [m] of frame O."""
-        u = 2 * WIDE * (y - Y[0]) / (Y[1] - Y[0])
-        v = self.top + self.height - (z - Z[0]) * 2 * WIDE / (Y[1] - Y[0])
-        return u, v
+        scale = 2 * WIDE / (Y[1] - Y[0])
+        return scale * (y - Y[0]), self.top + ROW - scale * (z - LOW)
 
     def flight(self, number: int) -> np.ndarray:
         """Way of a launch (y, z) [m], shape (K, 2)."""
@@ -76,7 +85,7 @@ class LaunchRow:
 
     def still(self, draw: ImageDraw.ImageDraw, floor: float, target: float) -> None:
         """Title, fork, floor, target and predicted interval."""
-        low, high = (float(self.trials.iloc[0][f"predicted_{end}"]) for end in ("low", "high"))
+        low, high = self.interval
         draw.text((10, self.top + 6), self.title, fill=self.color, font=font(16, bold=True))
         draw.line((*self.place(Y[0], floor), *self.place(Y[1], floor)), fill=PALE, width=2)
         draw.line((*self.place(0, floor), *self.place(0, 0)), fill=GREY, width=4)
@@ -111,7 +120,7 @@ class LaunchRow:
         ends = np.array([self.flight(number)[-1] for number in range(len(self.trials))])
         for y, z in ends:
             self.ball(draw, self.place(y, z), 3)
-        low, high = (float(self.trials.iloc[0][f"predicted_{end}"]) for end in ("low", "high"))
+        low, high = self.interval
         inside = int(((ends[:, 0] >= low) & (ends[:, 0] <= high)).sum())
         off = 100 * np.abs(ends[:, 0] - target).mean()
         text = f"{len(ends)} virtual launches: {off:.0f} cm from the target, {inside} as predicted"
@@ -129,19 +138,17 @@ def recorded(band: str) -> list[Frame]:
     simulated = simulate(params, band, OURS, episode, theta)
     begin, release = episode.grasp_time, simulated.release
     shown = episode, simulated, pictures, params.setup.fork_width, begin
-    quick, frames = (
-        ReleaseFrames(*shown, f"{PULL_STEP * 1000 / PULL_SHOWN:.0f} times faster"),
-        (ReleaseFrames(*shown)),
-    )
+    frames = ReleaseFrames(*shown)
+    quick = ReleaseFrames(*shown, f"{PULL_STEP * 1000 / PULL_SHOWN:.0f} times faster")
     pull = [
         (quick.frame(time), PULL_SHOWN)
         for time in np.arange(begin + 0.5, release + BEFORE, PULL_STEP)
     ]
-    times = np.arange(BEFORE, AFTER + SLOW_STEP / 2, SLOW_STEP) + release
+    times = np.arange(BEFORE, AFTER + STEP / 2, STEP) + release
     taken = pictures.time + simulated.camera
     new = taken[(taken > times[0]) & (taken < times[-1])]
     times = np.union1d(times, new)
-    lasts = 1000 * SLOWER * np.diff(times, append=times[-1] + SLOW_STEP)
+    lasts = 1000 * SLOWER * np.diff(times, append=times[-1] + STEP)
     lasts[np.isin(times, new)] += LOOK
     return pull + [
         (frames.frame(time), round(last)) for time, last in zip(times, lasts, strict=True)
@@ -161,7 +168,7 @@ def launched(band: str, target: float | None = None) -> list[Frame]:
         trials = trials[trials.target == target]
         if any(way is None for way in trials.flight_y):
             raise UserError(f"{name}: launches at {target:g} m did not fly; name another band")
-        rows.append(LaunchRow(title, color, len(rows) * (HEAD + TALL) // 2, trials))
+        rows.append(LaunchRow(title, color, len(rows) * ROW, trials))
 
     def frame(part: float) -> Image.Image:
         image = Image.new("RGB", (2 * WIDE, HEAD + TALL), "white")

@@ -225,6 +225,7 @@ def report(args: argparse.Namespace, params: Params) -> None:
             },
             "search_seeds_on_the_first": sorted({one["seed"] for one in results}),
             "preset": args.preset,
+            "pads": "open as fast as the recorded force fell; of nominal_pads in the lab's time",
             "optimizer": of_job(params, PAPER, args.preset).optimizer.model_dump(),
             "rollouts": {
                 name: rollouts_of_search(of_job(params, name, args.preset), name)

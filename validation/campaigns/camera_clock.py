@@ -116,8 +116,7 @@ def main() -> None:
     work, todo = args.work.resolve(), [Recorded(b, n) for n in range(TEN) for b in BANDS]
     results = ResultLines(work / "results.jsonl")
     runner.run(partial(performed, work=work), todo, results, args.workers, args.minutes)
-    done = results.of(Recorded)
-    lines = [done[job] for job in todo if job in done]
+    lines = results.among(todo)
     report = environment("cpu", "python -m validation.campaigns.camera_clock") | {
         "kind": "virtual",
         "asked": "At most 0.3 ms rms over 30 recordings of the rig, and the stated error true"

@@ -148,8 +148,7 @@ def run(args: argparse.Namespace, cases: list[Case]) -> None:
 
 def report(args: argparse.Namespace, cases: list[Case]) -> None:
     """Write what the results in the work folder say."""
-    there = lines_in(args.work).of(Case)
-    results = [there[case] for case in cases if case in there]
+    results = lines_in(args.work).among(cases)
     if not results:
         raise UserError(f"{args.work}: holds no result")
     params, rig = load(), [band for band in args.bands if band != orange.NAME]

@@ -202,8 +202,7 @@ def cases_of(recordings: list[str], sound: list[str], faults: list[str]) -> list
 
 def report(args: argparse.Namespace, cases: list[Faulty]) -> None:
     """Write what the results in the work folder say."""
-    there = ResultLines(args.work / "results.jsonl").of(Faulty)
-    results: list[dict] = [there[case] for case in cases if case in there]
+    results: list[dict] = ResultLines(args.work / "results.jsonl").among(cases)
     sound = [one for one in results if one["fault"] == SOUND]
     faulty = [one for one in results if one["fault"] != SOUND]
     if not results:

@@ -172,8 +172,7 @@ def main() -> int:
     if not arguments.report:
         limits = arguments.workers, arguments.minutes
         runner.run(partial(performed, work=work, keep=arguments.keep), todo, results, *limits)
-    done = results.of(OneRecording)
-    lines = [done[job] for job in todo if job in done]
+    lines = results.among(todo)
     command = f"python -m validation.campaigns.landings {arguments.set}"
     report = environment("cpu", command) | {
         "jobs": [len(lines), len(todo)],

@@ -79,8 +79,7 @@ def main() -> None:
     results = ResultLines(args.work.resolve() / "results.jsonl")
     if not args.report_only:
         runner.run(performed, todo, results, args.workers, args.minutes)
-    done = results.of(Drawn)
-    lines = [done[job] for job in todo if job in done]
+    lines = results.among(todo)
     report = environment("cpu", "python -m validation.campaigns.own_law") | {
         "kind": "virtual",
         "asked": "90 % intervals of each coordinate and of a launch hold 85 to 95 % of 200 truths"

@@ -57,6 +57,12 @@ class ResultLines:
         names = [field.name for field in fields(kind)]
         return {kind(*(line[name] for name in names)): line for line in self.lines}
 
+    def among(self, jobs: Iterable[object]) -> list[Result]:
+        """Results of those of some jobs of one kind that have one, in the order of the jobs."""
+        jobs = list(jobs)
+        there = self.of(type(jobs[0])) if jobs else {}
+        return [there[job] for job in jobs if job in there]
+
     def where(self, **values: object) -> list[Result]:
         """Lines with these values."""
         return [one for one in self.lines if all(one[name] == v for name, v in values.items())]

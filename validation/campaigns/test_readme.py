@@ -10,8 +10,6 @@ from validation.projects import ProjectCopy, copy_project
 
 pytestmark = pytest.mark.validation
 
-DEMO = "make demo"
-
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> ProjectCopy:

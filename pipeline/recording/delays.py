@@ -36,6 +36,7 @@ Found = TypeVar("Found")
 SIGMAS = 3.0  # what is less sure than this is not corrected
 MOST_ERROR = 0.003  # s: what is not known better counts as not seen
 LEAST_ERROR = 0.00005  # s: what no scatter shows
+WELL = 0.0005  # s: what is known as well is corrected, though it may be nothing
 AT_ONCE = 0.04  # s: a hand that starts later does so by itself, not because the band lets it go
 UNSEEN_POSE, UNSEEN_CAMERA = 0.003, 0.02  # s: standard deviations where nothing tells
 GIVEN_POSE, GIVEN_CAMERA = 0.002, 0.005  # s: of what was given
@@ -77,14 +78,16 @@ class Estimate:
     def seen(
         cls, rest: float, error: float, against: str = "force", given: float | None = None
     ) -> Estimate:
-        """What the recording shows, applied; beside what was given only where it is sure.
+        """What the recording shows, applied where it is sure, or well known and nothing was given.
 
-        Else it is what may be left.
+        Else it is what may be left: a wrong correction is worse than none.
         """
         error = max(error, LEAST_ERROR)
-        if given is None or abs(rest) > SIGMAS * error:
-            return cls(rest + (given or 0.0), error, "estimated", True, error, against, given)
         left = float(np.hypot(error, rest))
+        if abs(rest) > SIGMAS * error or (given is None and error < WELL):
+            return cls(rest + (given or 0.0), error, "estimated", True, error, against, given)
+        if given is None:
+            return cls(rest, error, "estimated", False, left, against)
         return cls(given, error, "setup", given != 0, left, against, given)
 
     @property

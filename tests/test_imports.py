@@ -161,6 +161,7 @@ def test_a_light_install_suffices_and_says_what_it_lacks() -> None:
     lacking = light("flow")
     assert lacking.returncode == 1
     assert re.fullmatch(
-        r"error: \w+ is not installed: make setup, or pip install 'sling2sim2real\[run\]'\n",
+        r"error: \w+ is not installed: make setup, or pip install '\.\[run\]' -c constraints\.txt in"
+        r" the project's folder\n",
         lacking.stderr,
     )

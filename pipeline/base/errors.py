@@ -67,7 +67,8 @@ def absent(error: ModuleNotFoundError) -> str | None:
     name = str(error.name).partition(".")[0]
     if name not in OF_THE_EXTRA:
         return None
-    return f"{name} is not installed: make setup, or pip install 'sling2sim2real[run]'"
+    how = "make setup, or pip install '.[run]' -c constraints.txt in the project's folder"
+    return f"{name} is not installed: {how}"
 
 
 def run(main: Callable[[], int | None]) -> None:

@@ -137,12 +137,16 @@ def drift(arguments: argparse.Namespace) -> Done:
 def check(arguments: argparse.Namespace) -> Done:
     from app.preflight.command import check
     from pipeline.params import load
+    from sling2sim2real.settings import Settings
 
     if arguments.frames and not arguments.json:
         arguments.refuse("argument --frames: used with --json alone")
+    own = arguments.band or Path("params.yaml").exists()
+    if not own:
+        say("no params.yaml in this folder: the settings that come with the package are taken")
     return check(
         arguments.recording,
-        load(),
+        load() if own else Settings.default(),
         band=arguments.band,
         diameter=arguments.diameter,
         rest_length=arguments.rest_length,

@@ -1,6 +1,7 @@
 """What is imported is declared in pyproject.toml, and what is declared is imported."""
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -147,18 +148,26 @@ main()
 """
 
 
-def light(*words: str) -> subprocess.CompletedProcess:
-    """`sling` in a Python without what the extra `run` brings."""
+def light(folder: Path, *words: str) -> subprocess.CompletedProcess:
+    """`sling` in a folder, by a Python without what the extra `run` brings."""
     script = LIGHT.format(absent=sorted(OF_THE_EXTRA), words=words)
-    return subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
+    return subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
 
 
-def test_a_light_install_suffices_and_says_what_it_lacks() -> None:
+def test_a_light_install_suffices_and_says_what_it_lacks(tmp_path: Path) -> None:
     brought = {name for one in OF_THE_EXTRA for name in distributions(one)}
     assert declared("run") <= brought
     assert not declared() & brought
-    assert light("--help").returncode == 0
-    lacking = light("flow")
-    assert lacking.returncode == 1
     how = "make setup, or pip install '.[run]' -c constraints.txt in the project's folder"
-    assert re.fullmatch(rf"error: \w+ is not installed: {re.escape(how)}\n", lacking.stderr)
+    assert light(ROOT, "--help").returncode == 0
+    # beside no params.yaml, as after `pip install` alone
+    assert light(tmp_path, "check", "no.mcap").stderr.endswith("error: no.mcap: no such file\n")
+    for lacking in (light(ROOT, "flow"), light(tmp_path, "ui")):
+        assert lacking.returncode == 1
+        assert re.fullmatch(rf"error: \w+ is not installed: {re.escape(how)}\n", lacking.stderr)

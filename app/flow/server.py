@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import importlib.util
 import json
 import os
 import socket
@@ -99,6 +100,8 @@ def serve(root: Path, port: int | None = None) -> str:
     Args:
         port: Default 4200.
     """
+    if importlib.util.find_spec("prefect") is None:  # else its absence would be told in a log alone
+        raise ModuleNotFoundError(name="prefect")
     where = address(root)
     if where:
         return f"the UI of this project runs already: {where}"

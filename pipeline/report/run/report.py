@@ -11,6 +11,7 @@ from pipeline.launching.surface.stored import Stored
 from pipeline.params import Params
 from pipeline.report.drawing.canvas import P, Saving
 from pipeline.report.drawing.styles import Styles, drawn, styles
+from pipeline.report.run.landscape import Landscape, landscape
 from pipeline.report.run.paper import METHOD
 from pipeline.report.run.repeated import Repeated
 from pipeline.report.run.replay import MethodReplay, replay_method
@@ -24,6 +25,7 @@ class Report:
     Attributes:
         replays: By band and method; of the methods that are drawn, of all where data are held out.
         styles: By method.
+        landscape: Of the first search that refines regions, with its result, where one did.
         repeated: The campaign on more recordings of the rig, where its bands ran.
         root: Of the project, with data/ and reports/.
     """
@@ -32,6 +34,7 @@ class Report:
     results: Results
     replays: dict[str, dict[str, MethodReplay]]
     styles: Styles
+    landscape: tuple[Result, Landscape] | None
     repeated: Repeated | None
     root: Path
 
@@ -42,7 +45,9 @@ class Report:
         named = styles(dict.fromkeys(result.method for result in results))
         replays = {band: _replays(params, results, band) for band in params.run.bands}
         repeated = Repeated.load(root) if results.floors else None
-        return cls(params, results, replays, named, repeated, root)
+        one = next((one for one in results if one.regions), None)
+        chart = one and (one, landscape(params, one, results.episodes[one.band]))
+        return cls(params, results, replays, named, chart, repeated, root)
 
     @property
     def folder(self) -> Path:

@@ -7,6 +7,7 @@ from pathlib import Path
 from pipeline.base.files import write_json, write_text
 from pipeline.params import Params
 from pipeline.report.run.chapters.appendix import appendix
+from pipeline.report.run.chapters.evaluation import evaluation
 from pipeline.report.run.chapters.outcome import outcome
 from pipeline.report.run.chapters.paper_tables import paper_tables
 from pipeline.report.run.metrics import summary
@@ -16,7 +17,7 @@ from pipeline.report.run.report import Report
 from pipeline.report.run.run import write_run
 
 # Each makes its text of a Report, and writes the pictures and tables that the text names.
-CHAPTERS = (outcome, paper_tables, appendix)
+CHAPTERS = (outcome, paper_tables, evaluation, appendix)
 
 
 def write(params: Params, root: str | Path = ".") -> None:

@@ -9,7 +9,7 @@ from pipeline.report.run import report as reporting
 from pipeline.report.run import write as writing
 from tests.edited import edits
 from tests.report.run.conftest import BAND, METHOD
-from tests.report.run.toy_replay import toy_replay
+from tests.report.run.toy_replay import toy_landscape, toy_replay
 
 FILES = {
     "theta": f"data/theta/{BAND}/{METHOD}.json",
@@ -21,6 +21,7 @@ FILES = {
 @pytest.mark.parametrize("name", FILES)
 def test_any_edit_is_one_line_or_a_report(name, template, root, params, monkeypatch) -> None:
     monkeypatch.setattr(reporting, "replay_method", toy_replay)
+    monkeypatch.setattr(reporting, "landscape", toy_landscape)
     monkeypatch.setattr(reporting.Report, "picture", lambda _, name, *__: f"{name}.png")
     monkeypatch.setattr(writing, "write_page", lambda *_: None)
     path, refused, accepted = root / FILES[name], 0, 0

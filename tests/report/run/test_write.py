@@ -14,7 +14,7 @@ from pipeline.base.layout import NotMade
 from pipeline.report.run import report as reporting
 from pipeline.report.run import write as writing
 from tests.report.run.conftest import BAND, METHOD
-from tests.report.run.toy_replay import toy_replay
+from tests.report.run.toy_replay import toy_landscape, toy_replay
 
 THETA_FILE = f"data/theta/{BAND}/{METHOD}.json"
 
@@ -22,6 +22,7 @@ THETA_FILE = f"data/theta/{BAND}/{METHOD}.json"
 @pytest.fixture(autouse=True)
 def no_simulation(monkeypatch) -> None:
     monkeypatch.setattr(reporting, "replay_method", toy_replay)
+    monkeypatch.setattr(reporting, "landscape", toy_landscape)
 
 
 @pytest.fixture
@@ -40,8 +41,8 @@ ELSEWHERE = """\
 from pathlib import Path
 from pipeline.params import load
 from pipeline.report.run import report, write
-from tests.report.run.toy_replay import toy_replay
-report.replay_method = toy_replay
+from tests.report.run.toy_replay import toy_landscape, toy_replay
+report.replay_method, report.landscape = toy_replay, toy_landscape
 root = Path({root!r})
 write.write(load(root / "params.yaml"), root)
 """
@@ -121,7 +122,7 @@ def test_a_run_of_three_bands_is_told_in_few_words_and_pictures(root, params, te
     told, appendix = text.split("\n## Appendix\n")
     words = [word for word in told.split() if re.search(r"\w", word)]
     assert len(words) <= 2500
-    chapters = ["What came out", "The bands", "The paper's tables"]
+    chapters = ["What came out", "The bands", "The paper's tables", "The paper's evaluation"]
     assert re.findall("^## (.*)$", told, re.MULTILINE) == chapters
     assert [f"### Table {n}\n" in told for n in (1, 2, 3, 4)] == [True] * 4
     assert "not run" not in text and text.count(".png") <= 15

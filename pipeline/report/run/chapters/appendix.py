@@ -36,9 +36,10 @@ recording or seed would give is not in them.
 PREDICTED = """\
 ### Predicted and actual landings
 
-No launch took part in the identification. Error in per cent of the landing distance, of every
-launch that came down; bias is its signed mean, predicted less landed; *beyond*: draws that stretch
-the band further than the recording did.
+No launch of these was fitted; defaults of ours were chosen with landings in sight
+([choices](../docs/paper.md#choices-and-what-they-were-made-on)). Error in per cent of the landing
+distance, of every launch that came down; bias is its signed mean, predicted less landed; *beyond*:
+draws that stretch the band further than the recording did.
 """
 ALONE = """\
 † The interval holds the draw's error alone: the method says nothing of how well it knows θ.

@@ -28,7 +28,10 @@ OVER = ("landing error [cm], g in cm", 4)  # above tables 1, 3 and 4, from that 
 INTRODUCTION = """\
 ## The paper's tables
 
-Only what ran has rows. Bold: the lowest of a band, which may be noise (see the appendix).
+Only what ran has rows. Bold: the lowest of a band and source, ties too, where two methods or more
+have a cell in which no launch failed; it may be noise (see the appendix). The paper's cells go by
+this rule as well: its table 1 has *Sling2Sim2Real* of band 3 bold, which stands alone there, and
+its table 3 leaves out *Adam* at 172.5, a tie.
 """
 SOURCES = {
     "virtual": "*virtual*: recorded or launched by the virtual rig.",
@@ -41,13 +44,16 @@ BEFORE = {
 Every policy launches at each target with the same errors of draw and release. *all targets*: ±
 within targets; the next column: ± over all launches (the paper's "±" mixes the two). A launch fails
 that does not land, takes more force than the arm may hold, or lands outside y = {TARGET_AREA[0]} –
-{TARGET_AREA[1]} m; it is counted, and left out of the mean. N/A: every launch failed.
+{TARGET_AREA[1]} m; it is counted, and left out of the mean, which may flatter a method
+of which some launches failed; the paper has no such cell. N/A: every launch failed, as in the
+paper.
 """,
     2: """\
 θ: Young's modulus E, Poisson's ratio ν, elasticity damping d (viscous stress = d × rate of the
 elastic stress), friction of the finger pads, damping scale s (share of d that acts on shape). A
 pull hardly tells E from ν, or s from d: single values are less certain than what they do together.
-The loss is the paper's (geometry + force + work), whatever the method minimised.
+The loss has the paper's terms (geometry + force + work), whatever the method minimised. Weights,
+simulator and rubber are other than the paper's, so it compares within a source alone.
 """,
     3: "Other searches of the paper's loss, with the same number of rollouts.\n",
     4: """\
@@ -66,7 +72,8 @@ identifiable*: the recording says hardly more than that; *fixed*: not searched.
 [docs/identification.md](../docs/identification.md) says what such an interval is and is not.
 """
 REPEATED = f"""\
-The same on ten further recordings of each band, one search each, that took part in no choice
+The same on ten further recordings of each band, one search each. They took part in no choice; the
+bands did. *all* pools the recordings, so that its interval and p hold for these three bands
 ([ablations.json](validation/{FILE.name})): mean distance [cm] of launches without errors of draw
 and release, aimed by the simulator itself; 95 % intervals. *Beside*: the difference on the same
 recordings; p: Wilcoxon's test with Holm's correction over all methods; bold where it is below

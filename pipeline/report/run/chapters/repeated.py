@@ -21,7 +21,8 @@ def claims(repeated: Repeated, params: Params) -> list[str]:
     misses = repeated.miss[ALL]
     known = [f"**{name_of(m)}** {_mean(misses[m])}" for m in (OURS, paper.METHOD) if m in misses]
     said = [f"On {max(one.count for one in misses.values())} further recordings of the rig's bands,"
-        f" which took part in no choice ([table 1](#table-1), [data](validation/{FILE.name})),"
+        f" which took part in no choice though their bands did"
+        f" ([table 1](#table-1), [data](validation/{FILE.name})),"
         f" launches without errors miss by {', '.join(known)}."]  # fmt: skip
     if changed := repeated.changed_settings(params):
         keys = ", ".join(one.key for one in changed)

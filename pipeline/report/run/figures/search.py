@@ -115,7 +115,7 @@ def corner(result: Result, boxes: ParameterBoxes, title: str) -> Figure:
             y = free[row]
             ax.plot(unit[x][failed], unit[y][failed], "x", ms=3, mew=0.6, color="0.6")
             ax.scatter(unit[x][good], unit[y][good], s=sizes, lw=0, **color)
-            _regions(ax, result, x, y)
+            regions(ax, result, x, y)
             ax.plot(unit[x][best], unit[y][best], "*", ms=12, mew=0.8, zorder=6, **star)
             ax.set(ylim=(0, 1))
             ax.set_yticks(*_ticks(y, boxes, history), fontsize=7)
@@ -138,7 +138,7 @@ def corner(result: Result, boxes: ParameterBoxes, title: str) -> Figure:
     return figure
 
 
-def _regions(ax: Axes, result: Result, x: str, y: str) -> None:
+def regions(ax: Axes, result: Result, x: str, y: str, paths: bool = True) -> None:
     """Centres of the regions, their covariances at one deviation, and the paths of CMA-ES."""
     refined = result.history.loc[result.history.phase == "cma"]
     searched = {x, y} <= set(result.axes)
@@ -152,7 +152,8 @@ def _regions(ax: Axes, result: Result, x: str, y: str) -> None:
         ax.add_patch(Ellipse((across, up), wide, tall, angle=angle, **line))
         mine = refined.loc[refined.solver == number]
         way = mine.groupby("generation")[[f"unit_{x}", f"unit_{y}"]].mean().to_numpy()
-        ax.plot(*np.vstack([centre, way]).T, color=PATH, lw=0.9, zorder=5)
+        if paths:
+            ax.plot(*np.vstack([centre, way]).T, color=PATH, lw=0.9, zorder=5)
         ax.plot(across, up, "o", ms=7.5, color="w", mec=INK, mew=0.7, zorder=5)
         text = {"ha": "center", "va": "center_baseline", "fontsize": 6}
         ax.text(across, up, str(number + 1), zorder=5.5, **text)

@@ -108,8 +108,8 @@ class Softening:
     def stored(self, energy: np.ndarray, worst: np.ndarray, modulus: float) -> np.ndarray:
         """The integral of h from 0 to `energy` [MJ/m3]: what an unloading gives back."""
         if self.strain:
-            m, most = self.energy, np.sqrt(2 * worst / modulus)
-            x = np.minimum(np.sqrt(2 * energy / modulus), most)
+            m, most = self.energy, np.sqrt(2 * np.maximum(worst, 0.0) / modulus)
+            x = np.minimum(np.sqrt(2 * np.maximum(energy, 0.0) / modulus), most)
             back = m * np.exp(-most / m) * (x * np.exp(x / m) - m * np.expm1(x / m))
             return energy - modulus * (x**2 / 2 - back) / self.damage
         width = self.energy * modulus + self.growth * worst
@@ -123,7 +123,8 @@ class Softening:
 def kept(energy: float, worst: float, modulus: float, softening: np.ndarray) -> float:
     """h of an energy and the largest so far [MJ/m3]; `softening` as in `Softening`."""
     if softening[4]:
-        short = math.sqrt(2 * worst / modulus) - math.sqrt(2 * min(energy, worst) / modulus)
+        least = max(min(energy, worst), 0.0)  # at rest, rounding can make an energy negative
+        short = math.sqrt(2 * max(worst, 0.0) / modulus) - math.sqrt(2 * least / modulus)
         return 1 + math.expm1(-short / softening[1]) / softening[0]
     width = softening[1] * modulus + softening[2] * worst
     return 1 - math.erf(max(worst - energy, 0.0) / width) / softening[0]

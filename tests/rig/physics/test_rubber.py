@@ -210,6 +210,16 @@ def test_work_is_what_is_stored_and_what_is_lost(kind: str) -> None:
         assert np.isclose(lost[-1], lost[10000], atol=1e-5)
 
 
+def test_a_law_whose_energy_at_rest_is_rounded_below_zero_softens_by_strain() -> None:
+    law = law_of("lopez_pamies", [0.3388, 0.717, 0.002875, 2.444])
+    rubber = Rubber(1.0, NONE, 0.0, law, softening=STRAINED)
+    stretch = np.append(1.0, np.nextafter(1.0, 2.0) + np.linspace(-1e-8, 1e-8, 101))
+    assert law.energy(stretch).min() < 0  # else this test would show nothing
+    memory = law.energy(stretch)[:, None]
+    assert all(np.isfinite(one).all() for one in rubber.response(stretch, memory))
+    assert np.isfinite(rubber.stored(stretch, memory)).all()
+
+
 def test_each_number_of_a_memory_counts() -> None:
     times = np.linspace(0, 1, 201)
     path = lambda time: 1.3 - 0.3 * np.cos(2 * np.pi * time)  # noqa: E731

@@ -26,6 +26,7 @@ SPAN = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
 SETTING = re.compile(r"\w+=\S*")  # of the environment, before a command
 IGNORED = {
     "reports/index.html",
+    "reports/appendix.html",
     "reports/run.js",
     "reports/bands",
     "reports/summary.json",

@@ -1,6 +1,6 @@
-"""reports/index.html: the report as one file that needs no network.
+"""reports/index.html and appendix.html: a page each as one file that needs no network.
 
-Only run.js lies beside it, which says where and when it was written and may be missing.
+Only run.js lies beside them, which says where and when they were written and may be missing.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from pathlib import Path
 from pipeline.base.files import write_text
 from pipeline.report.drawing.page import page
 
-CARD = re.compile(r"\]\((bands/[^)/]+)/README\.md\)")
+HTML = {"README": "index", "appendix": "appendix"}  # names of pages
+LINK = re.compile(rf"\]\(((?:bands/[^)/]+/)?)({'|'.join(HTML)})\.md\)")
 RUN = """\
 <p id="run"></p>
 <script src="run.js"></script>
@@ -23,10 +24,11 @@ if (window.run) {
 </script>"""
 
 
-def write_page(folder: Path, markdown: str) -> None:
-    """Write index.html into `folder`, where the text's pictures lie. Raises UserError.
+def write_page(folder: Path, name: str, markdown: str) -> None:
+    """Write <name>.md as HTML into `folder`, where the text's pictures lie. Raises UserError.
 
-    Bands link to the pages of their cards.
+    Links to texts become links to their pages.
     """
-    pages = CARD.sub(r"](\1/index.html)", markdown)
-    write_text(folder / "index.html", page(pages, folder, "Sling2Sim2Real: report", foot=RUN))
+    text = LINK.sub(lambda link: f"]({link[1]}{HTML[link[2]]}.html)", markdown)
+    title = "Sling2Sim2Real: " + ("report" if name == "README" else name)
+    write_text(folder / f"{HTML[name]}.html", page(text, folder, title, foot=RUN))

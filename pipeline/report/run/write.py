@@ -1,4 +1,4 @@
-"""Write reports/: README.md with pictures and tables, index.html, summary.json and run.js."""
+"""Write reports/: results, appendix, their pictures, tables and pages, summary.json and run.js."""
 
 from __future__ import annotations
 
@@ -16,16 +16,18 @@ from pipeline.report.run.paper import METHOD
 from pipeline.report.run.report import Report
 from pipeline.report.run.run import write_run
 
-# Each makes its text of a Report, and writes the pictures and tables that the text names.
-CHAPTERS = (outcome, paper_tables, evaluation, appendix)
+# The chapters of each page. A chapter makes its text of a Report, and writes the pictures and tables
+# that the text names.
+PAGES = {"README": (outcome, paper_tables, evaluation), "appendix": (appendix,)}
 
 
 def write(params: Params, root: str | Path = ".") -> None:
     """Write the report of everything in params.run. Raises UserError where an input is missing."""
     report = Report.of(params, Path(root))
-    markdown = "\n".join(chapter(report) for chapter in CHAPTERS)
     theirs = METHOD if METHOD in report.references[1:] else None
     write_json(report.folder / "summary.json", summary(report.results, report.main, theirs))
-    write_text(report.folder / "README.md", markdown)
+    for name, chapters in PAGES.items():
+        markdown = "\n".join(chapter(report) for chapter in chapters)
+        write_text(report.folder / f"{name}.md", markdown)
+        write_page(report.folder, name, markdown)
     write_run(report.folder)
-    write_page(report.folder, markdown)

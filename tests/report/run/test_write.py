@@ -33,8 +33,9 @@ def text_alone(monkeypatch) -> None:
 
 
 def written(root, params) -> str:
+    """The texts of both pages, one after the other."""
     writing.write(params, root)
-    return (root / "reports" / "README.md").read_text()
+    return "\n".join((root / "reports" / f"{name}.md").read_text() for name in writing.PAGES)
 
 
 ELSEWHERE = """\
@@ -98,7 +99,9 @@ def test_the_report_is_complete_and_equal_in_another_process(root, params) -> No
     assert {root / "reports" / name for name in pictures} == {
         file for file in first if file.suffix == ".png"
     }
-    page = (root / "reports" / "index.html").read_text("utf-8")
+    names = "index.html", "appendix.html"
+    page = "\n".join((root / "reports" / name).read_text("utf-8") for name in names)
+    assert set(re.findall(r'href="([a-z]+\.html)"', page)) == {*names}
     assert page.count('src="data:image/png;base64,') == len(pictures)
     for title in re.findall("^## (.*)$", text, re.MULTILINE):
         assert f">{title}</h2>" in page
@@ -119,7 +122,7 @@ def test_the_report_is_complete_and_equal_in_another_process(root, params) -> No
 
 def test_a_run_of_three_bands_is_told_in_few_words_and_pictures(root, params, text_alone) -> None:
     text = written(root, rig(root, params, ("band1", "band2", "band3")))
-    told, appendix = text.split("\n## Appendix\n")
+    told, appendix = text.split("\n# Appendix\n")
     words = [word for word in told.split() if re.search(r"\w", word)]
     assert len(words) <= 2500
     chapters = ["What came out", "The bands", "The paper's tables", "The paper's evaluation"]

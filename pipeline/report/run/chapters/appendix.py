@@ -20,8 +20,13 @@ from pipeline.report.run.tables.landings import (
 )
 from pipeline.report.run.tables.policies import policies
 
+INTRODUCTION = """\
+# Appendix
+
+What stands behind the [report](README.md).
+"""
 NOISE = f"""\
-### Which differences are more than noise
+## Which differences are more than noise
 
 By how much a method misses more (+) or less (−) than another: difference of the mean |landing −
 target| in cm, averaged over the targets that both reach, with its {percent(LEVEL)} interval by a
@@ -34,7 +39,7 @@ The intervals hold for **launches of these policies**, not for the methods at la
 recording or seed would give is not in them.
 """
 PREDICTED = """\
-### Predicted and actual landings
+## Predicted and actual landings
 
 No launch of these was fitted; defaults of ours were chosen with landings in sight
 ([choices](../docs/paper.md#choices-and-what-they-were-made-on)). Error in per cent of the landing
@@ -63,9 +68,10 @@ TRAINED = {  # by policy.landings: what training reads, and what a sample of it 
 
 
 def appendix(report: Report) -> str:
-    """The last chapter, a part each."""
+    """The second page, a chapter each part."""
     parts = (_noise, _predicted, _recording, _methods, _confidence, _policies, _budget)
-    return "\n".join(["## Appendix\n", *(line for part in parts for line in part(report))])
+    text = [INTRODUCTION, *(line for part in parts for line in part(report))]
+    return "\n".join(text)
 
 
 def _noise(report: Report) -> list[str]:
@@ -104,7 +110,7 @@ def _recording(report: Report) -> list[str]:
     episodes, styles = report.results.episodes, report.styles
     alt = "force against draw, residual force, distance of the clouds"
     text = [
-        "### Recording and simulation\n",
+        "## Recording and simulation\n",
         "Force of the band on the hand against the hand's draw; size of measured less simulated"
         " force, both through the same filter; mean distance of each frame's point cloud from the"
         " simulated band.\n",
@@ -123,7 +129,7 @@ def _recording(report: Report) -> list[str]:
 def _methods(report: Report) -> list[str]:
     params, results, styles = report.params, report.results, report.styles
     text = [
-        "### Searches and losses\n",
+        "## Searches and losses\n",
         markdown(identified.methods(results, params, styles)),
         LOSS,
         markdown(identified.losses(results, params, styles), repeats=False),
@@ -160,7 +166,7 @@ def _confidence(report: Report) -> list[str]:
     derived = identified.derived(results, styles)
     if derived is None:
         return []
-    text = ["### What the data can see\n", "Most likely value and 90 % interval:\n"]
+    text = ["## What the data can see\n", "Most likely value and 90 % interval:\n"]
     text += [markdown(derived)]
     text += [
         "What each recording shows and the simulation does not (root mean square); of several"
@@ -203,7 +209,7 @@ def _policies(report: Report) -> list[str]:
         for band, of_band in methods.items()
     }
     return [
-        "### Policies\n",
+        "## Policies\n",
         f"PPO on the launches of each calibrated simulator, targets {low:g} – {high:g} m."
         " Converged: the policy misses by at most 1 cm on average over 256 targets, launched in its"
         f" own simulator. {TRAINED[params.policy.landings][0]}\n",
@@ -225,7 +231,7 @@ def _budget(report: Report) -> list[str]:
         virtual += f" (of the draw {1e3 * trials.actuation_error:g} mm, standard deviation)"
     return [
         f"""\
-### Budget
+## Budget
 
 - Search: {explored} rollouts of exploration ({optimizer.population} agents, moved
   {optimizer.generations} times), then {optimizer.cma_rollouts} of CMA-ES shared by the regions; a

@@ -21,7 +21,7 @@ def correlation(confidences: dict[str, dict]) -> Figure:
         confidences: What the θ file of each band says of its confidence.
     """
     title = "Red or blue: the recording tells the two together better than each alone"
-    figure, found = panels(confidences, title, 4.0, 3.3)
+    figure, found = panels(confidences, title, 3.4, columns=1)
     norm = Normalize(-1, 1)
     shades = ScalarMappable(norm, "RdBu_r")
     for band, ax in found.items():

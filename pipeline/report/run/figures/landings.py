@@ -56,7 +56,7 @@ def misses(trials: pd.DataFrame, floors: dict[str, float], styles: Styles) -> Fi
                 where = {"transform": ax.get_yaxis_transform(), "fontsize": 7}
                 text = f"{failed} of {len(mine)} failed"
                 ax.text(0.01 if left else 0.99, row, text, **words, **where)
-        ax.set_xlabel(f"landing − target [cm]{beyond}")
+    ax.set_xlabel(f"landing − target [cm]{beyond}")
     dot = {"ls": "", "color": "0.4"}
     entries: list[tuple[str, Artist]] = [
         (f"aimed at {t:g} m", mark(**dot, marker=m)) for t, m in targets.items()
@@ -97,7 +97,7 @@ def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> Fi
             ax.hlines(height, mine.low, mine.high, color=color, lw=0.9, ls=line, zorder=2)
             face = np.where(inside[mine.index], color, "none")
             ax.scatter(mine.off, height, s=9, facecolors=face, edgecolors=color, lw=0.7, zorder=3)
-        ax.set_xlabel(f"predicted / landed − 1 [%]{beyond}")
+    ax.set_xlabel(f"predicted / landed − 1 [%]{beyond}")
     dot = {"ls": "", "marker": "o", "ms": 4, "color": "0.4"}
     entries = [("a launch", mark(**dot))]
     if not inside.all():
@@ -115,8 +115,8 @@ def predictions(trials: pd.DataFrame, trusted: Collection, styles: Styles) -> Fi
 def _rows(trials: pd.DataFrame, styles: Styles, title: str, off: pd.Series):
     """A panel a band with a row a method, an axis that reaches as far as `off`, and its label."""
     bands = dict.fromkeys(trials.band)
-    tall = 0.45 * len(styles) + 0.9
-    figure, found = panels(bands or [""], title, 3.8, tall, sharex=True, sharey=True)
+    tall = 0.3 * len(styles) + 0.6
+    figure, found = panels(bands or [""], title, tall, columns=1, sharex=True, sharey=True)
     most = max(LINEAR, 1.1 * float(np.nanmax(off.abs(), initial=0)))
     for ax in found.values():
         ax.axvline(0, color=INK, lw=0.8, zorder=1)
@@ -128,7 +128,7 @@ def _rows(trials: pd.DataFrame, styles: Styles, title: str, off: pd.Series):
         ax.xaxis.set_minor_locator(NullLocator())
         ax.xaxis.set_major_formatter("{x:g}")
         for label, style in zip(ax.get_yticklabels(), styles.values(), strict=False):
-            label.set_color(style.color)  # those of the first panel: others share them
+            label.set_color(style.color)
     return figure, found, f", logarithmic beyond ± {LINEAR}" * (most > LINEAR)
 
 

@@ -1,4 +1,7 @@
-"""A panel a band, with a common title that says what to see."""
+"""A panel a band, with a common title that says what to see.
+
+Figures are as wide as a column of text, so that they can be read on a phone.
+"""
 
 from __future__ import annotations
 
@@ -12,33 +15,36 @@ from matplotlib.figure import Figure
 
 from pipeline.report.drawing.canvas import key
 
-COLUMNS = 3
+COLUMNS, WIDTH = 2, 5.6  # panels in a row; inches
 ENTRY = 2.6  # inches of an entry of a key
 LETTERS = 11.5  # of a title, an inch
 
 
 def panels(
-    bands: Iterable[str], title: str, wide: float, tall: float, **more
+    bands: Iterable[str], title: str, tall: float, columns: int = COLUMNS, **more
 ) -> tuple[Figure, dict[str, Axes]]:
-    """A figure with a panel a band, three in a row.
+    """A figure with a panel a band.
 
     Args:
-        wide, tall: Of a panel [inches].
+        tall: Height of a panel [inches].
+        columns: Panels in a row, at most.
         more: For matplotlib's `subplots`.
 
     Returns:
         The figure, and its axes by band.
     """
     bands = list(bands)
-    columns = min(len(bands), COLUMNS)
+    columns = min(len(bands), columns)
     rows = -(-len(bands) // columns)
-    size = max(columns * wide, 5.6), rows * tall + 0.9
+    size = WIDTH, rows * tall + 0.9
     figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, **more)
     for ax in axes.flat[len(bands) :]:
         ax.remove()
     found = dict(zip(bands, axes.flat, strict=False))
     for band, ax in found.items():
         ax.set_title(band, fontsize=9)
+    for ax in axes.flat[len(bands) - columns : len(bands)]:  # the lowest of each column
+        ax.tick_params(labelbottom=True)
     entitle(figure, title)
     return figure, found
 

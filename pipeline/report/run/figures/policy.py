@@ -29,7 +29,7 @@ def training(curves: dict[str, dict[str, pd.DataFrame]], styles: Styles) -> Figu
         curves: training.parquet of each band and method.
     """
     title = "A policy has converged where its curve stays below the line at 1 cm"
-    figure, found = panels(curves, title, 3.8, 2.6, sharex=True, sharey=True)
+    figure, found = panels(curves, title, 2.1, sharex=True, sharey=True)
     for band, ax in found.items():
         for (method, curve), dash in zip(curves[band].items(), cycle(DASHES)):
             error = 100 * curve.mean_error
@@ -63,7 +63,7 @@ def landing_maps(
         rest_lengths: By band [m].
     """
     title = "Where each draw lands, and which draws the policy takes for near and far targets"
-    figure, found = panels(maps, title, 4.0, 3.3, sharex=True, sharey=True)
+    figure, found = panels(maps, title, 2.6, sharex=True, sharey=True)
     low = np.min([path.min(0) for path in draws.values()], axis=0) - AROUND
     high = np.max([path.max(0) for path in draws.values()], axis=0) + AROUND
     charts = {band: _fine(one, low, high) for band, one in maps.items()}

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from pipeline.episode.episode import Episode
 from pipeline.report.drawing.canvas import mark, picture
 from pipeline.report.drawing.styles import INK, Styles
-from pipeline.report.run.figures.panels import entitle, explain
+from pipeline.report.run.figures.panels import WIDTH, entitle, explain
 from pipeline.report.run.figures.policy import DASHES
 from pipeline.report.run.replay import MethodReplay
 
@@ -20,17 +20,18 @@ SLACK, MARGIN = 0.05, 0.04  # of the peak force, below which the band is slack; 
 def pull(
     episodes: dict[str, Episode], replays: dict[str, dict[str, MethodReplay]], styles: Styles
 ) -> Figure:
-    """A column a band: force against draw, residual force, and how far the clouds are off.
+    """By band: force against draw, and beside it residual force and distance of the clouds.
 
     Args:
         replays: By band and method; none shows the recordings alone.
     """
-    size = max(3.9 * len(episodes), 5.6), 7.2
-    figure, axes = plt.subplots(
-        3, len(episodes), figsize=size, squeeze=False, sharey="row", height_ratios=(1.5, 1, 1)
-    )
-    entitle(figure, "A good simulation lies on the black curve and leaves little in the rows below")
-    for (top, middle, bottom), (band, episode) in zip(axes.T, episodes.items(), strict=True):
+    figure = plt.figure(figsize=(WIDTH, 2.6 * len(episodes) + 0.9))
+    entitle(figure, "A good simulation lies on the black curve and leaves little beside it")
+    grid = figure.add_gridspec(len(episodes), 1)
+    for number, (band, episode) in enumerate(episodes.items()):
+        of_band = ("force", "residual"), ("force", "clouds")
+        axes = figure.add_subfigure(grid[number]).subplot_mosaic([*of_band])
+        top, middle, bottom = (axes[name] for name in ("force", "residual", "clouds"))
         held = _held(episode)
         draw = np.linalg.norm(episode.position[held, 1:], axis=1)
         force = np.linalg.norm(episode.force, axis=1)
@@ -47,12 +48,10 @@ def pull(
         for ax in (middle, bottom):
             ax.axvline(episode.release_time, color="0.6", lw=0.8, zorder=0)
             ax.set_xlim(episode.time[[0, -1]])
-        top.set(title=band, xlabel="draw: the hand's distance from the fork [m]")
-        bottom.set_xlabel("time [s] (grey line: release)")
-    labels = "force of the band [N]", "|residual| [N]", "clouds off by [cm]"
-    for ax, label in zip(axes[:, 0], labels, strict=True):
-        ax.set_ylabel(label)
-    figure.align_ylabels(axes[:, 0])
+        middle.tick_params(labelbottom=False)
+        top.set(title=band, xlabel="draw: hand to fork [m]", ylabel="force of the band [N]")
+        middle.set_ylabel("|residual| [N]")
+        bottom.set(xlabel="time [s] (grey line: release)", ylabel="clouds off by [cm]")
     methods = dict.fromkeys(method for of_band in replays.values() for method in of_band)
     curves = [
         (styles[method].name, mark(color=styles[method].color, ls=dash))

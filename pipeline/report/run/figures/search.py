@@ -39,7 +39,7 @@ def convergence(searches: dict[str, dict[str, Result]], styles: Styles) -> Figur
         searches: By band and method. A method that minimises another loss may rise.
     """
     title = "Lower is a better fit, further left a cheaper one: the paper's loss so far"
-    figure, found = panels(searches, title, 3.8, 3.0, sharex=True)
+    figure, found = panels(searches, title, 2.4, sharex=True)
     methods = dict.fromkeys(method for of_band in searches.values() for method in of_band)
     dashes = dict(zip(methods, cycle(DASHES)))
     for band, ax in found.items():

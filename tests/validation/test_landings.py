@@ -1,10 +1,14 @@
 """The campaign of landings by each pull: what it runs, and what it says of results by hand."""
 
+import json
+
 import numpy as np
 import pytest
 
-from validation.campaigns.landings import SETS, OneRecording, figures, jobs
+from tests.project import ROOT
+from validation.campaigns.landings import PAGE, SETS, OneRecording, block, figures, jobs, report_of
 from validation.campaigns.rig_scores import TARGETS
+from validation.campaigns.runner import OURS
 from validation.rubbers import DEVELOP, SEALED, UNSEEN_LAWS, rubbers
 
 
@@ -12,6 +16,13 @@ def test_each_band_is_recorded_by_both_pulls_and_once_after_it_was_drawn() -> No
     for name, (seed, bands, count, states) in SETS.items():
         every = jobs(name)
         assert len(set(every)) == len(every) and {one.seed for one in every} == {seed}
+        other = [one for one in every if one.launched or one.method != OURS]
+        assert {one.kind for one in other} == {
+            "paper, virgin, the paper's method",
+            "informative, virgin, one launch",
+        }
+        assert len(other) == 2 * len(bands) and {one.number for one in other} == {0}
+        every = [one for one in every if one not in other]
         virgin = [one for one in every if not one.worn]
         assert len(virgin) == 2 * count * len(bands)
         assert len(every) - len(virgin) == 2 * len(bands) * (True in states)
@@ -27,6 +38,9 @@ def test_half_of_the_sealed_rubbers_soften_by_laws_that_none_was_developed_on() 
     assert 2 * sum(about["softening"] is not None for _, about in sealed.values()) == len(sealed)
 
 
+JOB = vars(OneRecording(DEVELOP, "a", "paper", False, 0))
+
+
 def scores(error: float, inside: int) -> dict:
     landing = TARGETS * (1 + error)
     return {
@@ -40,14 +54,13 @@ def scores(error: float, inside: int) -> dict:
 
 def test_figures_are_means_over_bands() -> None:
     lines = [
-        {"band": band, "pull": "paper", "worn": False, "number": 0, "scores": one}
-        | {"told": {"settled": settled}}
+        JOB | {"band": band, "scores": one} | {"told": {"settled": settled}}
         for band, one, settled in (
             ("a", scores(0.04, 9), True),
             ("b", scores(-0.02, 0), False),
         )
     ]
-    lines.append({"band": "a", "pull": "paper", "worn": False, "number": 1, "failed": "no band"})
+    lines.append(JOB | {"band": "a", "number": 1, "failed": "no band"})
     (told,) = figures(lines).values()
     assert told["settled"] == [1, 2] and told["refused"] == {"a 1": "no band"}
     about = told["together"]
@@ -56,3 +69,9 @@ def test_figures_are_means_over_bands() -> None:
     assert (about["coverage"], about["least_coverage"]) == (0.5, 0.0)
     assert about["coverage_by_bands"] == [0.0, 1.0]
     assert about["median_width"] == pytest.approx(np.median(0.2 / TARGETS))
+
+
+def test_the_page_has_the_table_of_the_committed_reports(monkeypatch) -> None:
+    monkeypatch.chdir(ROOT)
+    contents = {name: json.loads(report_of(name).read_text("utf-8")) for name in SETS}
+    assert block(contents) in (ROOT / PAGE).read_text("utf-8")

@@ -37,6 +37,7 @@ from validation.campaigns.runner import PAPER, ResultLines, plain, result_of
 from validation.campaigns.variants import (
     BESIDE,
     LAST,
+    SETTINGS,
     of_job,
     priors_of,
     rollouts_of_search,
@@ -207,7 +208,11 @@ def report(args: argparse.Namespace, params: Params) -> None:
     results = [one for job, one in lines_in(args.work).of(Job).items() if job in wanted]
     if not results:
         raise UserError(f"{args.work}: holds no result of these bands and methods")
-    same = [name for name in args.methods if _of_one_loss(params.methods[name], params)]
+    same = [
+        name
+        for name in args.methods
+        if _of_one_loss(params.methods[name], params) and "loss" not in SETTINGS.get(name, {})
+    ]
     command = "python -m validation.campaigns.ablations"
     command += f" --workers {args.workers} --recordings {args.recordings} --seeds {args.seeds}"
     if args.preset:

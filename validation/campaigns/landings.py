@@ -6,51 +6,90 @@
 
 Each band is recorded by the paper's pull and by the informative one (`plan.dips`), virgin and as it
 is after an earlier pull, and identified by the default method from that one recording; nine targets
-are scored without launch noise (bias), and one launch each with it (coverage). Results are lines of
-results.jsonl in --work: a run that was killed, or whose --minutes were over, goes on from there. It
-writes reports/validation/landings-<set>.json. With --keep the episodes stay in --work: what comes
-after them is repeated without the recording, once results.jsonl is gone.
+are scored without launch noise (bias), and one launch each with it (coverage). The first recording
+of each virgin band is also identified otherwise: by the paper's pull by the paper's method, by the
+informative one with a measured launch besides. Results are lines of results.jsonl in --work: a run
+that was killed, or whose --minutes were over, goes on from there. It writes
+reports/validation/landings-<set>.json, and --page the table of docs/identification.md. With --keep
+the episodes stay in --work: what comes after them is repeated without the recording, once
+results.jsonl is gone.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import shutil
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 
 from pipeline.base import errors
 from pipeline.base.environment import environment
-from pipeline.base.files import write_json
+from pipeline.base.files import write_json, write_text
+from pipeline.base.fingerprint import fingerprint
 from pipeline.base.machine import cores
+from pipeline.identify.posterior.launches import Observed
 from pipeline.params import Params, load
 from rig.oracle.world import World
 from validation.campaigns import runner
-from validation.campaigns.rig_scores import recorded, saved, scored, sling_of, summary
-from validation.campaigns.runner import OURS, ResultLines, plain, result_of
-from validation.density import found
+from validation.campaigns.rig_scores import (
+    TARGETS,
+    aimed,
+    recorded,
+    saved,
+    scored,
+    sling_of,
+    summary,
+)
+from validation.campaigns.runner import OURS, PAPER, ResultLines, plain, result_of
+from validation.density import Calibrated, found
+from validation.marked import marks, with_block
 from validation.projects import DEFAULTS
 from validation.rubbers import DEVELOP, RECORDINGS, SEALED, rubbers, with_rubbers
 
 PULLS = "paper", "informative"
+PAGE, README, BLOCK = Path("docs/identification.md"), Path("README.md"), "landings"
+LINE = 125  # characters, of README.md
 BANDS, TEN = ("band1", "band2", "band3"), 10
 BOOTSTRAP = 2000
 
 
 @dataclass(frozen=True)
 class OneRecording:
-    """Of a band; `worn`: it was drawn before."""
+    """Of a band, and how it is identified.
+
+    Attributes:
+        worn: It was drawn before.
+        method: Of params.yaml.
+        launched: Whether one launch at the middle target was measured.
+    """
 
     seed: int
     band: str
     pull: str
     worn: bool
     number: int
+    method: str = OURS
+    launched: bool = False
+
+    @property
+    def name(self) -> str:
+        """Of its episode."""
+        state = "worn" if self.worn else "virgin"
+        return f"{self.band}-{self.pull}-{state}-{self.number}"
+
+    @property
+    def kind(self) -> str:
+        """What the figures take together: all recordings of all bands."""
+        parts = [self.pull, "worn" if self.worn else "virgin"]
+        parts += ["the paper's method"] if self.method == PAPER else []
+        return ", ".join([*parts, *(["one launch"] if self.launched else [])])
 
     @property
     def params(self) -> Params:
@@ -67,7 +106,13 @@ SETS = {
 def jobs(name: str, most: int = TEN, pulls: Sequence[str] = PULLS) -> list[OneRecording]:
     """At most so many recordings of each band of a set by each pull, worn ones once."""
     seed, bands, count, states = SETS[name]
+    once = {
+        "informative": {"launched": True},
+        "paper": {"method": PAPER},
+    }
     return [
+        OneRecording(seed, band, pull, False, 0, **once[pull]) for pull in pulls for band in bands
+    ] + [
         OneRecording(seed, band, pull, worn, number)
         for number in range(min(count, most))
         for worn in states
@@ -78,22 +123,25 @@ def jobs(name: str, most: int = TEN, pulls: Sequence[str] = PULLS) -> list[OneRe
 
 
 def identified(job: OneRecording, work: Path, keep: bool = False) -> dict:
-    """Scores of the default method by one recording, and what it says of itself.
+    """Scores of a method by one recording, and what it says of itself.
 
     Args:
         keep: The episode, in a folder of `work`; one that is there is taken as it is.
     """
     params, begin = job.params, time.process_time()
-    folder = work / f"{job.band}-{job.pull}-{'worn' if job.worn else 'virgin'}-{job.number}"
+    folder = work / (job.name if keep else fingerprint(repr(job)))
     episode = recorded(params, job.band, folder)
-    sling, start = sling_of(params, job.band, OURS, folder), time.process_time()
-    outcome, told = found(params, OURS, sling, [episode])
-    seconds = time.process_time() - start
+    sling, start = sling_of(params, job.band, job.method, folder), time.process_time()
+    outcome, confidence = found(params, job.method, sling, [episode])
     with World(job.band, saved(params, folder / "params.yaml"), workers=1) as world:
+        if job.launched:
+            observed = measured(outcome, params, world, job.number)
+            outcome, confidence = found(params, job.method, sling, [episode], observed)
+        seconds = time.process_time() - start
         scores = scored(outcome, params, world, seed=job.number)
     if not keep:
         shutil.rmtree(folder)
-    kept = {name: told[name] for name in ("parameters", "derived", "settled", "steps")}
+    kept = {name: confidence.get(name) for name in ("parameters", "derived", "settled", "steps")}
     return plain(
         {
             "scores": scores,
@@ -105,35 +153,46 @@ def identified(job: OneRecording, work: Path, keep: bool = False) -> dict:
     )
 
 
+def measured(outcome: Calibrated, params: Params, world: World, number: int) -> list[Observed]:
+    """One launch at the middle target with errors of its own, as a lab would make it."""
+    draws = aimed(outcome, params)[[len(TARGETS) // 2]]
+    landing = world.trials(draws, [5000 + 10 * number])[0].landing_y
+    if not np.isfinite(landing):
+        return []
+    return [Observed(tuple(draws[0].tolist()), params.trials.actuation_error, float(landing))]
+
+
 def performed(job: OneRecording, work: Path, keep: bool) -> dict:
     return result_of(job, partial(identified, job, work, keep))
 
 
 def figures(lines: list[dict]) -> dict:
-    """By pull and state: each band's `summary`, and what they say together."""
+    """By kind of recording: each band's `summary`, and what they say together."""
     result: dict = {}
-    for pull in PULLS:
-        for worn in (False, True):
-            some = [one for one in lines if one["pull"] == pull and one["worn"] == worn]
-            good = [one for one in some if "failed" not in one]
-            if not good:
-                continue
-            names = list(dict.fromkeys(one["band"] for one in good))
-            of_bands = {
-                name: summary([one["scores"] for one in good if one["band"] == name])
-                for name in names
-            }
-            result[f"{pull}, {'worn' if worn else 'virgin'}"] = {
-                "together": together(of_bands),
-                "settled": [sum(one["told"]["settled"] for one in good), len(good)],
-                "refused": {
-                    f"{one['band']} {one['number']}": one["failed"]
-                    for one in some
-                    if "failed" in one
-                },
-                "bands": of_bands,
-            }
+    kinds = {id(one): job_of(one).kind for one in lines}
+    for kind in sorted(set(kinds.values())):
+        some = [one for one in lines if kinds[id(one)] == kind]
+        good = [one for one in some if "failed" not in one]
+        if not good:
+            continue
+        names = list(dict.fromkeys(one["band"] for one in good))
+        of_bands = {
+            name: summary([one["scores"] for one in good if one["band"] == name]) for name in names
+        }
+        result[kind] = {
+            "together": together(of_bands),
+            "settled": [sum(bool(one["told"]["settled"]) for one in good), len(good)],
+            "refused": {
+                f"{one['band']} {one['number']}": one["failed"] for one in some if "failed" in one
+            },
+            "bands": of_bands,
+        }
     return plain(result)
+
+
+def job_of(line: dict) -> OneRecording:
+    """What a line of results is of."""
+    return OneRecording(**{field.name: line[field.name] for field in fields(OneRecording)})
 
 
 def together(of_bands: dict[str, dict]) -> dict:
@@ -153,9 +212,69 @@ def together(of_bands: dict[str, dict]) -> dict:
     }
 
 
+ROWS = {  # of the page's table
+    "informative, virgin": "one dip",
+    "informative, virgin, one launch": "one dip, one launch measured",
+    "paper, virgin": "the paper's pull",
+    "paper, virgin, the paper's method": "the paper's pull and method",
+    "informative, worn": "one dip, drawn before",
+    "paper, worn": "the paper's pull, drawn before",
+}
+WORDS = {"bands": "the rig's three bands", "develop": "four to develop on", "sealed": "16 sealed"}
+
+
+def block(contents: dict[str, dict]) -> str:
+    """What the page has between its marks, of the reports of all sets."""
+    begin, end = marks(BLOCK)
+    rows = [
+        "| rubbers | recorded by | recordings | size of the bias, mean (worst) | launches inside"
+        " (by bands drawn anew; least) | median width | fits that settled |",
+        "|---|---|---:|---:|---:|---:|---:|",
+    ]
+    percent = "{:.0f} %".format
+    for name, words in WORDS.items():
+        for kind, how in ROWS.items():
+            if kind not in (of := contents[name]["figures"]):
+                continue
+            about, (settled, count) = of[kind]["together"], of[kind]["settled"]
+            size, worst = 100 * about["mean_size_of_bias"], 100 * about["worst_bias"]
+            cells = [words, how, str(count), f"{size:.1f} % ({worst:+.1f} %)"]
+            if about["coverage"] is None:
+                cells += ["–", "–", "–"]
+            else:
+                low, high = (100 * value for value in about["coverage_by_bands"])
+                shares = percent(100 * about["coverage"]), percent(100 * about["least_coverage"])
+                cells.append(f"{shares[0]} ({low:.0f} to {high:.0f} %; {shares[1]})")
+                width = 100 * about["median_width"]
+                cells += [f"{width:.1f} %", f"{settled} of {count}"]
+            rows.append("| " + " | ".join(cells).replace("-", "−") + " |")
+    return begin + "\n".join(rows) + "\n" + end
+
+
+def sentence(content: dict) -> str:
+    """What the README has between its marks, of the report of the sealed rubbers."""
+    begin, end = marks(BLOCK)
+    about, bands = (content["figures"]["informative, virgin"][key] for key in ("together", "bands"))
+    size, worst, inside, width = (
+        100 * about[key] for key in ("mean_size_of_bias", "worst_bias", "coverage", "median_width")
+    )
+    text = (
+        f"On {len(bands)} further virtual rubbers, which took part in no choice, by one dip:"
+        f" predictions are off by {size:.1f} % of the distance in the mean over rubbers"
+        f" ({abs(worst):.1f} % at worst), and {inside:.0f} % of the launches land in their 90 %"
+        f" intervals, which are {width:.0f} % of the distance wide."
+    )
+    return f"{begin}{fill(text, LINE)}\n{end}"
+
+
+def report_of(name: str) -> Path:
+    return Path(f"reports/validation/landings-{name}.json")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("set", choices=SETS)
+    parser.add_argument("--page", action="store_true", help=f"only write into {PAGE} and {README}")
     parser.add_argument("--work", type=Path, default=Path(".checkpoints/landings"))
     parser.add_argument("--workers", type=int, default=cores())
     parser.add_argument("--minutes", type=float, default=1e4, help="then it ends; again: goes on")
@@ -164,6 +283,11 @@ def main() -> int:
     parser.add_argument("--report", action="store_true", help="of what is there; nothing runs")
     parser.add_argument("--recordings", type=int, default=TEN, help="of each band, at most")
     arguments = parser.parse_args()
+    if arguments.page:
+        contents = {name: json.loads(report_of(name).read_text("utf-8")) for name in SETS}
+        for page, text in ((PAGE, block(contents)), (README, sentence(contents["sealed"]))):
+            write_text(page, with_block(page.read_text(encoding="utf-8"), text))
+        return 0
     work = arguments.work.resolve() / arguments.set
     results, todo = (
         ResultLines(work / "results.jsonl"),
@@ -180,7 +304,7 @@ def main() -> int:
         "figures": figures(lines),
         "recordings": lines,
     }
-    write_json(Path(f"reports/validation/landings-{arguments.set}.json"), report)
+    write_json(report_of(arguments.set), report)
     for name, about in report["figures"].items():
         print(name, {key: value for key, value in about["together"].items()}, about["settled"])
     return 0

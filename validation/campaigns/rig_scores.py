@@ -6,7 +6,7 @@ Recordings are made once and kept as episodes; the rig is launched after a metho
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,7 +18,6 @@ from pipeline.base.schema import read_json
 from pipeline.episode.episode import Episode
 from pipeline.identify.clamps import calibrate_clamps
 from pipeline.identify.objective.box import SearchBox
-from pipeline.identify.posterior.launches import Observed
 from pipeline.identify.posterior.likelihood import opening_time
 from pipeline.identify.results.mounting import Mounting
 from pipeline.launching.surface.landing_map import LandingMap
@@ -28,7 +27,7 @@ from pipeline.simulator.model import ClampedBand
 from rig.oracle.aim import hit, least_sensitive_draw
 from rig.oracle.world import World
 from rig.physics.launch import launch
-from validation.campaigns.runner import OURS, made_once, plain
+from validation.campaigns.runner import OURS
 from validation.density import Calibrated, found
 
 TARGETS = np.linspace(1.525, 2.325, 9)  # m
@@ -163,52 +162,6 @@ def scored(outcome: Calibrated, params: Params, world: World, seed: int = 0) -> 
         "high": high,
         "inside": (noisy >= low) & (noisy <= high),
     }
-
-
-def result(
-    params: Callable[[int], Params],
-    band: str,
-    numbers: tuple[int, ...],
-    method: str,
-    folder: Path,
-    known: int = 0,
-) -> dict:
-    """Scores of a band by some of its recordings, kept in `folder`, from which it resumes.
-
-    Args:
-        params: Of a recording's number, with the rig's seed: params(0) has the rubbers too.
-        known: Launches at TARGETS' middle, first and last that are evidence: with errors of their
-            own, as a lab would make them.
-    """
-    name = "-".join([band, *map(str, numbers), method, str(known)])
-
-    def make() -> dict:
-        here = params(0)
-        places = [folder / f"{band}_{number}" for number in numbers]
-        episodes = [
-            recorded(params(number), band, place)
-            for number, place in zip(numbers, places, strict=True)
-        ]
-        sling = sling_of(here, band, method, places[0])
-        with World(band, saved(here, folder / f"{band}.yaml")) as world:
-            start = time.perf_counter()
-            outcome, told = found(here, method, sling, episodes)
-            seconds = time.perf_counter() - start
-            if known:
-                draws = aimed(outcome, here)[[4, 0, -1][:known]]
-                trials = 5000 + 10 * numbers[0] + np.arange(known)
-                landings = np.array([one.landing_y for one in world.trials(draws, trials.tolist())])
-                seen = [
-                    Observed(tuple(draw), here.trials.actuation_error, landing)
-                    for draw, landing in zip(draws.tolist(), landings.tolist(), strict=True)
-                    if np.isfinite(landing)
-                ]
-                outcome, told = found(here, method, sling, episodes, seen)
-            scores = scored(outcome, here, world, seed=numbers[0])
-        about = {"point": [*outcome.identified.values()], "told": told, "identification_s": seconds}
-        return plain(scores | about)
-
-    return made_once(folder / "scores" / f"{name}.json", make)
 
 
 def saved(params: Params, path: Path) -> Path:

@@ -16,8 +16,7 @@ from pipeline.report.run.paper import METHOD
 from pipeline.report.run.report import Report
 from pipeline.report.run.run import write_run
 
-# The chapters of each page. A chapter makes its text of a Report, and writes the pictures and tables
-# that the text names.
+# The chapters of each page: each makes its text of a Report, and writes what the text shows.
 PAGES = {"README": (outcome, paper_tables, evaluation), "appendix": (appendix,)}
 
 

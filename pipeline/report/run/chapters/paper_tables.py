@@ -29,9 +29,9 @@ INTRODUCTION = """\
 ## The paper's tables
 
 Only what ran has rows. Bold: the lowest of a band and source, ties too, where two methods or more
-have a cell in which no launch failed; it may be noise ([appendix](appendix.md)). The paper's cells go by
-this rule as well: its table 1 has *Sling2Sim2Real* of band 3 bold, which stands alone there, and
-its table 3 leaves out *Adam* at 172.5, a tie.
+have a cell in which no launch failed; it may be noise ([appendix](appendix.md)). The paper's cells
+go by this rule as well: its table 1 has *Sling2Sim2Real* of band 3 bold, which stands alone there,
+and its table 3 leaves out *Adam* at 172.5, a tie.
 """
 SOURCES = {
     "virtual": "*virtual*: recorded or launched by the virtual rig.",

@@ -1,0 +1,66 @@
+"""The table of docs/paper.md: which of the paper's findings hold by the large budget.
+
+    python -m validation.campaigns.findings          # exit status 1 if it is out of date
+    python -m validation.campaigns.findings --fix
+
+Filled from reports/validation/ablations-large.json (validation/campaigns/ablations.py).
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from pipeline.base.code import ROOT
+from pipeline.report.drawing.styles import styles
+from validation.campaigns.runner import PAPER
+from validation.marked import compared_or_fixed, marks, with_block
+
+PAGE, REPORT = ROOT / "docs" / "paper.md", ROOT / "reports/validation/ablations-large.json"
+NAMES = {
+    "late": "late frames weigh little",
+    "geom_quarter": "geometry weighs a quarter",
+    "search_rubber": "the law `rubber`",
+}  # of variants of the paper's method
+
+
+def block(content: dict) -> str:
+    """What the page has between its marks, of a report's content."""
+    begin, end = marks("findings")
+    figures, rollouts = content["figures"]["all"], content["settings"]["rollouts"]
+    methods, against = figures["methods"], figures[f"less_{PAPER}"]
+    named = styles(methods)
+    rows = [
+        "| method | rollouts | its loss | misses by [cm] | more than the paper's by [cm] | p |"
+        " farther off on |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for name in sorted(methods, key=lambda one: (one in NAMES, methods[one]["miss_cm"]["mean"])):
+        one, less = methods[name], against.get(name)
+        miss, paper = one["miss_cm"], methods[PAPER]["miss_cm_each"]
+        cells = [NAMES.get(name, named[name].name), f"{rollouts[name]:,}"]
+        cells += [f"{one['loss']['mean']:.3f}", interval(miss, "{:.1f}")]
+        if less:
+            each = [m > p for m, p in zip(one["miss_cm_each"], paper, strict=True)]
+            p = less["p_holm"]
+            cells += [interval(less, "{:+.1f}"), "< 0.001" if p < 1e-3 else f"{p:.2g}"]
+            cells.append(f"{sum(each)} of {len(each)}")
+        else:
+            cells += ["–", "–", "–"]
+        rows.append("| " + " | ".join(cells) + " |")
+    return begin + "\n".join(rows).replace(" -", " −").replace("(-", "(−") + "\n" + end
+
+
+def interval(about: dict, form: str) -> str:
+    """A mean with its interval."""
+    mean, low, high = (form.format(about[name]) for name in ("mean", "low", "high"))
+    return f"{mean} ({low} to {high})"
+
+
+def drawn(page: str) -> str:
+    return with_block(page, block(json.loads(Path(REPORT).read_text(encoding="utf-8"))))
+
+
+if __name__ == "__main__":
+    sys.exit(compared_or_fixed(PAGE, drawn, __doc__))
